@@ -12,11 +12,6 @@ from lab.cli.output import end, show
 from lab.errors import BadInput
 
 
-def load_run() -> None:
-    """Loads what carries a run out: other processes do so while this one does."""
-    import lab.production.run  # noqa: F401
-
-
 def run(
     task: Annotated[
         str | None, typer.Argument(help="A task that ships, or a .toml file.", show_default="toast")
@@ -68,6 +63,7 @@ def run(
     as_json: Json = False,
 ) -> None:
     """Find or learn the skills, time them, find an order for them, and carry them out in physics."""
+    from lab.production import load_run
     from lab.workers import Workers
 
     with Workers(workers, first=load_run) as beside:

@@ -36,9 +36,9 @@ class AroundPart(Skill):
         self.station = station
 
     @property
-    def survey(self) -> SurveyName:
+    def needs(self) -> tuple[SurveyName, ...]:
         """Around the part."""
-        return ("around", self.station, self.kind, self.carries)
+        return (("around", self.station, self.kind, self.carries),)
 
     def setup(self, surveys: Surveys) -> Problem:
         """The poses around a part with parts beside it; episodes begin anywhere above it."""

@@ -20,7 +20,7 @@ from lab.skills.place import let_go, release_pose
 from lab.skills.sight import SkillFailed
 from lab.skills.skill import Bench, Photo, Skill, learned_path, no_way
 from lab.skills.state_words import plain
-from lab.skills.surveys import Surveys
+from lab.skills.surveys import SurveyName, Surveys
 from lab.tasks.task import Task
 from lab.tasks.task_fields import Obstacle
 from lab.vision import Marker, find_markers, locate, see
@@ -59,6 +59,11 @@ class Insert(Skill):
     def on_carry(cls, task: Task, kind: str, origin: str, target: str) -> "Insert | None":
         """At the end, where a camera's grid leads."""
         return cls(task, kind, target) if task.station(target).grid is not None else None
+
+    @property
+    def needs(self) -> tuple[SurveyName, ...]:
+        """The camera's grid."""
+        return (("camera_grid", self.station, self.kind),)
 
     def setup(self, surveys: Surveys) -> Problem:
         """Take the overhead picture, find the markers, and block the cells in which the part would meet an obstacle."""

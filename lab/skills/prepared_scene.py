@@ -56,7 +56,8 @@ def prepare(task: Task, order: Order, seed: int, only: str | None = None, worker
         scene = scene_in_words(task, order, layout)
         chosen = {name: skill for name, skill in skillset.skills.items() if only in (None, name)}
         if workers is not None:
-            surveys.make([skill.survey for skill in chosen.values()], workers)
+            for step in (slice(1), slice(1, None)):
+                surveys.make([name for skill in chosen.values() for name in skill.needs[step]], workers)
         problems = {
             name: replace(skill.setup(surveys), scene=scene, arm=task.robot.model) for name, skill in chosen.items()
         }

@@ -182,9 +182,9 @@ class Skill:
     # ---- survey and aim ------------------------------------------------------------------------------------------
 
     @property
-    def survey(self) -> "SurveyName | None":
-        """The survey that its set-up takes longest for, which can be made beside others; None: there is none."""
-        return None
+    def needs(self) -> "tuple[SurveyName, ...]":
+        """The surveys that its set-up needs, which can be made beside others; all after the first build on the first."""
+        return ()
 
     def setup(self, surveys: "Surveys") -> Problem:
         """Survey the scene and state the problem to learn. BadInput when it has no solution, naming what is in the way."""

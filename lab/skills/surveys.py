@@ -77,11 +77,11 @@ class Surveys:
         self.kinds = self.places.kinds
         self.made: Made = {}
 
-    def make(self, names: Iterable[SurveyName | None], workers: Workers) -> None:
+    def make(self, names: Iterable[SurveyName], workers: Workers) -> None:
         """Make surveys, each once, side by side; one that cannot be made is left to whoever asks for it, who hears why."""
-        missing = [name for name in dict.fromkeys(names) if name is not None and name not in self.made]
-        self.made.update(zip(missing, workers.each(partial(_survey, self), missing), strict=True))
-        self.made = {name: found for name, found in self.made.items() if found is not None}
+        missing = [name for name in dict.fromkeys(names) if name not in self.made]
+        made = zip(missing, workers.each(partial(_survey, self), missing), strict=True)
+        self.made |= {name: found for name, found in made if found is not None}
 
     # ---- transfer: the whole workspace --------------------------------------------------------------------------
 
@@ -203,17 +203,19 @@ class Surveys:
 
     @once
     def camera_grid(self, station: str, kind: str) -> SurveyedGrid:
-        """The camera's grid before a station, for a part of a kind."""
-        return SurveyedGrid(self.task, self.layout, self.places, station, kind, self.parts)
+        """The camera's grid before a station, for a part of a kind, with its picture."""
+        grid = SurveyedGrid(self.task, self.layout, self.places, station, kind, self.parts)
+        grid.picture()
+        return grid
 
 
-def _survey(surveys: Surveys, name: SurveyName) -> Survey | None:
+def _survey(surveys: Surveys, name: SurveyName) -> object:
+    """What a survey finds; None when it cannot be made."""
     method, *arguments = name
     try:
-        found: Survey = getattr(surveys, str(method))(*arguments)
+        return getattr(surveys, str(method))(*arguments)
     except LabError:
         return None
-    return found
 
 
 def _between(one: ToolPose, other: ToolPose) -> list[ToolPose]:

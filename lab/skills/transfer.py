@@ -45,9 +45,9 @@ class Transfer(Skill):
         return cls(origin, target)
 
     @property
-    def survey(self) -> SurveyName:
-        """The workspace."""
-        return ("workspace", self.kind)
+    def needs(self) -> tuple[SurveyName, ...]:
+        """The workspace, and where it is left at both ends."""
+        return ("workspace", self.kind), ("dock", self.origin, self.kind), ("dock", self.target, self.kind)
 
     def setup(self, surveys: Surveys) -> Problem:
         """The workspace as a 3D grid: cells that are out of reach or too near to something are blocked."""
