@@ -153,10 +153,17 @@ def _png(draw: Callable[[Path], None]) -> bytes:
         return read_limited(path)
 
 
-def write_files(report: Report, out: Path, drawn: Drawn | None = None, workers: Workers | None = None) -> None:
+def write_files(
+    report: Report,
+    out: Path,
+    drawn: Drawn | None = None,
+    scene: Task[dict[str, Any]] | None = None,
+    workers: Workers | None = None,
+) -> None:
     """Write what there is of `FILES` to `out`, all at once at the end: none is ever half written, none is left of a run before.
 
-    drawn: what was begun by `begin_pictures`, None: it is drawn now. workers: who draws the rest, None: this process.
+    drawn: what was begun by `begin_pictures`; scene: what the recording shows (see `describe`); None: they are made now.
+    workers: who draws the rest, None: this process.
 
     The numbers come first; a picture, the replay or the program may fail alone, as on a full disk. Sets `report.files`, and
     `report.missing`. WorkFailed when the numbers cannot be written.
@@ -176,7 +183,7 @@ def write_files(report: Report, out: Path, drawn: Drawn | None = None, workers: 
             written = _write_numbers(report, paths, predicted)
             report.files = {name: str(out / FILES[name]) for name in written}
             _write_json(paths["run"], _run_document(report))  # in case that there is no room for it any more
-            for names, write in _pictures(report, paths, predicted, drawn):
+            for names, write in _pictures(report, paths, predicted, drawn, scene):
                 try:
                     write()
                 except (OSError, LabError) as error:
@@ -214,7 +221,7 @@ def _write_numbers(report: Report, paths: dict[str, Path], predicted: Schedule) 
 
 
 def _pictures(
-    report: Report, paths: dict[str, Path], predicted: Schedule, drawn: Drawn
+    report: Report, paths: dict[str, Path], predicted: Schedule, drawn: Drawn, scene: Task[dict[str, Any]] | None
 ) -> Iterator[tuple[tuple[str, ...], Callable[[], object]]]:
     """What else this run has, and what writes it; what other processes draw comes last."""
     from lab.view.meshcat import replay_html
@@ -230,7 +237,12 @@ def _pictures(
         yield ("overhead",), lambda: write_picture(paths["overhead"], photo.picture)
     title = f"{prepared.task.title or prepared.task.name}: {prepared.words}"
     story = story_of(outcome, predicted)
-    yield ("replay",), lambda: replay_html(report.recording, paths["replay"], title=title, story=story)
+    yield (
+        ("replay",),
+        lambda: replay_html(
+            report.recording, paths["replay"], title=title, story=story, scene=None if scene is None else scene.result()
+        ),
+    )
     for name, picture in drawn.items():
         yield (name,), partial(_write_picture, paths[name], picture)
 

@@ -1,7 +1,9 @@
 """The main job: find or learn the skills, measure their durations, sequence, carry out in physics."""
 
 import time
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +12,7 @@ from lab.production.composer import carry_out
 from lab.production.conditions import Conditions
 from lab.production.durations import RECORDS, Durations, cell_of, durations_key, kept_durations, measure
 from lab.production.faults.draw import draw
+from lab.production.floor import Floor
 from lab.production.order import OrderAdvice, ordered
 from lab.production.recorder import show_scene
 from lab.production.relearning import Relearner
@@ -18,12 +21,15 @@ from lab.production.run_advice import RunAdvice
 from lab.production.run_journal import DurationsKept, RunEnded, RunJournal
 from lab.production.taught import Taught, skill_row
 from lab.sequencing.simulate.run import simulate
+from lab.sim.frames import Recording
 from lab.skills.prepared_scene import Prepared
 from lab.skills.trial import trial_of
 from lab.teaching.events import MoveTimed, PhaseBegan, PlanMade, RecordSkipped, ScenePrepared, SkillReady
 from lab.teaching.lesson_plan import Lesson, LessonPlan
 from lab.teaching.teacher import Teacher
-from lab.workers import Workers
+from lab.workers import Task, Workers
+
+Described = tuple[Recording, Task[dict[str, Any]]]  # a recording, and the scene that it shows
 
 
 def teach_all(
@@ -135,6 +141,9 @@ def run(
     if conditions.fault_seed is not None:
         faults += draw(prepared.task, prepared.order, conditions.fault_seed, order.found.cost)
     conditions, relearner = replace(conditions, faults=faults), Relearner(prepared, taught, teacher)
+    scenes = list[Described]()
+    on_floor = partial(_look_at, conditions.on_floor, workers, scenes)
+    conditions = replace(conditions, on_floor=on_floor)
     outcome, recording = carry_out(prepared, taught.cell, order.found.sequence, conditions, teacher.tell, relearner)
     receipts = None if advice is None else advice.receipts(order)
     report = Report(
@@ -143,11 +152,22 @@ def run(
         cycle=order.cycle,
     )
     teacher.tell(PhaseBegan("draw", 1))
-    write_files(report, out, drawn, workers)
+    scene = next((scene for filmed, scene in scenes if filmed is recording), None)
+    write_files(report, out, drawn, scene, workers)
     if not outcome.interrupted:
         remember(report, teacher)
         conditions.journal.tell(RunEnded(len(outcome.delivered), outcome.failure or ""))
     return report
+
+
+def _look_at(and_then: Callable[[Floor], None], workers: Workers, scenes: list[Described], floor: Floor) -> None:
+    """Begin to describe what the floor's recording shows: reading its meshes takes longer than all else for the replay."""
+    from lab.view.scene_data import describe
+
+    if floor.recorder is not None:
+        filmed = floor.recorder.recording
+        scenes.append((filmed, workers.begin(describe, filmed.bodies, filmed.camera)))
+    and_then(floor)
 
 
 def remember(report: Report, teacher: Teacher) -> None:

@@ -23,6 +23,7 @@ from lab.sim.frames import Body, Frame, Recording, Viewpoint
 
 if TYPE_CHECKING:
     from lab.view.keyframes import Motion, Track
+    from lab.view.scene_data import Json
     from lab.view.server import File, Server
     from lab.view.server_page import Panel
     from lab.view.story import Story
@@ -159,12 +160,18 @@ class LiveView:
 
 
 def replay_html(
-    recording: Recording, path: Path, speed: float = 4.0, title: str = "Teaching lab", story: "Story | None" = None
+    recording: Recording,
+    path: Path,
+    speed: float = 4.0,
+    title: str = "Teaching lab",
+    story: "Story | None" = None,
+    scene: "Json | None" = None,
 ) -> Path:
     """Write the recording as one HTML file that plays from disk without a network, with keys and buttons to move in it.
 
-    `speed` is how many times faster than real time it begins; `story`: what is told beside the picture. Returns `path`,
-    written whole or not at all; its folder is made when it is missing. Raises BadInput for a speed that is not above 0, a
+    `speed` is how many times faster than real time it begins; `story`: what is told beside the picture. scene: as `describe`
+    gives it for this recording, None: it is described now. Returns `path`, written whole or not at all; its folder is made
+    when it is missing. Raises BadInput for a speed that is not above 0, a
     recording that contradicts itself, an unreadable mesh and a path that cannot be written.
     """
     from lab.view.keyframes import motions
@@ -173,7 +180,7 @@ def replay_html(
     if not (math.isfinite(speed) and speed > 0):
         raise BadInput(f"replay speed {speed}: must be finite and above 0 (1 is real time)")
     recording.check()
-    scene = describe(recording.bodies, recording.camera)
+    scene = scene or describe(recording.bodies, recording.camera)
     tracks = motions(recording)
     for body in scene["bodies"]:
         body["motion"] = _motion(tracks[body["name"]])
