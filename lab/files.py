@@ -5,6 +5,7 @@ import json
 import os
 import re
 import stat
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from errno import EFBIG, EINVAL
@@ -62,13 +63,30 @@ def source_hash(package: Path = PACKAGE) -> str:
     """A hash (64 hex digits) of every Python source of a package, by its place in it; a single file is a package of its own.
 
     What is computed once and kept, such as measured durations and compiled functions, is kept under this hash: whatever
-    source may have decided it is in it. Raises OSError when a source cannot be read.
+    source may have decided it is in it. Raises WorkFailed when there is no source, or one cannot be read.
     """
-    digest = hashlib.sha256()
-    for path in [package] if package.is_file() else sorted(package.rglob("*.py")):
-        text = read_limited(path)
+    digest, paths = hashlib.sha256(), [package] if package.is_file() else sorted(package.rglob("*.py"))
+    if not paths:
+        raise WorkFailed(f"no Python source is in '{package}'")
+    for path in paths:
+        try:
+            text = read_limited(path)
+        except OSError as error:
+            raise WorkFailed(f"source '{path}' cannot be read: {error.strerror}") from None
         digest.update(f"{path.relative_to(package).as_posix()} {len(text)} ".encode() + text)
     return digest.hexdigest()
+
+
+@cache
+def source_key(module: str) -> str:
+    """The name of a loaded module's package, or of one that lies in none, with hashes of all of its source and of the lab's.
+
+    Raises WorkFailed when there is no source.
+    """
+    package = module.partition(".")[0]
+    file = Path(str(sys.modules[package].__file__))
+    own = source_hash(file.parent if file.name == "__init__.py" else file)
+    return f"{package}-{own[:16]}-{source_hash()[:16]}"
 
 
 def read_limited(path: Path, most: int = MOST_BYTES) -> bytes:

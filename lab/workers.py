@@ -1,7 +1,7 @@
 """Processes that work beside this one, on the other cores. What they do comes out the same as if it was done here.
 
 They are new interpreters, so a script of a user's needs no guard around its own code, and threads do no harm. A
-worker ends when its standard input does, which is when its parent ends, however that happens.
+worker ends when its connection to the parent does, which is when the parent ends, however that happens.
 """
 
 import json
@@ -23,9 +23,13 @@ Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 
+MOST = 8  # processes, where nobody says how many: each is an interpreter of about 100 MB
+
+
 def cores() -> int:
-    """How many processors this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    """How many processors this process may use, at most MOST."""
+    usable = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return min(usable, MOST)
 
 
 Packed = tuple[bytes, bytes]  # a function and its arguments as they are sent: as they were when it was handed out
@@ -38,30 +42,34 @@ class _Lost(Exception):
 class Task(Generic[Result]):
     """Work that was handed out. Whoever needs its result before a worker has begun, or when one is lost, does it here."""
 
-    def __init__(self, work: Callable[..., Result], arguments: Sequence[Any], packed: "Packed | None" = None) -> None:
+    def __init__(self, work: Callable[..., Result], arguments: Sequence[Any], packed: Packed | None = None) -> None:
         self.work, self.arguments, self.packed = work, arguments, packed
         self.future: Future[Result] = Future()
 
     @property
-    def waits(self) -> bool:
+    def running(self) -> bool:
         """Whether a worker is at it."""
         return self.future.running()
 
     def result(self) -> Result:
         """What the work comes to; raises what it raises."""
-        if self.future.cancel():
-            return self.work(*self.arguments)
-        try:
-            return self.future.result()
-        except _Lost:
-            return self.work(*self.arguments)
+        if not self.future.cancel():
+            try:
+                return self.future.result()
+            except _Lost:
+                pass
+        done = self.work(*self.arguments)
+        self.future = Future()
+        self.future.set_result(done)
+        return done
 
 
 class Workers:
-    """This process and `count` - 1 others, None: one a core; with 1, everything is done here. In the end of the block they end.
+    """This process and `count` - 1 others, which end with the block; with 1, everything is done here.
 
-    first: what each of the others does as soon as it has begun, such as loading what it will need. What is handed out are
-    functions of modules with arguments that can be pickled, as they are at that moment; what cannot be is done here.
+    count: None for one a core, at most MOST. first: what each of the others does as soon as it has begun, such as loading
+    what it will need. What is handed out are functions of modules with arguments that can be pickled, as they are at that
+    moment; what cannot be is done here.
     """
 
     def __init__(self, count: int | None = 1, first: Callable[[], object] | None = None) -> None:
@@ -73,12 +81,13 @@ class Workers:
     def __enter__(self) -> Self:
         if self._others > 0:
             key = token_hex(32)
-            with suppress(OSError):  # where there is no room for another process, those that are there do the work
+            # Where there is no room for another process or thread, those that are there do the work.
+            with suppress(OSError, RuntimeError):
                 self._listener = Listener(authkey=key.encode(), backlog=self._others)
                 told = {"address": self._listener.address, "key": key}
                 for _ in range(self._others):
-                    self._processes.append(_started(json.dumps(told)))
                     threading.Thread(target=self._hand_out, args=[self._listener], daemon=True).start()
+                    self._processes.append(_started(json.dumps(told)))
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -93,21 +102,24 @@ class Workers:
             self._listener = None
 
     def begin(self, work: Callable[..., Result], *arguments: Any) -> Task[Result]:
-        """Hand work out; another process begins with it as soon as one is free."""
+        """Hand work out; another process begins with it as soon as one is free. Raises nothing that the work raises."""
         return self._handed(work, arguments, self._pack(work))
 
     def each(self, work: Callable[[Item], Result], items: Sequence[Item]) -> Iterator[Result]:
-        """What the work makes of each item, in the order of the items; meanwhile this process works from the end on."""
+        """What the work makes of each item, in the order of the items; meanwhile this process works from the end on.
+
+        What the work raises is raised in the item's turn.
+        """
         packed = self._pack(work)
         tasks = [self._handed(work, (item,), packed) for item in items]
-        own: dict[int, Result] = {}
         first_own = len(tasks)
         for number, task in enumerate(tasks):
-            while task.waits and number < first_own:
+            while task.running and number < first_own:
                 first_own -= 1
-                if tasks[first_own].future.cancel():
-                    own[first_own] = work(items[first_own])
-            yield own.pop(number) if number in own else task.result()
+                if not tasks[first_own].running:
+                    with suppress(Exception):  # it is raised when its turn comes
+                        tasks[first_own].result()
+            yield task.result()
 
     def _pack(self, thing: object) -> bytes | None:
         """How it is sent; None where nothing is, or where it cannot be."""
@@ -149,11 +161,12 @@ class Workers:
             except Exception:  # the worker is gone, or what came of it cannot be read here
                 task.future.set_exception(_Lost())
                 return
-            task.future.set_result(came) if done else task.future.set_exception(came)
+            task.future.set_result(came) if done else task.future.set_exception(_Lost())
 
 
 def _started(told: str) -> "subprocess.Popen[bytes]":
-    command = [sys.executable, "-c", "from lab.workers import serve; serve()"]
+    # -P: what lies in the working folder is not imported, as it is not in this process.
+    command = [sys.executable, "-P", "-c", "from lab.workers import serve; serve()"]
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
     process = subprocess.Popen(
         command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=environment
@@ -168,32 +181,38 @@ def serve() -> None:
     """Work for the process that has begun this one, until it ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent
     told = json.loads(sys.stdin.readline())
-    threading.Thread(target=_end_with_input, daemon=True).start()
     with Client(told["address"], authkey=told["key"].encode()) as parent:
-        _work_for(parent)
+        messages: SimpleQueue[tuple[bytes, bytes]] = SimpleQueue()
+        threading.Thread(target=_receive, args=[parent, messages], daemon=True).start()
+        _work_for(parent, messages)
 
 
-def _end_with_input() -> None:
-    while sys.stdin.buffer.read(1):
-        pass
-    os._exit(1)
+def _receive(parent: Connection, messages: "SimpleQueue[tuple[bytes, bytes]]") -> None:
+    """Take what the parent sends; when it is gone, however it ended, this process ends."""
+    try:
+        while True:
+            messages.put((parent.recv_bytes(), parent.recv_bytes()))
+    except (EOFError, OSError):
+        os._exit(1)
 
 
-def _work_for(parent: Connection) -> None:
-    """Answer each task with whether it was done, and with what came of it."""
+def _work_for(parent: Connection, messages: "SimpleQueue[tuple[bytes, bytes]]") -> None:
+    """Answer each task with whether it was done, and with what came of it.
+
+    What was not done, for whatever reason, the parent does itself: so it raises what the work raises, with its own lines.
+    """
     work: Callable[..., object] | None = None
     while True:
+        packed, arguments = messages.get()
         try:
-            packed, arguments = parent.recv_bytes(), parent.recv_bytes()
-        except EOFError:
-            return
-        try:
-            work = ForkingPickler.loads(packed) if packed else work
+            if packed:
+                work = None
+                work = ForkingPickler.loads(packed)
             assert work is not None
             answer = (True, work(*ForkingPickler.loads(arguments)))
-        except Exception as error:
-            answer = (False, error)
+        except Exception:
+            answer = (False, None)
         try:
             parent.send(answer)
-        except Exception:  # what came of it, or its error, cannot be pickled
-            parent.send((False, _Lost()))
+        except Exception:  # what came of it cannot be pickled
+            parent.send((False, None))

@@ -242,3 +242,9 @@ def test_a_single_file_is_hashed_as_a_package_of_its_own(tmp_path: Path) -> None
         source_hash.cache_clear()
         hashes.append(source_hash(tmp_path / "mine.py"))
     assert hashes[0] != hashes[1]
+
+
+def test_a_place_without_sources_has_no_hash(tmp_path: Path) -> None:
+    for place in (tmp_path, tmp_path / "none"):
+        with pytest.raises(WorkFailed, match="no Python source"):
+            source_hash(place)

@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 from concurrent.futures import wait
+from functools import partial
 from math import factorial
 from pathlib import Path
 
@@ -87,12 +88,59 @@ with Workers(2) as workers:
         assert reading.read() == b""
 
 
-@pytest.mark.parametrize("what", ["lab.workers.Listener", "lab.workers.subprocess.Popen"])
+@pytest.mark.parametrize("what", ["Listener", "subprocess.Popen", "threading.Thread"])
 def test_where_no_process_can_be_started_everything_is_done_here(monkeypatch: pytest.MonkeyPatch, what: str) -> None:
     def refused(*_: object, **__: object) -> None:
-        raise OSError(24, "Too many open files")
+        raise (
+            RuntimeError("can't start new thread") if what == "threading.Thread" else OSError(24, "Too many open files")
+        )
 
-    monkeypatch.setattr(what, refused)
+    monkeypatch.setattr(f"lab.workers.{what}", refused)
     with Workers(2) as workers:
         assert workers.begin(os.getpid).result() == HERE
         assert list(workers.each(factorial, range(3))) == [1, 1, 2]
+
+
+def test_no_file_of_the_working_folder_is_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A worker imports what this process would: a file that is called as a module of Python is not among it."""
+    (tmp_path / "queue.py").write_text(f"open({str(tmp_path / 'ran')!r}, 'w')\nfrom nowhere import nothing\n")
+    monkeypatch.chdir(tmp_path)
+    with Workers(2) as workers:
+        task = workers.begin(os.getpid)
+        wait([task.future])
+        assert task.result() != HERE
+    assert not (tmp_path / "ran").exists()
+
+
+def test_what_a_worker_cannot_load_is_done_here_and_no_other_function_in_its_place(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A function of the script that is run can be pickled, and is nowhere in a worker."""
+
+    def times(one: int, other: int) -> int:
+        return one * other
+
+    times.__module__, times.__qualname__ = "__main__", "times"
+    monkeypatch.setattr("__main__.times", times, raising=False)
+    with Workers(2) as workers:
+        tasks = [workers.begin(operator.add, 3, 4), workers.begin(times, 3, 4), workers.begin(times, 3, 4)]
+        wait([task.future for task in tasks])
+        assert [task.result() for task in tasks] == [7, 12, 12]
+
+
+def test_a_result_that_is_asked_for_again_is_not_made_again() -> None:
+    done = list[int]()
+    with Workers(1) as workers:
+        task = workers.begin(done.append, 1)
+        task.result()
+        task.result()
+    assert done == [1]
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_the_first_item_that_fails_is_the_one_that_is_told(count: int) -> None:
+    with Workers(count) as workers:
+        results = workers.each(partial(operator.truediv, 6), [1, 2, 0, 3, 0])
+        assert [next(results), next(results)] == [6, 3]
+        with pytest.raises(ZeroDivisionError):
+            next(results)

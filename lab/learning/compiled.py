@@ -6,12 +6,10 @@ written, nothing is kept: each run compiles anew, and says so.
 """
 
 import os
-import sys
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from errno import EACCES
-from functools import cache
 from pathlib import Path
 from shutil import rmtree
 from types import FunctionType
@@ -21,8 +19,8 @@ import numba
 from numba.core.caching import FunctionCache
 from platformdirs import user_cache_dir
 
-from lab.errors import Notice
-from lab.files import source_hash
+from lab.errors import Notice, WorkFailed
+from lab.files import source_key
 
 MOST_FOLDERS = 6  # versions of packages whose compiled functions are kept, each of a few tens of MB
 _LEAN: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
@@ -50,13 +48,14 @@ def compiled(function: Function, **options: Any) -> Function:
     """The function compiled, without the GIL, for each kind of arguments that it meets; options: those of `numba.njit`."""
     jit: Any = numba.njit  # its types do not know all options
     jitted: Any = jit(nogil=True, **options)(function)
-    folder = cache_folder() / key(function.__module__.partition(".")[0])
-    before, _CONFIG.CACHE_DIR = _CONFIG.CACHE_DIR, str(folder)  # read when the cache is made
+    kept, before = cache_folder(), _CONFIG.CACHE_DIR
     try:
+        folder = kept / source_key(function.__module__)
+        _CONFIG.CACHE_DIR = str(folder)  # read when the cache is made
         _make(folder)
         jitted._cache = cast(Any, _Kept)(function)
-    except (OSError, RuntimeError) as error:  # numba's, of a folder in which no file can be made
-        _not_kept(folder.parent, error)
+    except (OSError, RuntimeError, WorkFailed) as error:  # numba's, of a folder in which no file can be made
+        _not_kept(kept, error)
     finally:
         _CONFIG.CACHE_DIR = before
     made: Function = jitted
@@ -81,7 +80,7 @@ def _not_kept(kept: Path, error: Exception) -> None:
 
 
 def lean(function: Function, **options: Any) -> Function:
-    """For what makes no arrays and keeps none: references need no counting, which would take most of the time."""
+    """The function as njit makes it without reference counting; it must not allocate arrays."""
     return compiled(function, **_LEAN, **options)
 
 
@@ -112,14 +111,6 @@ def linked(function: Function, **called: Any) -> Function:
     made: Any = FunctionType(function.__code__, function.__globals__ | called, function.__name__, function.__defaults__)
     linked: Function = made
     return linked
-
-
-@cache
-def key(package: str) -> str:
-    """The name of a loaded package, or of a module that lies in none, with hashes of all of its source and of the lab's."""
-    file = Path(str(sys.modules[package].__file__))
-    own = source_hash(file.parent if file.name == "__init__.py" else file)
-    return f"{package}-{own[:16]}-{source_hash()[:16]}"
 
 
 def _make(folder: Path) -> None:

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from lab.errors import BadInput, WorkFailed, unknown
-from lab.files import assets_folder, read_limited, source_hash
+from lab.files import assets_folder, read_limited, source_key
 from lab.production.floor import Floor
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.stations import one_robot
@@ -253,8 +253,8 @@ def kept_durations(toolbox: Toolbox, key: str, skillset: SkillSet) -> Durations 
 def durations_key(task: Task, layout: Layout, skillset: SkillSet, policies: Mapping[str, Policy]) -> str:
     """A hash (24 hex digits) of all that the durations depend on.
 
-    These are the task and its files, the layout, the moves, the policies, the assets, all of the lab's own source, and
-    the physics engine. Raises WorkFailed when the engine's version is not known.
+    These are the task and its files, the layout, the moves, the policies, the assets, all source of the lab and of the
+    packages that its skills come from, and the physics engine. Raises WorkFailed when that or a source is not found.
     """
     decides = {
         "task": task.model_dump(mode="json", exclude={"name", "title", "sequencing", "subtasks", "faults"}),
@@ -262,7 +262,9 @@ def durations_key(task: Task, layout: Layout, skillset: SkillSet, policies: Mapp
         "moves": [asdict(skillset.moves), [*skillset.legs]],
         "policies": {name: [policy.signature, _hash(policy.q.tobytes())] for name, policy in policies.items()},
         "assets": {path.name: _hash(read_limited(path)) for path in files_of(task)},
-        "source": source_hash(),
+        "source": sorted(
+            {source_key(type(skill).__module__) for skill in skillset.skills.values()} | {source_key(__name__)}
+        ),
         "engine": engine(),
     }
     return _hash(json.dumps(decides, sort_keys=True).encode())[:24]

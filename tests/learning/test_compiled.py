@@ -11,7 +11,8 @@ from typing import Any
 import numba
 import pytest
 
-from lab.files import source_hash
+from lab import files
+from lab.files import source_hash, source_key
 from lab.learning import compiled
 
 DOUBLED = (
@@ -39,7 +40,7 @@ def kitchen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 def _forget() -> None:
     for name in [name for name in sys.modules if name.partition(".")[0] == "kitchen"]:
         del sys.modules[name]
-    compiled.key.cache_clear()
+    source_key.cache_clear()
     source_hash.cache_clear()
 
 
@@ -130,8 +131,8 @@ def test_a_change_of_the_lab_compiles_the_functions_of_others_anew(
     (kitchen.parent / "mine.py").write_text("import kitchen.kernel\n")
     importlib.import_module("mine")
     started()
-    before = compiled.key(package)
-    monkeypatch.setattr(compiled, "source_hash", lambda *own: source_hash(*own) if own else "0" * 64)
-    compiled.key.cache_clear()
-    assert compiled.key(package) != before
-    compiled.key.cache_clear()
+    before = source_key(package)
+    monkeypatch.setattr(files, "source_hash", lambda *own: source_hash(*own) if own else "0" * 64)
+    source_key.cache_clear()
+    assert source_key(package) != before
+    source_key.cache_clear()

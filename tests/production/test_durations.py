@@ -159,7 +159,7 @@ def test_the_key_changes_with_whatever_decides(
     given |= {"folder": own_assets.parent, "source": "the source", "engine": "pybullet 3.2.7"}
 
     def key() -> str:
-        monkeypatch.setattr(durations, "source_hash", lambda: given["source"])
+        monkeypatch.setattr(durations, "source_key", lambda module: given["source"])
         monkeypatch.setattr(durations, "engine", lambda: given["engine"])
         return durations_key(given["task"], given["layout"], given["skillset"], given["policies"])
 
@@ -182,3 +182,12 @@ def test_the_key_looks_for_no_library_but_the_engine(task: Task, monkeypatch: py
     monkeypatch.setattr("importlib.metadata.packages_distributions", lambda: pytest.fail("libraries were looked for"))
     monkeypatch.setattr(durations, "engine", lambda: "pybullet 3.2.7")
     durations_key(task, LAYOUT, SKILLS, {})
+
+
+def test_the_key_holds_the_source_of_every_package_that_skills_come_from(
+    task: Task, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked = set[str]()
+    monkeypatch.setattr(durations, "source_key", lambda module: asked.add(module) or "a")  # type: ignore[func-returns-value]
+    durations_key(task, LAYOUT, replace(SKILLS, skills={"grasp": ALONE[0]}), {})
+    assert asked == {"lab.production.durations", "lab.skills.grasp"}
