@@ -110,11 +110,13 @@ def run(
 
     advisor: as in `lab.teach`; toolbox: where skills are found and kept; None: they are learned anew and not kept; out: a
     folder for pictures, replay, numbers and the journal, with which `lab run --resume` goes on; None: nothing is written.
-    workers: processes that time moves and draw, None: one a core; the numbers are the same.
+    workers: processes that survey, time moves and draw, None: one a core, at most 8; the numbers are the same.
     A run that fails raises nothing: see `RunResult.failure`. Raises BadInput for what does not fit, WorkFailed where a
     skill cannot be learned.
     """
     given = checked(options, TaskOptions, "lab.run")
+    if workers is not None and workers < 1:
+        raise BadInput(f"workers {workers} (lab.run): at least 1, or None for one a core")
     loaded, advisors = load(str(task)), several(advisor)
     advising = advising_of(advisors, toolbox)
     if out is not None and not all(isinstance(one, str) for one in advisors):

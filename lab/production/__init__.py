@@ -2,7 +2,7 @@
 
 
 def load_run() -> None:
-    """Loads all that carries a run out, as workers do while their parent still does."""
+    """Loads what surveying and timing need, scipy's hulls and the engine too: a worker's first job, while its parent loads."""
     import scipy.spatial  # noqa: F401
 
     import lab.production.run  # noqa: F401

@@ -121,7 +121,7 @@ def run(
     """The whole job on a prepared task; pictures, replay and JSON files go to `out` (see `lab.files.check_out`).
 
     How long moves took is kept, and the next run plans with it. Ctrl-C while it is carried out ends it with what came of it
-    until then; the journal goes on from there. workers: who shares in the timing and draws, None: this process alone.
+    until then; the journal goes on from there. workers: who shares in timing and drawing, None: this process alone.
     """
     conditions, workers = conditions or Conditions(), workers or Workers()
     began = time.perf_counter() - prepared.wall_s

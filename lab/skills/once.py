@@ -27,6 +27,8 @@ def once(
     """
 
     def made_once(self: Self, /, *args: Arguments.args, **kwargs: Arguments.kwargs) -> Result:
+        if kwargs:
+            raise TypeError(f"{method.__name__} takes its arguments by their places")
         key = (method.__name__, *args)
         if key not in self.made:
             self.made[key] = method(self, *args, **kwargs)

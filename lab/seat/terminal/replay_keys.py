@@ -24,13 +24,18 @@ def replay_keys(pace: ReplayPace) -> Iterator[bool]:
     keys, over = create_input(sys.stdin), threading.Event()
 
     def read() -> None:
-        while not over.wait(LOOK_S) and not keys.closed:
-            for pressed in keys.read_keys():
-                key = pressed.key.lower()
-                if key in ENDS:
-                    signal.raise_signal(signal.SIGINT)
-                elif key in KEYS:
-                    pace.do(KEYS[key])
+        try:
+            while not over.wait(LOOK_S) and not keys.closed:
+                for pressed in keys.read_keys():
+                    key = pressed.key.lower()
+                    if key in ENDS:
+                        signal.raise_signal(signal.SIGINT)
+                        return
+                    if key in KEYS:
+                        pace.do(KEYS[key])
+        except Exception:  # in raw mode Ctrl-C is a key like another, and nobody would hear it any more
+            signal.raise_signal(signal.SIGINT)
+            raise
 
     reader = threading.Thread(target=read, daemon=True)
     with keys.raw_mode():
