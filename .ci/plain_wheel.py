@@ -139,11 +139,14 @@ def families(place: Place) -> None:
 
 
 def lessons(place: Place) -> None:
-    """The pages whose commands are run, the five lessons among them: their commands and their Python."""
+    """The pages whose commands are run, the five lessons among them: their commands and their Python, each in its own folder."""
     script = ROOT / "lab-dev" / "page_examples.py"
     for folder in run_path(str(script))["COMMANDS_RUN"]:
         for page in sorted((ROOT / "docs" / folder).glob("*.md")):
-            place.called(["-c", script.read_text(encoding="utf-8"), str(page)], f"the page {folder}/{page.stem}")
+            own = place.work / f"page-{page.stem}"
+            own.mkdir()
+            begin = f"import os\nos.chdir({str(own)!r})\n{script.read_text(encoding='utf-8')}"
+            place.called(["-c", begin, str(page)], f"the page {folder}/{page.stem}")
 
 
 def refused(place: Place) -> None:
