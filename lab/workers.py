@@ -45,6 +45,7 @@ class Task(Generic[Result]):
     def __init__(self, work: Callable[..., Result], arguments: Sequence[Any], packed: Packed | None = None) -> None:
         self.work, self.arguments, self.packed = work, arguments, packed
         self.future: Future[Result] = Future()
+        self._done_here: tuple[Result] | None = None
 
     @property
     def running(self) -> bool:
@@ -53,15 +54,14 @@ class Task(Generic[Result]):
 
     def result(self) -> Result:
         """What the work comes to; raises what it raises."""
-        if not self.future.cancel():
-            try:
-                return self.future.result()
-            except _Lost:
-                pass
-        done = self.work(*self.arguments)
-        self.future = Future()
-        self.future.set_result(done)
-        return done
+        if self._done_here is None:
+            if not self.future.cancel():
+                try:
+                    return self.future.result()
+                except _Lost:
+                    pass
+            self._done_here = (self.work(*self.arguments),)
+        return self._done_here[0]
 
 
 class Workers:

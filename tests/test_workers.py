@@ -144,3 +144,12 @@ def test_the_first_item_that_fails_is_the_one_that_is_told(count: int) -> None:
         assert [next(results), next(results)] == [6, 3]
         with pytest.raises(ZeroDivisionError):
             next(results)
+
+
+def test_work_that_was_taken_back_keeps_no_worker_from_the_next() -> None:
+    with Workers(2) as workers:
+        tasks = [workers.begin(os.getpid) for _ in range(20)]
+        assert {task.result() for task in reversed(tasks)} >= {HERE}  # some are done here before a worker has begun
+        later = workers.begin(os.getpid)
+        wait([later.future], timeout=60)
+        assert later.result() != HERE
