@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from audit_violations import PART as AUDITS
 from drawn_physics import PART as PHYSICS
 from kills import PART as KILLS
 from mutated_commands import PART as MUTATED_COMMANDS
@@ -28,6 +29,7 @@ PARTS: dict[str, Part] = {
     "requests": REQUESTS,
     "resources": RESOURCES,
     "physics": PHYSICS,
+    "audits": AUDITS,
 }
 
 

@@ -21,7 +21,7 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("lab.sequencing", "lab.toolbox"),
     ("lab.advice", "lab.tasks"),
     ("lab.sim",),
-    ("lab.skills", "lab.view", "lab.export"),
+    ("lab.skills", "lab.view", "lab.export", "lab.audit"),
     ("lab.gym",),
     ("lab.teaching",),
     ("lab.production",),
@@ -70,6 +70,8 @@ NEVER = {  # room -> rooms that it never imports, whatever the layers say
         ("lab.mdp", "lab.learning", "lab.advice", "lab.sequencing"), ("lab.sim", "lab.view", "lab.seat", "lab.cli")
     ),
     "lab.sim": ("lab.learning", "lab.sequencing"),
+    # it judges by frames and the task file, and shares no code with what carried the run out
+    "lab.audit": ("lab.skills", "lab.sequencing", "lab.learning", "lab.sim.scene", "lab.sim.world", "lab.sim.arms"),
     "lab.studies.ours.schedule_checker": ("lab",),  # it shares no code with what it checks
 }
 HEAVY = (

@@ -53,6 +53,12 @@ def replay(
     seconds: Annotated[
         float, typer.Option("--seconds", min=1.0, max=60.0, help="How long the moving picture lasts [s].")
     ] = 15.0,
+    audit: Annotated[
+        bool,
+        typer.Option(
+            "--audit", help="Hold a run's frames against its task once more: where each part stood, what is wrong."
+        ),
+    ] = False,
     toolbox: ToolboxPlace = None,
     as_json: Json = False,
 ) -> None:
@@ -72,12 +78,16 @@ def replay(
     from lab.toolbox.registry import Toolbox
     from lab.view.summary import replay_summary, table_of
 
-    if movie is not None and (folder is None or not is_run(folder)):
-        where = "" if folder is None else f"'{folder}': "
-        raise BadInput(f"{where}--movie goes with the folder of a run (lab run --out)")
+    for option, given in (("--movie", movie is not None), ("--audit", audit)):
+        if given and (folder is None or not is_run(folder)):
+            where = "" if folder is None else f"'{folder}': "
+            raise BadInput(f"{where}{option} goes with the folder of a run (lab run --out)")
     if folder is None:
         rows = session_rows(Toolbox(toolbox))
         show({"sessions": rows}, as_json, lambda d: table_of(d["sessions"], ("session", "problem", "advisor", "state")))
+        return
+    if audit:
+        _audit_run(folder, as_json)
         return
     if is_run(folder):
         _replay_run(folder, page, port, as_json, movie, seconds)
@@ -110,6 +120,19 @@ def replay(
             seat.stay()
     except KeyboardInterrupt:
         end("stopped by Ctrl-C", 130)
+
+
+def _audit_run(folder: Path, as_json: bool) -> None:
+    """Hold what a run's folder keeps against its task; exit 1 when something is wrong."""
+    from lab.audit.audit import audit, kept_evidence
+    from lab.production.run_options import kept_task
+    from lab.view.summary import audit_summary
+
+    options, task = kept_task(folder, "DIR")
+    found = audit(kept_evidence(folder, task, task.ordered(options.toasts, options.parts)))
+    show({"run": str(folder), "task": task.name} | found.to_json(), as_json, audit_summary)
+    if found.failure:
+        end(found.failure, 1)
 
 
 def _replay_run(

@@ -4,6 +4,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
+from lab.audit.audit import audit
+from lab.audit.rules import Evidence, Struck
+from lab.audit.tracks import tracks_of
 from lab.errors import LabError, WorkFailed
 from lab.export.recorder import MotionRecorder
 from lab.production.conditions import Conditions
@@ -22,6 +25,7 @@ from lab.production.transfers import Transfers
 from lab.production.trouble import RunStopped, Trouble
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.schedule import Schedule
+from lab.sequencing.cell.schedule_rows import rows_of
 from lab.sequencing.simulate.rest import Mishaps
 from lab.sim.frames import Recording
 from lab.sim.world import World
@@ -180,10 +184,10 @@ def carry_out(
     with World() as world:
         floor, injector = Floor(world, prepared.skillset, prepared.layout, prepared.order), Injector(conditions.faults)
         injector.prepare(floor.scene)
-        floor.record(conditions.viewer)
         floor.scene.robot.override(conditions.override)
         floor.stand(prepared.surveys.approach(cell.robot_start))
         floor.restart_clock()
+        floor.record(conditions.viewer)  # its times begin with the floor's, too
         motions = MotionRecorder(floor.scene.robot)  # its times begin with the floor's
         floor.hand = lambda: injector.tick(floor)
         journal = conditions.journal
@@ -207,7 +211,19 @@ def carry_out(
             heard=tuple(heard),
             program=motions.program(prepared.task, prepared.seed, production.work.moves, cell.part_name),
         )
-        return outcome, floor.recorder.recording  # type: ignore[union-attr]
+        recording = floor.recorder.recording  # type: ignore[union-attr]
+        return audited(outcome, recording, prepared, cell), recording
+
+
+def audited(outcome: Outcome, recording: Recording, prepared: Prepared, cell: Cell) -> Outcome:
+    """What came of a run after the audit: delivered is only what the frames show, else it fails for what they show."""
+    names = {cell.part_name(part): part for part in range(1, cell.parts + 1)}
+    claimed = [name for name, part in names.items() if part in outcome.delivered]
+    struck = tuple(Struck(one.what, one.part, one.station) for one in outcome.happened)
+    rows = rows_of(outcome.schedule, cell, "measured")
+    found = audit(Evidence(prepared.task, prepared.order, tracks_of(recording), rows, claimed, struck))
+    delivered = tuple(names[name] for name in found.delivered)
+    return replace(outcome, audit=found, delivered=delivered, failure=outcome.failure or found.failure)
 
 
 def noting(floor: Floor, journal: RunJournal, heard: list[Event], tell: Tell) -> Tell:

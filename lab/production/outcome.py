@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from lab.audit.audit import Audit
 from lab.export.program import Program
 from lab.production.durations import TimedMove
 from lab.production.faults.fault import Happened
@@ -18,7 +19,8 @@ class Outcome:
     timed: how long each move took in which nothing had to be
     tried again. skipped_s: of sim_s, the time that passed without physics, while the robot waited and nothing moved.
     interrupted: by Ctrl-C; all else is what came of it until then. happened: the faults that struck. heard: what the run
-    told. program: what the robot carried out.
+    told. program: what the robot carried out. audit: what the frames show of it (see `lab.audit`), None: nobody has looked;
+    `delivered` are those that it passes, and what it finds is the failure where nothing else is.
     """
 
     schedule: Schedule
@@ -34,6 +36,7 @@ class Outcome:
     happened: tuple[Happened, ...] = ()
     heard: tuple[Event, ...] = ()
     program: Program | None = None
+    audit: Audit | None = None
 
     def verdict(self, names: Sequence[str]) -> Verdict:
         """Whether all parts, of these names, were delivered, or the run stopped and told the truth (see `truth.verdict`)."""

@@ -10,6 +10,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
+from lab.audit.tracks import FILE as FRAMES
+from lab.audit.tracks import packed, tracks_of
 from lab.errors import LabError, WorkFailed
 from lab.export.program import PROGRAM, TRAJECTORY
 from lab.files import draft, read_limited, write_whole
@@ -42,6 +44,7 @@ FILES = {
     "sequence": "sequence.json",
     "schedule_table": "schedule.csv",
     "schedule": "schedule.json",
+    "frames": FRAMES,
     "program": PROGRAM,
     "trajectory": TRAJECTORY,
     "run": "run.json",
@@ -114,6 +117,7 @@ class Report:
             "timed_s": self.taught.durations.sim_s,  # of sim_s; 0: all durations were known
             "faults": [*verdict.rows],
             "outcome": verdict.came,
+            "audit": None if outcome.audit is None else outcome.audit.to_json(),
             "interrupted": outcome.interrupted,
             "receipts": self.receipts,
             "cyclic": self._cyclic(),
@@ -217,7 +221,8 @@ def _write_numbers(report: Report, paths: dict[str, Path], predicted: Schedule) 
     rows = rows_of(predicted, cell, "planned") + rows_of(report.outcome.schedule, cell, "measured")
     paths["schedule_table"].write_text(csv_of(rows), encoding="utf-8")
     _write_json(paths["schedule"], {"schedule": rows})
-    return ["sequence", "schedule_table", "schedule", "run"]
+    paths["frames"].write_bytes(packed(tracks_of(report.recording)))
+    return ["sequence", "schedule_table", "schedule", "frames", "run"]
 
 
 def _pictures(

@@ -68,11 +68,18 @@ def gone_on(given: RunOptions, folder: Path, out: Path | None, command: str = "r
         raise BadInput(
             f"the run in '{folder}' (--resume) was begun otherwise: go on with lab {head.command} --resume {folder}"
         )
-    options = RunOptions.from_json(head.words, f"journal in '{folder}' (--resume)")
+    options, task = kept_task(folder, "--resume")
     check_alone(given, RunOptions(task=""), folder)
+    return options, task
+
+
+def kept_task(folder: Path, where: str) -> tuple[RunOptions, Task]:
+    """What the run in a folder was begun with, and its task. BadInput when the task has changed since."""
+    head, _, _ = read_run(folder, where)
+    options = RunOptions.from_json(head.words, f"journal in '{folder}' ({where})")
     task = load(options.task)
     if hash_of(task) != head.task_hash:
-        raise BadInput(f"run in '{folder}' (--resume): its task '{options.task}' has changed since it was begun")
+        raise BadInput(f"run in '{folder}' ({where}): its task '{options.task}' has changed since it was begun")
     return options, task
 
 

@@ -137,6 +137,24 @@ def run_replay_summary(replay: Mapping[str, Any]) -> RenderableType:
     return Group(Text(f"{replay['task']} in {replay['run']}: {skills} there"), table, *lines)
 
 
+def audit_summary(document: Mapping[str, Any]) -> RenderableType:
+    """The text of `lab replay --audit`, from its JSON document: where each part stood, and what is wrong."""
+    rows = [
+        {
+            "part": stay["part"],
+            "station": stay["station"],
+            "from_s": f"{stay['start_s']:.1f}",
+            "to_s": f"{stay['end_s']:.1f}",
+            "stood_s": f"{stay['end_s'] - stay['start_s']:.1f}",
+        }
+        for stay in document["stays"]
+    ]
+    claimed, delivered = len(document["claimed"]), len(document["delivered"])
+    lines = [Text(f"{one['part']}: {one['words']}") for one in document["findings"]]
+    said = f"{delivered} of {counted(claimed, 'part')} said to be delivered are"
+    return Group(table_of(rows, ("part", "station", "from_s", "to_s", "stood_s")), *lines, Text(said))
+
+
 def _event_text(event: Mapping[str, Any]) -> str:
     """One line of a run's journal in words; "" for what is told otherwise."""
     match event["kind"]:

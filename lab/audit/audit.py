@@ -1,0 +1,83 @@
+"""The audit of a run: what is delivered by the frames and the task file, and what is wrong, part by part."""
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from lab.audit.rules import Evidence, Finding, Struck, findings
+from lab.audit.stays import PartSeen
+from lab.audit.tracks import FILE, read_tracks
+from lab.errors import BadInput
+from lab.files import json_of, read_limited
+from lab.tasks.task import Order, Task
+
+
+@dataclass(frozen=True)
+class Audit:
+    """What came of an audit: the parts that were said to be delivered, those that are, and all that is wrong, by time."""
+
+    claimed: tuple[str, ...]
+    delivered: tuple[str, ...]
+    findings: tuple[Finding, ...]
+    parts: tuple[PartSeen, ...]
+
+    @property
+    def failure(self) -> str | None:
+        """The first thing that is wrong and how many there are, in one line; None for nothing."""
+        if not self.findings:
+            return None
+        first, more = self.findings[0], len(self.findings) - 1
+        about = first.words if first.part in first.words else f"{first.part} {first.words}"
+        return f"audit: {about}{f' (and {more} more)' if more else ''}"
+
+    def to_json(self) -> dict[str, Any]:
+        """`claimed` and `delivered`, names; `findings`: rule, part, station, at_s, words; `stays`: part, station, from when to
+        when [s] it stood there."""
+        stays = [{"part": seen.name} | asdict(stay) for seen in self.parts for stay in seen.stays]
+        return {
+            "claimed": list(self.claimed),
+            "delivered": list(self.delivered),
+            "findings": [asdict(one) for one in self.findings],
+            "stays": [{k: round(v, 3) if isinstance(v, float) else v for k, v in row.items()} for row in stays],
+        }
+
+
+def audit(evidence: Evidence) -> Audit:
+    """Judges a run by its evidence. A part is delivered when it is claimed to be and nothing that is wrong names it."""
+    found = tuple(findings(evidence))
+    guilty = {one.part for one in found}
+    claimed = tuple(seen.name for seen in evidence.parts if seen.name in evidence.claimed)
+    delivered = tuple(name for name in claimed if name not in guilty)
+    return Audit(claimed, delivered, found, tuple(evidence.parts))
+
+
+def kept_evidence(folder: Path, task: Task, order: Order) -> Evidence:
+    """The evidence in a run's folder: its frames, the measured rows of `schedule.csv`, and what `run.json` claims of them.
+
+    Raises BadInput for a file that is missing or damaged.
+    """
+    where = f"run '{folder}'"
+    try:
+        run = json_of(read_limited(folder / "run.json"))
+        claimed = [str(name) for name in run["audit"]["claimed"]]
+        struck = [Struck(str(one["what"]), str(one["part"]), str(one["station"])) for one in run["faults"]]
+        rows = measured_rows(read_limited(folder / "schedule.csv").decode())
+    except OSError as error:
+        raise BadInput(f"{where}: '{error.filename}' cannot be read: {error.strerror or error}") from None
+    except (ValueError, KeyError, TypeError) as error:
+        why = f"no {error}" if isinstance(error, KeyError) else " ".join(str(error).split())[:120]
+        raise BadInput(f"{where}: its run.json or schedule.csv is damaged, or of an older lab: {why}") from None
+    return Evidence(task, order, read_tracks(folder / FILE), rows, claimed, struck)
+
+
+def measured_rows(text: str) -> list[dict[str, Any]]:
+    """The measured rows of a `schedule.csv`, their times as numbers [s]. Raises ValueError and KeyError for another file."""
+    from csv import DictReader
+    from io import StringIO
+
+    rows: list[dict[str, Any]] = [row for row in DictReader(StringIO(text)) if row["when"] == "measured"]
+    for row in rows:
+        row |= {"start_s": float(row["start_s"]), "end_s": float(row["end_s"])}
+        if not {"part", "operation", "station", "target"} <= row.keys():
+            raise ValueError("schedule.csv lacks a column")
+    return rows

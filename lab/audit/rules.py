@@ -1,0 +1,270 @@
+"""What an audit asks of a run, rule by rule; each finding names the part, the station and the time."""
+
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass, field
+from math import atan2, cos, hypot, sin
+from typing import Any
+
+import numpy as np
+
+from lab.audit.stays import Mask, PartSeen, Stay, pallet_of, parts_seen
+from lab.audit.tracks import Array, BodyTracks
+from lab.tasks.task import Order, Task
+from lab.tasks.task_fields import Stage
+
+SLACK_S = 0.25  # two frames, and what rounding does
+UPRIGHT = 0.985  # cosine of the tilt, ten degrees, that a part may have at the end of its route
+ON_SPOT_M = 0.02  # a part this near to a spot that the file names stands on it
+SEVERAL_FRAMES = 3  # in a row, for what a single frame may show by chance
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something that is not as the task asks: by which rule, about which part ("": about none alone), where and when [s]."""
+
+    rule: str
+    part: str
+    station: str
+    at_s: float
+    words: str
+
+
+@dataclass(frozen=True)
+class Struck:
+    """A fault that a hand or a machine had in a run, about a part or a station ("": about none)."""
+
+    what: str
+    part: str = ""
+    station: str = ""
+
+
+@dataclass
+class Evidence:
+    """What a run left: the task and its order, the tracks of its bodies, the measured rows of its schedule, what was claimed.
+
+    rows: as `schedule.csv` has them. claimed: the names of the parts that are said to be delivered. struck: the faults.
+    """
+
+    task: Task
+    order: Order
+    tracks: BodyTracks
+    rows: Sequence[dict[str, Any]]
+    claimed: Collection[str]
+    struck: Sequence[Struck] = ()
+    parts: list[PartSeen] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.parts = parts_seen(self.task, self.order, self.tracks)
+        moved = {one.station for one in self.struck if one.what == "station moved"}
+        self._touched = {one.part for one in self.struck if one.part}
+        self._touched |= {one.name for one in self.parts for stay in one.stays if stay.station in moved}
+
+    def undisturbed(self, part: str) -> bool:
+        """Whether no fault has touched a part."""
+        return part not in self._touched
+
+    def own_rows(self, part: str, operation: str) -> list[dict[str, Any]]:
+        """The measured rows of a part of one kind, by time."""
+        return [row for row in self.rows if row["part"] == part and row["operation"] == operation]
+
+    def work_s(self, kind: str, stage: Stage) -> float | None:
+        """How long a part of a kind is to be worked on in a stage by the task [s]; None where it is no machine's."""
+        station = self.task.station(stage.station)
+        if station.kind != "machine":
+            return None
+        if station.process is not None:
+            process = self.task.processes[station.process]
+            return process.grid[0] * process.grid[1] * process.dwell_s
+        return stage.processing_s if stage.processing_s is not None else station.processing_s
+
+    def at_most_s(self, stage: Stage) -> float | None:
+        """How long it may stay there after that by the task [s]; None: for ever."""
+        return stage.at_most_s if stage.at_most_s is not None else self.task.station(stage.station).at_most_s
+
+
+def findings(evidence: Evidence) -> list[Finding]:
+    """All that is wrong with a run, by time."""
+    found: list[Finding] = []
+    for seen in evidence.parts:
+        if seen.name in evidence.claimed:
+            found += _route(evidence, seen)
+            found += _end(evidence, seen)
+        found += _schedule(evidence, seen)
+    found += _capacities(evidence)
+    found += _gripper(evidence)
+    return sorted(found, key=lambda one: one.at_s)
+
+
+# ---- the route of one part -------------------------------------------------------------------------------------------
+
+
+def _route(evidence: Evidence, seen: PartSeen) -> list[Finding]:
+    """What is wrong with the stays of a part by the route that they fit best."""
+    found = [list(_along(evidence, seen, route)) for route in evidence.task.part(seen.kind).routes]
+    return min(found, key=len)
+
+
+def _along(evidence: Evidence, seen: PartSeen, route: Sequence[Stage]) -> Iterator[Finding]:
+    """The stations in their order, each for as long as it takes, and none that is not on the route."""
+    stays, place, before = seen.stays, 0, ""
+    for stage in route:
+        work_s = evidence.work_s(seen.kind, stage)
+        there = [n for n in range(place, len(stays)) if stays[n].station == stage.station]
+        if not there:
+            after = f" after '{before}'" if before else ""
+            at_s = stays[place - 1].end_s if place else 0.0
+            yield Finding("route", seen.name, stage.station, at_s, f"did not come to '{stage.station}'{after}")
+            continue
+        long = [n for n in there if work_s is None or stays[n].seconds >= work_s - SLACK_S]
+        chosen = long[0] if long else max(there, key=lambda n: stays[n].seconds)
+        between = [one for one in stays[place:chosen] if one.station != stage.buffer]
+        if between and evidence.undisturbed(seen.name) and not _repeated(between, before, stage):
+            words = f"came to '{between[0].station}', which is not on its route from '{before}' to '{stage.station}'"
+            yield Finding("route", seen.name, between[0].station, between[0].start_s, words)
+        stay, place, before = stays[chosen], chosen + 1, stage.station
+        if work_s is not None:
+            yield from _times(evidence, seen, stage, stay, work_s)
+    if stays[place:] and evidence.undisturbed(seen.name) and not _repeated(stays[place:], before, route[-1]):
+        words = f"went on to '{stays[place].station}' after the end of its route, '{before}'"
+        yield Finding("route", seen.name, stays[place].station, stays[place].start_s, words)
+
+
+def _repeated(between: Sequence[Stay], before: str, stage: Stage) -> bool:
+    """Whether a part only stood again where it was, or was set down more than once where it goes."""
+    return all(one.station in (before, stage.station) for one in between)
+
+
+def _times(evidence: Evidence, seen: PartSeen, stage: Stage, stay: Stay, work_s: float) -> Iterator[Finding]:
+    """At least its time in the machine, and at most its window after that."""
+    where, rows = stage.station, evidence.own_rows(seen.name, "process")
+    own = [
+        row for row in rows if row["station"] == where and row["start_s"] < stay.end_s and row["end_s"] > stay.start_s
+    ]
+    worked_s = min([stay.seconds, *(row["end_s"] - row["start_s"] for row in own)])
+    if worked_s < work_s - SLACK_S:
+        words = f"stood in '{where}' for {worked_s:.1f} s of {work_s:g}"
+        yield Finding("processing", seen.name, where, stay.start_s + worked_s, words)
+    at_most_s = evidence.at_most_s(stage)
+    if at_most_s is None:
+        return
+    slow = any(one.what.startswith("machine") and one.station == where for one in evidence.struck)
+    learned = evidence.task.station(where).process is not None
+    done_s = stay.start_s + work_s
+    if (slow or learned) and own:
+        done_s = own[-1]["end_s"]
+    in_hand_s = sum(_overlap(row, stay) for row in evidence.own_rows(seen.name, "carry"))
+    late_s = stay.end_s - done_s - in_hand_s
+    if late_s > at_most_s + SLACK_S:
+        words = f"stayed in '{where}' for {late_s:.1f} s after it was done, allowed are {at_most_s:g}"
+        yield Finding("window", seen.name, where, done_s + at_most_s, words)
+
+
+def _overlap(row: dict[str, Any], stay: Stay) -> float:
+    """How long of a stay a row lasts [s]: the gripper lets go, or takes hold."""
+    return float(max(0.0, min(row["end_s"], stay.end_s) - max(row["start_s"], stay.start_s)))
+
+
+def _end(evidence: Evidence, seen: PartSeen) -> Iterator[Finding]:
+    """It stands upright at the end of a route at last, on a spot that the file names, on its pallet."""
+    task, tracks, end_s = evidence.task, evidence.tracks, float(evidence.tracks.times_s[-1])
+    ends = [route[-1].station for route in task.part(seen.kind).routes]
+    body = tracks.number(seen.name)
+    last = task.stations[seen.at[-1]].name if seen.at[-1] >= 0 else ""
+    if last not in ends:
+        where = f"'{last}'" if last else "no station"
+        yield Finding("end", seen.name, ends[0], end_s, f"stands at {where} in the end, not at '{ends[0]}'")
+        return
+    if tracks.up(body)[-1] < UPRIGHT:
+        yield Finding("end", seen.name, last, end_s, f"is tilted in the end at '{last}'")
+    x, y, _ = tracks.poses[-1, body, :3]
+    spots = task.station(last).spots
+    if spots is not None:
+        place = _off_pose(evidence, last, tracks.inside(tracks.number(last), tracks.poses[:, body, :3])[-1])
+        off_m = min(hypot(place[0] - spot[0], place[1] - spot[1]) for spot in spots)
+        if off_m > ON_SPOT_M:
+            yield Finding("end", seen.name, last, end_s, f"stands {off_m:.3f} m off the spots of '{last}' in the end")
+    carrier = tracks.number(pallet_of(seen.name))
+    if carrier >= 0:
+        under = tracks.poses[-1, carrier, :2]
+        if hypot(x - under[0], y - under[1]) > ON_SPOT_M:
+            yield Finding("end", seen.name, last, end_s, f"does not stand on its pallet in the end at '{last}'")
+
+
+def _off_pose(evidence: Evidence, station: str, place: Array) -> tuple[float, float]:
+    """A point in the frame of a station's body [m], off the station's pose along and across, wherever the body is by now."""
+    x, y, _, *turn = evidence.tracks.poses[0, evidence.tracks.number(station)]
+    at_x, at_y, yaw = evidence.task.station(station).pose
+    along, across = _turned(place[0], place[1], 2.0 * atan2(turn[2], turn[3]))
+    return _turned(along + x - at_x, across + y - at_y, -yaw)
+
+
+def _turned(x: float, y: float, yaw: float) -> tuple[float, float]:
+    return cos(yaw) * x - sin(yaw) * y, sin(yaw) * x + cos(yaw) * y
+
+
+# ---- what the schedule says --------------------------------------------------------------------------------------------
+
+
+def _schedule(evidence: Evidence, seen: PartSeen) -> Iterator[Finding]:
+    """The measured rows say where the part was and when it was carried, and it was carried at no other time."""
+    if not evidence.undisturbed(seen.name):
+        return
+    carries = evidence.own_rows(seen.name, "carry")
+    for row in carries:
+        for place, at_s in ((row["station"], row["start_s"]), (row["target"], row["end_s"])):
+            if not _stands_at(seen, place, at_s):
+                words = f"is not at '{place}' at {at_s:.1f} s, as the schedule has it"
+                yield Finding("schedule", seen.name, place, at_s, words)
+    for row in evidence.own_rows(seen.name, "process"):
+        inside = [s for s in seen.stays if s.station == row["station"] and s.start_s <= row["start_s"] + SLACK_S]
+        if not any(stay.end_s >= row["end_s"] - SLACK_S for stay in inside):
+            when = f"from {row['start_s']:.1f} to {row['end_s']:.1f} s"
+            words = f"did not stand in '{row['station']}' {when}, as the schedule has it"
+            yield Finding("schedule", seen.name, row["station"], row["start_s"], words)
+    for before, after in zip(seen.stays, seen.stays[1:], strict=False):
+        if before.station != after.station and not any(
+            row["start_s"] - SLACK_S <= before.end_s and after.start_s <= row["end_s"] + SLACK_S for row in carries
+        ):
+            words = f"went from '{before.station}' to '{after.station}' at {before.end_s:.1f} s, which the schedule does not have"
+            yield Finding("schedule", seen.name, after.station, before.end_s, words)
+
+
+def _stands_at(seen: PartSeen, station: str, at_s: float) -> bool:
+    return any(
+        stay.station == station and stay.start_s - SLACK_S <= at_s <= stay.end_s + SLACK_S for stay in seen.stays
+    )
+
+
+# ---- what holds how many -----------------------------------------------------------------------------------------------
+
+
+def _capacities(evidence: Evidence) -> Iterator[Finding]:
+    """No station holds more parts, or pallets of parts, than its capacity."""
+    for number, station in enumerate(evidence.task.stations):
+        there = np.array([seen.occupies == number for seen in evidence.parts])
+        for first in _lasting(there.sum(axis=0) > station.capacity):
+            names = [seen.name for seen, at in zip(evidence.parts, there[:, first], strict=True) if at]
+            at_s = float(evidence.tracks.times_s[first])
+            words = f"'{station.name}' holds {' and '.join(names)} at {at_s:.1f} s, its capacity is {station.capacity}"
+            for name in names:
+                yield Finding("capacity", name, station.name, at_s, words)
+
+
+def _gripper(evidence: Evidence) -> Iterator[Finding]:
+    """The gripper carries one part at a time."""
+    own = [seen for seen in evidence.parts if evidence.undisturbed(seen.name)]
+    carried = np.array([seen.carried for seen in own])
+    if not len(own):
+        return
+    for first in _lasting(carried.sum(axis=0) > 1):
+        names = [seen.name for seen, at in zip(own, carried[:, first], strict=True) if at]
+        at_s = float(evidence.tracks.times_s[first])
+        for name in names:
+            words = f"{' and '.join(names)} are carried at once at {at_s:.1f} s, by one gripper"
+            yield Finding("gripper", name, "", at_s, words)
+
+
+def _lasting(mask: Mask) -> list[int]:
+    """The first frame of each run of frames in which something holds, where it lasts."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
+    return [int(first) for first, after in zip(edges[::2], edges[1::2], strict=True) if after - first >= SEVERAL_FRAMES]

@@ -1,0 +1,114 @@
+"""Where each part of an order stood, from when to when, read from the tracks of the bodies and the task file alone."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lab.audit.tracks import BodyTracks
+from lab.sim.parts.part_shape import shape_of
+from lab.tasks.task import Order, Task, part_name
+
+LOW_M, HIGH_M = -0.005, 0.01  # a foot so far from what it should stand on stands on it
+TILTED = 0.94  # cosine of a part's tilt from which on it does not stand
+LEAST_S = 0.5  # a stay; shorter is passing through
+GAP_S = 0.5  # a part that is nudged out of its stay for less than this has not left it
+FLIES_M = 0.02  # above the lowest place where it stood: it is carried
+
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Stay:
+    """A part stood at a station from `start_s` to `end_s` [s]."""
+
+    station: str
+    start_s: float
+    end_s: float
+
+    @property
+    def seconds(self) -> float:
+        """How long."""
+        return self.end_s - self.start_s
+
+
+@dataclass(frozen=True, eq=False)
+class PartSeen:
+    """What the frames show of one part: its stays in their order.
+
+    at (n,): the number of the station at which it stands at each frame, -1 for none. occupies (n,): the same, of the part or its
+    pallet. carried (n,): whether it is in the air.
+    """
+
+    name: str
+    kind: str
+    stays: tuple[Stay, ...]
+    at: NDArray[np.int64]
+    occupies: NDArray[np.int64]
+    carried: Mask
+
+
+def parts_seen(task: Task, order: Order, tracks: BodyTracks) -> list[PartSeen]:
+    """What the frames show of each part of an order, part 1 first; a part that was not recorded has no stays."""
+    return [_seen(task, part_name(order, number), kind, tracks) for number, kind in enumerate(order, start=1)]
+
+
+def pallet_of(name: str) -> str:
+    """What the pallet of a part is called in the frames."""
+    return f"{name}'s pallet"
+
+
+def _seen(task: Task, name: str, kind: str, tracks: BodyTracks) -> PartSeen:
+    body, part = tracks.number(name), task.part(kind)
+    nowhere = np.full(len(tracks.times_s), -1)
+    if body < 0:
+        return PartSeen(name, kind, (), nowhere, nowhere, np.zeros(len(tracks.times_s), dtype=bool))
+    foot_m = shape_of(part, task.folder).foot_m
+    heights = [0.0]
+    if part.pallet is not None:
+        pallet = shape_of(task.part(part.pallet), task.folder)
+        heights.append(pallet.height_m)
+    at = _stands_at(task, tracks, body, foot_m, heights)
+    occupies, carrier = at, tracks.number(pallet_of(name))
+    if part.pallet is not None and carrier >= 0:
+        occupies = np.where(at >= 0, at, _stands_at(task, tracks, carrier, pallet.foot_m, [0.0]))
+    return PartSeen(name, kind, _stays(task, tracks, at), at, occupies, _carried(tracks, body, at))
+
+
+def _stands_at(task: Task, tracks: BodyTracks, body: int, foot_m: float, heights: Sequence[float]) -> NDArray[np.int64]:
+    """The station on whose body one stands at each frame, on its floor or so much higher [m]; -1 for none."""
+    at, up = np.full(len(tracks.times_s), -1), tracks.up(body) >= TILTED
+    point = tracks.poses[:, body, :3]
+    for number, station in enumerate(task.stations):
+        own = tracks.number(station.name)
+        if own < 0:
+            continue
+        low, high, off = tracks.low[own], tracks.high[own], tracks.inside(own, point)
+        within = (off[:, :2] >= low[:2]).all(axis=1) & (off[:, :2] <= high[:2]).all(axis=1)
+        floor_m = station.floor_m if station.floor_m is not None else tracks.poses[:, own, 2] + high[2]
+        foot = point[:, 2] - foot_m - floor_m
+        on = np.logical_or.reduce([(foot - height >= LOW_M) & (foot - height <= HIGH_M) for height in heights])
+        at[within & on & up] = number
+    return at
+
+
+def _stays(task: Task, tracks: BodyTracks, at: NDArray[np.int64]) -> tuple[Stay, ...]:
+    edges = np.flatnonzero(np.diff(at)) + 1
+    found: list[Stay] = []
+    for first, after in zip([0, *edges], [*edges, len(at)], strict=True):
+        if at[first] < 0:
+            continue
+        stay = Stay(task.stations[at[first]].name, float(tracks.times_s[first]), float(tracks.times_s[after - 1]))
+        last = found[-1] if found else None
+        if last is not None and last.station == stay.station and stay.start_s - last.end_s < GAP_S:
+            found[-1] = Stay(stay.station, last.start_s, stay.end_s)
+        else:
+            found.append(stay)
+    return tuple(stay for stay in found if stay.seconds >= LEAST_S)
+
+
+def _carried(tracks: BodyTracks, body: int, at: NDArray[np.int64]) -> Mask:
+    """Whether a body stands nowhere, high above the lowest place where it ever was."""
+    height = tracks.poses[:, body, 2]
+    return np.asarray((at < 0) & (height > height.min() + FLIES_M))

@@ -1,0 +1,154 @@
+"""Where the bodies of a run were: frames as arrays, kept in a run's folder as `frames.npz`, which numpy alone reads."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+from zipfile import BadZipFile, ZipFile
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lab.errors import BadInput
+from lab.files import read_limited
+from lab.sim.frames import Body, Recording, Shape
+from lab.sim.mesh_file import readable
+
+FILE = "frames.npz"
+MAX_BYTES = 1_000_000_000  # of its arrays: a day of a cell with a hundred bodies has half of them
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class BodyTracks:
+    """Every body at every frame of a run.
+
+    names: one a body. times_s (n,) [s], rising. poses (n, bodies, 7): x, y, z [m] and a quaternion xyzw of the body's frame.
+    low, high (bodies, 3): the corners of each body's bounds in its own frame [m].
+    """
+
+    names: tuple[str, ...]
+    times_s: Array
+    poses: Array
+    low: Array
+    high: Array
+
+    def number(self, name: str) -> int:
+        """Which of the bodies is called so; -1 for none."""
+        return self.names.index(name) if name in self.names else -1
+
+    def up(self, body: int) -> Array:
+        """The cosine of a body's tilt at each frame (n,): 1 for one that stands upright."""
+        x, y = self.poses[:, body, 3], self.poses[:, body, 4]
+        return np.asarray(1.0 - 2.0 * (x * x + y * y))
+
+    def inside(self, body: int, point: Array) -> Array:
+        """The points (n, 3) [m], one a frame, in the frame of a body that may be turned about the vertical axis."""
+        off = point - self.poses[:, body, :3]
+        yaw = 2.0 * np.arctan2(self.poses[:, body, 5], self.poses[:, body, 6])
+        c, s = np.cos(yaw), np.sin(yaw)
+        return np.stack([c * off[:, 0] + s * off[:, 1], c * off[:, 1] - s * off[:, 0], off[:, 2]], axis=1)
+
+
+def tracks_of(recording: Recording) -> BodyTracks:
+    """The tracks of all bodies that a recording shows. Raises BadInput for a mesh that cannot be read."""
+    bodies = [body for body in recording.bodies if any(shape.kind != "label" for shape in body.shapes)]
+    names = tuple(body.name for body in bodies)
+    poses = np.full((len(recording.frames), len(names), 7), np.nan)
+    place = {name: number for number, name in enumerate(names)}
+    for now, frame in enumerate(recording.frames):
+        if now:
+            poses[now] = poses[now - 1]
+        for name, pose in frame.poses.items():
+            if name in place:
+                poses[now, place[name]] = pose
+    there = [
+        number for number in range(len(names)) if not np.isnan(poses[:, number]).any()
+    ]  # no finish that came later
+    corners = [_bounds(bodies[number]) for number in there]
+    return BodyTracks(
+        tuple(names[number] for number in there),
+        np.array([frame.time_s for frame in recording.frames]),
+        poses[:, there],
+        np.array([low for low, _ in corners]),
+        np.array([high for _, high in corners]),
+    )
+
+
+def _bounds(body: Body) -> tuple[Array, Array]:
+    """The lower and the upper corner of a body in its own frame [m]."""
+    from scipy.spatial.transform import Rotation
+
+    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    for shape in body.shapes:
+        corners = _corners(shape)
+        placed = Rotation.from_quat(shape.quaternion).apply(corners) + np.array(shape.position)
+        low, high = np.minimum(low, placed.min(axis=0)), np.maximum(high, placed.max(axis=0))
+    return low, high
+
+
+def _corners(shape: Shape) -> Array:
+    """Points (n, 3) [m] whose bounds are those of a shape."""
+    if shape.kind == "mesh":
+        import trimesh
+
+        path = Path(shape.mesh or "")
+        load: Any = trimesh.load
+        mesh = load(BytesIO(readable(path)), path.suffix.lower().removeprefix("."), force="mesh")
+        return np.asarray(mesh.bounds) * (shape.size or (1.0, 1.0, 1.0))
+    if shape.kind == "label":
+        return np.zeros((1, 3))
+    edges = shape.size
+    if shape.kind == "cylinder":
+        edges = (2 * shape.size[0], 2 * shape.size[0], shape.size[1])
+    elif shape.kind == "sphere":
+        edges = (2 * shape.size[0],) * 3
+    x, y, z = (edge / 2 for edge in edges)
+    return np.array([(i, j, k) for i in (-x, x) for j in (-y, y) for k in (-z, z)])
+
+
+def packed(tracks: BodyTracks) -> bytes:
+    """The content of a `frames.npz`: arrays `names`, `times_s`, `poses`, `low` and `high` as `BodyTracks` has them."""
+    data = BytesIO()
+    arrays: Mapping[str, Any] = {
+        "names": np.array(tracks.names),
+        "times_s": tracks.times_s,
+        "poses": tracks.poses.astype(np.float32),
+        "low": tracks.low,
+        "high": tracks.high,
+    }
+    np.savez_compressed(data, **arrays)
+    return data.getvalue()
+
+
+def read_tracks(path: Path) -> BodyTracks:
+    """The tracks in a file. Raises BadInput for one that is missing, damaged, or larger than any run's."""
+    try:
+        data = read_limited(path)
+        with ZipFile(BytesIO(data)) as archive:
+            size = sum(entry.file_size for entry in archive.infolist())
+        if size > MAX_BYTES:
+            raise ValueError(f"it unpacks to {size} bytes: allowed are {MAX_BYTES}")
+        with np.load(BytesIO(data), allow_pickle=False) as arrays:
+            names = tuple(str(name) for name in arrays["names"])
+            times_s, poses, low, high = (
+                np.asarray(arrays[name], dtype=np.float64) for name in ("times_s", "poses", "low", "high")
+            )
+    except OSError as error:
+        raise BadInput(f"'{path}' cannot be read: {error.strerror or error}") from None
+    except (ValueError, KeyError, BadZipFile, EOFError, MemoryError, NotImplementedError, RuntimeError) as error:
+        raise BadInput(f"'{path}' holds no frames of a run: {' '.join(str(error).split())[:120]}") from None
+    _check(path, names, (times_s, poses, low, high))
+    return BodyTracks(names, times_s, poses, low, high)
+
+
+def _check(path: Path, names: Sequence[str], arrays: Sequence[Array]) -> None:
+    times_s, _poses, _low, _high = arrays
+    bodies = len(names)
+    wanted = ((len(times_s),), (len(times_s), bodies, 7), (bodies, 3), (bodies, 3))
+    shapes = tuple(array.shape for array in arrays)
+    if shapes != wanted or not len(times_s) or len(set(names)) != bodies:
+        raise BadInput(f"'{path}' holds no frames of a run: arrays of {shapes} for {bodies} bodies")
+    if not all(np.isfinite(array).all() for array in arrays) or (np.diff(times_s) < 0).any():
+        raise BadInput(f"'{path}' holds no frames of a run: numbers that are not finite, or times that run back")

@@ -1,0 +1,254 @@
+"""A part of two stations and a machine, by frames that a reader can follow: what the audit says of it."""
+
+from collections.abc import Sequence
+from math import cos, sin
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from lab.audit.audit import audit, measured_rows
+from lab.audit.rules import Evidence, Struck
+from lab.audit.tracks import BodyTracks, packed, read_tracks
+from lab.errors import BadInput
+from lab.tasks.task import Task
+
+HALF_M = 0.02  # of a cube's edge
+TOPS = {"in": 0.01, "oven": 0.05, "out": 0.01}  # [m]
+AT = {"in": (0.4, 0.5), "oven": (0.6, 0.0), "out": (0.4, -0.5)}
+
+
+def a_task(**oven: Any) -> Task:
+    """Cubes go from 'in' through an oven of 20 s to 'out'."""
+    robot = {"start": "in", "speed_m_s": 0.5, "acceleration_m_s2": 1.0}
+    stations = [
+        {"name": "in", "kind": "storage", "pose": [*AT["in"], 0.0], "capacity": 2, "size_m": [0.2, 0.2, TOPS["in"]]},
+        {"name": "oven", "kind": "machine", "pose": [*AT["oven"], 0.0], "capacity": 1, "processing_s": 20.0}
+        | {"size_m": [0.1, 0.1, TOPS["oven"]]}
+        | oven,
+        {"name": "out", "kind": "storage", "pose": [*AT["out"], 0.0], "capacity": 2, "size_m": [0.2, 0.2, TOPS["out"]]},
+    ]
+    part = {"name": "cube", "shape": "box", "size_m": [2 * HALF_M] * 3, "mass_kg": 0.1, "count": 2}
+    return Task.model_validate(
+        {
+            "name": "cubes",
+            "robot": robot,
+            "workspace": {"lower_m": [-0.2, -0.8, 0.15], "cell_m": [0.1, 0.1, 0.1], "shape": [10, 16, 3]},
+            "stations": stations,
+            "parts": [part | {"routes": [["in", "oven", "out"]]}],
+        }
+    )
+
+
+Way = Sequence[tuple[float, str]]  # from when on it is where; "": in the air
+ONE: Way = ((0, "in"), (2, ""), (4, "oven"), (26, ""), (28, "out"))
+TWO: Way = ((0, "in"), (32, ""), (34, "oven"), (56, ""), (58, "out"))
+END_S = 60.0
+
+
+def tracks_of_ways(ways: Sequence[Way]) -> BodyTracks:
+    """Frames every 0.1 s in which cube n goes its way; in the air it moves along, over all."""
+    times_s = np.arange(0.0, END_S + 0.05, 0.1)
+    names = (*AT, *(f"cube {n}" for n in range(1, len(ways) + 1)))
+    poses = np.zeros((len(times_s), len(names), 7))
+    poses[..., 6] = 1.0
+    low, high = np.full((len(names), 3), -HALF_M), np.full((len(names), 3), HALF_M)
+    for number, station in enumerate(AT):
+        poses[:, number, :3] = (*AT[station], TOPS[station] / 2)
+        half = (0.05, 0.05, TOPS[station] / 2) if station == "oven" else (0.1, 0.1, TOPS[station] / 2)
+        low[number], high[number] = -np.array(half), half
+    for number, way in enumerate(ways):
+        for now, at_s in enumerate(times_s):
+            station = [where for since_s, where in way if since_s <= at_s + 1e-9][-1]
+            beside = 0.05 * (number if station != "oven" else 0)
+            place = (
+                (AT[station][0] + beside, AT[station][1], TOPS[station] + HALF_M) if station else (at_s / 60, 0.3, 0.4)
+            )
+            poses[now, len(AT) + number, :3] = place
+    return BodyTracks(names, times_s, poses, low, high)
+
+
+def rows_of_ways(ways: Sequence[Way]) -> list[dict[str, Any]]:
+    """What a schedule says of such ways: each flight is a carry, each stay in the oven a process."""
+    rows = []
+    for number, way in enumerate(ways, start=1):
+        for before, air, after in zip(way, way[1:], way[2:], strict=False):
+            if not air[1]:
+                rows.append(_row(number, "carry", before[1], after[1], air[0], after[0]))
+            elif air[1] == "oven":
+                rows.append(_row(number, "process", "oven", "oven", air[0], min(air[0] + 20, after[0])))
+    return rows
+
+
+def _row(number: int, operation: str, station: str, target: str, start_s: float, end_s: float) -> dict[str, Any]:
+    names = ("part", "operation", "station", "target", "start_s", "end_s")
+    return dict(zip(names, (f"cube {number}", operation, station, target, start_s, end_s), strict=True))
+
+
+def evidence(ways: Sequence[Way] = (ONE, TWO), struck: Sequence[Struck] = (), **oven: Any) -> Evidence:
+    """A run of two cubes that says that both are delivered."""
+    claimed = [f"cube {n}" for n in range(1, len(ways) + 1)]
+    order = ("cube",) * len(ways)
+    return Evidence(a_task(**oven), order, tracks_of_ways(ways), rows_of_ways(ways), claimed, struck)
+
+
+def found(case: Evidence) -> list[tuple[str, str, str]]:
+    """The findings: rule, part, station."""
+    return [(one.rule, one.part, one.station) for one in audit(case).findings]
+
+
+def test_a_run_that_is_right_is_delivered() -> None:
+    result = audit(evidence())
+    assert result.findings == ()
+    assert result.failure is None
+    assert result.delivered == result.claimed == ("cube 1", "cube 2")
+    stays = [
+        (row["station"], row["start_s"], row["end_s"]) for row in result.to_json()["stays"] if row["part"] == "cube 1"
+    ]
+    assert stays == [("in", 0.0, 1.9), ("oven", 4.0, 25.9), ("out", 28.0, 60.0)]
+
+
+def test_too_short_in_the_machine() -> None:
+    short: Way = ((0, "in"), (2, ""), (4, "oven"), (14, ""), (16, "out"))
+    result = audit(evidence((short, TWO)))
+    assert found(evidence((short, TWO))) == [("processing", "cube 1", "oven")]
+    assert result.delivered == ("cube 2",)
+    assert "cube 1" in str(result.failure)
+    assert "oven" in str(result.failure)
+    assert "20" in str(result.failure)
+
+
+def test_too_long_in_the_machine() -> None:
+    assert found(evidence(at_most_s=8.0)) == []
+    late: Way = ((0, "in"), (2, ""), (4, "oven"), (29, ""), (31, "out"))
+    assert found(evidence((late, TWO), at_most_s=3.0)) == [("window", "cube 1", "oven")]
+
+
+def test_a_slow_machine_is_done_when_the_schedule_says() -> None:
+    late: Way = ((0, "in"), (2, ""), (4, "oven"), (29, ""), (31, "out"))
+    case = evidence((late, TWO), [Struck("machine slow", "", "oven")], at_most_s=3.0)
+    for row in case.rows:
+        if row["part"] == "cube 1" and row["operation"] == "process":
+            row["end_s"] = 28.0
+    assert found(case) == []
+
+
+def test_a_station_left_out_or_in_the_wrong_order() -> None:
+    never: Way = ((0, "in"), (2, ""), (4, "out"))
+    assert ("route", "cube 1", "oven") in found(evidence((never, TWO)))
+    swapped: Way = ((0, "in"), (2, ""), (4, "out"), (6, ""), (8, "oven"), (30, ""), (31, "in"))
+    rules = {rule for rule, part, _ in found(evidence((swapped, TWO))) if part == "cube 1"}
+    assert {"route", "end"} <= rules
+    there_and_back: Way = ((0, "in"), (2, ""), (4, "out"), (6, ""), (8, "oven"), (30, ""), (31, "out"))
+    assert ("route", "cube 1", "out") in found(evidence((there_and_back, TWO)))
+
+
+def test_an_overfull_machine() -> None:
+    early: Way = ((0, "in"), (18, ""), (20, "oven"), (56, ""), (58, "out"))
+    assert set(found(evidence((ONE, early)))) == {("capacity", "cube 1", "oven"), ("capacity", "cube 2", "oven")}
+    assert found(evidence((ONE, early), capacity=2)) == []
+
+
+def test_two_parts_in_one_gripper() -> None:
+    ways: tuple[Way, Way] = (ONE, ((0, "in"), (1, ""), (34, "oven"), (56, ""), (58, "out")))
+    assert {("gripper", "cube 1", ""), ("gripper", "cube 2", "")} <= set(found(evidence(ways)))
+
+
+@pytest.mark.parametrize(("angle", "right"), [(0.05, True), (0.3, False)])
+def test_a_part_that_leans_in_the_end(angle: float, right: bool) -> None:
+    case = evidence()
+    case.tracks.poses[-1, case.tracks.number("cube 2"), 3:] = (sin(angle / 2), 0.0, 0.0, cos(angle / 2))
+    case.__post_init__()
+    assert (found(case) == []) is right
+    assert all(rule == "end" and part == "cube 2" for rule, part, _ in found(case))
+
+
+def test_a_part_that_is_not_at_the_end_of_its_route() -> None:
+    assert ("end", "cube 2", "out") in found(evidence((ONE, TWO[:3])))
+
+
+def test_a_part_beside_the_spots_of_its_last_station() -> None:
+    case = evidence((ONE,))
+    stations = [
+        station.model_copy(update={"spots": ((0.05, 0.05, 0.0), (-0.05, 0.0, 0.0))})
+        if station.name == "out"
+        else station
+        for station in case.task.stations
+    ]
+    task = case.task.model_copy(update={"stations": tuple(stations)})
+    assert found(Evidence(task, case.order, case.tracks, case.rows, case.claimed)) == [("end", "cube 1", "out")]
+
+
+def test_a_schedule_that_tells_another_story() -> None:
+    case = evidence()
+    carry = next(row for row in case.rows if row["part"] == "cube 1")
+    carry |= {"start_s": carry["start_s"] + 6, "end_s": carry["end_s"] + 6}
+    assert {rule for rule, part, _ in found(case)} == {"schedule"}
+    assert {part for _, part, _ in found(case)} == {"cube 1"}
+    case = evidence()
+    case.rows = [row for row in case.rows if row["part"] != "cube 2"]
+    assert {(rule, part) for rule, part, _ in found(case)} == {("schedule", "cube 2")}
+    case = evidence()
+    process = next(row for row in case.rows if row["operation"] == "process")
+    process["end_s"] += 5
+    assert ("schedule", "cube 1", "oven") in found(case)
+
+
+def test_what_is_not_claimed_need_not_be_there() -> None:
+    case = evidence((ONE, TWO[:1]))
+    case.claimed = ["cube 1"]
+    assert found(case) == []
+    assert audit(case).delivered == ("cube 1",)
+
+
+def test_a_part_that_was_moved_by_hand_may_stand_elsewhere_meanwhile() -> None:
+    astray: Way = ((0, "in"), (2, "out"), (10, ""), (12, "oven"), (33, ""), (35, "out"))
+    later: Way = ((0, "in"), (36, ""), (37, "oven"), (58, ""), (59, "out"))
+    assert found(evidence((astray, later)))
+    case = evidence((astray, later), [Struck("part moved", "cube 1", "in")])
+    assert [one for one in found(case) if one[1] == "cube 1"] == []
+
+
+def test_frames_are_read_back_as_they_were_written(tmp_path: Path) -> None:
+    tracks, path = evidence().tracks, tmp_path / "frames.npz"
+    path.write_bytes(packed(tracks))
+    again = read_tracks(path)
+    assert again.names == tracks.names
+    for name in ("times_s", "poses", "low", "high"):
+        np.testing.assert_allclose(getattr(again, name), getattr(tracks, name), atol=1e-6)
+
+
+@pytest.mark.parametrize("content", [b"", b"no archive", packed(evidence().tracks)[:-40]])
+def test_frames_that_are_damaged_are_refused(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "frames.npz"
+    path.write_bytes(content)
+    with pytest.raises(BadInput, match=r"frames\.npz"):
+        read_tracks(path)
+    with pytest.raises(BadInput, match="nowhere"):
+        read_tracks(tmp_path / "nowhere.npz")
+
+
+def test_frames_whose_arrays_do_not_fit_are_refused(tmp_path: Path) -> None:
+    tracks = evidence().tracks
+    path = tmp_path / "frames.npz"
+    for wrong in (
+        BodyTracks(tracks.names[:-1], tracks.times_s, tracks.poses, tracks.low, tracks.high),
+        BodyTracks(tracks.names, tracks.times_s[::-1].copy(), tracks.poses, tracks.low, tracks.high),
+        BodyTracks(tracks.names, tracks.times_s, tracks.poses * np.nan, tracks.low, tracks.high),
+    ):
+        path.write_bytes(packed(wrong))
+        with pytest.raises(BadInput, match="no frames of a run"):
+            read_tracks(path)
+
+
+def test_only_measured_rows_are_evidence() -> None:
+    header = "part,product,operation,station,target,resource,robot,start_s,end_s,when\n"
+    text = (
+        header
+        + "cube 1,cube,carry,in,oven,robot,robot,1.5,3.0,planned\ncube 1,cube,carry,in,oven,robot,robot,2,4,measured\n"
+    )
+    (row,) = measured_rows(text)
+    assert (row["part"], row["start_s"], row["end_s"]) == ("cube 1", 2.0, 4.0)
+    with pytest.raises((ValueError, KeyError)):
+        measured_rows(header + "cube 1,cube,carry,in,oven,robot,robot,soon,4,measured\n")
