@@ -50,12 +50,13 @@ class Floor:
         layout: Layout,
         order: Order = (),
         *,
+        parts: int = 0,
         film: bool = False,
         viewer: Viewer | None = None,
     ) -> None:
-        """Build the scene and let it settle; `film` keeps frames, `viewer` sees them live."""
+        """Build the scene and let it settle; `parts`: as `Scene` has it; `film` keeps frames, `viewer` sees them live."""
         self.world, self.skillset = world, skillset
-        self.scene = Scene(world, skillset.task, order, layout)
+        self.scene = Scene(world, skillset.task, order, layout, parts)
         self.bench = Bench(self.scene)
         self.machines = {s.name: Machine(s.name) for s in skillset.task.stations if s.kind == "machine"}
         self.controls, self.stops = Controls(), StopRecord()

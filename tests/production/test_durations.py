@@ -136,6 +136,7 @@ def shifted(task: Task) -> Task:
 CHANGES: dict[str, Change] = {
     "a robot's speed": edit("task", slower),
     "a station's place": edit("task", shifted),
+    "an order": edit("order", lambda order: (*order, "slice")),
     "an obstacle's place": edit("layout", lambda layout: replace(layout, obstacles=((0.5, 0.1), (0.6, 0.201)))),
     "a move": edit("skillset", lambda skills: replace(skills, moves=replace(skills.moves, empty=()))),
     "what is carried": edit(
@@ -156,12 +157,12 @@ def test_the_key_changes_with_whatever_decides(
     make_policy: MakePolicy, task: Task, own_assets: Path, monkeypatch: pytest.MonkeyPatch, what: str
 ) -> None:
     given: dict[str, Any] = {"task": task, "layout": LAYOUT, "skillset": SKILLS, "policies": {"grasp": make_policy()}}
-    given |= {"folder": own_assets.parent, "source": "the source", "engine": "pybullet 3.2.7"}
+    given |= {"order": ("slice",), "folder": own_assets.parent, "source": "the source", "engine": "pybullet 3.2.7"}
 
     def key() -> str:
         monkeypatch.setattr(durations, "source_key", lambda module: given["source"])
         monkeypatch.setattr(durations, "engine", lambda: given["engine"])
-        return durations_key(given["task"], given["layout"], given["skillset"], given["policies"])
+        return durations_key(given["task"], given["layout"], given["skillset"], given["policies"], given["order"])
 
     before = key()
     assert key() == before
@@ -172,8 +173,8 @@ def test_the_key_changes_with_whatever_decides(
 def test_what_decides_nothing_leaves_the_key(make_policy: MakePolicy, task: Task) -> None:
     other = task.model_copy(update={"title": "another", "subtasks": {}})
     moved = replace(LAYOUT, parts=((0.1, 0.0, 0.0),))  # a move is measured with a part on its spot
-    key = durations_key(task, LAYOUT, SKILLS, {"grasp": make_policy()})
-    assert durations_key(other, moved, SKILLS, {"grasp": make_policy()}) == key
+    key = durations_key(task, LAYOUT, SKILLS, {"grasp": make_policy()}, ("slice",))
+    assert durations_key(other, moved, SKILLS, {"grasp": make_policy()}, ("slice",)) == key
 
 
 def test_the_key_looks_for_no_library_but_the_engine(task: Task, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -181,7 +182,7 @@ def test_the_key_looks_for_no_library_but_the_engine(task: Task, monkeypatch: py
     monkeypatch.setattr("importlib.metadata.version", lambda name: pytest.fail(f"{name} was looked for"))
     monkeypatch.setattr("importlib.metadata.packages_distributions", lambda: pytest.fail("libraries were looked for"))
     monkeypatch.setattr(durations, "engine", lambda: "pybullet 3.2.7")
-    durations_key(task, LAYOUT, SKILLS, {})
+    durations_key(task, LAYOUT, SKILLS, {}, ("slice",))
 
 
 def test_the_key_holds_the_source_of_every_package_that_skills_come_from(
@@ -189,5 +190,5 @@ def test_the_key_holds_the_source_of_every_package_that_skills_come_from(
 ) -> None:
     asked = set[str]()
     monkeypatch.setattr(durations, "source_key", lambda module: asked.add(module) or "a")  # type: ignore[func-returns-value]
-    durations_key(task, LAYOUT, replace(SKILLS, skills={"grasp": ALONE[0]}), {})
+    durations_key(task, LAYOUT, replace(SKILLS, skills={"grasp": ALONE[0]}), {}, ("slice",))
     assert asked == {"lab.production.durations", "lab.skills.grasp"}
