@@ -12,12 +12,15 @@ import pytest
 import lab.files
 from lab.errors import BadInput
 from lab.production import durations
-from lab.production.durations import Durations, TimedMove, durations_key
+from lab.production.durations import Durations, TimedMove, cell_of, durations_key, spots_in_use, trials
 from lab.sequencing.cell.routes import NeededMoves
 from lab.sim.scene.places import Layout
+from lab.sim.scene.scene_check import places_of
 from lab.skills import Grasp
+from lab.skills.prepared_scene import Prepared
 from lab.skills.skillset import Carried, SkillSet
-from lab.tasks.task import Task
+from lab.skills.surveys import Surveys
+from lab.tasks.task import Order, Task
 from lab.tasks.task_file import load
 from lab.toolbox.policy import Policy
 
@@ -78,6 +81,46 @@ def test_a_damaged_record_is_refused_in_one_line(table: str, times: Any, says: s
     with pytest.raises(BadInput) as caught:
         Durations.from_json(MEASURED.to_json() | {table: times}, SKILLS)
     assert str(caught.value) == says
+
+
+# ---- the spots that are timed ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("order", "skill", "used"),
+    [
+        (("slice",) * 3, "grasp at plate", [0, 1, 2]),
+        (("slice",) * 3, "place at finished_plate", [0, 1, 2]),
+        (("slice",) * 3, "place at toaster_buffer", [0, 1]),  # one is in the toaster when another one waits
+        (("slice",) * 3, "insert at toaster", [0]),
+        (("slice",), "place at toaster_buffer", [0]),
+        (("slice", "cup", "slice"), "grasp slice at plate", [0, 1]),
+        (("slice", "cup", "slice"), "place cup at tray", [0, 1, 2]),  # beside whatever stands there
+    ],
+)
+def test_only_spots_that_the_order_uses_are_timed(order: Order, skill: str, used: list[int]) -> None:
+    task = load("breakfast" if "cup" in order else "toast")
+    skillset = SkillSet.of(task, order)
+    layout = Layout(tuple(o.position_m for o in task.obstacles), ())
+    prepared = Prepared(task, order, 0, layout, Surveys(task, order, layout), skillset, {})
+    own = skillset.skills[skill]
+    spots = places_of(task).spots(task.station(own.station))
+    assert list(spots_in_use(prepared, own)) == [spots[number] for number in used]
+    assert [trial.at == skill for trial in trials(prepared)].count(True) == (used != [0])
+
+
+def test_kinds_that_share_a_way_share_the_mean_of_its_parts() -> None:
+    """Two slices at 10 s and a cup at 16 s make 12 s."""
+    task, order = load("breakfast"), ("slice", "cup", "slice")
+    skills = SkillSet.of(task, order)
+    loaded = {way: 16.0 if way.kind == "cup" else 10.0 for way in skills.legs}
+    shared = Carried("plate", "tray", "slice"), Carried("plate", "tray", "cup")
+    cell = cell_of(
+        task,
+        Durations(dict.fromkeys(skills.travels, 1.0), loaded | dict(zip(shared, (10.0, 16.0), strict=True)), {}),
+        order,
+    )
+    assert cell.loaded_s[cell.index("plate"), cell.index("tray")] == pytest.approx(12.0)
 
 
 # ---- the key ---------------------------------------------------------------------------------------------------------
