@@ -94,9 +94,7 @@ class Production:
         """
         work, recovery, now_s = self.work, self.recovery, self.floor.now_s
         first = self.sequence[0] if self.sequence and self.floor.bench.held is not None else None
-        ready_s = {
-            part: work.left_s(part) for part in range(1, self.cell.parts + 1) if work.machine_of(part) is not None
-        }
+        ready_s = {part: work.left_s(part) for part in range(1, self.cell.parts + 1) if work.work_on(part) is not None}
         ready_s |= dict.fromkeys(back, 0.0)
         mishaps = Mishaps(frozenset(recovery.lost), tuple(recovery.out), ready_s, back)
         try:
@@ -122,21 +120,21 @@ class Production:
     def watch(self) -> None:
         """After each physics step: tell of machines that are done, and show what they have done to their parts."""
         floor, now_s = self.floor, self.floor.now_s
-        for machine in floor.machines.values():
-            if not machine.part:
-                continue
-            if not machine.told and machine.done(now_s):
-                machine.told = True
-                at_most_s = self.work.at_most_s(machine.part, machine.station)
-                machine.burns_s = NEVER if at_most_s is None else now_s + at_most_s
-                self.tell(MachineDone(machine.station, machine.part, now_s))
-                if machine.skill is None and floor.skillset.task.station(machine.station).finish is not None:
-                    self._show(finish_name(machine.part, machine.station))
-            if now_s > machine.burns_s:
-                machine.burns_s = NEVER
-                self._show(burnt_name(machine.part, machine.station))
-            if machine.skill is not None and machine.moves:
-                self._show(*machine.skill.shown())
+        for work in (work for machine in floor.machines.values() for work in machine.works.values()):
+            if not work.told and work.done(now_s):
+                work.told = True
+                if work.skill is not None:
+                    work.until_s = now_s
+                at_most_s = self.work.at_most_s(work.part, work.station)
+                work.burns_s = NEVER if at_most_s is None else now_s + at_most_s
+                self.tell(MachineDone(work.station, work.part, now_s))
+                if work.skill is None and floor.skillset.task.station(work.station).finish is not None:
+                    self._show(finish_name(work.part, work.station))
+            if now_s > work.burns_s:
+                work.burns_s = NEVER
+                self._show(burnt_name(work.part, work.station))
+            if work.skill is not None and work.moves:
+                self._show(*work.skill.shown())
 
     def _show(self, *names: str) -> None:
         if self.floor.recorder is not None:

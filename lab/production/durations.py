@@ -16,7 +16,9 @@ from lab.production.floor import Floor
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.stations import one_robot
 from lab.sim import urdf_reader
+from lab.sim.parts.kinds import Spot, on_its_pallet
 from lab.sim.scene.places import Layout
+from lab.sim.scene.scene import ABOVE_FOOT_M
 from lab.sim.world import TIME_STEP, World, engine
 from lab.skills import Skill
 from lab.skills.prepared_scene import Prepared
@@ -42,13 +44,18 @@ class TimedMove(NamedTuple):
 
 @dataclass(frozen=True)
 class Durations:
-    """Measured times [s]: the robot's moves, empty and with what it carries; its services, and what machines take."""
+    """Measured times [s]: the robot's moves, empty and with what it carries; its services, and what machines take.
+
+    A move with a part takes what it does in the mean over the spots that the order uses at both ends. more_s: of trials only,
+    by skill: how much longer it takes in the mean over its station's spots in use than on the first.
+    """
 
     empty_s: dict[Pair, float]
     loaded_s: dict[Carried, float]
     process_s: dict[str, float]
     service_s: dict[Pair, float] = field(default_factory=dict)
     sim_s: float = 0.0
+    more_s: dict[str, float] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, dict[str, float]]:
         """Plain dicts: 'origin > target' or 'origin > target with kind' -> seconds."""
@@ -82,6 +89,7 @@ class Durations:
             self.process_s | other.process_s,
             self.service_s | other.service_s,
             self.sim_s + other.sim_s,
+            self.more_s | other.more_s,
         )
 
     @classmethod
@@ -133,18 +141,29 @@ def _times(record: Mapping[str, Any], table: str, wanted: set[str]) -> dict[str,
 
 @dataclass(frozen=True)
 class Trial:
-    """What is timed in one world of its own: a way with a part and the process behind it, empty ways, or a service."""
+    """What is timed in one world of its own: a way with a part and the process behind it, empty ways, or a service.
+
+    at: a skill that takes parts up or sets them down, on the spots of its station that the order uses.
+    """
 
     loaded: Carried | None = None
     process: bool = False
     empty: tuple[Pair, ...] = ()
     service: Pair | None = None
+    at: str = ""
+    spots: tuple[Spot, ...] = ()
 
 
-def trials(skillset: SkillSet) -> list[Trial]:
-    """What times every move of these skills once; each trial can be made beside the others."""
-    timed = set[str]()
-    made = list[Trial]()
+def trials(prepared: Prepared) -> list[Trial]:
+    """What times every move once, and its ends on every spot that the order uses; each trial can be made beside the others."""
+    skillset, timed = prepared.skillset, set[str]()
+    ends = dict.fromkeys(skill for leg in skillset.legs.values() for skill in leg if skill.station and skill.kind)
+    used = ((skill, spots_in_use(prepared, skill)) for skill in ends)
+    made = [
+        Trial(at=skill.name, spots=spots)
+        for skill, spots in used
+        if {*spots} != {prepared.surveys.places.spots(prepared.task.station(skill.station))[0]}
+    ]
     for way in skillset.legs:
         made.append(Trial(loaded=way, process=bool(skillset.processes[way.target]) and way.target not in timed))
         timed.add(way.target)
@@ -153,16 +172,38 @@ def trials(skillset: SkillSet) -> list[Trial]:
     return made + [Trial(empty=tuple(pair for pair in skillset.travels if pair[0] == origin)) for origin in origins]
 
 
+def spots_in_use(prepared: Prepared, skill: Skill) -> tuple[Spot, ...]:
+    """The spots on which a skill takes parts of an order up, or sets them down.
+
+    A station is filled from its first spot on, and a buffer where parts wait for a station only while another one is there.
+    """
+    task, order, places = prepared.task, prepared.order, prepared.surveys.places
+    station, kind = task.station(skill.station), task.made_as(skill.kind).name
+    first, *others = places.spots(station)
+    if not skill.carries and task.starts(kind) == station.name:
+        begins = (spot for name, spot in zip(order, places.begins(order), strict=True) if name == kind)
+        return tuple(begins)
+    routes = {name: task.part(name).routes for name in order}
+    parts = sum(station.name in task.part(name).places for name in order)
+    waits = all(stage.station != station.name for own in routes.values() for route in own for stage in route)
+    return first, *others[: max(0, parts - 1 - waits)]
+
+
 def measure(
     prepared: Prepared, on_move: Callable[[str, float], None] | None = None, workers: Workers | None = None
 ) -> Durations:
-    """Carry every needed move out once in simulation and time it [s]; WorkFailed when one does not succeed.
+    """Carry every needed move out in simulation and time it [s]; WorkFailed when one does not succeed.
 
-    Each trial has a world of its own, so that the times do not depend on how many processes share the trials.
+    A way with a part leads from the tool's rest over one station to that over the other. So what it takes between other
+    spots is what it takes between the first ones, and what taking up and setting down take more there; that is timed once
+    for all ways that begin or end so. Each trial has a world of its own, so that the times do not depend on how many
+    processes share the trials.
     """
-    tell, skillset, timed = on_move or (lambda name, seconds: None), prepared.skillset, trials(prepared.skillset)
+    tell, skillset, timed = on_move or (lambda name, seconds: None), prepared.skillset, trials(prepared)
     whole = Durations({}, {}, {})
     for found in (workers or Workers()).each(partial(carried_out, prepared), timed):
+        for carried in found.loaded_s:
+            found.loaded_s[carried] += sum(whole.more_s.get(skill.name, 0.0) for skill in skillset.legs[carried])
         for way, seconds in (found.loaded_s | found.empty_s).items():
             tell(f"{_word(way)}, {'loaded' if isinstance(way, Carried) else 'empty'}", seconds)
         for station, seconds in found.process_s.items():
@@ -170,14 +211,14 @@ def measure(
         for own, seconds in found.service_s.items():
             tell(_service(own), seconds)
         whole = whole.joined(found)
-    return whole
+    return replace(whole, more_s={})
 
 
 def carried_out(prepared: Prepared, trial: Trial) -> Durations:
     """What one trial times [s]; WorkFailed when a move does not succeed."""
     skillset = prepared.skillset
     with World() as world:
-        floor = Floor(world, skillset, prepared.surveys.layout)
+        floor = Floor(world, skillset, prepared.surveys.layout, parts=len(prepared.order))
         found = Durations({}, {}, {})
         if trial.loaded is not None:
             leg = skillset.legs[trial.loaded]
@@ -196,26 +237,59 @@ def carried_out(prepared: Prepared, trial: Trial) -> Durations:
             skills = skillset.services[trial.service]
             skills[0].begin(floor.bench)
             found.service_s[trial.service] = _timed(floor, skills)
+        if trial.at:
+            found.more_s[trial.at] = _more_s(floor, skillset.skills[trial.at], trial.spots)
         return replace(found, sim_s=world.steps * TIME_STEP)
 
 
-def _timed(floor: Floor, skills: Sequence[Skill], part: str = "") -> float:
-    """How long skills take one after the other with the part that they are tried with [s]; WorkFailed."""
+def _more_s(floor: Floor, skill: Skill, spots: Sequence[Spot]) -> float:
+    """How much longer a skill takes in the mean over spots of its station than on the first of them [s]; WorkFailed.
+
+    As many parts are there as spots: they are taken up one after the other and put back at once, or set down.
+    """
+    scene, bench, pose, times = floor.scene, floor.bench, skill.begins_at(), dict[Spot, float]()
+    task, own = scene.task, scene.task.made_as(skill.kind)
+    first = scene.places.spots(task.station(skill.station))[0]
+    feet = {
+        f"{own.name} {n}": (spot, scene.places.raised(skill.kind, task.station(skill.station), spot))
+        for n, spot in enumerate(dict.fromkeys((first, *spots)), start=1)
+    }
+    assert pose is not None
+    for name, (spot, foot) in feet.items():
+        if on_its_pallet(task, skill.kind, skill.station):
+            scene.add(name, str(own.pallet), spot)
+        if not skill.carries:
+            scene.add(name, skill.kind, foot)
+            if bench.sight is not None:
+                bench.sight.where[scene.body_of(name, skill.kind)] = foot
+    for name, (spot, foot) in feet.items():
+        floor.stand(pose)
+        if skill.carries:
+            bench.hold(name, skill.kind, pose)
+        times[spot] = _timed(floor, [skill], name, spot)
+        if not skill.carries:
+            bench.held = None
+            scene.put(name, skill.kind, scene.kinds[skill.kind].held_at(foot.raised(ABOVE_FOOT_M)))
+    return sum(times[spot] for spot in spots) / len(spots) - times[first]
+
+
+def _timed(floor: Floor, skills: Sequence[Skill], part: str = "", spot: Spot | None = None) -> float:
+    """How long skills take one after the other with a part, set down on a spot, by default the first [s]; WorkFailed."""
     start = floor.now_s
     for skill in skills:
-        if floor.run(skill.aim(part)) is not Status.SUCCESS:
+        if floor.run(skill.aim(part, spot)) is not Status.SUCCESS:
             raise WorkFailed(f"measuring '{skill.name}': {skill.reason}")
     return floor.now_s - start
 
 
 def cell_of(task: Task, durations: Durations, order: Order) -> Cell:
-    """The sequencing problem that the measured durations make; kinds that share a way share its mean time."""
+    """The sequencing problem that the measured durations make; parts of all kinds that share a way share its mean time."""
     places = stations(task, durations.process_s)
     names = [place.name for place in places]
     wanted = [part for part in task.made if part.name in order]
     shared: dict[Pair, list[float]] = {}
     for way, seconds in durations.loaded_s.items():
-        shared.setdefault(way[:2], []).append(seconds)
+        shared.setdefault(way[:2], []).extend([seconds] * order.count(task.made_as(way.kind).name))
     tables = []
     for times in (durations.empty_s, {pair: sum(all_s) / len(all_s) for pair, all_s in shared.items()}):
         table = np.full((len(names), len(names)), np.nan)
@@ -250,14 +324,16 @@ def kept_durations(toolbox: Toolbox, key: str, skillset: SkillSet) -> Durations 
         raise BadInput(f"record '{key}' in toolbox {toolbox.address}: {error}") from None
 
 
-def durations_key(task: Task, layout: Layout, skillset: SkillSet, policies: Mapping[str, Policy]) -> str:
+def durations_key(task: Task, layout: Layout, skillset: SkillSet, policies: Mapping[str, Policy], order: Order) -> str:
     """A hash (24 hex digits) of all that the durations depend on.
 
-    These are the task and its files, the layout, the moves, the policies, the assets, all source of the lab and of the
-    packages that its skills come from, and the physics engine. Raises WorkFailed when that or a source is not found.
+    These are the task and its files, the order, for it says which spots are used, the layout, the moves, the policies, the
+    assets, all source of the lab and of the packages that its skills come from, and the physics engine. Raises WorkFailed
+    when that or a source is not found.
     """
     decides = {
         "task": task.model_dump(mode="json", exclude={"name", "title", "sequencing", "subtasks", "faults"}),
+        "order": order,
         "obstacles": layout.obstacles,
         "moves": [asdict(skillset.moves), [*skillset.legs]],
         "policies": {name: [policy.signature, _hash(policy.q.tobytes())] for name, policy in policies.items()},

@@ -7,7 +7,7 @@ from time import perf_counter
 
 from lab.errors import WorkFailed
 from lab.production.controls import Controls, StopKind
-from lab.production.machine import Machine
+from lab.production.machine import Machine, Work
 from lab.production.recorder import Recorder, Viewer, extras_of
 from lab.production.stop_record import StopRecord
 from lab.sim.arms.kinematics import ToolPose
@@ -50,12 +50,13 @@ class Floor:
         layout: Layout,
         order: Order = (),
         *,
+        parts: int = 0,
         film: bool = False,
         viewer: Viewer | None = None,
     ) -> None:
-        """Build the scene and let it settle; `film` keeps frames, `viewer` sees them live."""
+        """Build the scene and let it settle; `parts`: as `Scene` has it; `film` keeps frames, `viewer` sees them live."""
         self.world, self.skillset = world, skillset
-        self.scene = Scene(world, skillset.task, order, layout)
+        self.scene = Scene(world, skillset.task, order, layout, parts)
         self.bench = Bench(self.scene)
         self.machines = {s.name: Machine(s.name) for s in skillset.task.stations if s.kind == "machine"}
         self.controls, self.stops = Controls(), StopRecord()
@@ -265,17 +266,26 @@ class Floor:
             return f"{StopKind.PROTECTIVE} stop: {too_hard}"
         return ""
 
-    def begin(self, station: str, part: str, seconds: float) -> Machine:
+    def begin(self, station: str, part: str, seconds: float) -> Work:
         """Let a machine begin with a part: with its learned process, or for so long [s]."""
-        machine, skills = self.machines[station], self.skillset.processes[station]
-        machine.begin(part, self.now_s, seconds, skills)
-        self.again(machine)
-        return machine
+        skills = self.skillset.processes[station]
+        work = self.machines[station].begin(part, self.now_s, seconds, skills[0] if skills else None)
+        self.again(work)
+        return work
 
-    def again(self, machine: Machine) -> None:
+    def again(self, work: Work) -> None:
         """Let a machine carry its process out, from the beginning."""
-        if machine.skill is not None:
-            machine.start(self.bench, self.skillset.policies[machine.skill.name])
+        if work.skill is not None:
+            work.start(self.bench, self.skillset.policies[work.skill.name])
+
+    def work_on(self, part: str) -> Work | None:
+        """What the machine that a part stands in does with it, or has done; None where it stands in none."""
+        return next((m.works[part] for m in self.machines.values() if part in m.works), None)
+
+    def take_out(self, part: str) -> None:
+        """A part is not in any machine any more."""
+        for machine in self.machines.values():
+            machine.clear(part)
 
     def stand(self, pose: ToolPose) -> None:
         """Put the open gripper at once to a pose, to begin there."""

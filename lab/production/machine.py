@@ -1,6 +1,5 @@
-"""A machine at work on the part that stands in it: for a time, or with its learned process; it says when it is done."""
+"""A machine at work on the parts that stand in it, each by a clock of its own or with its learned process."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from lab.skills import Skill
@@ -11,29 +10,21 @@ NEVER = float("inf")
 
 
 @dataclass
-class Machine:
-    """One machine: idle, busy, done, or failed; what the controller reads is its inputs `done` and `failed`.
+class Work:
+    """What a machine, `station`, does with one part.
 
-    share: of its time that it really takes; fails: it never ends: both are what a fault sets. part: what it works on, or
-    has worked on, "" for none. until_s: when it is done with it by the clock [s]; of a learned process, `skill`, the
-    motion decides. burns_s: when the part is spoilt that is still in it then [s].
+    begun_s: since when [s]; expected_s: when it should be done [s]; until_s: when it is done by the clock [s]; of a learned
+    process, `skill`, the motion decides. burns_s: when the part is spoilt if it is still in the machine then [s].
     """
 
     station: str
-    share: float = 1.0
-    fails: bool = False
-    part: str = ""
-    until_s: float = 0.0
+    part: str
+    begun_s: float
+    expected_s: float
+    until_s: float
     skill: Skill | None = None
     burns_s: float = NEVER
-    told: bool = field(default=True, repr=False)  # that it is done
-    _due: float = field(default=0.0, repr=False)  # steps of its process
-
-    def begin(self, part: str, now_s: float, seconds: float, skills: Sequence[Skill] = ()) -> None:
-        """Begin to work on a part: for `seconds` [s], or with the process, which `start` then carries out."""
-        self.part, self.told, self.burns_s = part, False, NEVER
-        self.skill = skills[0].aim(part) if skills else None
-        self.until_s = NEVER if self.fails else now_s + (0.0 if skills else seconds * self.share)
+    told: bool = field(default=False, repr=False)  # that it is done
 
     def start(self, bench: Bench, policy: Policy) -> None:
         """Carry its process out, from the beginning."""
@@ -42,7 +33,7 @@ class Machine:
 
     @property
     def moves(self) -> bool:
-        """Whether its head is in motion."""
+        """Whether the machine's head is in motion."""
         return self.skill is not None and self.skill.status is Status.RUNNING
 
     @property
@@ -50,22 +41,64 @@ class Machine:
         """Why its process failed; "" when it did not."""
         return self.skill.reason if self.skill is not None and self.skill.status is Status.FAILURE else ""
 
+    def done(self, now_s: float) -> bool:
+        """Whether the machine has finished the part."""
+        return now_s >= self.until_s and not (self.moves or self.failed)
+
+
+@dataclass
+class Machine:
+    """One machine, with a clock for each part in it; what the controller reads are its inputs `done` and `failed`.
+
+    share: of its time that it really takes; fails: it never ends: both are what a fault sets. works: what it does with each
+    part that stands in it, by the part's name, in the order in which they were brought.
+    """
+
+    station: str
+    share: float = 1.0
+    fails: bool = False
+    works: dict[str, Work] = field(default_factory=dict)
+    _due: float = field(default=0.0, repr=False)  # steps of its process
+
+    def begin(self, part: str, now_s: float, seconds: float, skill: Skill | None = None) -> Work:
+        """Begin to work on a part: for `seconds` [s], or with the process, which `Work.start` then carries out."""
+        own = None if skill is None else skill.aim(part)
+        until_s = NEVER if self.fails else now_s + (seconds * self.share if skill is None else 0.0)
+        self.works[part] = Work(self.station, part, now_s, now_s + seconds, until_s, own)
+        return self.works[part]
+
+    @property
+    def moves(self) -> bool:
+        """Whether its head is in motion."""
+        return any(work.moves for work in self.works.values())
+
+    def slow_down(self, share: float, now_s: float) -> None:
+        """Take so many times as long from now on, also for what is left to do with the parts in it."""
+        for work in self.works.values():
+            if work.until_s > now_s:
+                work.until_s = now_s + (work.until_s - now_s) * share / self.share
+        self.share = share
+
+    def fail(self, now_s: float) -> None:
+        """Never be done from now on; what is done by now stays so."""
+        self.fails = True
+        for work in self.works.values():
+            if not work.done(now_s):
+                work.until_s = NEVER
+
     def step(self) -> None:
         """Set what the next physics step needs; a slow machine's process stands still in some of them."""
-        if self.skill is None and self.share == 1.0:
+        skills = [work.skill for work in self.works.values() if work.skill is not None]
+        if not skills and self.share == 1.0:
             return
         self._due += 1.0 / self.share
-        if self.skill is not None and not self.fails and self._due >= 1.0:
-            self.skill.step()
+        if self._due >= 1.0 and not self.fails:
+            for skill in skills:
+                skill.step()
         self._due %= 1.0
 
-    def done(self, now_s: float) -> bool:
-        """Whether it has finished its part."""
-        return bool(self.part) and now_s >= self.until_s and not (self.moves or self.failed)
-
-    def clear(self) -> None:
-        """The part has been taken out."""
-        self.part, self.told = "", True
-        if self.skill is not None:
-            self.skill.stop()
-            self.skill = None
+    def clear(self, part: str) -> None:
+        """A part has been taken out."""
+        work = self.works.pop(part, None)
+        if work is not None and work.skill is not None:
+            work.skill.stop()

@@ -138,9 +138,9 @@ class Recovery:
             return
         self._tell(trouble, "tries again")
         self._wait(PAUSES_S[tries])
-        machine = self.work.floor.machines.get(trouble.station)
-        if machine is not None and machine.failed:
-            self.work.floor.again(machine)
+        work = self.work.floor.work_on(trouble.part)
+        if work is not None and work.station == trouble.station and work.failed:
+            self.work.floor.again(work)
 
     def _wait_for_camera(self, trouble: Trouble) -> None:
         self._tell(trouble, "waits until the camera sees again")
@@ -193,14 +193,13 @@ class Recovery:
 
     def _leave(self, part: int, seen: Deviation) -> None:
         """A part that cannot be taken up is left; where it lies in a machine, that is closed."""
-        machine = self.work.machine_of(part)
+        work = self.work.work_on(part)
         place = self.work.plan.locations[part - 1]
-        if (machine is None or machine.done(self.work.floor.now_s)) and place < len(self.work.cell.laid_out):
+        if (work is None or work.done(self.work.floor.now_s)) and place < len(self.work.cell.laid_out):
             self._missing[part] = place
-        if machine is not None and seen.sort == "part fallen":
-            self.out[machine.station] = f"{seen.name} lies in '{machine.station}'"
-        if machine is not None:
-            machine.clear()
+        if work is not None and seen.sort == "part fallen":
+            self.out[work.station] = f"{seen.name} lies in '{work.station}'"
+        self.work.floor.take_out(self.work.name(part))
         self._lose(part, f"{seen.words}: {TO_DO[seen.sort]}")
         self._tell_seen(seen, "leaves it")
 
@@ -213,17 +212,16 @@ class Recovery:
         if other := too_near(self.work.floor.bench, seen.name):
             self._leave(part, replace(seen, words=f"{seen.words}, too near to {other} to be taken up"))
             return
-        work, machine, answer = self.work, self.work.machine_of(part), "takes it up there"
-        unfinished = machine is not None and not machine.done(work.floor.now_s)
+        work, begun, answer = self.work, self.work.work_on(part), "takes it up there"
+        unfinished = begun is not None and not begun.done(work.floor.now_s)
         if unfinished or part in work.finished:
             answer = "puts it back"
             work.to_put_back.append(part)
         else:
             work.spot_of[seen.name] = seen.at
-        if machine is not None:
-            if not unfinished and self._right_s < machine.until_s:
-                self._note(f"{seen.name} was taken out of '{machine.station}': whether it was done there was not seen")
-            machine.clear()
+        if begun is not None and not unfinished and self._right_s < begun.until_s:
+            self._note(f"{seen.name} was taken out of '{begun.station}': whether it was done there was not seen")
+        work.floor.take_out(work.name(part))
         self._tell_seen(seen, answer)
 
     def _learn_again(self, fixed: Sequence[Deviation]) -> None:
@@ -242,7 +240,7 @@ class Recovery:
         part = self._part_of(trouble.part)
         if floor.bench.held is not None or part is None:
             raise RunStopped(text)
-        if (machine := floor.machines.get(trouble.station)) is not None and machine.part == trouble.part:
+        if (work := floor.work_on(trouble.part)) is not None and work.station == trouble.station:
             self.out[trouble.station] = why
             self.work.tell(MachineFailed(trouble.station, trouble.part, why, floor.now_s))
         self._tell(trouble, "goes on without it")

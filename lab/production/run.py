@@ -91,7 +91,7 @@ def _durations(
     """
     skillset, key, kept = prepared.skillset, "", None
     try:
-        key = durations_key(prepared.task, prepared.layout, skillset, skillset.policies)
+        key = durations_key(prepared.task, prepared.layout, skillset, skillset.policies, prepared.order)
         record = journal.durations()
         if record is not None:
             return replace(Durations.from_json(record.times, skillset), sim_s=record.sim_s), key

@@ -43,7 +43,7 @@ class PartStatus:
 
 @dataclass
 class MachineStatus:
-    """A machine's light, the part in it ("": none), and when it should be done [s] (None: not known)."""
+    """A machine's light, a part in it ("": none), and when it should be done with that [s] (None: not known)."""
 
     station: str
     light: Light = "idle"
@@ -97,7 +97,8 @@ class RunStatus:
     """A run as it stands: pass it every event (`hear`), let `now_s` follow the floor's clock, show it (`to_json`).
 
     words: what the robot does now, for people. next_station: where the robot goes. move, moves: step n of m, 0 before the
-    first. speed: simulated seconds per second of the clock on the wall, None: as fast as it can.
+    first. machines: one for each machine, and one more for each part beyond the first in it. speed: simulated seconds per
+    second of the clock on the wall, None: as fast as it can.
     """
 
     now_s: float = 0.0
@@ -115,6 +116,7 @@ class RunStatus:
     trouble: list[TroubleStatus] = field(default_factory=list)
     acted: list[ActedStatus] = field(default_factory=list)
     speed: float | None = None
+    _room: dict[str, int] = field(default_factory=dict)  # for parts in each machine
     _target: str = ""  # of the move under way
     _grasped: str = ""  # the part that the robot is taking up
     _grasped_s: float = 0.0  # when that began
@@ -124,7 +126,8 @@ class RunStatus:
     def of(cls, task: Task, order: Order) -> "RunStatus":
         """Before anything has begun: the parts at their first stations, the machines idle."""
         parts = [PartStatus(f"{kind} {number}", kind, task.starts(kind)) for number, kind in enumerate(order, start=1)]
-        return cls(parts=parts, machines=[MachineStatus(s.name) for s in task.stations if s.kind == "machine"])
+        room = {s.name: s.capacity for s in task.stations if s.kind == "machine"}
+        return cls(parts=parts, machines=[MachineStatus(name) for name in room], _room=room)
 
     def hear(self, event: Event) -> None:
         """Take over what happened."""
@@ -182,12 +185,12 @@ class RunStatus:
                 self.finished = sum(other.state == "done" for other in self.parts)
             case PartLost():
                 part.state = "lost"
-                for machine in self.machines:
+                for machine in [*self.machines]:
                     if machine.part == event.part and machine.light != "failed":
                         self._fetched(machine.station, event.part, event.at_s)
 
     def _hear_machine(self, event: MachineBegan | MachineDone | MachineFailed) -> None:
-        machine = self.machine(event.station)
+        machine = self.machine(event.station, event.part)
         match event:
             case MachineBegan():
                 machine.light, machine.part, machine.until_s = "busy", event.part, event.until_s
@@ -199,10 +202,11 @@ class RunStatus:
 
     def _fetched(self, station: str, part: str, at_s: float) -> None:
         """A part was taken out of a machine: what it did with it is history."""
-        for machine in self.machines:
-            if machine.station == station and machine.part == part:
-                self.measured += self._work(machine, at_s)
-                machine.light, machine.part, machine.until_s = "idle", "", None
+        for machine in [one for one in self.machines if (one.station, one.part) == (station, part)]:
+            self.measured += self._work(machine, at_s)
+            machine.light, machine.part, machine.until_s = "idle", "", None
+            if len(self._in(station)) > 1:
+                self.machines = [one for one in self.machines if one is not machine]
 
     def _work(self, machine: MachineStatus, until_s: float) -> list[Activity]:
         """What a machine has done with the part in it, until a time."""
@@ -224,13 +228,20 @@ class RunStatus:
         self.parts.append(PartStatus(name, name.rpartition(" ")[0], ""))
         return self.parts[-1]
 
-    def machine(self, station: str) -> MachineStatus:
-        """The machine called so; one that nobody told of before is made."""
-        for machine in self.machines:
-            if machine.station == station:
+    def machine(self, station: str, part: str = "") -> MachineStatus:
+        """The machine called so with a part, or idle, as long as it has room for that; one that nobody told of is made."""
+        own = self._in(station)
+        for machine in own:
+            if part in ("", machine.part) or not machine.part:
                 return machine
-        self.machines.append(MachineStatus(station))
-        return self.machines[-1]
+        if len(own) >= self._room.get(station, 1) and own:
+            return own[0]
+        at = self.machines.index(own[-1]) + 1 if own else len(self.machines)
+        self.machines.insert(at, MachineStatus(station))
+        return self.machines[at]
+
+    def _in(self, station: str) -> list[MachineStatus]:
+        return [machine for machine in self.machines if machine.station == station]
 
     def so_far(self) -> list[Activity]:
         """What was measured, with what machines are doing now."""
@@ -255,6 +266,11 @@ class RunStatus:
             acted=[*self.acted],
         )
 
+    def _machine_json(self, station: str) -> dict[str, Any]:
+        """A machine with its first part; where there are several in it, `parts` has each."""
+        own = [{"light": m.light, "part": m.part, "until_s": m.until_s} for m in self._in(station)]
+        return {"station": station, **own[0]} | ({"parts": own} if len(own) > 1 else {})
+
     def to_json(self) -> dict[str, Any]:
         """Plain dicts, lists, numbers and strings, for `json.dumps`; activities as `Schedule.to_json` has them."""
         return {
@@ -267,9 +283,7 @@ class RunStatus:
             "moves": self.moves,
             "finished": self.finished,
             "parts": [asdict(part) for part in self.parts],
-            "machines": [
-                {"station": m.station, "light": m.light, "part": m.part, "until_s": m.until_s} for m in self.machines
-            ],
+            "machines": [self._machine_json(name) for name in dict.fromkeys(m.station for m in self.machines)],
             "plan": None if self.plan is None else asdict(self.plan),
             "measured": _rows(self.so_far()),
             "trouble": [asdict(one) for one in self.trouble],

@@ -6,7 +6,7 @@ from math import hypot
 
 from lab.production.durations import TimedMove
 from lab.production.floor import Floor
-from lab.production.machine import Machine
+from lab.production.machine import Work
 from lab.production.perception import moved_unseen
 from lab.production.standing import free_spot, station_near
 from lab.production.trouble import Trouble
@@ -59,13 +59,12 @@ class _UnderWay:
 
 @dataclass
 class Transfers:
-    """Parts being brought on upon a floor: where they are, which spots are taken, when machines should be done.
+    """Parts being brought on upon a floor: where they are, and which spots are taken.
 
-    spot_of: by body, a part's or its pallet's. expected_s: by machine, when it should be done [s]. place: the station at
-    whose approach the tool is; "": it is somewhere else. taken: spots on which something stands that belongs to nobody.
-    finished: when a part reached the end of its route [s]. to_put_back: parts that were moved from where they were brought.
-    left_lying: parts that were given up. spoilt: why a part was, which is brought on all the same. look: called while the
-    robot waits; raises Trouble.
+    spot_of: by body, a part's or its pallet's. place: the station at whose approach the tool is; "": it is somewhere else.
+    taken: spots on which something stands that belongs to nobody. finished: when a part reached the end of its route [s].
+    to_put_back: parts that were moved from where they were brought. left_lying: parts that were given up. spoilt: why a
+    part was, which is brought on all the same. look: called while the robot waits; raises Trouble.
     """
 
     floor: Floor
@@ -74,7 +73,6 @@ class Transfers:
     moves: list[Move] = field(default_factory=list)
     timed: list[TimedMove] = field(default_factory=list)
     deviations_m: list[float] = field(default_factory=list)
-    expected_s: dict[str, float] = field(default_factory=dict)
     spot_of: dict[str, Spot] = field(default_factory=dict)
     taken: set[Spot] = field(default_factory=set)
     finished: dict[int, float] = field(default_factory=dict)
@@ -153,10 +151,9 @@ class Transfers:
         """Let the machine begin that a part has been brought to."""
         floor = self.floor
         self._served.discard(name)
-        self.expected_s[station] = floor.now_s + process_s
         if station in floor.machines:
-            floor.begin(station, name, process_s)
-            self.tell(MachineBegan(station, name, floor.now_s, self.expected_s[station]))
+            work = floor.begin(station, name, process_s)
+            self.tell(MachineBegan(station, name, work.begun_s, work.expected_s))
 
     def _begin(self, name: str, way: Carried, ahead: int) -> _UnderWay:
         """The times of the move, which begins now or was interrupted."""
@@ -238,14 +235,14 @@ class Transfers:
 
     def _await(self, name: str, station: str) -> None:
         """Wait until the machine is done with the part; Trouble when it fails, or takes far too long."""
-        floor, machine = self.floor, self.floor.machines.get(station)
-        if machine is None or machine.part != name:
+        floor, work = self.floor, self.floor.work_on(name)
+        if work is None or work.station != station:
             return
-        expected_s, told = self.expected_s[station], False
-        patience_s = max(PATIENCE_S, PATIENCE * (expected_s - self._begun_s(name)))
-        while not machine.done(floor.now_s):
-            if machine.failed:
-                raise Trouble(machine.failed, name, station)
+        expected_s, told = work.expected_s, False
+        patience_s = max(PATIENCE_S, PATIENCE * (expected_s - work.begun_s))
+        while not work.done(floor.now_s):
+            if work.failed:
+                raise Trouble(work.failed, name, station)
             late_s = floor.now_s - expected_s
             if late_s > patience_s:
                 raise Trouble(f"it is not done {late_s:.0f} s after it should be", name, station, final=True)
@@ -255,36 +252,31 @@ class Transfers:
             floor.wait(expected_s if late_s < 0 else floor.now_s + 1.0)
             self.look()
 
-    def _begun_s(self, name: str) -> float:
-        """When the part was brought to where it is [s]."""
-        return next((move.drop_s for move in reversed(self.moves) if self.name(move.part) == name), 0.0)
-
-    def machine_of(self, part: int) -> Machine | None:
-        """The machine that a part stands in, and that works on it or has done so."""
-        return next((m for m in self.floor.machines.values() if m.part == self.name(part)), None)
+    def work_on(self, part: int) -> Work | None:
+        """What the machine that a part stands in does with it, or has done; None where it stands in none."""
+        return self.floor.work_on(self.name(part))
 
     def left_s(self, part: int) -> float:
         """How long until the machine of a part should be done [s]; below 0: it has been for so long, and the part must not wait
         on without end. A spoilt part may."""
-        machine = self.machine_of(part)
-        assert machine is not None
-        left_s = self.expected_s[machine.station] - self.floor.now_s
+        work = self.work_on(part)
+        assert work is not None
+        left_s = work.expected_s - self.floor.now_s
         self.check_window(part)
-        waits = self.cell.at_most_s(part, machine.station) is None or part in self.spoilt
+        waits = self.cell.at_most_s(part, work.station) is None or part in self.spoilt
         return max(0.0, left_s) if waits else left_s
 
     def check_window(self, part: int) -> None:
         """Notice a part that its machine has been done with for longer than it may stay there: it is spoilt."""
-        machine = self.machine_of(part)
-        if machine is None or part in self.spoilt or machine.moves:
+        work, name = self.work_on(part), self.name(part)
+        if work is None or part in self.spoilt or work.moves:
             return
-        at_most_s, late_s = self.at_most_s(machine.part, machine.station), self.floor.now_s - machine.until_s
+        at_most_s, late_s = self.at_most_s(name, work.station), self.floor.now_s - work.until_s
         if at_most_s is None or late_s <= at_most_s:
             return
-        name = self.name(part)
         what = f"it is burnt: fetched {late_s:.1f} s after it was done, allowed are {at_most_s:g}"
-        self.spoilt[part] = f"{name} at '{machine.station}': {what}"
-        self.tell(TroubleMet(what, "brings it on, but it counts as lost", name, machine.station, self.floor.now_s))
+        self.spoilt[part] = f"{name} at '{work.station}': {what}"
+        self.tell(TroubleMet(what, "brings it on, but it counts as lost", name, work.station, self.floor.now_s))
         self.tell(PartLost(name, what, self.floor.now_s))
 
     def at_most_s(self, name: str, station: str) -> float | None:
@@ -314,8 +306,8 @@ class Transfers:
         for skill in skillset.picks[way.kind, near]:
             self._do(skill.aim(name, spot), name, near)
         self.place = near
-        if near == way.origin and (machine := self.floor.machines.get(near)) is not None and machine.part == name:
-            machine.clear()
+        if near in self.floor.machines and near == way.origin:
+            self.floor.machines[near].clear(name)
         assert bench.held == body
 
     def _bring(self, way: Carried, spot: Spot, move: _UnderWay) -> None:

@@ -109,7 +109,9 @@ def _station(new: NewTask, one: Placed) -> str:
     order = [machine.name for machine in new.machines]
     if one.name in order:
         number = order.index(one.name)
-        size = (*(round(edge + AROUND_PART_M, 3) for edge in new.foot_m), MACHINE_HIGH_M)
+        out = [2 * max(abs(spot[axis]) for spot in one.spots) for axis in (0, 1)]  # from the pose to all spots, twice
+        edges = (foot + AROUND_PART_M + more for foot, more in zip(new.foot_m, out, strict=True))
+        size = (*(round(edge, 3) for edge in edges), MACHINE_HIGH_M)
         lines += [
             f"processing_s = {float(new.machines[number].processing_s)}",
             'body = "box"                # or a URDF or mesh file beside this one; parts stand on top of a box',

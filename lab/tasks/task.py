@@ -219,6 +219,11 @@ class Task(Record):
                 )
             if station.process is not None and station.process not in heads:
                 raise unknown("process", station.process, heads, f"station '{station.name}'")
+            if station.process is not None and station.capacity > 1:
+                raise BadInput(
+                    f"station '{station.name}': capacity = {station.capacity}: its head carries '{station.process}' out on one "
+                    "part at a time: wanted 1, and a buffer before it"
+                )
             if station.approach == "camera" and self.camera is None:
                 raise BadInput(
                     f"station '{station.name}': approach = 'camera': the table [camera] is missing, which says where it is"

@@ -101,10 +101,11 @@ class Process(Record):
 class Station(Record):
     """A place where parts stand: pose x, y [m], yaw [rad]; a machine has a processing time [s] or a process to learn.
 
-    at_most_s: how long a part may stay in a machine after that before the robot takes it out, else it is spoilt [s].
-    body: what stands there, "slab", "box" of `size_m`, or a URDF or mesh file; floor_m: how high parts stand on it;
-    spots: where, off the pose along its axes and by yaw, instead of in rows. finish: the colour of parts done here; color:
-    of a slab, box or mesh.
+    capacity: for how many parts there are spots; a machine works on each of them from when it comes, one with a process on
+    one at a time. at_most_s: how long a part may stay in a machine after that before the robot takes it out, else it is
+    spoilt [s]. body: what stands there, "slab", "box" of `size_m`, or a URDF or mesh file; floor_m: how high parts stand on
+    it; spots: where, off the pose along its axes and by yaw, instead of in rows. finish: the colour of parts done here;
+    color: of a slab, box or mesh.
     """
 
     name: Name

@@ -12,7 +12,7 @@ from lab.production.conditions import Conditions
 from lab.production.controls import RESET_FIRST
 from lab.production.durations import Durations, cell_of, measure
 from lab.production.floor import AT_REST_STEPS, SKIPPED_STEPS, Floor
-from lab.production.machine import Machine
+from lab.production.machine import Work
 from lab.production.outcome import Outcome
 from lab.production.recovery import MAX_TRIES
 from lab.sequencing.cell.cell import Cell
@@ -344,7 +344,7 @@ def test_a_slice_set_down_beside_its_spot_on_the_last_plate_is_taken_up_again_an
     assert floor.bench.stands("slice 1", ground.work.spot_of["slice 1"], 0.012)
 
 
-def at_butter(ground: Ground, surveys: Surveys) -> Machine:
+def at_butter(ground: Ground, surveys: Surveys) -> Work:
     """Slice 1 and the robot are at the butter applier, which begins with it."""
     floor, work = ground.floor, ground.work
     for decision in (1, 1):  # plate to toaster, toaster to butter_applier
@@ -353,7 +353,6 @@ def at_butter(ground: Ground, surveys: Surveys) -> Machine:
     work.spot_of["slice 1"] = floor.scene.places.spots(floor.skillset.task.station("butter_applier"))[0]
     floor.stand(surveys.approach("butter_applier"))
     work.place = "butter_applier"
-    work.expected_s["butter_applier"] = floor.now_s
     return floor.begin("butter_applier", "slice 1", 20.0)
 
 
@@ -406,11 +405,11 @@ def test_time_is_skipped_only_while_nothing_moves(ground: Ground, surveys: Surve
     floor.wait(before + 0.2)
     assert floor.now_s == pytest.approx(before + TIME_STEP)
     assert floor.skipped_s == 0.0
-    machine = at_butter(ground, surveys)
+    at_butter(ground, surveys)
     before = floor.now_s
     floor.wait(before + 10.0)
     assert floor.now_s == pytest.approx(before + TIME_STEP)
-    machine.clear()
+    floor.take_out("slice 1")
     before = floor.now_s
     floor.wait(before + 10.0)
     assert floor.now_s == pytest.approx(before + SKIPPED_STEPS * TIME_STEP)

@@ -12,12 +12,15 @@ import pytest
 import lab.files
 from lab.errors import BadInput
 from lab.production import durations
-from lab.production.durations import Durations, TimedMove, durations_key
+from lab.production.durations import Durations, TimedMove, cell_of, durations_key, spots_in_use, trials
 from lab.sequencing.cell.routes import NeededMoves
 from lab.sim.scene.places import Layout
+from lab.sim.scene.scene_check import places_of
 from lab.skills import Grasp
+from lab.skills.prepared_scene import Prepared
 from lab.skills.skillset import Carried, SkillSet
-from lab.tasks.task import Task
+from lab.skills.surveys import Surveys
+from lab.tasks.task import Order, Task
 from lab.tasks.task_file import load
 from lab.toolbox.policy import Policy
 
@@ -80,6 +83,46 @@ def test_a_damaged_record_is_refused_in_one_line(table: str, times: Any, says: s
     assert str(caught.value) == says
 
 
+# ---- the spots that are timed ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("order", "skill", "used"),
+    [
+        (("slice",) * 3, "grasp at plate", [0, 1, 2]),
+        (("slice",) * 3, "place at finished_plate", [0, 1, 2]),
+        (("slice",) * 3, "place at toaster_buffer", [0, 1]),  # one is in the toaster when another one waits
+        (("slice",) * 3, "insert at toaster", [0]),
+        (("slice",), "place at toaster_buffer", [0]),
+        (("slice", "cup", "slice"), "grasp slice at plate", [0, 1]),
+        (("slice", "cup", "slice"), "place cup at tray", [0, 1, 2]),  # beside whatever stands there
+    ],
+)
+def test_only_spots_that_the_order_uses_are_timed(order: Order, skill: str, used: list[int]) -> None:
+    task = load("breakfast" if "cup" in order else "toast")
+    skillset = SkillSet.of(task, order)
+    layout = Layout(tuple(o.position_m for o in task.obstacles), ())
+    prepared = Prepared(task, order, 0, layout, Surveys(task, order, layout), skillset, {})
+    own = skillset.skills[skill]
+    spots = places_of(task).spots(task.station(own.station))
+    assert list(spots_in_use(prepared, own)) == [spots[number] for number in used]
+    assert [trial.at == skill for trial in trials(prepared)].count(True) == (used != [0])
+
+
+def test_kinds_that_share_a_way_share_the_mean_of_its_parts() -> None:
+    """Two slices at 10 s and a cup at 16 s make 12 s."""
+    task, order = load("breakfast"), ("slice", "cup", "slice")
+    skills = SkillSet.of(task, order)
+    loaded = {way: 16.0 if way.kind == "cup" else 10.0 for way in skills.legs}
+    shared = Carried("plate", "tray", "slice"), Carried("plate", "tray", "cup")
+    cell = cell_of(
+        task,
+        Durations(dict.fromkeys(skills.travels, 1.0), loaded | dict(zip(shared, (10.0, 16.0), strict=True)), {}),
+        order,
+    )
+    assert cell.loaded_s[cell.index("plate"), cell.index("tray")] == pytest.approx(12.0)
+
+
 # ---- the key ---------------------------------------------------------------------------------------------------------
 
 MakePolicy = Callable[..., Policy]
@@ -136,6 +179,7 @@ def shifted(task: Task) -> Task:
 CHANGES: dict[str, Change] = {
     "a robot's speed": edit("task", slower),
     "a station's place": edit("task", shifted),
+    "an order": edit("order", lambda order: (*order, "slice")),
     "an obstacle's place": edit("layout", lambda layout: replace(layout, obstacles=((0.5, 0.1), (0.6, 0.201)))),
     "a move": edit("skillset", lambda skills: replace(skills, moves=replace(skills.moves, empty=()))),
     "what is carried": edit(
@@ -156,12 +200,12 @@ def test_the_key_changes_with_whatever_decides(
     make_policy: MakePolicy, task: Task, own_assets: Path, monkeypatch: pytest.MonkeyPatch, what: str
 ) -> None:
     given: dict[str, Any] = {"task": task, "layout": LAYOUT, "skillset": SKILLS, "policies": {"grasp": make_policy()}}
-    given |= {"folder": own_assets.parent, "source": "the source", "engine": "pybullet 3.2.7"}
+    given |= {"order": ("slice",), "folder": own_assets.parent, "source": "the source", "engine": "pybullet 3.2.7"}
 
     def key() -> str:
         monkeypatch.setattr(durations, "source_key", lambda module: given["source"])
         monkeypatch.setattr(durations, "engine", lambda: given["engine"])
-        return durations_key(given["task"], given["layout"], given["skillset"], given["policies"])
+        return durations_key(given["task"], given["layout"], given["skillset"], given["policies"], given["order"])
 
     before = key()
     assert key() == before
@@ -172,8 +216,8 @@ def test_the_key_changes_with_whatever_decides(
 def test_what_decides_nothing_leaves_the_key(make_policy: MakePolicy, task: Task) -> None:
     other = task.model_copy(update={"title": "another", "subtasks": {}})
     moved = replace(LAYOUT, parts=((0.1, 0.0, 0.0),))  # a move is measured with a part on its spot
-    key = durations_key(task, LAYOUT, SKILLS, {"grasp": make_policy()})
-    assert durations_key(other, moved, SKILLS, {"grasp": make_policy()}) == key
+    key = durations_key(task, LAYOUT, SKILLS, {"grasp": make_policy()}, ("slice",))
+    assert durations_key(other, moved, SKILLS, {"grasp": make_policy()}, ("slice",)) == key
 
 
 def test_the_key_looks_for_no_library_but_the_engine(task: Task, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -181,7 +225,7 @@ def test_the_key_looks_for_no_library_but_the_engine(task: Task, monkeypatch: py
     monkeypatch.setattr("importlib.metadata.version", lambda name: pytest.fail(f"{name} was looked for"))
     monkeypatch.setattr("importlib.metadata.packages_distributions", lambda: pytest.fail("libraries were looked for"))
     monkeypatch.setattr(durations, "engine", lambda: "pybullet 3.2.7")
-    durations_key(task, LAYOUT, SKILLS, {})
+    durations_key(task, LAYOUT, SKILLS, {}, ("slice",))
 
 
 def test_the_key_holds_the_source_of_every_package_that_skills_come_from(
@@ -189,5 +233,5 @@ def test_the_key_holds_the_source_of_every_package_that_skills_come_from(
 ) -> None:
     asked = set[str]()
     monkeypatch.setattr(durations, "source_key", lambda module: asked.add(module) or "a")  # type: ignore[func-returns-value]
-    durations_key(task, LAYOUT, replace(SKILLS, skills={"grasp": ALONE[0]}), {})
+    durations_key(task, LAYOUT, replace(SKILLS, skills={"grasp": ALONE[0]}), {}, ("slice",))
     assert asked == {"lab.production.durations", "lab.skills.grasp"}

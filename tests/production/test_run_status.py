@@ -85,6 +85,30 @@ def test_a_machine_is_busy_done_and_idle_again(status: RunStatus) -> None:
     assert (status.finished, status.part("slice 1").state, status.now_s) == (1, "done", 70.0)
 
 
+def test_a_machine_with_room_for_two_shows_each_part_with_its_own_time() -> None:
+    task = load("toast")
+    roomy = [s.model_copy(update={"capacity": 2}) if s.name == "toaster" else s for s in task.stations]
+    status = RunStatus.of(task.model_copy(update={"stations": tuple(roomy)}), task.ordered(2))
+    tell(status, *FIRST, MachineBegan("toaster", "slice 2", 20.0, 60.0), MachineDone("toaster", "slice 1", 50.0))
+    told = next(m for m in status.to_json()["machines"] if m["station"] == "toaster")
+    first = {"light": "done", "part": "slice 1", "until_s": 50.0}
+    second = {"light": "busy", "part": "slice 2", "until_s": 60.0}
+    assert told == {"station": "toaster", **first, "parts": [first, second]}
+    tell(status, MoveMade(Move(1, "toaster", "toaster", "finished_plate", 10.0, 10.0, 55.0, 58.0), "slice 1"))
+    told = next(m for m in status.to_json()["machines"] if m["station"] == "toaster")
+    assert told == {"station": "toaster", **second}
+    tell(status, MoveMade(Move(2, "toaster", "toaster", "finished_plate", 58.0, 58.0, 61.0, 65.0), "slice 2"))
+    told = next(m for m in status.to_json()["machines"] if m["station"] == "toaster")
+    assert told == {"station": "toaster", "light": "idle", "part": "", "until_s": None}
+    toasted = [(a.part, a.start_s, a.end_s) for a in status.so_far() if (a.resource, a.kind) == ("toaster", "process")]
+    assert toasted == [(1, 10.0, 50.0), (2, 20.0, 61.0)]
+
+
+def test_what_is_brought_to_a_full_machine_takes_the_place_of_what_was_there(status: RunStatus) -> None:
+    tell(status, *FIRST, MachineBegan("toaster", "slice 2", 70.0, 110.0))
+    assert [m.part for m in status.machines if m.station == "toaster"] == ["slice 2"]
+
+
 def test_a_machine_that_failed_and_a_part_that_is_lost_stay_so(status: RunStatus) -> None:
     tell(
         status, *FIRST, MachineFailed("toaster", "slice 1", "it is not done", 99.0), PartLost("slice 1", "burnt", 99.0)

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from lab.production.faults.fault import GROUND_M, NEVER, Fault, Happened, out_of_sight
+from lab.production.faults.fault import GROUND_M, Fault, Happened, out_of_sight
 from lab.production.faults.where import (
     AT_STATION_M,
     CLEAR_M,
@@ -66,9 +66,7 @@ class MachineSlow(Fault):
     def strikes(self, floor: "Floor") -> Happened:
         """At any time."""
         station, share = str(self.fields.station), self.fields.share or SLOWER
-        machine = floor.machine(station)
-        machine.until_s += max(0.0, machine.until_s - floor.now_s) * (share / machine.share - 1.0)
-        machine.share = share
+        floor.machine(station).slow_down(share, floor.now_s)
         words = f"'{station}' takes {share:g} times as long"
         return Happened(self.what, words, floor.now_s, station=station)
 
@@ -88,10 +86,7 @@ class MachineFails(Fault):
     def strikes(self, floor: "Floor") -> Happened:
         """At any time."""
         station = str(self.fields.station)
-        machine = floor.machine(station)
-        machine.fails = True
-        if machine.part and not machine.done(floor.now_s):
-            machine.until_s = NEVER
+        floor.machine(station).fail(floor.now_s)
         return Happened(self.what, f"'{station}' does not get done", floor.now_s, station=station)
 
 

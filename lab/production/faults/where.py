@@ -75,8 +75,8 @@ def whereabouts(floor: "Floor", name: str) -> Whereabouts:
 
 def is_undone(floor: "Floor", name: str) -> bool:
     """Whether a machine works on a part and has not finished it."""
-    own = [machine for machine in floor.machines.values() if machine.part == name]
-    return any(not machine.done(floor.now_s) for machine in own)
+    work = floor.work_on(name)
+    return work is not None and not work.done(floor.now_s)
 
 
 def in_the_air(floor: "Floor", body: str) -> bool:

@@ -138,9 +138,8 @@ class ByHand:
                 self._follow(by_free_cells(floor.bench, skill.surveys, begin, skill.kind))
             with self._careful():
                 done = floor.run(skill.aim(part)) is Status.SUCCESS
-            for machine in floor.machines.values():
-                if machine.part == floor.bench.held is not None:
-                    machine.clear()
+            if floor.bench.held is not None:
+                floor.take_out(floor.bench.held)
             if not done:
                 raise WorkFailed(f"'{skill.name}' failed: {skill.reason}")
 

@@ -108,7 +108,7 @@ def _chart(status: RunStatus, width: int) -> list[Text]:
     planned = [] if status.plan is None else status.plan.rows
     measured = status.so_far()
     end_s = max((a.end_s for a in (*planned, *measured)), default=0.0)
-    names = [ROBOT, *(machine.station for machine in status.machines)]
+    names = dict.fromkeys([ROBOT, *(machine.station for machine in status.machines)])
     label = max(map(len, names), default=0) + 9
     room = width - label
     if not end_s or room < LEAST_CHART:

@@ -27,8 +27,10 @@ ABOVE_FOOT_M = 0.0005  # [m] a part is put so high above its spot
 class Scene:
     """The cell of `task` with the parts of an order, laid out as `layout` says; the first part is called 'slice 1'."""
 
-    def __init__(self, world: World, task: Task, order: Order, layout: Layout) -> None:
+    def __init__(self, world: World, task: Task, order: Order, layout: Layout, parts: int = 0) -> None:
+        """parts: for how many the stations are built, where these are more than those of the order."""
         self.world, self.task, self.order, self.layout = world, task, order, layout
+        self._parts = max(parts, len(order))
         self.solid: list[str] = []  # what the arm must not touch
         self.kind_of: dict[str, Kind] = {}  # of each part in the scene, by its name
         arm = arm_of(task.robot, task.folder)
@@ -49,7 +51,7 @@ class Scene:
             self.add(part_name(order, number), comes_as(task.part(order[number - 1])), spot, off)
 
     def _build_station(self, station: Station) -> None:
-        station_bodies.build(self.world, station, self.places.slab(station, len(self.order)), self.task.folder)
+        station_bodies.build(self.world, station, self.places.slab(station, self._parts), self.task.folder)
         if station.grid is not None:
             self._mark(station.name, marker_of(station, station.grid), models.MARKER_CYAN)
         self.solid.append(station.name)

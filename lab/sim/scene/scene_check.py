@@ -1,15 +1,16 @@
 """What is wrong with a task's cell before anything is surveyed in it: reach, heights, and stations in each other's way."""
 
 from itertools import combinations
-from math import hypot, sin
+from math import ceil, cos, hypot, sin
 
-from lab.errors import BadInput
+from lab.errors import BadInput, counted
 from lab.sim import models
 from lab.sim.arms.arm import Arm
 from lab.sim.arms.arm_models import arm_of
 from lab.sim.arms.kinematics import ToolPose
 from lab.sim.camera import Camera
-from lab.sim.parts.kinds import Kind, Spot, comes_as, kinds_of
+from lab.sim.frames import Vector
+from lab.sim.parts.kinds import Kind, Spot, beside, comes_as, kinds_of
 from lab.sim.scene import station_bodies
 from lab.sim.scene.hold_trial import check_held
 from lab.sim.scene.places import Places, Rectangle
@@ -19,6 +20,7 @@ from lab.tasks.task_fields import CameraGrid, Station
 
 ACROSS = 0.3  # sine of the angle at most between the fingers and the way in
 OVER_M = 0.01  # [m] between a carried part and what stands below its way
+ON_M = 1e-6  # by what a part may reach beyond what it stands on: sums of lengths differ by less
 INTO_M = 0.005  # [m] the same above a machine that it is let down into
 
 
@@ -38,6 +40,7 @@ def check_scene(task: Task) -> None:
         if station.grid is not None:
             _check_seen(task, station, station.grid)
         spots, own = places.spots(station), places.kinds_at(station.name)
+        _check_on_body(places, station)
         for kind in own:
             _check_grid(station, kind, places.floor(station))
             _check_side(station, kind)
@@ -45,6 +48,38 @@ def check_scene(task: Task) -> None:
                 pose = kind.held_at(spot)
                 for at in (pose, ToolPose(pose.x, pose.y, low, pose.yaw)):
                     _check_reach(arm, station, at)
+
+
+def _check_on_body(places: Places, station: Station) -> None:
+    """BadInput when a part on a spot would stand beside the station's body, in whole or with an edge.
+
+    A slab without a size is drawn under all its spots. A body from a file has to reach below the middle of each spot, unless
+    parts stand on the table there.
+    """
+    (x, y, yaw), needed = station.pose, [0.0, 0.0]  # half the length and width that are needed [m]
+    for spot in places.spots(station):
+        middle, turn = beside((0.0, 0.0), -yaw, (spot.x - x, spot.y - y)), spot.yaw - yaw
+        if station.stands_on not in ("slab", "box") and spot.z > 0.0:
+            _check_in_bounds(station, middle, *station_bodies.bounds(station, places.task.folder))
+        for along, across in (kind.footprint_m() for kind in places.kinds_at(station.name)):
+            half = abs(cos(turn)) * along + abs(sin(turn)) * across, abs(sin(turn)) * along + abs(cos(turn)) * across
+            needed = [max(most, abs(at) + own) for most, at, own in zip(needed, middle, half, strict=True)]
+    size = station.size_m
+    if size is not None and any(2 * most > edge + ON_M for most, edge in zip(needed, size, strict=False)):
+        wanted = [max(edge, ceil(2000 * most - ON_M) / 1000) for most, edge in zip(needed, size, strict=False)]
+        raise BadInput(
+            f"station '{station.name}': size_m = {list(size)}: its {counted(station.capacity, 'spot')} reach beyond it, parts "
+            f"would fall off: at least {[*wanted, size[2]]} needed, or a smaller capacity"
+        )
+
+
+def _check_in_bounds(station: Station, at: tuple[float, float], low: Vector, high: Vector) -> None:
+    if not (low[0] <= at[0] <= high[0] and low[1] <= at[1] <= high[1]):
+        raise BadInput(
+            f"station '{station.name}': its spot at ({at[0]:.3f}, {at[1]:.3f}) m off its pose is beside its body "
+            f"{station.stands_on}, which is there from ({low[0]:.3f}, {low[1]:.3f}) to ({high[0]:.3f}, {high[1]:.3f}) m: "
+            "wanted spots on it, or a smaller capacity"
+        )
 
 
 def _check_lowest(places: Places, low: float) -> None:

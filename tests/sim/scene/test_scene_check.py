@@ -49,6 +49,20 @@ def test_a_machine_for_two_is_a_machine_with_two_spots(task: Task, moved: Moved)
     check_apart(double, 2)
 
 
+def test_parts_must_stand_on_the_body_of_their_station(task: Task, moved: Moved) -> None:
+    """Slices are 120 x 15 mm, and 55 mm apart in a row: two need 70 mm, around the pose 125."""
+    box: dict[str, object] = {"body": "box", "approach": "above", "grid": None}
+    check_scene(moved(task, "toaster", capacity=2, size_m=(0.12, 0.13, 0.05), **box))
+    with pytest.raises(
+        BadInput, match=r"'toaster': size_m = \[0\.12, 0\.09, 0\.05\]: its 2 spots .* at least \[0\.12, 0\.125, 0\.05\]"
+    ):
+        check_scene(moved(task, "toaster", capacity=2, size_m=(0.12, 0.09, 0.05), **box))
+    with pytest.raises(BadInput, match=r"size_m = .* at least \[0\.21, 0\.13, 0\.05\]"):
+        check_scene(moved(task, "toaster", spots=((0.045, 0.0, 0.0),), size_m=(0.12, 0.13, 0.05), **box))
+    with pytest.raises(BadInput, match=r"at \(0\.000, 0\.300\) m off its pose is beside its body toaster\.urdf"):
+        check_scene(moved(task, "toaster", spots=((0.0, 0.3, 0.0),)))
+
+
 def test_the_second_spot_of_a_machine_must_be_in_reach_too(task: Task, moved: Moved) -> None:
     """Turned to the right, the second spot lies 55 mm farther out than the first."""
 
