@@ -61,25 +61,32 @@ TAKES: dict[str, tuple[str, ...]] = {  # and those that it may have beside them
 
 
 class FaultFields(Record):
-    """A fault: it happens as soon as it can after at_s [s] of the run.
-
-    part: which one, such as "slice 1", else the first that fits; when: only while the part is so. by_m: how far what is moved,
-    or falls, comes to be off where it was, x, y [m]; at_m: where it comes to be; turn_rad: and turned. share: of the time that
-    a machine takes, or of the friction that is left. seconds: how long it lasts. size_m: of an obstacle that is put there.
-    """
+    """A fault: what goes wrong in a run, when, and with what."""
 
     what: FaultKind
+    """What goes wrong."""
     at_s: Annotated[float, Field(ge=0, le=86_400)] = 0.0
+    """It happens as soon as it can after this time of the run [s]."""
     when: When | None = None
+    """It waits until the part is so: carried, in a machine, or standing at a station, such as `"standing"`."""
     part: PartName | None = None
+    """Which part: its kind and number, such as `"bun 1"`; left out: the first that fits."""
     station: Name | None = None
+    """Which station or machine, such as `"oven"`."""
     obstacle: Name | None = None
+    """Which obstacle, such as `"tower"`."""
     by_m: XY | None = None
+    """How far what is moved, or falls, comes to lie off where it was: x and y [m], such as `[0.05, 0.0]`."""
     turn_rad: Annotated[float, Field(ge=-3.2, le=3.2)] = 0.0
+    """By how much the part is turned [rad]."""
     share: Annotated[float, Field(ge=0, le=100)] | None = None
+    """How many times as long the machine takes, or the share of the friction that is left [-], such as `1.5`."""
     seconds: Annotated[float, Field(gt=0, le=86_400)] | None = None
+    """How long it lasts [s], such as `30.0`."""
     at_m: XY | None = None
+    """Where what is moved, dropped or put comes to be: x and y [m], such as `[0.5, 0.3]`."""
     size_m: Edges | None = None
+    """Length, width and height of the obstacle that is put there [m], such as `[0.06, 0.06, 0.34]`."""
 
     @model_validator(mode="after")
     def _its_own_fields(self) -> Self:

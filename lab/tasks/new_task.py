@@ -64,7 +64,9 @@ class NewMachine:
 
 @dataclass(frozen=True)
 class NewTask:
-    """Parts that an arm brings from an input through all machines, in their order, to an output; buffers before machines."""
+    """Parts that an arm brings from an input through all machines, in their order, to an output; buffers before
+    machines.
+    """
 
     name: str
     arm: str = "up6"
@@ -115,7 +117,9 @@ class Placed(NamedTuple):
 
 
 def file_of(word: str) -> tuple[Path, str]:
-    """The file to be written and the task's name of NAME, with or without .toml; BadInput when it cannot be, or is there."""
+    """The file to be written and the task's name of NAME, with or without .toml; BadInput when it cannot be, or is
+    there.
+    """
     path = Path(word if word.endswith(".toml") else f"{word}.toml")
     if not NAME.fullmatch(path.stem):
         raise BadInput(
