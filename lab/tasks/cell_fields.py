@@ -64,7 +64,7 @@ class CellStation(Record):
     """The station's name, which routes and travel times use, such as `"oven"`."""
     kind: Annotated[Literal["storage", "buffer", "machine"], _known("kind", STATION_KINDS, "station")]
     """What it is: parts begin and end in storage, wait in a buffer, and are worked on in a machine."""
-    capacity: Annotated[Room, WrapValidator(_unlimited)]
+    capacity: Annotated[Room, WrapValidator(_unlimited, json_schema_input_type=Room | Literal["unlimited"])]
     """How many parts it holds at once, such as `1`, or `"unlimited"`."""
     processing_s: Seconds | None = None
     """How long the machine works on each part [s], such as `60.0`; a stage of a route may have its own."""
@@ -109,7 +109,9 @@ class CellStage(Record):
 
 
 Route = Annotated[
-    tuple[Annotated[CellStage, BeforeValidator(_as_stage)], ...], BeforeValidator(as_tuple), Field(max_length=100)
+    tuple[Annotated[CellStage, BeforeValidator(_as_stage, json_schema_input_type=Name | CellStage)], ...],
+    BeforeValidator(as_tuple),
+    Field(max_length=100),
 ]
 
 
@@ -177,7 +179,7 @@ class CellTrack(Record):
 
 
 class CellFields(Record):
-    """A whole cell file: a cell for `lab sequence`, without physics, and the order that it is to make."""
+    """All that a cell file may hold; `CellFile` makes a cell of it."""
 
     kind: Literal["cell"] = "cell"
     """What the file is; always "cell"."""

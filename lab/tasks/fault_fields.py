@@ -1,8 +1,8 @@
 """What a task file says of a fault: what goes wrong in a run, when, and with what."""
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, ConfigDict, Field, model_validator
 
 from lab.tasks.record import Name, Record, as_tuple
 
@@ -60,8 +60,26 @@ TAKES: dict[str, tuple[str, ...]] = {  # and those that it may have beside them
 }
 
 
+def allowed(what: str) -> list[str]:
+    """The fields that a kind of fault may have."""
+    return sorted({"what", "at_s", *NEEDS.get(what, ()), *TAKES[what]})
+
+
+def _by_kind(schema: dict[str, Any]) -> None:
+    """Adds to a schema which fields each kind of fault needs, and may have."""
+    schema["allOf"] = [
+        {
+            "if": {"properties": {"what": {"const": what}}, "required": ["what"]},
+            "then": {"required": [*NEEDS.get(what, ())], "propertyNames": {"enum": allowed(what)}},
+        }
+        for what in TAKES
+    ]
+
+
 class FaultFields(Record):
     """A fault: what goes wrong in a run, when, and with what."""
+
+    model_config = ConfigDict(json_schema_extra=_by_kind)
 
     what: FaultKind
     """What goes wrong."""
@@ -90,13 +108,11 @@ class FaultFields(Record):
 
     @model_validator(mode="after")
     def _its_own_fields(self) -> Self:
-        needed = NEEDS.get(self.what, ())
-        for field in needed:
+        for field in NEEDS.get(self.what, ()):
             if getattr(self, field) is None:
                 raise ValueError(f"what = '{self.what}' needs {field}")
-        allowed = {"what", "at_s", *needed, *TAKES[self.what]}
-        for field in sorted(self.model_fields_set - allowed):
-            raise ValueError(f"what = '{self.what}' has no {field}: allowed are {', '.join(sorted(allowed))}")
+        for field in sorted(self.model_fields_set - {*allowed(self.what)}):
+            raise ValueError(f"what = '{self.what}' has no {field}: allowed are {', '.join(allowed(self.what))}")
         if self.when == "carried" and self.what in ("part moved", "part gone"):
             raise ValueError(
                 "when = 'carried': what is carried is dropped, or slips; wanted 'in machine' or 'standing'"

@@ -45,7 +45,7 @@ class PartFields(Record):
     file: str | None = None
     """The OBJ or STL file of a mesh, beside the task file, such as `"bracket.stl"`."""
     scale: Annotated[float, Field(gt=0, le=1000)] = 1.0
-    """What one unit of the mesh file is [m], such as `0.001` where the file is in millimetres."""
+    """How many metres one unit of the mesh file is [m], such as `0.001`."""
     hull: bool = False
     """Whether a mesh with holes is taken as its convex hull."""
     stands: Annotated[tuple[Angle, Angle], BeforeValidator(as_tuple)] = (0.0, 0.0)

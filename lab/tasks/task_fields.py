@@ -221,7 +221,7 @@ def _as_stage(value: object) -> object:
 
 
 Route = Annotated[
-    tuple[Annotated[Stage, BeforeValidator(_as_stage)], ...],
+    tuple[Annotated[Stage, BeforeValidator(_as_stage, json_schema_input_type=Name | Stage)], ...],
     BeforeValidator(as_tuple),
     Field(min_length=2, max_length=MOST_THINGS),
 ]
