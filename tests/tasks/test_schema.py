@@ -17,11 +17,12 @@ from lab.errors import BadInput
 from lab.files import tasks_folder
 from lab.tasks.cell_file import CellFile
 from lab.tasks.grid_world import GridWorld
+from lab.tasks.record import Record
 from lab.tasks.schema import KINDS, TABLES, examples_of, page_of, schema_of, tables_of, unit_of
 from lab.tasks.task import Task
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
-MODELS = {"task": Task, "cell": CellFile, "world": GridWorld}
+MODELS: dict[str, type[Record]] = {"task": Task, "cell": CellFile, "world": GridWorld}
 SHIPPED = sorted(tasks_folder().glob("*.toml"))
 SMALL = [path for path in SHIPPED if path.stat().st_size < 20_000]
 OF_SEVERAL = {"value_error", "assertion_error"}  # what one key demands of another, which a schema does not say
