@@ -109,7 +109,7 @@ class CellStage(Record):
 
 
 Route = Annotated[
-    tuple[Annotated[CellStage, BeforeValidator(_as_stage, json_schema_input_type=Name | CellStage)], ...],
+    tuple[Annotated[CellStage, BeforeValidator(_as_stage)], ...],
     BeforeValidator(as_tuple),
     Field(max_length=100),
 ]

@@ -17,7 +17,8 @@ MAX_FILE_BYTES = 10_000_000  # of a text file: a world of 100 x 100 x 100 cells 
 MAX_SHORT_BYTES = 1_000_000  # of one that holds no world: reading a longer one takes seconds
 MAX_REWARD = 1_000_000  # sums of larger ones lose the small ones, and of much larger ones overflow
 
-Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9 _-]{0,39}$")]
+NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9 _-]{0,39}$"
+Name = Annotated[str, Field(pattern=NAME_PATTERN)]
 Count = Annotated[int, Field(ge=1, le=100)]
 
 

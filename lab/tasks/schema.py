@@ -10,10 +10,11 @@ from typing import Any, NamedTuple, get_type_hints
 from annotated_types import DocInfo
 
 from lab.errors import unknown
-from lab.tasks.record import Record
+from lab.tasks.record import NAME_PATTERN, Record
 
 DRAFT = "http://json-schema.org/draft-07/schema#"  # which the editors' extensions for TOML know
 TABLES = "definitions"
+STAGES = ("Stage", "CellStage")  # which may be written as their stations
 UNIT = re.compile(r" \[([^\]]+)\]")
 EXAMPLES = re.compile(r",? such as (`[^`]*`(?:(?:, | or )`[^`]*`)*)")
 QUOTED = re.compile(r"`[^`]*`")
@@ -125,6 +126,8 @@ def _plain(schema: Schema) -> Schema:
         found["description"] = " ".join(found["description"].split())
         if examples := examples_of(found["description"]):
             found["examples"] = examples
+    if found.get("$ref", "").rpartition("/")[2] in STAGES:
+        found = {"anyOf": [{"type": "string", "pattern": NAME_PATTERN}, found]}
     if "$ref" in found and len(found) > 1:
         found["allOf"] = [{"$ref": found.pop("$ref")}]
     return found

@@ -221,7 +221,7 @@ def _as_stage(value: object) -> object:
 
 
 Route = Annotated[
-    tuple[Annotated[Stage, BeforeValidator(_as_stage, json_schema_input_type=Name | Stage)], ...],
+    tuple[Annotated[Stage, BeforeValidator(_as_stage)], ...],
     BeforeValidator(as_tuple),
     Field(min_length=2, max_length=MOST_THINGS),
 ]
