@@ -7,7 +7,7 @@ from functools import cached_property
 from typing import Annotated, Literal
 
 import numpy as np
-from annotated_types import Ge, Gt, Le, Lt
+from annotated_types import Ge, Gt, Le, Lt, doc
 from numpy.typing import ArrayLike, NDArray
 
 from lab.errors import BadInput, WorkFailed
@@ -23,11 +23,11 @@ BoolArray = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class Rewards:
-    """What entering a goal, entering an obstacle and any other step are worth (thesis, sections 8.3 and 9.7)."""
+    """What a move is worth (thesis, sections 8.3 and 9.7)."""
 
-    goal: Annotated[float, Gt(0)] = 1.5
-    collision: Annotated[float, Lt(0)] = -1.0
-    step: Annotated[float, Le(0), Ge(-1000)] = -0.1
+    goal: Annotated[float, Gt(0), doc("what entering a goal is worth")] = 1.5
+    collision: Annotated[float, Lt(0), doc("what entering an obstacle is worth")] = -1.0
+    step: Annotated[float, Le(0), Ge(-1000), doc("what any other step is worth")] = -0.1
 
 
 class NoPath(BadInput):

@@ -159,6 +159,11 @@ COMMANDS = {  # what is typed after `lab` -> the command
         "lab task convert bilge-ulusoy-jobs.csv --layout bilge-ulusoy-layouts.csv --case 7:1 --robots 2 --out ex71.toml",
         more="{words of instances}",
     ),
+    "task schema": Command(
+        "task",
+        "The keys that a task, cell or world file may have, as a JSON Schema that editors complete with, or as a page.",
+        "lab task schema --out task-schema.json",
+    ),
     "task random": Command(
         "task",
         "Write a random grid world as a task file; a way always leads from its start to its goal.",

@@ -27,6 +27,22 @@ def new(
             help="A machine that all parts go to, NAME:SECONDS; several times: in this order. Default: none.",
         ),
     ] = None,
+    mass: Annotated[
+        list[str] | None,
+        typer.Option("--mass", help="What a kind of part weighs, PART=KG, such as pin=0.05; default: as much as wood."),
+    ] = None,
+    friction: Annotated[
+        list[str] | None,
+        typer.Option("--friction", help="A kind's coefficient of friction, PART=NUMBER, 0 to 5; default: 0.8."),
+    ] = None,
+    capacity: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--capacity",
+            help="How many parts a station holds, STATION=NUMBER, such as oven=2: a machine (by default 1), "
+            "a MACHINE_buffer (2), input or output (all parts).",
+        ),
+    ] = None,
     arm: Annotated[str | None, typer.Option("--arm", help="The robot: {arms}.", autocompletion=offers("arms"))] = None,
     buffer: Annotated[bool, typer.Option("--buffer", help="A buffer before each machine.")] = False,
     yes: Annotated[bool, typer.Option("--yes", help="Ask nothing: three boxes, one press.")] = False,
@@ -41,8 +57,9 @@ def new(
     from lab.tasks.record import write_whole
 
     path, task_name = file_of(name)
-    if part or machine or arm or buffer:
-        wanted = new_task(task_name, arm or "up6", part or (), machine or (), buffer)
+    numbers = (mass or (), friction or (), capacity or ())
+    if part or machine or arm or buffer or any(numbers):
+        wanted = new_task(task_name, arm or "up6", part or (), machine or (), buffer, *numbers)
     elif yes:
         wanted = new_task(task_name, "up6", (), (MACHINE,), False)
     else:

@@ -34,6 +34,42 @@ def task_show(task: str, as_json: Json = False) -> None:
         write(text)
 
 
+def task_schema(
+    kind: Annotated[
+        str,
+        typer.Argument(
+            help="Of which files: task, cell or world.",
+            autocompletion=lambda: ["task", "cell", "world"],
+            metavar="[KIND]",
+        ),
+    ] = "task",
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", help="The .json file to write, or, as a page to read, the .md file; default: shown."),
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """The keys that a task, cell or world file may have, as a JSON Schema that editors complete with, or as a page.
+
+    An editor with a TOML extension (Even Better TOML, taplo) reads the schema where the first line of a file says
+    #:schema FILE.
+    """
+    import json
+
+    from lab.tasks.record import write_whole
+    from lab.tasks.schema import page_of, schema_of
+
+    schema = schema_of(kind)
+    if out is None:
+        write_json(schema)
+        return
+    if out.suffix not in (".json", ".md"):
+        raise BadInput(f"file '{out}' (--out): wanted one that ends with .json or .md")
+    write_whole(out, page_of(kind) if out.suffix == ".md" else json.dumps(schema, indent=2, ensure_ascii=False) + "\n")
+    hint = "" if out.suffix == ".md" else f"; as the first line of a {kind} file: #:schema {out}"
+    show({"file": str(out), "kind": kind}, as_json, lambda d: f"{d['file']}: the keys of a {kind} file{hint}")
+
+
 def task_convert(
     file: Annotated[str, typer.Argument(help="An instance file ({instances}), or a cell.")],
     layout: Annotated[

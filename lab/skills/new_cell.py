@@ -1,5 +1,7 @@
 """A new task whose cell is laid out around its arm and checked, before it is a file."""
 
+import re
+from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 
@@ -10,7 +12,7 @@ from lab.sim.parts.grip import grip_of
 from lab.sim.parts.part_shape import shape_of
 from lab.sim.scene.reach import ring_of
 from lab.skills.prepared_scene import prepare
-from lab.tasks.new_task import FRICTION, Around, NewPart, NewTask, does_not_fit, heights_m, layouts
+from lab.tasks.new_task import HEAVIEST_KG, Around, NewPart, NewTask, does_not_fit, heights_m, layouts
 from lab.tasks.new_task_text import text_of
 from lab.tasks.part_fields import PartFields
 from lab.tasks.robot_fields import RobotSettings
@@ -20,10 +22,37 @@ from lab.tasks.task_file import task_of_text
 FINGERS_M = 0.016  # that the fingers open beyond the widest part
 ROOM_M = 0.08  # between parts, where what stations have by themselves is not enough for the gripper
 MOST_TRIES = 4  # layouts of which every sub-task is surveyed
+NOT_HELD = "is not held"  # what a trial says of a part that slips, turns or falls over
+HEAVIER = (2, 5, 10)  # times its mass, of such a part
 
 
 def new_cell(new: NewTask, path: Path) -> tuple[str, Task]:
-    """The text of a task file for `path`, and its task, whose every sub-task has a way. BadInput for what cannot be."""
+    """The text of a task file for `path`, and its task, whose every sub-task has a way.
+
+    BadInput for what cannot be; of parts that are not held, it says which mass would do, if one does.
+    """
+    try:
+        return _laid_out(new, path)
+    except BadInput as error:
+        said = re.sub(rf"^{re.escape(str(path))}: (line \d+: )?", "", str(error))  # there is no such file yet
+        if NOT_HELD not in said:
+            raise BadInput(said) from None
+        raise BadInput(f"{said.partition(';')[0]}: {_what_holds(new, path)}") from None
+
+
+def _what_holds(new: NewTask, path: Path) -> str:
+    """Which masses of its parts would do."""
+    for times in HEAVIER:
+        parts = [replace(part, given_kg=min(round(times * part.mass_kg, 3), HEAVIEST_KG)) for part in new.parts]
+        try:
+            _laid_out(replace(new, parts=tuple(parts)), path)
+        except BadInput:
+            continue
+        return "held with " + " ".join(f"--mass {part.name}={part.mass_kg:g}" for part in parts)
+    return "wanted another --mass, --friction, or size (--part)"
+
+
+def _laid_out(new: NewTask, path: Path) -> tuple[str, Task]:
     arm = arm_of(RobotSettings(model=new.arm, start="input"))
     widest = max(_grip_width(part, arm, path.parent) for part in new.parts)
     opening = round(widest + FINGERS_M, 4)  # wide open, fingers would need more room between parts
@@ -45,7 +74,7 @@ def new_cell(new: NewTask, path: Path) -> tuple[str, Task]:
 def _grip_width(part: NewPart, arm: Arm, folder: Path) -> float:
     """How far apart the fingers are that hold a part [m]; BadInput when they cannot."""
     fields = PartFields(name=part.name, shape=part.shape, size_m=part.size_m, mass_kg=part.mass_kg)  # type: ignore[arg-type]
-    return grip_of(shape_of(fields, folder), arm.gripper, FRICTION).width_m
+    return grip_of(shape_of(fields, folder), arm.gripper, part.friction).width_m
 
 
 def _around(new: NewTask, arm: Arm) -> Around:

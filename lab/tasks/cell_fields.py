@@ -41,16 +41,16 @@ def _unlimited(value: object, checked: Callable[[object], int]) -> int:
 
 
 class CellRobot(Record):
-    """A transfer robot, or a vehicle: the station where it stands at time 0.
-
-    name: needed where there are several. speed: how many times faster it is than `travel` says. serves: the stations where it may
-    pick and drop; left out: all.
-    """
+    """A transfer robot, or a vehicle."""
 
     start: Name
+    """The station where it stands at time 0, such as `"in"`."""
     name: Name = ROBOT
+    """Its name; needed where there are several."""
     speed: Annotated[float, Field(ge=1e-3, le=1e3)] = 1.0
+    """How many times faster it is than the travel times say [-]."""
     serves: Annotated[tuple[Name, ...], BeforeValidator(as_tuple)] | None = None
+    """The stations where it may pick and drop, such as `["in", "oven"]`; left out: all."""
 
     def built(self) -> Robot:
         """As the sequencer has it."""
@@ -58,20 +58,26 @@ class CellRobot(Record):
 
 
 class CellStation(Record):
-    """A place for parts: `capacity` in parts, or "unlimited"; a machine may have one processing time for all products [s].
-
-    at_most_s: how long after it a part may stay in the machine, else it is spoilt [s]. servers: how many parts it works on at
-    once; the others wait in its room, and those that are done, too; left out: all that stand in it, and no waiting. setup_s: from
-    product -> to product -> seconds that a server takes to change over.
-    """
+    """A place for parts: storage, a buffer, or a machine."""
 
     name: Name
+    """The station's name, which routes and travel times use, such as `"oven"`."""
     kind: Annotated[Literal["storage", "buffer", "machine"], _known("kind", STATION_KINDS, "station")]
-    capacity: Annotated[Room, WrapValidator(_unlimited)]
+    """What it is: parts begin and end in storage, wait in a buffer, and are worked on in a machine."""
+    capacity: Annotated[Room, WrapValidator(_unlimited, json_schema_input_type=Room | Literal["unlimited"])]
+    """How many parts it holds at once, such as `1`, or `"unlimited"`."""
     processing_s: Seconds | None = None
+    """How long the machine works on each part [s], such as `60.0`; a stage of a route may have its own."""
     at_most_s: Seconds | None = None
+    """How long a part may stay in the machine after that before it is spoilt [s], such as `4.0`; left out: as long as
+    you like.
+    """
     servers: Room | None = None
+    """How many parts the machine works on at once, such as `1`; the others wait in its room, and those that are done,
+    too. Left out: all that stand in it, each from when it comes.
+    """
     setup_s: Times = Field(default={})
+    """How long a server takes to change over, from product to product [s], such as `{ bun = { loaf = 20.0 } }`."""
 
     def built(self) -> Station:
         """As the sequencer has it."""
@@ -82,18 +88,30 @@ class CellStation(Record):
 
 
 class CellStage(Record):
-    """A step of a route (see `lab.sequencing.cell.cell.Stage`); with only a station it may be written as its name."""
+    """One stage of a route; a stage that is only a station may be written as its name."""
 
     station: Name
+    """The station to which the part goes, such as `"oven"`."""
     buffer: Name | None = None
+    """Where the part waits when that station is full, such as `"oven_buffer"`."""
     processing_s: Seconds | None = None
+    """How long the machine works on this product [s], such as `45.0`; left out: the station's time."""
     service_s: Seconds = 0.0
+    """What the robot has to do there before it can take the part out [s], such as `20.0`."""
     pallet: bool = False
+    """Whether the part is lifted off its pallet for this machine; the pallet stays at the station before, and is
+    brought to the one after.
+    """
     at_most_s: Seconds | None = None
+    """How long this product may stay in the machine after that before it is spoilt [s], such as `4.0`; left out: the
+    station's.
+    """
 
 
 Route = Annotated[
-    tuple[Annotated[CellStage, BeforeValidator(_as_stage)], ...], BeforeValidator(as_tuple), Field(max_length=100)
+    tuple[Annotated[CellStage, BeforeValidator(_as_stage)], ...],
+    BeforeValidator(as_tuple),
+    Field(max_length=100),
 ]
 
 
@@ -101,7 +119,9 @@ class CellProduct(Record):
     """A type of part, and the routes that the robot may take one of them along."""
 
     name: Name
+    """The product's name, such as `"bun"`."""
     routes: Annotated[tuple[Route, ...], BeforeValidator(as_tuple), Field(min_length=1, max_length=50)]
+    """The ways that one of them may take, each a list of stages, such as `[["in", "oven", "out"]]`."""
 
     def built(self) -> Product:
         """As the sequencer has it."""
@@ -109,24 +129,32 @@ class CellProduct(Record):
 
 
 class CellArrivals(Record):
-    """Parts that come one after the other: the time before each [s], counted from the arrival or the pick before it."""
+    """Parts that come to the first station one after the other."""
 
     interval_s: Seconds
+    """The time before each part [s], such as `90.0`."""
     after: Literal["clock", "pick"] = "clock"
+    """From when it counts: from the arrival before ("clock"), or from when the part before was taken away ("pick")."""
 
 
 Law = Annotated[str, _known("law", LAWS, "stochastic")]
 
 
 class Stochastic(Record):
-    """What --stochastic draws the times of an episode from (see `lab.sequencing.cell.chance.Chance`)."""
+    """What --stochastic draws the times of an episode from."""
 
     processing: Law = "normal"
+    """The law of processing times."""
     arrivals: Law = "constant"
+    """The law of the times between arrivals."""
     spread: Annotated[float, Field(ge=0, le=1)] = 0.1
+    """The standard deviation of a normal time, as a share of its mean [-]."""
     breaks_every_s: Seconds = 0.0
+    """The mean working time between two breakdowns of a machine [s], such as `3600.0`; 0: none."""
     repair_s: Seconds = 0.0
+    """The mean time of a repair [s], such as `120.0`."""
     late_s: Seconds = 0.0
+    """By how much a part with a release_s comes later than that, in the mean [s], such as `30.0`."""
 
     def built(self) -> Chance:
         """As the sequencer has it."""
@@ -134,13 +162,16 @@ class Stochastic(Record):
 
 
 class CellTrack(Record):
-    """What several robots drive on: stretches of so many seconds between two stations, each of which holds one at a time."""
+    """What several robots drive on: stretches between two stations, each of which holds one robot at a time."""
 
     stretches: Annotated[
         tuple[Annotated[tuple[Name, Name, Seconds], BeforeValidator(as_tuple)], ...],
         BeforeValidator(as_tuple),
         Field(min_length=1, max_length=200),
     ]
+    """A stretch each: the two stations that it joins, and how long a robot drives along it [s], such as
+    `[["in", "oven", 5.0]]`.
+    """
 
     def built(self) -> tuple[Stretch, ...]:
         """As the sequencer has it."""
@@ -148,36 +179,50 @@ class CellTrack(Record):
 
 
 class CellFields(Record):
-    """All that a cell file may hold.
-
-    Either `order`, a product for each part, or, for one product, `parts`. travel: seconds from a station (the row) to
-    another; a pair that is left out is no allowed move; with a track, the times are those of its ways.
-    loaded: those that differ when the robot carries something.
-    Either `robot`, the only one, or `robots`: several, or [] where parts go on by themselves. in_physics: the name of the task,
-    or its file in the same folder, in which lab run carries such a cell out. due_s, release_s: one a part, when it is wanted, and
-    when it is there at first; due_factor: a part is due so many times its own work after it arrives (see `CellFile.work_s`).
-    """
+    """All that a cell file may hold; `CellFile` makes a cell of it."""
 
     kind: Literal["cell"] = "cell"
+    """What the file is; always "cell"."""
     name: Name
+    """The cell's name, such as `"bakery"`: 1 to 40 letters, digits, spaces, - and _."""
     title: str = ""
+    """A line that says what the cell is, such as `"Two products, one oven"`."""
     in_physics: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9 ._-]{0,80}$")] | None = None
+    """The name of the task, or its file in the same folder, in which `lab run` carries such a cell out, such as `"fms"`."""
     order: Annotated[tuple[Name, ...], BeforeValidator(as_tuple)] | None = None
+    """A product for each part, such as `["bun", "loaf", "bun"]`."""
     parts: int | None = None
+    """How many parts, of a cell with one product, such as `4`; in place of order."""
     buffers: Literal["busy", "free"] = "busy"
+    """Whether a part goes to a buffer only while its machine is full ("busy"), or whenever the order says so ("free")."""
     due_s: Annotated[tuple[Seconds, ...], BeforeValidator(as_tuple)] | None = None
+    """When each part is wanted [s], such as `[120.0, 300.0, 240.0]`; one for each part."""
     release_s: Annotated[tuple[Seconds, ...], BeforeValidator(as_tuple)] | None = None
+    """When each part is there at first [s], such as `[0.0, 60.0, 60.0]`; one for each part."""
     due_factor: Annotated[float, Field(gt=0, le=1000)] | None = None
+    """A part is due so many times its own work after it arrives [-], such as `3.0`; in place of due_s."""
     robot: CellRobot | None = None
+    """The only robot; in place of robots."""
     robots: Annotated[tuple[CellRobot, ...], BeforeValidator(as_tuple), Field(max_length=50)] | None = None
+    """Several robots; `[]` where parts go on by themselves, in place of robot."""
     stations: Annotated[tuple[CellStation, ...], BeforeValidator(as_tuple), Field(min_length=2, max_length=100)]
+    """Where parts stand and are worked on."""
     products: Annotated[tuple[CellProduct, ...], BeforeValidator(as_tuple), Field(min_length=1, max_length=MAX_PARTS)]
+    """The types of parts."""
     travel: Times = Field(default={})
+    """How long a robot drives from a station (the row) to another [s], such as `{ in = { oven = 10.0 } }`; a pair that
+    is left out is no allowed move.
+    """
     track: CellTrack | None = None
+    """What several robots drive on; its ways then give the times, in place of travel."""
     loaded: Times = Field(default={})
+    """Those times that differ when the robot carries something [s], such as `{ in = { oven = 12.0 } }`."""
     arrivals: CellArrivals | None = None
+    """When parts come; left out: all are there at time 0."""
     stochastic: Stochastic = Stochastic()
+    """What --stochastic draws the times from."""
     sequencing: Sequencing = Sequencing()
+    """How the order of the robot's transfers is found."""
 
     @property
     def names(self) -> tuple[str, ...]:

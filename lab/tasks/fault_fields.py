@@ -1,8 +1,8 @@
 """What a task file says of a fault: what goes wrong in a run, when, and with what."""
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, ConfigDict, Field, model_validator
 
 from lab.tasks.record import Name, Record, as_tuple
 
@@ -60,36 +60,59 @@ TAKES: dict[str, tuple[str, ...]] = {  # and those that it may have beside them
 }
 
 
-class FaultFields(Record):
-    """A fault: it happens as soon as it can after at_s [s] of the run.
+def allowed(what: str) -> list[str]:
+    """The fields that a kind of fault may have."""
+    return sorted({"what", "at_s", *NEEDS.get(what, ()), *TAKES[what]})
 
-    part: which one, such as "slice 1", else the first that fits; when: only while the part is so. by_m: how far what is moved,
-    or falls, comes to be off where it was, x, y [m]; at_m: where it comes to be; turn_rad: and turned. share: of the time that
-    a machine takes, or of the friction that is left. seconds: how long it lasts. size_m: of an obstacle that is put there.
-    """
+
+def _by_kind(schema: dict[str, Any]) -> None:
+    """Adds to a schema which fields each kind of fault needs, and may have."""
+    schema["allOf"] = [
+        {
+            "if": {"properties": {"what": {"const": what}}, "required": ["what"]},
+            "then": {"required": [*NEEDS.get(what, ())], "propertyNames": {"enum": allowed(what)}},
+        }
+        for what in TAKES
+    ]
+
+
+class FaultFields(Record):
+    """A fault: what goes wrong in a run, when, and with what."""
+
+    model_config = ConfigDict(json_schema_extra=_by_kind)
 
     what: FaultKind
+    """What goes wrong."""
     at_s: Annotated[float, Field(ge=0, le=86_400)] = 0.0
+    """It happens as soon as it can after this time of the run [s]."""
     when: When | None = None
+    """It waits until the part is so: carried, in a machine, or standing at a station, such as `"standing"`."""
     part: PartName | None = None
+    """Which part: its kind and number, such as `"bun 1"`; left out: the first that fits."""
     station: Name | None = None
+    """Which station or machine, such as `"oven"`."""
     obstacle: Name | None = None
+    """Which obstacle, such as `"tower"`."""
     by_m: XY | None = None
+    """How far what is moved, or falls, comes to lie off where it was: x and y [m], such as `[0.05, 0.0]`."""
     turn_rad: Annotated[float, Field(ge=-3.2, le=3.2)] = 0.0
+    """By how much the part is turned [rad]."""
     share: Annotated[float, Field(ge=0, le=100)] | None = None
+    """How many times as long the machine takes, or the share of the friction that is left [-], such as `1.5`."""
     seconds: Annotated[float, Field(gt=0, le=86_400)] | None = None
+    """How long it lasts [s], such as `30.0`."""
     at_m: XY | None = None
+    """Where what is moved, dropped or put comes to be: x and y [m], such as `[0.5, 0.3]`."""
     size_m: Edges | None = None
+    """Length, width and height of the obstacle that is put there [m], such as `[0.06, 0.06, 0.34]`."""
 
     @model_validator(mode="after")
     def _its_own_fields(self) -> Self:
-        needed = NEEDS.get(self.what, ())
-        for field in needed:
+        for field in NEEDS.get(self.what, ()):
             if getattr(self, field) is None:
                 raise ValueError(f"what = '{self.what}' needs {field}")
-        allowed = {"what", "at_s", *needed, *TAKES[self.what]}
-        for field in sorted(self.model_fields_set - allowed):
-            raise ValueError(f"what = '{self.what}' has no {field}: allowed are {', '.join(sorted(allowed))}")
+        for field in sorted(self.model_fields_set - {*allowed(self.what)}):
+            raise ValueError(f"what = '{self.what}' has no {field}: allowed are {', '.join(allowed(self.what))}")
         if self.when == "carried" and self.what in ("part moved", "part gone"):
             raise ValueError(
                 "when = 'carried': what is carried is dropped, or slips; wanted 'in machine' or 'standing'"

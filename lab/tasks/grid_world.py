@@ -46,7 +46,9 @@ class AdvisorView(Record):
     """The block of cells in which an advisor with a limited view sees the robot, from corner to corner, both inside."""
 
     lower: GridCell
+    """One corner of the block, such as `[4, 4]`."""
     upper: GridCell
+    """The opposite one, such as `[7, 7]`."""
 
 
 class GridWorld(Learned):
@@ -57,13 +59,21 @@ class GridWorld(Learned):
     """
 
     kind: Literal["world"] = "world"
+    """What the file is; always "world"."""
     name: Name
+    """The world's name, such as `"maze"`: 1 to 40 letters, digits, spaces, - and _."""
     title: str = ""
+    """A line that says what the world is, such as `"A maze with one way"`."""
     shape: GridShape
+    """How many cells there are along each axis, such as `[12, 12]` or `[10, 10, 10]`."""
     start: GridCell
+    """The cell where every episode begins, such as `[0, 0]`."""
     goal: GridCell
+    """The cell to be reached, such as `[11, 11]`."""
     obstacles: Annotated[tuple[GridCell, ...], BeforeValidator(as_tuple)] = ()
+    """The cells that are blocked, such as `[[3, 4], [3, 5]]`."""
     view: AdvisorView | None = None
+    """Where an advisor with a limited view sees the robot; left out: everywhere."""
 
     @model_validator(mode="after")
     def _cells_fit(self) -> Self:

@@ -1,10 +1,10 @@
 """A new task file from a few words: an arm, parts, machines. The stations are laid out around the arm."""
 
 import re
-from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import combinations, product
-from math import ceil, cos, hypot, isfinite, pi, radians, sin
+from math import ceil, cos, hypot, inf, isfinite, pi, radians, sin
 from pathlib import Path
 from typing import NamedTuple
 
@@ -19,7 +19,7 @@ MACHINE_WORDS = "NAME:SECONDS, such as oven:60"
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9 _-]{0,30}")
 LARGEST_M, SMALLEST_M, LONGEST_S = 0.5, 0.005, 86_400
 KG_M3 = 400.0  # of a part: wood, about
-HEAVIEST_KG, LIGHTEST_KG = 3.0, 0.01
+HEAVIEST_KG, LIGHTEST_KG = 3.0, 0.02  # of wood: what is lighter falls over as the fingers leave it
 FRICTION = 0.8
 MACHINE_HIGH_M, AROUND_PART_M = 0.05, 0.06  # of a machine's box; its length and width beyond the part's
 COLUMNS, BUFFER_ROOM = 4, 2  # of a storage; parts that a buffer holds
@@ -34,12 +34,17 @@ EDGE_M = 0.03  # of the reach that is left alone
 
 @dataclass(frozen=True)
 class NewPart:
-    """A kind of part: a box [x, y, z] or a cylinder [diameter, height] [m], and how many."""
+    """A kind of part: a box [x, y, z] or a cylinder [diameter, height] [m], and how many.
+
+    given_kg: what it weighs; None: as much as wood.
+    """
 
     name: str
     shape: str
     size_m: tuple[float, ...]
     count: int
+    given_kg: float | None = None
+    friction: float = FRICTION
 
     @property
     def foot_m(self) -> tuple[float, float]:
@@ -48,7 +53,9 @@ class NewPart:
 
     @property
     def mass_kg(self) -> float:
-        """What it weighs, if it is of wood."""
+        """What it weighs."""
+        if self.given_kg is not None:
+            return self.given_kg
         share = 1.0 if self.shape == "box" else pi / 4
         x, y = self.foot_m
         return round(min(max(share * x * y * self.size_m[-1] * KG_M3, LIGHTEST_KG), HEAVIEST_KG), 3)
@@ -64,13 +71,28 @@ class NewMachine:
 
 @dataclass(frozen=True)
 class NewTask:
-    """Parts that an arm brings from an input through all machines, in their order, to an output; buffers before machines."""
+    """Parts that an arm brings from an input through all machines, in their order, to an output; buffers before machines.
+
+    capacities: of stations that hold more or fewer parts than they do by default, by name.
+    """
 
     name: str
     arm: str = "up6"
     parts: tuple[NewPart, ...] = ()
     machines: tuple[NewMachine, ...] = ()
     buffers: bool = False
+    capacities: Mapping[str, int] = field(default_factory=dict)
+
+    @property
+    def stations(self) -> dict[str, tuple[str, int]]:
+        """The kind and the capacity of each station, in the order of the route."""
+        found = {"input": ("storage", self.count)}
+        for machine in self.machines:
+            if self.buffers:
+                found[f"{machine.name}_buffer"] = ("buffer", BUFFER_ROOM)
+            found[machine.name] = ("machine", 1)
+        found["output"] = ("storage", self.count)
+        return {name: (kind, self.capacities.get(name, own)) for name, (kind, own) in found.items()}
 
     @property
     def count(self) -> int:
@@ -115,7 +137,9 @@ class Placed(NamedTuple):
 
 
 def file_of(word: str) -> tuple[Path, str]:
-    """The file to be written and the task's name of NAME, with or without .toml; BadInput when it cannot be, or is there."""
+    """The file to be written and the task's name of NAME, with or without .toml; BadInput when it cannot be, or is
+    there.
+    """
     path = Path(word if word.endswith(".toml") else f"{word}.toml")
     if not NAME.fullmatch(path.stem):
         raise BadInput(
@@ -169,8 +193,20 @@ def machine_of_word(word: str, taken: Collection[str] = ()) -> NewMachine:
     return NewMachine(name, seconds)
 
 
-def new_task(name: str, arm: str, parts: Sequence[str], machines: Sequence[str], buffers: bool) -> NewTask:
-    """What options, or answers, ask for. Raises BadInput."""
+def new_task(
+    name: str,
+    arm: str,
+    parts: Sequence[str],
+    machines: Sequence[str],
+    buffers: bool,
+    masses: Sequence[str] = (),
+    frictions: Sequence[str] = (),
+    capacities: Sequence[str] = (),
+) -> NewTask:
+    """What options, or answers, ask for. Raises BadInput.
+
+    masses [kg], frictions: of kinds of parts, "pin=0.05"; capacities: of stations, "oven=2".
+    """
     kinds: list[NewPart] = []
     for word in parts or (PART,):
         kinds.append(part_of_word(word, [part.name for part in kinds]))
@@ -179,19 +215,52 @@ def new_task(name: str, arm: str, parts: Sequence[str], machines: Sequence[str],
         stations.append(
             machine_of_word(word, ["input", "output", *(m.name for m in stations), *(p.name for p in kinds)])
         )
+    names = [part.name for part in kinds]
+    weigh = _by_name(masses, "--mass", "part", names, (0.001, 6.0), "0.05")
+    rub = _by_name(frictions, "--friction", "part", names, (0.0, 5.0), "0.5")
+    kinds = [replace(one, given_kg=weigh.get(one.name), friction=rub.get(one.name, FRICTION)) for one in kinds]
     found = NewTask(name, arm_of_word(arm), tuple(kinds), tuple(stations), buffers)
     if found.count > MAX_PARTS:
         raise BadInput(f"{found.count} parts (--part): allowed are 1 to {MAX_PARTS} in all")
+    return replace(found, capacities=_capacities(found, capacities))
+
+
+def _by_name(
+    words: Sequence[str], option: str, label: str, names: Collection[str], allowed: tuple[float, float], example: str
+) -> dict[str, float]:
+    """The numbers of an option such as --mass pin=0.05, by name. Raises BadInput."""
+    found: dict[str, float] = {}
+    for word in words:
+        name, equals, number = word.rpartition("=")
+        if not equals:
+            raise BadInput(f"'{word}' ({option}): wanted NAME=NUMBER, such as {min(names)}={example}")
+        if name not in names:
+            raise unknown(label, name, names, option)
+        value = _number(number, -inf)
+        if not allowed[0] <= value <= allowed[1]:
+            raise BadInput(f"'{word}' ({option}): '{number}': allowed are {allowed[0]:g} to {allowed[1]:g}")
+        if name in found:
+            raise BadInput(f"'{word}' ({option}): {label} '{name}' has {found[name]:g} already: once is allowed")
+        found[name] = value
     return found
 
 
-def _number(text: str) -> float:
-    """A number, -1 for what is none."""
+def _capacities(new: NewTask, words: Sequence[str]) -> dict[str, int]:
+    found = _by_name(words, "--capacity", "station", [*new.stations], (1, MAX_PARTS), "2")
+    for name, most in found.items():
+        least = new.count if new.stations[name][0] == "storage" else 1
+        if most != int(most) or most < least:
+            raise BadInput(f"'{name}={most:g}' (--capacity): allowed are whole numbers from {least} to {MAX_PARTS}")
+    return {name: int(most) for name, most in found.items()}
+
+
+def _number(text: str, none: float = -1.0) -> float:
+    """A number, `none` for what is none."""
     try:
         value = float(text)
     except ValueError:
-        return -1.0
-    return value if isfinite(value) else -1.0
+        return none
+    return value if isfinite(value) else none
 
 
 def _check_name(name: str, where: str, taken: Collection[str]) -> None:
@@ -241,20 +310,17 @@ def _stations(new: NewTask, between_m: float | None = None) -> list[Placed]:
     """The stations in the order of the route, all at the arm's foot."""
     pitch = [foot + (between_m or BETWEEN_M) for foot in new.foot_m]
 
-    def placed(name: str, kind: str, capacity: int, columns: int) -> Placed:
-        columns = min(columns, capacity)
+    def placed(name: str, kind: str, capacity: int) -> Placed:
+        columns = min(COLUMNS, capacity) if kind == "storage" else 1
         rows = ceil(capacity / columns)
         at = product(range(columns), range(rows))
-        spots = [((c - (columns - 1) / 2) * pitch[0], (r - (rows - 1) // 2) * pitch[1]) for c, r in at]
+        first = (rows - 1) / 2 if kind == "machine" else (rows - 1) // 2  # a machine's body lies around its middle
+        spots = [((c - (columns - 1) / 2) * pitch[0], (r - first) * pitch[1]) for c, r in at]
         spots = sorted(spots, key=lambda spot: (round(hypot(*spot), 6), spot))[:capacity]
-        return Placed(name, kind, capacity, 0.0, 0.0, tuple(spots), between_m is not None and capacity > 1)
+        said = capacity > 1 and (between_m is not None or kind == "machine")
+        return Placed(name, kind, capacity, 0.0, 0.0, tuple(spots), said)
 
-    found = [placed("input", "storage", new.count, COLUMNS)]
-    for machine in new.machines:
-        if new.buffers:
-            found.append(placed(f"{machine.name}_buffer", "buffer", BUFFER_ROOM, 1))
-        found.append(placed(machine.name, "machine", 1, 1))
-    return [*found, placed("output", "storage", new.count, COLUMNS)]
+    return [placed(name, kind, capacity) for name, (kind, capacity) in new.stations.items()]
 
 
 def _reached(one: Placed, around: Around) -> bool:

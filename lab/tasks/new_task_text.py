@@ -6,7 +6,6 @@ from math import ceil, floor, hypot, inf
 from lab.tasks.new_task import (
     AROUND_PART_M,
     CELL_M,
-    FRICTION,
     LEVELS,
     MACHINE_HIGH_M,
     Around,
@@ -36,6 +35,8 @@ def _head(new: NewTask, opening_m: float | None) -> str:
 # {kinds}: {way}
 # Change a number, move a station, and look: lab task check {new.name}.toml --plot cell.png    Then: lab run {new.name}.toml
 # Units: metres, radians, seconds, kilograms, newtons. The robot stands at the origin; z = 0 is the table top.
+# An editor for TOML completes the keys: lab task schema --out task-schema.json, and as the first line here
+# #:schema task-schema.json
 
 name = "{new.name}"
 title = "{new.name}: {way}"
@@ -64,7 +65,7 @@ count = {part.count}                   # unless --parts {part.name}=N says other
 shape = "{part.shape}"
 size_m = {_list(part.size_m)}  # {sizes}
 mass_kg = {part.mass_kg}
-friction = {FRICTION}
+friction = {part.friction}
 color = {_list(COLORS[number % len(COLORS)])}
 area = {_list(area)}  # it stands on its spot at the start within +- x, +- y [m], +- yaw [rad]
 # its way; a buffer is used only when the machine ahead of it is busy

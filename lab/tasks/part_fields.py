@@ -19,40 +19,51 @@ SIZES = {"box": ("[x, y, z]", 3), "cylinder": ("[diameter, height]", 2)}  # what
 
 
 class GripFields(Record):
-    """Where the gripper takes a part: turned by yaw [rad], finger tips up_m above its foot, the tool at_m off its middle.
-
-    At yaw 0 the fingers close along the part's y axis; at_m: x, y [m] in the part's axes.
-    """
+    """Where the gripper takes a part."""
 
     yaw: Angle = 0.0
+    """The tool's turn against the part [rad]; at 0 the fingers close along the part's y axis."""
     up_m: Annotated[float, Field(gt=0, le=10)]
+    """How high the finger tips are above the part's foot [m], such as `0.04`."""
     at_m: Annotated[
         tuple[Annotated[float, Field(ge=-1, le=1)], Annotated[float, Field(ge=-1, le=1)]], BeforeValidator(as_tuple)
     ] = (0.0, 0.0)
+    """How far the tool's axis is off the part's middle, along its x and y [m], such as `[0.0, 0.01]`."""
 
 
 class PartFields(Record):
-    """A kind of part.
-
-    size_m: box [x, y, z], cylinder [diameter, height] [m]. file: of a mesh, an OBJ or STL file, whose numbers times scale are
-    metres. hull: a mesh with holes is taken as its convex hull. stands: roll, pitch [rad] of the shape as it stands. look: a
-    URDF whose visuals are shown instead of the shape in its colour. area: a part stands off its spot at the start within +- x,
-    y [m], yaw [rad]. grip: where it is gripped; left out, that is computed from the shape.
-    """
+    """A kind of part: its body, and where the gripper takes it."""
 
     name: Name
+    """The kind's name, such as `"bun"`; parts are called by it and their number: bun 1, bun 2."""
     shape: ShapeName
+    """What its body is: a box, an upright cylinder, or a mesh from a file."""
     size_m: Annotated[tuple[Edge, ...] | None, BeforeValidator(as_tuple)] = None
+    """The edges along x, y and z of a box, or the diameter and height of a cylinder [m], such as `[0.06, 0.03, 0.08]`
+    or `[0.03, 0.09]`; a mesh has none.
+    """
     file: str | None = None
+    """The OBJ or STL file of a mesh, beside the task file, such as `"bracket.stl"`."""
     scale: Annotated[float, Field(gt=0, le=1000)] = 1.0
+    """How many metres one unit of the mesh file is [m], such as `0.001`."""
     hull: bool = False
+    """Whether a mesh with holes is taken as its convex hull."""
     stands: Annotated[tuple[Angle, Angle], BeforeValidator(as_tuple)] = (0.0, 0.0)
+    """How the shape is tilted as it stands: roll and pitch [rad], such as `[1.5708, 0.0]`."""
     mass_kg: Annotated[float, Field(ge=0.001, le=6)]
+    """What one part weighs [kg], such as `0.05`."""
     friction: Annotated[float, Field(ge=0, le=5)] = 0.8
+    """The coefficient of friction against the fingers and what it stands on [-]."""
     color: Annotated[tuple[Share, Share, Share], BeforeValidator(as_tuple)] = (0.62, 0.42, 0.22)
+    """Its colour: red, green and blue [-]."""
     look: str | None = None
+    """A URDF that is shown instead of the shape in its colour, such as `"slice.urdf"`."""
     area: Annotated[tuple[Off, Off, Off], BeforeValidator(as_tuple)] = (0.0, 0.0, 0.0)
+    """How far a part may stand off its spot at the start, either way, drawn from the seed: x, y and turn [m, m, rad],
+    such as `[0.004, 0.004, 0.06]`.
+    """
     grip: GripFields | None = None
+    """Where the gripper takes it, such as `{ up_m = 0.04 }`; left out, that is computed from the shape."""
 
     @field_validator("shape", mode="before")
     @classmethod

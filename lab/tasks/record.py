@@ -17,7 +17,8 @@ MAX_FILE_BYTES = 10_000_000  # of a text file: a world of 100 x 100 x 100 cells 
 MAX_SHORT_BYTES = 1_000_000  # of one that holds no world: reading a longer one takes seconds
 MAX_REWARD = 1_000_000  # sums of larger ones lose the small ones, and of much larger ones overflow
 
-Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9 _-]{0,39}$")]
+NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9 _-]{0,39}$"
+Name = Annotated[str, Field(pattern=NAME_PATTERN)]
 Count = Annotated[int, Field(ge=1, le=100)]
 
 
@@ -27,9 +28,15 @@ def as_tuple(value: object) -> object:
 
 
 class Record(BaseModel):
-    """A frozen record that knows its fields and takes no others."""
+    """A frozen record that knows its fields and takes no others.
 
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+    The text below a field is its description in the schema and in the reference (`lab.tasks.schema`): its unit stands in
+    brackets, [-] for a bare number, and an example after "such as". A key is added as one field with such a text.
+    """
+
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", strict=True, allow_inf_nan=False, use_attribute_docstrings=True
+    )
 
 
 class _FromTable:
@@ -45,7 +52,9 @@ FROM_TABLE = _FromTable()
 
 
 def walking(step: float, learner: LearnerSettings) -> float:
-    """What walking as long as can be is worth, for ever or, without discount, through an episode; `step`: a move's reward."""
+    """What walking as long as can be is worth, for ever or, without discount, through an episode; `step`: a move's
+    reward.
+    """
     for_ever = inf if learner.discount == 1.0 else 1.0 / (1.0 - learner.discount)
     return step * min(for_ever, learner.max_steps)
 
@@ -58,8 +67,13 @@ class Learned(Record):
     """
 
     learner: Annotated[LearnerSettings, FROM_TABLE] = LearnerSettings()
+    """How it learns; the keys that are left out keep their defaults, such as `{ learner = "dyna-q", episodes = 300 }`."""
     rewards: Annotated[Rewards, FROM_TABLE] = Field(default=cast(Rewards, {}), validate_default=True)
+    """What moves are worth, such as `{ goal = 1.5, step = -0.1 }`."""
     gate: Annotated[GateSettings, FROM_TABLE] = GateSettings(spare_best=True)
+    """When it asks for advice, such as `{ gate = "ccrl", omega = 7 }`; `spare_best` is true here unless the file says
+    otherwise.
+    """
 
     @field_validator("rewards", mode="before")
     @classmethod

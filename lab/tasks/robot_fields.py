@@ -14,29 +14,42 @@ Part = Annotated[str, Field(min_length=1, max_length=100)]
 
 
 class RobotSettings(Record):
-    """The arm, where it starts, and how fast and firm it works [m/s], [m/s2], [N].
-
-    model: a name of MODELS, or the path of a URDF beside the task file; that one also needs tool_link, whose z axis points
-    out of the gripper and along whose y axis its fingers close, fingers, the joints that move them, and tip_m, how far the
-    finger tips are out along z [m]. nearest_m [m]: nearer to its own axis than this the tool never goes. opening_m [m]:
-    between the open fingers, by default all that the gripper has. base_up_m: its foot above the table [m]. grip_force_n: of
-    each finger [N], at most: a part that is light for it is held with 1000 N/kg; by default chosen for each kind of part from
-    its mass and friction. force_limit_n: a protective stop holds the arm that presses on something harder [N], by default
-    150 or six times the grip force.
-    """
+    """The arm, how it is mounted, where it starts, and how fast and firm it works."""
 
     model: str = "up6"
+    """An arm that ships: `up6`, `panda`, `iiwa`, `xarm6`; or the URDF file of another beside the task file, such as
+    `"my-arm.urdf"`.
+    """
     tool_link: Part | None = None
+    """Of a URDF: the link whose z axis points out of the gripper and along whose y axis the fingers close, such as
+    `"hand"`.
+    """
     fingers: Annotated[tuple[Part, ...], BeforeValidator(as_tuple), Field(min_length=1, max_length=8)] | None = None
+    """Of a URDF: the joints that move the fingers, such as `["left_finger", "right_finger"]`."""
     tip_m: Annotated[float, Field(ge=0, le=1)] | None = None
+    """Of a URDF: how far the finger tips are out along the tool link's z axis [m], such as `0.1`."""
     nearest_m: Annotated[float, Field(ge=0.05, le=5)] | None = None
+    """The tool never comes nearer than this to the arm's own vertical axis [m], such as `0.3`; left out: as the arm
+    has it.
+    """
     opening_m: Annotated[float, Field(ge=0.002, le=1)] | None = None
+    """How far the fingers open [m], such as `0.046`; left out: all the way."""
     base_up_m: Annotated[float, Field(ge=-2, le=5)] = 0.0
+    """How high the arm's foot stands above the table [m]."""
     start: Name
+    """The station above which the arm waits at time 0, such as `"input"`."""
     speed_m_s: Annotated[float, Field(ge=0.01, le=1.5)] = 0.5
+    """How fast the tool moves along its path, at most [m/s]."""
     acceleration_m_s2: Annotated[float, Field(ge=0.01, le=10)] = 2.0
+    """How fast the tool gains and loses speed, at most [m/s2]."""
     grip_force_n: Annotated[float, Field(gt=0, le=STRONGEST_N)] | None = None
+    """With what force each finger presses, at most [N], such as `25.0`: a part that is light for it is held with 1000
+    N/kg. Left out, it is chosen for each kind of part from its mass and friction.
+    """
     force_limit_n: Annotated[float, Field(ge=10, le=5000)] | None = None
+    """With what force the arm may press on something hard before a protective stop holds it [N], such as `150.0`; left
+    out: 150, or six times the grip force where that is more.
+    """
 
     @property
     def is_file(self) -> bool:

@@ -16,14 +16,23 @@ class Sequencing(Record):
     """How the order of the robot's transfers is found, and what it is judged by."""
 
     method: str = "srl-time"
+    """Who finds the order: a name that `lab sequence --help` lists."""
     episodes: Annotated[int, Field(ge=1, le=1_000_000)] = 400
+    """How many sequences are tried."""
     alpha: Annotated[float, Field(gt=0, le=1)] = 0.05
+    """The learning rate of srl and mc [-]."""
     discount: Annotated[float, Field(gt=0, le=1)] = 0.9
+    """What the next step counts for, compared with this one, in srl [-]."""
     beta: Annotated[float, Field(ge=0, le=100)] = 1.0
+    """How fast srl stops exploring: in episode n with the chance n**-beta [-]."""
     reward_factor: Literal["A", "B"] = "B"
+    """Which of the thesis's two reward factors srl has."""
     objective: str = MAKESPAN
+    """What a sequence is judged by: a name that `lab sequence --help` lists."""
     values: Literal["pairs", "states"] = "pairs"
+    """What srl has values of: pairs of a state and an action (figure 5.1), or the states after it (the listings)."""
     state: Literal["parts", "stations"] = "parts"
+    """What a state of srl is: where each part is, or what stands at each station (thesis, appendix III)."""
 
     def settings(self) -> SrlSettings:
         """The parameters of SRL and Monte Carlo."""

@@ -38,24 +38,38 @@ Order = tuple[str, ...]  # the kind of each part, part 1 first
 
 
 class Task(Record):
-    """A whole task file, checked.
-
-    perception: where parts stand is read from the simulator ("truth"), or seen by the camera in the hand ("camera").
-    """
+    """A whole task file, checked: a cell in physics, the parts that are made in it, and how the robot learns."""
 
     name: Name
+    """The task's name, such as `"bakery"`: 1 to 40 letters, digits, spaces, - and _."""
     title: str = ""
+    """A line that says what the task is, such as `"Two buns through one oven"`."""
     perception: Literal["truth", "camera"] = "truth"
+    """How the robot knows where parts stand: the simulator says so ("truth"), or the camera in the hand sees it
+    ("camera").
+    """
     robot: RobotSettings
+    """The arm."""
     parts: Annotated[tuple[Part, ...], BeforeValidator(as_tuple), Field(min_length=1, max_length=MAX_PARTS)]
+    """The kinds of parts."""
     workspace: Workspace
+    """The grid of cells in which the tool moves between stations."""
     camera: CameraSettings | None = None
+    """The overhead camera; needed by a station with approach = "camera"."""
     stations: Annotated[tuple[Station, ...], BeforeValidator(as_tuple), Field(min_length=2, max_length=MOST_THINGS)]
+    """Where parts stand and are worked on."""
     processes: dict[Name, Process] = Field(default={})
+    """What is done to a surface cell by cell, such as butter or glue; by the names that stations and stages use."""
     obstacles: Annotated[tuple[Obstacle, ...], BeforeValidator(as_tuple), Field(max_length=MOST_THINGS)] = ()
+    """What stands in the way."""
     faults: Annotated[tuple[FaultFields, ...], BeforeValidator(as_tuple), Field(max_length=MOST_THINGS)] = ()
+    """What goes wrong in every run."""
     subtasks: dict[str, Subtask] = Field(default={})
+    """How a sub-task is learned, by its kind: grasp, transfer, place, insert or cover; the defaults serve where there
+    is none.
+    """
     sequencing: Sequencing = Sequencing()
+    """How the order of the robot's transfers is found."""
     _folder: Path | None = PrivateAttr(default=None)
     _toml: TomlText | None = PrivateAttr(default=None)
 

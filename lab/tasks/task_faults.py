@@ -47,7 +47,9 @@ def loc_of(raw: dict[str, Any], message: str) -> Loc:
 
 
 def within(raw: dict[str, Any], loc: Loc, message: str) -> Loc:
-    """The rest of the way, from the table to which `loc` leads: to the value that a message quotes, or the field it names."""
+    """The rest of the way, from the table to which `loc` leads: to the value that a message quotes, or the field it
+    names.
+    """
     table: Any = raw
     for part in loc:
         table = table[part]

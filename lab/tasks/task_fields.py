@@ -28,11 +28,14 @@ MOST_THINGS = 200  # stations, stages or obstacles: on one table is no room for 
 
 
 class Workspace(Record):
-    """The grid of the transfer sub-task: lower corner [m], cell [m], cells along x, y, z."""
+    """The grid of the transfer sub-task: where the finger tips may go between stations."""
 
     lower_m: XYZ
+    """The grid's lower corner: x, y and z [m], such as `[-0.24, -1.08, 0.15]`."""
     cell_m: Sizes
+    """The edges of a cell along x, y and z [m], such as `[0.12, 0.12, 0.12]`."""
     shape: Annotated[tuple[Count, Count, Count], BeforeValidator(as_tuple)]
+    """How many cells there are along x, y and z, such as `[9, 18, 3]`; at most 100,000 in all."""
 
     @field_validator("shape")
     @classmethod
@@ -43,47 +46,64 @@ class Workspace(Record):
 
 
 class CameraSettings(Record):
-    """The overhead camera: position above the table [m], field of view [rad], picture width and height [pixels].
-
-    calibration: a file that `lab see --calibrate` wrote, which then says where the camera is, and what lens it has.
-    """
+    """The overhead camera."""
 
     position_m: Above
+    """Where the camera is, x, y and z above the table [m], such as `[0.7, 0.0, 1.6]`; it looks straight down."""
     field_of_view_rad: Annotated[float, Field(gt=0.01, lt=2.5)]
+    """The angle that its picture spans [rad], such as `0.9`."""
     pixels: Annotated[int, Field(ge=64, le=4096)] = 640
+    """The width and the height of its picture [pixels]."""
     calibration: Annotated[str, Field(min_length=1, max_length=200)] | None = None
+    """A file that `lab see --calibrate` wrote; the camera's place and lens are then taken from it, such as
+    `"camera.json"`.
+    """
 
 
 class CameraGrid(Record):
-    """The camera's grid before a station (ch. 8): origin, cell, start [m], and the finger tips' height on the way [m].
-
-    marker_m: where the station's cyan marker lies, off its pose along and across its axes, and above the table.
-    """
+    """The grid before a station that is approached by camera (thesis, chapter 8)."""
 
     origin_m: XY
+    """The grid's lower corner: x and y [m], such as `[0.64, 0.1]`."""
     cell_m: Size
+    """The edge of a cell [m], such as `0.02`."""
     shape: Annotated[tuple[Count, Count], BeforeValidator(as_tuple)] = (12, 12)
+    """How many cells there are along x and y."""
     start_m: XY
+    """Where the way through the grid begins: x and y [m], such as `[0.65, 0.2]`."""
     height_m: Size
+    """How high the finger tips are on that way [m], such as `0.3`."""
     marker_m: XYZ
+    """Where the station's cyan marker lies: off its pose along and across its axes, and above the table [m], such as
+    `[0.0, 0.038, 0.1]`.
+    """
 
 
 class Process(Record):
-    """A surface that is covered cell by cell, as with butter, glue or paint, or by vacuuming: cells, dwell [s], speed [m/s].
-
-    by "head": the machine's own head covers the side of the part that stands in it. by "robot": the empty gripper covers
-    `area_m` [m] around the station's pose, moved by `off_m` along its axes; z is the height of the finger tips.
-    """
+    """A surface that is covered cell by cell, as with butter, glue or paint, or by vacuuming."""
 
     grid: Annotated[
         tuple[Annotated[int, Field(ge=1, le=4)], Annotated[int, Field(ge=1, le=4)]], BeforeValidator(as_tuple)
     ]
+    """How many cells the surface has along and across, such as `[3, 3]`: each 1 to 4, at most 12 in all."""
     dwell_s: Time = 3.0
+    """How long the head stays at each cell [s]."""
     speed_m_s: Annotated[float, Field(ge=0.001, le=2)] = 0.02
+    """How fast it moves from cell to cell [m/s]."""
     color: Color = (1.0, 0.87, 0.25)
+    """The colour of what it leaves: red, green and blue [-]."""
     by: Literal["head", "robot"] = "head"
+    """Who covers: the machine's own head, over the side of the part that stands in it ("head"), or the empty gripper
+    ("robot").
+    """
     area_m: Annotated[tuple[Size, Size], BeforeValidator(as_tuple)] | None = None
+    """The surface that the robot covers: its length and width [m], such as `[0.1, 0.08]`; of by = "robot" only, which
+    needs it.
+    """
     off_m: XYZ = (0.0, 0.0, 0.0)
+    """The middle of that surface off the station's pose along its axes; z is the height of the finger tips [m], such
+    as `[0.0, 0.0, 0.2]`.
+    """
 
     @model_validator(mode="after")
     def _area_for_the_robot(self) -> Self:
@@ -99,30 +119,52 @@ class Process(Record):
 
 
 class Station(Record):
-    """A place where parts stand: pose x, y [m], yaw [rad]; a machine has a processing time [s] or a process to learn.
-
-    capacity: for how many parts there are spots; a machine works on each of them from when it comes, one with a process on
-    one at a time. at_most_s: how long a part may stay in a machine after that before the robot takes it out, else it is
-    spoilt [s]. body: what stands there, "slab", "box" of `size_m`, or a URDF or mesh file; floor_m: how high parts stand on
-    it; spots: where, off the pose along its axes and by yaw, instead of in rows. finish: the colour of parts done here;
-    color: of a slab, box or mesh.
-    """
+    """A place where parts stand: storage, a buffer, or a machine with a processing time or a process to learn."""
 
     name: Name
+    """The station's name, which routes use, such as `"oven"`."""
     kind: Literal["storage", "buffer", "machine"]
+    """What it is: parts begin and end in storage, wait in a buffer, and are worked on in a machine."""
     pose: XYZ
+    """Where it stands: x, y and its turn about the vertical [m, m, rad], such as `[0.6, -0.2, 0.0]`; the arm stands at
+    0, 0.
+    """
     capacity: Count
+    """How many parts it holds at once, such as `1`. A machine works on each of them from when it comes, one with a process on
+    one at a time.
+    """
     processing_s: Time | None = None
+    """How long the machine works on each part [s], such as `60.0`; a stage of a route may have its own."""
     process: Name | None = None
+    """The process that the machine carries out, which is learned; in place of processing_s, such as `"butter"`."""
     at_most_s: Time | None = None
+    """How long a part may stay in the machine after that before it is spoilt [s], such as `4.0`; left out: as long as
+    you like.
+    """
     body: Annotated[str, Field(min_length=1, max_length=200)] | None = None
+    """What stands there: "slab", "box", or a URDF, OBJ or STL file beside the task file, such as `"toaster.urdf"`.
+    Left out: a box for a machine, else a slab.
+    """
     size_m: Sizes | None = None
+    """Length, width and height of a slab or box [m], such as `[0.12, 0.1, 0.05]`; a box needs it, a slab is fitted to
+    its parts.
+    """
     floor_m: Off | None = None
+    """How high parts stand above the table [m], such as `0.015`; left out: on top of a slab or box."""
     spots: Annotated[tuple[XYZ, ...], BeforeValidator(as_tuple), Field(max_length=100)] | None = None
+    """Where parts stand: x, y and turn off the pose, along its axes, one for each part that it holds [m, m, rad], such
+    as `[[0.0, -0.05, 0.0], [0.0, 0.05, 0.0]]`; left out: in rows.
+    """
     approach: Literal["above", "camera", "side"] = "above"
+    """From where the gripper comes: straight down ("above"), through the grid that the overhead camera looks at
+    ("camera"), or level along the yaw of the pose ("side"); the tool hangs down in all three.
+    """
     grid: CameraGrid | None = None
+    """The camera's grid before the station; of approach = "camera" only, which needs it."""
     finish: Color | None = None
+    """The colour of parts that the machine has done: red, green and blue [-], such as `[0.7, 0.42, 0.16]`."""
     color: Color | None = None
+    """The colour of a slab, box or mesh: red, green and blue [-], such as `[0.3, 0.3, 0.35]`."""
 
     @model_validator(mode="after")
     def _one_time(self) -> Self:
@@ -158,18 +200,22 @@ class Station(Record):
 
 
 class Stage(Record):
-    """One stage of a route; with only a station it may be written as its name.
-
-    buffer: where the part waits when the station is full. processing_s, at_most_s: this kind's own in the machine [s].
-    service: a process that the robot carries out before it takes the part out. pallet: the part is lifted off its pallet here.
-    """
+    """One stage of a route; a stage that is only a station may be written as its name."""
 
     station: Name
+    """The station to which the part goes, such as `"oven"`."""
     buffer: Name | None = None
+    """Where the part waits when that station is full, such as `"oven_buffer"`."""
     processing_s: Time | None = None
+    """How long the machine works on this kind [s], such as `45.0`; left out: the station's time."""
     service: Name | None = None
+    """A process by = "robot" that the robot carries out before it takes the part out, such as `"vacuum"`."""
     pallet: bool = False
+    """Whether the part is lifted off its pallet here."""
     at_most_s: Time | None = None
+    """How long this kind may stay in the machine after that before it is spoilt [s], such as `4.0`; left out: the
+    station's.
+    """
 
 
 def _as_stage(value: object) -> object:
@@ -184,14 +230,16 @@ Route = Annotated[
 
 
 class Part(PartFields):
-    """A kind of part: its shape, how many there are, and the routes that one of them may take.
-
-    pallet: the kind, without routes of its own, that it comes and goes on.
-    """
+    """A kind of part: its shape, how many there are, and the routes that one of them may take."""
 
     count: Annotated[int, Field(ge=0, le=MAX_PARTS)] = 1
+    """How many there are, unless `--parts` says otherwise."""
     pallet: Name | None = None
+    """The kind on which it comes and goes, which has no routes of its own, such as `"carrier"`."""
     routes: Annotated[tuple[Route, ...], BeforeValidator(as_tuple), Field(max_length=MOST_THINGS)] = ()
+    """The ways that one of them may take, each a list of stages, such as `[["input", "oven", "output"]]`; of several
+    the order picks one for each part.
+    """
 
     @property
     def places(self) -> tuple[str, ...]:
@@ -206,16 +254,24 @@ class Part(PartFields):
 
 
 class Obstacle(Record):
-    """What stands in the way at `position_m` [m], within +- `area` [m] of it: a stack of cubes, or a box of `size_m`."""
+    """What stands in the way: a stack of cubes, or a box."""
 
     name: Name
+    """The obstacle's name, such as `"tower"`."""
     position_m: XY
+    """Where its middle stands: x and y [m], such as `[0.5, 0.3]`."""
     cubes: Annotated[int, Field(ge=1, le=15)] = 3
+    """How many cubes are stacked."""
     edge_m: Annotated[float, Field(gt=0.005, le=0.3)] = 0.06
+    """The edge of a cube [m]."""
     size_m: Sizes | None = None
+    """Length, width and height of a box in place of cubes [m], such as `[0.4, 0.02, 0.2]`."""
     yaw: Number = 0.0
+    """Its turn about the vertical [rad]."""
     color: Color = (0.72, 0.53, 0.33)
+    """Its colour: red, green and blue [-]."""
     area: Area = (0.0, 0.0)
+    """How far it may stand off its position along x and y, either way, drawn from the seed [m], such as `[0.04, 0.04]`."""
 
     @property
     def size(self) -> tuple[float, float, float]:

@@ -69,7 +69,9 @@ def find(task: str) -> Path:
 
 
 def load(task: str) -> Task:
-    """Read and check a task given by name or path; BadInput names the file, the line or field, the value and what is allowed."""
+    """Read and check a task given by name or path; BadInput names the file, the line or field, the value and what is
+    allowed.
+    """
     return cast(Task, load_any(task, "task"))
 
 

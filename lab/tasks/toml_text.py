@@ -51,7 +51,9 @@ _STRING = re.compile(
 
 @dataclass(frozen=True)
 class TomlText:
-    """A file's text and its values; all are equal, so that records which remember where they are from compare by content."""
+    """A file's text and its values; all are equal, so that records which remember where they are from compare by
+    content.
+    """
 
     path: Path = field(compare=False)
     text: str = field(compare=False, repr=False)

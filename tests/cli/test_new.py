@@ -1,5 +1,6 @@
 """`lab new`: a task file of one's own, which runs."""
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -47,6 +48,21 @@ def test_yes_takes_the_defaults(lab: Lab, folder: Path) -> None:
     assert lab("new", "mine", "--yes", "--json").json == {"file": "mine.toml", "arm": "up6", "parts": 3, "stations": 3}
 
 
+def test_thin_parts_of_an_own_mass_and_a_machine_for_two(lab: Lab, folder: Path) -> None:
+    words = "new pins --part pin=cylinder:0.012x0.04:2 --mass pin=0.05 --friction pin=0.6 --machine oven:5 --capacity oven=2"
+    assert lab(*words.split()).code == 0
+    task = load("pins.toml")
+    assert (task.part("pin").mass_kg, task.part("pin").friction, task.station("oven").capacity) == (0.05, 0.6, 2)
+    assert lab("task", "check", "pins.toml").code == 0
+
+
+def test_a_refusal_says_the_mass_that_would_do(lab: Lab, folder: Path) -> None:
+    words = "new x --part pin=cylinder:0.008x0.03:1"
+    refused = lab(*words.split(), "--mass", "pin=0.005").err.strip()
+    (wanted,) = re.findall("held with --mass (pin=[0-9.]+)$", refused)
+    assert lab(*words.split(), "--mass", wanted).code == 0
+
+
 @pytest.mark.parametrize(
     ("words", "line"),
     [
@@ -57,6 +73,10 @@ def test_yes_takes_the_defaults(lab: Lab, folder: Path) -> None:
         ("new x --arm pnda", "unknown arm 'pnda' (--arm): did you mean 'panda'? known: iiwa, panda, up6, xarm6"),
         ("new x --machine oven:-3", "machine 'oven:-3' (--machine): '-3' seconds: allowed are 0 to 86400"),
         ("new x --part box:0.06x0.05x0.1:2", "part 'box' cannot be gripped: "),
+        (
+            "new x --part pin=cylinder:0.008x0.03:1 --mass pin=0.005",
+            "robot.grip_force_n = 5, chosen for it: pin of 0.005 kg, friction 0.8, is not held: ",
+        ),
         ("new no/x --yes", "task file 'no/x.toml' (NAME): there is no folder 'no'"),
     ],
 )

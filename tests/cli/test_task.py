@@ -1,9 +1,12 @@
 """`lab task`: lists, shows, draws and checks task files."""
 
+import json
 import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+
+import pytest
 
 from lab.tasks.task_file import load, load_world
 
@@ -58,6 +61,26 @@ def test_a_world_is_shown_checked_and_learned(lab: Lab, folder: Path, root: Path
     (row,) = lab("toolbox", "list", "--json").json["policies"]
     assert (row["name"], row["subtask"], row["task"]) == (ran.json["saved_as"], "world", "world-1")
     assert (folder / "toolbox").is_dir()
+
+
+@pytest.mark.parametrize("kind", ["task", "cell", "world"])
+def test_the_schema_of_a_kind_is_shown_or_written(lab: Lab, folder: Path, kind: str) -> None:
+    shown = lab("task", "schema", kind).json
+    assert shown["required"]
+    assert lab("task", "schema", kind, "--out", "keys.json", "--json").json == {"file": "keys.json", "kind": kind}
+    assert json.loads((folder / "keys.json").read_text(encoding="utf-8")) == shown
+    assert lab("task", "schema", kind, "--out", "keys.md").code == 0
+    assert (folder / "keys.md").read_text(encoding="utf-8").startswith(f"# Keys of a {kind} file")
+
+
+def test_a_schema_of_nothing_is_refused(lab: Lab, folder: Path, tree: Tree) -> None:
+    assert lab("task", "schema", "tsk").err == (
+        "lab: unknown kind 'tsk' (of file): did you mean 'task'? known: cell, task, world\n"
+    )
+    assert lab("task", "schema", "--out", "keys.txt").err == (
+        "lab: file 'keys.txt' (--out): wanted one that ends with .json or .md\n"
+    )
+    assert tree(folder) == []
 
 
 def test_a_random_world_is_written_checked_and_learned(lab: Lab, folder: Path, tree: Tree) -> None:

@@ -83,6 +83,60 @@ def test_machines_that_cannot_be(words: tuple[str, ...], line: str) -> None:
         new_task("t", "up6", (), words, False)
 
 
+def test_masses_frictions_and_capacities_go_to_what_they_name() -> None:
+    found = new_task(
+        "t",
+        "up6",
+        ("pin=cylinder:0.012x0.04:2", "box:0.06x0.03x0.08:1"),
+        ("oven:60",),
+        True,
+        ["pin=0.05"],
+        ["box=0.4"],
+        ["oven=2", "output=6"],
+    )
+    assert [(part.mass_kg, part.friction) for part in found.parts] == [(0.05, 0.8), (0.058, 0.4)]
+    assert found.stations == {
+        "input": ("storage", 3),
+        "oven_buffer": ("buffer", 2),
+        "oven": ("machine", 2),
+        "output": ("storage", 6),
+    }
+
+
+@pytest.mark.parametrize(
+    ("option", "word", "line"),
+    [
+        (0, "0.05", r"'0.05' \(--mass\): wanted NAME=NUMBER, such as box=0.05"),
+        (0, "bxo=0.05", r"unknown part 'bxo' \(--mass\): did you mean 'box'"),
+        (0, "box=0", r"'box=0' \(--mass\): '0': allowed are 0.001 to 6"),
+        (1, "box=nan", r"'box=nan' \(--friction\): 'nan': allowed are 0 to 5"),
+        (2, "oven=1", "unknown station 'oven'"),
+        (2, "input=2", "'input=2' .*whole numbers from 3 to 50"),
+        (2, "press=1.5", "'press=1.5' .*whole numbers from 1 to 50"),
+    ],
+)
+def test_numbers_that_cannot_be(option: int, word: str, line: str) -> None:
+    numbers: list[list[str]] = [[], [], []]
+    numbers[option] = [word]
+    with pytest.raises(BadInput, match=line):
+        new_task("t", "up6", (), (MACHINE,), False, *numbers)
+    numbers[0] = ["box=1", "box=2"]
+    with pytest.raises(BadInput, match=r"'box=2' .*once is allowed"):
+        new_task("t", "up6", (), (MACHINE,), False, numbers[0])
+
+
+@pytest.mark.parametrize("capacity", [1, 2, 3])
+def test_a_machine_of_any_capacity_has_its_spots_on_its_body(capacity: int) -> None:
+    new = new_task("t", "up6", (), (MACHINE,), False, capacities=[f"press={capacity}"])
+    task = task_of_text(Path("t.toml"), text_of(new, next(layouts(new, ROOMY)), ROOMY))
+    press = task.station("press")
+    assert press.size_m is not None
+    assert len(press.spots or [()]) == press.capacity == capacity
+    for x, y, _ in press.spots or ():
+        assert abs(x) + new.foot_m[0] / 2 < press.size_m[0] / 2
+        assert abs(y) + new.foot_m[1] / 2 < press.size_m[1] / 2
+
+
 def test_an_arm_that_is_not_known_and_too_many_parts() -> None:
     with pytest.raises(BadInput, match=r"unknown arm 'up5' \(--arm\): did you mean 'up6'"):
         new_task("t", "up5", (), (), False)

@@ -106,7 +106,7 @@ def _alone(cell: Cell, objective: str) -> float:
     known = {MAKESPAN: max(ends.values(), default=0.0)}
     if late:
         known |= {"mean-tardiness": sum(late) / cell.parts, "tardy-parts": float(sum(one > SAME for one in late))}
-    return known.get(objective, 0.0)
+    return float(known.get(objective, 0.0))  # of numpy, which no JSON has
 
 
 def _side_by_side(shared: Shared, until_s: float, seed: int, workers: int) -> None:

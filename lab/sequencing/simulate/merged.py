@@ -50,7 +50,7 @@ class MergedCell:
     def __init__(self, cell: Cell) -> None:
         if not cell.serial:
             raise BadInput(
-                "the search of states is for cells of one robot, and machines without servers; CP-SAT is for all"
+                "the search of states is for cells of one robot, and machines without servers: --method cp-sat is for all"
             )
         self.cell, self._empty = cell, empty_ticks(cell)
         self._loaded = loaded_ticks(cell)

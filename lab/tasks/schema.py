@@ -1,0 +1,283 @@
+"""The keys of task, cell and world files: as a JSON Schema, which editors complete with, and as a page; made from the records."""
+
+import json
+import re
+import tomllib
+from collections.abc import Iterator
+from dataclasses import fields
+from typing import Any, NamedTuple, get_type_hints
+
+from annotated_types import DocInfo
+
+from lab.errors import unknown
+from lab.tasks.record import NAME_PATTERN, Record
+
+DRAFT = "http://json-schema.org/draft-07/schema#"  # which the editors' extensions for TOML know
+TABLES = "definitions"
+STAGES = ("Stage", "CellStage")  # which may be written as their stations
+UNIT = re.compile(r" \[([^\]]+)\]")
+EXAMPLES = re.compile(r",? such as (`[^`]*`(?:(?:, | or )`[^`]*`)*)")
+QUOTED = re.compile(r"`[^`]*`")
+
+Schema = dict[str, Any]
+
+
+def _records() -> dict[str, type[Record]]:
+    from lab.tasks.cell_file import CellFile
+    from lab.tasks.grid_world import GridWorld
+    from lab.tasks.task import Task
+
+    return {"task": Task, "cell": CellFile, "world": GridWorld}
+
+
+KINDS = ("task", "cell", "world")  # of files
+
+
+def schema_of(kind: str) -> Schema:
+    """The JSON Schema (draft 7) of a kind of file; BadInput for an unknown one.
+
+    It holds what can be said of each key by itself: names, types, ranges, choices, lengths. What one key demands of another,
+    `lab task check` says.
+    """
+    if kind not in KINDS:
+        raise unknown("kind", kind, KINDS, "of file")
+    raw = _records()[kind].model_json_schema(ref_template=f"#/{TABLES}/{{model}}")
+    tables = {name: _plain(table) for name, table in raw.pop("$defs").items()}
+    for name, described in _from_dataclasses().items():
+        if name in tables:
+            tables[name] |= {"additionalProperties": False, "description": described.pop("")}
+            for key, text in described.items():
+                tables[name]["properties"][key]["description"] = text
+    for (name, key), (names, open_to_others) in _names().items():
+        if name in tables:
+            field = tables[name]["properties"][key]
+            del field["type"]
+            field |= {"anyOf": [{"enum": names}, open_to_others]} if open_to_others else {"enum": names}
+    whole = _plain(raw)
+    if "kind" in whole["properties"]:  # a file that does not say its kind is a task
+        del whole["properties"]["kind"]["default"]
+        whole["required"] = ["kind", *whole["required"]]
+    return {"$schema": DRAFT, "title": f"A {kind} file of the Teaching Lab", **whole, TABLES: tables}
+
+
+def _from_dataclasses() -> dict[str, dict[str, str]]:
+    """The descriptions of records that are no pydantic models, and of their fields: by record, and by field, "" its own."""
+    from lab.learning.settings import GateSettings, LearnerSettings
+    from lab.mdp import Rewards
+
+    found: dict[str, dict[str, str]] = {}
+    for kind in (LearnerSettings, GateSettings, Rewards):
+        hints = get_type_hints(kind, include_extras=True)
+        found[kind.__name__] = {"": " ".join(str(kind.__doc__).split("\n\n")[0].split())}
+        for field in fields(kind):
+            texts = [one.documentation for one in hints[field.name].__metadata__ if isinstance(one, DocInfo)]
+            found[kind.__name__][field.name] = "".join(texts)
+    return found
+
+
+def _names() -> dict[tuple[str, str], tuple[list[str], Schema | None]]:
+    """The names that a key may hold, by record and key; and what else it may hold: a plug-in's name, or a file's."""
+    from lab.learning.gates import GATES
+    from lab.learning.selection import SELECTIONS
+    from lab.learning.updates import UPDATES
+    from lab.sequencing import SEQUENCERS
+    from lab.sequencing.cell.chance import LAWS
+    from lab.sequencing.cell.objectives import OBJECTIVES
+    from lab.tasks.robot_fields import MODELS
+
+    plugged: Schema = {"type": "string"}
+    urdf: Schema = {"type": "string", "pattern": r"\.[uU][rR][dD][fF]$"}
+    return {
+        ("LearnerSettings", "learner"): ([*UPDATES], plugged),
+        ("LearnerSettings", "selection"): ([*SELECTIONS], plugged),
+        ("GateSettings", "gate"): ([*GATES], plugged),
+        ("Sequencing", "method"): ([*SEQUENCERS], plugged),
+        ("Sequencing", "objective"): ([*OBJECTIVES], None),
+        ("Stochastic", "processing"): ([*LAWS], None),
+        ("Stochastic", "arrivals"): ([*LAWS], None),
+        ("RobotSettings", "model"): ([*MODELS], urdf),
+    }
+
+
+def _plain(schema: Schema) -> Schema:
+    """A schema in words that draft 7 and TOML have: no null, arrays with items, references without neighbours, examples."""
+    found = {key: value for key, value in schema.items() if key != "title"}
+    if "properties" in found:
+        found["properties"] = {key: _plain(value) for key, value in found["properties"].items()}
+    for pattern, value in found.pop("patternProperties", {}).items():  # tables by name, all of one kind
+        found |= {"propertyNames": {"pattern": pattern}, "additionalProperties": value}
+    for key in ("items", "additionalProperties"):
+        if isinstance(found.get(key), dict):
+            found[key] = _plain(found[key])
+    if found.get("default", ()) is None or isinstance(found.get("default"), dict) or found.get("default") == []:
+        del found["default"]
+    choices = [_plain(one) for one in found.pop("anyOf", []) if one != {"type": "null"}]
+    if len(choices) == 1:
+        found = choices[0] | found
+    elif choices:
+        found["anyOf"] = choices
+    if found.get("type") == "array":
+        for old, new in (("minLength", "minItems"), ("maxLength", "maxItems")):
+            if old in found:
+                found[new] = found.pop(old)
+        if places := [_plain(one) for one in found.pop("prefixItems", [])]:
+            found["items"] = places[0] if all(place == places[0] for place in places) else places
+    if "description" in found:
+        found["description"] = " ".join(found["description"].split())
+        if examples := examples_of(found["description"]):
+            found["examples"] = examples
+    if found.get("$ref", "").rpartition("/")[2] in STAGES:
+        found = {"anyOf": [{"type": "string", "pattern": NAME_PATTERN}, found]}
+    if "$ref" in found and len(found) > 1:
+        found["allOf"] = [{"$ref": found.pop("$ref")}]
+    return found
+
+
+def examples_of(description: str) -> list[Any]:
+    """The values that a description shows after "such as", as TOML has them."""
+    found = EXAMPLES.search(description)
+    return (
+        [] if found is None else [tomllib.loads(f"value = {word[1:-1]}")["value"] for word in QUOTED.findall(found[1])]
+    )
+
+
+def unit_of(description: str) -> str:
+    """The unit that stands in brackets in a description; "-": a bare number; empty: there is none."""
+    found = UNIT.search(QUOTED.sub("", description))
+    return "" if found is None else found[1]
+
+
+# ---- the page -----------------------------------------------------------------------------------------------------
+
+HEADS = {
+    "task": (
+        "Keys of a task file",
+        "A task file is a cell in physics: `lab run FILE` carries it out, `lab task check FILE` checks it.",
+    ),
+    "cell": (
+        "Keys of a cell file",
+        "A cell file is a cell without physics: `lab sequence FILE` looks for the order of its parts.",
+    ),
+    "world": ("Keys of a world file", "A world file is a grid of cells: `lab teach FILE` learns the way through it."),
+}
+
+
+class Table(NamedTuple):
+    """A table of a file: what its heading is, and its schema."""
+
+    heading: str
+    schema: Schema
+
+
+def page_of(kind: str) -> str:
+    """The reference of a kind of file, as Markdown: every key of every table. BadInput for an unknown kind."""
+    schema = schema_of(kind)
+    title, first = HEADS[kind]
+    lines = [
+        f"# {title}",
+        "",
+        f"{first} This page is made from the records that check it (`lab task schema {kind} --out keys.md`). Where the unit is",
+        "-, the key is a bare number. Whatever is not *required* may be left out.",
+        "",
+    ]
+    for table in tables_of(schema):
+        lines += [f"## {table.heading}", "", table.schema["description"], ""]
+        lines += ["| key | meaning | unit | allowed | default | example |", "|---|---|---|---|---|---|"]
+        required = table.schema.get("required", [])
+        for key, field in table.schema["properties"].items():
+            text = field["description"]
+            meaning = EXAMPLES.sub("", UNIT.sub("", text, count=1) if unit_of(text) else text)
+            meaning = meaning[:1].upper() + meaning[1:].rstrip(".") + "."
+            default = _code(field["default"]) if "default" in field else "*required*" if key in required else ""
+            shown = " or ".join(_code(value) for value in field.get("examples", []))
+            row = (f"`{key}`", meaning, unit_of(text), _allowed(field, schema), default, shown or _choice(field))
+            lines.append(f"| {' | '.join(word.replace('|', chr(92) + '|') for word in row)} |")
+        lines.append("")
+    return "\n".join(lines)
+
+
+def tables_of(schema: Schema) -> list[Table]:
+    """The tables of a kind of file, each once, in the order of the keys that hold them; the whole file first."""
+    found = [Table("The file itself", schema)]
+    seen: set[str] = set()
+
+    def walk(above: str, properties: Schema) -> None:
+        inner = [(key, *one) for key, field in properties.items() for one in _held(field) if one[0] not in seen]
+        for key, name, many in inner:
+            if name in seen:
+                continue
+            seen.add(name)
+            path = f"{above}{key}"
+            own = {"[]": f"`[[{path}]]`", "{}": f"`[{path}.NAME]`", "": f"`[{path}]`"}.get(many, f"A stage of `{path}`")
+            found.append(Table(own, schema[TABLES][name]))
+            walk(path + {"{}": ".NAME."}.get(many, "."), schema[TABLES][name]["properties"])
+
+    walk("", schema["properties"])
+    return found
+
+
+def _held(field: Schema, many: str = "") -> Iterator[tuple[str, str]]:
+    """The records that a field holds, and how: "" one, "[]" a list of them, "[][]" lists of lists, "{}" by name."""
+    for one in (field, *field.get("allOf", []), *field.get("anyOf", [])):
+        if "$ref" in one:
+            yield one["$ref"].rpartition("/")[2], many
+    for key, way in (("items", "[]"), ("additionalProperties", "{}")):
+        if isinstance(field.get(key), dict):
+            yield from _held(field[key], many + way)
+
+
+def _allowed(field: Schema, schema: Schema) -> str:
+    """What a field may hold, in words."""
+    if "anyOf" in field:
+        return ", or ".join(_allowed(one, schema) for one in field["anyOf"])
+    if (held := next(_held(field), None)) and field.get("type") != "array":
+        return next(table.heading for table in tables_of(schema) if table.schema is schema[TABLES][held[0]])
+    if "enum" in field or "const" in field:
+        return ", ".join(_code(value) for value in field.get("enum", [field.get("const")]))
+    match field.get("type"):
+        case "array":
+            items = field.get("items", {})
+            each = " and ".join(
+                dict.fromkeys(_allowed(one, schema) for one in (items if isinstance(items, list) else [items]))
+            )
+            return f"{_count(field.get('minItems', 0), field.get('maxItems'))}: {each}"
+        case "object":
+            return f"a table by name, of: {_allowed(field['additionalProperties'], schema)}"
+        case "boolean":
+            return "`true`, `false`"
+        case "string":
+            return "a name" if "pattern" in field else "text"
+        case kind:
+            return f"{'whole numbers' if kind == 'integer' else 'numbers'}{_range(field)}"
+
+
+def _count(least: int, most: int | None) -> str:
+    if least == most:
+        return f"{least} values"
+    return f"a list of {least} or more" if most is None else f"a list of {least} to {most}"
+
+
+def _range(field: Schema) -> str:
+    words = {"exclusiveMinimum": "above", "minimum": "from", "exclusiveMaximum": "below", "maximum": "to"}
+    return "".join(f" {word} {field[key]:g}" for key, word in words.items() if key in field)
+
+
+def _choice(field: Schema) -> str:
+    """An example of a key whose choices or default show one."""
+    if "default" in field:
+        return _code(field["default"])
+    choices = field.get("enum", [field["const"]] if "const" in field else [])
+    return _code(choices[-1]) if choices else ""
+
+
+def _code(value: Any) -> str:
+    return f"`{toml_value(value)}`"
+
+
+def toml_value(value: Any) -> str:
+    """A value as TOML has it, on one line."""
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{key} = {toml_value(inner)}" for key, inner in value.items()) + " }"
+    if isinstance(value, list):
+        return f"[{', '.join(toml_value(inner) for inner in value)}]"
+    return json.dumps(value, ensure_ascii=False)
