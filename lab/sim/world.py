@@ -186,6 +186,8 @@ class World:
             PART_ROLLING * (shape.solid != "box"),
         )
         self._call("changeDynamics", entry.number, -1, localInertiaDiagonal=moments, rollingFriction=rolling)
+        if shape.solid == "mesh":
+            self._call("changeDynamics", entry.number, -1, collisionMargin=shape.inner[1])
         self._add(name, entry)
         self.friction(name, friction, spinning=PART_SPINNING)
 

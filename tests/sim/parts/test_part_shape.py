@@ -165,6 +165,59 @@ def test_a_mesh_in_physics_lies_where_its_shape_says(write: Callable[..., Path])
         assert world.pose("angle")[1] == pytest.approx([0, 0, 0, 1], abs=1e-7)
 
 
+def nut() -> trimesh.Trimesh:
+    return trimesh.creation.annulus(r_min=0.008, r_max=0.018, height=0.016, sections=6)
+
+
+def bottle() -> trimesh.Trimesh:
+    outline = [(0, 0), (0.025, 0), (0.025, 0.07), (0.012, 0.09), (0.012, 0.11), (0, 0.11)]
+    return trimesh.creation.revolve(np.array(outline), sections=40)
+
+
+MESHES: dict[str, Callable[[], trimesh.Trimesh]] = {
+    "box": lambda: trimesh.creation.box((0.05, 0.03, 0.04)),
+    "cylinder": lambda: trimesh.creation.cylinder(radius=0.015, height=0.06),
+    "plate": lambda: trimesh.creation.cylinder(radius=0.04, height=0.0012),
+    "cone": lambda: trimesh.creation.cone(radius=0.02, height=0.05),
+    "bracket": angle,
+    "nut": nut,
+    "bottle": bottle,
+}
+
+
+@pytest.mark.parametrize("name", MESHES)
+@pytest.mark.parametrize("off", [0.0, 0.3])
+def test_a_mesh_is_felt_where_it_is_seen(write: Callable[..., Path], name: str, off: float) -> None:
+    """2 mm above a floor it is 2 mm from it, not less by an engine's margin; and it rests with its foot on the floor."""
+    mesh = MESHES[name]()
+    mesh.apply_translation((off, -off, off))
+    shape = shape_of(mesh_part(), write(mesh))
+    with World() as world:
+        world.box("floor", (1, 1, 0.02), (0, 0, -0.01), (1, 1, 1, 1))
+        world.part(name, shape, 0.1, 0.8, (0, 0, shape.foot_m + 0.002), 0.5)
+        assert world.nearest(name, "floor", 0.1) == pytest.approx(0.002, abs=5e-5)
+        for _ in range(120):
+            world.step()
+        assert world.pose(name)[0][2] == pytest.approx(shape.foot_m, abs=1e-4)
+
+
+def test_a_mesh_that_is_a_box_is_one_in_physics_and_a_hollow_one_is_none(write: Callable[..., Path]) -> None:
+    """However the file has it: off its origin, turned, in millimetres."""
+    box = trimesh.creation.box((50, 30, 40), trimesh.transformations.rotation_matrix(0.7, (1, 2, 3), (90, 20, 5)))
+    shape = shape_of(mesh_part(scale=0.001), write(box))
+    assert (shape.solid, shape.size) == ("box", pytest.approx((0.05, 0.04, 0.03)))
+    own = np.array([(i, j, k) for i in (-25, 25) for j in (-20, 20) for k in (-15, 15)]) / 1000 @ rotation(shape.turn).T
+    assert np.sort(own[:, 2]) == pytest.approx(np.sort(shape.hull[:, 2]), abs=1e-6)
+    hollow = trimesh.util.concatenate([trimesh.creation.box((50, 30, 40)), _inside_out((40, 20, 30))])
+    assert shape_of(mesh_part(scale=0.001), write(hollow)).solid == "mesh"
+
+
+def _inside_out(size: tuple[float, ...]) -> trimesh.Trimesh:
+    box = trimesh.creation.box(size)
+    box.invert()
+    return box
+
+
 def test_a_mesh_of_many_corners_has_few_in_physics(write: Callable[..., Path]) -> None:
     ball = trimesh.creation.icosphere(subdivisions=4, radius=0.02)
     shape = shape_of(mesh_part(), write(ball))
