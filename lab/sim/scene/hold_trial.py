@@ -24,6 +24,7 @@ SLIPPED_M, TILTED = 0.008, 0.96  # of what the fingers hold: off where they took
 NEAR_M = 0.012  # a part is set down so near to where it should stand
 SETTLE_STEPS, HELD_STEPS = 60, 240  # of physics, before and after; that it hangs in the air
 BLOCK, RGBA = "block", (0.8, 0.8, 0.8, 1.0)
+BESIDE_M = 0.03  # [m] of the block around the foot
 ABOVE_M = 0.0005  # [m] between what stands on one another, at first
 
 
@@ -97,8 +98,8 @@ def _way(trial: Trial, spot: Spot) -> list[ToolPose]:
 
 
 def _built(world: World, kind: Kind, spot: Spot) -> list[str]:
-    """The part on a block as large as its foot, and what rides on it; their names from the foot upwards."""
-    along, across = (2 * half for half in kind.footprint_m())
+    """The part on a block that is larger than its foot, and what rides on it; their names from the foot upwards."""
+    along, across = (2 * (half + BESIDE_M) for half in kind.footprint_m())
     world.box(BLOCK, (along, across, spot.z), (spot.x, spot.y, spot.z / 2), RGBA)
     names, foot_m = [], spot.z + ABOVE_M
     for own in kind.stack():
