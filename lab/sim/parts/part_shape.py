@@ -71,7 +71,7 @@ class PartShape:
         from scipy.spatial import ConvexHull, HalfspaceIntersection
 
         corners = self.hull @ urdf_reader.rotation(self.turn)
-        sides = np.unique(ConvexHull(corners).equations.round(9), axis=0)  # (k, 4): normals, and how far in the origin lies
+        sides = np.unique(ConvexHull(corners).equations.round(9), axis=0)  # (k, 4): normals, and offsets [m]
         middle = corners.mean(axis=0)
         margin = min(MARGIN_M, float(np.min(-sides[:, :3] @ middle - sides[:, 3])) / 2)
         sides[:, 3] += margin
