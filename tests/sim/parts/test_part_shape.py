@@ -10,6 +10,7 @@ import pytest
 import trimesh
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 from lab.errors import BadInput
 from lab.files import assets_folder
@@ -166,12 +167,14 @@ def test_a_mesh_in_physics_lies_where_its_shape_says(write: Callable[..., Path])
 
 
 def nut() -> trimesh.Trimesh:
-    return trimesh.creation.annulus(r_min=0.008, r_max=0.018, height=0.016, sections=6)
+    made: trimesh.Trimesh = trimesh.creation.annulus(r_min=0.008, r_max=0.018, height=0.016, sections=6)
+    return made
 
 
 def bottle() -> trimesh.Trimesh:
     outline = [(0, 0), (0.025, 0), (0.025, 0.07), (0.012, 0.09), (0.012, 0.11), (0, 0.11)]
-    return trimesh.creation.revolve(np.array(outline), sections=40)
+    made: trimesh.Trimesh = trimesh.creation.revolve(np.array(outline), sections=40)
+    return made
 
 
 MESHES: dict[str, Callable[[], trimesh.Trimesh]] = {
@@ -203,17 +206,21 @@ def test_a_mesh_is_felt_where_it_is_seen(write: Callable[..., Path], name: str, 
 
 def test_a_mesh_that_is_a_box_is_one_in_physics_and_a_hollow_one_is_none(write: Callable[..., Path]) -> None:
     """However the file has it: off its origin, turned, in millimetres."""
-    box = trimesh.creation.box((50, 30, 40), trimesh.transformations.rotation_matrix(0.7, (1, 2, 3), (90, 20, 5)))
+    turned = np.eye(4)
+    turned[:3, :3], turned[:3, 3] = Rotation.from_rotvec((0.2, 0.4, 0.6)).as_matrix(), (90, 20, 5)
+    box = trimesh.creation.box((50, 30, 40), turned)
     shape = shape_of(mesh_part(scale=0.001), write(box))
-    assert (shape.solid, shape.size) == ("box", pytest.approx((0.05, 0.04, 0.03)))
+    assert shape.solid == "box"
+    assert shape.size == pytest.approx((0.05, 0.04, 0.03))
     own = np.array([(i, j, k) for i in (-25, 25) for j in (-20, 20) for k in (-15, 15)]) / 1000 @ rotation(shape.turn).T
     assert np.sort(own[:, 2]) == pytest.approx(np.sort(shape.hull[:, 2]), abs=1e-6)
     hollow = trimesh.util.concatenate([trimesh.creation.box((50, 30, 40)), _inside_out((40, 20, 30))])
+    assert isinstance(hollow, trimesh.Trimesh)
     assert shape_of(mesh_part(scale=0.001), write(hollow)).solid == "mesh"
 
 
 def _inside_out(size: tuple[float, ...]) -> trimesh.Trimesh:
-    box = trimesh.creation.box(size)
+    box: trimesh.Trimesh = trimesh.creation.box(size)
     box.invert()
     return box
 
