@@ -1,5 +1,6 @@
 """Shapes of parts: hulls, inertia and looks as they stand; mesh files of all kinds, and the wrong ones told in words."""
 
+import tomllib
 from collections.abc import Callable
 from math import pi
 from pathlib import Path
@@ -20,6 +21,7 @@ from lab.sim.parts.part_shape import PartShape, shape_of
 from lab.sim.urdf_reader import looks, rotation
 from lab.sim.world import World
 from lab.tasks.part_fields import PartFields
+from lab.tasks.task_fields import Part
 
 QUARTER = pi / 2
 edges = st.floats(0.005, 0.2)
@@ -202,6 +204,16 @@ def test_a_mesh_is_felt_where_it_is_seen(write: Callable[..., Path], name: str, 
         for _ in range(120):
             world.step()
         assert world.pose(name)[0][2] == pytest.approx(shape.foot_m, abs=1e-4)
+
+
+def test_the_mesh_of_the_docs_is_one(write: Callable[..., Path], root: Path) -> None:
+    """The example on the page of cells, with a nut in millimetres that stands on one of its sides."""
+    page = (root / "docs" / "cells.md").read_text(encoding="utf-8")
+    (fields,) = tomllib.loads(page.split("```toml")[1].split("```")[0])["parts"]
+    in_mm = nut()
+    in_mm.apply_scale(1000)  # type: ignore[no-untyped-call]
+    shape = shape_of(Part.model_validate(fields), write(in_mm, fields["file"]))
+    assert shape.high[1] - shape.low[1] == pytest.approx(0.016, abs=1e-5)
 
 
 def test_a_mesh_that_is_a_box_is_one_in_physics_and_a_hollow_one_is_none(write: Callable[..., Path]) -> None:
