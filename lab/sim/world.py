@@ -186,6 +186,8 @@ class World:
             PART_ROLLING * (shape.solid != "box"),
         )
         self._call("changeDynamics", entry.number, -1, localInertiaDiagonal=moments, rollingFriction=rolling)
+        if shape.solid == "mesh":
+            self._call("changeDynamics", entry.number, -1, collisionMargin=shape.inner[1])
         self._add(name, entry)
         self.friction(name, friction, spinning=PART_SPINNING)
 
@@ -199,11 +201,25 @@ class World:
         self._bodies[name] = entry
         self._names[entry.number] = name
 
-    def friction(self, name: str, lateral: float, *, links: Sequence[str] | None = None, spinning: float = 0.0) -> None:
-        """Set the Coulomb friction of a body (or of some of its links); `spinning` resists turning about the contact [m]."""
+    def friction(
+        self,
+        name: str,
+        lateral: float,
+        *,
+        links: Sequence[str] | None = None,
+        spinning: float = 0.0,
+        sticks: bool = False,
+    ) -> None:
+        """Set the Coulomb friction of a body (or of some of its links); `spinning` resists turning about the contact [m].
+
+        sticks: what does not slide stays where it touches; otherwise it creeps, as velocities alone are brought to nothing.
+        """
         entry = self._bodies[name]
+        anchor = {"frictionAnchor": 1} if sticks else {}
         for link in [-1, *entry.links.values()] if links is None else [entry.links[one] for one in links]:
-            self._call("changeDynamics", entry.number, link, lateralFriction=lateral, spinningFriction=spinning)
+            self._call(
+                "changeDynamics", entry.number, link, lateralFriction=lateral, spinningFriction=spinning, **anchor
+            )
 
     def mass(self, name: str, mass_kg: float) -> None:
         """Give a one-link body another mass [kg]; its inertia is scaled alike."""

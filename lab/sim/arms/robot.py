@@ -109,7 +109,8 @@ class Robot:
     ) -> None:
         """Load the arm at the world's origin; `speed` [m/s], `acceleration` [m/s2], `grip_force` [N] unless `grip` is told.
 
-        fine: it slows down for corners, its pads hold as areas do, not as points, and physics is solved in many iterations.
+        fine: it slows down for corners, its pads hold as areas do, not as points, and without creep; physics is solved in
+        many iterations.
         """
         self.world, self.arm, self.grip_force = world, arm, grip_force
         self.speed, self.acceleration, self.fine = speed, acceleration, fine
@@ -118,7 +119,7 @@ class Robot:
         world.load(NAME, arm.urdf, (0.0, 0.0, arm.base_up_m), checked=True)
         if arm.base_up_m > 0.0:
             world.disc(f"{NAME} pedestal", _PEDESTAL_M, arm.base_up_m, (0.0, 0.0, arm.base_up_m / 2), _PEDESTAL_RGBA)
-        world.friction(NAME, 1.0, links=holding, spinning=PAD_M if fine else _POINT_M)
+        world.friction(NAME, 1.0, links=holding, spinning=PAD_M if fine else _POINT_M, sticks=fine)
         for follower, leader in fingers.leaders.items():
             world.gear(NAME, leader, follower, fingers.ratio(follower))
         if fine or len(fingers.joints) > 2:

@@ -11,6 +11,7 @@ from math import hypot, inf
 
 from lab.errors import BadInput
 from lab.sim.arms.gripper import PAD_M
+from lab.sim.frames import ShapeKind
 from lab.sim.parts.kinds import Kind
 from lab.tasks.robot_fields import STRONGEST_N, RobotSettings
 
@@ -19,6 +20,7 @@ SLOW = 0.6  # of the robot's speed and acceleration, as skills rise with a part
 MARGIN = 6.0  # times what friction needs a force is chosen; measured: with 2.5 parts are lost where they touch machines
 USUAL_N = 25.0  # chosen where friction needs less, unless a part is lighter than this is gentle to
 GENTLE_N_KG = 1000.0  # at most for each kilogram: pressed harder, light parts creep in physics, or are squeezed out
+GENTLE_ROUND_N_KG = 150.0  # the same of a cylinder or a hull, touched in lines and points; measured: 100 to 200 do
 GENTLE_N, USUAL_KG = 50.0, (0.02, 0.35)  # with a stronger grip, or others, forces are not found in a usual step
 STAYS = 2.0  # times the acceleration friction holds a part on a pallet that is far from sliding off
 ROUGH = 0.5  # friction from which on what holds by the numbers has always held
@@ -28,8 +30,8 @@ ROUGH = 0.5  # friction from which on what holds by the numbers has always held
 class Load:
     """A part in the gripper, or a pallet with what stands on it: its mass, and the friction where the fingers touch it.
 
-    lever_m: from the finger tips up or down to its middle. carries: the friction, of both, by which the part stays on its
-    pallet; endless where nothing rides.
+    lever_m: from the finger tips up or down to its middle. solid: what the fingers touch, for physics. carries: the friction,
+    of both, by which the part stays on its pallet; endless where nothing rides.
     """
 
     name: str
@@ -37,6 +39,7 @@ class Load:
     friction: float
     lever_m: float = 0.0
     carries: float = inf
+    solid: ShapeKind = "box"
 
     @classmethod
     def of(cls, kind: Kind) -> "Load":
@@ -47,7 +50,8 @@ class Load:
             moment += one.part.mass_kg * (foot_m + one.shape.foot_m)
             foot_m += one.height_m
         carries = inf if kind.rider is None else kind.part.friction * kind.rider.part.friction
-        return cls(kind.name, mass_kg, kind.part.friction, abs(moment / mass_kg - kind.grip.up_m), carries)
+        lever_m = abs(moment / mass_kg - kind.grip.up_m)
+        return cls(kind.name, mass_kg, kind.part.friction, lever_m, carries, kind.shape.solid)
 
     def needs_n(self, acceleration_m_s2: float) -> float:
         """The least force [N] of each finger that friction needs to lift it; endless for what has none."""
@@ -64,7 +68,8 @@ class Load:
 
     def held_n(self, asked_n: float, acceleration_m_s2: float) -> float:
         """The force [N] with which it is held when one is asked for: gentler where it is light, and friction needs less."""
-        return min(asked_n, max(MARGIN * self.needs_n(acceleration_m_s2), GENTLE_N_KG * self.mass_kg))
+        gentle_n_kg = GENTLE_N_KG if self.solid == "box" else GENTLE_ROUND_N_KG
+        return min(asked_n, max(MARGIN * self.needs_n(acceleration_m_s2), gentle_n_kg * self.mass_kg))
 
     def chosen_n(self, acceleration_m_s2: float) -> float:
         """The force [N] chosen where none is asked for: as usual, or what friction needs with a margin."""
@@ -76,7 +81,7 @@ class Load:
         strong = force_n >= MARGIN * self.needs_n(acceleration_m_s2)
         gentle = USUAL_KG[0] <= self.mass_kg <= USUAL_KG[1] and force_n <= GENTLE_N
         rides = self.carries * GRAVITY_M_S2 >= STAYS * acceleration_m_s2
-        return strong and gentle and rides and self.friction >= ROUGH
+        return strong and gentle and rides and self.friction >= ROUGH and self.solid != "mesh"
 
 
 def grip_force_n(robot: RobotSettings, load: Load) -> float:

@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from typing import Any
 
-from lab.sim import urdf_reader
 from lab.sim.mesh_file import text_corners
 from lab.sim.parts.part_shape import PartShape, visual_arrays
 
@@ -17,8 +16,7 @@ def solid_of(engine: Any, call: Call, shape: PartShape) -> int:
     if shape.solid == "cylinder":
         diameter, height = shape.size
         return int(call("createCollisionShape", engine.GEOM_CYLINDER, radius=diameter / 2, height=height))
-    corners = shape.hull @ urdf_reader.rotation(shape.turn)  # (n, 3), from the part's axes into the principal ones
-    return int(call("createCollisionShape", engine.GEOM_MESH, vertices=corners.tolist()))
+    return int(call("createCollisionShape", engine.GEOM_MESH, vertices=shape.inner[0].tolist()))
 
 
 def seen_of(engine: Any, call: Call, shape: PartShape) -> int:

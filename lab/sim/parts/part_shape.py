@@ -1,6 +1,7 @@
 """A part's shape as physics and gripper have it: hull, how it stands, inertia, looks; from a record of a task file.
 
-Physics knows a part as a box, a cylinder or a convex hull: hollows of a mesh are seen and weighed, not felt.
+Physics knows a part as a box, a cylinder or a convex hull: hollows of a mesh are seen and weighed, not felt. A mesh that is
+a box is one, too: a box touches a flat side with four corners at once, a hull with one after the other.
 """
 
 from collections.abc import Sequence
@@ -27,7 +28,9 @@ if TYPE_CHECKING:
 MOST_TEXT = 40_000  # triangles of an STL in text: PyBullet, which reads none, is handed them one by one
 MOST_HULL = 256  # vertices: more make physics slow and no rounder
 LARGEST_M, SMALLEST_M = 2.0, 0.002  # of a part's longest edge: beyond them its unit is not the metre
+MARGIN_M = 0.001  # around a hull that is not thin: with less, where it touches is found less surely
 ROUND = 64  # sides of a cylinder's hull
+BOX_SHARE = 0.999  # a mesh that fills so much of the smallest box around it is that box
 
 Array = NDArray[np.float64]
 
@@ -59,6 +62,21 @@ class PartShape:
         """The upper corner (3,) of its bounds [m]."""
         return np.asarray(self.hull.max(axis=0))
 
+    @cached_property
+    def inner(self) -> tuple[Array, float]:
+        """What an engine is told of a hull: corners (n, 3) [m], in principal axes, and the margin [m] that it adds around them.
+
+        Flat sides are then felt where they are; edges are rounded by the margin.
+        """
+        from scipy.spatial import ConvexHull, HalfspaceIntersection
+
+        corners = self.hull @ urdf_reader.rotation(self.turn)
+        sides = np.unique(ConvexHull(corners).equations.round(9), axis=0)  # (k, 4): normals, and offsets [m]
+        middle = corners.mean(axis=0)
+        margin = min(MARGIN_M, float(np.min(-sides[:, :3] @ middle - sides[:, 3])) / 2)
+        sides[:, 3] += margin
+        return np.asarray(HalfspaceIntersection(sides, middle).intersections), margin
+
     @property
     def foot_m(self) -> float:
         """How far the origin is above the foot [m]."""
@@ -77,13 +95,20 @@ def shape_of(part: PartFields, folder: Path) -> PartShape:
     """
     tilt, (r, g, b) = _tilt(*part.stands), part.color
     size: tuple[float, ...] = part.size_m or ()
+    solid: ShapeKind = part.shape
     if part.shape == "mesh":
         path = _found(part, "file", part.file or "", folder)
         mesh = _mesh(part, path)
         middle, tensor = np.array(mesh.center_mass), np.array(mesh.moment_inertia) / float(mesh.mass)
         moments, axes = np.linalg.eigh(tensor)
-        axes = axes * np.sign(np.linalg.det(axes))  # a turn, not a mirror
         hull = _few(np.array(mesh.convex_hull.vertices) - middle)
+        around = mesh.bounding_box_oriented.primitive
+        if mesh.volume >= BOX_SHARE * float(np.prod(around.extents)):
+            edges = np.argsort(-np.array(around.extents))  # the least moment first, as above
+            solid, axes = "box", np.array(around.transform)[:3, edges]
+            size = tuple(float(edge) for edge in around.extents[edges])
+            moments = _box(size)[1]
+        axes = axes * np.sign(np.linalg.det(axes))  # a turn, not a mirror
         seen = Shape("mesh", (part.scale,) * 3, path, (r, g, b, 1.0))
     else:
         middle, axes = np.zeros(3), np.eye(3)
@@ -93,7 +118,7 @@ def shape_of(part: PartFields, folder: Path) -> PartShape:
     x, y, z = (float(f"{one:.12g}") for one in moments)  # without the noise of the last bits
     return PartShape(
         part.name,
-        part.shape,
+        solid,
         size,
         _quaternion(tilt @ axes),
         hull @ tilt.T,

@@ -1,9 +1,12 @@
-"""Whether the fingers hold what they carry, tried in physics before any work: taken up, swung, turned, set down."""
+"""Whether the fingers hold what they carry, tried in physics before any work: taken up, swung, turned, set down.
+
+It is carried at least as far as the task carries it: what creeps between the fingers creeps all the way.
+"""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from math import hypot, pi
+from math import ceil, hypot, pi
 from typing import NamedTuple
 
 from lab.errors import BadInput, WorkFailed
@@ -16,6 +19,7 @@ from lab.sim.world import World
 from lab.tasks.robot_fields import RobotSettings
 
 LIFT_M, SWING_M, CORNER_M, TURN_RAD = 0.1, 0.25, 0.2, pi / 4
+LAP_M = 1.2  # at least, of carrying it from side to side once
 BLEND_M = 0.1  # of its corner, as in transfers
 OUT = (0.5, 0.62, 0.75, 0.4, 0.9, 0.3)  # [m] ahead of the arm, the first that it reaches all over
 OFF = (0.002, 0.002, 0.04)  # [m], [rad] the part stands off where the fingers expect it: parts do, after some transfers
@@ -24,19 +28,23 @@ SLIPPED_M, TILTED = 0.008, 0.96  # of what the fingers hold: off where they took
 NEAR_M = 0.012  # a part is set down so near to where it should stand
 SETTLE_STEPS, HELD_STEPS = 60, 240  # of physics, before and after; that it hangs in the air
 BLOCK, RGBA = "block", (0.8, 0.8, 0.8, 1.0)
+BESIDE_M = 0.03  # [m] of the block around the foot
 ABOVE_M = 0.0005  # [m] between what stands on one another, at first
 
 
-def check_held(robot: RobotSettings, arm: Arm, kinds: Sequence[Kind]) -> None:
-    """BadInput where friction cannot hold a part, or where a part is lost in a trial; only what is unusual is tried."""
-    fine = needs_fine(robot, kinds)
+def check_held(robot: RobotSettings, arm: Arm, kinds: Sequence[Kind], way_m: float = 0.0) -> None:
+    """BadInput where friction cannot hold a part, or where a part is lost in a trial; only what is unusual is tried.
+
+    way_m: how far parts are carried at most [m].
+    """
+    fine, laps = needs_fine(robot, kinds), max(1, ceil(way_m / LAP_M))
     for kind in kinds:
         load = Load.of(kind)
         check_friction(robot, load)
         force_n = grip_force_n(robot, load)
         if load.is_usual(force_n, robot.acceleration_m_s2) and not robot.is_file:
             continue
-        if went := tried(Trial(arm, kind, force_n, robot.speed_m_s, robot.acceleration_m_s2, fine)):
+        if went := tried(Trial(arm, kind, force_n, robot.speed_m_s, robot.acceleration_m_s2, fine, laps)):
             raise BadInput(_refusal(robot, load, went))
 
 
@@ -48,7 +56,10 @@ def _refusal(robot: RobotSettings, load: Load, went: str) -> str:
 
 
 class Trial(NamedTuple):
-    """A kind that an arm takes up with a force [N], moving as fast [m/s] and speeding up as much [m/s2] as in its task."""
+    """A kind that an arm takes up with a force [N], moving as fast [m/s] and speeding up as much [m/s2] as in its task.
+
+    laps: how often it is carried from side to side, round a corner, and turned.
+    """
 
     arm: Arm
     kind: Kind
@@ -56,6 +67,7 @@ class Trial(NamedTuple):
     speed_m_s: float
     acceleration_m_s2: float
     fine: bool = False
+    laps: int = 1
 
 
 @lru_cache(maxsize=64)
@@ -72,7 +84,7 @@ def tried(trial: Trial) -> str:
         for _ in range(SETTLE_STEPS):
             world.step()
         try:
-            for _ in _motion(hand, _way(trial, place)):
+            for _ in _motion(hand, _way(trial, place), trial.laps):
                 world.step()
         except WorkFailed as error:
             return str(error)
@@ -97,8 +109,8 @@ def _way(trial: Trial, spot: Spot) -> list[ToolPose]:
 
 
 def _built(world: World, kind: Kind, spot: Spot) -> list[str]:
-    """The part on a block as large as its foot, and what rides on it; their names from the foot upwards."""
-    along, across = (2 * half for half in kind.footprint_m())
+    """The part on a block that is larger than its foot, and what rides on it; their names from the foot upwards."""
+    along, across = (2 * (half + BESIDE_M) for half in kind.footprint_m())
     world.box(BLOCK, (along, across, spot.z), (spot.x, spot.y, spot.z / 2), RGBA)
     names, foot_m = [], spot.z + ABOVE_M
     for own in kind.stack():
@@ -139,20 +151,21 @@ class _Hand:
         return self.robot.tool().z - float(self.world.pose(self.body)[0][2])
 
 
-def _motion(hand: _Hand, way: Sequence[ToolPose]) -> Iterator[None]:
+def _motion(hand: _Hand, way: Sequence[ToolPose], laps: int) -> Iterator[None]:
     at, up, start, corner, end, turned, above = way
     robot = hand.robot
     yield from robot.grip()
     hand.took()
     yield from robot.follow([up], slow=SLOW)
     hand.check("it is lifted")
-    yield from robot.follow([start])
-    hand.check("it is swung")
-    yield from robot.follow([corner, end], blend=BLEND_M)
-    hand.check("it is swung round a corner")
-    for pose in (turned, above):
-        yield from robot.follow([pose])
+    for _ in range(laps):
+        yield from robot.follow([start])
         hand.check("it is swung")
+        yield from robot.follow([corner, end], blend=BLEND_M)
+        hand.check("it is swung round a corner")
+        for pose in (turned, above):
+            yield from robot.follow([pose])
+            hand.check("it is swung")
     yield from robot.rest(HELD_STEPS)
     hand.check("it hangs")
     yield from robot.follow([at], slow=SLOW)

@@ -19,6 +19,7 @@ from lab.tasks.task import Task
 from lab.tasks.task_fields import CameraGrid, Station
 
 ACROSS = 0.3  # sine of the angle at most between the fingers and the way in
+DETOUR = 1.5  # times the straight way along the axes, at most, around the arm and obstacles
 OVER_M = 0.01  # [m] between a carried part and what stands below its way
 ON_M = 1e-6  # by what a part may reach beyond what it stands on: sums of lengths differ by less
 INTO_M = 0.005  # [m] the same above a machine that it is let down into
@@ -34,7 +35,7 @@ def check_scene(task: Task) -> None:
     arm, places = arm_of(task.robot, task.folder), places_of(task)
     low = task.workspace.lower_m[2] + task.workspace.cell_m[2] / 2
     _check_lowest(places, low)
-    check_held(task.robot, arm, list(places.kinds.values()))
+    check_held(task.robot, arm, list(places.kinds.values()), longest_way_m(places))
     for station in task.stations:
         station_bodies.check(station, task.folder)
         if station.grid is not None:
@@ -80,6 +81,15 @@ def _check_in_bounds(station: Station, at: tuple[float, float], low: Vector, hig
             f"{station.stands_on}, which is there from ({low[0]:.3f}, {low[1]:.3f}) to ({high[0]:.3f}, {high[1]:.3f}) m: "
             "wanted spots on it, or a smaller capacity"
         )
+
+
+def longest_way_m(places: Places) -> float:
+    """How far a part is carried at most from one of its stations to another, cell by cell and around what is in the way [m]."""
+    longest = 0.0
+    for here, there in combinations(places.task.stations, 2):
+        if set(places.task.kinds_at(here.name)) & set(places.task.kinds_at(there.name)):
+            longest = max(longest, sum(abs(a - b) for a, b in zip(here.pose[:2], there.pose[:2], strict=True)))
+    return DETOUR * longest
 
 
 def _check_lowest(places: Places, low: float) -> None:

@@ -139,3 +139,9 @@ def test_the_lever_goes_from_the_tips_to_the_middle() -> None:
     """A slice of 12 cm is taken 3 cm below its top."""
     task = load_task("toast")
     assert Load.of(kinds(task)[0]).lever_m == pytest.approx(0.03)
+
+
+def test_what_pads_touch_in_lines_and_points_is_held_more_gently() -> None:
+    held = {solid: Load("part", 0.05, 0.8, solid=solid).chosen_n(2.0) for solid in ("box", "cylinder", "mesh")}
+    assert held == {"box": 25.0, "cylinder": pytest.approx(7.5), "mesh": pytest.approx(7.5)}
+    assert not Load("part", 0.05, 0.8, solid="mesh").is_usual(7.5, 2.0), "it is always tried"

@@ -1,5 +1,6 @@
 """Shapes of parts: hulls, inertia and looks as they stand; mesh files of all kinds, and the wrong ones told in words."""
 
+import tomllib
 from collections.abc import Callable
 from math import pi
 from pathlib import Path
@@ -10,6 +11,7 @@ import pytest
 import trimesh
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 from lab.errors import BadInput
 from lab.files import assets_folder
@@ -19,6 +21,7 @@ from lab.sim.parts.part_shape import PartShape, shape_of
 from lab.sim.urdf_reader import looks, rotation
 from lab.sim.world import World
 from lab.tasks.part_fields import PartFields
+from lab.tasks.task_fields import Part
 
 QUARTER = pi / 2
 edges = st.floats(0.005, 0.2)
@@ -163,6 +166,75 @@ def test_a_mesh_in_physics_lies_where_its_shape_says(write: Callable[..., Path])
         assert turn == pytest.approx([0, 0, np.sin(0.25), np.cos(0.25)], abs=0.01)
         world.put("angle", (0, 0, 0.3), (0, 0, 0, 1))
         assert world.pose("angle")[1] == pytest.approx([0, 0, 0, 1], abs=1e-7)
+
+
+def nut() -> trimesh.Trimesh:
+    made: trimesh.Trimesh = trimesh.creation.annulus(r_min=0.008, r_max=0.018, height=0.016, sections=6)
+    return made
+
+
+def bottle() -> trimesh.Trimesh:
+    outline = [(0, 0), (0.025, 0), (0.025, 0.07), (0.012, 0.09), (0.012, 0.11), (0, 0.11)]
+    made: trimesh.Trimesh = trimesh.creation.revolve(np.array(outline), sections=40)
+    return made
+
+
+MESHES: dict[str, Callable[[], trimesh.Trimesh]] = {
+    "box": lambda: trimesh.creation.box((0.05, 0.03, 0.04)),
+    "cylinder": lambda: trimesh.creation.cylinder(radius=0.015, height=0.06),
+    "plate": lambda: trimesh.creation.cylinder(radius=0.04, height=0.0012),
+    "cone": lambda: trimesh.creation.cone(radius=0.02, height=0.05),
+    "bracket": angle,
+    "nut": nut,
+    "bottle": bottle,
+}
+
+
+@pytest.mark.parametrize("name", MESHES)
+@pytest.mark.parametrize("off", [0.0, 0.3])
+def test_a_mesh_is_felt_where_it_is_seen(write: Callable[..., Path], name: str, off: float) -> None:
+    """2 mm above a floor it is 2 mm from it, not less by an engine's margin; and it rests with its foot on the floor."""
+    mesh = MESHES[name]()
+    mesh.apply_translation((off, -off, off))
+    shape = shape_of(mesh_part(), write(mesh))
+    with World() as world:
+        world.box("floor", (1, 1, 0.02), (0, 0, -0.01), (1, 1, 1, 1))
+        world.part(name, shape, 0.1, 0.8, (0, 0, shape.foot_m + 0.002), 0.5)
+        assert world.nearest(name, "floor", 0.1) == pytest.approx(0.002, abs=5e-5)
+        for _ in range(120):
+            world.step()
+        assert world.pose(name)[0][2] == pytest.approx(shape.foot_m, abs=1e-4)
+
+
+def test_the_mesh_of_the_docs_is_one(write: Callable[..., Path], root: Path) -> None:
+    """The example on the page of cells, with a nut in millimetres that stands on one of its sides."""
+    page = (root / "docs" / "cells.md").read_text(encoding="utf-8")
+    (fields,) = tomllib.loads(page.split("```toml")[1].split("```")[0])["parts"]
+    in_mm = nut()
+    in_mm.apply_scale(1000)  # type: ignore[no-untyped-call]
+    shape = shape_of(Part.model_validate(fields), write(in_mm, fields["file"]))
+    assert shape.high[1] - shape.low[1] == pytest.approx(0.016, abs=1e-5)
+
+
+def test_a_mesh_that_is_a_box_is_one_in_physics_and_a_hollow_one_is_none(write: Callable[..., Path]) -> None:
+    """However the file has it: off its origin, turned, in millimetres."""
+    turned = np.eye(4)
+    turned[:3, :3], turned[:3, 3] = Rotation.from_rotvec((0.2, 0.4, 0.6)).as_matrix(), (90, 20, 5)
+    box = trimesh.creation.box((50, 30, 40), turned)
+    shape = shape_of(mesh_part(scale=0.001), write(box))
+    assert shape.solid == "box"
+    assert shape.size == pytest.approx((0.05, 0.04, 0.03))
+    own = np.array([(i, j, k) for i in (-25, 25) for j in (-20, 20) for k in (-15, 15)]) / 1000 @ rotation(shape.turn).T
+    assert np.sort(own[:, 2]) == pytest.approx(np.sort(shape.hull[:, 2]), abs=1e-6)
+    hollow = trimesh.util.concatenate([trimesh.creation.box((50, 30, 40)), _inside_out((40, 20, 30))])
+    assert isinstance(hollow, trimesh.Trimesh)
+    assert shape_of(mesh_part(scale=0.001), write(hollow)).solid == "mesh"
+
+
+def _inside_out(size: tuple[float, ...]) -> trimesh.Trimesh:
+    box: trimesh.Trimesh = trimesh.creation.box(size)
+    box.invert()
+    return box
 
 
 def test_a_mesh_of_many_corners_has_few_in_physics(write: Callable[..., Path]) -> None:

@@ -51,3 +51,35 @@ def test_what_happened_is_told(task: Task) -> None:
     kind = kinds_of(task, arm.gripper)["slice"]
     assert tried(Trial(arm, kind, 25.0, 0.5, 2.0)) == ""
     assert tried(Trial(arm, kind, 0.05, 0.5, 2.0, fine=True)) == "it is lost while it is lifted"
+
+
+@pytest.mark.parametrize(
+    ("name", "mass_kg", "friction", "force_n", "speed", "acceleration"),
+    [("toast-xarm6", 0.57, 1.04, 32.9, 1.42, 1.82), ("toast", 0.34, 0.23, 27.2, 0.56, 5.23)],
+)
+def test_what_is_held_does_not_creep_however_far_it_is_carried(
+    name: str, mass_kg: float, friction: float, force_n: float, speed: float, acceleration: float
+) -> None:
+    """Each crept 1 mm a corner in fingers that hold velocities to nothing, not places: both were lost in three laps."""
+    task = load(name)
+    parts = tuple(one.model_copy(update={"mass_kg": mass_kg, "friction": friction}) for one in task.parts)
+    arm = arm_of(task.robot)
+    kind = kinds_of(task.changed(parts=parts), arm.gripper)["slice"]
+    assert tried(Trial(arm, kind, force_n, speed, acceleration, fine=True, laps=3)) == ""
+
+
+def test_it_is_tried_for_as_far_as_the_task_carries_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    task, seen = load("toast"), list[Trial]()
+
+    def nothing_wrong(trial: Trial) -> str:
+        seen.append(trial)
+        return ""
+
+    monkeypatch.setattr(hold_trial, "tried", nothing_wrong)
+    arm = arm_of(task.robot)
+    kinds = kinds_of(
+        task.changed(parts=tuple(one.model_copy(update={"mass_kg": 1.0}) for one in task.parts)), arm.gripper
+    )
+    for way_m in (0.5, 3.0):
+        check_held(task.robot, arm, list(kinds.values()), way_m)
+    assert [trial.laps for trial in seen] == [1, 3]
