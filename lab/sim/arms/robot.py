@@ -12,7 +12,7 @@ from lab.errors import WorkFailed
 from lab.sim.arms.arm import Arm
 from lab.sim.arms.gripper import PAD_M
 from lab.sim.arms.kinematics import ToolPose
-from lab.sim.arms.tool_path import YAW_ARM, timed
+from lab.sim.arms.tool_path import timed
 from lab.sim.urdf_reader import rotation
 from lab.sim.world import TIME_STEP, World
 
@@ -37,9 +37,14 @@ class Trajectory:
 
 
 def plan(
-    arm: Arm, poses: Sequence[ToolPose], speed: float, acceleration: float, blend: float = 0.0, before: Array | None = None
+    arm: Arm,
+    poses: Sequence[ToolPose],
+    speed: float,
+    acceleration: float,
+    blend: float = 0.0,
+    before: Array | None = None,
 ) -> Trajectory:
-    """Time a path of tool poses, its corners rounded by `blend` [m]: at most `speed` [m/s] and `acceleration` [m/s2], see `timed`.
+    """Time a path of tool poses, corners rounded by `blend` [m]: at most `speed` [m/s] and `acceleration` [m/s2], see `timed`.
 
     Joint speeds stay within the arm's; `before` (k,) [rad] are the joints it starts from. WorkFailed names a pose out of reach.
     """

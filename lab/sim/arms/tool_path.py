@@ -115,7 +115,11 @@ def _arc(first: Array, along: Array, then: Array, turn: float, radius: float) ->
 def _squares(pieces: Sequence[_Piece], speed: float, acceleration: float) -> list[float]:
     """The squares of the speeds where pieces begin, and where the last one ends: there and where it begins 0."""
     most = [min(speed**2, acceleration * piece.radius) for piece in pieces]
-    caps = [0.0, *(0.0 if b.stops else min(one, other) for one, other, b in zip(most, most[1:], pieces[1:], strict=False)), 0.0]
+    caps = [
+        0.0,
+        *(0.0 if b.stops else min(one, other) for one, other, b in zip(most, most[1:], pieces[1:], strict=False)),
+        0.0,
+    ]
     forward = _pass(pieces, caps, acceleration)
     return _pass(pieces[::-1], forward[::-1], acceleration)[::-1]
 
