@@ -148,7 +148,7 @@ def test_the_arm_comes_to_rest_where_it_was_sent(robot: Robot, world: World) -> 
 
 def test_targets_never_jump_from_one_motion_to_the_next(robot: Robot, world: World) -> None:
     """Also where something keeps the arm a little off them: the tool is told to go from where it is held."""
-    told: list[np.ndarray] = [UP6.home]  # in each physics step
+    told: list[np.ndarray] = [UP6.home, UP6.home]  # in each physics step
     drive, step = world.drive, world.step
 
     def drives(name: str, names: Sequence[str], positions: Sequence[float], *rest: Any, **more: Any) -> None:
@@ -160,7 +160,7 @@ def test_targets_never_jump_from_one_motion_to_the_next(robot: Robot, world: Wor
         step()
         told.append(told[-1])
 
-    world.drive, world.step = drives, steps_on  # type: ignore[method-assign]
+    world.drive, world.step = drives, steps_on  # type: ignore[method-assign,assignment]
     for way in ([ToolPose(0.6, -0.2, 0.3)], [ToolPose(0.6, -0.2, 0.1), ToolPose(0.7, 0.1, 0.2, 0.4)]):
         steps(world, robot.follow(way, blend=0.05))
         world.set_joints(NAME, UP6.joints, np.array(world.joints(NAME, UP6.joints)) + 0.001)
