@@ -41,7 +41,7 @@ def plan(
     poses: Sequence[ToolPose],
     speed: float,
     acceleration: float,
-    blend: float = 0.0,
+    blend: float | Sequence[float] = 0.0,
     before: Array | None = None,
 ) -> Trajectory:
     """Time a path of tool poses, corners rounded by `blend` [m]: at most `speed` [m/s] and `acceleration` [m/s2], see `timed`.
@@ -181,7 +181,7 @@ class Robot:
         """Move from now on with a share of speed and acceleration, as an operator's speed override."""
         self.speed, self.acceleration = share * self.speed, share * self.acceleration
 
-    def follow(self, poses: Sequence[ToolPose], *, blend: float = 0.0, slow: float = 1.0) -> Iterator[None]:
+    def follow(self, poses: Sequence[ToolPose], *, blend: float | Sequence[float] = 0.0, slow: float = 1.0) -> Iterator[None]:
         """Move the tool from where it is held along `poses`; `slow` < 1 lowers speed and acceleration."""
         before = self.world.joints(NAME, self.arm.joints)
         if np.abs(before - self._led).max() < _HELD_RAD:

@@ -7,7 +7,7 @@ J. Bobrow, S. Dubowsky and J. Gibson, 1985 (passes forward and backward).
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import acos, ceil, inf, sqrt, tan
+from math import atan2, ceil, inf, sqrt, tan
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,7 @@ from lab.sim.world import TIME_STEP
 
 YAW_ARM = 0.15  # [m/rad] a turn of the tool counts as this much way
 COUNTED = np.array([1.0, 1.0, 1.0, YAW_ARM])  # of a tool pose
+ROUNDINGS_M = (0.002, 0.004, 0.008, 0.015, 0.02, 0.03, 0.04, 0.05)  # as few as a controller's position levels
 _NEAR_M = 1e-9
 _STRAIGHT_RAD = 1e-4  # a corner that bends less is none
 _PARTS = 8  # of an arc, each with one acceleration along it
@@ -46,15 +47,17 @@ def way_of(points: Array) -> Array:
     return np.concatenate([[0.0], np.cumsum(steps)])
 
 
-def timed(poses: Sequence[ToolPose], speed: float, acceleration: float, blend: float = 0.0) -> Array:
+def timed(
+    poses: Sequence[ToolPose], speed: float, acceleration: float, blend: float | Sequence[float] = 0.0
+) -> Array:
     """Where the tool is after each physics step (n, 4), x, y, z [m], yaw [rad], from rest at the first pose to rest at the last.
 
     It goes at most at `speed` [m/s] and with `acceleration` [m/s2], along and across the path together, a turn counted as way.
-    Each corner is an arc from `blend` / 2 [m] before it to as far behind it, or half of the shorter line beside it; without a
-    blend, and where the path turns back, the tool stops at corners.
+    Each corner is an arc, see `roundings`, with a `blend` [m] for all poses or one each; without, and where the path turns
+    back, the tool stops at corners.
     """
     corners = np.array([[p.x, p.y, p.z, p.yaw] for p in poses])
-    pieces = _pieces(corners * COUNTED, blend)
+    pieces = _pieces(corners * COUNTED, np.broadcast_to(np.asarray(blend, float), len(corners)))
     if not pieces:
         return corners[-1:]
     lengths = np.array([piece.length for piece in pieces])
@@ -72,10 +75,40 @@ def timed(poses: Sequence[ToolPose], speed: float, acceleration: float, blend: f
     return np.asarray(points)
 
 
-def _pieces(corners: Array, blend: float) -> list[_Piece]:
-    """The path along counted poses (n, 4); none where they are all one place."""
-    far = np.linalg.norm(np.diff(corners, axis=0), axis=1)
-    corners = corners[np.concatenate([[True], far > _NEAR_M])]
+def bending(corners: Array) -> list[int]:
+    """Which of counted poses (n, 4) a path bends at, its ends included: the others lie on straight lines between them."""
+    far = np.concatenate([[True], np.linalg.norm(np.diff(corners, axis=0), axis=1) > _NEAR_M])
+    kept: list[int] = []
+    for row in np.flatnonzero(far).tolist():
+        if len(kept) > 1 and _turn(corners[[kept[-2], kept[-1], row]]) <= _STRAIGHT_RAD:
+            kept.pop()
+        kept.append(row)
+    return kept
+
+
+def _turn(corners: Array) -> float:
+    """By what angle [rad] a path through three places (3, n) turns at the second."""
+    ahead = np.diff(corners, axis=0)
+    ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
+    return 2.0 * atan2(float(np.linalg.norm(ahead[1] - ahead[0])), float(np.linalg.norm(ahead[1] + ahead[0])))
+
+
+def roundings(corners: Array, blends: Array) -> Array:
+    """How far before and behind each of counted poses (n, 4), all `bending`, the arc begins and ends (n,) [m]; 0 at both ends.
+
+    It is the largest of ROUNDINGS_M that is no more than half a blend (n,) [m] and half of the shorter line beside it, or 0.
+    """
+    halves = np.linalg.norm(np.diff(corners, axis=0), axis=1) / 2.0
+    room = np.zeros(len(corners))
+    room[1:-1] = np.minimum(blends[1:-1] / 2.0, np.minimum(halves[:-1], halves[1:])) + _NEAR_M
+    return np.array([0.0, *ROUNDINGS_M])[np.searchsorted(ROUNDINGS_M, room, side="right")]
+
+
+def _pieces(corners: Array, blends: Array) -> list[_Piece]:
+    """The path along counted poses (n, 4), with a blend each; none where they are all one place."""
+    kept = bending(corners)
+    corners = corners[kept]
+    rooms = roundings(corners, blends[kept]).tolist()
     legs = np.diff(corners, axis=0)
     lengths = np.linalg.norm(legs, axis=1)
     ahead = legs / lengths[:, None]
@@ -86,15 +119,13 @@ def _pieces(corners: Array, blend: float) -> list[_Piece]:
         if number == len(legs) - 1:
             pieces.append(_Piece(length - begun, corner + begun * along, along, none, stops=stops))
             break
-        then = ahead[number + 1]
-        turn = acos(min(1.0, max(-1.0, float(along @ then))))
-        room = min(blend / 2.0, length / 2.0, float(lengths[number + 1]) / 2.0) if turn > _STRAIGHT_RAD else 0.0
-        radius = room / tan(turn / 2.0) if room > 0.0 else 0.0
+        then, turn = ahead[number + 1], _turn(corners[number : number + 3])
+        room = rooms[number + 1]
+        radius = room / tan(turn / 2.0)
         cut = room if radius > _NEAR_M else 0.0
         if length - begun - cut > 0.0:
             pieces.append(_Piece(length - begun - cut, corner + begun * along, along, none, stops=stops))
-        stops = cut == 0.0 and turn > _STRAIGHT_RAD
-        begun = cut
+        stops, begun = cut == 0.0, cut
         if cut:
             pieces += _arc(corner + (length - cut) * along, along, then, turn, radius)
     return pieces
