@@ -181,8 +181,14 @@ class Robot:
         """Move from now on with a share of speed and acceleration, as an operator's speed override."""
         self.speed, self.acceleration = share * self.speed, share * self.acceleration
 
-    def follow(self, poses: Sequence[ToolPose], *, blend: float | Sequence[float] = 0.0, slow: float = 1.0) -> Iterator[None]:
-        """Move the tool from where it is held along `poses`; `slow` < 1 lowers speed and acceleration."""
+    def follow(
+        self, poses: Sequence[ToolPose], *, blend: float | Sequence[float] = 0.0, slow: float = 1.0
+    ) -> Iterator[None]:
+        """Move the tool from where it is held along `poses`, with a `blend` [m] for all or one each.
+
+        slow: below 1 it lowers speed and acceleration.
+        """
+        blends = [0.0, *np.broadcast_to(blend, len(poses)).tolist()]
         before = self.world.joints(NAME, self.arm.joints)
         if np.abs(before - self._led).max() < _HELD_RAD:
             before = self._led  # what it was told last: from elsewhere the targets would jump
@@ -190,11 +196,11 @@ class Robot:
         first = poses[0]
         turn = (self._counted(here.yaw) - first.yaw + pi) % (2 * pi) - pi
         start = ToolPose(here.x, here.y, here.z, first.yaw + turn)
-        way = plan(self.arm, [start, *poses], self.speed * slow, self.acceleration * slow, blend, before)
+        way = plan(self.arm, [start, *poses], self.speed * slow, self.acceleration * slow, blends, before)
         self._half_on = self.arm.is_half_on(way.positions[-1], poses[-1])
         heard = self.listener
         if heard is not None:
-            heard.began(poses, blend, way, before)
+            heard.began(poses, max(blends), way, before)
         for row, (position, velocity) in enumerate(zip(way.positions, way.velocities, strict=True)):
             self._lead(position, velocity)
             if heard is not None:

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lab.sim.arms.kinematics import ToolPose
-from lab.sim.arms.tool_path import COUNTED, timed, way_of
+from lab.sim.arms.tool_path import COUNTED, roundings, timed, way_of
 from lab.sim.world import TIME_STEP
 
 at = st.floats(-1.0, 1.0) | st.sampled_from([-0.1, 0.0, 0.1, 0.1001])  # corners of all angles, and ways back
@@ -59,6 +59,15 @@ def test_a_corner_is_an_arc_that_the_acceleration_holds() -> None:
     assert np.diff(way_of(bent)).max() / TIME_STEP <= sqrt(2.0 * 0.05)
     assert np.diff(way_of(bent)).max() / TIME_STEP == pytest.approx(sqrt(2.0 * 0.05), rel=0.01)
     assert len(points) < len(timed(CORNER, 0.5, 2.0))
+
+
+def test_corners_are_rounded_by_few_radii_and_where_the_tool_turns_by_none() -> None:
+    """A room of 35 mm holds 30; one of 1 mm none; lines that turn the tool meet in a stop."""
+    places = np.array([[0.0, 0.0, 0.0, 0.0], [0.3, 0.0, 0.0, 0.0], [0.3, 0.07, 0.0, 0.0], [0.302, 0.07, 0.0, 0.0]])
+    assert roundings(places, np.full(4, 0.1)).tolist() == [0.0, 0.03, 0.0, 0.0]
+    assert roundings(places, np.full(4, 0.01)).tolist() == [0.0, 0.004, 0.0, 0.0]
+    places[2:, 3] = 0.01
+    assert roundings(places, np.full(4, 0.1)).tolist() == [0.0, 0.0, 0.0, 0.0]
 
 
 def test_without_a_blend_it_stops_at_a_corner_but_not_on_a_straight_line() -> None:
