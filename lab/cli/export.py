@@ -19,6 +19,9 @@ def export(
     positions: Annotated[
         str, typer.Option("--positions", help="Of job files: rectan, or pulse (assumed pulses of the lab's own arm).")
     ] = "rectan",
+    any_arm: Annotated[
+        bool, typer.Option("--any-arm", help="Write job files also for an arm that is none of the controller's maker.")
+    ] = False,
     out: Annotated[Path | None, typer.Option("--out", help="Folder for the files; default: RUN/FORMAT.")] = None,
     as_json: Json = False,
 ) -> None:
@@ -27,6 +30,7 @@ def export(
 
     from lab.errors import unknown
     from lab.export import FORMATS
+    from lab.export.commands import Path as Lines
     from lab.export.options import POSITIONS, Options
     from lab.export.play import deviation
     from lab.export.program import Program
@@ -39,11 +43,12 @@ def export(
     folder = out or run / to
     check_out(folder)
     program, form = Program.load(run), FORMATS[to]
-    options = Options("pulse" if positions == "pulse" else "rectan", datetime.now().strftime("%Y/%m/%d %H:%M"))
+    options = Options("pulse" if positions == "pulse" else "rectan", datetime.now().strftime("%Y/%m/%d %H:%M"), any_arm)
     written = form.write(program, options)
     files = _written(written, folder)
     read = {path.name: path.read_bytes().decode("utf-8") for path in files}
-    off = deviation(program, form.read(read, program.arm))
+    read_back = form.read(read, program.arm)
+    off = deviation(program, read_back)
     for warning in form.warnings(program):
         complain(warning)
     document = {
@@ -53,6 +58,9 @@ def export(
         "files": [str(path) for path in files],
         "transfers": len(program.carried.transfers),
         "motions": off.motions,
+        "moves": sum(len(one.points) for one in read_back if isinstance(one, Lines))
+        if isinstance(read_back, list)
+        else 0,
         "poses": off.poses,
         "max_deviation_m": off.max_m,
         "max_deviation_rad": off.max_rad,

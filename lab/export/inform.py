@@ -2,8 +2,9 @@
 
 Source of the dialect: the listings of the thesis (Appendix VI; an XRC controller), which write /JOB, //NAME, //POS, ///NPOS,
 ///TOOL, ///POSTYPE PULSE or ROBOT, ///PULSE or ///RECTAN, ///RCONF, C00000=..., //INST, ///DATE, ///ATTR SC,RW, ///GROUP1 RB1,
-NOP, MOVJ, TIMER, CALL JOB and END; beyond these MOVL with V, VR and PL, DOUT OT#, WAIT IN#, ///COMM and comments, as in
-Yaskawa's manuals of job data and INFORM II (XRC, NX100: HW0481924, section 4.1). No controller has read what is written here.
+NOP, MOVJ, TIMER, CALL JOB and END; beyond these MOVL
+with V, VR and PL, DOUT and PULSE OT#, WAIT and PAUSE IF IN#, ///COMM and comments, as in Yaskawa's manuals of job data and
+INFORM II (XRC, NX100: HW0481924, section 4.1). No controller has read what is written here.
 """
 
 import re
@@ -60,12 +61,34 @@ class Dout:
 
 @dataclass(frozen=True)
 class Wait:
-    """Waits for an input to be on."""
+    """Waits for an input to be on, or off."""
+
+    input: int
+    on: bool = True
+
+    def __str__(self) -> str:
+        return f"WAIT IN#({self.input})={'ON' if self.on else 'OFF'}"
+
+
+@dataclass(frozen=True)
+class Pulse:
+    """Sets an output for so many seconds, and goes on meanwhile."""
+
+    output: int
+    seconds: float
+
+    def __str__(self) -> str:
+        return f"PULSE OT#({self.output}) T={self.seconds:.2f}"
+
+
+@dataclass(frozen=True)
+class PauseIfOff:
+    """Stops the job, for a person, where an input is off."""
 
     input: int
 
     def __str__(self) -> str:
-        return f"WAIT IN#({self.input})=ON"
+        return f"PAUSE IF IN#({self.input})=OFF"
 
 
 @dataclass(frozen=True)
@@ -98,7 +121,7 @@ class Comment:
         return f"'{self.text}"
 
 
-Instruction = MoveJ | MoveL | Dout | Wait | Timer | Call | Comment
+Instruction = MoveJ | MoveL | Dout | Wait | Pulse | PauseIfOff | Timer | Call | Comment
 _INSTRUCTIONS: dict[str, tuple[str, Callable[..., Instruction]]] = {  # first word -> the whole line, and what it makes
     "MOVJ": (rf"MOVJ C(\d{{5}}) VJ=({_NUMBER})", lambda c, v: MoveJ(int(c), float(v))),
     "MOVL": (
@@ -106,7 +129,9 @@ _INSTRUCTIONS: dict[str, tuple[str, Callable[..., Instruction]]] = {  # first wo
         lambda c, unit, v, level: MoveL(int(c), unit, float(v), int(level)),
     ),
     "DOUT": (r"DOUT OT#\((\d{1,4})\) (ON|OFF)", lambda n, on: Dout(int(n), on == "ON")),
-    "WAIT": (r"WAIT IN#\((\d{1,4})\)=ON", lambda n: Wait(int(n))),
+    "WAIT": (r"WAIT IN#\((\d{1,4})\)=(ON|OFF)", lambda n, on: Wait(int(n), on == "ON")),
+    "PULSE": (rf"PULSE OT#\((\d{{1,4}})\) T=({_NUMBER})", lambda n, seconds: Pulse(int(n), float(seconds))),
+    "PAUSE": (r"PAUSE IF IN#\((\d{1,4})\)=OFF", lambda n: PauseIfOff(int(n))),
     "TIMER": (rf"TIMER T=({_NUMBER})", lambda seconds: Timer(float(seconds))),
     "CALL": (rf"CALL JOB:({NAME.pattern})", Call),
 }
@@ -118,6 +143,7 @@ class Position:
 
     numbers: tuple[float, ...]
     configuration: tuple[int, ...] | None = None  # None: pulses
+    tool: int = 0
 
 
 @dataclass(frozen=True)
@@ -133,15 +159,14 @@ class InformJob:
     def text(self) -> str:
         """The file, lines ending as controllers want it."""
         lines = ["/JOB", f"//NAME {self.name}", "//POS", f"///NPOS {len(self.positions)},0,0,0,0,0"]
-        if self.positions:
-            pulses = self.positions[0].configuration is None
-            lines += [
-                "///TOOL 0",
-                f"///POSTYPE {'PULSE' if pulses else 'ROBOT'}",
-                f"///{'PULSE' if pulses else 'RECTAN'}",
-            ]
         before: tuple[int, ...] | None = None
+        tool = -1
         for number, position in enumerate(self.positions):
+            if position.tool != tool:
+                pulses = position.configuration is None
+                sort = ("PULSE", "PULSE") if pulses else ("ROBOT", "RECTAN")
+                lines += [f"///TOOL {position.tool}", f"///POSTYPE {sort[0]}", f"///{sort[1]}"]
+                tool, before = position.tool, None
             if position.configuration is not None and position.configuration != before:
                 before = position.configuration
                 lines.append(f"///RCONF {','.join(map(str, before))}")
@@ -208,14 +233,17 @@ def read_job(text: str, where: str) -> InformJob:
 
 
 def _read_positions(lines: _Lines, count: int) -> list[Position]:
-    lines.matched("///TOOL 0", "///TOOL 0")
-    pulses = lines.matched("///POSTYPE (PULSE|ROBOT)", "///POSTYPE PULSE or ROBOT")[1] == "PULSE"
-    sort = "///PULSE" if pulses else "///RECTAN"
-    lines.matched(sort, sort)
+    tool, pulses = _read_sort(lines)
     found: list[Position] = []
     configuration: tuple[int, ...] | None = None
     number = r"-?\d{1,9}" if pulses else _NUMBER
     while len(found) < count:
+        if lines.peek().startswith("///TOOL"):
+            tool, other = _read_sort(lines)
+            configuration = None
+            if other != pulses:
+                raise lines.fault("positions of two sorts in one job")
+            continue
         if not pulses and lines.peek().startswith("///RCONF"):
             bits = lines.matched(r"///RCONF ([01](?:,[01]){7})", "///RCONF and eight times 0 or 1")[1]
             configuration = tuple(map(int, bits.split(",")))
@@ -224,8 +252,17 @@ def _read_positions(lines: _Lines, count: int) -> list[Position]:
         numbers = lines.matched(at, f"C{len(found):05d}= and six {'pulses' if pulses else 'numbers'}")[1]
         if not pulses and configuration is None:
             raise lines.fault("a position before any ///RCONF")
-        found.append(Position(tuple(map(float, numbers.split(","))), configuration))
+        found.append(Position(tuple(map(float, numbers.split(","))), configuration, tool))
     return found
+
+
+def _read_sort(lines: _Lines) -> tuple[int, bool]:
+    """The tool of the positions that follow, and whether they are pulses."""
+    tool = int(lines.matched(r"///TOOL (\d{1,2})", "///TOOL and its number")[1])
+    pulses = lines.matched("///POSTYPE (PULSE|ROBOT)", "///POSTYPE PULSE or ROBOT")[1] == "PULSE"
+    sort = "///PULSE" if pulses else "///RECTAN"
+    lines.matched(sort, sort)
+    return tool, pulses
 
 
 def _read_instruction(lines: _Lines, line: str, positions: int) -> Instruction:

@@ -14,7 +14,22 @@ from typing import Literal
 import numpy as np
 
 from lab.errors import BadInput, counted
-from lab.export.commands import GRIP_S, Await, Command, Grip, Job, Joint, Path, Pause, jobs_of, step_between
+from lab.export.commands import (
+    GRIP_S,
+    Await,
+    Check,
+    Command,
+    Grip,
+    Job,
+    Joint,
+    Path,
+    Pause,
+    Payload,
+    Reset,
+    Start,
+    jobs_of,
+    step_between,
+)
 from lab.export.inform import (
     MOST_POSITIONS,
     MOST_TEXT,
@@ -26,21 +41,23 @@ from lab.export.inform import (
     Instruction,
     MoveJ,
     MoveL,
+    PauseIfOff,
     Position,
+    Pulse,
     Timer,
     Wait,
     read_job,
 )
-from lab.export.options import Options
+from lab.export.options import GRIPPER, PULSE_S, Options, done_input, reset_output, start_output
 from lab.export.program import Array, Program
 from lab.sim.arms.arm import Arm
-from lab.sim.arms.tool_path import YAW_ARM
+from lab.sim.arms.tool_path import ROUNDINGS_M, YAW_ARM
 
 PULSES = {
     "up6": tuple(n * 4096 / (2 * pi) for n in (120.0, 120.0, 120.0, 50.0, 50.0, 30.0))
 }  # by arm, pulses/rad, assumed
-GRIPPER = 1  # its output
-THROUGH = 1  # PL of a position that is passed without a stop, rounded least
+MAKER, NAMES = "Yaskawa", r"up\d+|motoman.*|yaskawa.*|(gp|hc|hp|mh|ma|ar|sia)\d+.*"
+_TOOL = re.compile(r"TOOL (\d+): (\d+\.\d{3}) KG")  # how a comment says what the gripper carries from there on
 _ALMOST_M = 1e-6
 _OWN = re.compile(r"M\d{3}|OPEN|CLOSE")
 
@@ -48,19 +65,27 @@ _OWN = re.compile(r"M\d{3}|OPEN|CLOSE")
 def warnings(program: Program) -> list[str]:
     """What a person must know before such jobs run."""
     return [
-        f"jbi: no controller has read these files; tool 0 must be the tool of '{program.arm.name}', and the pulses of "
-        "pulse positions are assumed, not a real arm's"
+        f"jbi: no controller has read these files; tool 0 and those that carry must have the tool of '{program.arm.name}' and "
+        "their payload, and the pulses of pulse positions are assumed, not a real arm's",
+        f"jbi: set the radii of position levels 1 to 8 to {', '.join(f'{1000 * cut:g}' for cut in ROUNDINGS_M)} mm",
     ]
+
+
+def _tools(program: Program) -> dict[float, int]:
+    """The number of the tool that carries so many [kg], as a comment writes them; 0 carries nothing."""
+    masses = sorted({round(transfer.mass_kg, 3) for transfer in program.carried.transfers} - {0.0})
+    return {0.0: 0} | {mass: number for number, mass in enumerate(masses, start=1)}
 
 
 def write(program: Program, options: Options) -> dict[str, str]:
     """The jobs' texts by file name, the master first. BadInput for pulses of an arm whose table is not known."""
     arm = program.arm
+    options.check_maker("jbi", MAKER, NAMES, arm.name)
     if options.positions == "pulse" and arm.name not in PULSES:
         raise BadInput(f"--positions pulse: pulses of arm '{arm.name}' are not known; known: {', '.join(PULSES)}")
     jobs = [(f"M{number:03d}", job) for number, job in enumerate(jobs_of(program), start=1)]
     master = re.sub(r"[^A-Z0-9]", "", program.carried.task.upper())[:8]
-    transfers = [_Writer(arm, options).job(name, job) for name, job in jobs]
+    transfers = [_Writer(arm, options, _tools(program)).job(name, job) for name, job in jobs]
     calls = (Call("OPEN"), *(Call(name) for name, _ in jobs))
     called = {*calls, *(step for job in transfers for step in job.instructions)}
     grips = [
@@ -79,6 +104,8 @@ class _Writer:
 
     arm: Arm
     options: Options
+    tools: Mapping[float, int] = field(default_factory=lambda: {0.0: 0})
+    tool: int = 0
     positions: list[Position] = field(default_factory=list)
     instructions: list[Instruction] = field(default_factory=list)
     joints: Array | None = None
@@ -106,7 +133,18 @@ class _Writer:
         elif isinstance(command, Grip):
             self.instructions.append(Call("CLOSE" if command.closed else "OPEN"))
         elif isinstance(command, Await):
-            self.instructions += [Comment(f"{command.station} done"[:MOST_TEXT]), Wait(command.machine)]
+            self.instructions += [Comment(f"{command.station} done"[:MOST_TEXT]), Wait(done_input(command.machine))]
+        elif isinstance(command, Start | Reset):
+            starts = isinstance(command, Start)
+            output = start_output(command.machine) if starts else reset_output(command.machine)
+            comment = Comment(f"{'start' if starts else 'reset'} {command.station}"[:MOST_TEXT])
+            self.instructions += [comment, Pulse(output, PULSE_S), Wait(done_input(command.machine), on=False)]
+        elif isinstance(command, Check):
+            self.instructions.append(PauseIfOff(GRIPPER))
+        elif isinstance(command, Payload):
+            mass = round(command.mass_kg, 3)
+            self.tool = self.tools.get(mass, 0)
+            self.instructions.append(Comment(f"TOOL {self.tool}: {mass:.3f} KG"))
         else:
             times = max(1, ceil(command.seconds / MOST_TIMER_S))
             self.instructions += [Timer(command.seconds / times)] * times
@@ -116,8 +154,8 @@ class _Writer:
         poses = np.vstack([self.pose, path.points])
         joints = self.arm.inverse_path(poses, self.joints)
         for number, pose in enumerate(path.points):
-            unit, speed = _spoken_speed(step_between(self.pose, pose), path.speed_m_s)
-            level = 0 if number == len(path.points) - 1 else THROUGH
+            unit, speed = _spoken_speed(step_between(self.pose, pose), float(path.speeds[number]))
+            level = _level(float(path.roundings[number]))
             at = self._at(pose, joints[number + 1])
             self.instructions.append(MoveL(at, unit, speed, level))
             self.pose = pose
@@ -127,12 +165,17 @@ class _Writer:
         """The number of a new position."""
         if self.options.positions == "pulse":
             pulses = joints * np.array(PULSES[self.arm.name])
-            self.positions.append(Position(tuple(float(round(p)) for p in pulses)))
+            self.positions.append(Position(tuple(float(round(p)) for p in pulses), None, self.tool))
         else:
             x, y, z = (1000.0 * (pose[:3] - [0.0, 0.0, self.arm.base_up_m])).tolist()
             yaw = round(degrees(_wrapped(pose[3])), 2)
-            self.positions.append(Position((x, y, z, 180.0, 0.0, yaw), _configuration(joints)))
+            self.positions.append(Position((x, y, z, 180.0, 0.0, yaw), _configuration(joints), self.tool))
         return len(self.positions) - 1
+
+
+def _level(rounding_m: float) -> int:
+    """The position level whose radius is nearest to it; 0 to a stop."""
+    return 0 if rounding_m == 0.0 else 1 + int(np.argmin(np.abs(np.array(ROUNDINGS_M) - rounding_m)))
 
 
 def _spoken_speed(step: Array, speed_m_s: float) -> tuple[Literal["V", "VR"], float]:
@@ -193,6 +236,7 @@ class _Reader:
     found: list[Command] = field(default_factory=list)
     pose: Array | None = None
     points: list[Array] = field(default_factory=list)  # since the last stop
+    roundings: list[float] = field(default_factory=list)
     speeds: list[float] = field(default_factory=list)
 
     def read(self, master: str) -> list[Command]:
@@ -209,8 +253,15 @@ class _Reader:
                 self.found.append(Grip(step.on))
             elif isinstance(step, Timer):
                 self.found.append(Pause(step.seconds))
-            elif isinstance(step, Wait):
-                self.found.append(Await(step.input))
+            elif isinstance(step, Wait) and step.on:
+                self.found.append(Await(step.input - done_input(0)))
+            elif isinstance(step, Pulse):
+                machine = step.output // 2
+                self.found.append(Start(machine) if step.output == start_output(machine) else Reset(machine))
+            elif isinstance(step, PauseIfOff):
+                self.found.append(Check())
+            elif isinstance(step, Comment) and (told := _TOOL.fullmatch(step.text)):
+                self.found.append(Payload(float(told[2])))
         self._stop()
         return self.found
 
@@ -235,13 +286,12 @@ class _Reader:
         self.speeds.append(_way_speed(way, step))
         self.pose = self.pose + way
         self.points.append(self.pose)
-        if step.level == 0:
-            self._stop()
+        self.roundings.append(0.0 if step.level == 0 else ROUNDINGS_M[step.level - 1])
 
     def _stop(self) -> None:
         if self.points:
-            self.found.append(Path(np.array(self.points), min(self.speeds)))
-            self.points, self.speeds = [], []
+            self.found.append(Path(np.array(self.points), np.array(self.roundings), np.array(self.speeds)))
+            self.points, self.roundings, self.speeds = [], [], []
 
     def _tool(self, position: Position) -> Array:
         x, y, z, rx, ry, rz = position.numbers

@@ -70,7 +70,8 @@ Action = Annotated[Motion | Press | Rest, Field(discriminator="what")]
 class Transfer(Record):
     """One move of the sequence: the robot leaves `start`, reaches the part at `origin`, sets it down at `target`.
 
-    waits_for: the machine that must have finished before the part is taken out; None: none.
+    waits_for: the machine that must have finished before the part is taken out; None: none. mass_kg: of what is carried, a
+    pallet with its part on it; 0: not known.
     """
 
     part: str
@@ -82,6 +83,7 @@ class Transfer(Record):
     reach_s: At
     drop_s: At
     waits_for: str | None
+    mass_kg: Annotated[float, Field(ge=0)] = 0.0
 
     @property
     def words(self) -> str:

@@ -107,7 +107,7 @@ class MotionRecorder:
             robot=task.robot,
             folder=str(task.folder) if task.robot.is_file else "",
             machines=machines,
-            transfers=tuple(_transfer(move, name(move.part), machines) for move in moves),
+            transfers=tuple(_transfer(move, name(move.part), machines, task) for move in moves),
             actions=tuple(self._actions),
         )
         joints = np.concatenate([np.empty((0, len(arm.joints))), *self._rows])
@@ -134,7 +134,16 @@ def closed_at(actions: Sequence[Action], at_s: Array) -> NDArray[np.bool_]:
     return np.asarray(states[np.searchsorted([press.at_s for press in presses], at_s, side="right")])
 
 
-def _transfer(move: Move, part: str, machines: Sequence[str]) -> Transfer:
+def _mass_kg(task: Task, part: str, *, on_pallet: bool) -> float:
+    """The mass of a part, named by its kind and number, and of the pallet that it is on; 0 for what the task does not know."""
+    masses = {one.name: one.mass_kg for one in task.parts}
+    own = next((one for one in task.parts if one.name == part.rpartition(" ")[0]), None)
+    if own is None:
+        return 0.0
+    return own.mass_kg + (masses.get(own.pallet or "", 0.0) if on_pallet else 0.0)
+
+
+def _transfer(move: Move, part: str, machines: Sequence[str], task: Task) -> Transfer:
     waits = move.origin in machines and move.carries == "part"
     return Transfer(
         part=part,
@@ -146,4 +155,5 @@ def _transfer(move: Move, part: str, machines: Sequence[str]) -> Transfer:
         reach_s=move.reach_s,
         drop_s=move.drop_s,
         waits_for=move.origin if waits else None,
+        mass_kg=_mass_kg(task, part, on_pallet=move.carries != "part"),
     )

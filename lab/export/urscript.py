@@ -13,15 +13,28 @@ from math import atan2, cos, hypot, pi, sin
 import numpy as np
 
 from lab.errors import BadInput, unknown
-from lab.export.commands import Await, Command, Grip, Joint, Path, Pause, jobs_of, step_between
-from lab.export.options import Options
+from lab.export.commands import (
+    Await,
+    Check,
+    Command,
+    Grip,
+    Joint,
+    Path,
+    Pause,
+    Payload,
+    Reset,
+    Start,
+    jobs_of,
+    step_between,
+)
+from lab.export.options import GRIPPER, PULSE_S, Options, done_input, reset_output, start_output
 from lab.export.program import Array, Program
 from lab.sim.arms.arm import Arm
-from lab.sim.arms.tool_path import YAW_ARM
+from lab.sim.arms.tool_path import ROUNDINGS_M, YAW_ARM
 
 AXES = 6
-GRIPPER = 1  # its digital output
-THROUGH_M = 0.0005  # blend radius of a pose that is passed without a stop
+MAKER, NAMES = "Universal Robots", r"ur\d+e?([_-].*)?"
+MOST_SHARE = 0.49  # of the shorter line: blends must not meet
 JOINT_SPEED, JOINT_ACCELERATION = 0.3, 1.0  # [rad/s], [rad/s2] to where a transfer begins
 _NUMBER = r"-?\d+\.\d+"
 _POSE = rf"p\[({_NUMBER}(?:, {_NUMBER}){{5}})\]"
@@ -30,6 +43,10 @@ _JOINTS = rf"\[({_NUMBER}(?:, {_NUMBER}){{5}})\]"
 
 def warnings(program: Program) -> list[str]:
     """What a person must know before such a program runs."""
+    if re.fullmatch(NAMES, program.arm.name, re.IGNORECASE):
+        return [
+            "urscript: no controller has run this program; set_payload tells the part's mass, without the gripper's"
+        ]
     return [
         f"urscript: '{program.arm.name}' is no arm of Universal Robots: on one, check reach, joint limits and which of its "
         "elbow and wrist configurations it takes; the base must stand where this arm's foot does"
@@ -43,6 +60,7 @@ def write(program: Program, options: Options) -> dict[str, str]:
         raise BadInput(
             f"--format urscript: arm '{arm.name}' has {len(arm.joints)} axes; URScript is for arms with {AXES}"
         )
+    options.check_maker("urscript", MAKER, NAMES, arm.name)
     name = re.sub(r"[^a-z0-9]", "_", program.carried.task.lower())
     acceleration = program.carried.robot.acceleration_m_s2
     tool_m = float(np.linalg.norm(arm.tip[:3, 3]))
@@ -72,20 +90,38 @@ class _Writer:
             self.lines.append(f"movej({self._text(self.pose)}, a={JOINT_ACCELERATION:.3f}, v={JOINT_SPEED:.3f})")
         elif isinstance(command, Path):
             assert self.pose is not None
+            lines = np.diff(np.vstack([self.pose, command.points])[:, :3], axis=0)
+            far = [*np.linalg.norm(lines, axis=1).tolist(), 0.0]
             for number, pose in enumerate(command.points):
-                rounded = 0.0 if number == len(command.points) - 1 else THROUGH_M
-                speeds = (
-                    f"a={self.acceleration:.3f}, v={_tool_speed(step_between(self.pose, pose), command.speed_m_s):.5f}"
-                )
-                self.lines.append(f"movel({self._text(pose)}, {speeds}, r={rounded:.4f})")
+                rounded = min(float(command.roundings[number]), MOST_SHARE * min(far[number], far[number + 1]))
+                v = _tool_speed(step_between(self.pose, pose), float(command.speeds[number]))
+                self.lines.append(f"movel({self._text(pose)}, a={self.acceleration:.3f}, v={v:.5f}, r={rounded:.4f})")
                 self.pose = pose
         elif isinstance(command, Grip):
             self.lines.append(f"set_digital_out({GRIPPER}, {command.closed})")
         elif isinstance(command, Pause):
             self.lines.append(f"sleep({command.seconds:.3f})")
+        elif isinstance(command, Await):
+            self.lines.append(f"# {command.station} done")
+            self._wait(command.machine, "False")
+        elif isinstance(command, Check):
+            self.lines += [f"if (get_digital_in({GRIPPER}) == False):"]
+            self.lines += ['  popup("nothing in the gripper", error=True, blocking=True)', "  halt", "end"]
+        elif isinstance(command, Payload):
+            self.lines.append(f"set_payload({command.mass_kg:.3f})")
         else:
-            self.lines += [f"# {command.station} done", f"while (get_digital_in({command.machine}) == False):"]
-            self.lines += ["  sync()", "end"]
+            starts = isinstance(command, Start)
+            output = start_output(command.machine) if starts else reset_output(command.machine)
+            self.lines.append(f"# {'start' if starts else 'reset'} {command.station}")
+            self.lines += [
+                f"set_digital_out({output}, True)",
+                f"sleep({PULSE_S:.3f})",
+                f"set_digital_out({output}, False)",
+            ]
+            self._wait(command.machine, "True")
+
+    def _wait(self, machine: int, until_not: str) -> None:
+        self.lines += [f"while (get_digital_in({done_input(machine)}) == {until_not}):", "  sync()", "end"]
 
     def _text(self, pose: Array) -> str:
         x, y, z, yaw = pose.tolist()
@@ -106,6 +142,12 @@ def _tool_speed(step: Array, way_m_s: float) -> float:
     """v of one straight piece (4,): of a mere turn, which movel times by its angle [rad/s], else of the tool [m/s]."""
     far, turn = hypot(*step[:3]), abs(step[3])
     return way_m_s / YAW_ARM if far < 1e-6 else way_m_s * far / hypot(far, YAW_ARM * turn)
+
+
+def _nearest_rounding(radius_m: float) -> float:
+    """Of a blend radius, which MOST_SHARE may have cut a little: the one of ROUNDINGS_M that is meant; others as they are."""
+    nearest = min(ROUNDINGS_M, key=lambda cut: abs(cut - radius_m))
+    return nearest if abs(nearest - radius_m) < 0.03 * nearest else radius_m
 
 
 def _way_speed(step: Array, v: float) -> float:
@@ -132,6 +174,7 @@ class _Reader:
     found: list[Command] = field(default_factory=list)
     pose: Array | None = None
     points: list[Array] = field(default_factory=list)  # since the last stop
+    roundings: list[float] = field(default_factory=list)
     speeds: list[float] = field(default_factory=list)
 
     def read(self, text: str) -> list[Command]:
@@ -139,24 +182,24 @@ class _Reader:
         head = re.fullmatch(r"def (\w+)\(\):", lines[0]) if lines else None
         if head is None or lines[-2:] != ["end", f"{head[1]}()"]:
             raise BadInput(f"{self.where}: wanted one program, from 'def NAME():' to 'end' and 'NAME()'")
-        waiting = False
+        block = ""  # what has begun and has no end yet
         for self.number, line in enumerate(lines[1:-2], start=2):
-            if waiting and line in ("sync()", "end"):
-                waiting = line != "end"
-            elif waiting:
-                raise self._fault(f"'{line}' within a wait: wanted sync() and end")
+            if block and (line == "end" or re.fullmatch(_WITHIN[block], line)):
+                block = "" if line == "end" else block
+            elif block:
+                raise self._fault(f"'{line}' within {block}: wanted {_WITHIN[block]} and end".replace("\\", ""))
             elif line and not line.startswith("#"):
-                waiting = self._line(line)
-        if waiting:
-            raise self._fault("a wait has no end")
+                block = self._line(line)
+        if block:
+            raise self._fault(f"'{block}' has no end")
         self._stop()
         return self.found
 
     def _fault(self, what: str) -> BadInput:
         return BadInput(f"{self.where}, line {self.number}: {what}")
 
-    def _line(self, line: str) -> bool:
-        """Read one line; whether a wait begins with it."""
+    def _line(self, line: str) -> str:
+        """Read one line; the word that begins a block, or ""."""
         word = re.split(r"[ (]", line, maxsplit=1)[0]
         if word not in _LINES:
             raise unknown("instruction", word, _LINES, f"{self.where}, line {self.number}")
@@ -165,13 +208,13 @@ class _Reader:
                 if word != "movel":
                     self._stop()
                 act(self, match)
-                return word == "while"
+                return word if word in _WITHIN else ""
         raise self._fault(f"'{line}' is not how {word} is written here")
 
     def _stop(self) -> None:
         if self.points:
-            self.found.append(Path(np.array(self.points), min(self.speeds)))
-            self.points, self.speeds = [], []
+            self.found.append(Path(np.array(self.points), np.array(self.roundings), np.array(self.speeds)))
+            self.points, self.roundings, self.speeds = [], [], []
 
     def joint_pose(self, match: "re.Match[str]") -> None:
         pose = self._read_pose(match[1])
@@ -194,8 +237,15 @@ class _Reader:
         self.speeds.append(_way_speed(way, float(match[3])))
         self.pose = self.pose + way
         self.points.append(self.pose)
-        if float(match[4]) == 0.0:
-            self._stop()
+        self.roundings.append(_nearest_rounding(float(match[4])))
+
+    def output(self, match: "re.Match[str]") -> None:
+        number, on = int(match[1]), match[2] == "True"
+        machine = number // 2
+        if number == GRIPPER:
+            self.found.append(Grip(on))
+        elif on:
+            self.found.append(Start(machine) if number == start_output(machine) else Reset(machine))
 
     def _read_pose(self, text: str) -> Array:
         x, y, z, rx, ry, rz = (float(number) for number in text.split(", "))
@@ -214,17 +264,20 @@ _LINES: dict[str, list[tuple[str, _Act]]] = {  # first word -> the forms of the 
         (rf"movej\({_JOINTS}, a=({_NUMBER}), v=({_NUMBER})\)", _Reader.joint_list),
     ],
     "movel": [(rf"movel\({_POSE}, a=({_NUMBER}), v=({_NUMBER}), r=({_NUMBER})\)", _Reader.straight)],
-    "set_digital_out": [
-        (
-            rf"set_digital_out\({GRIPPER}, (True|False)\)",
-            lambda reader, match: reader.found.append(Grip(match[1] == "True")),
-        )
+    "set_digital_out": [(r"set_digital_out\((\d{1,2}), (True|False)\)", _Reader.output)],
+    "set_payload": [
+        (rf"set_payload\(({_NUMBER})\)", lambda reader, match: reader.found.append(Payload(float(match[1]))))
+    ],
+    "if": [
+        (rf"if \(get_digital_in\({GRIPPER}\) == False\):", lambda reader, match: reader.found.append(Check())),
     ],
     "sleep": [(rf"sleep\(({_NUMBER})\)", lambda reader, match: reader.found.append(Pause(float(match[1]))))],
     "while": [
         (
             r"while \(get_digital_in\((\d{1,2})\) == False\):",
-            lambda reader, match: reader.found.append(Await(int(match[1]))),
-        )
+            lambda reader, match: reader.found.append(Await(int(match[1]) - done_input(0))),
+        ),
+        (r"while \(get_digital_in\((\d{1,2})\) == True\):", lambda reader, match: None),
     ],
 }
+_WITHIN = {"while": r"sync\(\)", "if": r'popup\(".*", error=True, blocking=True\)|halt'}  # the lines of a block

@@ -19,7 +19,17 @@ from lab.tasks.task_file import load
 
 Lab = Callable[..., Any]  # the fixture of tests/conftest.py; it returns a Ran
 FIELDS = {"files", "poses", "max_deviation_m", "max_deviation_rad", "deviation_at_rest_m", "deviation_at_rest_rad"} | {
-    *("task", "arm", "format", "transfers", "motions", "within_1_mm_and_1_degree", "run_off_target_m", "warnings")
+    *(
+        "task",
+        "arm",
+        "format",
+        "transfers",
+        "motions",
+        "within_1_mm_and_1_degree",
+        "run_off_target_m",
+        "warnings",
+        "moves",
+    )
 }
 
 
@@ -52,8 +62,9 @@ def test_job_files_are_written_checked_and_told(lab: Lab, run: Path) -> None:
     assert {Path(path) for path in ran.json["files"]} == {*(run / "jbi").iterdir()}
     assert 0.0 < ran.json["max_deviation_m"] < 1e-3
     assert (ran.json["within_1_mm_and_1_degree"], ran.json["motions"], ran.json["transfers"]) == (True, 1, 1)
-    assert ran.err == f"lab: {ran.json['warnings'][0]}\n"
-    assert (run / "jbi" / "M001.JBI").read_bytes().endswith(b"CALL JOB:CLOSE\r\nEND\r\n")
+    assert ran.json["moves"] == 1
+    assert ran.err == "".join(f"lab: {warning}\n" for warning in ran.json["warnings"])
+    assert (run / "jbi" / "M001.JBI").read_bytes().endswith(b"WAIT IN#(2)=OFF\r\nEND\r\n")
 
 
 def test_people_are_told_in_two_lines(lab: Lab, run: Path) -> None:

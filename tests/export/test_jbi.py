@@ -12,11 +12,25 @@ from hypothesis import strategies as st
 from lab.errors import BadInput
 from lab.export import jbi
 from lab.export.commands import Await, Grip, Job, Joint, Path, Pause, jobs_of
-from lab.export.inform import Call, Comment, Dout, InformJob, MoveJ, MoveL, Position, Timer, Wait, read_job
+from lab.export.inform import (
+    Call,
+    Comment,
+    Dout,
+    InformJob,
+    MoveJ,
+    MoveL,
+    PauseIfOff,
+    Position,
+    Pulse,
+    Timer,
+    Wait,
+    read_job,
+)
 from lab.export.options import Options
 from lab.export.program import Program
 from lab.sim.arms.arm_models import arm_named
 from lab.sim.arms.kinematics import ToolPose
+from tests.export.conftest import carried_out
 
 UP6 = arm_named("up6")
 DATE = "2026/11/22 21:00"
@@ -44,17 +58,20 @@ def test_the_grip_and_the_way_down_by_hand(up6: Program) -> None:
     assert job.positions[0].numbers == pytest.approx((500.0, 100.0, 300.0, 180.0, 0.0, 0.0), abs=0.01)
     assert job.positions[1].numbers == pytest.approx((500.0, 100.0, 150.0, 180.0, 0.0, 0.0), abs=0.01)
     assert job.instructions[:2] == (MoveJ(0, 10.0), MoveL(1, "V", 300.0, 0))
-    assert job.instructions[2] == Call("CLOSE")
-    assert job.instructions[-1] == Call("OPEN")
+    assert job.instructions[2:5] == (Call("CLOSE"), PauseIfOff(1), Comment("TOOL 1: 0.040 KG"))
+    assert {position.tool for position in job.positions[:2]} == {0}
+    assert {position.tool for position in job.positions[2:]} == {1}
+    start = (Comment("start toaster"), Pulse(2, 0.5), Wait(2, on=False))
+    assert job.instructions[-5:] == (Call("OPEN"), Comment("TOOL 0: 0.000 KG"), *start)
 
 
 def test_a_wait_comes_before_what_is_done_at_the_machine_and_a_turn_is_timed_in_degrees(up6: Program) -> None:
     """A quarter turn; the wait; a rest of 1 s that stands for it in the run; another quarter turn; a rest of 0.25 s."""
     job = read_back(jbi.write(up6, Options()))["M002.JBI"]
     moves = [step for step in job.instructions if isinstance(step, MoveL)]
-    at = job.instructions.index(Wait(1))
-    assert job.instructions[at - 1 : at + 2] == (Comment("toaster done"), Wait(1), Timer(1.0))
-    assert job.instructions[-1] == Timer(0.25)
+    at = job.instructions.index(Wait(2))
+    assert job.instructions[at - 1 : at + 2] == (Comment("toaster done"), Wait(2), Timer(1.0))
+    assert job.instructions[-4:] == (Timer(0.25), Comment("start butter_applier"), Pulse(4, 0.5), Wait(3, on=False))
     assert [(move.unit, move.level) for move in moves[-1:]] == [("VR", 0)]
     assert job.positions[moves[-1].c].numbers[5] == pytest.approx(-180.0, abs=0.02)
 
@@ -68,7 +85,13 @@ def test_a_way_comes_back_within_what_is_written(begin: ToolPose, end: ToolPose,
     assert joints is not None
     turn = (end.yaw - begin.yaw + pi / 2) % pi - pi / 2
     points = np.array([[end.x, end.y, end.z, begin.yaw + turn]])
-    commands = (Joint(tuple(joints.tolist())), Path(points, speed), Grip(True), Pause(0.3), Await(2, "mill"))
+    commands = (
+        Joint(tuple(joints.tolist())),
+        Path(points, np.zeros(1), np.full(1, speed)),
+        Grip(True),
+        Pause(0.3),
+        Await(2, "mill"),
+    )
     options = Options("pulse" if positions == "pulse" else "rectan", DATE)
     close = InformJob("CLOSE", "", DATE, (), (Dout(1, True), Timer(0.3)))
     job = jbi._Writer(UP6, options).job("M001", Job("one", commands))
@@ -82,7 +105,7 @@ def test_a_way_comes_back_within_what_is_written(begin: ToolPose, end: ToolPose,
     assert way.points[:, :3] == pytest.approx(points[:, :3], abs=2e-5)
     assert np.cos(way.points[:, 3] - points[:, 3]) == pytest.approx(1.0, abs=1e-6)
     if np.linalg.norm(points[0, :3] - [begin.x, begin.y, begin.z]) > 0.01:
-        assert way.speed_m_s == pytest.approx(speed, rel=0.02)
+        assert way.speeds[0] == pytest.approx(speed, rel=0.02)
 
 
 def test_a_tool_that_is_wound_up_stays_so() -> None:
@@ -103,6 +126,13 @@ def test_what_the_robot_did_after_its_last_transfer_is_a_job_of_its_own(up6: Pro
     begun = replace(up6, carried=up6.carried.model_copy(update={"transfers": up6.carried.transfers[:1]}))
     assert [job.words for job in jobs_of(begun)] == ["slice 1: plate to toaster", "not finished"]
     assert read_back(jbi.write(begun, Options()))["M002.JBI"].comment == "not finished"
+
+
+def test_arms_of_other_makers_are_refused_unless_any_will_do() -> None:
+    panda = carried_out("panda")
+    with pytest.raises(BadInput, match=r"^--format jbi: arm 'panda' is not made by Yaskawa; --any-arm"):
+        jbi.write(panda, Options())
+    assert jbi.write(panda, Options(any_arm=True))
 
 
 def job_of(name: str, *steps: object, positions: tuple[Position, ...] = ()) -> str:

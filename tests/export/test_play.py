@@ -75,7 +75,15 @@ def test_a_turn_that_is_2_degrees_off_is_found_out(up6: Program) -> None:
 
 @pytest.mark.parametrize(
     ("line", "other"),
-    [("CALL JOB:CLOSE\r\n", ""), ("WAIT IN#(1)=ON\r\n", ""), ("CALL JOB:CLOSE", "CALL JOB:OPEN"), ("IN#(1)", "IN#(2)")],
+    [
+        ("CALL JOB:CLOSE\r\n", ""),
+        ("WAIT IN#(2)=ON\r\n", ""),
+        ("PAUSE IF IN#(1)=OFF\r\n", ""),
+        ("PULSE OT#(2)", "PULSE OT#(3)"),
+        ("TOOL 1: 0.040", "TOOL 1: 0.050"),
+        ("CALL JOB:CLOSE", "CALL JOB:OPEN"),
+        ("IN#(2)", "IN#(3)"),
+    ],
 )
 def test_a_gripper_output_or_a_wait_that_is_wrong_is_found_out(up6: Program, line: str, other: str) -> None:
     files = jbi.write(up6, Options())

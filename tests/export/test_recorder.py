@@ -137,8 +137,9 @@ def test_a_run_that_was_stopped_is_exported_with_its_stop(robot: Robot, name: st
         robot.world.step()
     run(robot, robot.follow([HIGH.shifted(dz=-0.1)]))
     program = written(recorder)
-    off = deviation(program, FORMATS[name].read(FORMATS[name].write(program, Options()), UP6))
-    assert (off.motions, off.near_enough) == (2, True), off
+    off = deviation(program, FORMATS[name].read(FORMATS[name].write(program, Options(any_arm=True)), UP6))
+    ways = 1 if name in ("jbi", "urscript") else 2  # a job goes on where it was stopped
+    assert (off.motions, off.near_enough) == (ways, True), off
 
 
 def test_a_motion_that_was_never_driven_is_none(robot: Robot) -> None:

@@ -8,7 +8,7 @@ import pytest
 
 from lab.errors import BadInput
 from lab.export import urscript
-from lab.export.commands import Await, Grip, Joint, Path, Pause
+from lab.export.commands import Await, Grip, Joint, Path, Pause, Payload
 from lab.export.options import Options
 from lab.export.program import Program
 from lab.sim.arms.arm_models import arm_named
@@ -24,7 +24,8 @@ def run_toast():
   movel(p[0.500000, 0.100000, 0.150000, 2.221441, 2.221441, 0.000000], a=2.000, v=2.00000, r=0.0000)
   set_digital_out(1, True)
   sleep(0.300)
-  while (get_digital_in(2) == False):
+  set_payload(0.100)
+  while (get_digital_in(3) == False):
     sync()
   end
 end
@@ -34,12 +35,13 @@ run_toast()
 
 def test_a_program_by_hand_is_understood() -> None:
     start, way, *rest = urscript.read({"a": TEXT}, UP6)
-    assert rest == [Grip(True), Pause(0.3), Await(2)]
+    assert rest == [Grip(True), Pause(0.3), Payload(0.1), Await(2)]
     assert isinstance(start, Joint)
     assert start.joints == pytest.approx(UP6.inverse(ToolPose(0.5, 0.1, 0.3, 0.0)), abs=1e-5)
     assert isinstance(way, Path)
     assert way.points == pytest.approx(np.array([[0.5, 0.1, 0.15, 0.0], [0.5, 0.1, 0.15, pi / 2]]), abs=1e-5)
-    assert way.speed_m_s == pytest.approx(0.3)
+    assert way.speeds == pytest.approx([0.3, 0.3])
+    assert way.roundings == pytest.approx([0.0005, 0.0])
 
 
 def test_joints_may_stand_for_the_pose_where_a_way_begins() -> None:
@@ -54,25 +56,31 @@ def test_joints_may_stand_for_the_pose_where_a_way_begins() -> None:
 
 
 def test_the_run_as_a_program(up6: Program) -> None:
-    ((name, text),) = urscript.write(up6, Options()).items()
+    ((name, text),) = urscript.write(up6, Options(any_arm=True)).items()
     assert name == "toast.script"
     lines = [line.strip() for line in text.splitlines()]
     assert lines[:3] == ["def run_toast():", TEXT.splitlines()[1].strip(), "set_digital_out(1, False)"]
     assert [line for line in lines if line.startswith("# ")] == [
         "# 1: slice 1: plate to toaster",
+        "# start toaster",
         "# 2: slice 1: toaster to butter_applier",
         "# toaster done",
+        "# start butter_applier",
     ]
-    assert lines.index("while (get_digital_in(1) == False):") > lines.index("# 2: slice 1: toaster to butter_applier")
+    assert lines.index("while (get_digital_in(2) == False):") > lines.index("# 2: slice 1: toaster to butter_applier")
     assert [line for line in lines if line.startswith(("set_d", "sleep"))] == [
         "set_digital_out(1, False)",
         "set_digital_out(1, True)",
         "sleep(0.300)",
         "set_digital_out(1, False)",
         "sleep(0.300)",
+        *("set_digital_out(2, True)", "sleep(0.500)", "set_digital_out(2, False)"),
         "sleep(1.000)",
         "sleep(0.250)",
+        *("set_digital_out(4, True)", "sleep(0.500)", "set_digital_out(4, False)"),
     ]
+    check = lines.index("if (get_digital_in(1) == False):")
+    assert lines[check + 2 : check + 5] == ["halt", "end", "set_payload(0.040)"]
     assert urscript.warnings(up6)[0].startswith("urscript: 'up6' is no arm of Universal Robots")
 
 
@@ -84,9 +92,9 @@ WRONG = [
     ("movej(p[0.5", "movej(p[5.5", "line 4: out of reach of arm 'up6'"),
     ("  movej(p[", "  # (p[", "line 5: a straight line before any movej"),
     ("2.221441, 0.000000]", "2.221441, 0.500000]", "line 6: the lab's tool points straight down"),
-    ("    sync()\n", "    sleep(0.100)\n", "line 10: 'sleep(0.100)' within a wait: wanted sync() and end"),
-    ("  end\nend", "end", "a wait has no end"),
-    ("set_digital_out(1,", "set_digital_out(3,", "line 7: 'set_digital_out(3, True)' is not how set_digital_out"),
+    ("    sync()\n", "    sleep(0.100)\n", "line 11: 'sleep(0.100)' within while: wanted sync() and end"),
+    ("  end\nend", "end", "'while' has no end"),
+    ("set_digital_out(1,", "set_digital_out(one,", "line 7: 'set_digital_out(one, True)' is not how set_digital_out"),
 ]
 
 

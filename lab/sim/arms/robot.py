@@ -12,13 +12,14 @@ from lab.errors import WorkFailed
 from lab.sim.arms.arm import Arm
 from lab.sim.arms.gripper import PAD_M
 from lab.sim.arms.kinematics import ToolPose
-from lab.sim.arms.tool_path import YAW_ARM, evenly, rounded, sampled, slowed, way_of
+from lab.sim.arms.tool_path import timed
 from lab.sim.urdf_reader import rotation
 from lab.sim.world import TIME_STEP, World
 
 NAME = "robot"
 _TURNED_RAD = pi / 2  # [rad] from here on the tool begins a path by turning on the spot
 _SETTLE_STEPS = 12  # after a path ends
+_HELD_RAD = 0.005  # farther off its targets than this something has moved the arm
 GRIP_STEPS = 72  # 0.3 s to close or open
 _PEDESTAL_M, _PEDESTAL_RGBA = 0.09, (0.22, 0.23, 0.26, 1.0)  # radius
 _POINT_M = 0.002  # the same as PAD_M where a finger touches in a point
@@ -40,27 +41,22 @@ def plan(
     poses: Sequence[ToolPose],
     speed: float,
     acceleration: float,
-    blend: float = 0.0,
+    blend: float | Sequence[float] = 0.0,
     before: Array | None = None,
-    gently: bool = False,
 ) -> Trajectory:
-    """Time a path of tool poses, rounded by `blend` [m]: at most `speed` [m/s], and `acceleration` [m/s2] along it.
+    """Time a path of tool poses, corners rounded by `blend` [m]: at most `speed` [m/s] and `acceleration` [m/s2], see `timed`.
 
-    gently: across it, too, so that it slows down for its corners; otherwise it goes round them as fast as straight on.
     Joint speeds stay within the arm's; `before` (k,) [rad] are the joints it starts from. WorkFailed names a pose out of reach.
     """
-    points = rounded(sampled(poses), blend)
-    way = way_of(points)
-    ticks = slowed(points, speed, acceleration) if gently else evenly(float(way[-1]), speed, acceleration)
-    timed = np.stack([np.interp(ticks, way, points[:, k]) for k in range(4)], axis=1)
-    joints = arm.inverse_path(timed, before)
-    _check_reached(joints, timed)
+    tools = timed(poses, speed, acceleration, blend)
+    joints = arm.inverse_path(tools, before)
+    _check_reached(joints, tools)
     if before is not None and abs(joints[0, -1] - before[-1]) > _TURNED_RAD:
         joints = np.concatenate([_turned_back(before[-1], joints[0], speed, acceleration), joints])
     velocities = np.gradient(joints, TIME_STEP, axis=0) if len(joints) > 1 else np.zeros_like(joints)
     hurry = float(np.max(np.abs(velocities) / arm.speed)) if len(joints) > 1 else 0.0
     if hurry > 1.0:
-        return plan(arm, poses, speed / (hurry * 1.02), acceleration / (hurry * 1.02) ** 2, blend, before, gently)
+        return plan(arm, poses, speed / (hurry * 1.02), acceleration / (hurry * 1.02) ** 2, blend, before)
     return Trajectory(joints, velocities)
 
 
@@ -75,10 +71,9 @@ def _check_reached(joints: Array, poses: Array) -> None:
 
 def _turned_back(turn: float, first: Array, speed: float, acceleration: float) -> Array:
     """Rows (n, k) that take the tool on the spot from `turn` [rad] by half turns to `first` (k,): its range ends there."""
-    back = first[-1] - turn
-    ticks = evenly(abs(float(back)), speed / YAW_ARM, acceleration / YAW_ARM)
-    rows = np.repeat(first[None], len(ticks), axis=0)
-    rows[:, -1] = turn + np.sign(back) * ticks
+    turns = timed([ToolPose(0.0, 0.0, 0.0, turn), ToolPose(0.0, 0.0, 0.0, first[-1])], speed, acceleration)[:, 3]
+    rows = np.repeat(first[None], len(turns), axis=0)
+    rows[:, -1] = turns
     return rows
 
 
@@ -109,11 +104,10 @@ class Robot:
     ) -> None:
         """Load the arm at the world's origin; `speed` [m/s], `acceleration` [m/s2], `grip_force` [N] unless `grip` is told.
 
-        fine: it slows down for corners, its pads hold as areas do, not as points, and without creep; physics is solved in
-        many iterations.
+        fine: its pads hold as areas do, not as points, and without creep; physics is solved in many iterations.
         """
         self.world, self.arm, self.grip_force = world, arm, grip_force
-        self.speed, self.acceleration, self.fine = speed, acceleration, fine
+        self.speed, self.acceleration = speed, acceleration
         fingers = arm.fingers
         holding = [link for side in fingers.links for link in side]
         world.load(NAME, arm.urdf, (0.0, 0.0, arm.base_up_m), checked=True)
@@ -134,7 +128,12 @@ class Robot:
     def hold(self, joints: Array) -> None:
         """Put the arm at `joints` (k,) [rad] at once and hold it there: for building and surveying a scene."""
         self.world.set_joints(NAME, self.arm.joints, joints)
-        self.world.drive(NAME, self.arm.joints, joints)
+        self._lead(joints)
+
+    def _lead(self, joints: Array, velocities: Array | None = None) -> None:
+        """Set the joints' targets (k,) [rad], and how fast they move there [rad/s]."""
+        self.world.drive(NAME, self.arm.joints, joints, velocities)
+        self._led = np.array(joints, float)
 
     def stand(self, pose: ToolPose) -> bool:
         """Put the arm at a tool pose at once; False when that is out of reach."""
@@ -176,30 +175,38 @@ class Robot:
 
     def brake(self) -> None:
         """Hold all joints where they are, from the next physics step on: what a protective or emergency stop does."""
-        self.world.drive(NAME, self.arm.joints, self.world.joints(NAME, self.arm.joints))
+        self._lead(self.world.joints(NAME, self.arm.joints))
 
     def override(self, share: float) -> None:
         """Move from now on with a share of speed and acceleration, as an operator's speed override."""
         self.speed, self.acceleration = share * self.speed, share * self.acceleration
 
-    def follow(self, poses: Sequence[ToolPose], *, blend: float = 0.0, slow: float = 1.0) -> Iterator[None]:
-        """Move the tool from where it is along `poses`; `slow` < 1 lowers speed and acceleration."""
+    def follow(
+        self, poses: Sequence[ToolPose], *, blend: float | Sequence[float] = 0.0, slow: float = 1.0
+    ) -> Iterator[None]:
+        """Move the tool from where it is held along `poses`, with a `blend` [m] for all or one each.
+
+        slow: below 1 it lowers speed and acceleration.
+        """
+        blends = [0.0, *np.broadcast_to(blend, len(poses)).tolist()]
         before = self.world.joints(NAME, self.arm.joints)
+        if np.abs(before - self._led).max() < _HELD_RAD:
+            before = self._led  # what it was told last: from elsewhere the targets would jump
         here = self.arm.forward(before)
         first = poses[0]
         turn = (self._counted(here.yaw) - first.yaw + pi) % (2 * pi) - pi
         start = ToolPose(here.x, here.y, here.z, first.yaw + turn)
-        way = plan(self.arm, [start, *poses], self.speed * slow, self.acceleration * slow, blend, before, self.fine)
+        way = plan(self.arm, [start, *poses], self.speed * slow, self.acceleration * slow, blends, before)
         self._half_on = self.arm.is_half_on(way.positions[-1], poses[-1])
         heard = self.listener
         if heard is not None:
-            heard.began(poses, blend, way, before)
-        for row, (position, velocity) in enumerate(zip(way.positions.tolist(), way.velocities.tolist(), strict=True)):
-            self.world.drive(NAME, self.arm.joints, position, velocity)
+            heard.began(poses, max(blends), way, before)
+        for row, (position, velocity) in enumerate(zip(way.positions, way.velocities, strict=True)):
+            self._lead(position, velocity)
             if heard is not None:
                 heard.drives(row)
             yield
-        self.world.drive(NAME, self.arm.joints, way.positions[-1])
+        self._lead(way.positions[-1])
         if heard is not None:
             heard.drives(len(way.positions))
         yield from _stay(_SETTLE_STEPS)

@@ -1,7 +1,13 @@
-"""A path of tool poses: sampled, rounded at its corners, and timed."""
+"""A path of the tool: straight lines between poses, arcs at corners, timed so that the tool's acceleration keeps to a limit.
+
+The time law is that of a path with a bounded acceleration: at each place the speed is at most what the bend there allows, and
+what can be reached from the place before and braked to the next. Source: T. Kunz and M. Stilman, 2012 (arcs at corners);
+J. Bobrow, S. Dubowsky and J. Gibson, 1985 (passes forward and backward).
+"""
 
 from collections.abc import Sequence
-from itertools import pairwise
+from dataclasses import dataclass
+from math import atan2, ceil, inf, sqrt, tan
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,80 +17,190 @@ from lab.sim.world import TIME_STEP
 
 YAW_ARM = 0.15  # [m/rad] a turn of the tool counts as this much way
 COUNTED = np.array([1.0, 1.0, 1.0, YAW_ARM])  # of a tool pose
-_SAMPLE_M = 0.004  # between points of a path before it is timed
+ROUNDINGS_M = (0.002, 0.004, 0.008, 0.015, 0.02, 0.03, 0.04, 0.05)  # as few as a controller's position levels
 _NEAR_M = 1e-9
+_STRAIGHT_RAD = 1e-4  # a corner that bends less is none
+_TURNED_RAD = 0.01  # a line that turns the tool by more is no part of a corner that is rounded
+_PARTS = 8  # of an arc, each with one acceleration along it
 
 Array = NDArray[np.float64]
 
 
-def sampled(poses: Sequence[ToolPose]) -> Array:
-    """Points (n, 4) along the straight ways between poses: x, y, z [m], yaw [rad]."""
-    corners = np.array([[p.x, p.y, p.z, p.yaw] for p in poses])
-    rows = [corners[:1]]
-    for start, end in pairwise(corners):
-        count = max(1, int(np.ceil(lengths(np.array([start, end]))[0] / _SAMPLE_M)))
-        rows.append(start + (end - start) * (np.arange(1, count + 1) / count)[:, None])
-    return np.concatenate(rows)
+@dataclass(frozen=True, eq=False)
+class _Piece:
+    """A straight line or a part of an arc, `length` [m] of a path; poses are counted (4,) [m], see COUNTED.
 
+    first: where it begins; ahead: the unit vector along it there; across: the unit vector to the arc's middle; radius [m]: inf
+    of a line. stops: the tool comes to rest where it begins.
+    """
 
-def rounded(points: Array, blend: float) -> Array:
-    """A moving average along the path cuts its corners by about blend / 2; the ends stay."""
-    half = int(blend / _SAMPLE_M / 2)
-    if half < 1 or len(points) < 3:
-        return points
-    padded = np.concatenate([np.repeat(points[:1], half, 0), points, np.repeat(points[-1:], half, 0)])
-    kernel = np.full(2 * half + 1, 1.0 / (2 * half + 1))
-    smooth = np.stack([np.convolve(padded[:, k], kernel, mode="valid") for k in range(4)], axis=1)
-    smooth[0], smooth[-1] = points[0], points[-1]
-    return smooth
-
-
-def lengths(points: Array) -> Array:
-    """How far it is from each of points (n, 4) to the next [m], a turn counted as way."""
-    return np.asarray(np.linalg.norm(np.diff(points, axis=0) * COUNTED, axis=1))
+    length: float
+    first: Array
+    ahead: Array
+    across: Array
+    radius: float = inf
+    stops: bool = False
 
 
 def way_of(points: Array) -> Array:
-    """How far along they are (n,) [m], for points (n, 4)."""
-    return np.concatenate([[0.0], np.cumsum(lengths(points))])
+    """How far along they are (n,) [m], for points (n, 4), a turn counted as way."""
+    steps = np.linalg.norm(np.diff(points, axis=0) * COUNTED, axis=1)
+    return np.concatenate([[0.0], np.cumsum(steps)])
 
 
-def evenly(length: float, speed: float, acceleration: float) -> Array:
-    """Way [m] after each physics step when speeding up, cruising and slowing down over `length` [m]."""
-    if length < 1e-9:
-        return np.array([0.0])
-    ramp = min(speed**2 / acceleration, length) / 2.0
-    top = np.sqrt(2.0 * acceleration * ramp)
-    speeding, cruising = top / acceleration, (length - 2.0 * ramp) / top
-    total = 2.0 * speeding + cruising
-    t = np.minimum(np.arange(1, int(np.ceil(total / TIME_STEP)) + 1) * TIME_STEP, total)
-    left = np.maximum(total - t, 0.0)
-    slowing = np.where(left < speeding, length - acceleration * left**2 / 2.0, ramp + top * (t - speeding))
-    return np.asarray(np.where(t < speeding, acceleration * t**2 / 2.0, slowing))
+def timed(poses: Sequence[ToolPose], speed: float, acceleration: float, blend: float | Sequence[float] = 0.0) -> Array:
+    """Where the tool is after each physics step (n, 4), x, y, z [m], yaw [rad], from rest at the first pose to rest at the last.
+
+    It goes at most at `speed` [m/s] and with `acceleration` [m/s2], along and across the path together, a turn counted as way.
+    Each corner is an arc, see `roundings`, with a `blend` [m] for all poses or one each; without, and where the path turns
+    back, the tool stops at corners.
+    """
+    corners = np.array([[p.x, p.y, p.z, p.yaw] for p in poses])
+    pieces = _pieces(corners * COUNTED, np.broadcast_to(np.asarray(blend, float), len(corners)))
+    if not pieces:
+        return corners[-1:]
+    lengths = np.array([piece.length for piece in pieces])
+    starts = np.concatenate([[0.0], np.cumsum(lengths)])
+    way = _ticks(pieces, _squares(pieces, speed, acceleration), speed, acceleration)
+    at = np.clip(np.searchsorted(starts, way, side="right") - 1, 0, len(pieces) - 1)
+    since = np.minimum(way - starts[at], lengths[at])[:, None]
+    first, ahead, across = (np.array([getattr(p, name) for p in pieces])[at] for name in ("first", "ahead", "across"))
+    radius = np.array([piece.radius if piece.radius < inf else 1.0 for piece in pieces])[at][:, None]
+    turned = since / radius
+    arcs = radius * (np.sin(turned) * ahead + (1.0 - np.cos(turned)) * across)
+    bent = np.array([piece.radius < inf for piece in pieces])[at][:, None]
+    points = (first + np.where(bent, arcs, since * ahead)) / COUNTED
+    points[-1] = corners[-1]
+    return np.asarray(points)
 
 
-def slowed(points: Array, speed: float, acceleration: float) -> Array:
-    """Way [m] after each physics step along points (n, 4), as fast as `acceleration` along and across the way allows."""
-    points = points[np.concatenate([[True], lengths(points) > _NEAR_M])]
-    steps, way = lengths(points), way_of(points)
-    if len(points) < 3:
-        return evenly(float(way[-1]), speed, acceleration)
-    speeds = np.sqrt(_squares(points, steps, speed, acceleration))
-    seconds = 2.0 * steps / np.maximum(speeds[:-1] + speeds[1:], _NEAR_M)
-    times = np.concatenate([[0.0], np.cumsum(seconds)])
-    t = np.minimum(np.arange(1, int(np.ceil(times[-1] / TIME_STEP - _NEAR_M)) + 1) * TIME_STEP, times[-1])
-    at = np.clip(np.searchsorted(times, t, side="right") - 1, 0, len(steps) - 1)
-    since, gained = t - times[at], np.diff(speeds) / np.maximum(seconds, _NEAR_M)
-    return np.asarray(np.minimum(way[at] + speeds[at] * since + gained[at] * since**2 / 2.0, way[at + 1]))
+def bending(corners: Array) -> list[int]:
+    """Which of counted poses (n, 4) a path bends at, its ends included: the others lie on straight lines between them."""
+    far = np.concatenate([[True], np.linalg.norm(np.diff(corners, axis=0), axis=1) > _NEAR_M])
+    kept: list[int] = []
+    for row in np.flatnonzero(far).tolist():
+        if len(kept) > 1 and _turn(corners[[kept[-2], kept[-1], row]]) <= _STRAIGHT_RAD:
+            kept.pop()
+        kept.append(row)
+    return kept
 
 
-def _squares(points: Array, steps: Array, speed: float, acceleration: float) -> Array:
-    """The squares (n,) of the speeds at points (n, 4) that are `steps` (n - 1,) [m] apart; at rest at both ends."""
-    ahead = np.diff(points, axis=0) * COUNTED / np.maximum(steps, _NEAR_M)[:, None]
-    between = np.maximum((steps[:-1] + steps[1:]) / 2.0, _NEAR_M)
-    bends = np.linalg.norm(np.diff(ahead, axis=0), axis=1) / between  # [1/m]
-    squares = np.concatenate([[0.0], np.minimum(speed**2, acceleration / np.maximum(bends, _NEAR_M)), [0.0]])
-    gained = 2.0 * acceleration * np.concatenate([[0.0], np.cumsum(steps)])  # by speeding up all the way
-    squares = np.minimum.accumulate(squares - gained) + gained
-    squares = np.minimum.accumulate((squares + gained)[::-1])[::-1] - gained
-    return np.asarray(np.maximum(squares, 0.0))
+def _turn(corners: Array) -> float:
+    """By what angle [rad] a path through three places (3, n) turns at the second."""
+    ahead = np.diff(corners, axis=0)
+    ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
+    return 2.0 * atan2(float(np.linalg.norm(ahead[1] - ahead[0])), float(np.linalg.norm(ahead[1] + ahead[0])))
+
+
+def roundings(corners: Array, blends: Array) -> Array:
+    """How far before and behind each of counted poses (n, 4), all `bending`, the arc begins and ends (n,) [m]; 0 at both ends.
+
+    It is the largest of ROUNDINGS_M that is no more than half a blend (n,) [m] and half of the shorter line beside it, or 0,
+    as where a line beside it turns the tool.
+    """
+    halves = np.linalg.norm(np.diff(corners, axis=0), axis=1) / 2.0
+    room = np.zeros(len(corners))
+    room[1:-1] = np.minimum(blends[1:-1] / 2.0, np.minimum(halves[:-1], halves[1:])) + _NEAR_M
+    turns = np.abs(np.diff(corners[:, 3])) > YAW_ARM * _TURNED_RAD
+    room[1:-1][turns[:-1] | turns[1:]] = 0.0
+    return np.array([0.0, *ROUNDINGS_M])[np.searchsorted(ROUNDINGS_M, room, side="right")]
+
+
+def _pieces(corners: Array, blends: Array) -> list[_Piece]:
+    """The path along counted poses (n, 4), with a blend each; none where they are all one place."""
+    kept = bending(corners)
+    corners = corners[kept]
+    rooms = roundings(corners, blends[kept]).tolist()
+    legs = np.diff(corners, axis=0)
+    lengths = np.linalg.norm(legs, axis=1)
+    ahead = legs / lengths[:, None]
+    pieces: list[_Piece] = []
+    begun, stops = 0.0, False  # how far into the leg its line begins, and whether from rest
+    none = np.zeros(4)
+    for number, (corner, along, length) in enumerate(zip(corners[:-1], ahead, lengths.tolist(), strict=True)):
+        if number == len(legs) - 1:
+            pieces.append(_Piece(length - begun, corner + begun * along, along, none, stops=stops))
+            break
+        then, turn = ahead[number + 1], _turn(corners[number : number + 3])
+        room = rooms[number + 1]
+        radius = room / tan(turn / 2.0)
+        cut = room if radius > _NEAR_M else 0.0
+        if length - begun - cut > 0.0:
+            pieces.append(_Piece(length - begun - cut, corner + begun * along, along, none, stops=stops))
+        stops, begun = cut == 0.0, cut
+        if cut:
+            pieces += _arc(corner + (length - cut) * along, along, then, turn, radius)
+    return pieces
+
+
+def _arc(first: Array, along: Array, then: Array, turn: float, radius: float) -> list[_Piece]:
+    """An arc from `first` by `turn` [rad], from the direction `along` to the direction `then`, in parts."""
+    across = then - (along @ then) * along
+    across = across / np.linalg.norm(across)
+    parts = []
+    for part in range(_PARTS):
+        c, s = np.cos(turn * part / _PARTS), np.sin(turn * part / _PARTS)
+        at = first + radius * (s * along + (1.0 - c) * across)
+        parts.append(_Piece(radius * turn / _PARTS, at, c * along + s * across, c * across - s * along, radius))
+    return parts
+
+
+def _squares(pieces: Sequence[_Piece], speed: float, acceleration: float) -> list[float]:
+    """The squares of the speeds where pieces begin, and where the last one ends: there and where it begins 0."""
+    most = [min(speed**2, acceleration * piece.radius) for piece in pieces]
+    caps = [
+        0.0,
+        *(0.0 if b.stops else min(one, other) for one, other, b in zip(most, most[1:], pieces[1:], strict=False)),
+        0.0,
+    ]
+    forward = _pass(pieces, caps, acceleration)
+    return _pass(pieces[::-1], forward[::-1], acceleration)[::-1]
+
+
+def _pass(pieces: Sequence[_Piece], caps: Sequence[float], acceleration: float) -> list[float]:
+    """The squares of the speeds, at most `caps`, that can be reached from the one before, faster and faster."""
+    found = [caps[0]]
+    for piece, cap in zip(pieces, caps[1:], strict=True):
+        found.append(min(cap, found[-1] + 2.0 * piece.length * _gain(found[-1], piece, acceleration)))
+    return found
+
+
+def _gain(square: float, piece: _Piece, acceleration: float) -> float:
+    """The acceleration [m/s2] along a piece with which the whole one, across it too, is within its limit up to its end."""
+    if piece.radius == inf:
+        return acceleration
+    across, grows = square / piece.radius, 2.0 * piece.length / piece.radius
+    left = acceleration**2 - across**2  # g^2 + (across + grows g)^2 = acceleration^2 where it ends
+    if left <= 0.0:
+        return 0.0
+    a, b = 1.0 + grows**2, across * grows
+    return (sqrt(b**2 + a * left) - b) / a
+
+
+def _ticks(pieces: Sequence[_Piece], squares: Sequence[float], speed: float, acceleration: float) -> Array:
+    """The way [m] after each physics step."""
+    begun, way = [0.0], [0.0]
+    speeds, gains = list[float](), list[float]()
+
+    def goes(length: float, before: float, after: float) -> None:
+        if length > 0.0:
+            speeds.append(sqrt(before))
+            gains.append((after - before) / (2.0 * length))
+            begun.append(begun[-1] + 2.0 * length / (sqrt(before) + sqrt(after)))
+            way.append(way[-1] + length)
+
+    for piece, before, after in zip(pieces, squares, squares[1:], strict=False):
+        if piece.radius < inf:
+            goes(piece.length, before, after)
+            continue
+        top = min(max(speed**2, before, after), (before + after) / 2.0 + acceleration * piece.length)
+        up, down = (max(0.0, top - square) / (2.0 * acceleration) for square in (before, after))
+        goes(up, before, top)
+        goes(piece.length - up - down, top, top)
+        goes(down, top, after)
+    end = begun[-1]
+    t = np.minimum(np.arange(1, ceil(end / TIME_STEP - 1e-9) + 1) * TIME_STEP, end)
+    at = np.clip(np.searchsorted(begun, t, side="right") - 1, 0, len(speeds) - 1)
+    since = t - np.array(begun)[at]
+    went = np.array(way)[at] + np.array(speeds)[at] * since + np.array(gains)[at] * since**2 / 2.0
+    return np.asarray(np.minimum(went, np.array(way)[at + 1]))

@@ -1,7 +1,8 @@
 """Paths of the tool as joint targets, and the arm that follows them."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from math import cos, pi, sin
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from hypothesis import strategies as st
 from lab.errors import WorkFailed
 from lab.files import assets_folder
 from lab.sim.arms import kinematics
+from lab.sim.arms.arm import Arm
 from lab.sim.arms.arm_models import arm_named
 from lab.sim.arms.kinematics import ToolPose
 from lab.sim.arms.robot import NAME, Robot, Trajectory, plan
@@ -54,26 +56,31 @@ def check_sound(way: Trajectory, poses: list[ToolPose], speed: float, start: np.
     assert np.all(np.linalg.norm(went, axis=1) <= speed * TIME_STEP * 1.001)
 
 
-@given(st.lists(poses, min_size=2, max_size=4), speeds, accelerations, blends, st.booleans())
+def hardest(arm: Arm, joints: np.ndarray) -> float:
+    """The largest acceleration [m/s2] of the tool that joints (n, k), one a physics step, hold, from rest to rest."""
+    tools = arm.kinematics.tools(np.vstack([joints[:1], joints, joints[-1:], joints[-1:]]))[:, :3]
+    return float(np.linalg.norm(np.diff(tools, 2, axis=0), axis=1).max()) / TIME_STEP**2
+
+
+@given(st.lists(poses, min_size=2, max_size=4), speeds, accelerations, blends)
 def test_a_plan_keeps_to_every_limit_and_ends_at_its_target(
-    path: list[ToolPose], speed: float, acceleration: float, blend: float, gently: bool
+    path: list[ToolPose], speed: float, acceleration: float, blend: float
 ) -> None:
     start = inverse(path[0])
     assert start is not None
-    way = plan(UP6, path, speed, acceleration, blend, start, gently)
+    way = plan(UP6, path, speed, acceleration, blend, start)
     check_sound(way, path, speed, start)
+    assert hardest(UP6, np.vstack([start, way.positions])) <= acceleration * (1 + 1e-6)
 
 
-@pytest.mark.parametrize("gently", [False, True])
-def test_a_straight_way_takes_as_long_as_by_hand(gently: bool) -> None:
+def test_a_straight_way_takes_as_long_as_by_hand() -> None:
     """0.5 m at 0.5 m/s and 2 m/s2: 0.25 s to speed up, 0.25 s to slow down, 0.75 s in between."""
-    way = plan(UP6, [ToolPose(0.6, -0.25, 0.3), ToolPose(0.6, 0.25, 0.3)], 0.5, 2.0, gently=gently)
-    off = 1e-4 if gently else 1e-9  # which speeds up between two points less than it may
-    assert len(way.positions) * TIME_STEP == pytest.approx(1.25, abs=gently * TIME_STEP)
+    way = plan(UP6, [ToolPose(0.6, -0.25, 0.3), ToolPose(0.6, 0.25, 0.3)], 0.5, 2.0)
+    assert len(way.positions) * TIME_STEP == pytest.approx(1.25)
     halfway = forward(way.positions[149])
-    assert halfway.y == pytest.approx(0.0, abs=10 * off)
+    assert halfway.y == pytest.approx(0.0, abs=1e-8)
     quarter = forward(way.positions[59])  # after 0.25 s: 1/2 * 2 * 0.25^2 m
-    assert quarter.y == pytest.approx(-0.25 + 0.0625, abs=off)
+    assert quarter.y == pytest.approx(-0.25 + 0.0625, abs=1e-9)
     assert quarter.x == pytest.approx(0.6)
 
 
@@ -82,36 +89,19 @@ def test_a_short_way_never_reaches_full_speed() -> None:
     assert len(way.positions) == np.ceil(2 * np.sqrt(0.02 / 2.0) / TIME_STEP)
 
 
-@pytest.mark.parametrize("gently", [False, True])
-def test_no_way_is_one_target(gently: bool) -> None:
+def test_no_way_is_one_target() -> None:
     here = ToolPose(0.6, 0.1, 0.3, 0.2)
     for path in ([here], [here, here], [here, here, here]):
-        way = plan(UP6, path, 0.5, 2.0, gently=gently)
+        way = plan(UP6, path, 0.5, 2.0)
         assert way.positions == pytest.approx(np.array([inverse(here)]))
         assert not way.velocities.any()
 
 
-@pytest.mark.parametrize("gently", [False, True])
-def test_almost_no_way_takes_almost_no_time(gently: bool) -> None:
+def test_almost_no_way_takes_almost_no_time() -> None:
+    """A micrometre at 2 m/s2 takes 1.4 ms, to and fro and to three times as long."""
     here, there = ToolPose(0.6, 0.1, 0.3), ToolPose(0.6, 0.100001, 0.3)
     for path in ([here, there, there], [here, here, there], [here, there, here, there]):
-        assert len(plan(UP6, path, 0.5, 2.0, gently=gently).positions) <= 2
-
-
-@pytest.mark.parametrize(
-    ("gently", "corner", "back"), [(False, (5.0, 20.0), (25.0, 200.0)), (True, (2.0, 3.2), (2.0, 3.2))]
-)
-def test_a_gentle_way_slows_down_for_its_corners(
-    gently: bool, corner: tuple[float, float], back: tuple[float, float]
-) -> None:
-    """2 m/s2 along and 2 across are up to 2.8 together, over 8 steps; a way back is a stop."""
-    for end, (least, most) in ((ToolPose(0.9, 0.2, 0.3), corner), (ToolPose(0.6, -0.19, 0.3), back)):
-        path = [ToolPose(0.6, -0.2, 0.3), ToolPose(0.9, -0.2, 0.3), end]
-        way = plan(UP6, path, 0.5, 2.0, blend=0.1, gently=gently)
-        tools = np.array([(tool.x, tool.y) for tool in map(forward, way.positions)])
-        speeds = np.diff(tools, axis=0) / TIME_STEP
-        felt = np.linalg.norm(speeds[8:] - speeds[:-8], axis=1) / (8 * TIME_STEP)
-        assert least <= felt.max() <= most
+        assert len(plan(UP6, path, 0.5, 2.0).positions) <= 2
 
 
 def test_blending_cuts_the_corner_but_not_the_ends() -> None:
@@ -156,6 +146,38 @@ def test_the_arm_comes_to_rest_where_it_was_sent(robot: Robot, world: World) -> 
     assert 0 < count * TIME_STEP < 5
 
 
+def test_targets_never_jump_from_one_motion_to_the_next(robot: Robot, world: World) -> None:
+    """Also where something keeps the arm a little off them: the tool is told to go from where it is held."""
+    told: list[np.ndarray] = [UP6.home, UP6.home]  # in each physics step
+    drive, step = world.drive, world.step
+
+    def drives(name: str, names: Sequence[str], positions: Sequence[float], *rest: Any, **more: Any) -> None:
+        drive(name, names, positions, *rest, **more)
+        if tuple(names) == UP6.joints:
+            told[-1] = np.array(positions)
+
+    def steps_on() -> None:
+        step()
+        told.append(told[-1])
+
+    world.drive, world.step = drives, steps_on  # type: ignore[method-assign,assignment]
+    for way in ([ToolPose(0.6, -0.2, 0.3)], [ToolPose(0.6, -0.2, 0.1), ToolPose(0.7, 0.1, 0.2, 0.4)]):
+        steps(world, robot.follow(way, blend=0.05))
+        world.set_joints(NAME, UP6.joints, np.array(world.joints(NAME, UP6.joints)) + 0.001)
+    steps(world, robot.follow([ToolPose(0.7, 0.1, 0.3)]))
+    assert hardest(UP6, np.array(told)) <= robot.acceleration * (1 + 1e-6)
+
+
+def test_an_arm_that_was_moved_goes_on_from_where_it_is(robot: Robot, world: World) -> None:
+    steps(world, robot.follow([ToolPose(0.6, -0.2, 0.3)]))
+    moved = inverse(ToolPose(0.6, 0.2, 0.3))
+    assert moved is not None
+    world.set_joints(NAME, UP6.joints, moved)
+    next(iter(robot.follow([ToolPose(0.6, 0.25, 0.3)])))
+    world.step()
+    assert robot.tool().y == pytest.approx(0.2, abs=1e-3)
+
+
 def test_a_slower_path_takes_longer(robot: Robot, world: World) -> None:
     goals = [ToolPose(0.6, -0.4, 0.3), ToolPose(0.6, 0.4, 0.3)]
     steps(world, robot.follow(goals[:1]))
@@ -184,7 +206,7 @@ def test_the_fingers_close_together_and_open_again(robot: Robot, world: World) -
 
 
 def test_friction_alone_holds_a_slice_that_is_swung_about(robot: Robot, world: World) -> None:
-    """Held still it does not creep; swung through 1 m and turned it slides by millimetres at most."""
+    """Lifted and held still it does not creep; swung through 1 m, turned, and held it slides by millimetres at most."""
     angle = 0.4
     pose = ToolPose(0.7 * cos(angle), 0.7 * sin(angle), 0.3, 0.1)
     robot.stand(pose)
@@ -193,13 +215,15 @@ def test_friction_alone_holds_a_slice_that_is_swung_about(robot: Robot, world: W
     world.load("slice", assets_folder() / "slice.urdf", (pose.x, pose.y, pose.z + 0.03 - 0.06), 0.1, fixed=False)
     world.friction("slice", 0.8, spinning=0.001)
     steps(world, robot.grip())
+    steps(world, robot.follow([pose.shifted(dz=0.1)]))
     before = _hangs(robot, world)
+    steps(world, robot.rest(240))
+    assert np.linalg.norm(_hangs(robot, world) - before) < 1e-4
     way = [pose.shifted(dz=0.2), ToolPose(0.6, -0.5, 0.4, -0.8), ToolPose(0.8, 0.3, 0.3, 0.6)]
     steps(world, robot.follow(way, blend=0.1))
-    swung = _hangs(robot, world)
-    assert np.linalg.norm(swung - before) < 4e-3
+    assert np.linalg.norm(_hangs(robot, world) - before) < 4e-3
     steps(world, robot.rest(240))
-    assert np.linalg.norm(_hangs(robot, world) - swung) < 1e-4
+    assert np.linalg.norm(_hangs(robot, world) - before) < 4e-3
 
 
 def _hangs(robot: Robot, world: World) -> np.ndarray:
