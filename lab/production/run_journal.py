@@ -157,6 +157,7 @@ class RunJournal:
     known: tuple[Entry, ...] = ()
     file: AppendedFile | None = None
     _again: list[Entry] = field(default_factory=list)  # outputs that are still to be told again
+    _made: set[str] = field(default_factory=set)  # the problems of the policies that were kept, as `KnownPolicies.made`
 
     @classmethod
     def begin(cls, folder: Path, head: RunBegan) -> "RunJournal":
@@ -196,7 +197,10 @@ class RunJournal:
     # ---- what is known of a run that is gone on with ---------------------------------------------------------------
 
     def known_at_first(self, now: KnownPolicies) -> KnownPolicies:
-        """Of the toolbox's policies those that were there when the run began: what it does must not depend on its break."""
+        """Of the toolbox's policies those that were there when the run began, and those that it has kept since.
+
+        So what it does does not depend on its break.
+        """
         if self.path is None:
             return now
         path = self.path.with_name(KNOWN)
@@ -207,7 +211,8 @@ class RunJournal:
             made = json_of(read_limited(path, MAX_BYTES))
         except (OSError, ValueError) as error:
             raise BadInput(f"'{path}' (--resume): cannot be read: {error}") from None
-        return now.only(made if isinstance(made, dict) else {})
+        own = {key: at for key, at in now.made().items() if key in self._made}
+        return now.only((made if isinstance(made, dict) else {}) | own)
 
     def skill(self, name: str) -> "KeptSkill | None":
         """What was kept of a skill. BadInput when its policy is damaged or gone."""
@@ -222,6 +227,7 @@ class RunJournal:
             file = f"{slug(str(row['name']))}{SUFFIX}"
             FolderPlace(self.path.parent / SKILLS).write(file, encode(policy))
             self.write(SkillKept(row, file))
+            self._made.add(f"{policy.subtask} {policy.signature}")
 
     def sessions(self, name: str) -> list[Path]:
         """The folders of the sessions that were begun under a name, the first one first: what changed is learned again."""

@@ -147,7 +147,7 @@ COMMANDS: dict[str, Command] = {
     "open": Command("", "open the gripper", "by hand", _nothing),
     "close": Command("", "close the gripper", "by hand", _nothing),
     "home": Command("", "bring the arm home, over everything", "by hand", _nothing),
-    "grasp": Command("", "take up the part that is nearest to the gripper", "by hand", _nothing),
+    "grasp": Command("", "take up the part that is nearest to the gripper, wherever that is", "by hand", _nothing),
     "order": Command("1 2 1 3", "make this sequence the plan, checked move by move", "in turn", _order),
     "learn": Command("NAME", "learn a skill, or a family of skills, and keep it", "in turn", _name),
     "execute": Command("NAME [PART]", "carry one skill out now", "by hand", _name),

@@ -25,12 +25,13 @@ from lab.sequencing.methods.exact import Optimum
 from lab.sequencing.search import SequenceResult
 from lab.sequencing.simulate.run import simulate
 from lab.sim.world import World
+from lab.skills import Skill
 from lab.skills.prepared_scene import Prepared, prepare
 from lab.skills.trial import trial_of
 from lab.tasks.fault_fields import FaultFields
 from lab.tasks.task import Order, Task, counts_from_word, in_words
 from lab.teaching.events import Event, PhaseBegan, PlanMade, SkillReady, TroubleMet
-from lab.teaching.lesson_plan import LessonPlan
+from lab.teaching.lesson_plan import Lesson, LessonPlan
 from lab.teaching.teacher import Teacher
 
 Deed = Callable[[], str]  # carries a checked command out, and says what came of it; raises WorkFailed
@@ -96,7 +97,7 @@ class OperatedScene:
         floor.tell = noting(floor, self.journal, self.heard, self.tell)
         floor.hand, floor.meanwhile = self._hand, lambda: self.meanwhile()
         floor.controls, floor.stops.note = self.controls, self.journal.note_stops
-        self._world, self.by_hand = world, ByHand(floor)
+        self._world, self.by_hand = world, ByHand(floor, self._ready)
         with self.lock:
             self._status = RunStatus.of(self.task, prepared.order)
         self.on_laid_out()
@@ -258,8 +259,35 @@ class OperatedScene:
 
         return deed
 
+    def _ready(self, skill: Skill) -> None:
+        """Give a skill the policy that the journal or the toolbox has for it, as `policy` would. BadInput where there is none."""
+        name, policies = skill.name, self.prepared.skillset.policies
+        if name in policies:
+            return
+        if (kept := self.journal.skill(name)) is not None:
+            policies[name] = kept.policy
+            return
+        teacher = replace(self.teacher, trial=trial_of(self.prepared))
+        lesson = teacher.find(self._plan(name), teacher.toolbox.index()[0])
+        if lesson is None:
+            raise BadInput(f"'{name}' is not learned yet: policy, or learn {name}")
+        self._keep(name, lesson)
+
+    def _plan(self, name: str) -> LessonPlan:
+        """How a skill is learned here."""
+        problem = self.prepared.problems[name]
+        settings = self.task.subtask(problem.subtask)
+        return LessonPlan(problem, settings.learner, settings.gate, self.task.name)
+
+    def _keep(self, name: str, lesson: Lesson) -> None:
+        """Carry a skill out by what was found or learned now, and keep that with the run."""
+        self.prepared.skillset.policies[name] = lesson.policy
+        if not self.again:
+            self.journal.keep_skill(skill_row(name, lesson), lesson.policy)
+        self.tell(SkillReady(name, lesson))
+
     def _learn(self, name: str) -> Deed:
-        problems, task = self.prepared.problems, self.task
+        problems = self.prepared.problems
         families = {problem.subtask for problem in problems.values()}
         wanted = [own for own, problem in problems.items() if name in (own, problem.subtask)]
         if not wanted:
@@ -269,12 +297,7 @@ class OperatedScene:
             teacher = replace(self.teacher, trial=trial_of(self.prepared))
             self.tell(PhaseBegan("learn", len(wanted)))
             for own in wanted:
-                problem, settings = problems[own], task.subtask(problems[own].subtask)
-                lesson = teacher.teach(LessonPlan(problem, settings.learner, settings.gate, task.name))
-                self.prepared.skillset.policies[own] = lesson.policy
-                if not self.again:
-                    self.journal.keep_skill(skill_row(own, lesson), lesson.policy)
-                self.tell(SkillReady(own, lesson))
+                self._keep(own, teacher.teach(self._plan(own)))
             if self.plan is not None and not self.plan.production.work.moves:
                 self.plan = None  # its times are those of the skills as they were
             return f"learned {', '.join(wanted)}"
