@@ -31,6 +31,7 @@ from lab.toolbox.policy_file import decode, encode
 FILE = "run.jsonl"
 KNOWN = "known.json"  # which policies the toolbox held when the run began
 SKILLS = "skills"  # the folder for the policies of the run
+LED = "led"  # the folder for what people led the arm along, a file of answers a skill
 SCHEMA = 1
 MAX_STEP = 10**12  # physics steps, more than a century
 
@@ -93,6 +94,16 @@ class Commanded:
 
 
 @dataclass(frozen=True)
+class Led:
+    """A person has led the arm along a skill's way: the move that was shown in each state, by their labels."""
+
+    step: int
+    skill: str
+    by: str
+    said: dict[str, str]
+
+
+@dataclass(frozen=True)
 class Moved:
     """A part was brought on, until this physics step."""
 
@@ -123,7 +134,7 @@ class RunEnded:
     failure: str
 
 
-Entry = RunBegan | SessionKept | SkillKept | DurationsKept | Stopped | Commanded | Moved | Met | RunEnded
+Entry = RunBegan | SessionKept | SkillKept | DurationsKept | Stopped | Commanded | Led | Moved | Met | RunEnded
 KINDS: dict[str, type[Any]] = {
     "run": RunBegan,
     "session": SessionKept,
@@ -131,6 +142,7 @@ KINDS: dict[str, type[Any]] = {
     "durations": DurationsKept,
     "stopped": Stopped,
     "commanded": Commanded,
+    "led": Led,
     "moved": Moved,
     "met": Met,
     "ended": RunEnded,
@@ -191,7 +203,7 @@ class RunJournal:
         except BadInput:
             journal.close()
             raise
-        journal._again = [entry for entry in journal.known if isinstance(entry, Moved | Met)]
+        journal._again = [entry for entry in journal.known if isinstance(entry, Led | Moved | Met)]
         return journal
 
     # ---- what is known of a run that is gone on with ---------------------------------------------------------------
@@ -229,6 +241,14 @@ class RunJournal:
             self.write(SkillKept(row, file))
             self._made.add(f"{policy.subtask} {policy.signature}")
 
+    def keep_led(self, led: Led) -> None:
+        """What was led is written to the run's folder as a file of answers, then its line."""
+        if self.path is not None:
+            answers = self.path.parent / LED / f"{slug(led.skill)}.json"
+            answers.parent.mkdir(exist_ok=True)
+            write_whole(answers, json.dumps(led.said, indent=0) + "\n")
+        self.tell(led)
+
     def sessions(self, name: str) -> list[Path]:
         """The folders of the sessions that were begun under a name, the first one first: what changed is learned again."""
         return [Path(e.folder) for e in self.known if isinstance(e, SessionKept) and e.name == name]
@@ -247,7 +267,7 @@ class RunJournal:
 
     def last_step(self) -> int:
         """The last physics step that it knows of."""
-        return max((e.step for e in self.known if isinstance(e, Stopped | Commanded | Moved | Met)), default=0)
+        return max((e.step for e in self.known if isinstance(e, Stopped | Commanded | Led | Moved | Met)), default=0)
 
     # ---- what is written -------------------------------------------------------------------------------------------
 
@@ -305,7 +325,7 @@ def _check(entry: Entry) -> None:
             StopKind(kind)
     if isinstance(entry, SkillKept):
         _check_row(entry.row)
-    if isinstance(entry, Stopped | Commanded | Moved | Met) and not 0 <= entry.step <= MAX_STEP:
+    if isinstance(entry, Stopped | Commanded | Led | Moved | Met) and not 0 <= entry.step <= MAX_STEP:
         raise ValueError(f"step {entry.step}: wanted 0 to {MAX_STEP}")
 
 

@@ -13,6 +13,7 @@ from lab.sim.parts.kinds import Spot, comes_as
 from lab.skills import Skill
 from lab.skills.free_way import by_free_cells
 from lab.skills.skill import Status
+from lab.skills.surveys import Surveys, way_to
 
 SLOW = 0.5  # of the arm's speed, for motions by hand
 FORCE_N = (
@@ -40,6 +41,20 @@ class ByHand:
         """Turn the tool on the spot."""
         return self._to(self.floor.scene.robot.tool().shifted(dyaw=radians(degrees)))
 
+    def move(self, to: str | tuple[float, float, float]) -> Deed:
+        """Move the tool straight to where a station is approached, or to a point [m]."""
+        robot, task = self.floor.scene.robot, self.floor.scene.task
+        if not isinstance(to, str):
+            return self._to(ToolPose(*to, robot.tool().yaw))
+        places = {name: None for station in task.stations for name in (station.name, way_to(task, station.name))}
+        if to not in places:
+            raise unknown("station", to, places, "move")
+        return self._to(self._surveys.approach(to))
+
+    @property
+    def _surveys(self) -> Surveys:
+        return next(iter(self.floor.skillset.skills.values())).surveys
+
     def _to(self, pose: ToolPose) -> Deed:
         robot = self.floor.scene.robot
         if robot.arm.inverse(pose) is None:
@@ -50,9 +65,8 @@ class ByHand:
         """Bring the arm home, by free cells of the workspace."""
         floor, robot, held = self.floor, self.floor.scene.robot, self.floor.bench.held
         pose = robot.arm.forward(robot.arm.home)
-        surveys = next(iter(floor.skillset.skills.values())).surveys
         carried = "" if held is None else comes_as(floor.scene.kind_of[held].part)
-        return lambda: self._follow(by_free_cells(floor.bench, surveys, pose, carried))
+        return lambda: self._follow(by_free_cells(floor.bench, self._surveys, pose, carried))
 
     def open(self) -> Deed:
         """Open the gripper; what it holds is let go."""
