@@ -12,7 +12,7 @@ import numpy as np
 
 from lab.errors import BadInput, counted
 from lab.learning.values import fewest_moves, greedy_moves
-from lab.mdp import TabularMDP
+from lab.mdp import TabularMDP, distances
 from lab.sim.arms.kinematics import ToolPose
 from lab.sim.world import Array
 from lab.skills import Skill
@@ -20,14 +20,16 @@ from lab.teaching.lesson_plan import Lesson
 
 OUTSIDE = -1  # of the problem's grid
 EVERY = 12  # physics steps from one look at the tool to the next
+NEAR = 2  # moves: a station is approached from a cell that is nearer than that
 END, DROP = "end", "drop"
 
 
 @dataclass(frozen=True)
 class Demonstration:
-    """What was led: the moves (state, action) from the first free cell on, without loops, and the state where they end.
+    """What was led: the moves (state, action) from a start of the problem on, without loops, and the state where they end.
 
-    left: how often the tool left the grid in between; blocked: the cells that it may not enter; moves lead round both.
+    first: another state than a start where none came near one. left: how often the tool left the grid in between; blocked:
+    the cells that it may not enter; moves lead round both.
     """
 
     skill: Skill
@@ -44,17 +46,17 @@ class Demonstration:
         return {mdp.state_label(state): mdp.action_labels[action] for state, action in self.moves.items()}
 
     def judged(self, lesson: Lesson) -> dict[str, Any]:
-        """What came of it: its moves beside the learned policy's and the fewest, from its first cell, and whether it was
-        believed."""
+        """What came of it: its moves beside the learned policy's and the fewest, from the start, and whether it was believed."""
         mdp, result = self.skill.problem.mdp, lesson.result
         assert result is not None
-        learned, fewest = (
-            float(moves[self.first]) for moves in (greedy_moves(lesson.policy.q, mdp), fewest_moves(mdp))
-        )
+        begins = self.first in (mdp.starts or (mdp.start,))
+        start = self.first if begins else mdp.start
+        learned, fewest = (float(moves[start]) for moves in (greedy_moves(lesson.policy.q, mdp), fewest_moves(mdp)))
         dropped = result.rejected_at_episode
         return {
             "skill": self.skill.name,
             "led_moves": len(self.moves),
+            "begins_at_start": begins,
             "reached": bool(mdp.goal[self.last]),
             "left_grid": self.left,
             "blocked": list(self.blocked),
@@ -102,7 +104,8 @@ class Lead:
     def demonstration(self) -> Demonstration:
         """The moves that were led, up to the goal. Cells between two that were seen are filled in by free neighbours.
 
-        Raises BadInput when fewer than two free cells were seen.
+        What comes within NEAR moves of a start begins there, and what ends so near to the goal ends there: a skill goes
+        straight to where it begins, and from where it ends. Raises BadInput when fewer than two free cells were seen.
         """
         mdp = self.skill.problem.mdp
         free, blocked, left, gone = list[int](), dict[str, None](), 0, False
@@ -117,6 +120,10 @@ class Lead:
             free.append(state)
             if mdp.goal[state]:
                 break
+        if free:
+            free = _from_start(mdp, free)
+            if 0 < fewest_moves(mdp)[free[-1]] <= NEAR:
+                free.append(int(np.flatnonzero(mdp.goal)[0]))
         said, at = dict[int, int](), free[0] if free else OUTSIDE
         for state in free[1:]:
             way = _moves_between(mdp, at, state)
@@ -150,6 +157,17 @@ def state_at(skill: Skill, pose: ToolPose) -> int:
     return int(np.ravel_multi_index(tuple(cell), mdp.shape)) if inside else OUTSIDE
 
 
+def _from_start(mdp: TabularMDP, states: list[int]) -> list[int]:
+    """The states from the one on that is nearest to a start, that start before them; all of them where none is near to one."""
+    starts = [*(mdp.starts or (mdp.start,))]
+    far = np.where(np.isin(states, starts), 0, distances(mdp.successor, mdp.terminal, mdp.start)[states])
+    least = int(far[far >= 0].min(initial=NEAR + 1))
+    if least > NEAR:
+        return states
+    last = int(np.flatnonzero(far == least)[-1])
+    return states[last:] if least == 0 else [mdp.start, *states[last:]]
+
+
 def _numbers(pose: ToolPose) -> Array:
     return np.array([pose.x, pose.y, pose.z, pose.yaw])
 
@@ -176,8 +194,9 @@ def _moves_between(mdp: TabularMDP, start: int, end: int) -> dict[int, int] | No
 def led_in_words(row: dict[str, Any]) -> str:
     """What came of a demonstration, in one line: `Demonstration.judged` for people."""
     learned, fewest = row["learned_moves"], row["fewest_moves"]
-    said = f"led {counted(row['led_moves'], 'move')}{'' if row['reached'] else ', not to the goal'}"
-    said += f"; learned: {'no way' if learned is None else learned} from there, fewest: {fewest}"
+    said = f"led {counted(row['led_moves'], 'move')}{'' if row['begins_at_start'] else ', not from the start'}"
+    said += f"{'' if row['reached'] else ', not to the goal'}"
+    said += f"; learned: {'no way' if learned is None else learned}, fewest: {fewest}"
     notes: Sequence[str] = (
         row["left_grid"] and f"it left the grid {counted(row['left_grid'], 'time')}",
         row["blocked"] and f"blocked cells on it: {', '.join(row['blocked'][:4])}",
