@@ -242,12 +242,13 @@ class RunJournal:
             self._made.add(f"{policy.subtask} {policy.signature}")
 
     def keep_led(self, led: Led) -> None:
-        """What was led is written to the run's folder as a file of answers, then its line."""
+        """What was led: its line, then a file of answers in the run's folder. WorkFailed where it was led otherwise before."""
+        self.tell(led)
         if self.path is not None:
             answers = self.path.parent / LED / f"{slug(led.skill)}.json"
-            answers.parent.mkdir(exist_ok=True)
+            with suppress(OSError):  # it is not written then, and says why
+                answers.parent.mkdir(exist_ok=True)
             write_whole(answers, json.dumps(led.said, indent=0) + "\n")
-        self.tell(led)
 
     def sessions(self, name: str) -> list[Path]:
         """The folders of the sessions that were begun under a name, the first one first: what changed is learned again."""
