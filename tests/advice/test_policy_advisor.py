@@ -8,7 +8,7 @@ import pytest
 
 import lab
 from lab.advice.advising import Advising
-from lab.advice.advisors import AdvisorName, make_advisor
+from lab.advice.advisors import PYTHON, AdvisorName, RecordedAdvisor, make_advisor
 from lab.advice.order_level import OrderLevel
 from lab.advice.policy_advisor import PolicyAdvisor, advice_of
 from lab.advice.table_level import LimitedView, TableLevel
