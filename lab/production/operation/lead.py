@@ -6,7 +6,7 @@ Source: thesis, section 4.2: a low-level task may be given to the system by the 
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from lab.mdp import TabularMDP, distances
 from lab.sim.arms.kinematics import ToolPose
 from lab.sim.world import Array
 from lab.skills import Skill
+from lab.skills.state_words import away_in_words
 from lab.teaching.lesson_plan import Lesson
 
 OUTSIDE = -1  # of the problem's grid
@@ -79,6 +80,7 @@ class Lead:
 
     skill: Skill
     visited: list[int] = field(default_factory=list)
+    _last: "Seen | None" = None
 
     @classmethod
     def of(cls, skill: Skill, where: str) -> "Lead":
@@ -89,17 +91,22 @@ class Lead:
 
     def see(self, pose: ToolPose) -> None:
         """Take in where the tool is."""
-        state = state_at(self.skill, pose)
+        self._last = Seen.of(self.skill, pose)
+        state = self._last.state
         if not self.visited or self.visited[-1] != state:
             self.visited.append(state)
 
     def where(self) -> str:
         """Where the tool was seen last, in words."""
-        state = self.visited[-1]
-        if state == OUTSIDE:
-            return f"outside the grid of '{self.skill.name}'"
-        mdp = self.skill.problem.mdp
-        return self.skill.in_words(state) + (" That cell is blocked." if mdp.terminal[state] > mdp.goal[state] else "")
+        assert self._last is not None
+        skill, mdp, (state, cell, beside_m) = self.skill, self.skill.problem.mdp, self._last
+        if state != OUTSIDE:
+            return skill.in_words(state) + (" That cell is blocked." if mdp.terminal[state] > mdp.goal[state] else "")
+        goal = mdp.state_cell(int(np.flatnonzero(mdp.goal)[0]))
+        by = [here - there for here, there in zip(cell, goal, strict=True)]
+        words = away_in_words(*skill.way_in_words(), by, mdp.action_labels, skill.cell_steps())
+        off = f" The grid's plane is {100 * beside_m:.0f} cm away." if beside_m > 0.01 else ""
+        return f"Outside the grid: {words[:1].lower()}{words[1:]}{off}"
 
     def demonstration(self) -> Demonstration:
         """The moves that were led, up to the goal. Cells between two that were seen are filled in by free neighbours.
@@ -140,21 +147,31 @@ class Lead:
         return Demonstration(self.skill, moves, free[0], state, left, tuple(blocked))
 
 
-def state_at(skill: Skill, pose: ToolPose) -> int:
-    """The state of a skill's grid whose pose is the nearest, OUTSIDE where the tool is farther off than half a cell."""
-    mdp = skill.problem.mdp
-    cells = [(0,) * len(mdp.shape), *np.eye(len(mdp.shape), dtype=int)]
-    first, *others = (
-        _numbers(skill.pose(int(np.ravel_multi_index(tuple(cell), mdp.shape, mode="clip")))) for cell in cells
-    )
-    steps = np.stack(others, axis=1) - first[:, None]  # (x, y, z, yaw; axes)
-    off = _numbers(pose) - first
-    off[3] = (off[3] + np.pi / 2) % np.pi - np.pi / 2  # the fingers are alike
-    along = np.linalg.pinv(steps) @ off
-    cell = np.rint(along).astype(int)
-    beside = np.linalg.norm((off - steps @ along)[:3])
-    inside = bool(((cell >= 0) & (cell < mdp.shape)).all()) and beside < np.linalg.norm(steps[:3], axis=0).max()
-    return int(np.ravel_multi_index(tuple(cell), mdp.shape)) if inside else OUTSIDE
+class Seen(NamedTuple):
+    """Where the tool is in a skill's grid: the state, OUTSIDE for none; the nearest cell, also beyond the border; how far from
+    that cell's line or plane [m], of a grid of one axis or two."""
+
+    state: int
+    cell: tuple[int, ...]
+    beside_m: float
+
+    @classmethod
+    def of(cls, skill: Skill, pose: ToolPose) -> "Seen":
+        """For a tool pose: the states' poses lie at equal steps along each axis."""
+        shape = skill.problem.mdp.shape
+        cells = [(0,) * len(shape), *np.eye(len(shape), dtype=int)]
+        first, *others = (
+            _numbers(skill.pose(int(np.ravel_multi_index(tuple(cell), shape, mode="clip")))) for cell in cells
+        )
+        steps = np.stack(others, axis=1) - first[:, None]  # (x, y, z, yaw; axes)
+        off = _numbers(pose) - first
+        off[3] = (off[3] + np.pi / 2) % np.pi - np.pi / 2  # the fingers are alike
+        along = np.linalg.pinv(steps) @ off
+        cell = tuple(np.rint(along).astype(int).tolist())
+        beside_m = float(np.linalg.norm((off - steps @ along)[:3]))
+        near = beside_m < np.linalg.norm(steps[:3], axis=0).max()
+        inside = near and all(0 <= at < size for at, size in zip(cell, shape, strict=True))
+        return cls(int(np.ravel_multi_index(cell, shape)) if inside else OUTSIDE, cell, beside_m)
 
 
 def _from_start(mdp: TabularMDP, states: list[int]) -> list[int]:

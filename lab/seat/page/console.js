@@ -26,7 +26,7 @@ const seatConsole = (() => {
     ["hand", "o", "o", "open", "Open", "open the gripper"],
     ["hand", "c", "c", "close", "Close", "close the gripper"],
     ["hand", "h", "h", "home", "Home", "bring the arm home, over everything"],
-    ["hand", "g", "g", "grasp", "Grasp here", "take up the part that is nearest to the gripper"],
+    ["hand", "g", "g", "grasp", "Grasp nearest", "take up the part that is nearest to the gripper, wherever that is"],
   ];
   // Key, its name on the button, what is said before the number that is chosen, where it is chosen, label, what it does, place
   const JOGS = [

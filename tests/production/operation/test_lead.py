@@ -10,7 +10,7 @@ from lab.advice.answers_file import answers_of
 from lab.errors import BadInput
 from lab.learning.problem import Problem
 from lab.mdp import grid
-from lab.production.operation.lead import OUTSIDE, Lead, state_at
+from lab.production.operation.lead import OUTSIDE, Lead, Seen
 from lab.production.operation.operation import Operation
 from lab.production.run_journal import Led, read_run
 from lab.sim.arms.kinematics import ToolPose
@@ -51,9 +51,9 @@ def led(*cells: tuple[float, float]) -> Lead:
 
 def test_the_tool_is_in_the_cell_whose_middle_is_nearest() -> None:
     flat = Flat()
-    assert state_at(flat, ToolPose(0.14, 0.06, 0.2, 0.0)) == 1 * 3 + 1
-    assert state_at(flat, ToolPose(0.36, 0.06, 0.2, 0.0)) == OUTSIDE
-    assert state_at(flat, ToolPose(0.14, 0.06, 0.31, 0.0)) == OUTSIDE
+    assert Seen.of(flat, ToolPose(0.14, 0.06, 0.2, 0.0)).state == 1 * 3 + 1
+    assert Seen.of(flat, ToolPose(0.36, 0.06, 0.2, 0.0))[:2] == (OUTSIDE, (4, 1))
+    assert Seen.of(flat, ToolPose(0.14, 0.06, 0.31, 0.0)).state == OUTSIDE
 
 
 def test_cells_between_are_filled_in_by_free_neighbours_and_it_ends_at_the_goal() -> None:
@@ -152,7 +152,7 @@ def test_one_lead_at_a_time_and_a_new_scene_forgets_it(made: Made) -> None:
     operation.open()
     assert "nothing is led: lead NAME begins" in operation.do("lead end").refused
     assert "cannot be led" in operation.do("lead butter at butter_applier").refused
-    assert operation.do("lead insert at toaster").said == "outside the grid of 'insert at toaster'"
+    assert operation.do("lead insert at toaster").said.startswith("Outside the grid: ")
     assert "fewer than two free cells" in operation.do("lead end").refused
     assert "'insert at toaster' is led" in operation.do(f"lead {WAY}").refused
     assert operation.do("parts slice=1").well
