@@ -189,7 +189,7 @@ def _neighbours(shape: tuple[int, ...]) -> IntArray:
     return np.stack(columns, axis=1).astype(np.int32)
 
 
-def _distances(successor: IntArray, closed: BoolArray, source: int) -> IntArray:
+def distances(successor: IntArray, closed: BoolArray, source: int) -> IntArray:
     """Moves from source to each state, -1 where unreachable; closed states are reached but not left; (S,) int32."""
     distance = np.full(len(successor), -1, np.int32)
     frontier = np.array([source])
@@ -252,10 +252,10 @@ def _free_cell(name: str, cell: Sequence[int], wall: BoolArray) -> int:
 def _require_path(moves: IntArray, wall: BoolArray, start: int, goal: int) -> None:
     """Raises NoPath, naming the obstacles around the smaller of the two regions that start and goal lie in."""
     closed = wall.ravel()
-    from_goal = _distances(moves, closed, goal) >= 0
+    from_goal = distances(moves, closed, goal) >= 0
     if from_goal[start]:
         return
-    from_start = _distances(moves, closed, start) >= 0
+    from_start = distances(moves, closed, start) >= 0
     around: Literal["goal", "start"] = (
         "goal" if (from_goal & ~closed).sum() <= (from_start & ~closed).sum() else "start"
     )
@@ -312,7 +312,7 @@ def optimal_values(mdp: TabularMDP, discount: float, guess: FloatArray | None = 
 
 def shortest_steps(mdp: TabularMDP) -> int:
     """The fewest moves from the start to a goal that enter no other terminal state (breadth first). Raises NoPath."""
-    distance = _distances(mdp.successor, mdp.terminal, mdp.start)[mdp.goal]
+    distance = distances(mdp.successor, mdp.terminal, mdp.start)[mdp.goal]
     if not (distance >= 0).any():
         raise NoPath(f"no goal can be reached from {mdp.state_label(mdp.start)}", (), "goal")
     return int(distance[distance >= 0].min())
@@ -321,7 +321,7 @@ def shortest_steps(mdp: TabularMDP) -> int:
 def shortest_way(mdp: TabularMDP) -> list[int]:
     """The states of a way of `shortest_steps` moves, from the start to a goal. Raises NoPath."""
     moves = shortest_steps(mdp)
-    distance = _distances(mdp.successor, mdp.terminal, mdp.start)
+    distance = distances(mdp.successor, mdp.terminal, mdp.start)
     way = [int(np.flatnonzero(mdp.goal & (distance == moves))[0])]
     for left in range(moves - 1, -1, -1):
         before = np.flatnonzero((distance == left) & ~mdp.terminal)

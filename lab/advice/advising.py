@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from lab.advice.advisors import PEOPLE, AdvisorName, make_advisor
+from lab.advice.advisors import PEOPLE, AdvisorName, RecordedAdvisor, make_advisor
 from lab.advice.entries import Read, read_journal
 from lab.advice.journal import Journal
 from lab.advice.panel import Panel, PanelSettings, members_of
@@ -66,7 +66,10 @@ class Advising:
     @property
     def records(self) -> bool:
         """Whether anybody speaks only where a record or a policy has something: such silence is not held against the advice."""
-        return any(name.folder or name.policy or name.answers for name in self.names)
+        return any(
+            name.folder or name.policy or name.answers or isinstance(name.itself, RecordedAdvisor)
+            for name in self.names
+        )
 
     def cut_records(self) -> list[Read]:
         """The journals among the advisors whose last line was cut off. Raises BadInput for what is no journal."""

@@ -42,7 +42,7 @@ def operate(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Run a task by hand: order, pause, stop, jog, grasp, learn, in a live console, on a page, or from a pipe."""
+    """Run a task by hand: order, pause, stop, jog, lead, grasp, learn, in a live console, on a page, or from a pipe."""
     import sys
     from dataclasses import replace
 
@@ -134,7 +134,8 @@ def _kept(operation: "Operation", folder: Path) -> dict[str, Any]:
             scene.journal.tell(RunEnded(len(report.outcome.delivered), report.outcome.failure or ""))
     if report is not None:
         document |= report.to_json()
-    return document | {"commands": [asdict(done) for done in operation.done], "status": operation.now().to_json()}
+    said = {"commands": [asdict(done) for done in operation.done], "demonstrations": scene.demonstrations}
+    return document | said | {"status": operation.now().to_json()}
 
 
 def _summary(document: dict[str, Any]) -> Any:

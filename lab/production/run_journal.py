@@ -31,6 +31,7 @@ from lab.toolbox.policy_file import decode, encode
 FILE = "run.jsonl"
 KNOWN = "known.json"  # which policies the toolbox held when the run began
 SKILLS = "skills"  # the folder for the policies of the run
+LED = "led"  # the folder for what people led the arm along, a file of answers a skill
 SCHEMA = 1
 MAX_STEP = 10**12  # physics steps, more than a century
 
@@ -93,6 +94,16 @@ class Commanded:
 
 
 @dataclass(frozen=True)
+class Led:
+    """A person has led the arm along a skill's way: the move that was shown in each state, by their labels."""
+
+    step: int
+    skill: str
+    by: str
+    said: dict[str, str]
+
+
+@dataclass(frozen=True)
 class Moved:
     """A part was brought on, until this physics step."""
 
@@ -123,7 +134,7 @@ class RunEnded:
     failure: str
 
 
-Entry = RunBegan | SessionKept | SkillKept | DurationsKept | Stopped | Commanded | Moved | Met | RunEnded
+Entry = RunBegan | SessionKept | SkillKept | DurationsKept | Stopped | Commanded | Led | Moved | Met | RunEnded
 KINDS: dict[str, type[Any]] = {
     "run": RunBegan,
     "session": SessionKept,
@@ -131,6 +142,7 @@ KINDS: dict[str, type[Any]] = {
     "durations": DurationsKept,
     "stopped": Stopped,
     "commanded": Commanded,
+    "led": Led,
     "moved": Moved,
     "met": Met,
     "ended": RunEnded,
@@ -157,6 +169,7 @@ class RunJournal:
     known: tuple[Entry, ...] = ()
     file: AppendedFile | None = None
     _again: list[Entry] = field(default_factory=list)  # outputs that are still to be told again
+    _made: set[str] = field(default_factory=set)  # the problems of the policies that were kept, as `KnownPolicies.made`
 
     @classmethod
     def begin(cls, folder: Path, head: RunBegan) -> "RunJournal":
@@ -190,13 +203,16 @@ class RunJournal:
         except BadInput:
             journal.close()
             raise
-        journal._again = [entry for entry in journal.known if isinstance(entry, Moved | Met)]
+        journal._again = [entry for entry in journal.known if isinstance(entry, Led | Moved | Met)]
         return journal
 
     # ---- what is known of a run that is gone on with ---------------------------------------------------------------
 
     def known_at_first(self, now: KnownPolicies) -> KnownPolicies:
-        """Of the toolbox's policies those that were there when the run began: what it does must not depend on its break."""
+        """Of the toolbox's policies those that were there when the run began, and those that it has kept since.
+
+        So what it does does not depend on its break.
+        """
         if self.path is None:
             return now
         path = self.path.with_name(KNOWN)
@@ -207,7 +223,8 @@ class RunJournal:
             made = json_of(read_limited(path, MAX_BYTES))
         except (OSError, ValueError) as error:
             raise BadInput(f"'{path}' (--resume): cannot be read: {error}") from None
-        return now.only(made if isinstance(made, dict) else {})
+        own = {key: at for key, at in now.made().items() if key in self._made}
+        return now.only((made if isinstance(made, dict) else {}) | own)
 
     def skill(self, name: str) -> "KeptSkill | None":
         """What was kept of a skill. BadInput when its policy is damaged or gone."""
@@ -222,6 +239,16 @@ class RunJournal:
             file = f"{slug(str(row['name']))}{SUFFIX}"
             FolderPlace(self.path.parent / SKILLS).write(file, encode(policy))
             self.write(SkillKept(row, file))
+            self._made.add(f"{policy.subtask} {policy.signature}")
+
+    def keep_led(self, led: Led) -> None:
+        """What was led: its line, then a file of answers in the run's folder. WorkFailed where it was led otherwise before."""
+        self.tell(led)
+        if self.path is not None:
+            answers = self.path.parent / LED / f"{slug(led.skill)}.json"
+            with suppress(OSError):  # it is not written then, and says why
+                answers.parent.mkdir(exist_ok=True)
+            write_whole(answers, json.dumps(led.said, indent=0) + "\n")
 
     def sessions(self, name: str) -> list[Path]:
         """The folders of the sessions that were begun under a name, the first one first: what changed is learned again."""
@@ -241,7 +268,7 @@ class RunJournal:
 
     def last_step(self) -> int:
         """The last physics step that it knows of."""
-        return max((e.step for e in self.known if isinstance(e, Stopped | Commanded | Moved | Met)), default=0)
+        return max((e.step for e in self.known if isinstance(e, Stopped | Commanded | Led | Moved | Met)), default=0)
 
     # ---- what is written -------------------------------------------------------------------------------------------
 
@@ -299,7 +326,7 @@ def _check(entry: Entry) -> None:
             StopKind(kind)
     if isinstance(entry, SkillKept):
         _check_row(entry.row)
-    if isinstance(entry, Stopped | Commanded | Moved | Met) and not 0 <= entry.step <= MAX_STEP:
+    if isinstance(entry, Stopped | Commanded | Led | Moved | Met) and not 0 <= entry.step <= MAX_STEP:
         raise ValueError(f"step {entry.step}: wanted 0 to {MAX_STEP}")
 
 

@@ -51,21 +51,9 @@ class Teacher:
         session finds a way; Interrupted on Ctrl-C.
         """
         problem = plan.problem
-        found = known.get((problem.subtask, problem.mdp.signature))
-        if found is not None and not _belongs(found, problem.mdp):
-            found = None
-        if found is not None and found.solved and fits(found.q, problem, plan.learner):
-            return _reused(plan, found, f"it was learned in exactly this problem{_elsewhere(found, plan)}")
-        fitting = None
-        if problem.environment is None:
-            fitting = best_fit(self._candidates(known, problem), problem.mdp, plan.learner.discount)
-        if fitting is not None and fitting[1].verdict == "use":
-            policy, fitness = fitting
-            failure = None if self.trial is None else self.trial(problem, policy)
-            if failure is None:
-                self._remember(problem, {"policy": reference(policy)})
-                return _reused(plan, policy, _reason(policy, fitness, plan), fitness)
-            fitting = policy, replace(fitness, verdict="refuse", reason=f"in physics, {failure}")
+        ready, found, fitting = self._looked_up(plan, known)
+        if ready is not None:
+            return ready
         if found is not None:
             lesson = self.teach(replace(plan, unfinished=found))
             return _told(lesson, f"'{found.name}' was left unfinished", found, problem)
@@ -77,6 +65,33 @@ class Teacher:
         saved = (0, 0) if parent is None else _saved(plan, parent, lesson.result)
         lesson = replace(lesson, parent=parent, fitness=fitness, saved=saved)
         return _told(lesson, _reason(policy, fitness, plan), policy, problem)
+
+    def find(self, plan: LessonPlan, known: KnownPolicies) -> Lesson | None:
+        """The policy that `find_or_teach` would reuse, None where it would teach one."""
+        return self._looked_up(plan, known)[0]
+
+    def _looked_up(
+        self, plan: LessonPlan, known: KnownPolicies
+    ) -> tuple[Lesson | None, Policy | None, tuple[Policy, Fitness] | None]:
+        """What is reused; else the policy of exactly this problem, and the best one of another, with what is judged of it."""
+        problem = plan.problem
+        found = known.get((problem.subtask, problem.mdp.signature))
+        if found is not None and not _belongs(found, problem.mdp):
+            found = None
+        if found is not None and found.solved and fits(found.q, problem, plan.learner):
+            reason = f"it was learned in exactly this problem{_elsewhere(found, plan)}"
+            return _reused(plan, found, reason), found, None
+        fitting = None
+        if problem.environment is None:
+            fitting = best_fit(self._candidates(known, problem), problem.mdp, plan.learner.discount)
+        if fitting is not None and fitting[1].verdict == "use":
+            policy, fitness = fitting
+            failure = None if self.trial is None else self.trial(problem, policy)
+            if failure is None:
+                self._remember(problem, {"policy": reference(policy)})
+                return _reused(plan, policy, _reason(policy, fitness, plan), fitness), found, fitting
+            fitting = policy, replace(fitness, verdict="refuse", reason=f"in physics, {failure}")
+        return None, found, fitting
 
     def _candidates(self, known: KnownPolicies, problem: Problem) -> Iterator[Policy]:
         """As `candidates`, but the one that was used for this problem before comes first: the next run does the same."""

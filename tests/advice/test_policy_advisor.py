@@ -8,7 +8,7 @@ import pytest
 
 import lab
 from lab.advice.advising import Advising
-from lab.advice.advisors import AdvisorName, make_advisor
+from lab.advice.advisors import PYTHON, AdvisorName, RecordedAdvisor, make_advisor
 from lab.advice.order_level import OrderLevel
 from lab.advice.policy_advisor import PolicyAdvisor, advice_of
 from lab.advice.table_level import LimitedView, TableLevel
@@ -122,3 +122,8 @@ def test_in_python_it_teaches_from_the_toolbox_that_is_given(tmp_path: Path) -> 
     assert (taught.solved, taught.session.helped_steps > 0) == (True, True)
     with pytest.raises(BadInput, match="unknown policy 'none'"):
         lab.teach(lab.world(WIDE), advisor="policy:none", toolbox=tmp_path)
+
+
+def test_a_record_made_in_python_is_one_whose_silence_is_not_held_against_it() -> None:
+    assert Advising((AdvisorName("led by operator", PYTHON, itself=RecordedAdvisor({0: 1})),)).records
+    assert not Advising.of(["expert"]).records

@@ -55,6 +55,20 @@ def test_a_motion_that_is_stopped_ends_it_with_exit_code_1(lab: Lab, tmp_path: P
     assert ran.json["commands"][-1]["failed"]
 
 
+def test_a_lead_that_was_broken_off_goes_on_and_is_in_the_toolbox(lab: Lab, tmp_path: Path) -> None:
+    out, box, skill = str(tmp_path / "led"), str(tmp_path / "box"), "transfer plate to insert with slice"
+    lines = f"lead {skill}\nmove plate\n"
+    ran = lab("operate", "toast", "--toasts", "1", "--json", "--out", out, "--toolbox", box, stdin=lines)
+    assert (ran.code, ran.json["demonstrations"]) == (0, [])
+    ran = lab("operate", "--resume", out, "--json", "--toolbox", box, stdin="move insert\nlead end\n")
+    (row,) = ran.json["demonstrations"]
+    assert (ran.code, row["skill"], row["begins_at_start"], row["reached"]) == (0, skill, True, True)
+    words = [done["words"] for done in ran.json["commands"]]
+    assert words == [f"lead {skill}", "move plate", "move insert", "lead end"]
+    listed = lab("toolbox", "list", "--json", "--toolbox", box).json
+    assert [(one["name"], one["advisor"]) for one in listed["policies"]] == [(row["policy"], "led by operator")]
+
+
 def test_what_was_done_by_hand_is_done_again_and_gone_on_with(lab: Lab, tmp_path: Path) -> None:
     """Nobody ran it to its end; the jog is done again at its step, and a run is not gone on with as another command's."""
     out = tmp_path / "mine"

@@ -23,7 +23,7 @@ from lab.learning.advice_memory import (
     Recall,
 )
 from lab.learning.session_events import AdviceEnded, AdviceRemembered
-from lab.mdp import _distances
+from lab.mdp import distances
 
 STATES, GOAL, PIT = 10, 8, 9  # states 0..9; an action leads to the state of its number
 EPISODES, WINDOW = 20, 2  # the last 15 %: episodes 17 to 19, and 20 is the very last
@@ -259,7 +259,7 @@ def test_whatever_happens_a_walk_has_no_repeats_and_the_way_is_the_shortest_know
         assert len(set(on_walk)) == len(on_walk)
         assert on_walk[0] == 0
         assert kept.now.trust <= MOST
-        shortest = int(_distances(successor, np.arange(STATES) >= GOAL, 0)[GOAL])
+        shortest = int(distances(successor, np.arange(STATES) >= GOAL, 0)[GOAL])
         found = way(kept)
         assert (len(found) - 1, kept.now.best) == ((shortest, shortest) if shortest > 0 else (0, UNKNOWN))
         assert sum(one != NOTHING for one in kept.way) == len(found) - 1

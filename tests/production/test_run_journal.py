@@ -1,6 +1,7 @@
 """A run's journal: what is written is read again, damage is told with its line, and a run does again what it did."""
 
 import fcntl
+import json
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -16,6 +17,7 @@ from lab.production.run_journal import (
     KINDS,
     Commanded,
     DurationsKept,
+    Led,
     Met,
     Moved,
     RunBegan,
@@ -31,6 +33,7 @@ from lab.production.stop_record import StopsChanged
 
 HEAD = RunBegan({"task": "toast", "seed": 3}, "toast", "abc")
 MOVED = Moved(4150, "slice 1", "plate", "toaster", 1.5, 17.25)
+LED = Led(4500, "transfer a to b", "operator", {"(0, 0)": "right"})
 MET = Met(5000, "it lies on its side", "leaves it", "slice 2", "plate")
 STOPPED = Stopped(200, [("emergency", "pressed by hand", "operator")])
 
@@ -69,6 +72,19 @@ def test_a_run_that_is_gone_on_with_does_again_what_it_did(journal: RunJournal, 
     again.tell(RunEnded(1, ""))
     again.close()
     assert read_run(tmp_path, "DIR")[1][-1] == RunEnded(1, "")
+
+
+def test_what_was_led_is_kept_as_answers_and_held_against_what_is_led_again(tmp_path: Path) -> None:
+    journal = RunJournal.begin(tmp_path, HEAD)
+    journal.keep_led(LED)
+    journal.close()
+    (file,) = (tmp_path / "led").iterdir()
+    assert json.loads(file.read_text()) == LED.said
+    again = RunJournal.resume(tmp_path)
+    with pytest.raises(WorkFailed, match="cannot be carried out again"):
+        again.keep_led(replace(LED, said={}))
+    again.close()
+    assert json.loads(file.read_text()) == LED.said
 
 
 def test_a_run_that_goes_another_way_than_it_did_is_refused(journal: RunJournal, tmp_path: Path) -> None:
@@ -183,6 +199,7 @@ def test_a_folder_without_a_run(tmp_path: Path) -> None:
         [
             MOVED,
             MET,
+            LED,
             STOPPED,
             HEAD,
             RunEnded(0, "why"),

@@ -1,6 +1,6 @@
 """The arm moved by the operator: jogged, turned, opened, closed, brought home, and told to take up what is near."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from math import hypot, radians
@@ -9,13 +9,13 @@ from lab.errors import BadInput, WorkFailed, unknown
 from lab.production.floor import Floor
 from lab.sim.arms.kinematics import ToolPose
 from lab.sim.arms.robot import NAME
-from lab.sim.parts.kinds import comes_as
+from lab.sim.parts.kinds import Spot, comes_as
 from lab.skills import Skill
 from lab.skills.free_way import by_free_cells
 from lab.skills.skill import Status
+from lab.skills.surveys import Surveys, way_to
 
 SLOW = 0.5  # of the arm's speed, for motions by hand
-NEAR_M = 0.2  # from the tool, across the table, a part may be that "grasp" takes up
 FORCE_N = (
     60.0  # more than this on top of what it presses on already stops a motion by hand, where the task says nothing
 )
@@ -25,9 +25,13 @@ Deed = Callable[[], None]  # raises WorkFailed
 
 @dataclass
 class ByHand:
-    """Motions of the arm on a floor that are no skill's; each is checked first (BadInput), then returned to be done."""
+    """Motions of the arm on a floor that are no skill's; each is checked first (BadInput), then returned to be done.
+
+    ready: gives a skill the policy that it needs; BadInput where there is none.
+    """
 
     floor: Floor
+    ready: Callable[[Skill], None]
 
     def jog(self, way_m: tuple[float, float, float]) -> Deed:
         """Move the tool along the world's axes [m]."""
@@ -36,6 +40,20 @@ class ByHand:
     def rotate(self, degrees: float) -> Deed:
         """Turn the tool on the spot."""
         return self._to(self.floor.scene.robot.tool().shifted(dyaw=radians(degrees)))
+
+    def move(self, to: str | tuple[float, float, float]) -> Deed:
+        """Move the tool straight to where a station is approached, or to a point [m]."""
+        robot, task = self.floor.scene.robot, self.floor.scene.task
+        if not isinstance(to, str):
+            return self._to(ToolPose(*to, robot.tool().yaw))
+        places = {name: None for station in task.stations for name in (station.name, way_to(task, station.name))}
+        if to not in places:
+            raise unknown("station", to, places, "move")
+        return self._to(self._surveys.approach(to))
+
+    @property
+    def _surveys(self) -> Surveys:
+        return next(iter(self.floor.skillset.skills.values())).surveys
 
     def _to(self, pose: ToolPose) -> Deed:
         robot = self.floor.scene.robot
@@ -47,9 +65,8 @@ class ByHand:
         """Bring the arm home, by free cells of the workspace."""
         floor, robot, held = self.floor, self.floor.scene.robot, self.floor.bench.held
         pose = robot.arm.forward(robot.arm.home)
-        surveys = next(iter(floor.skillset.skills.values())).surveys
         carried = "" if held is None else comes_as(floor.scene.kind_of[held].part)
-        return lambda: self._follow(by_free_cells(floor.bench, surveys, pose, carried))
+        return lambda: self._follow(by_free_cells(floor.bench, self._surveys, pose, carried))
 
     def open(self) -> Deed:
         """Open the gripper; what it holds is let go."""
@@ -72,63 +89,68 @@ class ByHand:
         return deed
 
     def grasp(self) -> Deed:
-        """Take up the part nearest to the tool, by the learned skill of the station that it is nearest to."""
+        """Take up the part nearest to the tool, wherever that is, by the learned skill of the station that it is nearest to."""
         floor = self.floor
-        bench, scene = floor.bench, floor.scene
-        if bench.held is not None:
-            raise BadInput(f"the robot holds {bench.held}: open first")
-        tool = scene.robot.tool()
-
-        def off_m(body: str) -> float:
-            at = bench.part_pose(body)
-            return hypot(at.x - tool.x, at.y - tool.y)
-
-        body = min(scene.kind_of, key=off_m, default=None)
-        if body is None or off_m(body) > NEAR_M:
-            nearest = "" if body is None else f": the nearest, {body}, is {100 * off_m(body):.0f} cm away"
-            raise BadInput(f"no part within {100 * NEAR_M:.0f} cm of the gripper{nearest}")
-        at, kind = bench.part_pose(body), scene.kind_of[body].name
-        picks = {station: skills for (own, station), skills in floor.skillset.picks.items() if own == kind}
-        if not picks:
-            raise BadInput(f"no skill of this task takes up {body}, a {kind}")
-
-        def far_m(station: str) -> float:
-            return min(hypot(at.x - s.x, at.y - s.y) for s in scene.places.spots(scene.task.station(station)))
-
-        skills = picks[min(picks, key=far_m)]
-        self._check_taught(skills)
-        return lambda: self._carry_out(skills, body)
+        if (held := floor.bench.held) is not None:
+            raise BadInput(f"the robot holds {held}: open first")
+        tool = floor.scene.robot.tool()
+        near = [
+            (self._far_m(part, (tool,)), self._far_m(body, self._spots(station)), skills, part)
+            for (kind, station), skills in floor.skillset.picks.items()
+            for body, part in self._parts(kind).items()
+        ]
+        if not near:
+            raise BadInput("no part is here that a skill of this task takes up")
+        *_, skills, part = min(near, key=lambda found: found[:2])
+        return self._carried_out(skills, part)
 
     def execute(self, name: str) -> Deed:
-        """Carry one skill out, with a part where one is named after it."""
+        """Carry one skill out, with a part where one is named after it, else the one nearest to where it takes parts up."""
         floor = self.floor
-        skills = floor.skillset.skills
+        skills, held = floor.skillset.skills, floor.bench.held
         found = next((own for own in sorted(skills, key=len, reverse=True) if f"{name} ".startswith(f"{own} ")), None)
         if found is None:
             raise unknown("skill", name, skills, "execute")
         skill, part = skills[found], name[len(found) :].strip()
         if not skill.moves_arm:
             raise BadInput(f"'{found}' is what a machine does by itself: bring a part there, and it begins")
-        bodies, held = floor.scene.kind_of, floor.bench.held
-        if part and part not in bodies:
-            raise unknown("part", part, bodies, "execute")
+        parts = self._parts(skill.kind)
+        if part and part not in floor.scene.kind_of:
+            raise unknown("part", part, floor.scene.kind_of, "execute")
+        if part and part not in parts.values():
+            raise BadInput(f"'{found}' is not done with {part}: wanted {', '.join(parts.values()) or 'no part'}")
         if skill.carries and held is None:
             raise BadInput(f"'{found}' begins with a part in the gripper: grasp one first")
         if not skill.carries and held is not None:
             raise BadInput(f"'{found}' begins with an empty gripper, and the robot holds {held}: open first")
-        if skill.carries and part not in ("", held):
-            raise BadInput(f"the robot holds {held}, not {part}")
-        self._check_taught((skill,))
-        if not part:
-            part = held or next((body for body in bodies if bodies[body].name == skill.kind), "")
-        return lambda: self._carry_out((skill,), part)
+        if skill.carries and (held not in parts or part not in ("", parts[held])):
+            raise BadInput(f"the robot holds {held}: '{found}' carries {part or f'a {skill.kind}'}")
+        if not part and parts:
+            part = parts[held or min(parts, key=lambda body: self._far_m(body, self._spots(skill.station)))]
+        return self._carried_out((skill,), part)
+
+    def _parts(self, kind: str) -> dict[str, str]:
+        """The parts that may be carried as a kind, by the body that the gripper then holds; "": none."""
+        scene = self.floor.scene
+        made = scene.task.made_as(kind).name if kind else ""
+        found = {scene.body_of(name, kind): name for name, own in scene.kind_of.items() if own.part.name == made}
+        return {body: name for body, name in found.items() if body in scene.kind_of}
+
+    def _spots(self, station: str) -> Sequence[Spot]:
+        places = self.floor.scene.places
+        return places.spots(places.task.station(station)) if station else ()
+
+    def _far_m(self, body: str, places: Sequence[Spot | ToolPose]) -> float:
+        """How far a body is from the nearest of these places across the table [m]; 0 where there are none."""
+        at = self.floor.bench.part_pose(body)
+        return min((hypot(at.x - place.x, at.y - place.y) for place in places), default=0.0)
 
     # ---- how it is done ----------------------------------------------------------------------------------------------
 
-    def _check_taught(self, skills: tuple[Skill, ...]) -> None:
+    def _carried_out(self, skills: tuple[Skill, ...], part: str) -> Deed:
         for skill in skills:
-            if skill.name not in self.floor.skillset.policies:
-                raise BadInput(f"'{skill.name}' is not learned yet: policy, or learn {skill.name}")
+            self.ready(skill)
+        return lambda: self._carry_out(skills, part)
 
     def _carry_out(self, skills: tuple[Skill, ...], part: str) -> None:
         floor = self.floor

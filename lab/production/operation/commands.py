@@ -10,6 +10,7 @@ from lab.errors import BadInput, unknown
 
 Argument = str | float | tuple[float, float, float] | tuple[int, ...] | None
 How = Literal["at once", "by hand", "in turn", "console"]
+MOST_POINT_MM = 10_000.0
 MOST_MM, MOST_DEGREES, MOST_SPEED, MOST_ENTRIES, MOST_CHARACTERS = 500.0, 180.0, 100.0, 10_000, 4000
 AXES = {"x": 0, "y": 1, "z": 2}
 _SIGN = re.compile(r"([+-])([xyz])")
@@ -118,6 +119,15 @@ def pace(text: str) -> float | None:
         raise BadInput(f"speed: {error}") from None
 
 
+def _place(rest: str) -> str | tuple[float, float, float]:
+    """A station's name, or a point [m] from millimetres."""
+    words = rest.split()
+    if len(words) != 3:
+        return _name(rest)
+    x, y, z = (_number(word, MOST_POINT_MM, "mm") / 1000 for word in words)
+    return x, y, z
+
+
 def _order(rest: str) -> tuple[int, ...]:
     words = rest.replace(",", " ").split()
     if not words:
@@ -144,13 +154,19 @@ COMMANDS: dict[str, Command] = {
     "rotate": Command(
         "15", "turn the gripper so many degrees", "by hand", lambda rest: _number(rest, MOST_DEGREES, "degrees")
     ),
+    "move": Command(
+        "plate|300 -100 450", "move the tool straight over a station, or to x y z in mm", "by hand", _place
+    ),
     "open": Command("", "open the gripper", "by hand", _nothing),
     "close": Command("", "close the gripper", "by hand", _nothing),
     "home": Command("", "bring the arm home, over everything", "by hand", _nothing),
-    "grasp": Command("", "take up the part that is nearest to the gripper", "by hand", _nothing),
+    "grasp": Command("", "take up the part that is nearest to the gripper, wherever that is", "by hand", _nothing),
     "order": Command("1 2 1 3", "make this sequence the plan, checked move by move", "in turn", _order),
     "learn": Command("NAME", "learn a skill, or a family of skills, and keep it", "in turn", _name),
     "execute": Command("NAME [PART]", "carry one skill out now", "by hand", _name),
+    "lead": Command(
+        "NAME|end|drop", "what you do by hand from now on shows a skill; end: learn from it", "by hand", _name
+    ),
     "status": Command("", "say where everything stands", "console", _nothing),
     "help": Command("", "list the commands", "console", _nothing),
     "quit": Command("", "keep everything and leave", "console", _nothing),

@@ -2,8 +2,11 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from threading import RLock
+from typing import Any
 
+from lab.advice.advisors import PYTHON, AdvisorName, RecordedAdvisor
 from lab.errors import BadInput, WorkFailed, unknown
 from lab.export.recorder import MotionRecorder
 from lab.production.composer import Production, noting
@@ -12,12 +15,15 @@ from lab.production.controls import RESET_FIRST, StopKind
 from lab.production.faults.draw import draw
 from lab.production.faults.injector import Injector
 from lab.production.floor import Floor
+from lab.production.operation.at_once import OPERATOR
 from lab.production.operation.by_hand import ByHand
 from lab.production.operation.commands import Spoken
+from lab.production.operation.lead import DROP, END, EVERY, Demonstration, Lead, led_in_words
 from lab.production.operation.typed_order import checked
 from lab.production.order import GIVEN, OrderAdvice, ordered
 from lab.production.relearning import Relearner
 from lab.production.run import teach_all
+from lab.production.run_journal import Led
 from lab.production.run_status import RunStatus
 from lab.production.taught import Taught, skill_row
 from lab.sequencing.cell.routes import part_of
@@ -25,12 +31,13 @@ from lab.sequencing.methods.exact import Optimum
 from lab.sequencing.search import SequenceResult
 from lab.sequencing.simulate.run import simulate
 from lab.sim.world import World
+from lab.skills import Skill
 from lab.skills.prepared_scene import Prepared, prepare
 from lab.skills.trial import trial_of
 from lab.tasks.fault_fields import FaultFields
 from lab.tasks.task import Order, Task, counts_from_word, in_words
 from lab.teaching.events import Event, PhaseBegan, PlanMade, SkillReady, TroubleMet
-from lab.teaching.lesson_plan import LessonPlan
+from lab.teaching.lesson_plan import Lesson, LessonPlan
 from lab.teaching.teacher import Teacher
 
 Deed = Callable[[], str]  # carries a checked command out, and says what came of it; raises WorkFailed
@@ -66,6 +73,8 @@ class OperatedScene:
         self.controls, self.journal = conditions.controls, conditions.journal
         self.leaving = self.again = self.resting = False
         self.plan: Plan | None = None
+        self.lead: Lead | None = None
+        self.demonstrations: list[dict[str, Any]] = []  # what came of each, as `Demonstration.judged`
         self.failure: str | None = None
         self.on_laid_out: Callable[[], None] = lambda: None
         self.on_step: Callable[[], None] = lambda: None
@@ -82,7 +91,7 @@ class OperatedScene:
     def _build(self, faults: Sequence[FaultFields]) -> None:
         """The floor, with nothing done on it yet."""
         self.close()
-        prepared, self.plan, self.failure = self.prepared, None, None
+        prepared, self.plan, self.lead, self.failure = self.prepared, None, None, None
         world = World()
         floor = self.floor = Floor(world, prepared.skillset, prepared.layout, prepared.order)
         self.injector = Injector(faults)
@@ -96,7 +105,7 @@ class OperatedScene:
         floor.tell = noting(floor, self.journal, self.heard, self.tell)
         floor.hand, floor.meanwhile = self._hand, lambda: self.meanwhile()
         floor.controls, floor.stops.note = self.controls, self.journal.note_stops
-        self._world, self.by_hand = world, ByHand(floor)
+        self._world, self.by_hand = world, ByHand(floor, self._ready)
         with self.lock:
             self._status = RunStatus.of(self.task, prepared.order)
         self.on_laid_out()
@@ -114,6 +123,8 @@ class OperatedScene:
 
     def _hand(self) -> bool:
         self._status.now_s, self.resting = self.floor.now_s, False
+        if self.lead is not None and self.floor.steps % EVERY == 0:
+            self.lead.see(self.floor.scene.robot.tool())
         self.on_step()
         self.check_leaving()
         return self.injector.tick(self.floor)
@@ -145,6 +156,7 @@ class OperatedScene:
             "parts": [part.name for part in self.task.made],
             "learn": [*families, *problems],
             "execute": [*problems],
+            "lead": [*problems, END, DROP],
         }
 
     def trouble(self, why: str) -> None:
@@ -156,6 +168,8 @@ class OperatedScene:
     def checked(self, said: Spoken) -> Deed:
         """What a command does, once it was checked. Raises BadInput for what may not be."""
         word, argument = said.word, said.argument
+        if word == "lead":
+            return self._lead(str(argument))
         if said.how == "by hand":
             return self._moved(word, argument)
         match word, argument:
@@ -191,7 +205,10 @@ class OperatedScene:
                 self.floor.recorder.take()  # type: ignore[union-attr]
                 if self.plan is not None:
                     self.plan.production.work.place = ""
-            return ""
+            if self.lead is None:
+                return ""
+            self.lead.see(self.floor.scene.robot.tool())
+            return self.lead.where()
 
         return moved
 
@@ -258,8 +275,35 @@ class OperatedScene:
 
         return deed
 
+    def _ready(self, skill: Skill) -> None:
+        """Give a skill the policy that the journal or the toolbox has for it, as `policy` would. BadInput where there is none."""
+        name, policies = skill.name, self.prepared.skillset.policies
+        if name in policies:
+            return
+        if (kept := self.journal.skill(name)) is not None:
+            policies[name] = kept.policy
+            return
+        teacher = replace(self.teacher, trial=trial_of(self.prepared))
+        lesson = teacher.find(self._plan(name), teacher.toolbox.index()[0])
+        if lesson is None:
+            raise BadInput(f"'{name}' is not learned yet: policy, or learn {name}")
+        self._keep(name, lesson)
+
+    def _plan(self, name: str) -> LessonPlan:
+        """How a skill is learned here."""
+        problem = self.prepared.problems[name]
+        settings = self.task.subtask(problem.subtask)
+        return LessonPlan(problem, settings.learner, settings.gate, self.task.name)
+
+    def _keep(self, name: str, lesson: Lesson) -> None:
+        """Carry a skill out by what was found or learned now, and keep that with the run."""
+        self.prepared.skillset.policies[name] = lesson.policy
+        if not self.again:
+            self.journal.keep_skill(skill_row(name, lesson), lesson.policy)
+        self.tell(SkillReady(name, lesson))
+
     def _learn(self, name: str) -> Deed:
-        problems, task = self.prepared.problems, self.task
+        problems = self.prepared.problems
         families = {problem.subtask for problem in problems.values()}
         wanted = [own for own, problem in problems.items() if name in (own, problem.subtask)]
         if not wanted:
@@ -269,17 +313,56 @@ class OperatedScene:
             teacher = replace(self.teacher, trial=trial_of(self.prepared))
             self.tell(PhaseBegan("learn", len(wanted)))
             for own in wanted:
-                problem, settings = problems[own], task.subtask(problems[own].subtask)
-                lesson = teacher.teach(LessonPlan(problem, settings.learner, settings.gate, task.name))
-                self.prepared.skillset.policies[own] = lesson.policy
-                if not self.again:
-                    self.journal.keep_skill(skill_row(own, lesson), lesson.policy)
-                self.tell(SkillReady(own, lesson))
-            if self.plan is not None and not self.plan.production.work.moves:
-                self.plan = None  # its times are those of the skills as they were
+                self._keep(own, teacher.teach(self._plan(own)))
+            self._outdate_plan()
             return f"learned {', '.join(wanted)}"
 
         return deed
+
+    def _outdate_plan(self) -> None:
+        """A plan that was not begun has the times of the skills as they were."""
+        if self.plan is not None and not self.plan.production.work.moves:
+            self.plan = None
+
+    # ---- what a person shows -----------------------------------------------------------------------------------------
+
+    def _lead(self, name: str) -> Deed:
+        """Begin to lead a skill's way by hand, end that and learn from it, or drop it."""
+        lead, skills = self.lead, self.prepared.skillset.skills
+        if name in (END, DROP):
+            if lead is None:
+                raise BadInput(f"lead {name}: nothing is led: lead NAME begins")
+            return partial(self._learn_from, lead.demonstration()) if name == END else self._dropped
+        if lead is not None:
+            raise BadInput(f"lead: '{lead.skill.name}' is led: lead {END}, or lead {DROP}, first")
+        if name not in skills:
+            raise unknown("skill", name, skills, "lead")
+        lead = Lead.of(skills[name], "lead")
+
+        def deed() -> str:
+            self.lead = lead
+            lead.see(self.floor.scene.robot.tool())
+            return lead.where()
+
+        return deed
+
+    def _dropped(self) -> str:
+        self.lead = None
+        return "forgotten"
+
+    def _learn_from(self, shown: Demonstration) -> str:
+        """Teach the skill with the demonstration as its advisor, whom the task's gate judges; what it came to, in words."""
+        name, self.lead = shown.skill.name, None
+        self.journal.keep_led(Led(self.floor.steps, name, OPERATOR, shown.said))
+        by = AdvisorName(f"led by {OPERATOR}", PYTHON, itself=RecordedAdvisor(shown.moves))
+        advising = replace(self.teacher.advising, names=(by,))
+        teacher = replace(self.teacher, advising=advising, trial=trial_of(self.prepared))
+        self.tell(PhaseBegan("learn", 1))
+        lesson = teacher.teach(self._plan(name))
+        self._keep(name, lesson)
+        self._outdate_plan()
+        self.demonstrations.append(shown.judged(lesson))
+        return led_in_words(self.demonstrations[-1])
 
     # ---- the run -----------------------------------------------------------------------------------------------------
 

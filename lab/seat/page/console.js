@@ -26,7 +26,7 @@ const seatConsole = (() => {
     ["hand", "o", "o", "open", "Open", "open the gripper"],
     ["hand", "c", "c", "close", "Close", "close the gripper"],
     ["hand", "h", "h", "home", "Home", "bring the arm home, over everything"],
-    ["hand", "g", "g", "grasp", "Grasp here", "take up the part that is nearest to the gripper"],
+    ["hand", "g", "g", "grasp", "Grasp nearest", "take up the part that is nearest to the gripper, wherever that is"],
   ];
   // Key, its name on the button, what is said before the number that is chosen, where it is chosen, label, what it does, place
   const JOGS = [
@@ -39,7 +39,7 @@ const seatConsole = (() => {
     ["[", "[", "rotate -", "run-degrees", "↷ turn", "turn the gripper clockwise", "1 / 1"],
     ["]", "]", "rotate +", "run-degrees", "↶ turn", "turn the gripper the other way", "1 / 3"],
   ];
-  const FIELDS = { k: "parts", d: "order", l: "learn", e: "execute" };
+  const FIELDS = { k: "parts", d: "order", l: "learn", e: "execute", t: "lead" };
   const el = (id) => document.getElementById(id);
   const { make } = seatStatus;
   const buttons = [];
@@ -218,7 +218,7 @@ const seatConsole = (() => {
     const text = JSON.stringify(state.run.names);
     if (text === names) return;
     names = text;
-    for (const word of ["learn", "execute"]) {
+    for (const word of ["learn", "execute", "lead"]) {
       el(`run-${word}-names`).replaceChildren(...(state.run.names[word] || []).map((name) => Object.assign(make("option"), { value: name })));
     }
     const [kind] = state.run.names.parts || [];

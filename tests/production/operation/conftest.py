@@ -43,12 +43,12 @@ def heard() -> list[Event]:
 
 @pytest.fixture
 def made(brisk: Task, toolbox: Toolbox, heard: list[Event], tmp_path: Path) -> Iterator[Made]:
-    """A new operation with so many slices, its journal in a folder of that name."""
+    """A new operation with so many slices, its journal in a folder of that name; box: another toolbox than the shared one."""
     all_made: list[tuple[Operation, RunJournal]] = []
 
-    def make(parts: int = 1, folder: str = "run") -> Operation:
+    def make(parts: int = 1, folder: str = "run", box: Toolbox = toolbox) -> Operation:
         journal = RunJournal.begin(tmp_path / folder, RunBegan({}, brisk.name, ""))
-        teacher = Teacher(toolbox, tell=heard.append)
+        teacher = Teacher(box, tell=heard.append)
         operation = Operation(brisk, brisk.order(parts), 0, teacher, Conditions(journal=journal))
         all_made.append((operation, journal))
         return operation

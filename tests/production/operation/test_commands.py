@@ -19,6 +19,9 @@ from lab.production.operation.commands import COMMANDS, MOST_MM, Spoken, help_li
         ("speed 4", Spoken("speed", 4.0, "speed 4")),
         ("order 1 2, 1", Spoken("order", (1, 2, 1), "order 1 2, 1")),
         ("parts slice=2 cup=1", Spoken("parts", "slice=2,cup=1", "parts slice=2 cup=1")),
+        ("move plate", Spoken("move", "plate", "move plate")),
+        ("move 300 -100 450", Spoken("move", (0.3, -0.1, 0.45), "move 300 -100 450")),
+        ("lead end", Spoken("lead", "end", "lead end")),
         ("learn insert at toaster", Spoken("learn", "insert at toaster", "learn insert at toaster")),
     ],
 )
@@ -44,6 +47,8 @@ def test_a_line_is_understood(line: str, said: Spoken) -> None:
         ("order 0", "entry 1, '0'"),
         ("parts 2", "wanted kind=number, such as slice=2,cup=1"),
         ("learn", "learn: no name after it"),
+        ("move", "move: no name after it"),
+        ("move 1 2 99999", "99999: allowed are -10000 to 10000 mm"),
         ("run " + 5000 * "x", "4000 characters at the most"),
     ],
 )

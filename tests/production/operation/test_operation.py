@@ -8,11 +8,15 @@ from typing import Any
 
 import pytest
 
+from lab.production.conditions import Conditions
 from lab.production.operation.desk import AT_WORK, Desk
 from lab.production.operation.operation import Operation
-from lab.production.run_journal import Commanded, read_run
+from lab.production.run_journal import Commanded, SkillKept, read_run
 from lab.sim.world import TIME_STEP
-from lab.teaching.events import Event, MoveMade, OperatorActed, PlanMade
+from lab.tasks.task_file import load
+from lab.teaching.events import Event, MoveMade, OperatorActed, PlanMade, SkillReady
+from lab.teaching.teacher import Teacher
+from lab.toolbox.registry import Toolbox
 
 PATIENCE_S = 60.0
 Made = Callable[..., Operation]
@@ -67,20 +71,21 @@ def test_the_tool_goes_where_it_is_jogged(made: Made) -> None:
 
 
 def test_what_may_not_be_is_refused_and_nothing_moves(made: Made, tmp_path: Path, heard: list[Event]) -> None:
-    operation = made()
+    operation = made(box=Toolbox(tmp_path / "empty"))
     operation.open()
     for _ in range(5):
         operation.do("jog +x 500")
     before, steps = poses(operation), operation.scene.floor.steps
     for line, why in (
         ("jog +x 500", "out of the arm's reach"),
-        ("grasp", "no part within 20 cm of the gripper: the nearest, slice 1, is"),
+        ("grasp", "'grasp at plate' is not learned yet: policy, or learn grasp at plate"),
         ("run", "there is no plan yet: policy finds one"),
         ("order 1", "there is no plan yet"),
         ("execute insert at toaster", "begins with a part in the gripper"),
         ("execute grasp at plate", "'grasp at plate' is not learned yet: policy, or learn grasp at plate"),
         ("execute butter at butter_applier", "what a machine does by itself"),
         ("execute grasp at plate slice 9", "unknown part 'slice 9'"),
+        ("execute transfer toaster_buffer to plate slice 1", "is not done with slice 1: wanted no part"),
         ("learn insrt", "did you mean 'insert'?"),
         ("parts slice=0", "0 parts"),
         ("parts cup=1", "unknown part 'cup'"),
@@ -145,6 +150,74 @@ def test_what_was_grasped_by_hand_is_brought_on_first(made: Made) -> None:
     assert operation.do("jog +z 40").well
     done = operation.do("run")
     assert done.said == "1 of 1 parts made", done
+
+
+def test_what_the_toolbox_holds_is_carried_out_without_a_plan(made: Made, toolbox: Toolbox) -> None:
+    learned = made()
+    learned.open()
+    assert learned.do("policy").well
+    operation = made(folder="again")
+    operation.open()
+    for line in (
+        "home",
+        "grasp",
+        "home",
+        "execute transfer plate to insert with slice",
+        "execute insert at toaster",
+        "home",
+        "execute transfer toaster_buffer to plate",
+        "execute grasp at toaster",
+    ):
+        assert operation.do(line).well, operation.done[-1]
+    assert operation.scene.plan is None
+    assert operation.scene.floor.bench.held == "slice 1"
+    kept = operation.scene.journal.path
+    assert kept is not None
+    rows = [entry.row for entry in read_run(kept.parent, "test")[1] if isinstance(entry, SkillKept)]
+    assert [(row["name"], row["source"]) for row in rows][:2] == [
+        ("grasp at plate", "reused"),
+        ("transfer plate to insert with slice", "reused"),
+    ]
+
+
+def test_a_skill_takes_the_part_at_its_own_station(made: Made) -> None:
+    operation = made(2)
+    operation.open()
+    assert operation.do("execute grasp at plate slice 2").well
+    assert operation.do("execute transfer plate to insert with slice").well
+    assert operation.do("execute insert at toaster").well
+    assert operation.do("execute grasp at toaster").well
+    assert operation.scene.floor.bench.held == "slice 2"
+
+
+def test_a_skill_refuses_another_kind_of_part_than_its_own(tmp_path: Path) -> None:
+    task = load("breakfast")
+    operation = Operation(task, task.order(None), 0, Teacher(Toolbox(tmp_path / "box")), Conditions())
+    operation.open()
+    try:
+        assert (
+            "'grasp cup at shelf' is not done with slice 1: wanted cup 3"
+            in operation.do("execute grasp cup at shelf slice 1").refused
+        )
+        operation.scene.floor.bench.held = "cup 3"
+        assert (
+            "the robot holds cup 3: 'insert slice at toaster' carries a slice"
+            in operation.do("execute insert slice at toaster").refused
+        )
+    finally:
+        operation.close()
+
+
+def test_what_was_learned_after_a_plan_is_in_the_next(made: Made, heard: list[Event]) -> None:
+    operation = made()
+    operation.open()
+    assert operation.do("policy").well
+    assert operation.do("learn grasp at plate").well
+    policy = operation.scene.prepared.skillset.policies["grasp at plate"]
+    heard.clear()
+    assert operation.do("policy").well
+    assert operation.scene.prepared.skillset.policies["grasp at plate"].created == policy.created
+    assert {e.lesson.source for e in heard if isinstance(e, SkillReady)} == {"reused"}
 
 
 def test_a_skill_is_learned_by_its_name_and_kept(made: Made) -> None:
