@@ -151,7 +151,7 @@ def audit_summary(document: Mapping[str, Any]) -> RenderableType:
     ]
     claimed, delivered = len(document["claimed"]), len(document["delivered"])
     lines = [Text(f"{one['part']}: {one['words']}") for one in document["findings"]]
-    said = f"{delivered} of {counted(claimed, 'part')} said to be delivered are"
+    said = f"delivered: {delivered} of the {counted(claimed, 'part')} that the run calls so"
     return Group(table_of(rows, ("part", "station", "from_s", "to_s", "stood_s")), *lines, Text(said))
 
 
