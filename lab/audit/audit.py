@@ -20,6 +20,7 @@ class Audit:
     delivered: tuple[str, ...]
     findings: tuple[Finding, ...]
     parts: tuple[PartSeen, ...]
+    struck: tuple[Struck, ...] = ()
 
     @property
     def failure(self) -> str | None:
@@ -31,12 +32,14 @@ class Audit:
         return f"audit: {about}{f' (and {more} more)' if more else ''}"
 
     def to_json(self) -> dict[str, Any]:
-        """`claimed` and `delivered`, names; `findings`: rule, part, station, at_s, words; `stays`: part, station, from when to
-        when [s] it stood there."""
+        """`claimed` and `delivered`: names. `struck`: the faults, each what, part, station. `findings`: rule, part, station,
+        at_s, words. `stays`: part, station, from when to when [s] it stood there.
+        """
         stays = [{"part": seen.name} | asdict(stay) for seen in self.parts for stay in seen.stays]
         return {
             "claimed": list(self.claimed),
             "delivered": list(self.delivered),
+            "struck": [asdict(one) for one in self.struck],
             "findings": [asdict(one) for one in self.findings],
             "stays": [{k: round(v, 3) if isinstance(v, float) else v for k, v in row.items()} for row in stays],
         }
@@ -48,7 +51,7 @@ def audit(evidence: Evidence) -> Audit:
     guilty = {one.part for one in found}
     claimed = tuple(seen.name for seen in evidence.parts if seen.name in evidence.claimed)
     delivered = tuple(name for name in claimed if name not in guilty)
-    return Audit(claimed, delivered, found, tuple(evidence.parts))
+    return Audit(claimed, delivered, found, tuple(evidence.parts), tuple(evidence.struck))
 
 
 def kept_evidence(folder: Path, task: Task, order: Order) -> Evidence:
@@ -60,7 +63,7 @@ def kept_evidence(folder: Path, task: Task, order: Order) -> Evidence:
     try:
         run = json_of(read_limited(folder / "run.json"))
         claimed = [str(name) for name in run["audit"]["claimed"]]
-        struck = [Struck(str(one["what"]), str(one["part"]), str(one["station"])) for one in run["faults"]]
+        struck = [Struck(str(one["what"]), str(one["part"]), str(one["station"])) for one in run["audit"]["struck"]]
         rows = measured_rows(read_limited(folder / "schedule.csv").decode())
     except OSError as error:
         raise BadInput(f"{where}: '{error.filename}' cannot be read: {error.strerror or error}") from None

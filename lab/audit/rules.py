@@ -2,6 +2,7 @@
 
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import combinations
 from math import atan2, cos, hypot, sin
 from typing import Any
 
@@ -15,6 +16,8 @@ from lab.tasks.task_fields import Stage
 SLACK_S = 0.25  # two frames, and what rounding does
 UPRIGHT = 0.985  # cosine of the tilt, ten degrees, that a part may have at the end of its route
 ON_SPOT_M = 0.02  # a part this near to a spot that the file names stands on it
+TAKES_S = 4.0  # the gripper may be so long at a part before it stands free, and before it leaves
+BETWEEN_M = 0.002  # by so much two parts may stand in one another: what is recorded is not finer
 RESTS_M = 0.001  # a head that moves less from one frame to the next rests
 SEVERAL_FRAMES = 3  # in a row, for what a single frame may show by chance
 
@@ -93,6 +96,7 @@ def findings(evidence: Evidence) -> list[Finding]:
         found += _schedule(evidence, seen)
     found += _capacities(evidence)
     found += _gripper(evidence)
+    found += _in_one_another(evidence)
     return sorted(found, key=lambda one: one.at_s)
 
 
@@ -151,11 +155,10 @@ def _times(evidence: Evidence, seen: PartSeen, stage: Stage, stay: Stay, work_s:
         return
     slow = any(one.what.startswith("machine") and one.station == where for one in evidence.struck)
     learned = evidence.task.station(where).process is not None
-    done_s = stay.start_s + work_s
-    if (slow or learned) and own:
-        done_s = own[-1]["end_s"]
-    in_hand_s = sum(_overlap(row, stay) for row in evidence.own_rows(seen.name, "carry"))
-    late_s = stay.end_s - done_s - in_hand_s
+    begun_s = max([stay.start_s, *(row["start_s"] for row in own if row["start_s"] < stay.start_s + TAKES_S)])
+    done_s = own[-1]["end_s"] if (slow or learned) and own else begun_s + work_s
+    taken = [_overlap(row, stay) for row in evidence.own_rows(seen.name, "carry") if row["start_s"] >= done_s - SLACK_S]
+    late_s = stay.end_s - done_s - min(sum(taken), TAKES_S)
     if late_s > at_most_s + SLACK_S:
         words = f"stayed in '{where}' for {late_s:.1f} s after it was done, allowed are {at_most_s:g}"
         yield Finding("window", seen.name, where, done_s + at_most_s, words)
@@ -287,6 +290,22 @@ def _gripper(evidence: Evidence) -> Iterator[Finding]:
         for name in names:
             words = f"{' and '.join(names)} are carried at once at {at_s:.1f} s, by one gripper"
             yield Finding("gripper", name, "", at_s, words)
+
+
+def _in_one_another(evidence: Evidence) -> Iterator[Finding]:
+    """No two parts are in one place: the circles within their feet, and their heights, do not overlap."""
+    tracks = evidence.tracks
+    own = [(seen, tracks.number(seen.name)) for seen in evidence.parts if tracks.number(seen.name) >= 0]
+    for (one, a), (other, b) in combinations(own, 2):
+        off = np.abs(tracks.poses[:, a, :3] - tracks.poses[:, b, :3])
+        sizes = [tracks.high[body] - tracks.low[body] for body in (a, b)]
+        within = sum(min(size[:2]) / 2 for size in sizes) - BETWEEN_M
+        level = off[:, 2] < sum(size[2] / 2 for size in sizes) - BETWEEN_M
+        for first in _lasting(level & (np.hypot(off[:, 0], off[:, 1]) < within)):
+            at_s = float(tracks.times_s[first])
+            for seen in (one, other):
+                words = f"{one.name} and {other.name} are in one place at {at_s:.1f} s"
+                yield Finding("overlap", seen.name, "", at_s, words)
 
 
 def _lasting(mask: Mask) -> list[int]:

@@ -40,7 +40,7 @@ COMMANDS = {  # what is typed after `lab` -> the command
     ),
     "operate": Command(
         "operate",
-        "Run a task by hand: order, pause, stop, jog, grasp, learn, in a live console, on a page, or from a pipe.",
+        "Run a task by hand: order, pause, stop, jog, lead, grasp, learn, in a live console, on a page, or from a pipe.",
         "lab operate toast --toasts 2",
     ),
     "teach": Command(

@@ -46,7 +46,10 @@ def _unseen() -> None:
 
 @dataclass
 class _UnderWay:
-    """The times [s] of a move under way; leg: what of the carrying comes next; smooth: nothing had to be done twice."""
+    """The times [s] of a move under way; leg: what of the carrying comes next; smooth: nothing had to be done twice.
+
+    picked: when it reached its part, was served and took it up for the first time; None: not yet.
+    """
 
     what: tuple[str, Carried]
     start: str
@@ -56,6 +59,7 @@ class _UnderWay:
     pick_s: float = 0.0
     leg: int = 0
     smooth: bool = True
+    picked: tuple[float, float, float] | None = None
 
 
 @dataclass
@@ -125,6 +129,7 @@ class Transfers:
             move.pick_s = floor.now_s
             self.check_window(part)
             self._take_up(name, way, spot)
+            move.picked = move.picked or (move.reach_s, move.served_s, move.pick_s)
         else:
             move.smooth = False  # it was taken up before this move, or before it was interrupted
         self._bring(way, spot, move)
@@ -176,7 +181,8 @@ class Transfers:
         for body in floor.scene.bodies_of(name, way.kind):
             self.spot_of[body] = spot
         planned = self.plan.move(decision)
-        times_s = move.leave_s, move.reach_s, move.pick_s, floor.now_s, planned.process_s, move.pick_s - move.served_s
+        reach_s, served_s, pick_s = move.picked or (move.reach_s, move.served_s, move.pick_s)
+        times_s = move.leave_s, reach_s, pick_s, floor.now_s, planned.process_s, pick_s - served_s
         self.moves.append(Move(part, move.start, way.origin, way.target, *times_s, planned.carries))
         if planned.carries == "part":
             self._last[name] = way, spot, planned.process_s

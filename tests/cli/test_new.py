@@ -57,7 +57,7 @@ def test_thin_parts_of_an_own_mass_and_a_machine_for_two(lab: Lab, folder: Path)
 
 
 def test_a_refusal_says_the_mass_that_would_do(lab: Lab, folder: Path) -> None:
-    words = "new x --part pin=cylinder:0.008x0.03:1"
+    words = "new x --part pin=box:0.008x0.008x0.03:1"
     refused = lab(*words.split(), "--mass", "pin=0.005").err.strip()
     (wanted,) = re.findall("held with --mass (pin=[0-9.]+)$", refused)
     assert lab(*words.split(), "--mass", wanted).code == 0
