@@ -245,6 +245,11 @@ class Task(Record):
                     f"station '{station.name}': places: height_m: parts are taken from it, and one below another cannot be: "
                     "layers are for stations where routes end"
                 )
+            if station.is_layered and self.perception == "camera":
+                raise BadInput(
+                    f"station '{station.name}': places: height_m: with perception = 'camera' the outline of a part is not told "
+                    "from that of the part below it: wanted perception = 'truth', or one layer"
+                )
             for place in station.places or ():
                 if place.kind is None:
                     continue

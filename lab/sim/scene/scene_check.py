@@ -255,5 +255,6 @@ def _ground(places: Places, station: Station, parts: int) -> list[Rectangle]:
     def around(spot: Spot) -> Rectangle:
         return Rectangle(spot.x, spot.y, along, across, spot.yaw)
 
-    found = [around(spot) for spot in places.spots(station)[:parts]]
+    spots = places.spots(station)
+    found = [around(spot) for spot in (spots if station.places is not None else spots[:parts])]
     return [*found, places.body(station, parts)] if station.kind == "machine" else found
