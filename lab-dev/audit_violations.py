@@ -219,6 +219,22 @@ def window_overrun(evidence: Evidence, rng: np.random.Generator) -> Violated:
     return Violated(own, seen.name, ("window",), f"{seen.name} stays in {stay.station} for {over_s:.1f} s too long")
 
 
+def head_idle(evidence: Evidence, rng: np.random.Generator) -> Violated:
+    """A machine's head leaves out what it should cover from a time on."""
+    stays = [
+        (seen, stay)
+        for seen in evidence.parts
+        for stay in seen.stays
+        if seen.name in evidence.claimed and evidence.task.station(stay.station).process is not None
+    ]
+    seen, stay = drawn(rng, stays)
+    own = copied(evidence)
+    head, during = own.tracks.number(f"{stay.station} head"), _during(evidence, stay)
+    first = int(rng.integers(len(during) // 10, len(during) * 2 // 3))
+    own.tracks.poses[during[first:], head] = own.tracks.poses[during[0], head]
+    return Violated(own, seen.name, ("process",), f"the head of {stay.station} stops over {seen.name}")
+
+
 def tilted(evidence: Evidence, rng: np.random.Generator) -> Violated:
     """A part leans at the end."""
     seen = drawn(rng, [seen for seen in evidence.parts if seen.name in evidence.claimed])
@@ -277,7 +293,7 @@ def row_lost(evidence: Evidence, rng: np.random.Generator) -> Violated:
 
 
 VIOLATIONS: tuple[Callable[[Evidence, np.random.Generator], Violated], ...] = (
-    *(time_cut, time_hidden, station_swapped, station_left_out, overfull, window_overrun, tilted, elsewhere),
+    *(time_cut, time_hidden, station_swapped, station_left_out, overfull, window_overrun, head_idle, tilted, elsewhere),
     *(two_in_hand, row_moved, row_lost),
 )
 

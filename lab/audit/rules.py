@@ -15,6 +15,7 @@ from lab.tasks.task_fields import Stage
 SLACK_S = 0.25  # two frames, and what rounding does
 UPRIGHT = 0.985  # cosine of the tilt, ten degrees, that a part may have at the end of its route
 ON_SPOT_M = 0.02  # a part this near to a spot that the file names stands on it
+RESTS_M = 0.001  # a head that moves less from one frame to the next rests
 SEVERAL_FRAMES = 3  # in a row, for what a single frame may show by chance
 
 
@@ -124,6 +125,7 @@ def _along(evidence: Evidence, seen: PartSeen, route: Sequence[Stage]) -> Iterat
         stay, place, before = stays[chosen], chosen + 1, stage.station
         if work_s is not None:
             yield from _times(evidence, seen, stage, stay, work_s)
+            yield from _covered(evidence, seen, stage.station, stay)
     if stays[place:] and evidence.undisturbed(seen.name) and not _repeated(stays[place:], before, route[-1]):
         words = f"went on to '{stays[place].station}' after the end of its route, '{before}'"
         yield Finding("route", seen.name, stays[place].station, stays[place].start_s, words)
@@ -157,6 +159,29 @@ def _times(evidence: Evidence, seen: PartSeen, stage: Stage, stay: Stay, work_s:
     if late_s > at_most_s + SLACK_S:
         words = f"stayed in '{where}' for {late_s:.1f} s after it was done, allowed are {at_most_s:g}"
         yield Finding("window", seen.name, where, done_s + at_most_s, words)
+
+
+def _covered(evidence: Evidence, seen: PartSeen, where: str, stay: Stay) -> Iterator[Finding]:
+    """A head that covers a side of the part rested before each cell of it, rows up and columns across, for its time."""
+    tracks, name = evidence.tracks, evidence.task.station(where).process
+    head, body = tracks.number(f"{where} head"), tracks.number(seen.name)
+    if name is None or head < 0:
+        return
+    process = evidence.task.processes[name]
+    during = np.flatnonzero((tracks.times_s >= stay.start_s) & (tracks.times_s <= stay.end_s))
+    at = tracks.inside(body, tracks.poses[:, head, :3])[during][:, [2, 0]]  # up and across, off the part
+    steps = np.diff(at, axis=0)
+    rests_s = np.where(np.linalg.norm(steps, axis=1) < RESTS_M, np.diff(tracks.times_s[during]), 0.0)
+    low, cell = tracks.low[body, [2, 0]], (tracks.high[body] - tracks.low[body])[[2, 0]] / process.grid
+    numbers = np.floor((at[1:] - low) / cell).astype(int)
+    missed = [
+        one
+        for one in np.ndindex(*process.grid)
+        if rests_s[(numbers == one).all(axis=1)].sum() < process.dwell_s - SLACK_S
+    ]
+    if missed:
+        words = f"{len(missed)} of {process.grid[0] * process.grid[1]} cells were not covered in '{where}'"
+        yield Finding("process", seen.name, where, stay.end_s, words)
 
 
 def _overlap(row: dict[str, Any], stay: Stay) -> float:

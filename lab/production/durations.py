@@ -23,7 +23,7 @@ from lab.sim.world import TIME_STEP, World, engine
 from lab.skills import Skill
 from lab.skills.prepared_scene import Prepared
 from lab.skills.skill import Status
-from lab.skills.skillset import Carried, Pair, SkillSet, products, stations
+from lab.skills.skillset import Carried, Pair, SkillSet, products, stations, ways_of
 from lab.tasks.task import Order, Task
 from lab.toolbox.policy import Policy
 from lab.toolbox.registry import Toolbox
@@ -182,7 +182,7 @@ def spots_in_use(prepared: Prepared, skill: Skill) -> tuple[Spot, ...]:
     first, *others = places.spots(station, kind)
     if not skill.carries and task.starts(kind) == station.name:
         begins = (spot for name, spot in zip(order, places.begins(order), strict=True) if name == kind)
-        return tuple(begins)
+        return tuple(begins) or (first,)
     routes = {name: task.part(name).routes for name in order}
     parts = sum(station.name in task.part(n).places and task.share_places(station.name, n, kind) for n in order)
     waits = all(stage.station != station.name for own in routes.values() for route in own for stage in route)
@@ -289,7 +289,8 @@ def cell_of(task: Task, durations: Durations, order: Order) -> Cell:
     wanted = [part for part in task.made if part.name in order]
     shared: dict[Pair, list[float]] = {}
     for way, seconds in durations.loaded_s.items():
-        shared.setdefault(way[:2], []).extend([seconds] * order.count(task.made_as(way.kind).name))
+        carried = sum(any(own.kind == way.kind for own in ways_of(task.part(name))) for name in order)
+        shared.setdefault(way[:2], []).extend([seconds] * carried)
     tables = []
     for times in (durations.empty_s, {pair: sum(all_s) / len(all_s) for pair, all_s in shared.items()}):
         table = np.full((len(names), len(names)), np.nan)

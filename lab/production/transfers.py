@@ -1,7 +1,7 @@
 """One decision at a time: go to a part, wait for its machine, take it up, carry it on; from whatever state was reached."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import hypot
 
 from lab.production.durations import TimedMove
@@ -16,6 +16,7 @@ from lab.sequencing.cell.schedule import Move
 from lab.sequencing.simulate.run import Run
 from lab.sim.parts.kinds import Spot, comes_as, on_its_pallet
 from lab.sim.scene.scene import pallet_of
+from lab.sim.world import TIME_STEP
 from lab.skills import Skill
 from lab.skills.free_way import by_free_cells
 from lab.skills.skill import Status
@@ -306,8 +307,20 @@ class Transfers:
             self._do(skill.aim(name, spot), name, near)
         self.place = near
         if near in self.floor.machines and near == way.origin:
+            self._note_work(name)
             self.floor.machines[near].clear(name)
         assert bench.held == body
+
+    def _note_work(self, name: str) -> None:
+        """Write down for how long a machine has really worked on a part that is taken out of it."""
+        work = self.floor.work_on(name)
+        own = [n for n, move in enumerate(self.moves) if move.carries == "part" and self.name(move.part) == name]
+        if work is None or not own or not work.done(self.floor.now_s):
+            return
+        brought = self.moves[own[-1]]
+        worked_s = work.until_s - brought.drop_s
+        if abs(worked_s - brought.process_s) > TIME_STEP:
+            self.moves[own[-1]] = replace(brought, process_s=worked_s)
 
     def _bring(self, way: Carried, spot: Spot, move: _UnderWay) -> None:
         """Carry what is in the gripper to its target and set it down; from a station near the target, that is all."""

@@ -13,6 +13,7 @@ from lab.audit.rules import Evidence, Struck
 from lab.audit.tracks import BodyTracks, packed, read_tracks
 from lab.errors import BadInput
 from lab.tasks.task import Task
+from lab.tasks.task_fields import Process
 
 HALF_M = 0.02  # of a cube's edge
 TOPS = {"in": 0.01, "oven": 0.05, "out": 0.01}  # [m]
@@ -297,3 +298,31 @@ def test_only_measured_rows_are_evidence() -> None:
     assert (row["part"], row["start_s"], row["end_s"]) == ("cube 1", 2.0, 4.0)
     with pytest.raises((ValueError, KeyError)):
         measured_rows(header + "cube 1,cube,carry,in,oven,robot,robot,soon,4,measured\n")
+
+
+def test_a_head_that_leaves_cells_out() -> None:
+    """A head rests for 3 s before each of two cells, one over the other, of the side of a cube in the oven; then before one."""
+    case = evidence((ONE,))
+    tracks, times_s = case.tracks, case.tracks.times_s
+    low = np.where((times_s >= 10) & (times_s < 13.5), 0.01, 0.03)  # [m] above the oven
+    for middle, found_ in ((low, []), (np.full(len(times_s), 0.03), [("process", "cube 1", "oven")])):
+        head = np.zeros((len(times_s), 1, 7))
+        head[:, 0, :3] = np.stack(
+            [np.full(len(times_s), 0.6), np.full(len(times_s), -0.1), TOPS["oven"] + middle], axis=1
+        )
+        head[:, 0, 6] = 1.0
+        half = np.full((1, 3), 0.01)
+        own = BodyTracks(
+            (*tracks.names, "oven head"),
+            times_s,
+            np.concatenate([tracks.poses, head], axis=1),
+            np.concatenate([tracks.low, -half]),
+            np.concatenate([tracks.high, half]),
+        )
+        stations = [
+            station.model_copy(update={"process": "glue", "processing_s": None}) if station.name == "oven" else station
+            for station in case.task.stations
+        ]
+        process = Process(grid=(2, 1), dwell_s=3.0)
+        task = case.task.model_copy(update={"stations": tuple(stations), "processes": {"glue": process}})
+        assert found(Evidence(task, case.order, own, case.rows, case.claimed)) == found_

@@ -51,6 +51,7 @@ RUN_FIELDS = (
         "timed_s",
         "faults",
         "outcome",
+        "audit",
         "interrupted",
         "receipts",
         "cyclic",

@@ -20,6 +20,7 @@ COUNTED = np.array([1.0, 1.0, 1.0, YAW_ARM])  # of a tool pose
 ROUNDINGS_M = (0.002, 0.004, 0.008, 0.015, 0.02, 0.03, 0.04, 0.05)  # as few as a controller's position levels
 _NEAR_M = 1e-9
 _STRAIGHT_RAD = 1e-4  # a corner that bends less is none
+_BACK_RAD = 3.0  # a corner that bends more is a way back
 _TURNED_RAD = 0.01  # a line that turns the tool by more is no part of a corner that is rounded
 _PARTS = 8  # of an arc, each with one acceleration along it
 
@@ -96,13 +97,14 @@ def roundings(corners: Array, blends: Array) -> Array:
     """How far before and behind each of counted poses (n, 4), all `bending`, the arc begins and ends (n,) [m]; 0 at both ends.
 
     It is the largest of ROUNDINGS_M that is no more than half a blend (n,) [m] and half of the shorter line beside it, or 0,
-    as where a line beside it turns the tool.
+    as where a line beside it turns the tool, or the path turns back.
     """
     halves = np.linalg.norm(np.diff(corners, axis=0), axis=1) / 2.0
     room = np.zeros(len(corners))
     room[1:-1] = np.minimum(blends[1:-1] / 2.0, np.minimum(halves[:-1], halves[1:])) + _NEAR_M
     turns = np.abs(np.diff(corners[:, 3])) > YAW_ARM * _TURNED_RAD
-    room[1:-1][turns[:-1] | turns[1:]] = 0.0
+    back = [_turn(corners[at : at + 3]) > _BACK_RAD for at in range(len(corners) - 2)]
+    room[1:-1][turns[:-1] | turns[1:] | np.array(back, bool)] = 0.0
     return np.array([0.0, *ROUNDINGS_M])[np.searchsorted(ROUNDINGS_M, room, side="right")]
 
 

@@ -20,7 +20,9 @@ SLOW = 0.6  # of the robot's speed and acceleration, as skills rise with a part
 MARGIN = 6.0  # times what friction needs a force is chosen; measured: with 2.5 parts are lost where they touch machines
 USUAL_N = 25.0  # chosen where friction needs less, unless a part is lighter than this is gentle to
 GENTLE_N_KG = 1000.0  # at most for each kilogram: pressed harder, light parts creep in physics, or are squeezed out
-GENTLE_ROUND_N_KG = 150.0  # the same of a cylinder or a hull, touched in lines and points; measured: 100 to 200 do
+GENTLE_ROUND_N_KG = (
+    150.0  # the same of a cylinder or a hull, touched in lines and points; picked among twenty drawn parts
+)
 GENTLE_N, USUAL_KG = 50.0, (0.02, 0.35)  # with a stronger grip, or others, forces are not found in a usual step
 STAYS = 2.0  # times the acceleration friction holds a part on a pallet that is far from sliding off
 ROUGH = 0.5  # friction from which on what holds by the numbers has always held

@@ -38,9 +38,10 @@ def check_held(robot: RobotSettings, arm: Arm, kinds: Sequence[Kind], way_m: flo
     way_m: how far parts are carried at most [m].
     """
     fine, laps = needs_fine(robot, kinds), max(1, ceil(way_m / LAP_M))
-    for kind in kinds:
-        load = Load.of(kind)
+    loads = [Load.of(kind) for kind in kinds]
+    for load in loads:
         check_friction(robot, load)
+    for kind, load in zip(kinds, loads, strict=True):
         force_n = grip_force_n(robot, load)
         if load.is_usual(force_n, robot.acceleration_m_s2) and not robot.is_file:
             continue

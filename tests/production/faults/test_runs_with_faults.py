@@ -79,3 +79,15 @@ def test_what_nobody_saw_is_said(run_with: Any) -> None:
         why.endswith("was taken out of 'toaster': whether it was done there was not seen") for why in outcome.retries
     )
     assert outcome.verdict(NAMES).unexplained == ()
+
+
+def test_the_schedule_says_how_long_a_slow_machine_took(run_with: Any) -> None:
+    outcome = run_with({"what": "machine slow", "station": "toaster", "share": 1.5})
+    toasted = [
+        row.end_s - row.start_s
+        for row in outcome.schedule.machines
+        if (row.resource, row.kind) == ("toaster", "process")
+    ]
+    assert toasted == pytest.approx([90.0, 90.0], abs=0.1)
+    assert outcome.delivered == (1, 2)
+    assert outcome.audit.findings == ()
