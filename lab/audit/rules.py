@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from lab.audit.stays import Mask, PartSeen, Stay, pallet_of, parts_seen
+from lab.audit.stays import HIGH_M, LOW_M, Mask, PartSeen, Stay, floor_of, pallet_of, parts_seen
 from lab.audit.tracks import Array, BodyTracks
 from lab.tasks.task import Order, Task
 from lab.tasks.task_fields import Stage
@@ -205,17 +205,53 @@ def _end(evidence: Evidence, seen: PartSeen) -> Iterator[Finding]:
     if tracks.up(body)[-1] < UPRIGHT:
         yield Finding("end", seen.name, last, end_s, f"is tilted in the end at '{last}'")
     x, y, _ = tracks.poses[-1, body, :3]
-    spots = task.station(last).spots
-    if spots is not None:
-        place = _off_pose(evidence, last, tracks.inside(tracks.number(last), tracks.poses[:, body, :3])[-1])
-        off_m = min(hypot(place[0] - spot[0], place[1] - spot[1]) for spot in spots)
-        if off_m > ON_SPOT_M:
-            yield Finding("end", seen.name, last, end_s, f"stands {off_m:.3f} m off the spots of '{last}' in the end")
     carrier = tracks.number(pallet_of(seen.name))
+    for words in _place(evidence, seen, last, body if carrier < 0 else carrier):
+        yield Finding("end", seen.name, last, end_s, words)
     if carrier >= 0:
         under = tracks.poses[-1, carrier, :2]
         if hypot(x - under[0], y - under[1]) > ON_SPOT_M:
             yield Finding("end", seen.name, last, end_s, f"does not stand on its pallet in the end at '{last}'")
+
+
+def _place(evidence: Evidence, seen: PartSeen, last: str, body: int) -> Iterator[str]:
+    """What is wrong in the end with where a part, or its pallet `body`, stands at a station whose places the file gives."""
+    station, tracks = evidence.task.station(last), evidence.tracks
+    x, y = _off_pose(evidence, last, tracks.inside(tracks.number(last), tracks.poses[:, body, :3])[-1])
+    foot_m = tracks.poses[-1, body, 2] + tracks.low[body, 2] - floor_of(station, tracks)[-1]
+    level = [one for one in station.own_places if LOW_M <= foot_m - one.height_m <= HIGH_M]
+    if not level:
+        return
+    near = min(level, key=lambda one: hypot(x - one.at[0], y - one.at[1]))
+    off_m = hypot(x - near.at[0], y - near.at[1])
+    here = [one for one in level if hypot(x - one.at[0], y - one.at[1]) <= ON_SPOT_M]
+    if off_m > ON_SPOT_M:
+        yield f"stands {off_m:.3f} m off the spots of '{last}' in the end"
+    elif all(one.kind != station.nests(seen.kind) for one in here):
+        whose = "no kind of its own" if near.kind is None else f"a {near.kind}"
+        yield f"stands on a place of '{last}' in the end that is for {whose}"
+    if near.height_m and station.stands_on in ("slab", "box") and not _is_carried(evidence, body):
+        yield f"stands {near.height_m:g} m above '{last}' in the end, and on nothing"
+
+
+def _is_carried(evidence: Evidence, body: int) -> bool:
+    """Whether the top of another part, or of a pallet, is below the foot of a body in the last frame."""
+    tracks, shares = evidence.tracks, np.linspace(-0.45, 0.45, 5)
+    low, high, (x, y, z, *turn) = tracks.low[body], tracks.high[body], tracks.poses[-1, body]
+    middle, size, yaw = (low + high) / 2, high - low, 2.0 * atan2(turn[2], turn[3])
+    under = [(middle[0] + a * size[0], middle[1] + b * size[1]) for a in shares for b in shares]
+    parts = {name for seen in evidence.parts for name in (seen.name, pallet_of(seen.name))}
+    for other in (n for n, name in enumerate(tracks.names) if n != body and name in parts):
+        gap = z + low[2] - tracks.poses[-1, other, 2] - tracks.high[other, 2]
+        if not LOW_M <= gap <= HIGH_M:
+            continue
+        for along, across in under:
+            dx, dy = _turned(along, across, yaw)
+            point = np.array([[x + dx, y + dy, z]])
+            off = tracks.inside(other, np.repeat(point, len(tracks.times_s), axis=0))[-1]
+            if (off[:2] >= tracks.low[other, :2]).all() and (off[:2] <= tracks.high[other, :2]).all():
+                return True
+    return False
 
 
 def _off_pose(evidence: Evidence, station: str, place: Array) -> tuple[float, float]:

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lab.audit.tracks import BodyTracks
+from lab.audit.tracks import Array, BodyTracks
 from lab.sim.parts.part_shape import shape_of
 from lab.tasks.task import Order, Task, part_name
+from lab.tasks.task_fields import Station
 
 LOW_M, HIGH_M = -0.005, 0.01  # a foot so far from what it should stand on stands on it
 TILTED = 0.94  # cosine of a part's tilt from which on it does not stand
@@ -77,7 +78,7 @@ def _seen(task: Task, name: str, kind: str, tracks: BodyTracks) -> PartSeen:
 
 
 def _stands_at(task: Task, tracks: BodyTracks, body: int, foot_m: float, heights: Sequence[float]) -> NDArray[np.int64]:
-    """The station on whose body one stands at each frame, on its floor or so much higher [m]; -1 for none."""
+    """The station on whose body one stands at each frame, on its floor or a layer, or so much higher [m]; -1 for none."""
     at, up = np.full(len(tracks.times_s), -1), tracks.up(body) >= TILTED
     point = tracks.poses[:, body, :3]
     for number, station in enumerate(task.stations):
@@ -86,11 +87,20 @@ def _stands_at(task: Task, tracks: BodyTracks, body: int, foot_m: float, heights
             continue
         low, high, off = tracks.low[own], tracks.high[own], tracks.inside(own, point)
         within = (off[:, :2] >= low[:2]).all(axis=1) & (off[:, :2] <= high[:2]).all(axis=1)
-        floor_m = station.floor_m if station.floor_m is not None else tracks.poses[:, own, 2] + high[2]
-        foot = point[:, 2] - foot_m - floor_m
-        on = np.logical_or.reduce([(foot - height >= LOW_M) & (foot - height <= HIGH_M) for height in heights])
+        foot = point[:, 2] - foot_m - floor_of(station, tracks)
+        levels = {0.0} if station.places is None else {place.height_m for place in station.places}
+        above = [foot - level - height for level in levels for height in heights]
+        on = np.logical_or.reduce([(gap >= LOW_M) & (gap <= HIGH_M) for gap in above])
         at[within & on & up] = number
     return at
+
+
+def floor_of(station: Station, tracks: BodyTracks) -> Array:
+    """How high the floor of a recorded station is at each frame (n,) [m]: as the file says, else its body's top."""
+    own = tracks.number(station.name)
+    if station.floor_m is not None:
+        return np.full(len(tracks.times_s), station.floor_m)
+    return np.asarray(tracks.poses[:, own, 2] + tracks.high[own, 2])
 
 
 def _stays(task: Task, tracks: BodyTracks, at: NDArray[np.int64]) -> tuple[Stay, ...]:

@@ -162,7 +162,7 @@ def trials(prepared: Prepared) -> list[Trial]:
     made = [
         Trial(at=skill.name, spots=spots)
         for skill, spots in used
-        if {*spots} != {prepared.surveys.places.spots(prepared.task.station(skill.station))[0]}
+        if {*spots} != {prepared.surveys.places.spots(prepared.task.station(skill.station), skill.kind)[0]}
     ]
     for way in skillset.legs:
         made.append(Trial(loaded=way, process=bool(skillset.processes[way.target]) and way.target not in timed))
@@ -179,12 +179,12 @@ def spots_in_use(prepared: Prepared, skill: Skill) -> tuple[Spot, ...]:
     """
     task, order, places = prepared.task, prepared.order, prepared.surveys.places
     station, kind = task.station(skill.station), task.made_as(skill.kind).name
-    first, *others = places.spots(station)
+    first, *others = places.spots(station, kind)
     if not skill.carries and task.starts(kind) == station.name:
         begins = (spot for name, spot in zip(order, places.begins(order), strict=True) if name == kind)
         return tuple(begins) or (first,)
     routes = {name: task.part(name).routes for name in order}
-    parts = sum(station.name in task.part(name).places for name in order)
+    parts = sum(station.name in task.part(n).places and task.share_places(station.name, n, kind) for n in order)
     waits = all(stage.station != station.name for own in routes.values() for route in own for stage in route)
     return first, *others[: max(0, parts - 1 - waits)]
 
@@ -249,7 +249,7 @@ def _more_s(floor: Floor, skill: Skill, spots: Sequence[Spot]) -> float:
     """
     scene, bench, pose, times = floor.scene, floor.bench, skill.begins_at(), dict[Spot, float]()
     task, own = scene.task, scene.task.made_as(skill.kind)
-    first = scene.places.spots(task.station(skill.station))[0]
+    first = scene.places.spots(task.station(skill.station), skill.kind)[0]
     feet = {
         f"{own.name} {n}": (spot, scene.places.raised(skill.kind, task.station(skill.station), spot))
         for n, spot in enumerate(dict.fromkeys((first, *spots)), start=1)

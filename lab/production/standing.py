@@ -1,6 +1,6 @@
 """Where parts stand, and where there is room to set one down."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from math import hypot
 
 from lab.production.trouble import Trouble
@@ -16,19 +16,35 @@ DELIVERED_M = 0.02  # a part this near to its spot has been delivered
 BESIDE_M = 0.004  # between a part, or the open fingers, and what stands beside it
 
 
-def free_spot(scene: Scene, name: str, way: Carried, taken: Collection[Spot], lying: Collection[str]) -> Spot:
-    """The first spot at the end of a way that is not taken, and on which nothing of what lies about is. Raises Trouble."""
-    kind, blocked = scene.kinds[way.kind], ""
+def free_spot(
+    bench: Bench, name: str, way: Carried, standing: Mapping[str, Spot], taken: Collection[Spot], lying: Collection[str]
+) -> Spot:
+    """The first spot at the end of a way that is not taken, and on which nothing of what lies about is. Raises Trouble.
+
+    standing: on which spot each other body is. One of a layer is free once what carries it stands below.
+    """
+    scene, why = bench.scene, ""
+    kind, station = scene.kinds[way.kind], scene.task.station(way.target)
     length, across = kind.footprint_m()
-    for spot in scene.places.used_spots(scene.task.station(way.target), len(scene.order)):
-        if spot in taken:
+    for spot in scene.places.used_spots(station, len(scene.order), way.kind):
+        if spot in taken or spot in standing.values():
+            continue
+        below = scene.places.carriers(station, spot)
+        firm = {on for body, on in standing.items() if on in below and _carries(bench, body, on, lying)}
+        if len(firm) < len(below):
+            why = why or ": what would carry it does not stand there"
             continue
         room = Rectangle(spot.x, spot.y, length + BESIDE_M, across + BESIDE_M, spot.yaw)
         blocked = _standing_in(scene, room, spot.z, lying) or in_fingers_way(scene, kind.held_at(spot), lying)
         if not blocked:
             return spot
-    why = f": {blocked} is there" if blocked else ""
+        why = f": {blocked} is there"
     raise Trouble(f"no spot of '{way.target}' is free{why}", name, way.target, final=True)
+
+
+def _carries(bench: Bench, body: str, spot: Spot, lying: Collection[str]) -> bool:
+    """Whether a body stands on its spot, as far as is known, so that another one can be put on it."""
+    return body not in lying and bench.stands(body, spot, DELIVERED_M)
 
 
 def too_near(bench: Bench, body: str) -> str:

@@ -209,10 +209,9 @@ class Transfers:
             return self.spot_of[pallet_of(name)]
         own, spots = scene.bodies_of(name, way.kind), scene.places.spots(scene.task.station(way.target))
         others = {body: spot for body, spot in self.spot_of.items() if body not in own}
-        taken = [*others.values(), *self.taken]
         in_the_way = self.left_lying | {self.name(one) for one in self.to_put_back}
         in_the_way |= {body for body, spot in others.items() if spot not in spots}  # they stand astray
-        return free_spot(scene, name, way, taken, in_the_way)
+        return free_spot(self.floor.bench, name, way, others, self.taken, in_the_way)
 
     # ---- what a move is made of ------------------------------------------------------------------------------------
 

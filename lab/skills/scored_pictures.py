@@ -146,7 +146,7 @@ def parts_seen(task: Task, image: Image, view: View) -> list[dict[str, Any]]:
     for station in task.stations:
         for kind in {kind.name: kind for kind in places.kinds_at(station.name) if kind.rider is None}.values():
             colours = np.array([look.rgba[:3] for look in kind.shape.looks])
-            for spot in places.spots(station):
+            for spot in places.spots(station, kind.name):
                 foot = places.raised(kind.name, station, spot)
                 part = Outlined(seen_corners(kind.shape), foot.z, not kind.grip.period, view.pixel_from_world, colours)
                 near = np.array([foot.x, foot.y, foot.yaw])

@@ -204,7 +204,7 @@ class Skill:
         """Where the part that it is about stands at its station, or is to be set down: on a spot, or on the pallet there."""
         places, station = self.surveys.places, self.surveys.task.station(self.station)
         spot = self.spot if self.carries else None
-        return places.raised(self.kind, station, spot or places.spots(station)[0])
+        return places.raised(self.kind, station, spot or places.spots(station, self.kind)[0])
 
     def pose(self, state: int) -> ToolPose:
         """The tool pose that the motion goes through in a state of the problem; a blocked one may be out of reach."""
@@ -298,7 +298,10 @@ class Skill:
         """Put there what its part stands on, or is to be set down on: its pallet, where it stands on one."""
         task, name = self.surveys.task, self.tried_with()
         if self.station and self.kind and on_its_pallet(task, self.kind, self.station):
-            pallet, spot = task.part(self.kind).pallet, self.surveys.places.spots(task.station(self.station))[0]
+            pallet, spot = (
+                task.part(self.kind).pallet,
+                self.surveys.places.spots(task.station(self.station), self.kind)[0],
+            )
             if pallet_of(name) not in bench.scene.kind_of:
                 bench.scene.add(name, str(pallet), spot)
 

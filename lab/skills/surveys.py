@@ -168,7 +168,7 @@ class Surveys:
     def around(self, station_name: str, kind: str, loaded: bool) -> Survey:
         """Around the part that stands (or, loaded, is to stand) on a station's first spot, with neighbours on all sides."""
         station, own = self.task.station(station_name), self.kinds[kind]
-        spot = self.places.spots(station)[0]
+        spot = self.places.spots(station, kind)[0]
         with World() as world:
             scene = Scene(world, self.task, (), Layout(self.layout.obstacles, ()))
             for name, (neighbour, other) in self.places.neighbours(station, spot).items():

@@ -167,21 +167,33 @@ class Task(Record):
     def fitting(self, first: int) -> Order:
         """An order with so many parts of the first kind, or as many as there is room for."""
         own, *others = self.made
-        room = [self.station(end).capacity - sum(p.count for p in others if end in p.ends) for end in own.ends]
+        room = [
+            self.station(end).room_for(own.name)
+            - sum(p.count for p in others if end in p.ends and self.share_places(end, own.name, p.name))
+            for end in own.ends
+        ]
         return self.order(max(1, min(first, *room)))
+
+    def share_places(self, station: str, one: str, other: str) -> bool:
+        """Whether two kinds stand on the same places of a station."""
+        place = self.station(station)
+        return place.nests(one) == place.nests(other)
 
     def _check_room(self, order: Order, asked: str, where: str) -> None:
         if not 1 <= len(order) <= MAX_PARTS:
             raise BadInput(f"{where}{len(order)} parts ({asked}) for task '{self.name}': allowed are 1 to {MAX_PARTS}")
-        for end in dict.fromkeys(end for part in self.made for end in part.ends):
-            ending = [part.name for part in self.made if end in part.ends]
-            most, room = sum(kind in ending for kind in order), self.station(end).capacity
+        ends = dict.fromkeys((end, self.station(end).nests(part.name)) for part in self.made for end in part.ends)
+        for end, nest in ends:
+            own = [part.name for part in self.made if end in part.ends]
+            ending = [kind for kind in own if self.station(end).nests(kind) == nest]
+            most, room = sum(kind in ending for kind in order), self.station(end).room_for(ending[0])
             if most > room:
                 words = in_words(kind for kind in order if kind in ending)
+                room_word = "capacity" if self.station(end).places is None else "places for them"
                 raise BadInput(
-                    f"{words} ({asked}) do not fit on '{end}': its capacity in the task file is {room}"
+                    f"{words} ({asked}) do not fit on '{end}': its {room_word} in the task file is {room}"
                     if not where
-                    else f"station '{end}': capacity = {room}: {words} ({asked}) begin or end there, wanted at least {most}"
+                    else f"station '{end}': {room_word} = {room}: {words} ({asked}) begin or end there, wanted at least {most}"
                 )
 
     # ---- what must be known, once, and have a time ---------------------------------------------------------------
@@ -220,6 +232,34 @@ class Task(Record):
                         raise unknown("station", name, stations, f"route of part '{part.name}'")
                 if stage.pallet and part.pallet is None:
                     raise ValueError(f"part '{part.name}' has no pallet to be lifted off at '{stage.station}'")
+        return self
+
+    @model_validator(mode="after")
+    def _places_known(self) -> Self:
+        for station in self.stations:
+            coming = [part.name for part in self.kinds_at(station.name)]
+            routes = [route for part in self.made for route in part.routes]
+            inside = any(station.name in (*(s.station for s in r[1:-1]), *(s.buffer for s in r)) for r in routes)
+            if station.is_layered and (inside or any(route[0].station == station.name for route in routes)):
+                raise ValueError(
+                    f"station '{station.name}': places: height_m: parts are taken from it, and one below another cannot be: "
+                    "layers are for stations where routes end"
+                )
+            if station.is_layered and self.perception == "camera":
+                raise BadInput(
+                    f"station '{station.name}': places: height_m: with perception = 'camera' the outline of a part is not told "
+                    "from that of the part below it: wanted perception = 'truth', or one layer"
+                )
+            for place in station.places or ():
+                if place.kind is None:
+                    continue
+                if place.kind not in coming:
+                    raise unknown("kind", place.kind, coming, f"station '{station.name}': places: kind")
+                if inside:
+                    raise ValueError(
+                        f"station '{station.name}': places: kind = '{place.kind}': routes lead on through it, and which kinds "
+                        "wait there is not planned: nests are for stations where routes begin or end"
+                    )
         return self
 
     @model_validator(mode="after")

@@ -118,6 +118,17 @@ class Process(Record):
         return self
 
 
+class Place(Record):
+    """Where one part stands at a station: on its floor, on a part below, or in a nest for one kind."""
+
+    at: XYZ
+    """Where its middle is: x, y and turn off the station's pose, along its axes [m, m, rad], such as `[0.0, 0.05, 0.0]`."""
+    height_m: Off = 0.0
+    """How high the part's foot is above the station's floor [m], such as `0.04`: as high as the part below it is."""
+    kind: Name | None = None
+    """The kind that it takes, such as `"pin"`; left out: every kind that has no places of its own at the station."""
+
+
 class Station(Record):
     """A place where parts stand: storage, a buffer, or a machine with a processing time or a process to learn."""
 
@@ -155,6 +166,10 @@ class Station(Record):
     """Where parts stand: x, y and turn off the pose, along its axes, one for each part that it holds [m, m, rad], such
     as `[[0.0, -0.05, 0.0], [0.0, 0.05, 0.0]]`; left out: in rows.
     """
+    places: Annotated[tuple[Place, ...], BeforeValidator(as_tuple), Field(max_length=100)] | None = None
+    """Where parts stand, as tables `[[stations.places]]`, in place of spots: with a height for a layer, and a kind for a
+    nest. They are filled from the lowest on.
+    """
     approach: Literal["above", "camera", "side"] = "above"
     """From where the gripper comes: straight down ("above"), through the grid that the overhead camera looks at
     ("camera"), or level along the yaw of the pose ("side"); the tool hangs down in all three.
@@ -183,9 +198,15 @@ class Station(Record):
             raise ValueError(f"station '{self.name}': approach = 'camera' needs a grid, through which the camera leads")
         if self.approach != "camera" and self.grid is not None:
             raise ValueError(f"station '{self.name}': grid is for approach = 'camera', not '{self.approach}'")
+        if self.places is not None and self.spots is not None:
+            raise ValueError(f"station '{self.name}': spots and places: wanted one of them, spots are the short form")
         if self.spots is not None and len(self.spots) != self.capacity:
             raise ValueError(
                 f"station '{self.name}' has {len(self.spots)} spots and the capacity {self.capacity}: wanted as many"
+            )
+        if self.places is not None and len(self.places) != self.capacity:
+            raise ValueError(
+                f"station '{self.name}' has {len(self.places)} places and the capacity {self.capacity}: wanted as many"
             )
         if self.size_m is not None and self.stands_on not in ("slab", "box"):
             raise ValueError(f"station '{self.name}': size_m is for a 'slab' or 'box', its body is '{self.stands_on}'")
@@ -197,6 +218,27 @@ class Station(Record):
     def stands_on(self) -> str:
         """The body, also where the file says none."""
         return self.body or ("box" if self.kind == "machine" else "slab")
+
+    @property
+    def own_places(self) -> tuple[Place, ...]:
+        """The places that the file gives, also as spots, the lowest first; none where parts stand in rows."""
+        given = self.places or tuple(Place(at=spot) for spot in self.spots or ())
+        return tuple(sorted(given, key=lambda place: place.height_m))
+
+    @property
+    def is_layered(self) -> bool:
+        """Whether parts may stand on parts."""
+        return any(place.height_m for place in self.places or ())
+
+    def nests(self, kind: str) -> str | None:
+        """The kind of the places that take a part of a kind: its own where it has some here, else None, those of any."""
+        return kind if any(place.kind == kind for place in self.places or ()) else None
+
+    def room_for(self, kind: str) -> int:
+        """How many parts of a kind it holds, where no other kind takes their places."""
+        if self.places is None:
+            return self.capacity
+        return sum(place.kind == self.nests(kind) for place in self.places)
 
 
 class Stage(Record):

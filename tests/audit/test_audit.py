@@ -181,6 +181,51 @@ def test_a_part_beside_the_spots_of_its_last_station() -> None:
     assert found(Evidence(task, case.order, case.tracks, case.rows, case.claimed)) == [("end", "cube 1", "out")]
 
 
+def stacked(
+    *places: dict[str, Any], upper: Sequence[float] = (0.0, 0.0), height_m: float = 2 * HALF_M
+) -> list[tuple[str, str]]:
+    """What is found (part, words) where cube 1 ends on the pose of 'out', and cube 2 off that by `upper`, so high."""
+    case = evidence()
+    for name, (x, y), high_m in (("cube 1", (0.0, 0.0), 0.0), ("cube 2", upper, height_m)):
+        poses = case.tracks.poses[:, case.tracks.number(name)]
+        there = np.hypot(poses[:, 1] - AT["out"][1], poses[:, 0] - AT["out"][0]) < 0.06
+        poses[there, :3] = (AT["out"][0] + x, AT["out"][1] + y, TOPS["out"] + HALF_M + high_m)
+    document = case.task.model_dump(mode="json", exclude_unset=True)
+    document["stations"][2] |= {"places": list(places), "capacity": len(places)}
+    document["parts"].append(document["parts"][0] | {"name": "pin", "count": 0})
+    task = Task.model_validate(document)
+    result = audit(Evidence(task, case.order, case.tracks, case.rows, case.claimed))
+    return [(one.part, one.words) for one in result.findings]
+
+
+FLOOR: dict[str, Any] = {"at": [0.0, 0.0, 0.0]}
+LAYER: dict[str, Any] = FLOOR | {"height_m": 2 * HALF_M}
+
+
+def test_a_part_on_a_part_is_delivered_where_the_file_has_a_place_there() -> None:
+    assert stacked(FLOOR, LAYER) == []
+    part, words = stacked(FLOOR, {"at": [0.08, 0.0, 0.0]})[0]  # no layer
+    assert (part, "did not come to 'out'" in words) == ("cube 2", True)
+
+
+def test_a_part_of_a_layer_stands_on_something() -> None:
+    beside = {"at": [0.06, 0.0, 0.0], "height_m": 2 * HALF_M}
+    ((part, words),) = stacked(FLOOR, LAYER, beside, upper=(0.06, 0.0))
+    assert part == "cube 2"
+    assert "on nothing" in words
+    ((part, words),) = stacked(FLOOR, LAYER, upper=(0.03, 0.0))
+    assert (part, "0.030 m off the spots" in words) == ("cube 2", True)
+
+
+def test_a_nest_of_another_kind_is_no_place_for_a_part() -> None:
+    nest = {"at": [0.06, 0.0, 0.0], "kind": "pin"}
+    ((part, words),) = stacked(FLOOR, nest, FLOOR | {"at": [-0.06, 0.0, 0.0]}, upper=(0.06, 0.0), height_m=0.0)
+    assert part == "cube 2"
+    assert "is for a pin" in words
+    own = [FLOOR | {"kind": "cube"}, nest | {"kind": "cube"}]
+    assert stacked(*own, upper=(0.06, 0.0), height_m=0.0) == []
+
+
 def test_a_schedule_that_tells_another_story() -> None:
     case = evidence()
     carry = next(row for row in case.rows if row["part"] == "cube 1")

@@ -34,3 +34,16 @@ def test_each_of_two_parts_stands_in_the_machine_for_its_own_time(lab: Lab, fold
     assert came_s[1] < fetched_s[0]
     assert all(fetched - came > PROCESS_S - 1e-6 for came, fetched in zip(came_s, fetched_s, strict=True))
     assert document["measured_makespan_s"] == pytest.approx(document["predicted_makespan_s"], rel=0.03)
+
+
+def test_a_part_is_put_on_a_part_and_the_next_one_beside(lab: Lab, folder: Path) -> None:
+    """Two boxes one on the other, the file's upper place first: the lower one is filled before."""
+    assert lab("new", "pile", "--part", "box:0.06x0.03x0.04:2", "--machine", "oven:2").code == 0
+    file = folder / "pile.toml"
+    at = 'name = "output"\nkind = "storage"\n'
+    before, after = file.read_text().split(at)
+    places = "places = [{ at = [0.0, 0.0, 0.0], height_m = 0.04 }, { at = [0.0, 0.0, 0.0] }]\n"
+    file.write_text(before + at + places + after)
+    ran = lab("run", str(file), "--json", "--out", "out")
+    assert (ran.code, json.loads(ran.out)["delivered"]) == (0, 2)
+    assert lab("replay", "out", "--audit").code == 0

@@ -24,6 +24,12 @@ def fms() -> Task:
 
 
 @pytest.fixture(scope="session")
+def palletise() -> Task:
+    """The task with places in two layers: boxes of 60 x 30 x 50 mm."""
+    return load("palletise")
+
+
+@pytest.fixture(scope="session")
 def breakfast() -> Task:
     """The task with two kinds of parts, slices and cups."""
     return load("breakfast")

@@ -25,6 +25,7 @@ SLAB_M, CLOSING_M = (
 APART_M = 0.002  # [m] between parts where they begin, at least
 FREE_M = 0.0125  # [m] beyond an open finger to what stands beside, at least
 MAX_DRAWS = 100  # of an obstacle's place
+ON_TOP_M = 0.002  # between the top of a part and the foot of the one that stands on it, at most [m]
 SPARE_SPOTS = 4  # so many spots of a station are reckoned with, however few parts there are
 
 
@@ -86,11 +87,19 @@ class Places:
             return station.size_m[2]
         return SLAB if station.size_m is None else station.size_m[2]
 
-    def spots(self, station: Station) -> list[Spot]:
-        """The places for parts at a station, the middle ones first; as many as its capacity."""
+    def spots(self, station: Station, kind: str = "") -> list[Spot]:
+        """The places for parts at a station, the middle or lowest ones first; as many as its capacity.
+
+        kind: only those that take parts of this kind, which may be named as it comes, on its pallet.
+        """
         at, yaw, high = station.pose[:2], station.pose[2], self.floor(station)
-        if station.spots is not None:
-            return [Spot(*beside(at, yaw, off[:2]), high, yaw + off[2]) for off in station.spots]
+        if given := station.own_places:
+            nest = station.nests(self.task.made_as(kind).name) if kind else None
+            return [
+                Spot(*beside(at, yaw, place.at[:2]), high + place.height_m, yaw + place.at[2])
+                for place in given
+                if not kind or place.kind == nest
+            ]
         if station.kind == "machine":
             offsets: list[tuple[float, float]] = [(0.0, 0.0)]
             if station.capacity > 1:
@@ -132,9 +141,37 @@ class Places:
         x, y = np.max(sizes, axis=0) if sizes else (BETWEEN_M, BETWEEN_M)
         return float(x), float(y)
 
-    def used_spots(self, station: Station, parts: int) -> list[Spot]:
-        """The spots that so many parts can ever need, and a few more for a plate."""
-        return self.spots(station)[: max(parts, SPARE_SPOTS)]
+    def used_spots(self, station: Station, parts: int, kind: str = "") -> list[Spot]:
+        """The spots that so many parts can ever need, and a few more for a plate; nests all, for each takes its kind."""
+        found = self.spots(station, kind)
+        return found if station.places is not None else found[: max(parts, SPARE_SPOTS)]
+
+    def top_m(self, station: Station) -> float:
+        """How high what stands at a station reaches above the table at most [m]."""
+        tops = [
+            spot.z + kind.height_m for kind in self.kinds_at(station.name) for spot in self.spots(station, kind.name)
+        ]
+        return max(tops, default=self.floor(station))
+
+    def carriers(self, station: Station, spot: Spot) -> list[Spot]:
+        """The spots whose parts carry a part that stands on a spot of a layer; none for one on the floor or on the body."""
+        if not station.is_layered:
+            return []
+        own = self.grounds(station, spot)
+        return [
+            other
+            for other in self.spots(station)
+            for kind, ground in self.grounds(station, other)
+            if abs(other.z + kind.height_m - spot.z) <= ON_TOP_M and any(ground.meets(mine) for _, mine in own)
+        ]
+
+    def grounds(self, station: Station, spot: Spot) -> list[tuple[Kind, Rectangle]]:
+        """The kinds that may stand on a spot, with the ground that a part of each covers there."""
+        found = []
+        for kind in self.kinds_at(station.name):
+            if spot in self.spots(station, kind.name):
+                found.append((kind, Rectangle(spot.x, spot.y, *kind.footprint_m(), spot.yaw)))
+        return found
 
     def slab(self, station: Station, parts: int) -> tuple[Vector, Vector]:
         """Size and centre [m] of the slab under the spots that so many parts can need, turned as the station is."""
@@ -204,12 +241,10 @@ class Places:
 
     def begins(self, order: Order) -> list[Spot]:
         """The spot on which each part of an order stands at the start, part 1 first: the stations' first ones."""
-        taken: dict[str, int] = {}
-        found = []
+        found: list[Spot] = []
         for kind in order:
-            start = self.task.starts(kind)
-            found.append(self.spots(self.task.station(start))[taken.get(start, 0)])
-            taken[start] = taken.get(start, 0) + 1
+            own = self.spots(self.task.station(self.task.starts(kind)), kind)
+            found.append(next(spot for spot in own if spot not in found))
         return found
 
     def neighbours(self, station: Station, spot: Spot) -> dict[str, tuple[str, Spot]]:
@@ -217,9 +252,9 @@ class Places:
         largest = max(self.kinds_at(station.name), key=lambda kind: kind.footprint_m(), default=None)
         if largest is None or station.capacity == 1:
             return {}
-        if station.spots is not None:
-            others = enumerate(self._seen_from(station, spot), 1)
-            return {f"{largest.name} {n} beside": (largest.name, other) for n, other in others}
+        if station.own_places:
+            seen = enumerate(self._seen_from(station, spot), 1)
+            return {f"{kind} {n} beside": (kind, other) for n, (kind, other) in seen}
         column_m, row_m = self.pitch(station)
         steps = {"in front": (0.0, -row_m), "behind": (0.0, row_m)}
         if station.kind == "storage":
@@ -232,16 +267,24 @@ class Places:
             for where, off in steps.items()
         }
 
-    def _seen_from(self, station: Station, spot: Spot) -> list[Spot]:
-        """Where the station's other spots lie as seen from any of them, seen from this one."""
-        all_spots, found = self.spots(station), {}
-        for one in all_spots:
-            for other in all_spots:
+    def _seen_from(self, station: Station, spot: Spot) -> list[tuple[str, Spot]]:
+        """The largest kind on each other spot of the station and where that lies as seen from any of them, seen from this one.
+
+        Lower layers are left away: they are no higher than what this spot lies on.
+        """
+        found: dict[tuple[float, ...], tuple[str, Spot]] = {}
+        stand = {one: [kind.name for kind, _ in self.grounds(station, one)] for one in self.spots(station)}
+        for one, own in stand.items():
+            for other, kinds in stand.items():
+                # the places of a kind are filled from the lowest on: above it stands none of its own yet
+                up = other.z - one.z
+                if other == one or not own or not kinds or up < 0.0 or (up > 0.0 and own == kinds):
+                    continue
                 along, across = beside((0.0, 0.0), -one.yaw, (other.x - one.x, other.y - one.y))
-                if other != one:
-                    x, y = beside((spot.x, spot.y), spot.yaw, (along, across))
-                    key = round(along, 4), round(across, 4), round(other.yaw - one.yaw, 4)
-                    found[key] = Spot(x, y, spot.z, spot.yaw + other.yaw - one.yaw)
+                largest = max(kinds, key=lambda kind: self.kinds[kind].footprint_m())
+                x, y = beside((spot.x, spot.y), spot.yaw, (along, across))
+                key = round(along, 4), round(across, 4), round(up, 4), round(other.yaw - one.yaw, 4)
+                found[key] = largest, Spot(x, y, spot.z + up, spot.yaw + other.yaw - one.yaw)
         return list(found.values())
 
 

@@ -1,6 +1,6 @@
 """What is wrong with a task's cell before anything is surveyed in it: reach, heights, and stations in each other's way."""
 
-from itertools import combinations
+from itertools import combinations, product
 from math import ceil, cos, hypot, sin
 
 from lab.errors import BadInput, counted
@@ -13,7 +13,7 @@ from lab.sim.frames import Vector
 from lab.sim.parts.kinds import Kind, Spot, beside, comes_as, kinds_of
 from lab.sim.scene import station_bodies
 from lab.sim.scene.hold_trial import check_held
-from lab.sim.scene.places import Places, Rectangle
+from lab.sim.scene.places import ON_TOP_M, Places, Rectangle
 from lab.sim.scene.scene import in_grid, marker_of
 from lab.tasks.task import Task
 from lab.tasks.task_fields import CameraGrid, Station
@@ -22,6 +22,7 @@ ACROSS = 0.3  # sine of the angle at most between the fingers and the way in
 DETOUR = 1.5  # times the straight way along the axes, at most, around the arm and obstacles
 OVER_M = 0.01  # [m] between a carried part and what stands below its way
 ON_M = 1e-6  # by what a part may reach beyond what it stands on: sums of lengths differ by less
+RESTS = 0.25  # of the way from a part's middle to its sides: so far at least reaches what carries it
 INTO_M = 0.005  # [m] the same above a machine that it is let down into
 
 
@@ -40,12 +41,12 @@ def check_scene(task: Task) -> None:
         station_bodies.check(station, task.folder)
         if station.grid is not None:
             _check_seen(task, station, station.grid)
-        spots, own = places.spots(station), places.kinds_at(station.name)
         _check_on_body(places, station)
-        for kind in own:
+        check_places(places, station)
+        for kind in places.kinds_at(station.name):
             _check_grid(station, kind, places.floor(station))
             _check_side(station, kind)
-            for spot in spots:
+            for spot in places.spots(station, kind.name):
                 pose = kind.held_at(spot)
                 for at in (pose, ToolPose(pose.x, pose.y, low, pose.yaw)):
                     _check_reach(arm, station, at)
@@ -62,7 +63,7 @@ def _check_on_body(places: Places, station: Station) -> None:
         middle, turn = beside((0.0, 0.0), -yaw, (spot.x - x, spot.y - y)), spot.yaw - yaw
         if station.stands_on not in ("slab", "box") and spot.z > 0.0:
             _check_in_bounds(station, middle, *station_bodies.bounds(station, places.task.folder))
-        for along, across in (kind.footprint_m() for kind in places.kinds_at(station.name)):
+        for along, across in (kind.footprint_m() for kind, _ in places.grounds(station, spot)):
             half = abs(cos(turn)) * along + abs(sin(turn)) * across, abs(sin(turn)) * along + abs(cos(turn)) * across
             needed = [max(most, abs(at) + own) for most, at, own in zip(needed, middle, half, strict=True)]
     size = station.size_m
@@ -72,6 +73,82 @@ def _check_on_body(places: Places, station: Station) -> None:
             f"station '{station.name}': size_m = {list(size)}: its {counted(station.capacity, 'spot')} reach beyond it, parts "
             f"would fall off: at least {[*wanted, size[2]]} needed, or a smaller capacity"
         )
+
+
+def check_places(places: Places, station: Station) -> None:
+    """BadInput for places that the file gives where parts would stand in one another, and on a layer with nothing below."""
+    if station.places is None:
+        return
+    on_file_body = station.stands_on not in ("slab", "box")
+    spots = {spot: places.grounds(station, spot) for spot in places.spots(station)}
+    for (one, here), (other, there) in combinations(spots.items(), 2):
+        for kind, ground in here:
+            for above, covered in there:
+                over = min(one.z + kind.height_m, other.z + above.height_m) - max(one.z, other.z)
+                if over > ON_TOP_M and ground.meets(covered):
+                    raise BadInput(
+                        f"{_place_in_words(places, station, other)}: a {above.name} there would stand in a {kind.name} at "
+                        f"{_off(station, one)}, which is {kind.height_m:g} m high: move one, or raise it"
+                    )
+    for spot, own in spots.items():
+        below = [under for under in spots if under.z < spot.z and _meet(own, spots[under])]
+        if spot.z <= places.floor(station) or (on_file_body and not below):
+            continue
+        _check_carried(places, station, spot, below)
+
+
+def _check_carried(places: Places, station: Station, spot: Spot, below: list[Spot]) -> None:
+    """BadInput for a place of a layer when what is below does not carry it, whatever kinds stand there."""
+    where, own = _place_in_words(places, station, spot), places.grounds(station, spot)
+    carriers = places.carriers(station, spot)
+    if not carriers:
+        tops = sorted(
+            {round(s.z + k.height_m - places.floor(station), 4) for s in below for k, _ in places.grounds(station, s)}
+        )
+        what = f"below it parts reach up to {', '.join(map(str, tops))} m" if tops else "no place is below it"
+        raise BadInput(
+            f"{where}: {what}: wanted a place that carries it, and height_m = the height of the part on that"
+        )
+    names = {kind.name for kind, _ in own}
+    for under in carriers:
+        for kind, _ in places.grounds(station, under):
+            if abs(under.z + kind.height_m - spot.z) > ON_TOP_M:
+                raise BadInput(
+                    f"{where}: a {kind.name} may stand below it, {kind.height_m:g} m high: give the place at "
+                    f"{_off(station, under)} the kind that carries it"
+                )
+            if kind.name not in names:
+                raise BadInput(
+                    f"{where}: it stands on a {kind.name}, which takes places of its own: which of them comes first is "
+                    "not planned: wanted the same kinds in all layers of a stack"
+                )
+    for kind, ground in own:
+        if not _rests(ground, [covered for under in carriers for _, covered in places.grounds(station, under)]):
+            raise BadInput(f"{where}: a {kind.name} there would topple: its middle is not over what carries it")
+
+
+def _rests(ground: Rectangle, below: list[Rectangle]) -> bool:
+    """Whether what carries a part reaches beyond the middle of its foot to all four sides, by a quarter of the way at least."""
+    shares = [n / 8 for n in range(-8, 9)]
+    held = []
+    for along, across in product(shares, shares):
+        at = beside((ground.x, ground.y), ground.yaw, (along * ground.half_along, across * ground.half_across))
+        if any(one.meets(Rectangle(*at, 0.0, 0.0, 0.0)) for one in below):
+            held.append((along, across))
+    return bool(held) and all(min(axis) <= -RESTS and max(axis) >= RESTS for axis in zip(*held, strict=True))
+
+
+def _meet(one: list[tuple[Kind, Rectangle]], other: list[tuple[Kind, Rectangle]]) -> bool:
+    return any(a.meets(b) for _, a in one for _, b in other)
+
+
+def _off(station: Station, spot: Spot) -> str:
+    x, y = beside((0.0, 0.0), -station.pose[2], (spot.x - station.pose[0], spot.y - station.pose[1]))
+    return f"({x + 0.0:.3f}, {y + 0.0:.3f}) m"
+
+
+def _place_in_words(places: Places, station: Station, spot: Spot) -> str:
+    return f"station '{station.name}': place at {_off(station, spot)}, height_m = {spot.z - places.floor(station):g}"
 
 
 def _check_in_bounds(station: Station, at: tuple[float, float], low: Vector, high: Vector) -> None:
@@ -94,11 +171,7 @@ def longest_way_m(places: Places) -> float:
 
 def _check_lowest(places: Places, low: float) -> None:
     """BadInput when what is carried in the lowest cells would meet what stands at the stations."""
-    standing = {
-        station.name: places.floor(station) + kind.height_m
-        for station in places.task.stations
-        for kind in places.kinds_at(station.name)
-    }
+    standing = {station.name: places.top_m(station) for station in places.task.stations}
     where = max(standing, key=lambda name: standing[name])
     for kind in (places.kinds[comes_as(part)] for part in places.task.made):
         if low - kind.grip.up_m < standing[where] + OVER_M:
@@ -182,5 +255,6 @@ def _ground(places: Places, station: Station, parts: int) -> list[Rectangle]:
     def around(spot: Spot) -> Rectangle:
         return Rectangle(spot.x, spot.y, along, across, spot.yaw)
 
-    found = [around(spot) for spot in places.spots(station)[:parts]]
+    spots = places.spots(station)
+    found = [around(spot) for spot in (spots if station.places is not None else spots[:parts])]
     return [*found, places.body(station, parts)] if station.kind == "machine" else found

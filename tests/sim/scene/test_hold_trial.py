@@ -10,7 +10,17 @@ from lab.sim.scene.hold_trial import Trial, check_held, tried
 from lab.tasks.task import Task
 from lab.tasks.task_file import load
 
-SHIPPED = ["toast", "toast-panda", "toast-iiwa", "toast-xarm6", "breakfast", "fms-arm", "sorting", "two-toasters"]
+SHIPPED = [
+    "toast",
+    "toast-panda",
+    "toast-iiwa",
+    "toast-xarm6",
+    "breakfast",
+    "fms-arm",
+    "sorting",
+    "two-toasters",
+    "palletise",
+]
 
 
 def check(task: Task, force_n: float | None = None, **fields: float) -> None:

@@ -15,7 +15,7 @@ from lab.sim.parts.kinds import Spot, beside
 from lab.sim.scene.places import SLAB, Layout, Rectangle
 from lab.sim.scene.scene_check import places_of
 from lab.tasks.task import Order, Task
-from lab.tasks.task_fields import Obstacle
+from lab.tasks.task_fields import Obstacle, Place
 
 Moved = Callable[..., Task]
 QUARTER = pi / 2
@@ -118,6 +118,48 @@ def test_parts_begin_on_the_first_free_spots_of_where_their_routes_begin(fms: Ta
     places = places_of(breakfast)
     plate, shelf = (places.spots(breakfast.station(name)) for name in ("plate", "shelf"))
     assert places.begins(("slice", "cup", "slice")) == [plate[0], shelf[0], plate[1]]
+
+
+def test_places_are_filled_from_the_lowest_on(palletise: Task, moved: Moved) -> None:
+    high, low = Place(at=(0.1, 0.0, 0.0), height_m=0.05), Place(at=(0.1, 0.0, QUARTER))
+    stacked = moved(palletise, "pallet", pose=(0.4, -0.6, QUARTER), capacity=2, places=(high, low))
+    first, second = places_of(stacked).spots(stacked.station("pallet"))
+    assert at(first) == pytest.approx((0.4, -0.5, 0.02, 2 * QUARTER))
+    assert at(second) == pytest.approx((0.4, -0.5, 0.07, QUARTER))
+    assert places_of(stacked).top_m(stacked.station("pallet")) == pytest.approx(0.12)
+
+
+def test_a_spot_of_a_layer_is_carried_by_the_spots_below(palletise: Task, moved: Moved) -> None:
+    places, pallet = places_of(palletise), palletise.station("pallet")
+    spots = places.spots(pallet)
+    assert [places.carriers(pallet, spot) for spot in spots] == [[]] * 4 + [[spot] for spot in spots[:4]]
+    two = (Place(at=(-0.032, 0.0, 0.0)), Place(at=(0.032, 0.0, 0.0)), Place(at=(0.0, 0.0, 0.0), height_m=0.05))
+    bonded = moved(palletise, "pallet", capacity=3, places=two)
+    left, right, top = places_of(bonded).spots(bonded.station("pallet"))
+    assert places_of(bonded).carriers(bonded.station("pallet"), top) == [left, right]
+
+
+def test_beside_a_spot_stand_no_lower_layers_and_none_above_that_come_later(palletise: Task) -> None:
+    """Of 2 x 2 places others are -1, 0, 1 columns and rows away: 3 * 3 - 1, in either layer the same."""
+    here = Spot(0.0, 0.0, 0.02, 0.0)
+    found = [spot for _, spot in places_of(palletise).neighbours(palletise.station("pallet"), here).values()]
+    assert len(found) == 8
+    assert {spot.z for spot in found} == {0.02}
+
+
+def test_a_nest_takes_its_kind_alone(breakfast: Task, moved: Moved) -> None:
+    """Cups have places of their own on the tray, so that slices have the others."""
+    given = tuple(Place(at=(0.0, 0.1 * n, 0.0), kind="cup" if n == 1 else None) for n in (-1, 0, 1))
+    tray = moved(breakfast, "tray", capacity=3, spots=None, places=given)
+    places, station = places_of(tray), tray.station("tray")
+    left, middle, right = places.spots(station)
+    assert places.spots(station, "cup") == [right]
+    assert places.spots(station, "slice") == [left, middle]
+    beside = [places.neighbours(station, spot).values() for spot in (left, right)]
+    assert {kind for found in beside for kind, _ in found} == {"slice", "cup"}
+    assert tray.share_places("tray", "slice", "cup") is False
+    with pytest.raises(BadInput, match="places for them in the task file is 1"):
+        tray.order(counts={"cup": 2})
 
 
 def test_at_machines_there_are_no_pallets(fms: Task) -> None:

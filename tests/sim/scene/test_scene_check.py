@@ -8,12 +8,13 @@ import pytest
 
 from lab.errors import BadInput
 from lab.sim.arms.arm_models import arm_of
-from lab.sim.scene.scene_check import check_apart, check_scene, places_of
+from lab.sim.scene.scene_check import check_apart, check_places, check_scene, places_of
 from lab.tasks.task import Task
+from lab.tasks.task_fields import Place
 from lab.tasks.task_file import load
 
 Moved = Callable[..., Task]
-SHIPPED = ["toast", "two-toasters", "breakfast", "fms-arm", "sorting"]
+SHIPPED = ["toast", "two-toasters", "breakfast", "fms-arm", "sorting", "palletise"]
 
 
 @pytest.mark.parametrize("name", ["plate", "toaster_buffer", "toaster", "butter_applier", "finished_plate"])
@@ -153,3 +154,53 @@ def test_what_the_fingers_cannot_hold_is_refused(task: Task) -> None:
     with pytest.raises(BadInput, match=r"^robot.grip_force_n = 10: slice of 2 kg, friction 0.8, would slip"):
         check_scene(task.changed(parts=heavy, robot=given))
     check_scene(task.changed(parts=heavy, robot=task.robot.model_copy(update={"grip_force_n": None})))
+
+
+def a_stack(task: Task, moved: Moved, *places: tuple[float, float, float], **changed: object) -> Task:
+    """The pallet with places at x, y and a height: boxes are 60 x 30 x 50 mm."""
+    given = tuple(Place(at=(x, y, 0.0), height_m=height_m) for x, y, height_m in places)
+    return moved(task, "pallet", capacity=len(given), places=given, **changed)
+
+
+@pytest.mark.parametrize(
+    ("places", "said"),
+    [
+        ([(0.0, 0.0, 0.0), (0.05, 0.0, 0.0)], "a box there would stand in a box"),
+        ([(0.0, 0.0, 0.0), (0.0, 0.0, 0.04)], "a box there would stand in a box"),
+        ([(0.0, 0.0, 0.0), (0.0, 0.0, 0.06)], r"below it parts reach up to 0\.05 m"),
+        ([(0.0, 0.0, 0.0), (0.07, 0.0, 0.05)], "no place is below it"),
+        ([(0.0, 0.0, 0.0), (0.03, 0.0, 0.05)], "would topple"),
+    ],
+)
+def test_a_layer_rests_on_places_below_and_places_do_not_overlap(
+    palletise: Task, moved: Moved, places: list[tuple[float, float, float]], said: str
+) -> None:
+    with pytest.raises(BadInput, match=rf"station 'pallet': place at \(0\.0\d0, 0\.000\) m, height_m = 0.*{said}"):
+        check_scene(a_stack(palletise, moved, *places))
+
+
+def test_a_part_may_lie_across_two_and_stand_as_high_as_the_robot_clears(palletise: Task, moved: Moved) -> None:
+    across = (-0.035, 0.0, 0.0), (0.035, 0.0, 0.0), (0.0, 0.0, 0.05)
+    check_scene(a_stack(palletise, moved, *across))
+    with pytest.raises(BadInput, match=r"lowest tool height 0\.230 m would sweep a carried box through .* 'pallet'"):
+        check_scene(a_stack(palletise, moved, *across, *((0.0, 0.0, 0.05 * n) for n in (2, 3, 4))))
+
+
+def test_on_a_body_from_a_file_a_place_may_be_high_alone(palletise: Task, moved: Moved) -> None:
+    task = a_stack(palletise, moved, (0.0, 0.0, 0.03), body="applier.urdf", size_m=None, floor_m=0.0)
+    check_places(places_of(task), task.station("pallet"))
+
+
+def test_a_kind_stands_on_its_own_kind(breakfast: Task, moved: Moved) -> None:
+    """Which of two kinds comes first is not planned; and a place that takes both is as high as neither."""
+    slice_m, cup_m = (places_of(breakfast).kinds[kind].height_m for kind in ("slice", "cup"))
+    low, high = Place(at=(0.0, 0.0, 0.0), kind="slice"), Place(at=(0.0, 0.0, 0.0), kind="cup", height_m=slice_m)
+    other = Place(at=(0.0, 0.2, 0.0), kind="slice")
+    mixed = moved(breakfast, "tray", capacity=3, spots=None, places=(low, other, high))
+    with pytest.raises(BadInput, match="it stands on a slice, which takes places of its own"):
+        check_places(places_of(mixed), mixed.station("tray"))
+    lowest = min(slice_m, cup_m)
+    any_kind = (Place(at=(0.0, 0.0, 0.0)), Place(at=(0.0, 0.2, 0.0)), Place(at=(0.0, 0.0, 0.0), height_m=lowest))
+    both = moved(breakfast, "tray", capacity=3, spots=None, places=any_kind)
+    with pytest.raises(BadInput, match=r"would stand in a (slice|cup)"):
+        check_places(places_of(both), both.station("tray"))
