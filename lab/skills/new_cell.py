@@ -12,7 +12,7 @@ from lab.sim.parts.grip import grip_of
 from lab.sim.parts.part_shape import shape_of
 from lab.sim.scene.reach import ring_of
 from lab.skills.prepared_scene import prepare
-from lab.tasks.new_task import HEAVIEST_KG, Around, NewPart, NewTask, does_not_fit, heights_m, layouts
+from lab.tasks.new_task import HEAVIEST_KG, LIGHTEST_KG, Around, NewPart, NewTask, does_not_fit, heights_m, layouts
 from lab.tasks.new_task_text import text_of
 from lab.tasks.part_fields import PartFields
 from lab.tasks.robot_fields import RobotSettings
@@ -23,7 +23,7 @@ FINGERS_M = 0.016  # that the fingers open beyond the widest part
 ROOM_M = 0.08  # between parts, where what stations have by themselves is not enough for the gripper
 MOST_TRIES = 4  # layouts of which every sub-task is surveyed
 NOT_HELD = "is not held"  # what a trial says of a part that slips, turns or falls over
-HEAVIER = (2, 5, 10)  # times its mass, of such a part
+OTHER_MASSES = (0.5, 0.2, 0.1, 2, 5, 10)  # times its own, tried for such a part
 
 
 def new_cell(new: NewTask, path: Path) -> tuple[str, Task]:
@@ -42,8 +42,11 @@ def new_cell(new: NewTask, path: Path) -> tuple[str, Task]:
 
 def _what_holds(new: NewTask, path: Path) -> str:
     """Which masses of its parts would do."""
-    for times in HEAVIER:
-        parts = [replace(part, given_kg=min(round(times * part.mass_kg, 3), HEAVIEST_KG)) for part in new.parts]
+    for times in OTHER_MASSES:
+        parts = [
+            replace(part, given_kg=min(max(round(times * part.mass_kg, 3), LIGHTEST_KG), HEAVIEST_KG))
+            for part in new.parts
+        ]
         try:
             _laid_out(replace(new, parts=tuple(parts)), path)
         except BadInput:

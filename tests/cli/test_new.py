@@ -57,8 +57,8 @@ def test_thin_parts_of_an_own_mass_and_a_machine_for_two(lab: Lab, folder: Path)
 
 
 def test_a_refusal_says_the_mass_that_would_do(lab: Lab, folder: Path) -> None:
-    words = "new x --part pin=box:0.008x0.008x0.03:1"
-    refused = lab(*words.split(), "--mass", "pin=0.005").err.strip()
+    words = "new x --part pin=cylinder:0.03x0.08:1 --friction pin=0.15"
+    refused = lab(*words.split(), "--mass", "pin=2").err.strip()
     (wanted,) = re.findall("held with --mass (pin=[0-9.]+)$", refused)
     assert lab(*words.split(), "--mass", wanted).code == 0
 
@@ -74,8 +74,8 @@ def test_a_refusal_says_the_mass_that_would_do(lab: Lab, folder: Path) -> None:
         ("new x --machine oven:-3", "machine 'oven:-3' (--machine): '-3' seconds: allowed are 0 to 86400"),
         ("new x --part box:0.06x0.05x0.1:2", "part 'box' cannot be gripped: "),
         (
-            "new x --part pin=cylinder:0.008x0.03:1 --mass pin=0.005",
-            "robot.grip_force_n = 5, chosen for it: pin of 0.005 kg, friction 0.8, is not held: ",
+            "new x --part pin=cylinder:0.03x0.08:1 --mass pin=2 --friction pin=0.15",
+            "robot.grip_force_n = 200, chosen for it: pin of 2 kg, friction 0.15, is not held: ",
         ),
         ("new no/x --yes", "task file 'no/x.toml' (NAME): there is no folder 'no'"),
     ],
