@@ -138,9 +138,8 @@ class Arm:
         out = np.arange(self.nearest_m, 3.0, 0.01)
         found = self.inverse_each(np.stack([out, 0 * out, 0 * out + z, 0 * out], axis=1))
         reached = out[~np.isnan(found[:, 0])]
-        if not len(reached):
-            return f"reaches nothing at a height of {z:.2f} m"
-        return f"reaches {reached[0]:.2f} to {reached[-1]:.2f} m at a height of {z:.2f} m"
+        at = f"at a height of {z:.2f} m{'' if self.level is None else ', its tool level and straight ahead'}"
+        return f"reaches {reached[0]:.2f} to {reached[-1]:.2f} m {at}" if len(reached) else f"reaches nothing {at}"
 
     def _bent(self, poses: Array) -> Array:
         """Joints (n, k) within all ranges but the last's, whose turn is within half a turn of its own zero; NaN: none."""
