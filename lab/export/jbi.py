@@ -80,7 +80,7 @@ def _tools(program: Program) -> dict[float, int]:
 def write(program: Program, options: Options) -> dict[str, str]:
     """The jobs' texts by file name, the master first. BadInput for pulses of an arm whose table is not known."""
     arm = program.arm
-    options.check_maker("jbi", MAKER, NAMES, arm.name)
+    options.check_arm("jbi", MAKER, NAMES, arm.name, level=arm.level is not None)
     if options.positions == "pulse" and arm.name not in PULSES:
         raise BadInput(f"--positions pulse: pulses of arm '{arm.name}' are not known; known: {', '.join(PULSES)}")
     jobs = [(f"M{number:03d}", job) for number, job in enumerate(jobs_of(program), start=1)]

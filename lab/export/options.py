@@ -20,8 +20,12 @@ class Options:
     date: str = "2000/01/01 00:00"
     any_arm: bool = False
 
-    def check_maker(self, form: str, maker: str, names: str, arm: str) -> None:
-        """BadInput for an arm that is none of a controller's maker, whose names match `names`, unless any will do."""
+    def check_arm(self, form: str, maker: str, names: str, arm: str, *, level: bool) -> None:
+        """BadInput for an arm that is none of a controller's maker, whose names match `names`, unless any will do; or level."""
+        if level:
+            raise BadInput(
+                f"--format {form}: its poses are of a tool that hangs; this run's is level: csv and json fit any"
+            )
         if not self.any_arm and not re.fullmatch(names, arm, re.IGNORECASE):
             raise BadInput(
                 f"--format {form}: arm '{arm}' is not made by {maker}; --any-arm writes it all the same, csv and json fit any"

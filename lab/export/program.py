@@ -132,7 +132,7 @@ class Program:
 
     def tools(self, first: int, last: int) -> Array:
         """The tool poses x, y, z [m], yaw [rad] (n, 4) that these rows of joints hold; the yaw goes on without jumps."""
-        poses = self.arm.kinematics.tools(self.joints[first:last])
+        poses = self.arm.tools(self.joints[first:last])
         poses[:, 2] += self.arm.base_up_m
         poses[:, 3] = np.unwrap(poses[:, 3])
         return poses

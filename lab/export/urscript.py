@@ -60,7 +60,7 @@ def write(program: Program, options: Options) -> dict[str, str]:
         raise BadInput(
             f"--format urscript: arm '{arm.name}' has {len(arm.joints)} axes; URScript is for arms with {AXES}"
         )
-    options.check_maker("urscript", MAKER, NAMES, arm.name)
+    options.check_arm("urscript", MAKER, NAMES, arm.name, level=arm.level is not None)
     name = re.sub(r"[^a-z0-9]", "_", program.carried.task.lower())
     acceleration = program.carried.robot.acceleration_m_s2
     tool_m = float(np.linalg.norm(arm.tip[:3, 3]))

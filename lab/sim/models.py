@@ -32,6 +32,8 @@ STEEL, RUBBER = (0.72, 0.73, 0.76, 1.0), (0.12, 0.12, 0.12, 1.0)
 CRUST, CRUMB = (0.62, 0.42, 0.22, 1.0), (0.93, 0.83, 0.64, 1.0)
 MARKER_MAGENTA, MARKER_CYAN, MARKER_GREEN = (0.95, 0.0, 0.95, 1.0), (0.0, 0.85, 0.85, 1.0), (0.0, 0.80, 0.0, 1.0)
 
+FURNACE_FLOOR, FURNACE_ROOF = 0.12, 0.36  # [m] how high its hearth is, and its roof
+
 
 def _turning(number: int, parent: str, at: Vector, axis: Vector) -> Joint:
     limits = (float(arm.LOWER[number]), float(arm.UPPER[number]))
@@ -120,6 +122,18 @@ def toaster() -> Model:
     return Model("toaster", [Link("toaster", 2.0, parts)])
 
 
+def furnace() -> Model:
+    """A furnace that is open towards its negative x axis: hearth, back, two sides and a roof; parts stand over its origin."""
+    length, width, wall, middle = 0.16, 0.26, 0.02, 0.01
+    up = FURNACE_ROOF - FURNACE_FLOOR
+    walls = [((wall, width), (middle + (length - wall) / 2, 0.0))]
+    walls += [((length - wall, wall), (middle - wall / 2, side * (width - wall) / 2)) for side in (1.0, -1.0)]
+    parts = [Part(GRAPHITE, (length, width, FURNACE_FLOOR), (middle, 0, FURNACE_FLOOR / 2))]
+    parts += [Part(STEEL, (*size, up), (*at, FURNACE_FLOOR + up / 2)) for size, at in walls]
+    parts.append(Part(STEEL, (length, width, wall), (middle, 0, FURNACE_ROOF + wall / 2)))
+    return Model("furnace", [Link("furnace", 20.0, parts)])
+
+
 def applier() -> Model:
     """The butter applier: a groove with a low back rest that a slice stands in, and a head that slides across and up."""
     groove, lip = SLICE[1] + 0.005, 0.012
@@ -162,7 +176,7 @@ def bread() -> Model:
     return Model("slice", [Link("slice", SLICE_KG, [Part(CRUST, SLICE, hidden=True), *seen])])
 
 
-MODELS = {"robot": robot, "toaster": toaster, "applier": applier, "slice": bread}
+MODELS = {"robot": robot, "toaster": toaster, "applier": applier, "furnace": furnace, "slice": bread}
 
 
 def write(folder: Path) -> list[Path]:

@@ -345,11 +345,14 @@ class World:
         number, force = max(forces.items(), key=lambda one: one[1], default=(-1, 0.0))
         return self._names.get(number, ""), force
 
-    def nearest(self, one: str, other: str, within: float) -> float:
-        """Distance [m] between two bodies where they are now, `within` when they are farther apart than that."""
+    def nearest(self, one: str, other: str, within: float, first_link: int = -1) -> float:
+        """Distance [m] between two bodies where they are now, `within` when they are farther apart than that.
+
+        first_link: of the first body only the links from this number on count; -1 is its base.
+        """
         first, second = self._bodies[one].number, self._bodies[other].number
         points = self._call("getClosestPoints", first, second, within)
-        return min((float(point[8]) for point in points), default=within)
+        return min((float(point[8]) for point in points if point[3] >= first_link), default=within)
 
     def ray(self, start: Position, end: Position) -> tuple[str, Array] | None:
         """The first body that the ray from `start` to `end` [m] meets, and where, or None."""

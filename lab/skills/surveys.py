@@ -1,8 +1,9 @@
 """What the sub-tasks survey of one scene, each survey made once: the workspace, the surroundings of a station, the grids."""
 
 from collections.abc import Hashable, Iterable, Sequence
+from dataclasses import replace
 from functools import partial
-from math import hypot
+from math import hypot, pi
 
 import numpy as np
 
@@ -95,7 +96,7 @@ class Surveys:
     def workspace(self, carried: str) -> Survey:
         grid = self.task.workspace
         with World() as world:
-            scene = Scene(world, self.task, (), self.layout)
+            scene = self._cell(world)
             surveyor = Surveyor(scene, carried or None, clearance=max(grid.cell_m) / 2 + _TRAVEL_MARGIN)
             survey = surveyor.grid(grid.shape, self.cell_pose)
         for cell in np.ndindex(*grid.shape):
@@ -110,9 +111,9 @@ class Surveys:
         near, approach = self.cells_near(place), self.approach(place)
         survey = self.workspace(carried)
         with World() as world:
-            scene = Scene(world, self.task, (), self.layout)
+            scene = self._cell(world)
             surveyor = Surveyor(scene, carried or None, clearance=_DOCK_CLEARANCE)
-            cause = surveyor.cause(approach)
+            cause = next(filter(None, map(surveyor.cause, self._turned(approach))), "")
             for cell in [] if cause else near:
                 way = _between(self.cell_pose(cell), approach)
                 if not survey.blocked[cell] and not any(surveyor.cause(pose) for pose in way):
@@ -121,6 +122,23 @@ class Surveys:
         raise BadInput(
             f"station '{place}' cannot be approached{f' with {carried}' if carried else ''}: in the way: {cause}"
         )
+
+    def _cell(self, world: World) -> Scene:
+        """The cell without parts; for a level tool, whose wrist is low, with the highest that comes there on each spot in use."""
+        scene = Scene(world, self.task, (), self.layout)
+        for station in self.task.stations if self.task.robot.tool == "level" else ():
+            kind = max(self.places.kinds_at(station.name), key=lambda kind: kind.height_m, default=None)
+            for number, spot in enumerate(self.places.used_spots(station, self.parts), 1):
+                if kind is not None:
+                    self._stand(scene, f"part {number} at {station.name}", kind.name, spot)
+        return scene
+
+    def _turned(self, approach: ToolPose) -> list[ToolPose]:
+        """The poses at an approach through which a level tool turns from the workspace's yaw; a hanging one takes no room."""
+        if self.task.robot.tool != "level":
+            return [approach]
+        yaw = (approach.yaw + pi) % (2 * pi) - pi
+        return [replace(approach, yaw=share * yaw) for share in (1.0, 0.75, 0.5, 0.25, 0.0)]
 
     def cells_near(self, place: str) -> list[Cell]:
         """The workspace's cells of the lowest level within 1.6 cells of a place's approach, nearest first; BadInput for none."""

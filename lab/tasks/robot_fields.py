@@ -1,7 +1,7 @@
 """The robot's fields of a task file: which arm, how it is mounted, how fast and firm it works."""
 
 from pathlib import PurePosixPath
-from typing import Annotated, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
@@ -36,6 +36,10 @@ class RobotSettings(Record):
     """How far the fingers open [m], such as `0.046`; left out: all the way."""
     base_up_m: Annotated[float, Field(ge=-2, le=5)] = 0.0
     """How high the arm's foot stands above the table [m]."""
+    tool: Literal["hanging", "level"] | None = None
+    """How the tool is held, everywhere: it hangs down ("hanging"), or is level and takes parts from behind ("level"); left
+    out: level where a station has approach = "side", else hanging.
+    """
     start: Name
     """The station above which the arm waits at time 0, such as `"input"`."""
     speed_m_s: Annotated[float, Field(ge=0.01, le=1.5)] = 0.5

@@ -217,6 +217,14 @@ class Task(Record):
         return self
 
     @model_validator(mode="after")
+    def _tool_is_level(self) -> Self:
+        """Where the file does not say how the tool is held: level where parts are brought in from the side."""
+        sides = any(station.approach == "side" for station in self.stations)
+        if self.robot.tool is None and sides:
+            object.__setattr__(self, "robot", self.robot.model_copy(update={"tool": "level"}))
+        return self
+
+    @model_validator(mode="after")
     def _routes_known(self) -> Self:
         stations = [s.name for s in self.stations]
         carriers = {part.pallet for part in self.parts}

@@ -172,7 +172,7 @@ class Station(Record):
     """
     approach: Literal["above", "camera", "side"] = "above"
     """From where the gripper comes: straight down ("above"), through the grid that the overhead camera looks at
-    ("camera"), or level along the yaw of the pose ("side"); the tool hangs down in all three.
+    ("camera"), or level along the yaw of the pose ("side"), with a level tool unless `robot.tool` says that it hangs.
     """
     grid: CameraGrid | None = None
     """The camera's grid before the station; of approach = "camera" only, which needs it."""

@@ -87,7 +87,8 @@ def test_from_the_side_the_moves_are_called_as_they_go(task: Task, layout: Layou
     stations = tuple(
         s.model_copy(update={"approach": "side"}) if s.name == "toaster_buffer" else s for s in task.stations
     )
-    surveys = Surveys(task.changed(stations=stations), ORDER, layout)
+    robot = task.robot.model_copy(update={"tool": "hanging"})
+    surveys = Surveys(task.changed(stations=stations, robot=robot), ORDER, layout)
     mdp = Grasp(surveys.task, "slice", "toaster_buffer").setup(surveys).mdp
     assert mdp.action_labels == tuple(SIDEWAYS.get(action, action) for action in ACTIONS)
     assert mdp.action_labels[:6] == ("lower", "higher", "backward", "forward", "in", "out")

@@ -28,7 +28,8 @@ def refused(folder: Path, robot: str) -> str:
         ('model = "panda"\ntip_m = 0.1', "tip_m is for a URDF file: the arm 'panda' knows its own"),
         ("opening_m = -0.1", "robot.opening_m"),
         ("base_up_m = 100.0", "robot.base_up_m"),
-        ("tool = 1", "robot.tool: there is no such key"),
+        ("hand = 1", "robot.hand: there is no such key"),
+        ('tool = "up"', "robot.tool"),
     ],
 )
 def test_words_that_mean_no_arm_are_refused(tmp_path: Path, robot: str, said: str) -> None:

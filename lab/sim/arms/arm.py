@@ -1,19 +1,22 @@
 """An arm: its URDF, its joints, its gripper, and which joints hold its tool where; those that ship, and any other."""
 
-from dataclasses import dataclass
-from math import pi
+from dataclasses import dataclass, replace
+from math import cos, pi, sin
 from pathlib import Path
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lab.errors import BadInput
 from lab.sim.arms.fingers import Fingers
 from lab.sim.arms.gripper import Gripper
 from lab.sim.arms.kinematics import ToolPose
+from lab.sim.arms.level_tool import LevelTool
 
 Array = NDArray[np.float64]
 _WAYS_ROUND = (0, 1, -1, 2, -2, 3, -3, 4, -4)  # half turns of the tool that are tried
+_ASIDE = (0.0, 0.4, -0.4, 0.8, -0.8, 1.2, -1.2, 1.6, -1.6)  # [rad] off straight ahead, in which a level tool may wait
 
 
 class Kinematics(Protocol):
@@ -40,7 +43,7 @@ class Arm:
 
     urdf: what physics loads, checked; joints (k,) from the foot to the tool, their ranges lower, upper (k,) [rad] and speed
     (k,) [rad/s]; tool_link, tip (4, 4): the finger tips' frame in it, x out of the gripper, y across; nearest_m: nearer to
-    its own axis than this the tool would touch the arm.
+    its own axis than this the tool would touch the arm. level: how it holds its tool level; None: the tool hangs.
     """
 
     name: str
@@ -55,16 +58,26 @@ class Arm:
     nearest_m: float
     base_up_m: float
     kinematics: Kinematics
+    level: LevelTool | None = None
 
     @property
     def gripper(self) -> Gripper:
         """What its fingers can take."""
-        return self.fingers.gripper
+        return replace(self.fingers.gripper, level=self.level is not None)
 
     @property
     def home(self) -> Array:
-        """Joints (k,) in which it waits, its tool down."""
-        return self.kinematics.home
+        """Joints (k,) in which it waits, its tool down, or level with its wrist there."""
+        if self.level is None:
+            return self.kinematics.home
+        x, y, z, yaw = self.kinematics.tools(self.kinematics.home[None])[0].tolist()
+        ahead = self.level.wrist_m
+        for aside in _ASIDE:
+            way = ahead * cos(yaw + aside), ahead * sin(yaw + aside)
+            found = self.inverse(ToolPose(x + way[0], y + way[1], z + ahead + self.base_up_m, yaw + aside))
+            if found is not None:
+                return found
+        raise BadInput(f"robot.tool = 'level': the wrist of arm '{self.name}' cannot hold its tool so in front of it")
 
     def inverse(self, pose: ToolPose) -> Array | None:
         """The joints (k,) that hold the tool at `pose`, which depend on nothing else; None when out of reach or range.
@@ -109,8 +122,12 @@ class Arm:
 
     def forward(self, joints: Array) -> ToolPose:
         """The tool pose that joints (k,) hold; for joints that `inverse` gave, or that are near to such."""
-        x, y, z, yaw = (float(number) for number in self.kinematics.tools(joints[None])[0])
+        x, y, z, yaw = (float(number) for number in self.tools(joints[None])[0])
         return ToolPose(x, y, z + self.base_up_m, yaw)
+
+    def tools(self, joints: Array) -> Array:
+        """The tool poses x, y, z [m], yaw [rad] (n, 4) that joints (n, k) hold, in the foot's frame."""
+        return (self.kinematics if self.level is None else self.level).tools(joints)
 
     def is_half_on(self, joints: Array, pose: ToolPose) -> bool:
         """Whether joints hold the tool half a turn on from the yaw of `pose`."""
@@ -121,19 +138,22 @@ class Arm:
         out = np.arange(self.nearest_m, 3.0, 0.01)
         found = self.inverse_each(np.stack([out, 0 * out, 0 * out + z, 0 * out], axis=1))
         reached = out[~np.isnan(found[:, 0])]
-        if not len(reached):
-            return f"reaches nothing at a height of {z:.2f} m"
-        return f"reaches {reached[0]:.2f} to {reached[-1]:.2f} m at a height of {z:.2f} m"
+        at = f"at a height of {z:.2f} m{'' if self.level is None else ', its tool level and straight ahead'}"
+        return f"reaches {reached[0]:.2f} to {reached[-1]:.2f} m {at}" if len(reached) else f"reaches nothing {at}"
 
     def _bent(self, poses: Array) -> Array:
         """Joints (n, k) within all ranges but the last's, whose turn is within half a turn of its own zero; NaN: none."""
         with np.errstate(invalid="ignore"):
             poses = np.where(np.abs(poses).max(axis=1, keepdims=True) < 1e3, poses, np.nan)
+            asked, poses = poses, poses if self.level is None else self.level.hanging(poses)
             first, last = self.kinematics.spins
             turn = np.arctan2(poses[:, 1], poses[:, 0])
             joints = self.kinematics.bent(np.hypot(poses[:, 0], poses[:, 1]), poses[:, 2] - self.base_up_m)
             joints[:, 0] += first * turn
             joints[:, -1] = (joints[:, -1] + last * (poses[:, 3] - turn) + pi) % (2 * pi) - pi
+            if self.level is not None:
+                joints = self.level.raised(joints, asked - [0.0, 0.0, self.base_up_m, 0.0])
+                joints[:, -1] = (joints[:, -1] + pi) % (2 * pi) - pi
             under, over = joints[:, :-1] < self.lower[:-1], joints[:, :-1] > self.upper[:-1]
             inside = ~np.any(under | over, axis=1)
         joints[~inside] = np.nan

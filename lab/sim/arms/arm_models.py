@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from math import pi
 from pathlib import Path
+from typing import Literal
 from xml.etree import ElementTree as Xml
 
 import numpy as np
@@ -17,6 +18,7 @@ from lab.sim.arms.arm import Arm, Kinematics
 from lab.sim.arms.chain import Chain
 from lab.sim.arms.fingers import fingers_of
 from lab.sim.arms.foreign_urdf import Urdf, settled, written
+from lab.sim.arms.level_tool import LevelTool
 from lab.sim.arms.numeric_kinematics import NumericKinematics
 from lab.tasks.robot_fields import RobotSettings
 
@@ -79,14 +81,13 @@ def arm_of(settings: RobotSettings, folder: Path = Path()) -> Arm:
             raise BadInput(f"robot.model '{settings.model}': no such file beside the task file, or over 5 MB")
         changed = path.stat().st_mtime_ns
     mount = (settings.opening_m, settings.base_up_m, settings.nearest_m)
-    return _made(
-        settings.model, path, changed, (settings.tool_link or "", settings.fingers or (), settings.tip_m), mount
-    )
+    tool = settings.tool_link or "", settings.fingers or (), settings.tip_m
+    return _made(settings.model, path, changed, tool, mount, settings.tool == "level")
 
 
-def arm_named(name: str) -> Arm:
+def arm_named(name: str, tool: Literal["hanging", "level"] = "hanging") -> Arm:
     """An arm that ships, as it comes."""
-    return arm_of(RobotSettings(model=name, start="anywhere"))
+    return arm_of(RobotSettings(model=name, tool=tool, start="anywhere"))
 
 
 @lru_cache(maxsize=16)
@@ -96,6 +97,7 @@ def _made(
     changed_ns: int,
     tool: tuple[str, tuple[str, ...], float | None],
     mount: tuple[float | None, float, float | None],
+    level: bool,
 ) -> Arm:
     if name in ARMS:
         model = ARMS[name]
@@ -134,6 +136,7 @@ def _made(
         nearest_m or model.nearest_m,
         base_up_m,
         how,
+        LevelTool.of(chain, how.home) if level else None,
     )
 
 

@@ -64,12 +64,12 @@ class Chain:
 
     def ends(self, joints: Array) -> tuple[Array, Array]:
         """Where the end is (n, 3) [m] and its axes (n, 3, 3), in the foot's frame, for joints (n, k)."""
-        at, axes, _, _ = self._along(joints)
+        at, axes, _, _ = self.along(joints)
         return at, axes
 
     def jacobian(self, joints: Array) -> tuple[Array, Array, Array]:
         """As `ends`, and how the end moves and turns with each joint: (n, 6, k), [m] then [rad], in the foot's axes."""
-        at, axes, origins, directions = self._along(joints)
+        at, axes, origins, directions = self.along(joints)
         moved = np.cross(directions, at[:, None] - origins)
         moved[:, self.slides] = directions[:, self.slides]
         turned = np.where(self.slides[:, None], 0.0, directions)
@@ -77,10 +77,11 @@ class Chain:
 
     def middles(self, joints: Array) -> Array:
         """Where the joints are on the whole (n, 3) [m]."""
-        _, _, origins, _ = self._along(joints)
+        _, _, origins, _ = self.along(joints)
         return np.asarray(origins.mean(axis=1))
 
-    def _along(self, joints: Array) -> tuple[Array, Array, Array, Array]:
+    def along(self, joints: Array) -> tuple[Array, Array, Array, Array]:
+        """As `ends`, and where each joint is and along or about which it moves (n, k, 3), in the foot's frame."""
         n, k = joints.shape
         sines, cosines = np.sin(joints), np.cos(joints)
         at, axes = np.zeros((n, 3)), np.broadcast_to(np.eye(3), (n, 3, 3))

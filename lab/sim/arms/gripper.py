@@ -7,13 +7,14 @@ PAD_M = 0.011  # how far from the middle of a finger's pad, of 3 x 3 cm, frictio
 
 @dataclass(frozen=True)
 class Gripper:
-    """Two parallel fingers of a vertical tool, which close along the tool's y axis [m].
+    """Two parallel fingers, which close along the tool's y axis [m].
 
     opening_m: between the open fingers' pads. depth_m: from the finger tips up to the palm. width_m, thick_m: of a
-    finger, across the way it closes and along it.
+    finger, across the way it closes and along it. level: the tool is held level, not hanging.
     """
 
     opening_m: float
     depth_m: float
     width_m: float
     thick_m: float
+    level: bool = False

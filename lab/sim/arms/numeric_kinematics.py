@@ -179,12 +179,14 @@ class NumericKinematics:
         going = np.arange(len(joints))
         for _ in range(tries):
             at, axes, moved = self.chain.jacobian(joints[going])
-            missed = np.concatenate([np.stack([out[going], 0 * going, up[going]], axis=1) - at, _turn(axes)], axis=1)
+            missed = np.concatenate(
+                [np.stack([out[going], 0 * going, up[going]], axis=1) - at, turn_to(axes, DOWN[None])], axis=1
+            )
             aside = np.zeros((len(going), self.count))
             if self.count > 6:
                 aside[:, 1:-1] = (self._rest - joints[going])[:, 1:-1]
             wanted = missed - np.einsum("nij,nj->ni", moved, aside)
-            step = _damped(moved, wanted) + aside
+            step = damped(moved, wanted) + aside
             step *= np.minimum(1.0, 0.4 / np.maximum(np.abs(step).max(axis=1), 1e-12))[:, None]
             joints[going] += step
             left = (np.abs(missed).max(axis=1) > _EXACT) | (np.abs(step).max(axis=1) > 1e-7)
@@ -197,7 +199,7 @@ class NumericKinematics:
         return joints, held
 
 
-def _damped(moved: Array, wanted: Array) -> Array:
+def damped(moved: Array, wanted: Array) -> Array:
     """The joints' steps (n, k) that bring the end by `wanted` (n, 6), as far as `moved` (n, 6, k) lets them."""
     back = moved.transpose(0, 2, 1)
     if moved.shape[2] < 6:
@@ -207,6 +209,6 @@ def _damped(moved: Array, wanted: Array) -> Array:
     return np.asarray((back @ np.linalg.solve(square, wanted[:, :, None]))[:, :, 0])
 
 
-def _turn(axes: Array) -> Array:
-    """The small rotation (n, 3) [rad] that takes the tool's axes (n, 3, 3) to those of a vertical one at yaw 0."""
-    return np.asarray(0.5 * np.cross(axes, DOWN, axisa=1, axisb=0, axisc=2).sum(axis=1))
+def turn_to(axes: Array, wanted: Array) -> Array:
+    """The small rotation (n, 3) [rad] that takes the tool's axes (n, 3, 3) to `wanted` ones (n, 3, 3)."""
+    return np.asarray(0.5 * np.cross(axes, wanted, axisa=1, axisb=1, axisc=2).sum(axis=1))

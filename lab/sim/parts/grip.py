@@ -1,10 +1,12 @@
 """Where a two-finger gripper takes a part: computed from the part's shape, or checked where a file gives it.
 
-The fingers come straight down on both sides. A flat pad that closes on a convex body touches it where that is widest
+The fingers come straight down on both sides; those of a level tool come along the part's x axis, the palm behind it, which is
+as from above on the part laid on its front. A flat pad that closes on a convex body touches it where that is widest
 across the pad; where this is at the pad's edge the body slopes away, and slips out unless friction holds it.
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import atan, atan2, cos, degrees, inf, pi, sin
 
@@ -51,6 +53,8 @@ def grip_of(shape: PartShape, gripper: Gripper, friction: float, given: GripFiel
 
     BadInput, with the part's widths, for one that cannot be taken, and for a grip that was `given` and does not fit.
     """
+    if gripper.level:
+        return _level(shape, gripper, friction, given)
     if given is not None:
         return _as_given(shape, gripper, given)
     sections = _Sections(shape)
@@ -79,6 +83,45 @@ def grip_of(shape: PartShape, gripper: Gripper, friction: float, given: GripFiel
         if found:
             return min(found, key=lambda one: one[0])[1]
     raise BadInput(_refusal(sections, gripper, friction, slopes))
+
+
+def _level(shape: PartShape, gripper: Gripper, friction: float, given: GripFields | None) -> Grip:
+    """The grip of a level tool: as near to the middle as can be, the pads' middle at the part's axis."""
+    if given is not None:
+        raise BadInput(
+            f"part '{shape.name}': grip is for a tool that hangs; here it is level, by robot.tool "
+            "or an approach = 'side': leave grip away"
+        )
+    laid = replace(shape, hull=shape.hull[:, [2, 1, 0]] * [1.0, 1.0, -1.0])  # x up, and its front, +x, below
+    deep_m = max(laid.foot_m - PAD_M / 2, laid.height_m - gripper.depth_m + PALM_M)  # the tips, behind the front
+    low, high = gripper.width_m / 2 + OVER_FLOOR_M, max(shape.height_m - HOLD_M, shape.foot_m)
+    if high < low:
+        raise BadInput(
+            f"part '{shape.name}' is {shape.height_m:.4f} m high as it stands, too flat for the fingers of a level tool: at "
+            f"least {low + HOLD_M:.3f} m needed"
+        )
+    slopes: list[float] = []
+    for up_m in [min(max(shape.foot_m, low), high), *np.linspace(low, high, 6).tolist()]:
+        sections = _Sections(laid, (up_m - shape.foot_m, 0.0))
+        pads = sections.between(0.0, deep_m, gripper.width_m, gripper.opening_m - 2 * BESIDE_M)
+        if pads is not None and pads.slope <= atan(SHARE * friction) and deep_m <= laid.height_m - HOLD_M:
+            return Grip(0.0, up_m, laid.foot_m - deep_m, pads.middle_m, pads.width_m, 2 * pi)
+        slopes += [] if pads is None else [pads.slope]
+    raise BadInput(_level_refusal(shape, laid, gripper, friction, slopes))
+
+
+def _level_refusal(
+    shape: PartShape, laid: PartShape, gripper: Gripper, friction: float, slopes: Sequence[float]
+) -> str:
+    long_m, wide_m = (shape.high - shape.low)[:2].tolist()
+    what = f"part '{shape.name}' cannot be gripped level, along its x axis: it is {wide_m:.3f} m wide and {long_m:.3f} m long"
+    if slopes:
+        least, holds = degrees(min(slopes)), degrees(atan(SHARE * friction))
+        return f"{what}, and its sides slope by {least:.0f} degrees: friction {friction:g} holds {holds:.0f}"
+    return (
+        f"{what}; the gripper takes up to {gripper.opening_m - 2 * BESIDE_M:.3f} m, and "
+        f"{gripper.depth_m - PALM_M:.3f} m from its tips to its palm"
+    )
 
 
 def _as_given(shape: PartShape, gripper: Gripper, given: GripFields) -> Grip:

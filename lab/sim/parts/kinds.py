@@ -119,6 +119,11 @@ def kinds_of(task: Task, gripper: Gripper) -> dict[str, Kind]:
     kinds = {part.name: _kind(part, task.folder, gripper) for part in task.parts}
     for part in task.made:
         if part.pallet is not None:
+            if gripper.level:
+                raise BadInput(
+                    f"part '{part.name}' comes on '{part.pallet}': only a tool that hangs carries pallets; here it is level, by "
+                    "robot.tool or an approach = 'side'"
+                )
             name = comes_as(part)
             kinds[name] = replace(kinds[part.pallet], name=name, rider=kinds[part.name])
             _check_rider(kinds[name], gripper)

@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 from lab.sim.arms.kinematics import ToolPose
 from lab.sim.arms.robot import NAME
 from lab.sim.parts.kinds import Spot
-from lab.sim.scene.scene import Scene
+from lab.sim.scene.scene import TABLE, Scene
 
 OUT_OF_REACH = "out of reach"
 CARRIED = "carried part"
 FINGERS_OFF_M = 0.0005  # [m] of a finger off a part that is put between them
+FOREARM = 3  # the links from here on come near the table with a level tool; the first ones stand on it
 _AWAY = Spot(0.0, 0.0, -5.0, 0.0)
 
 
@@ -72,6 +73,9 @@ class Surveyor:
         for name in self.solid:
             if any(world.nearest(moving, name, self.clearance) < self.clearance for moving in self.moving):
                 return name
+        level = self.scene.robot.arm.level is not None
+        if level and world.nearest(NAME, TABLE, self.clearance, FOREARM) < self.clearance:
+            return TABLE
         return ""
 
     def grid(self, shape: tuple[int, ...], pose_of: Callable[[tuple[int, ...]], ToolPose]) -> Survey:

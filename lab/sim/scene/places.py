@@ -105,8 +105,12 @@ class Places:
             if station.capacity > 1:
                 offsets = self._rows(station, 1)
         else:
-            offsets = self._rows(station, min(COLUMNS, station.capacity) if station.kind == "storage" else 1)
+            offsets = self._rows(station, min(COLUMNS, station.capacity) if self._has_columns(station) else 1)
         return [Spot(*beside(at, yaw, off), high, yaw) for off in offsets[: station.capacity]]
+
+    def _has_columns(self, station: Station) -> bool:
+        """Whether parts stand before and behind one another there, too: the palm of a level tool is behind its part."""
+        return station.kind == "storage" and self.task.robot.tool != "level"
 
     def raised(self, kind: str, station: Station, spot: Spot) -> Spot:
         """Where a part of a kind stands on a spot: on the floor, or on its pallet that stands there."""
@@ -257,7 +261,7 @@ class Places:
             return {f"{kind} {n} beside": (kind, other) for n, (kind, other) in seen}
         column_m, row_m = self.pitch(station)
         steps = {"in front": (0.0, -row_m), "behind": (0.0, row_m)}
-        if station.kind == "storage":
+        if self._has_columns(station):
             steps |= {"to the left": (-column_m, 0.0), "to the right": (column_m, 0.0)}
         return {
             f"{largest.name} {where}": (

@@ -35,6 +35,7 @@ def check_scene(task: Task) -> None:
     """BadInput when a part cannot be gripped, spots are out of the arm's reach, or transfers would sweep parts."""
     arm, places = arm_of(task.robot, task.folder), places_of(task)
     low = task.workspace.lower_m[2] + task.workspace.cell_m[2] / 2
+    _check_level(task)
     _check_lowest(places, low)
     check_held(task.robot, arm, list(places.kinds.values()), longest_way_m(places))
     for station in task.stations:
@@ -50,6 +51,19 @@ def check_scene(task: Task) -> None:
                 pose = kind.held_at(spot)
                 for at in (pose, ToolPose(pose.x, pose.y, low, pose.yaw)):
                     _check_reach(arm, station, at)
+
+
+def _check_level(task: Task) -> None:
+    """BadInput for what only a hanging tool can do, in a task whose tool is level."""
+    if task.robot.tool != "level":
+        return
+    grids = [f"station '{station.name}': approach = 'camera'" for station in task.stations if station.grid is not None]
+    covers = [f"processes.{name}: by = 'robot'" for name, process in task.processes.items() if process.by == "robot"]
+    seen = ["perception = 'camera'"] if task.perception == "camera" else []
+    if found := [*grids, *covers, *seen]:
+        sides = [station.name for station in task.stations if station.approach == "side"]
+        why = f", for '{sides[0]}' has approach = 'side'" if sides else ""
+        raise BadInput(f"{found[0]} is for a tool that hangs; robot.tool is 'level'{why}")
 
 
 def _check_on_body(places: Places, station: Station) -> None:
