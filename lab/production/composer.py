@@ -95,12 +95,15 @@ class Production:
         work, recovery, now_s = self.work, self.recovery, self.floor.now_s
         first = self.sequence[0] if self.sequence and self.floor.bench.held is not None else None
         ready_s = {part: work.left_s(part) for part in range(1, self.cell.parts + 1) if work.work_on(part) is not None}
-        ready_s |= dict.fromkeys(back, 0.0)
+        ready_s |= dict.fromkeys([*back, *work.taken_out()], 0.0)
         mishaps = Mishaps(frozenset(recovery.lost), tuple(recovery.out), ready_s, back)
         try:
             found = plan_again(work.plan, mishaps, first)
         except LabError as error:
-            raise RunStopped(f"{why}: {error}") from None
+            if first is None or not recovery.set_aside(why):
+                raise RunStopped(f"{why}: {error}") from None
+            self.replan(why, back)
+            return
         recovery.lose(dict(found.stuck))
         work.plan, self.sequence = found.run, [*found.sequence]
         if found.schedule is not None and found.proven is not None:

@@ -7,6 +7,7 @@ from lab.skills.skill import Bench, Status
 from lab.toolbox.policy import Policy
 
 NEVER = float("inf")
+PATIENCE, PATIENCE_S = 1.0, 10.0  # a machine may be late by this share of its time, and by at least so much [s]
 
 
 @dataclass
@@ -25,6 +26,7 @@ class Work:
     skill: Skill | None = None
     burns_s: float = NEVER
     told: bool = field(default=False, repr=False)  # that it is done
+    late: bool = field(default=False, repr=False)  # whether it was noticed that it is not done when it should be
 
     def start(self, bench: Bench, policy: Policy) -> None:
         """Carry its process out, from the beginning."""
@@ -40,6 +42,11 @@ class Work:
     def failed(self) -> str:
         """Why its process failed; "" when it did not."""
         return self.skill.reason if self.skill is not None and self.skill.status is Status.FAILURE else ""
+
+    @property
+    def given_up_s(self) -> float:
+        """When the machine counts as out of order if it is still not done [s]."""
+        return self.expected_s + max(PATIENCE_S, PATIENCE * (self.expected_s - self.begun_s))
 
     def done(self, now_s: float) -> bool:
         """Whether the machine has finished the part."""

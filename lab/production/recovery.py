@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
 from lab.errors import LabError
@@ -101,6 +102,9 @@ class Recovery:
     def answer(self, trouble: Trouble) -> None:
         """Do what lets the run go on, perhaps without a part. Raises RunStopped."""
         work, floor = self.work, self.work.floor
+        if trouble.late:
+            self._put_off(trouble)
+            return
         work.place = ""
         floor.scene.robot.brake()
         if not trouble.held:  # a protective stop
@@ -129,6 +133,21 @@ class Recovery:
             self._wait_for_camera(trouble)
         elif not self._see() and not trouble.seen:
             self._try_again(trouble, self._tries[key])
+
+    def _put_off(self, trouble: Trouble) -> None:
+        """A machine is late: what can be done meanwhile comes first, and its part is fetched as if the machine took as long as it
+        is allowed to. Where no order keeps to all windows then, the old one is gone on with."""
+        self._tell(trouble, "waits for it, and does first what can be done meanwhile")
+        with suppress(RunStopped):
+            self.replan(str(trouble))
+
+    def set_aside(self, why: str) -> bool:
+        """Set down what is in the gripper, for it cannot be brought on now; whether that was done."""
+        held = self.work.floor.bench.held
+        if held is None or not self.work.set_aside():
+            return False
+        self._tell(Trouble(why, held), "sets it down again")
+        return True
 
     def _try_again(self, trouble: Trouble, tries: int) -> None:
         """Nothing is to be seen that explains it: try it again, a few times, then give up."""
@@ -177,7 +196,8 @@ class Recovery:
             self._follow(part, seen)
 
     def _avoid(self, seen: Deviation) -> None:
-        """Something stands where it does not belong: its spot is taken; where that was the only one, the station is closed."""
+        """Something stands where it does not belong: its spot is taken; where that was the only one, it is set aside, or else the
+        station is closed."""
         assert seen.at is not None
         floor = self.work.floor
         self._strange[seen.name] = ""
@@ -186,10 +206,24 @@ class Recovery:
             spots = floor.scene.places.spots(floor.skillset.task.station(seen.station))
             near = min(spots, key=lambda spot: (spot.x - seen.at.x) ** 2 + (spot.y - seen.at.y) ** 2)  # type: ignore[union-attr]
             self.work.taken.add(near)
+            if len(spots) == 1 and self._clear_away(seen):
+                self.work.taken.discard(near)
+                self._tell_seen(seen, "sets it aside")
+                return
             if len(spots) == 1:
                 self._strange[seen.name] = seen.station
                 self.out[seen.station] = seen.words
         self._tell_seen(seen, "brings nothing there")
+
+    def _clear_away(self, seen: Deviation) -> bool:
+        """Whether what belongs to nobody was set aside; what is in the gripper is set down first."""
+        try:
+            if self.work.floor.bench.held is not None and not self.set_aside(seen.words):
+                return False
+            return self.work.clear_away(seen.name, seen.station)
+        except Trouble as trouble:
+            self._note(str(trouble))
+            return False
 
     def _leave(self, part: int, seen: Deviation) -> None:
         """A part that cannot be taken up is left; where it lies in a machine, that is closed."""
@@ -234,11 +268,11 @@ class Recovery:
             raise RunStopped(f"{fixed[0].words}: {error}") from None
 
     def _give_up(self, trouble: Trouble, why: str) -> None:
-        """Go on without a machine or without a part; RunStopped when the part is in the gripper, or it is about none."""
+        """Go on without a machine or without a part; RunStopped when the part cannot be set down, or it is about none."""
         floor = self.work.floor
         text = str(Trouble(why, trouble.part, trouble.station))
         part = self._part_of(trouble.part)
-        if floor.bench.held is not None or part is None:
+        if part is None or (floor.bench.held is not None and not self.set_aside(why)):
             raise RunStopped(text)
         if (work := floor.work_on(trouble.part)) is not None and work.station == trouble.station:
             self.out[trouble.station] = why

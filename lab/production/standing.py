@@ -1,19 +1,28 @@
 """Where parts stand, and where there is room to set one down."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from math import hypot
+
+import numpy as np
 
 from lab.production.trouble import Trouble
 from lab.sim.arms.kinematics import ToolPose
+from lab.sim.arms.robot import NAME
 from lab.sim.parts.kinds import Spot, comes_as
 from lab.sim.scene.places import Rectangle
-from lab.sim.scene.scene import Scene, pallet_of
+from lab.sim.scene.scene import TABLE, Scene, in_grid, pallet_of
+from lab.skills.around_part import SLOW
+from lab.skills.free_way import by_free_cells
+from lab.skills.place import let_go, release_pose
+from lab.skills.sight import SkillFailed
 from lab.skills.skill import UPRIGHT, Bench
 from lab.skills.skillset import Carried, SkillSet
+from lab.skills.surveys import Surveys
 
 ASTRAY_M = 0.15  # a part this near to a spot of a station is taken up by the station's own way
 DELIVERED_M = 0.02  # a part this near to its spot has been delivered
 BESIDE_M = 0.004  # between a part, or the open fingers, and what stands beside it
+ASIDE_M = 0.03  # around a part that is set aside on the table
 
 
 def free_spot(
@@ -45,6 +54,52 @@ def free_spot(
 def _carries(bench: Bench, body: str, spot: Spot, lying: Collection[str]) -> bool:
     """Whether a body stands on its spot, as far as is known, so that another one can be put on it."""
     return body not in lying and bench.stands(body, spot, DELIVERED_M)
+
+
+def spots_aside(bench: Bench, surveys: Surveys, name: str, way: Carried, spot_of: Mapping[str, Spot]) -> Iterator[Spot]:
+    """Where a part in the gripper may be set down for now: where it was taken up, unless a machine would keep it, then free
+    places of the table, the nearest first."""
+    scene, own = bench.scene, bench.scene.bodies_of(name, way.kind)
+    kind, begun, origin = scene.kinds[way.kind], spot_of.get(own[0]), scene.task.station(way.origin)
+    others = [
+        body for body in scene.world.names() if body not in (*own, TABLE, NAME) and not body.startswith(f"{NAME} ")
+    ]
+    length, across = kind.footprint_m()
+
+    def is_free(spot: Spot, room_m: float, bodies: Collection[str]) -> bool:
+        room = Rectangle(spot.x, spot.y, length + room_m, across + room_m, spot.yaw)
+        tool = kind.held_at(spot)
+        if scene.robot.arm.inverse(tool) is None or _standing_in(scene, room, spot.z, bodies):
+            return False
+        return not in_fingers_way(scene, tool, bodies)
+
+    if begun and origin.kind != "machine" and is_free(begun, BESIDE_M, [one for one in others if one != origin.name]):
+        yield begun
+    blocked, (x, y, _) = surveys.workspace(way.kind).blocked, origin.pose
+    cells = [surveys.cell_pose(cell) for cell in np.ndindex(*blocked.shape[:2], 1) if not blocked[cell]]
+    kept = [room for _, room in scene.places.kept_free(len(scene.order))]
+    grids = [one.grid for one in scene.task.stations if one.grid is not None]
+    for cell in sorted(cells, key=lambda cell: hypot(cell.x - x, cell.y - y)):
+        ground = Rectangle(cell.x, cell.y, length + ASIDE_M, across + ASIDE_M, 0.0)
+        if any(in_grid(grid, (cell.x, cell.y)) for grid in grids) or any(room.meets(ground) for room in kept):
+            continue
+        if is_free(spot := Spot(cell.x, cell.y, 0.0, 0.0), ASIDE_M, others):
+            yield spot
+
+
+def set_down(bench: Bench, surveys: Surveys, spot: Spot, carried: str) -> Iterator[None]:
+    """Set down what is in the gripper on a free spot, by free cells; carried: its kind. Raises SkillFailed where it does not
+    stand there then."""
+    body, robot = bench.held, bench.scene.robot
+    assert body is not None
+    goal = release_pose(bench, body, spot)
+    above = ToolPose(goal.x, goal.y, surveys.cell_pose((0, 0, 0)).z, goal.yaw)
+    yield from by_free_cells(bench, surveys, above, carried)
+    goal = release_pose(bench, body, spot)
+    yield from robot.follow([goal], slow=SLOW)
+    yield from let_go(bench, [above])
+    if not bench.stands(body, spot, DELIVERED_M):
+        raise SkillFailed(f"{body} does not stand where it was set aside")
 
 
 def too_near(bench: Bench, body: str) -> str:

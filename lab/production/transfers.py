@@ -2,13 +2,14 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from itertools import islice
 from math import hypot
 
 from lab.production.durations import TimedMove
 from lab.production.floor import Floor
 from lab.production.machine import Work
 from lab.production.perception import moved_unseen
-from lab.production.standing import free_spot, station_near
+from lab.production.standing import free_spot, set_down, spots_aside, station_near
 from lab.production.trouble import Trouble
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.routes import Option, part_of
@@ -34,10 +35,8 @@ from lab.teaching.events import (
 )
 
 BEGINS_M = 0.05  # a tool this near to where a skill begins need not be brought there
-PATIENCE, PATIENCE_S = (
-    1.0,
-    10.0,
-)  # of its time, and at least so much, a machine may take longer before it is out of order
+LATE_S = 1.0  # a machine that takes so much longer than it should is late
+MOST_ASIDE = 3  # places at which it is tried to set a part aside
 
 
 def _unseen() -> None:
@@ -91,6 +90,7 @@ class Transfers:
         self.look: Callable[[], None] = _unseen
         self._under_way: _UnderWay | None = None
         self._last: dict[str, tuple[Carried, Spot, float]] = {}
+        self._left_s: dict[str, float] = {}  # when parts that were set aside left their stations
         self._served: set[str] = set()  # parts for which the robot's service is done
         scene = self.floor.scene
         for number, spot in enumerate(scene.places.begins(scene.order), start=1):
@@ -150,8 +150,40 @@ class Transfers:
                 self._take_up(name, way, spot)
             self._bring(way, spot, move)
             self._under_way = None
+            self._left_s.pop(name, None)
             self._start_machine(name, way.target, process_s)
             self.to_put_back.pop(0)
+
+    def set_aside(self) -> bool:
+        """Set what is in the gripper down where it was taken up, or on a free place of the table; whether that was done."""
+        bench, skillset = self.floor.bench, self.floor.skillset
+        if self._under_way is None or bench.held is None:
+            return False
+        (name, way), surveys = self._under_way.what, next(iter(skillset.skills.values())).surveys
+        bodies, self.place = self.floor.scene.bodies_of(name, way.kind), ""
+        for spot in islice(spots_aside(bench, surveys, name, way, self.spot_of), MOST_ASIDE):
+            why = self.floor.follow(set_down(bench, surveys, spot, way.kind))
+            if why and bench.held is not None:
+                continue
+            if spot != self.spot_of.get(bodies[0]):
+                self._left_s.setdefault(name, self._under_way.pick_s)
+            self._under_way = None
+            self.spot_of |= dict.fromkeys(bodies, spot)
+            return True
+        return False
+
+    def clear_away(self, body: str, station: str) -> bool:
+        """Take up what stands at a station and belongs to nobody, and set it aside; whether that was done. Raises Trouble."""
+        bench, kind = self.floor.bench, self.floor.scene.kind_of[body].part.name
+        skills = self.floor.skillset.picks.get((kind, station), ())
+        if bench.held is not None or bench.sight is not None or not skills:
+            return False
+        self.over_to(station)
+        self.place, now_s = "", self.floor.now_s
+        for skill in skills:
+            self._do(skill.aim(body), body, station)
+        self._under_way = _UnderWay((body, Carried(station, station, kind)), station, now_s, smooth=False)
+        return self.set_aside()
 
     def _start_machine(self, name: str, station: str, process_s: float) -> None:
         """Let the machine begin that a part has been brought to."""
@@ -182,7 +214,9 @@ class Transfers:
             self.spot_of[body] = spot
         planned = self.plan.move(decision)
         reach_s, served_s, pick_s = move.picked or (move.reach_s, move.served_s, move.pick_s)
-        times_s = move.leave_s, reach_s, pick_s, floor.now_s, planned.process_s, pick_s - served_s
+        pick_s = self._left_s.pop(name, pick_s)  # of a part that was set aside on its way: when it left its station
+        leave_s, reach_s, served_s = (min(at_s, pick_s) for at_s in (move.leave_s, reach_s, served_s))
+        times_s = leave_s, reach_s, pick_s, floor.now_s, planned.process_s, pick_s - served_s
         self.moves.append(Move(part, move.start, way.origin, way.target, *times_s, planned.carries))
         if planned.carries == "part":
             self._last[name] = way, spot, planned.process_s
@@ -240,34 +274,42 @@ class Transfers:
         self.place = station
 
     def _await(self, name: str, station: str) -> None:
-        """Wait until the machine is done with the part; Trouble when it fails, or takes far too long."""
+        """Wait until the machine is done with the part; Trouble when it fails, once when it is late, and when it takes far too
+        long."""
         floor, work = self.floor, self.floor.work_on(name)
         if work is None or work.station != station:
             return
-        expected_s, told = work.expected_s, False
-        patience_s = max(PATIENCE_S, PATIENCE * (expected_s - work.begun_s))
         while not work.done(floor.now_s):
             if work.failed:
                 raise Trouble(work.failed, name, station)
-            late_s = floor.now_s - expected_s
-            if late_s > patience_s:
+            late_s = floor.now_s - work.expected_s
+            if floor.now_s > work.given_up_s:
                 raise Trouble(f"it is not done {late_s:.0f} s after it should be", name, station, final=True)
-            if late_s > 1.0 and not told:
-                told = True
-                self.tell(TroubleMet("it is not done when it should be", "waits for it", name, station, floor.now_s))
-            floor.wait(expected_s if late_s < 0 else floor.now_s + 1.0)
+            if late_s > LATE_S and not work.late:
+                work.late = True
+                raise Trouble("it is not done when it should be", name, station, late=True)
+            floor.wait(work.expected_s if late_s < 0 else floor.now_s + 1.0)
             self.look()
 
     def work_on(self, part: int) -> Work | None:
         """What the machine that a part stands in does with it, or has done; None where it stands in none."""
         return self.floor.work_on(self.name(part))
 
+    def taken_out(self) -> list[int]:
+        """The parts that a machine is done with and that are not in it any more, though not at their next station either."""
+        laid_out, names = self.cell.laid_out, self.cell.names
+        places = [(part, place) for part, place in enumerate(self.plan.locations, 1) if place < len(laid_out)]
+        in_machine = [part for part, place in places if names[laid_out[place].station] in self.floor.machines]
+        return [part for part in in_machine if part not in self.to_put_back and self.work_on(part) is None]
+
     def left_s(self, part: int) -> float:
-        """How long until the machine of a part should be done [s]; below 0: it has been for so long, and the part must not wait
-        on without end. A spoilt part may."""
-        work = self.work_on(part)
+        """How long until the machine of a part should be done, or, when it is late, is given up [s]; below 0: it has been done
+        for so long, and the part must not wait on without end. A spoilt part may."""
+        work, now_s = self.work_on(part), self.floor.now_s
         assert work is not None
-        left_s = work.expected_s - self.floor.now_s
+        if not work.done(now_s):
+            return max(0.0, (work.given_up_s if work.late else work.expected_s) - now_s)
+        left_s = work.until_s - now_s
         self.check_window(part)
         waits = self.cell.at_most_s(part, work.station) is None or part in self.spoilt
         return max(0.0, left_s) if waits else left_s

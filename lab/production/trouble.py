@@ -6,6 +6,7 @@ class Trouble(Exception):
 
     skill: what was being carried out. held: the operator stopped the arm: what was under way is done again, and that does
     not count as a try. final: to try again is no use.
+    late: a machine takes longer than it should, and may yet get done.
     seen: something is not where it should be.
     """
 
@@ -18,11 +19,12 @@ class Trouble(Exception):
         skill: str = "",
         held: bool = False,
         final: bool = False,
+        late: bool = False,
         seen: bool = False,
     ) -> None:
         super().__init__(what)
         self.what, self.part, self.station, self.skill = what, part, station, skill
-        self.held, self.final, self.seen = held, final, seen
+        self.held, self.final, self.late, self.seen = held, final, late, seen
 
     def __str__(self) -> str:
         where = " at ".join(one for one in (self.part, self.station and f"'{self.station}'") if one)

@@ -12,6 +12,7 @@ from lab.production.taught import Taught
 from lab.sequencing.methods.exact import optimum
 from lab.skills.prepared_scene import Prepared
 from lab.tasks.fault_fields import FaultFields
+from lab.teaching.events import TroubleMet
 from lab.teaching.teacher import Teacher
 
 NAMES = ("slice 1", "slice 2")
@@ -91,3 +92,16 @@ def test_the_schedule_says_how_long_a_slow_machine_took(run_with: Any) -> None:
     assert toasted == pytest.approx([90.0, 90.0], abs=0.1)
     assert outcome.delivered == (1, 2)
     assert outcome.audit.findings == ()
+
+
+@pytest.mark.parametrize(("station", "at_s"), [("toaster", 5), ("toaster", 78), ("butter_applier", 81)])
+def test_what_cannot_be_brought_on_is_set_down_and_goes_on_when_the_way_is_free(
+    run_with: Any, station: str, at_s: float
+) -> None:
+    """A strange part comes into a machine while slice 1 is in the gripper: that is put back on the plate, or from the toaster on
+    the table, and the strange part is set aside."""
+    outcome = run_with({"what": "station full", "station": station, "at_s": at_s})
+    answers = [event.answer for event in outcome.heard if isinstance(event, TroubleMet)]
+    assert answers == ["sets it down again", "sets it aside"]
+    assert (outcome.failure, outcome.delivered) == (None, (1, 2))
+    assert outcome.verdict(NAMES).came == "delivered"
