@@ -18,6 +18,10 @@ UPRIGHT = 0.985  # cosine of the tilt, ten degrees, that a part may have at the 
 ON_SPOT_M = 0.02  # a part this near to a spot that the file names stands on it
 TAKES_S = 4.0  # the gripper may be so long at a part before it stands free, and before it leaves
 BETWEEN_M = 0.002  # by so much two parts may stand in one another: what is recorded is not finer
+LEANS = 0.97  # cosine of the tilt, fourteen degrees, from which on a part does not stand in a station on its way
+NEAR_SPOT_M = 0.03  # a part this near to a station's only spot stands on it on its way
+HELD_M = 0.02  # beyond half its diagonal the middle of a part may be from the robot that carries it
+FASTER = 1.5  # times the robot's speed no part is carried
 RESTS_M = 0.001  # a head that moves less from one frame to the next rests
 SEVERAL_FRAMES = 3  # in a row, for what a single frame may show by chance
 
@@ -93,7 +97,11 @@ def findings(evidence: Evidence) -> list[Finding]:
         if seen.name in evidence.claimed:
             found += _route(evidence, seen)
             found += _end(evidence, seen)
-        found += _schedule(evidence, seen)
+        if evidence.undisturbed(seen.name):
+            found += _stood(evidence, seen)
+            found += _schedule(evidence, seen)
+            found += _in_hand(evidence, seen)
+    found += _stations(evidence)
     found += _capacities(evidence)
     found += _gripper(evidence)
     found += _in_one_another(evidence)
@@ -266,13 +274,66 @@ def _turned(x: float, y: float, yaw: float) -> tuple[float, float]:
     return cos(yaw) * x - sin(yaw) * y, sin(yaw) * x + cos(yaw) * y
 
 
+def _stood(evidence: Evidence, seen: PartSeen) -> Iterator[Finding]:
+    """On its way it stood straight, and on the spot of each station that has one only and is not where it began."""
+    tracks, body = evidence.tracks, evidence.tracks.number(seen.name)
+    for number, stay in enumerate(seen.stays):
+        during = (tracks.times_s >= stay.start_s) & (tracks.times_s <= stay.end_s)
+        if np.median(tracks.up(body)[during]) < LEANS:
+            yield Finding("stood", seen.name, stay.station, stay.start_s, f"leans in '{stay.station}'")
+        station = evidence.task.station(stay.station)
+        if not number or station.capacity > 1 or station.own_places:
+            continue
+        places = tracks.inside(tracks.number(stay.station), tracks.poses[:, body, :3])[during]
+        off_m = hypot(*_off_pose(evidence, stay.station, np.median(places, axis=0)))
+        if off_m > NEAR_SPOT_M:
+            words = f"stands {off_m:.3f} m off the spot of '{stay.station}'"
+            yield Finding("stood", seen.name, stay.station, stay.start_s, words)
+
+
+def _in_hand(evidence: Evidence, seen: PartSeen) -> Iterator[Finding]:
+    """In the air it is at the robot, and nowhere does it move faster than the robot carries."""
+    tracks, body = evidence.tracks, evidence.tracks.number(seen.name)
+    robot = [n for n, name in enumerate(tracks.names) if name == "robot" or name.startswith("robot ")]
+    point, reach_m = tracks.poses[:, body, :3], HELD_M + float(np.linalg.norm(tracks.high[body] - tracks.low[body])) / 2
+    near = np.zeros(len(point), dtype=bool)
+    for link in robot:
+        off = tracks.within(link, point)
+        beyond = np.maximum(np.maximum(tracks.low[link] - off, off - tracks.high[link]), 0.0)
+        near |= np.linalg.norm(beyond, axis=1) <= reach_m
+    for first in _lasting(seen.carried & ~near):
+        at_s = float(tracks.times_s[first])
+        yield Finding("gripper", seen.name, "", at_s, f"is in the air at {at_s:.1f} s, and the robot is not there")
+    ways, spans = np.linalg.norm(np.diff(point, axis=0), axis=1), np.diff(tracks.times_s)
+    fast = np.flatnonzero(ways > FASTER * evidence.task.robot.speed_m_s * np.maximum(spans, SLACK_S))
+    if len(fast):
+        at_s = float(tracks.times_s[fast[0]])
+        yield Finding("gripper", seen.name, "", at_s, f"moves {ways[fast[0]]:.2f} m within {spans[fast[0]]:.2f} s")
+
+
+def _stations(evidence: Evidence) -> Iterator[Finding]:
+    """Stations stand where the task has them: their poses are within their bodies. No part is there that nobody ordered."""
+    tracks, ordered = evidence.tracks, {seen.name for seen in evidence.parts}
+    for name in tracks.names:
+        kind, _, number = name.rpartition(" ")
+        if number.isdigit() and kind in [part.name for part in evidence.task.made] and name not in ordered:
+            yield Finding("order", name, "", 0.0, f"{name} is in the frames, and not in the order")
+    for station in evidence.task.stations:
+        own = tracks.number(station.name)
+        if own < 0:
+            yield Finding("station", "", station.name, 0.0, f"'{station.name}' is not in the frames")
+            continue
+        at = np.array([[*station.pose[:2], 0.0]])
+        off = tracks.inside(own, np.repeat(at, len(tracks.times_s), axis=0))[0, :2]
+        if (off < tracks.low[own, :2]).any() or (off > tracks.high[own, :2]).any():
+            yield Finding("station", "", station.name, 0.0, f"'{station.name}' does not stand where the task has it")
+
+
 # ---- what the schedule says --------------------------------------------------------------------------------------------
 
 
 def _schedule(evidence: Evidence, seen: PartSeen) -> Iterator[Finding]:
     """The measured rows say where the part was and when it was carried, and it was carried at no other time."""
-    if not evidence.undisturbed(seen.name):
-        return
     carries = evidence.own_rows(seen.name, "carry")
     for row in carries:
         for place, at_s in ((row["station"], row["start_s"]), (row["target"], row["end_s"])):
@@ -285,6 +346,12 @@ def _schedule(evidence: Evidence, seen: PartSeen) -> Iterator[Finding]:
             when = f"from {row['start_s']:.1f} to {row['end_s']:.1f} s"
             words = f"did not stand in '{row['station']}' {when}, as the schedule has it"
             yield Finding("schedule", seen.name, row["station"], row["start_s"], words)
+    for stay in seen.stays if evidence.rows else ():
+        works = evidence.task.station(stay.station).kind == "machine" and stay is not seen.stays[0]
+        rows = [row for row in evidence.own_rows(seen.name, "process") if row["station"] == stay.station]
+        if works and stay is not seen.stays[-1] and not rows:
+            words = f"stood in '{stay.station}', and the schedule has no row of that"
+            yield Finding("schedule", seen.name, stay.station, stay.start_s, words)
     for before, after in zip(seen.stays, seen.stays[1:], strict=False):
         if before.station != after.station and not any(
             row["start_s"] - SLACK_S <= before.end_s and after.start_s <= row["end_s"] + SLACK_S for row in carries

@@ -43,6 +43,13 @@ class BodyTracks:
         x, y = self.poses[:, body, 3], self.poses[:, body, 4]
         return np.asarray(1.0 - 2.0 * (x * x + y * y))
 
+    def within(self, body: int, point: Array) -> Array:
+        """The points (n, 3) [m], one a frame, in the frame of a body that may be turned in any way."""
+        from scipy.spatial.transform import Rotation
+
+        turns = Rotation.from_quat(self.poses[:, body, 3:])
+        return np.asarray(turns.inv().apply(point - self.poses[:, body, :3]))
+
     def inside(self, body: int, point: Array) -> Array:
         """The points (n, 3) [m], one a frame, in the frame of a body that may be turned about the vertical axis."""
         off = point - self.poses[:, body, :3]
@@ -144,11 +151,13 @@ def read_tracks(path: Path) -> BodyTracks:
 
 
 def _check(path: Path, names: Sequence[str], arrays: Sequence[Array]) -> None:
-    times_s, _poses, _low, _high = arrays
+    times_s, poses, _, _ = arrays
     bodies = len(names)
     wanted = ((len(times_s),), (len(times_s), bodies, 7), (bodies, 3), (bodies, 3))
     shapes = tuple(array.shape for array in arrays)
     if shapes != wanted or not len(times_s) or len(set(names)) != bodies:
         raise BadInput(f"'{path}' holds no frames of a run: arrays of {shapes} for {bodies} bodies")
+    if (np.abs(np.linalg.norm(poses[..., 3:], axis=2) - 1.0) > 1e-2).any():
+        raise BadInput(f"'{path}' holds no frames of a run: a quaternion whose length is not 1")
     if not all(np.isfinite(array).all() for array in arrays) or (np.diff(times_s) < 0).any():
         raise BadInput(f"'{path}' holds no frames of a run: numbers that are not finite, or times that run back")

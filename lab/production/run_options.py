@@ -85,4 +85,4 @@ def kept_task(folder: Path, where: str) -> tuple[RunOptions, Task]:
 
 def hash_of(task: Task) -> str:
     """What a task says, as a hash: another one is another run."""
-    return hashlib.sha256(task.model_dump_json().encode()).hexdigest()[:24]
+    return hashlib.sha256(task.model_dump_json(exclude_defaults=True).encode()).hexdigest()[:24]

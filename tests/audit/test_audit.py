@@ -49,9 +49,9 @@ END_S = 60.0
 
 
 def tracks_of_ways(ways: Sequence[Way]) -> BodyTracks:
-    """Frames every 0.1 s in which cube n goes its way; in the air it moves along, over all."""
+    """Frames every 0.1 s in which cube n goes its way; in the air it goes straight, over all, in the robot's hand."""
     times_s = np.arange(0.0, END_S + 0.05, 0.1)
-    names = (*AT, *(f"cube {n}" for n in range(1, len(ways) + 1)))
+    names = (*AT, *(f"cube {n}" for n in range(1, len(ways) + 1)), "robot")
     poses = np.zeros((len(times_s), len(names), 7))
     poses[..., 6] = 1.0
     low, high = np.full((len(names), 3), -HALF_M), np.full((len(names), 3), HALF_M)
@@ -60,14 +60,25 @@ def tracks_of_ways(ways: Sequence[Way]) -> BodyTracks:
         half = (0.05, 0.05, TOPS[station] / 2) if station == "oven" else (0.1, 0.1, TOPS[station] / 2)
         low[number], high[number] = -np.array(half), half
     for number, way in enumerate(ways):
-        for now, at_s in enumerate(times_s):
-            station = [where for since_s, where in way if since_s <= at_s + 1e-9][-1]
-            beside = 0.045 * number
-            place = (
-                (AT[station][0] + beside, AT[station][1], TOPS[station] + HALF_M) if station else (at_s / 60, 0.3, 0.4)
-            )
-            poses[now, len(AT) + number, :3] = place
+        ends = [*(since_s for since_s, _ in way[1:]), END_S + 1.0]
+        for step, ((since_s, station), until_s) in enumerate(zip(way, ends, strict=True)):
+            now = (times_s >= since_s - 1e-9) & (times_s < until_s - 1e-9)
+            if station:
+                poses[now, len(AT) + number, :3] = _stands(station, number)
+                continue
+            before = _stands(way[step - 1][1], number)
+            after = _stands(way[step + 1][1], number) if step + 1 < len(way) else before
+            share = (times_s[now, None] - since_s) / (until_s - since_s)
+            flight = before + share * (after - before)
+            flight[:, 2] = max(TOPS.values()) + HALF_M + 0.06
+            poses[now, len(AT) + number, :3] = poses[now, -1, :3] = flight
     return BodyTracks(names, times_s, poses, low, high)
+
+
+def _stands(station: str, number: int) -> Any:
+    """Where the middle of cube `number` is, from 0, that stands at a station: beside the others (3,) [m]."""
+    beside = 0.045 * (number - 0.5 if station == "oven" else number)
+    return np.array([AT[station][0] + beside, AT[station][1], TOPS[station] + HALF_M])
 
 
 def rows_of_ways(ways: Sequence[Way]) -> list[dict[str, Any]]:
@@ -308,7 +319,7 @@ def test_a_head_that_leaves_cells_out() -> None:
     for middle, found_ in ((low, []), (np.full(len(times_s), 0.03), [("process", "cube 1", "oven")])):
         head = np.zeros((len(times_s), 1, 7))
         head[:, 0, :3] = np.stack(
-            [np.full(len(times_s), 0.6), np.full(len(times_s), -0.1), TOPS["oven"] + middle], axis=1
+            [np.full(len(times_s), 0.58), np.full(len(times_s), -0.1), TOPS["oven"] + middle], axis=1
         )
         head[:, 0, 6] = 1.0
         half = np.full((1, 3), 0.01)
@@ -342,3 +353,57 @@ def test_a_gripper_that_waits_at_a_part_does_not_stretch_its_window() -> None:
         if row["station"] == "oven" and row["operation"] == "carry":
             row["start_s"] = 25.0
     assert found(case) == [("window", "cube 1", "oven")]
+
+
+def frames(case: Evidence, name: str, from_s: float, to_s: float) -> Any:
+    """The poses of a body in a span of time, to be written to."""
+    first, after = np.searchsorted(case.tracks.times_s, (from_s - 1e-9, to_s - 1e-9))
+    return case.tracks.poses[first:after, case.tracks.number(name)]
+
+
+def test_a_part_that_leans_or_stands_beside_its_spot_on_its_way() -> None:
+    case = evidence()
+    frames(case, "cube 1", 4.0, 26.0)[:, 3:] = (sin(0.15), 0.0, 0.0, cos(0.15))
+    case.__post_init__()
+    assert found(case) == [("stood", "cube 1", "oven")]
+    case = evidence()
+    frames(case, "cube 1", 4.0, 26.0)[:, 0] -= 0.02
+    case.__post_init__()
+    assert found(case) == [("stood", "cube 1", "oven")]
+
+
+def test_a_part_that_flies_without_the_robot() -> None:
+    case = evidence()
+    frames(case, "robot", 2.0, 4.0)[:, 1] += 0.2
+    assert found(case) == [("gripper", "cube 1", "")]
+
+
+def test_a_part_that_is_elsewhere_at_once() -> None:
+    case = evidence()
+    frames(case, "cube 1", 3.0, 3.1)[:, 0] += 0.5
+    frames(case, "robot", 3.0, 3.1)[:, 0] += 0.5
+    assert found(case) == [("gripper", "cube 1", "")]
+
+
+def test_a_station_that_is_elsewhere_and_a_part_that_nobody_ordered() -> None:
+    case = evidence((ONE,))
+    everything = case.tracks.poses[:, :, 1]
+    everything += 0.2
+    assert {rule for rule, _, _ in found(case)} == {"station", "stood"}
+    case = evidence((ONE, TWO))
+    alone = Evidence(case.task, case.order[:1], case.tracks, case.rows[:3], ["cube 1"])
+    assert found(alone) == [("order", "cube 2", "")]
+
+
+def test_work_that_the_schedule_does_not_have() -> None:
+    case = evidence((ONE,))
+    case.rows = [row for row in case.rows if row["operation"] != "process"]
+    assert found(case) == [("schedule", "cube 1", "oven")]
+
+
+def test_turns_that_are_none_are_refused(tmp_path: Path) -> None:
+    case, path = evidence(), tmp_path / "frames.npz"
+    frames(case, "cube 1", 3.0, 4.0)[:, 3:] = 0.0
+    path.write_bytes(packed(case.tracks))
+    with pytest.raises(BadInput, match="quaternion"):
+        read_tracks(path)
