@@ -18,7 +18,7 @@ Lab = Callable[..., Any]  # the fixture of tests/conftest.py; it returns a Ran
 Tree = Callable[[Path], list[str]]
 
 
-SHIPPED = "breakfast, fms-arm, fms, hoist-pu"
+SHIPPED = "breakfast, fms-arm, fms, "
 TASKS, METHODS = (f"known: {', '.join(sorted(names))}" for names in (shipped(), SEQUENCERS))
 ADVISORS, LEARNERS, GATES = (
     f"known: {', '.join(sorted(names))}" for names in (advisors.ADVISORS, UPDATES, gates.GATES)
