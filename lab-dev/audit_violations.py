@@ -45,16 +45,10 @@ class Violated:
     words: str
 
 
-def changed(evidence: Evidence, **fields: Any) -> Evidence:
-    """A copy of evidence with other tracks, rows or task."""
-    own = ("task", "order", "tracks", "rows", "claimed", "struck")
-    return Evidence(**({name: getattr(evidence, name) for name in own} | fields))
-
-
 def copied(evidence: Evidence) -> Evidence:
     """A copy whose frames and rows can be written to."""
     tracks = replace(evidence.tracks, poses=evidence.tracks.poses.copy(), times_s=evidence.tracks.times_s.copy())
-    return changed(evidence, tracks=tracks, rows=[dict(row) for row in evidence.rows])
+    return replace(evidence, tracks=tracks, rows=[dict(row) for row in evidence.rows])
 
 
 def worked(evidence: Evidence) -> list[tuple[PartSeen, Stay, float]]:
@@ -99,7 +93,7 @@ def without(evidence: Evidence, from_s: float, to_s: float, rows: bool) -> Evide
         dict(row) | ({"start_s": moved(row["start_s"]), "end_s": moved(row["end_s"])} if rows else {})
         for row in evidence.rows
     ]
-    return changed(evidence, tracks=tracks, rows=own)
+    return replace(evidence, tracks=tracks, rows=own)
 
 
 def time_cut(evidence: Evidence, rng: np.random.Generator) -> Violated:
@@ -154,16 +148,16 @@ def _swapped(evidence: Evidence, seen: PartSeen, one: Stay, other: Stay) -> Viol
         if row["part"] == seen.name:
             row["station"], row["target"] = (names.get(row[field], row[field]) for field in ("station", "target"))
     words = f"{seen.name} comes to {one.station} and {other.station} in the wrong order"
-    return Violated(changed(evidence), seen.name, ("route", "end", "processing"), words)
+    return Violated(replace(evidence), seen.name, ("route", "end", "processing"), words)
 
 
 def station_left_out(evidence: Evidence, rng: np.random.Generator) -> Violated:
     """A part never stands at a station of its route."""
     stays = [(seen, stay) for seen in evidence.parts for stay in seen.stays[1:-1] if _stages(evidence, seen, stay)]
     seen, stay = drawn(rng, stays)
-    changed_ = copied(evidence)
-    changed_.tracks.poses[_during(evidence, stay), changed_.tracks.number(seen.name), 2] += 0.2
-    return Violated(changed(changed_), seen.name, ("route", "schedule"), f"{seen.name} hangs over {stay.station}")
+    own = copied(evidence)
+    own.tracks.poses[_during(evidence, stay), own.tracks.number(seen.name), 2] += 0.2
+    return Violated(replace(own), seen.name, ("route", "schedule"), f"{seen.name} hangs over {stay.station}")
 
 
 def _during(evidence: Evidence, stay: Stay) -> np.ndarray[Any, Any]:
@@ -192,7 +186,7 @@ def overfull(evidence: Evidence, rng: np.random.Generator) -> Violated:
     span = run[first : first + 12]
     tracks.poses[span, guest] = tracks.poses[span, body]
     tracks.poses[span, guest, 2] += tracks.low[body, 2] - tracks.low[guest, 2]  # foot on foot
-    return Violated(changed(own), seen.name, ("capacity",), f"{seen.name} stands in {station}, which is full")
+    return Violated(replace(own), seen.name, ("capacity",), f"{seen.name} stands in {station}, which is full")
 
 
 def window_overrun(evidence: Evidence, rng: np.random.Generator) -> Violated:
@@ -215,7 +209,7 @@ def window_overrun(evidence: Evidence, rng: np.random.Generator) -> Violated:
     for row in rows:
         if row["operation"] == "process" and row["part"] == seen.name and row["station"] == stay.station:
             row["end_s"] = row["start_s"] + work_s
-    own = changed(evidence, task=task, tracks=replace(evidence.tracks, times_s=times_s), rows=rows)
+    own = replace(evidence, task=task, tracks=replace(evidence.tracks, times_s=times_s), rows=rows)
     return Violated(own, seen.name, ("window",), f"{seen.name} stays in {stay.station} for {over_s:.1f} s too long")
 
 
@@ -242,7 +236,7 @@ def tilted(evidence: Evidence, rng: np.random.Generator) -> Violated:
     half = np.sin(angle / 2)
     body = own.tracks.number(seen.name)
     own.tracks.poses[-1:, body, 3:] = (half * np.cos(about), half * np.sin(about), 0.0, np.cos(angle / 2))
-    return Violated(changed(own), seen.name, ("end",), f"{seen.name} leans by {angle:.2f} rad at the end")
+    return Violated(replace(own), seen.name, ("end",), f"{seen.name} leans by {angle:.2f} rad at the end")
 
 
 def elsewhere(evidence: Evidence, rng: np.random.Generator) -> Violated:
@@ -253,7 +247,7 @@ def elsewhere(evidence: Evidence, rng: np.random.Generator) -> Violated:
     last = own.tracks.number(seen.stays[-1].station)
     off_m = float(hypot(*(own.tracks.high[last] - own.tracks.low[last])[:2])) + float(rng.uniform(0.02, 0.3))
     own.tracks.poses[-4:, body, :2] += (off_m * np.cos(about), off_m * np.sin(about))
-    return Violated(changed(own), seen.name, ("end",), f"{seen.name} is left {off_m:.2f} m beside")
+    return Violated(replace(own), seen.name, ("end",), f"{seen.name} is left {off_m:.2f} m beside")
 
 
 def two_in_hand(evidence: Evidence, rng: np.random.Generator) -> Violated:
@@ -269,7 +263,7 @@ def two_in_hand(evidence: Evidence, rng: np.random.Generator) -> Violated:
         span, own.tracks.number(one.name), :3
     ] + (0.0, 0.0, 0.1)
     return Violated(
-        changed(own), other.name, ("gripper", "schedule"), f"{one.name} and {other.name} are carried at once"
+        replace(own), other.name, ("gripper", "schedule"), f"{one.name} and {other.name} are carried at once"
     )
 
 

@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any
 
 from lab.audit.rules import Evidence, Finding, Struck, findings
-from lab.audit.stays import PartSeen
 from lab.audit.tracks import FILE, read_tracks
 from lab.errors import BadInput
 from lab.files import json_of, read_limited
@@ -14,13 +13,21 @@ from lab.tasks.task import Order, Task
 
 @dataclass(frozen=True)
 class Audit:
-    """What came of an audit: the parts that were said to be delivered, those that are, and all that is wrong, by time."""
+    """What came of an audit: the evidence, and all that is wrong with it, by time."""
 
-    claimed: tuple[str, ...]
-    delivered: tuple[str, ...]
+    evidence: Evidence
     findings: tuple[Finding, ...]
-    parts: tuple[PartSeen, ...]
-    struck: tuple[Struck, ...] = ()
+
+    @property
+    def claimed(self) -> tuple[str, ...]:
+        """The parts that were said to be delivered, by name, part 1 first."""
+        return tuple(seen.name for seen in self.evidence.parts if seen.name in self.evidence.claimed)
+
+    @property
+    def delivered(self) -> tuple[str, ...]:
+        """Those of them that are: nothing that is wrong names them."""
+        guilty = {one.part for one in self.findings}
+        return tuple(name for name in self.claimed if name not in guilty)
 
     @property
     def failure(self) -> str | None:
@@ -35,11 +42,11 @@ class Audit:
         """`claimed` and `delivered`: names. `struck`: the faults, each what, part, station. `findings`: rule, part, station,
         at_s, words. `stays`: part, station, from when to when [s] it stood there.
         """
-        stays = [{"part": seen.name} | asdict(stay) for seen in self.parts for stay in seen.stays]
+        stays = [{"part": seen.name} | asdict(stay) for seen in self.evidence.parts for stay in seen.stays]
         return {
             "claimed": list(self.claimed),
             "delivered": list(self.delivered),
-            "struck": [asdict(one) for one in self.struck],
+            "struck": [asdict(one) for one in self.evidence.struck],
             "findings": [asdict(one) for one in self.findings],
             "stays": [{k: round(v, 3) if isinstance(v, float) else v for k, v in row.items()} for row in stays],
         }
@@ -47,11 +54,7 @@ class Audit:
 
 def audit(evidence: Evidence) -> Audit:
     """Judges a run by its evidence. A part is delivered when it is claimed to be and nothing that is wrong names it."""
-    found = tuple(findings(evidence))
-    guilty = {one.part for one in found}
-    claimed = tuple(seen.name for seen in evidence.parts if seen.name in evidence.claimed)
-    delivered = tuple(name for name in claimed if name not in guilty)
-    return Audit(claimed, delivered, found, tuple(evidence.parts), tuple(evidence.struck))
+    return Audit(evidence, tuple(findings(evidence)))
 
 
 def kept_evidence(folder: Path, task: Task, order: Order) -> Evidence:

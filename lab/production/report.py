@@ -221,7 +221,9 @@ def _write_numbers(report: Report, paths: dict[str, Path], predicted: Schedule) 
     rows = rows_of(predicted, cell, "planned") + rows_of(report.outcome.schedule, cell, "measured")
     paths["schedule_table"].write_text(csv_of(rows), encoding="utf-8")
     _write_json(paths["schedule"], {"schedule": rows})
-    paths["frames"].write_bytes(packed(tracks_of(report.recording)))
+    audited = report.outcome.audit
+    tracks = tracks_of(report.recording) if audited is None else audited.evidence.tracks
+    paths["frames"].write_bytes(packed(tracks))
     return ["sequence", "schedule_table", "schedule", "frames", "run"]
 
 
