@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 import lab.production.run
+from lab.audit.tracks import packed, read_tracks
 from lab.errors import BadInput, WorkFailed
 from lab.export.program import Program
 from lab.mdp import shortest_steps
@@ -161,6 +162,23 @@ def test_the_json_files_hold_the_run(cold: Ran, warm: Ran) -> None:
     assert order["sequence"] == order["optimal_sequence"] == [1, 1, 1]
     assert order["makespan_s"] == min(order["episode_makespans_s"]) == warm.document["predicted_makespan_s"]
     assert order["durations"]["process_s"].keys() == {"butter_applier"}
+
+
+def test_a_kept_run_is_audited_again(warm: Ran, lab: Lab, tmp_path: Path) -> None:
+    kept = copytree(warm.folder / "toast-run", tmp_path / "kept")
+    again = lab("replay", str(kept), "--audit", "--json").json
+    assert {name: again[name] for name in warm.document["audit"]} == warm.document["audit"]
+    assert again["delivered"] == ["slice 1"]
+    tracks = read_tracks(kept / "frames.npz")
+    tracks.poses[-1, tracks.number("slice 1"), 0] += 0.5
+    (kept / "frames.npz").write_bytes(packed(tracks))
+    moved = lab("replay", str(kept), "--audit")
+    assert moved.code == 1
+    assert "slice 1" in moved.err
+    (kept / "frames.npz").unlink()
+    assert lab("replay", str(kept), "--audit").code == 2
+    assert lab("replay", str(tmp_path), "--audit").code == 2
+    assert lab("replay", "--audit").code == 2
 
 
 def test_the_program_has_the_runs_moves_and_begins_when_it_does(cold: Ran) -> None:
