@@ -15,7 +15,8 @@ from commands import environment, lab
 from parts import Outcome, Part
 
 from lab.audit.audit import audit, kept_evidence
-from lab.audit.rules import SLACK_S, Evidence
+from lab.audit.evidence import Evidence
+from lab.audit.rules import SLACK_S
 from lab.audit.stays import PartSeen, Stay
 from lab.production.run_options import kept_task
 

@@ -4,7 +4,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from lab.audit.rules import Evidence, Finding, Struck, findings
+from lab.audit.evidence import Evidence, Finding, Struck
+from lab.audit.rules import findings
 from lab.audit.tracks import FILE, read_tracks
 from lab.errors import BadInput
 from lab.files import json_of, read_limited

@@ -1,16 +1,15 @@
 """What an audit asks of a run, rule by rule; each finding names the part, the station and the time."""
 
-from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
 from itertools import combinations
 from math import atan2, cos, hypot, sin
 from typing import Any
 
 import numpy as np
 
-from lab.audit.stays import HIGH_M, LOW_M, Mask, PartSeen, Stay, floor_of, pallet_of, parts_seen
-from lab.audit.tracks import Array, BodyTracks
-from lab.tasks.task import Order, Task
+from lab.audit.evidence import Evidence, Finding
+from lab.audit.stays import HIGH_M, LOW_M, Mask, PartSeen, Stay, floor_of, pallet_of
+from lab.audit.tracks import Array
 from lab.tasks.task_fields import Stage
 
 SLACK_S = 0.25  # two frames, and what rounding does
@@ -24,70 +23,6 @@ HELD_M = 0.02  # beyond half its diagonal the middle of a part may be from the r
 FASTER = 1.5  # times the robot's speed no part is carried
 RESTS_M = 0.001  # a head that moves less from one frame to the next rests
 SEVERAL_FRAMES = 3  # in a row, for what a single frame may show by chance
-
-
-@dataclass(frozen=True)
-class Finding:
-    """Something that is not as the task asks: by which rule, about which part ("": about none alone), where and when [s]."""
-
-    rule: str
-    part: str
-    station: str
-    at_s: float
-    words: str
-
-
-@dataclass(frozen=True)
-class Struck:
-    """A fault that a hand or a machine had in a run, about a part or a station ("": about none)."""
-
-    what: str
-    part: str = ""
-    station: str = ""
-
-
-@dataclass
-class Evidence:
-    """What a run left: the task and its order, the tracks of its bodies, the measured rows of its schedule, what was claimed.
-
-    rows: as `schedule.csv` has them. claimed: the names of the parts that are said to be delivered. struck: the faults.
-    """
-
-    task: Task
-    order: Order
-    tracks: BodyTracks
-    rows: Sequence[dict[str, Any]]
-    claimed: Collection[str]
-    struck: Sequence[Struck] = ()
-    parts: list[PartSeen] = field(init=False)
-
-    def __post_init__(self) -> None:
-        self.parts = parts_seen(self.task, self.order, self.tracks)
-        moved = {one.station for one in self.struck if one.what == "station moved"}
-        self._touched = {one.part for one in self.struck if one.part}
-        self._touched |= {one.name for one in self.parts for stay in one.stays if stay.station in moved}
-
-    def undisturbed(self, part: str) -> bool:
-        """Whether no fault has touched a part."""
-        return part not in self._touched
-
-    def own_rows(self, part: str, operation: str) -> list[dict[str, Any]]:
-        """The measured rows of a part of one kind, by time."""
-        return [row for row in self.rows if row["part"] == part and row["operation"] == operation]
-
-    def work_s(self, kind: str, stage: Stage) -> float | None:
-        """How long a part of a kind is to be worked on in a stage by the task [s]; None where it is no machine's."""
-        station = self.task.station(stage.station)
-        if station.kind != "machine":
-            return None
-        if station.process is not None:
-            process = self.task.processes[station.process]
-            return process.grid[0] * process.grid[1] * process.dwell_s
-        return stage.processing_s if stage.processing_s is not None else station.processing_s
-
-    def at_most_s(self, stage: Stage) -> float | None:
-        """How long it may stay there after that by the task [s]; None: for ever."""
-        return stage.at_most_s if stage.at_most_s is not None else self.task.station(stage.station).at_most_s
 
 
 def findings(evidence: Evidence) -> list[Finding]:
@@ -337,7 +272,7 @@ def _schedule(evidence: Evidence, seen: PartSeen) -> Iterator[Finding]:
     carries = evidence.own_rows(seen.name, "carry")
     for row in carries:
         for place, at_s in ((row["station"], row["start_s"]), (row["target"], row["end_s"])):
-            if not _stands_at(seen, place, at_s):
+            if not _stood_at(seen, place, at_s):
                 words = f"is not at '{place}' at {at_s:.1f} s, as the schedule has it"
                 yield Finding("schedule", seen.name, place, at_s, words)
     for row in evidence.own_rows(seen.name, "process"):
@@ -360,7 +295,7 @@ def _schedule(evidence: Evidence, seen: PartSeen) -> Iterator[Finding]:
             yield Finding("schedule", seen.name, after.station, before.end_s, words)
 
 
-def _stands_at(seen: PartSeen, station: str, at_s: float) -> bool:
+def _stood_at(seen: PartSeen, station: str, at_s: float) -> bool:
     return any(
         stay.station == station and stay.start_s - SLACK_S <= at_s <= stay.end_s + SLACK_S for stay in seen.stays
     )

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
 from lab.audit.audit import audit
-from lab.audit.rules import Evidence, Struck
+from lab.audit.evidence import Evidence, Struck
 from lab.audit.tracks import tracks_of
 from lab.errors import LabError, WorkFailed
 from lab.export.recorder import MotionRecorder

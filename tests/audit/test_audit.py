@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from lab.audit.audit import audit, measured_rows
-from lab.audit.rules import Evidence, Struck
+from lab.audit.evidence import Evidence, Struck
 from lab.audit.tracks import BodyTracks, packed, read_tracks
 from lab.errors import BadInput
 from lab.tasks.task import Task
