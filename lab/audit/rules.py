@@ -210,13 +210,20 @@ def _turned(x: float, y: float, yaw: float) -> tuple[float, float]:
 
 
 def _stood(evidence: Evidence, seen: PartSeen) -> Iterator[Finding]:
-    """On its way it stood straight, and on the spot of each station that has one only and is not where it began."""
+    """On its way it stood straight, as high as it had come, and on the spot of each station that has one only and is not where it
+    began."""
     tracks, body = evidence.tracks, evidence.tracks.number(seen.name)
     for number, stay in enumerate(seen.stays):
         during = (tracks.times_s >= stay.start_s) & (tracks.times_s <= stay.end_s)
         if np.median(tracks.up(body)[during]) < LEANS:
             yield Finding("stood", seen.name, stay.station, stay.start_s, f"leans in '{stay.station}'")
         station = evidence.task.station(stay.station)
+        free_s = stay.start_s + (TAKES_S if number else 0.0)  # before that it may be let down in the gripper
+        heights = tracks.poses[during & (tracks.times_s >= free_s), body, 2]
+        sunk_m = float((np.maximum.accumulate(heights) - heights).max(initial=0.0))
+        if station.is_layered and sunk_m > HIGH_M - LOW_M:
+            words = f"sinks by {sunk_m:.3f} m in '{stay.station}': what carried it was taken away"
+            yield Finding("stood", seen.name, stay.station, stay.start_s, words)
         if not number or station.capacity > 1 or station.own_places:
             continue
         places = tracks.inside(tracks.number(stay.station), tracks.poses[:, body, :3])[during]
