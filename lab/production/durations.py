@@ -259,9 +259,9 @@ def _more_s(floor: Floor, skill: Skill, spots: Sequence[Spot]) -> float:
     }
     station, layered = task.station(skill.station), task.station(skill.station).is_layered
     standing = {spot for spot, _ in feet.values()}
-    for spot in standing:
-        carried_by = scene.places.below(station, spot)
-        stand_below(scene, station.name, [(kind, under) for kind, under in carried_by if under not in standing])
+    carriers = {spot: [one for one in scene.places.below(station, spot) if one[1] not in standing] for spot in standing}
+    for spot in () if skill.carries else standing:
+        stand_below(scene, station.name, carriers[spot])
     assert pose is not None
     for name, (spot, foot) in feet.items():
         if on_its_pallet(task, skill.kind, skill.station):
@@ -271,6 +271,8 @@ def _more_s(floor: Floor, skill: Skill, spots: Sequence[Spot]) -> float:
             if bench.sight is not None:
                 bench.sight.where[scene.body_of(name, skill.kind)] = foot
     for name, (spot, foot) in sorted(feet.items(), key=lambda one: one[1][0].z if skill.carries else -one[1][0].z):
+        if skill.carries:  # others of its kind may have to stand below what carries it
+            stand_below(scene, station.name, carriers[spot])
         floor.stand(pose)
         if skill.carries:
             bench.hold(name, skill.kind, pose)

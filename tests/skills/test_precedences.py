@@ -48,6 +48,17 @@ def test_a_lid_across_two_boxes_waits_for_both() -> None:
     assert precedences(task, ("box", "box", "lid")) == (Precedence((3,), TRAY, (1, 2), TRAY, (2,)),)
 
 
+def test_kinds_lie_on_one_another_in_turn() -> None:
+    """A box on a lid on a box: the second box waits for the lid, and the lid for the first one."""
+    places = [
+        {"at": [0.0, 0.0, 0.0], "height_m": z, "kind": k} for z, k in ((0.0, "box"), (0.05, "lid"), (0.07, "box"))
+    ]
+    kit = load("kit").model_dump(mode="json", exclude_unset=True)
+    stations = [s | {"places": places, "capacity": 3} if s["name"] == "tray" else s for s in kit["stations"]]
+    found = precedences(changed("kit", stations=stations), ("box", "box", "lid"))
+    assert found == (Precedence((1, 2), TRAY, (3,), TRAY, (0, 1)), Precedence((3,), TRAY, (1, 2), TRAY, (1,)))
+
+
 def test_layers_of_one_kind_are_filled_from_the_lowest_on_by_themselves() -> None:
     task = load("palletise")
     assert precedences(task, task.order()) == ()
