@@ -22,7 +22,7 @@ from lab.production.run_options import kept_task
 
 TASKS = (
     *("toast", "toast-window", "two-toasters", "toast-panda", "toast-iiwa", "toast-xarm6"),
-    *("breakfast", "sorting", "fms-arm", "palletise", "furnace"),
+    *("breakfast", "sorting", "fms-arm", "palletise", "furnace", "kit"),
 )
 SEEDS = 3  # runs of each task
 RUN_S = 900.0

@@ -19,6 +19,7 @@ from lab.tasks.task_file import find
 
 TASKS = (
     "toast", "toast-panda", "toast-iiwa", "toast-xarm6", "two-toasters", "breakfast", "sorting", "fms-arm", "palletise",
+    "kit",
 )  # fmt: skip
 PARTS = 2  # of a kind, at most
 MASS_KG, FRICTION, FORCE_N = (0.002, 3.0), (0.1, 1.5), (1.0, 150.0)  # drawn evenly over their logarithms

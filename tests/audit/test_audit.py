@@ -250,6 +250,18 @@ def test_a_part_of_a_layer_stands_on_something() -> None:
     assert (part, "0.030 m off the spots" in words) == ("cube 2", True)
 
 
+def test_a_part_whose_carrier_is_taken_away_sinks() -> None:
+    """Cube 1 begins on 0.04 m, and falls onto the floor before it is taken up."""
+    case = evidence()
+    frames(case, "cube 1", 0.0, 1.0)[:, 2] += 2 * HALF_M
+    document = case.task.model_dump(mode="json", exclude_unset=True)
+    document["stations"][0] |= {"places": [FLOOR, LAYER]}
+    task = Task.model_validate(document)
+    result = audit(Evidence(task, case.order, case.tracks, case.rows, case.claimed))
+    words = next(one.words for one in result.findings if (one.rule, one.part) == ("gripper", "cube 1"))
+    assert "not by the robot's hand" in words
+
+
 def test_a_nest_of_another_kind_is_no_place_for_a_part() -> None:
     nest = {"at": [0.06, 0.0, 0.0], "kind": "pin"}
     ((part, words),) = stacked(FLOOR, nest, FLOOR | {"at": [-0.06, 0.0, 0.0]}, upper=(0.06, 0.0), height_m=0.0)
