@@ -175,6 +175,17 @@ def test_a_full_station_takes_no_part() -> None:
     assert violations(cell, Plan((ONE, other, *out))) == []
 
 
+def test_a_part_that_only_passes_a_shelf_needs_room_on_it() -> None:
+    """A shelf with one place between two machines: a part that stands on it keeps the others off it."""
+    stations = (Station("in"), machine("m1"), Station("shelf", 1), machine("m2"), Station("out"))
+    way = (Stage("in"), Stage("m1", 1), Stage("shelf"), Stage("m2", 100), Stage("out"))
+    travel = every_way([one.name for one in stations])
+    cell = Cell(stations, {"p": (way,)}, ("p",) * 3, travel, travel, (Robot("r1", "in"), Robot("r2", "in")))
+    found = best(cell)
+    assert found.plan is not None
+    assert violations(cell, found.plan) == []
+
+
 def test_servers_and_setups() -> None:
     """One server: 10 s a part, and 7 s from a to b; none from b to a."""
     stations = (Station("in"), Station("m", None, True, 1, {("a", "b"): 7.0}))

@@ -11,7 +11,7 @@ from typing import Literal, NamedTuple
 from ortools.sat.python import cp_model
 
 from oracle.cell import Carried, Cell, Objective, Plan, Worked, ticks_per_s
-from oracle.ways import Step, Way, stretches, ways_of
+from oracle.ways import Room, Step, Way, stretches, ways_of
 
 FINER = 100  # ticks of the model in one of the cell, where two that swap places need an instant between them
 Time = cp_model.IntVar
@@ -81,7 +81,12 @@ class _Model:
         self.cells_per_s = ticks_per_s(cell)
         self.ways = {name: ways_of(cell, name) for name in set(cell.order)}
         self._may_be_full = self._full_ones()
-        shared = any(capacity > 1 for capacity in self._may_be_full.values())
+        shared = any(capacity > 1 for capacity in self._may_be_full.values()) or any(
+            room.station in self._may_be_full and _passes(way, room)
+            for ways in self.ways.values()
+            for way in ways
+            for room in way.rooms
+        )
         self.per_s = self.cells_per_s * (FINER if shared and len(cell.robots) > 1 else 1)
         self.horizon = self._horizon()
         self.nodes = list[_Node]()
@@ -340,11 +345,13 @@ class _Model:
                 capacity = self._may_be_full.get(room.station)
                 if capacity is None:
                     continue
-                if capacity > 1 and not room.at_end:
-                    end = cp_model.LinearExpr.sum([until.begin, *self._swaps(number)])
-                stop = self.model.new_int_var(0, self.horizon + 1, "")
+                if not room.at_end and (capacity > 1 or _passes(way, room)):
+                    instant = 1 if _passes(way, room) else 0
+                    swaps = self._swaps(number) if capacity > 1 else []
+                    end = cp_model.LinearExpr.sum([until.begin, *swaps]) + instant
+                stop = self.model.new_int_var(0, self.horizon + 2, "")
                 self.model.add(stop == end).only_enforce_if(since.there)
-                size = self.model.new_int_var(0, self.horizon + 1, "")
+                size = self.model.new_int_var(0, self.horizon + 2, "")
                 held.setdefault(room.station, []).append(
                     self.model.new_optional_interval_var(since.end, size, stop, since.there, "")
                 )
@@ -506,6 +513,12 @@ class _Model:
         return Plan(
             tuple(sorted(carried, key=lambda one: one.pick_s)), tuple(sorted(worked, key=lambda one: one.begin_s))
         )
+
+
+def _passes(way: Way, room: Room) -> bool:
+    """Whether a part may be put down and picked in one instant: even then there has to be room."""
+    work = [step.processing_s for step in way.steps[room.since : room.until]]
+    return not room.at_end and sum(work) == 0
 
 
 def places(cell: Cell) -> int:

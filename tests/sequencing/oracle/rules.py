@@ -54,14 +54,7 @@ def value_of(cell: Cell, plan: Plan, objective: Objective) -> float:
     if objective == "tardy-parts":
         return float(sum(one > EPS for one in late))
     if objective == "machine-idle":
-        works = sum(one.end_s - one.begin_s for one in plan.worked)
-        stations = {
-            (name, one.station): one.processing_s for name in cell.routes for way in cell.routes[name] for one in way
-        }
-        for one in plan.carried:
-            if one.what == "part" and cell.station(one.target).machine and cell.station(one.target).servers is None:
-                works += stations[cell.order[one.part - 1], one.target]
-        return places(cell) * max(ends) - works
+        return places(cell) * max(ends) - sum(_work_s(cell, plan, part) for part in range(1, len(ends) + 1))
     waits = 0.0
     for robot in cell.robots:
         at, own = robot.start, [one for one in plan.carried if one.robot == robot.name]
@@ -71,6 +64,14 @@ def value_of(cell: Cell, plan: Plan, objective: Objective) -> float:
             waits -= one.service_s + (drives + _loaded_s(cell, one)) / robot.speed
             at = one.target
     return waits
+
+
+def _work_s(cell: Cell, plan: Plan, part: int) -> float:
+    """How long machines work on a part, on the way that it takes."""
+    happens = _of_part(plan, part)
+    tried = [(way, *_followed(cell, way, part, happens, plan)) for way in ways_of(cell, cell.order[part - 1])]
+    way, *_ = min(tried, key=lambda one: (one[2] == [], len(one[1])))
+    return sum(step.processing_s for step in way.steps)
 
 
 def _loaded_s(cell: Cell, one: Carried) -> float:
