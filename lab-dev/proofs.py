@@ -13,6 +13,7 @@ from parts import Outcome, Part
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests" / "sequencing"))
 
 from against_oracle.compared import METHODS, Compared, compared, freedom, label, least
+from against_oracle.cycles import fits, judged, periods
 from against_oracle.drawn import as_toml, drawn
 
 from lab.errors import BadInput
@@ -33,6 +34,12 @@ def attempt(number: int, seed: int, room: Path) -> Outcome:
         return Outcome("refused by the lab", f"cell {seed} {number}: {error}")
     figures = {"oracle_s": round(found.seconds["oracle"], 2), "lab_s": round(found.seconds["lab"], 2)}
     figures |= {"proven": float(any(claim.proven for claim in found.claims))}
+    cycles = judged(periods(raw)) if fits(raw) else []
+    if not found.wrong and cycles:
+        file = room / f"{number}.toml"
+        file.write_text(as_toml(raw), encoding="utf-8")
+        said = "; ".join(words for *_, words in cycles)
+        return Outcome(f"{cycles[0][0]}: {label(raw)}", f"cell {seed} {number}: {file.name}", said, figures=figures)
     if not found.wrong:
         sure = "agrees" if found.oracle.status in ("optimal", "impossible") else "not proven by the oracle"
         return Outcome(sure, f"cell {seed} {number}: {label(raw)}", figures=figures)
