@@ -310,7 +310,7 @@ FEATURES: dict[str, tuple[Callable[[Raw], bool], Callable[[Raw], None]]] = {
     "reach": (lambda raw: any("serves" in one for one in raw.get("robots", ())), _serves_all),
     "speed": (lambda raw: any("speed" in one for one in raw.get("robots", [raw.get("robot", {})])), _one_speed),
     "loaded": (lambda raw: "loaded" in raw, _drop("loaded")),
-    "windows": (lambda raw: any("at_most_s" in one for one in raw["stations"]), _no_windows),
+    "windows": (lambda raw: any("at_most_s" in one for one in (*raw["stations"], *_stages(raw))), _no_windows),
     "servers": (lambda raw: any("servers" in one for one in raw["stations"]), _no_servers),
     "setups": (lambda raw: any("setup_s" in one for one in raw["stations"]), _without("setup_s")),
     "busy buffers": (
