@@ -25,7 +25,7 @@ def cyclic_found(given: "OrderOptions", toolbox: str | None, files: dict[str, Pa
         if name not in OF_A_CYCLE and value != none[name]:
             said = "" if value is True else f" {value}"
             raise BadInput(
-                f"--cyclic beside --{name}{said}: the shortest cycle is found and proven, by its period alone"
+                f"--cyclic beside --{name}{said}: the shortest cycle of its parts is found and proven, by its period alone"
             )
     if "plot" in files:
         raise BadInput(f"--cyclic beside --plot {files['plot']}: a cycle has no episodes; --gantt draws it")

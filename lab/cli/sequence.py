@@ -84,7 +84,8 @@ def sequence(
     cyclic: Annotated[
         bool,
         typer.Option(
-            "--cyclic", help="The shortest cycle that the robot can repeat; -n, --parts, --case: of one cycle."
+            "--cyclic",
+            help="The shortest cycle that the robot can repeat; -n, --parts, --case: the parts of one cycle.",
         ),
     ] = False,
     resume: Annotated[

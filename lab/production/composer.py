@@ -110,7 +110,7 @@ class Production:
         if found.schedule is not None and found.proven is not None:
             gap = found.proven.gap(found.schedule.makespan_s)
             plan = found.schedule.later(now_s)
-            self.tell(PlanMade(plan, len(self.sequence), gap, found.proven.proven, now_s, why))
+            self.tell(PlanMade(plan, len(self.sequence), gap, found.proven.proven, now_s, why, found.proven.of))
 
     def relearn(self, seen: Sequence[Deviation]) -> None:
         """Learn what changed in the scene, and go on with that. Raises LabError where nothing can be done in it."""

@@ -71,6 +71,7 @@ class PlanStatus:
     proven: bool
     why: str
     rows: list[Activity]
+    of: str
 
 
 @dataclass
@@ -137,7 +138,7 @@ class RunStatus:
                 self.phase, self.words = name, ""
             case PlanMade():
                 rows = [*event.schedule.robot, *event.schedule.machines, *event.schedule.parts]
-                self.plan = PlanStatus(event.schedule.makespan_s, event.gap, event.proven, event.why, rows)
+                self.plan = PlanStatus(event.schedule.makespan_s, event.gap, event.proven, event.why, rows, event.of)
                 self.moves = self._made + event.moves
             case MoveBegan() | SkillBegan() | MoveMade() | PartDone() | PartLost():
                 self._hear_move(event)

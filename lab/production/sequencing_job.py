@@ -349,7 +349,14 @@ def draw(cell: Cell, document: dict[str, Any], found: Sequence[SequenceResult], 
         label = "makespan [s]" if document["objective"] == MAKESPAN else document["objective"]
         costs = [result.episode_costs for result in found]
         stuck = stuck_cost(cell, document["objective"])
-        sequence_plot(costs, document["optimal_cost"], files["plot"], ylabel=label, deadlock=stuck)
+        sequence_plot(
+            costs,
+            document["optimal_cost"],
+            files["plot"],
+            ylabel=label,
+            deadlock=stuck,
+            proven_of=document["proven_of"],
+        )
     if "gantt" in files:
         gantt(simulate(cell, document["best_sequence"]), files["gantt"], due_s=cell.due_s)
     if "schedule" in files:

@@ -20,6 +20,7 @@ from lab.seat.request_text import percent, verdict
 from lab.sequencing import BESIDE_METHODS
 from lab.sequencing.cell.objectives import MAKESPAN
 from lab.sequencing.cell.routes import part_of
+from lab.sequencing.search import among
 from lab.teaching.events import (
     Event,
     KeptBeside,
@@ -35,7 +36,7 @@ from lab.teaching.events import (
     SkillReady,
 )
 from lab.teaching.lesson_plan import Lesson
-from lab.view.figures import among, beside, gap_of
+from lab.view.figures import beside, gap_of
 
 PHASES = {
     "learn": "Find or learn the skills",

@@ -112,6 +112,11 @@ def gap(cost: float, bound: float) -> float:
     return share if share >= SAME else 0.0
 
 
+def among(of: str) -> str:
+    """Of which plans something is proven, where these are not all (see `Cell.proven_of`): ", among ...", else ""."""
+    return "" if of == EVERY_PLAN else f", among {of}"
+
+
 @dataclass(frozen=True)
 class Reference:
     """What no sequence can beat: `bound`, in the objective's unit; `proven`: some sequence reaches it.

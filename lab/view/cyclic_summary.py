@@ -13,7 +13,7 @@ from lab.errors import counted
 def cyclic_summary(found: Mapping[str, Any]) -> RenderableType:
     """The end of `lab sequence --cyclic`, from its JSON document."""
     mix = ", ".join(counted(count, name) for name, count in Counter(found["mix"]).items())
-    proven = "proven: no order repeats faster" if found["proven"] else f"proven bound {found['bound_s']:.2f} s"
+    proven = f"proven: no cycle of {mix} is shorter" if found["proven"] else f"proven bound {found['bound_s']:.2f} s"
     each = "" if found["parts_a_cycle"] == 1 else f", {found['per_part_s']:.2f} s a part"
     lines = [
         f"every {found['period_s']:.2f} s: {mix}{each}, {found['parts_per_hour']:.1f} parts an hour (seed {found['seed']})",

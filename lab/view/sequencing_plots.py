@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.errors import BadInput, counted
+from lab.sequencing.cell.cell import EVERY_PLAN
+from lab.sequencing.search import among
 from lab.view.canvas import BLUE, GREY, INK, RED, SKY, picture_file, seconds, tip
 
 if TYPE_CHECKING:
@@ -25,12 +27,14 @@ def sequence_plot(
     *,
     ylabel: str = "makespan [s]",
     deadlock: float | None = None,
+    proven_of: str = EVERY_PLAN,
 ) -> None:
     """Cost of each sequencing episode, the best so far, and the proven optimum; PNG or SVG by the path's suffix.
 
     Several sessions (a list of lists): the best so far of each as a pale line, their mean, and the mean cost of an
     episode. deadlock: the cost of episodes that ended in one (`stuck_cost`), drawn as marks at the upper edge; they
-    count in no mean. Raises BadInput without episodes, and as all plots here do. Source: thesis fig. 7.3.
+    count in no mean. proven_of: see `Cell.proven_of`. Raises BadInput without episodes, and as all plots here do.
+    Source: thesis fig. 7.3.
     """
     from matplotlib.ticker import MaxNLocator
 
@@ -48,7 +52,7 @@ def sequence_plot(
         draw = _draw_session if len(sessions) == 1 else _draw_sessions
         draw(axes, kept, unit)
         if optimal is not None:
-            label = f"proven optimum: {_number(optimal, unit)}"
+            label = f"proven optimum: {_number(optimal, unit)}{among(proven_of)}"
             axes.axhline(optimal, color=RED, linestyle="--", linewidth=1.4, label=label)
         _draw_stuck(axes, stuck)
         axes.set(xlabel="episode", ylabel=ylabel, xlim=(0, 1.02 * max(2, costs.shape[1])))

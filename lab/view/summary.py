@@ -11,8 +11,9 @@ from rich.text import Text
 
 from lab.errors import counted
 from lab.sequencing import BESIDE_METHODS, method_in_words
+from lab.sequencing.search import among
 from lab.view.cyclic_summary import period_in_words
-from lab.view.figures import SAME, among, beside, gap_of
+from lab.view.figures import SAME, beside, gap_of
 
 _STUDY_ROWS = 30
 SHOWN_MOVES = 60

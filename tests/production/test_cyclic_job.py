@@ -38,7 +38,7 @@ def test_the_hoist_that_ships(lab: Lab, tmp_path: Path) -> None:
     assert ran.code == 0, ran.err
     lines = ran.out.splitlines()
     assert lines[0] == "every 521.00 s: 1 carrier, 6.9 parts an hour (seed 0)"
-    assert lines[1] == "proven: no order repeats faster; 4 parts in work at once at the most"
+    assert lines[1] == "proven: no cycle of 1 carrier is shorter; 4 parts in work at once at the most"
     assert sum(" > tank-" in line or " > unload" in line for line in lines) == 13
     assert lines[-1] == str(picture)
     assert "the period: 521 s" in picture.read_text(encoding="utf-8")
@@ -47,7 +47,10 @@ def test_the_hoist_that_ships(lab: Lab, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "reason"),
     [
-        ("toast-case-1 --method srl", "--cyclic beside --method srl: the shortest cycle is found and proven"),
+        (
+            "toast-case-1 --method srl",
+            "--cyclic beside --method srl: the shortest cycle of its parts is found and proven",
+        ),
         ("toast-case-1 --stochastic", "--cyclic beside --stochastic: "),
         ("toast-case-1 --sessions 3", "--cyclic beside --sessions 3: "),
         ("toast-case-1 --objective mean-tardiness", "--cyclic beside --objective mean-tardiness: "),

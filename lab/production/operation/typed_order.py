@@ -9,6 +9,7 @@ from lab.errors import counted
 from lab.production.order import moves_from
 from lab.sequencing.cell.schedule import Schedule
 from lab.sequencing.methods.exact import optimum
+from lab.sequencing.search import among
 from lab.sequencing.simulate.rest import rest_of
 from lab.sequencing.simulate.run import Run
 
@@ -17,13 +18,14 @@ from lab.sequencing.simulate.run import Run
 class TypedOrder:
     """A sequence that may be carried out: when it ends [s] and how much longer that is than the proven optimum or bound.
 
-    gap: a fraction; proven: against an optimum, not only a bound.
+    gap: a fraction; proven: against an optimum, not only a bound. of: of which plans (see `Cell.proven_of`).
     """
 
     sequence: tuple[int, ...]
     schedule: Schedule
     gap: float
     proven: bool
+    of: str
 
     @property
     def words(self) -> str:
@@ -32,7 +34,7 @@ class TypedOrder:
         longer = (
             f"{100 * self.gap:.1f} % longer than the {against}" if self.gap > 1e-9 else f"as short as the {against}"
         )
-        return f"{counted(len(self.sequence), 'move')}, {self.schedule.makespan_s:.1f} s: {longer}"
+        return f"{counted(len(self.sequence), 'move')}, {self.schedule.makespan_s:.1f} s: {longer}{among(self.of)}"
 
 
 def checked(state: Run, sequence: Sequence[int]) -> TypedOrder:
@@ -41,4 +43,5 @@ def checked(state: Run, sequence: Sequence[int]) -> TypedOrder:
     schedule = Schedule.from_moves(state.cell, moves, sequence)
     rest = rest_of(state, fallback_s=float(np.nanmax(state.cell.empty_s, initial=0.0))).cell
     proven = optimum(state.cell if rest is None else rest)
-    return TypedOrder(tuple(sequence), schedule, proven.gap(schedule.makespan_s - state.now_s), proven.proven)
+    gap = proven.gap(schedule.makespan_s - state.now_s)
+    return TypedOrder(tuple(sequence), schedule, gap, proven.proven, proven.of)

@@ -9,7 +9,7 @@ from operator import le
 import numpy as np
 
 from lab.errors import WorkFailed, counted
-from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.cell import EVERY_PLAN, Cell
 from lab.sequencing.cell.objectives import MAKESPAN
 from lab.sequencing.cell.ways import FAR, TICKS_PER_S
 from lab.sequencing.methods.lower_bound import LowerBound
@@ -28,7 +28,7 @@ class Optimum:
     """The best sequence known, and what is proven: no sequence is shorter than `bound_s`.
 
     cost: its makespan [s]. `proven`: the sequence is optimal (to a nanosecond a move) and `bound_s` is its makespan.
-    `expanded`: states opened.
+    `expanded`: states opened. `of`: of which plans that is said (see `Cell.proven_of`).
     """
 
     cost: float
@@ -36,6 +36,7 @@ class Optimum:
     proven: bool
     bound_s: float
     expanded: int
+    of: str = EVERY_PLAN
 
     @property
     def optimal_s(self) -> float | None:
@@ -128,7 +129,7 @@ def optimum(cell: Cell, max_expanded: int = MAX_EXPANDED) -> Optimum:
     """The shortest makespan of the cell and a sequence that reaches it, alike parts numbered first in, first out.
 
     Of all sequences, each carried out as early as it can be (see `Run`). Where parts may be picked too late, a robot that
-    waited on purpose before it brings a part might do better; that is not looked for.
+    waited on purpose before it brings a part might do better; that is not looked for, and `of` says so.
 
     States are opened in the order of time so far + a bound on what is still to do, so the first complete one is
     optimal; a deadlock leads nowhere. After `max_expanded` states, or once those that were reached hold MOST_KEPT numbers, it
@@ -142,7 +143,7 @@ def optimum(cell: Cell, max_expanded: int = MAX_EXPANDED) -> Optimum:
     if state is not None:
         sequence = search.merged.decisions(state)
         cost = simulate(cell, sequence).makespan_s
-        return Optimum(cost, sequence, True, cost, search.expanded)
+        return Optimum(cost, sequence, True, cost, search.expanded, cell.proven_of)
     bound_s, expanded = search.bound / TICKS_PER_S, search.expanded
     search.hasten()
     state = search.run(2 * max_expanded)
@@ -150,10 +151,11 @@ def optimum(cell: Cell, max_expanded: int = MAX_EXPANDED) -> Optimum:
     sequence = sequence if state is None else search.merged.decisions(state)
     if not sequence:
         why = "is proven: all were tried" if search.exhausted else f"was not proven, in {search.expanded} states"
+        kind = "order" if cell.proven_of == EVERY_PLAN else "order that never waits on purpose"
         raise WorkFailed(
-            f"no order was found that finishes {counted(len(cell.unfinished), 'part')}; that there is none {why}"
+            f"no {kind} was found that finishes {counted(len(cell.unfinished), 'part')}; that there is none {why}"
         )
-    return Optimum(simulate(cell, sequence).makespan_s, sequence, False, bound_s, expanded)
+    return Optimum(simulate(cell, sequence).makespan_s, sequence, False, bound_s, expanded, cell.proven_of)
 
 
 def exact(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceResult:
