@@ -12,6 +12,8 @@ LONGEST = 10.0  # of the mean: where only the direction of weights matters, they
 class Evolution:
     """A search under way over N weights whose length does not matter. mean (N,): where it stands.
 
+    Candidates are drawn by the symmetric root of the covariance, which is one; the eigenvectors that it is made of are not: each
+    linear algebra library has its own signs. So one seed learns the same on every machine, as far as costs can be told apart.
     Source: Hansen 2016, The CMA evolution strategy: a tutorial, with its default settings.
     """
 
@@ -29,15 +31,18 @@ class Evolution:
         self._damping = 1.0 + 2.0 * max(0.0, sqrt((mass - 1.0) / (n + 1.0)) - 1.0) + self._step_rate
         self._usual = sqrt(n) * (1.0 - 1.0 / (4.0 * n) + 1.0 / (21.0 * n * n))
         self._spread, self._path, self._step_path = np.eye(n), np.zeros(n), np.zeros(n)
-        self._axes, self._moves, self._generation = np.eye(n), np.zeros((population, n)), 0
+        self._root, self._inverse = (
+            np.eye(n),
+            np.eye(n),
+        )  # of the covariance: its symmetric root, and the inverse of that
+        self._moves, self._generation = np.zeros((population, n)), 0
 
     def ask(self) -> Floats:
         """The candidates (population, N) of a generation."""
-        lengths, self._axes = np.linalg.eigh(self._spread)
+        lengths, axes = np.linalg.eigh(self._spread)
         lengths = np.sqrt(np.maximum(lengths, 1e-20))
-        self._lengths = lengths
-        drawn = self._rng.standard_normal((self._size, len(self.mean)))
-        self._moves = (drawn * lengths) @ self._axes.T
+        self._root, self._inverse = (axes * lengths) @ axes.T, (axes / lengths) @ axes.T
+        self._moves = self._rng.standard_normal((self._size, len(self.mean))) @ self._root
         return np.asarray(self.mean + self._step * self._moves)
 
     def tell(self, costs: Floats) -> None:
@@ -46,10 +51,9 @@ class Evolution:
         move = self._shares @ self._moves[best]
         self._generation += 1
         self.mean = self.mean + self._step * move
-        whitened = self._axes @ ((self._axes.T @ move) / self._lengths)
         keep = 1.0 - self._step_rate
         self._step_path = (
-            keep * self._step_path + sqrt(self._step_rate * (2.0 - self._step_rate) * self._mass) * whitened
+            keep * self._step_path + sqrt(self._step_rate * (2.0 - self._step_rate) * self._mass) * self._inverse @ move
         )
         length = float(np.linalg.norm(self._step_path))
         usual = self._usual * sqrt(1.0 - keep ** (2 * self._generation))

@@ -39,3 +39,16 @@ def test_the_generator_decides() -> None:
     assert searched(9, 1, start).mean.tolist() == searched(9, 1, start).mean.tolist()
     assert searched(9, 1, start).mean.tolist() != searched(9, 2, start).mean.tolist()
     assert start.tolist() == [1.0] * 4
+
+
+def test_the_signs_of_eigenvectors_decide_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each linear algebra library has its own: with all turned round the search goes the same way."""
+    start, eigh = np.ones(4), np.linalg.eigh
+    mean = searched(40, 3, start).mean
+
+    def turned(matrix: Floats) -> tuple[Floats, Floats]:
+        values, vectors = eigh(matrix)
+        return values, -vectors
+
+    monkeypatch.setattr(np.linalg, "eigh", turned)
+    np.testing.assert_allclose(searched(40, 3, start).mean, mean, rtol=1e-6)
