@@ -142,7 +142,7 @@ def _stages(evidence: Evidence, seen: PartSeen, stay: Stay) -> bool:
 
 def _swapped(evidence: Evidence, seen: PartSeen, one: Stay, other: Stay) -> Violated:
     tracks, body = evidence.tracks, evidence.tracks.number(seen.name)
-    here, there = (_during(evidence, stay) for stay in (one, other))
+    here, there = (stay.frames(evidence.tracks) for stay in (one, other))
     at, elsewhere = tracks.poses[here, body][-1].copy(), tracks.poses[there, body][0].copy()
     tracks.poses[here, body], tracks.poses[there, body] = elsewhere, at
     names = {one.station: other.station, other.station: one.station}
@@ -158,13 +158,8 @@ def station_left_out(evidence: Evidence, rng: np.random.Generator) -> Violated:
     stays = [(seen, stay) for seen in evidence.parts for stay in seen.stays[1:-1] if _stages(evidence, seen, stay)]
     seen, stay = drawn(rng, stays)
     own = copied(evidence)
-    own.tracks.poses[_during(evidence, stay), own.tracks.number(seen.name), 2] += 0.2
+    own.tracks.poses[stay.frames(evidence.tracks), own.tracks.number(seen.name), 2] += 0.2
     return Violated(replace(own), seen.name, ("route", "schedule"), f"{seen.name} hangs over {stay.station}")
-
-
-def _during(evidence: Evidence, stay: Stay) -> np.ndarray[Any, Any]:
-    times_s = evidence.tracks.times_s
-    return np.flatnonzero((times_s >= stay.start_s) & (times_s <= stay.end_s))
 
 
 def overfull(evidence: Evidence, rng: np.random.Generator) -> Violated:
@@ -225,7 +220,7 @@ def head_idle(evidence: Evidence, rng: np.random.Generator) -> Violated:
     ]
     seen, stay = drawn(rng, stays)
     own = copied(evidence)
-    head, during = own.tracks.number(f"{stay.station} head"), _during(evidence, stay)
+    head, during = own.tracks.number(f"{stay.station} head"), stay.frames(evidence.tracks)
     first = int(rng.integers(len(during) // 10, len(during) * 2 // 3))
     own.tracks.poses[during[first:], head] = own.tracks.poses[during[0], head]
     return Violated(own, seen.name, ("process",), f"the head of {stay.station} stops over {seen.name}")
@@ -293,7 +288,7 @@ def drifting(evidence: Evidence, rng: np.random.Generator) -> Violated:
     stays = [(seen, stay) for seen in evidence.parts for stay in seen.stays if stay.seconds > 3 * HANDLING_S]
     seen, stay = drawn(rng, stays)
     own = copied(evidence)
-    during, by_m, about = _during(evidence, stay), float(rng.uniform(0.01, 0.04)), float(rng.uniform(0, 2 * np.pi))
+    during, by_m, about = stay.frames(evidence.tracks), float(rng.uniform(0.01, 0.04)), float(rng.uniform(0, 2 * np.pi))
     times_s = own.tracks.times_s[during]
     share = np.clip((times_s - times_s[0] - HANDLING_S) / (stay.seconds - 2 * HANDLING_S), 0.0, 1.0)[:, None]
     own.tracks.poses[during, own.tracks.number(seen.name), :2] += (
@@ -307,7 +302,7 @@ def beside(evidence: Evidence, rng: np.random.Generator) -> Violated:
     seen, stay = drawn(rng, [(seen, stay) for seen in evidence.parts for stay in seen.stays[1:]])
     own = copied(evidence)
     by_m, about = float(rng.uniform(0.03, 0.06)), float(rng.uniform(0, 2 * np.pi))
-    own.tracks.poses[_during(evidence, stay), own.tracks.number(seen.name), :2] += (
+    own.tracks.poses[stay.frames(evidence.tracks), own.tracks.number(seen.name), :2] += (
         by_m * np.cos(about),
         by_m * np.sin(about),
     )
@@ -319,7 +314,7 @@ def off_its_foot(evidence: Evidence, rng: np.random.Generator) -> Violated:
     """A part hangs over what it ends on, or has sunk into it."""
     seen = drawn(rng, [seen for seen in evidence.parts if seen.name in evidence.claimed])
     own, by_m = copied(evidence), float(rng.choice([rng.uniform(0.004, 0.009), -rng.uniform(0.003, 0.0045)]))
-    own.tracks.poses[_during(evidence, seen.stays[-1]), own.tracks.number(seen.name), 2] += by_m
+    own.tracks.poses[seen.stays[-1].frames(evidence.tracks), own.tracks.number(seen.name), 2] += by_m
     return Violated(replace(own), seen.name, ("stood",), f"{seen.name} ends {1000 * by_m:.1f} mm off its foot")
 
 
@@ -374,7 +369,7 @@ def service_left_out(evidence: Evidence, rng: np.random.Generator) -> Violated:
     ]
     seen, stay = drawn(rng, stays)
     own, by_m = copied(evidence), float(rng.uniform(0.1, 0.3))
-    during = _during(evidence, stay)
+    during = stay.frames(evidence.tracks)
     span = during[int(len(during) * rng.uniform(0.3, 0.6)) :]
     own.tracks.poses[np.ix_(span, np.array(own.tracks.robot[1:]))] += (0.0, by_m, 0.0, 0.0, 0.0, 0.0, 0.0)
     return Violated(own, seen.name, ("service",), f"the robot does not serve {seen.name} in {stay.station}")

@@ -27,7 +27,7 @@ def stood(evidence: Evidence, seen: PartSeen) -> Iterator[Finding]:
     """It stood straight, its foot on what carries it, still between its two transfers, on the spot where there is only one."""
     tracks, body = evidence.tracks, evidence.tracks.number(seen.name)
     for number, stay in enumerate(seen.stays):
-        station, during = evidence.task.station(stay.station), _during(tracks, stay)
+        station, during = evidence.task.station(stay.station), stay.frames(tracks)
         if np.median(tracks.up(body)[during]) < LEANS:
             yield Finding("stood", seen.name, stay.station, stay.start_s, f"leans in '{stay.station}'")
         gap_m = float(np.median(gap_of(evidence.task, seen.kind, station, tracks, body)[during]))
@@ -47,7 +47,7 @@ def _shifted(evidence: Evidence, seen: PartSeen, stay: Stay, places: Array) -> I
     """It did not move in a stay, the time aside in which a gripper lets go of it or takes hold."""
     tracks, last_s = evidence.tracks, float(evidence.tracks.times_s[-1])
     start_s = stay.start_s + (TAKES_S if stay.start_s > tracks.times_s[0] else 0.0)
-    free = np.flatnonzero(_during(tracks, Stay("", start_s, stay.end_s - (TAKES_S if stay.end_s < last_s else 0.0))))
+    free = Stay("", start_s, stay.end_s - (TAKES_S if stay.end_s < last_s else 0.0)).frames(tracks)
     if not len(free):
         return
     off_m = np.linalg.norm(places[free] - places[free[0]], axis=1)
@@ -158,7 +158,3 @@ def runs(mask: Mask) -> list[tuple[int, int]]:
     """The first frame of each run of frames in which something holds, and the one after its last."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
     return [(int(first), int(after)) for first, after in zip(edges[::2], edges[1::2], strict=True)]
-
-
-def _during(tracks: BodyTracks, stay: Stay) -> Mask:
-    return np.asarray((tracks.times_s >= stay.start_s) & (tracks.times_s <= stay.end_s))

@@ -109,7 +109,7 @@ def _covered(evidence: Evidence, seen: PartSeen, where: str, stay: Stay) -> Iter
     head, body = tracks.number(f"{where} head"), tracks.number(seen.name)
     if name is None or head < 0:
         return
-    process, during = evidence.task.processes[name], _frames(evidence, stay)
+    process, during = evidence.task.processes[name], stay.frames(evidence.tracks)
     at = tracks.inside(body, tracks.poses[:, head, :3])[:, [2, 0]]  # up and across, off the part
     low, size = tracks.low[body, [2, 0]], (tracks.high[body] - tracks.low[body])[[2, 0]]
     grid = _Grid(process, low, size, at[during], during)
@@ -122,7 +122,7 @@ def _served(evidence: Evidence, seen: PartSeen, stage: Stage, stay: Stay) -> Ite
     process = None if stage.service is None else task.processes[stage.service]
     if process is None or process.area_m is None or task.robot.tool == "level" or not tracks.fingers:
         return
-    during = _frames(evidence, stay)
+    during = stay.frames(evidence.tracks)
     hand = np.mean([tracks.middle(finger) for finger in tracks.fingers], axis=0)
     off = tracks.inside(tracks.number(where), hand)[during]
     across, along = np.array([evidence.off_pose(where, place) for place in off]).T
@@ -152,12 +152,6 @@ def _missed(evidence: Evidence, seen: PartSeen, rule: str, where: str, grid: _Gr
     if missed:
         words = f"{len(missed)} of {len(cells)} cells were not covered in '{where}'"
         yield Finding(rule, seen.name, where, float(times_s[-1]), words)
-
-
-def _frames(evidence: Evidence, stay: Stay) -> Numbers:
-    """The numbers of the frames of a stay (n,)."""
-    times_s = evidence.tracks.times_s
-    return np.flatnonzero((times_s >= stay.start_s) & (times_s <= stay.end_s))
 
 
 def _overlap(row: dict[str, Any], stay: Stay) -> float:

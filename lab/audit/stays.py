@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lab.audit.tracks import Array, BodyTracks
+from lab.audit.tracks import Array, BodyTracks, Numbers
 from lab.sim.parts.part_shape import shape_of
 from lab.tasks.task import Order, Task, part_name
 from lab.tasks.task_fields import Station
@@ -32,6 +32,10 @@ class Stay:
     def seconds(self) -> float:
         """How long."""
         return self.end_s - self.start_s
+
+    def frames(self, tracks: BodyTracks) -> Numbers:
+        """The numbers of the frames in it (n,)."""
+        return np.flatnonzero((tracks.times_s >= self.start_s) & (tracks.times_s <= self.end_s))
 
 
 @dataclass(frozen=True, eq=False)

@@ -319,21 +319,6 @@ def cell_of(task: Task, durations: Durations, order: Order) -> Cell:
     )
 
 
-def cell_without_times(task: Task, order: Order) -> Cell:
-    """The cell of a task as far as it says which moves are allowed: all take no time."""
-    places = stations(task, {})
-    no_time = np.zeros((len(places), len(places)))
-    return Cell(
-        places,
-        products(part for part in task.made if part.name in order),
-        order,
-        no_time,
-        no_time,
-        one_robot(task.robot.start),
-        precedences=precedences(task, order),
-    )
-
-
 def kept_durations(toolbox: Toolbox, key: str, skillset: SkillSet) -> Durations | None:
     """The durations kept under a key, None when there are none; BadInput for a record that does not hold them."""
     record = toolbox.load_record(RECORDS, key)
