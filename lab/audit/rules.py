@@ -1,7 +1,7 @@
 """What an audit asks of a run, rule by rule; each finding names the part, the station and the time."""
 
 from collections.abc import Iterator, Sequence
-from itertools import combinations
+from itertools import combinations, permutations
 from math import atan2, cos, hypot, sin
 from typing import Any
 
@@ -38,6 +38,7 @@ def findings(evidence: Evidence) -> list[Finding]:
             found += _in_hand(evidence, seen)
     found += _stations(evidence)
     found += _capacities(evidence)
+    found += _batches(evidence)
     found += _gripper(evidence)
     found += _in_one_another(evidence)
     return sorted(found, key=lambda one: one.at_s)
@@ -321,6 +322,33 @@ def _capacities(evidence: Evidence) -> Iterator[Finding]:
             words = f"'{station.name}' holds {' and '.join(names)} at {at_s:.1f} s, its capacity is {station.capacity}"
             for name in names:
                 yield Finding("capacity", name, station.name, at_s, words)
+
+
+def _batches(evidence: Evidence) -> Iterator[Finding]:
+    """A machine with batches works on all parts in it together: none comes or goes meanwhile, and their rows are alike."""
+    own = [seen for seen in evidence.parts if evidence.undisturbed(seen.name)]
+    for name in [station.name for station in evidence.task.stations if station.batch]:
+        rows = {
+            seen.name: [one for one in evidence.own_rows(seen.name, "process") if one["station"] == name]
+            for seen in own
+        }
+        for seen, other in permutations(own, 2):
+            for begin_s, end_s in [(row["start_s"], row["end_s"]) for row in rows[seen.name]]:
+                there = [s for s in other.stays if s.station == name and s.end_s > begin_s + SLACK_S]
+                stay = next((s for s in there if s.start_s < end_s - SLACK_S), None)
+                if stay is None:
+                    continue
+                comes, goes = stay.start_s > begin_s + SLACK_S, stay.end_s < end_s - SLACK_S
+                alike = any(
+                    max(abs(row["start_s"] - begin_s), abs(row["end_s"] - end_s)) <= SLACK_S for row in rows[other.name]
+                )
+                if comes or goes:
+                    at_s, verb = (stay.start_s, "came to") if comes else (stay.end_s, "left")
+                    words = f"{verb} '{name}' at {at_s:.1f} s, while the batch with {seen.name} was worked on"
+                    yield Finding("batch", other.name, name, at_s, words)
+                elif not alike:
+                    words = f"stood in '{name}' with {seen.name}, and was not worked on together with it"
+                    yield Finding("batch", other.name, name, begin_s, words)
 
 
 def _gripper(evidence: Evidence) -> Iterator[Finding]:
