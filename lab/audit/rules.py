@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from lab.audit.batches import batches
 from lab.audit.evidence import SLACK_S, Evidence, Finding, turned
 from lab.audit.motion import TAKES_S, in_hand, in_one_another, lasting, one_gripper, stood
 from lab.audit.schedule import one_story, told
@@ -32,6 +33,7 @@ def findings(evidence: Evidence) -> list[Finding]:
             found += in_hand(evidence, seen)
     found += _stations(evidence)
     found += _capacities(evidence)
+    found += batches(evidence)
     found += one_gripper(evidence)
     found += in_one_another(evidence)
     found += one_story(evidence)

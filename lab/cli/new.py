@@ -43,6 +43,12 @@ def new(
             "a MACHINE_buffer (2), input or output (all parts).",
         ),
     ] = None,
+    batch: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--batch", help="A machine that works on all parts in it together, such as oven; with --capacity."
+        ),
+    ] = None,
     arm: Annotated[str | None, typer.Option("--arm", help="The robot: {arms}.", autocompletion=offers("arms"))] = None,
     buffer: Annotated[bool, typer.Option("--buffer", help="A buffer before each machine.")] = False,
     yes: Annotated[bool, typer.Option("--yes", help="Ask nothing: three boxes, one press.")] = False,
@@ -57,7 +63,7 @@ def new(
     from lab.tasks.record import write_whole
 
     path, task_name = file_of(name)
-    numbers = (mass or (), friction or (), capacity or ())
+    numbers = (mass or (), friction or (), capacity or (), batch or ())
     if part or machine or arm or buffer or any(numbers):
         wanted = new_task(task_name, arm or "up6", part or (), machine or (), buffer, *numbers)
     elif yes:

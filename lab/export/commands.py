@@ -1,6 +1,6 @@
 """A program as a controller takes it: straight lines with rounded corners, outputs, inputs, timers, one job a transfer."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from math import ceil, pi
@@ -108,11 +108,12 @@ class Job:
 
 def jobs_of(program: Program) -> list[Job]:
     """One job a transfer; what the robot did after the last one, where a run failed, is a job of its own."""
-    jobs, left = [], list(program.carried.actions)
-    for transfer in program.carried.transfers:
+    jobs, left, transfers = [], list(program.carried.actions), program.carried.transfers
+    for number, transfer in enumerate(transfers):
         own = [action for action in left if action.at_s < transfer.drop_s]
         left = left[len(own) :]
-        jobs.append(_job(program, own, transfer))
+        more = _more_of_batch(program, transfer, transfers[number + 1 :])
+        jobs.append(_job(program, own, transfer, frozenset(more)))
     if left:
         jobs.append(_job(program, left, None))
     return jobs
@@ -123,7 +124,19 @@ def moving(program: Program) -> list[tuple[Motion, ...]]:
     return [way for job in jobs_of(program) for way in job.ways]
 
 
-def _job(program: Program, actions: Sequence[Action], transfer: Transfer | None) -> Job:
+def _more_of_batch(program: Program, transfer: Transfer, following: Sequence[Transfer]) -> set[str]:
+    """The machines with batches for which another transfer does the same: it brings another part, or takes another one out."""
+    found = set()
+    for name in program.carried.batches:
+        own = next((one for one in following if name in (one.origin, one.target)), None)
+        if own is not None and name in (transfer.origin, transfer.target):
+            found |= {name} if (own.target == name) == (transfer.target == name) else set()
+    return found
+
+
+def _job(
+    program: Program, actions: Sequence[Action], transfer: Transfer | None, more: Collection[str] = frozenset()
+) -> Job:
     machines = program.carried.machines
     found: list[Command] = []
     ways: list[tuple[Motion, ...]] = []
@@ -140,7 +153,7 @@ def _job(program: Program, actions: Sequence[Action], transfer: Transfer | None)
             found.append(Joint(tuple(map(float, program.joints[way[0].first]))))
         ways.append(way)
         found.append(_path(program, way))
-        if taken and transfer is not None and transfer.waits_for is not None:
+        if taken and transfer is not None and transfer.waits_for is not None and transfer.waits_for not in more:
             found.append(Reset(machines.index(transfer.waits_for) + 1, transfer.waits_for))
             taken = False
 
@@ -161,7 +174,12 @@ def _job(program: Program, actions: Sequence[Action], transfer: Transfer | None)
         else:
             found.append(Pause(action.seconds))
     lead()
-    if transfer is not None and transfer.carries == "part" and transfer.target in machines:
+    if (
+        transfer is not None
+        and transfer.carries == "part"
+        and transfer.target in machines
+        and transfer.target not in more
+    ):
         found.append(Start(machines.index(transfer.target) + 1, transfer.target))
     return Job("not finished" if transfer is None else transfer.words, tuple(found), tuple(ways))
 

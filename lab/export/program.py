@@ -93,7 +93,10 @@ class Transfer(Record):
 
 
 class Carried(Record):
-    """What `program.json` says; the rows that it counts stand in `trajectory.npz`. folder: of an arm that is a URDF file."""
+    """What `program.json` says; the rows that it counts stand in `trajectory.npz`. folder: of an arm that is a URDF file.
+
+    batches: the machines that work on all parts in them together.
+    """
 
     version: Literal[1] = 1
     task: str
@@ -101,6 +104,7 @@ class Carried(Record):
     robot: RobotSettings
     folder: str
     machines: tuple[str, ...]
+    batches: tuple[str, ...] = ()
     transfers: tuple[Transfer, ...]
     actions: tuple[Action, ...]
 

@@ -107,6 +107,7 @@ class MotionRecorder:
             robot=task.robot,
             folder=str(task.folder) if task.robot.is_file else "",
             machines=machines,
+            batches=tuple(station.name for station in task.stations if station.batch),
             transfers=tuple(_transfer(move, name(move.part), machines, task) for move in moves),
             actions=tuple(self._actions),
         )

@@ -79,7 +79,7 @@ class Production:
             self.recovery.look()
             self.work.put_back()
             if self.sequence:
-                self.work.bring_on(self.sequence[0], len(self.sequence))
+                self.work.bring_on(self.sequence)
                 self.sequence.pop(0)
             elif not self.recovery.find_again():
                 return False
@@ -94,6 +94,7 @@ class Production:
         back: parts that had been given up and are to be brought on after all, and their positions.
         """
         work, recovery, now_s = self.work, self.recovery, self.floor.now_s
+        work.begin_batches()
         first = self.sequence[0] if self.sequence and self.floor.bench.held is not None else None
         ready_s = {part: work.left_s(part) for part in range(1, self.cell.parts + 1) if work.work_on(part) is not None}
         ready_s |= dict.fromkeys([*back, *work.taken_out()], 0.0)

@@ -247,7 +247,7 @@ class Recovery:
             self._leave(part, replace(seen, words=f"{seen.words}, too near to {other} to be taken up"))
             return
         work, begun, answer = self.work, self.work.work_on(part), "takes it up there"
-        unfinished = begun is not None and not begun.done(work.floor.now_s)
+        unfinished = (begun is not None and not begun.done(work.floor.now_s)) or seen.name in work.waiting
         if unfinished or part in work.finished:
             answer = "puts it back"
             work.to_put_back.append(part)

@@ -68,6 +68,6 @@ def in_another(run: Run, cell: Cell) -> Run:
             ends = (n for n, at in enumerate(cell.laid_out) if at.product == product and not at.options)
             place = next(ends) if known is None else known
         other.locations[part] = place
-    other.ready_s = run.ready_s.copy()
+    other.ready_s, other.occupied = run.ready_s.copy(), run.occupied.copy()
     other.robots_at, other.robots_s = run.robots_at.copy(), run.robots_s.copy()
     return other

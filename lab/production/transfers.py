@@ -1,6 +1,6 @@
 """One decision at a time: go to a part, wait for its machine, take it up, carry it on; from whatever state was reached."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import islice
 from math import hypot
@@ -14,7 +14,7 @@ from lab.production.trouble import Trouble
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.routes import Option, part_of
 from lab.sequencing.cell.schedule import Move
-from lab.sequencing.simulate.run import Run
+from lab.sequencing.simulate.run import Run, closes
 from lab.sim.parts.kinds import Spot, comes_as, on_its_pallet
 from lab.sim.scene.scene import pallet_of
 from lab.sim.world import TIME_STEP
@@ -68,7 +68,8 @@ class Transfers:
     spot_of: by body, a part's or its pallet's. place: the station at whose approach the tool is; "": it is somewhere else.
     taken: spots on which something stands that belongs to nobody. finished: when a part reached the end of its route [s].
     to_put_back: parts that were moved from where they were brought. left_lying: parts that were given up. spoilt: why a
-    part was, which is brought on all the same. look: called while the robot waits; raises Trouble.
+    part was, which is brought on all the same. waiting: parts in a machine whose batch has not begun. look: called while the
+    robot waits; raises Trouble.
     """
 
     floor: Floor
@@ -83,6 +84,7 @@ class Transfers:
     to_put_back: list[int] = field(default_factory=list)
     left_lying: set[str] = field(default_factory=set)
     spoilt: dict[int, str] = field(default_factory=dict)
+    waiting: set[str] = field(default_factory=set)
 
     def __post_init__(self) -> None:
         self.plan = Run(self.cell)  # where parts are and may go; its times are the predicted ones
@@ -105,11 +107,9 @@ class Transfers:
         """The kind that a part is as it comes, on its pallet if it has one."""
         return comes_as(self.floor.scene.task.part(self.cell.order[part - 1]))
 
-    def bring_on(self, decision: int, ahead: int) -> None:
-        """Carry one decision out; what was done of it before is not done again. Raises Trouble.
-
-        ahead: how many decisions are still to come, with this one.
-        """
+    def bring_on(self, sequence: Sequence[int]) -> None:
+        """Carry the first of the decisions out that are still to come; what was done of it is not done again. Raises Trouble."""
+        decision, ahead = sequence[0], len(sequence)
         option = self.plan.option(decision)
         if option is None:
             raise Trouble(self.plan.refusal(decision), final=True)
@@ -133,7 +133,7 @@ class Transfers:
         else:
             move.smooth = False  # it was taken up before this move, or before it was interrupted
         self._bring(way, spot, move)
-        self._finish(decision, way, spot, move)
+        self._finish(sequence, way, spot, move)
 
     @property
     def under_way(self) -> bool:
@@ -151,8 +151,12 @@ class Transfers:
             self._bring(way, spot, move)
             self._under_way = None
             self._left_s.pop(name, None)
-            self._start_machine(name, way.target, process_s)
             self.to_put_back.pop(0)
+            if self.cell.index(way.target) not in self.cell.batches:
+                self._start_machine(name, way.target, process_s)
+            elif self.floor.machines[way.target].works:
+                self.waiting.add(name)
+                self._begin_batch(way.target)
 
     def set_aside(self) -> bool:
         """Set what is in the gripper down where it was taken up, or on a free place of the table; whether that was done."""
@@ -193,6 +197,22 @@ class Transfers:
             work = floor.begin(station, name, process_s)
             self.tell(MachineBegan(station, name, work.begun_s, work.expected_s))
 
+    def begin_batches(self) -> None:
+        """Let machines begin with the parts that wait in them for others of their batch: nothing more is to come."""
+        for station in [self.cell.names[index] for index in sorted(self.cell.batches)]:
+            if any(self.name(part) in self.waiting for part in self.plan.inside(self.cell.index(station))):
+                self._begin_batch(station)
+
+    def _begin_batch(self, station: str) -> None:
+        """Let a machine begin with all parts in it that it is not done with, for the longest of their times."""
+        inside = [part for part in self.plan.inside(self.cell.index(station)) if part not in self.to_put_back]
+        working = {name for name, work in self.floor.machines[station].works.items() if not work.done(self.floor.now_s)}
+        names = [name for name in map(self.name, inside) if name in self.waiting | working]
+        longest_s = max((self._last[name][2] for name in names), default=0.0)
+        for name in names:
+            self._start_machine(name, station, longest_s)
+        self.waiting -= {*names}
+
     def _begin(self, name: str, way: Carried, ahead: int) -> _UnderWay:
         """The times of the move, which begins now or was interrupted."""
         now_s = self.floor.now_s
@@ -204,8 +224,9 @@ class Transfers:
             self._under_way.smooth = False
         return self._under_way
 
-    def _finish(self, decision: int, way: Carried, spot: Spot, move: _UnderWay) -> None:
+    def _finish(self, sequence: Sequence[int], way: Carried, spot: Spot, move: _UnderWay) -> None:
         """The part stands where it was to be brought: all that knows of it is told."""
+        decision, *following = sequence
         part, floor, name = part_of(decision, self.cell.parts), self.floor, move.what[0]
         if move.smooth:
             self.timed.append(TimedMove(way, floor.now_s - move.pick_s))
@@ -220,7 +241,12 @@ class Transfers:
         self.moves.append(Move(part, move.start, way.origin, way.target, *times_s, planned.carries))
         if planned.carries == "part":
             self._last[name] = way, spot, planned.process_s
-            self._start_machine(name, way.target, planned.process_s)
+            batch = self.cell.index(way.target) in self.cell.batches
+            if not batch:
+                self._start_machine(name, way.target, planned.process_s)
+            self.waiting |= {name} if batch else set()
+            if batch and closes(self.plan, self.cell.index(way.target), following):
+                self._begin_batch(way.target)
         self.tell(MoveMade(self.moves[-1], name))
         if self.plan.finished_s[part - 1] is not None:
             self.finished[part] = floor.now_s
@@ -366,7 +392,8 @@ class Transfers:
         if work is None or not own or not work.done(self.floor.now_s):
             return
         brought = self.moves[own[-1]]
-        worked_s = work.until_s - brought.drop_s
+        batch = self.cell.index(brought.target) in self.cell.batches
+        worked_s = work.until_s - (work.begun_s if batch else brought.drop_s)
         if abs(worked_s - brought.process_s) > TIME_STEP:
             self.moves[own[-1]] = replace(brought, process_s=worked_s)
 

@@ -131,7 +131,10 @@ def stations(task: Task, process_s: Mapping[str, float]) -> tuple[Station, ...]:
     times = {
         s.name: s.processing_s if s.processing_s is not None else process_s.get(s.name, 0.0) for s in task.stations
     }
-    return tuple(Station(s.name, s.kind, s.capacity, times[s.name] or 0.0, planned(s.at_most_s)) for s in task.stations)
+    return tuple(
+        Station(s.name, s.kind, s.capacity, times[s.name] or 0.0, planned(s.at_most_s), batch=s.batch)
+        for s in task.stations
+    )
 
 
 def products(parts: Iterable[Part], service_s: Mapping[Pair, float] = NO_SERVICE) -> tuple[Product, ...]:

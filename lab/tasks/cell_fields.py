@@ -76,6 +76,11 @@ class CellStation(Record):
     """How many parts the machine works on at once, such as `1`; the others wait in its room, and those that are done,
     too. Left out: all that stand in it, each from when it comes.
     """
+    batch: bool = False
+    """Whether the machine works on all parts that stand in it together, such as `true`: they begin with the last that is
+    brought before one is taken out, take the longest of their times, and nothing comes in until all are out. It needs a
+    capacity of 2 or more, and one robot.
+    """
     setup_s: Times = Field(default={})
     """How long a server takes to change over, from product to product [s], such as `{ bun = { loaf = 20.0 } }`."""
 
@@ -83,7 +88,14 @@ class CellStation(Record):
         """As the sequencer has it."""
         setups = tuple((a, b, seconds) for a, row in self.setup_s.items() for b, seconds in row.items())
         return Station(
-            self.name, self.kind, self.capacity, self.processing_s or 0.0, self.at_most_s, self.servers, setups
+            self.name,
+            self.kind,
+            self.capacity,
+            self.processing_s or 0.0,
+            self.at_most_s,
+            self.servers,
+            setups,
+            self.batch,
         )
 
 

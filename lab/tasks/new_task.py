@@ -73,7 +73,8 @@ class NewMachine:
 class NewTask:
     """Parts that an arm brings from an input through all machines, in their order, to an output; buffers before machines.
 
-    capacities: of stations that hold more or fewer parts than they do by default, by name.
+    capacities: of stations that hold more or fewer parts than they do by default, by name. batches: machines that work on all
+    parts in them together.
     """
 
     name: str
@@ -82,6 +83,7 @@ class NewTask:
     machines: tuple[NewMachine, ...] = ()
     buffers: bool = False
     capacities: Mapping[str, int] = field(default_factory=dict)
+    batches: tuple[str, ...] = ()
 
     @property
     def stations(self) -> dict[str, tuple[str, int]]:
@@ -202,10 +204,11 @@ def new_task(
     masses: Sequence[str] = (),
     frictions: Sequence[str] = (),
     capacities: Sequence[str] = (),
+    batches: Sequence[str] = (),
 ) -> NewTask:
     """What options, or answers, ask for. Raises BadInput.
 
-    masses [kg], frictions: of kinds of parts, "pin=0.05"; capacities: of stations, "oven=2".
+    masses [kg], frictions: of kinds of parts, "pin=0.05"; capacities: of stations, "oven=2". batches: names of machines.
     """
     kinds: list[NewPart] = []
     for word in parts or (PART,):
@@ -222,7 +225,13 @@ def new_task(
     found = NewTask(name, arm_of_word(arm), tuple(kinds), tuple(stations), buffers)
     if found.count > MAX_PARTS:
         raise BadInput(f"{found.count} parts (--part): allowed are 1 to {MAX_PARTS} in all")
-    return replace(found, capacities=_capacities(found, capacities))
+    found = replace(found, capacities=_capacities(found, capacities))
+    for name in batches:
+        if name not in [machine.name for machine in found.machines]:
+            raise unknown("machine", name, [machine.name for machine in found.machines], "--batch")
+        if found.stations[name][1] < 2:
+            raise BadInput(f"'{name}' (--batch): it holds 1 part, a batch needs room for 2: add --capacity {name}=2")
+    return replace(found, batches=tuple(dict.fromkeys(batches)))
 
 
 def _by_name(

@@ -103,6 +103,8 @@ def _station(new: NewTask, one: Placed) -> str:
         f"pose = {_list((one.x, one.y, 0.0))}",
         f"capacity = {one.capacity}",
     ]
+    if one.name in new.batches:
+        lines.append("batch = true                # all parts in it begin and end together")
     if one.said:
         lines.append("spots = [                   # where parts stand: x, y, yaw off the pose")
         lines += [f"  {_list((*spot, 0.0))}," for spot in one.spots]

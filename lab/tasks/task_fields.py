@@ -161,7 +161,12 @@ class Station(Record):
     """
     capacity: Count
     """How many parts it holds at once, such as `1`. A machine works on each of them from when it comes, one with a process on
-    one at a time.
+    one at a time, and one with a batch on all together.
+    """
+    batch: bool = False
+    """Whether the machine works on all parts that stand in it together, such as `true`: it begins with the last that the order
+    brings before one is taken out, takes the longest of their times, and nothing comes in until all are out. It needs a
+    capacity of 2 or more.
     """
     processing_s: Time | None = None
     """How long the machine works on each part [s], such as `60.0`; a stage of a route may have its own."""
@@ -209,6 +214,21 @@ class Station(Record):
             raise ValueError(
                 f"machine '{self.name}' needs either processing_s or process, a sub-task to learn, not both"
             )
+        return self
+
+    @model_validator(mode="after")
+    def _batch_possible(self) -> Self:
+        if not self.batch:
+            return self
+        if self.kind != "machine":
+            raise ValueError(f"station '{self.name}' is a {self.kind}: only a machine has batch")
+        if self.capacity < 2:
+            raise ValueError(
+                f"machine '{self.name}' has batch = true and the capacity {self.capacity}: a batch needs room for 2 or more"
+            )
+        for field in ("process", "at_most_s"):
+            if getattr(self, field) is not None:
+                raise ValueError(f"machine '{self.name}' has batch = true and {field}: leave one of them away")
         return self
 
     @model_validator(mode="after")

@@ -446,6 +446,23 @@ def test_turns_that_are_none_are_refused(tmp_path: Path) -> None:
         read_tracks(path)
 
 
+def test_a_batch_is_worked_on_together() -> None:
+    """Cube 1 comes at 4 s, cube 2 at 10 s: together from 10 to 30 s. Who comes or goes meanwhile is seen, and what differs."""
+    one: Way = ((0, "in"), (2, ""), (4, "oven"), (34, ""), (36, "out"))
+    two: Way = ((0, "in"), (8, ""), (10, "oven"), (40, ""), (42, "out"))
+
+    def case(ways: Sequence[Way], *spans: tuple[float, float]) -> list[tuple[str, str, str]]:
+        seen = evidence(ways, capacity=2, batch=True, size_m=[0.1, 0.1, TOPS["oven"]])
+        others = [row for row in seen.rows if row["operation"] != "process"]
+        seen.rows = [*others, *(_row(n, "process", "oven", "oven", *span) for n, span in enumerate(spans, 1))]
+        return [one for one in found(seen) if one[0] == "batch"]
+
+    assert case((one, two), (10.0, 30.0), (10.0, 30.0)) == []
+    assert set(case((one, two), (4.0, 24.0), (10.0, 30.0))) == {("batch", f"cube {n}", "oven") for n in (1, 2)}
+    early: Way = ((0, "in"), (2, ""), (4, "oven"), (25, ""), (27, "out"))
+    assert ("batch", "cube 1", "oven") in case((early, two), (5.0, 25.0), (10.0, 30.0))
+
+
 def test_a_part_that_drifts_while_it_is_worked_on() -> None:
     """3 cm from 10 to 20 s, so slowly that no step is seen: in a machine of two, where any place would do."""
     case = evidence(capacity=2)

@@ -56,6 +56,18 @@ def test_thin_parts_of_an_own_mass_and_a_machine_for_two(lab: Lab, folder: Path)
     assert lab("task", "check", "pins.toml").code == 0
 
 
+def test_a_machine_with_batches(lab: Lab, folder: Path) -> None:
+    words = ["new", "pins", "--part", "pin=cylinder:0.02x0.04:2", "--machine", "oven:5", "--batch", "oven"]
+    assert (
+        lab(*words).err.strip()
+        == "lab: 'oven' (--batch): it holds 1 part, a batch needs room for 2: add --capacity oven=2"
+    )
+    assert "unknown machine 'oben' (--batch): did you mean 'oven'?" in lab(*words[:-1], "oben").err
+    assert not Path("pins.toml").exists()
+    assert lab(*words, "--capacity", "oven=2").code == 0
+    assert load("pins.toml").station("oven").batch
+
+
 def test_a_refusal_says_the_mass_that_would_do(lab: Lab, folder: Path) -> None:
     words = "new x --part pin=cylinder:0.03x0.08:1 --friction pin=0.15"
     refused = lab(*words.split(), "--mass", "pin=2").err.strip()

@@ -78,6 +78,7 @@ class Cell:
     def __post_init__(self) -> None:
         check_layout(self.stations, self.products)
         check_robots(self.robots, self.stations)
+        self._check_batches()
         if self.buffers not in BUFFER_USES:
             raise unknown("use of buffers", self.buffers, BUFFER_USES, "cell")
         self._check_order()
@@ -127,6 +128,11 @@ class Cell:
         """Room for parts, by station index."""
         return tuple(station.capacity for station in self.stations)
 
+    @cached_property
+    def batches(self) -> frozenset[int]:
+        """The stations, by index, that work on all parts that stand in them together."""
+        return frozenset(index for index, station in enumerate(self.stations) if station.batch)
+
     @property
     def robot_start(self) -> str:
         """Where the first robot stands at time 0."""
@@ -162,6 +168,7 @@ class Cell:
         """Every place on a route where a part of the order may stand between two moves."""
         shut = {self.index(name) for name in self.closed}
         taken = [station for at in self._stay for station in at.holds]
+        shut |= self.batches.intersection(taken)  # what is never empty takes no new batch
         shut |= {station for station in taken if taken.count(station) >= self.capacities[station]}
         return (*open_ways(self.laid_out, shut), *self._stay)
 
@@ -332,6 +339,11 @@ class Cell:
             does[self.part_name(part)] = [s for s in steps if ends <= made_in(self.laid_out, own, s, self.names)]
         names = [self.part_name(part) for part in range(1, self.parts + 1)]
         check_precedences(self.precedences, self.names, names, does)
+
+    def _check_batches(self) -> None:
+        if self.batches and not is_serial(self.laid_out, self.robots):
+            name = self.names[min(self.batches)]
+            raise BadInput(f"station '{name}': batch = true is for cells of one robot, and machines without servers")
 
     def _check_begins(self) -> None:
         begins = self.begins if self.begins is not None else [Begins(start) for start in self.starts]

@@ -88,6 +88,19 @@ class Chance:
 NO_CHANCE = Chance("constant", "constant")
 
 
+def check_chance(cell: Cell, chance: Chance) -> None:
+    """BadInput for chance in a cell with batches.
+
+    An order tells with what is brought, or taken out, next whether a machine has begun: who decides on the way would decide
+    afterwards that it had begun before.
+    """
+    if cell.batches and chance != NO_CHANCE:
+        name = cell.names[min(cell.batches)]
+        raise BadInput(
+            f"station '{name}': batch = true, which times that are drawn do not know: leave one of them away"
+        )
+
+
 @dataclass(frozen=True)
 class Episode:
     """The times that one episode meets: those of the cell when there is no chance, else drawn by the seed, 0 to 2**64 - 1."""
@@ -95,6 +108,9 @@ class Episode:
     cell: Cell
     chance: Chance = NO_CHANCE
     seed: int = 0
+
+    def __post_init__(self) -> None:
+        check_chance(self.cell, self.chance)
 
     def processing_s(self, part: int, position: int) -> float:
         """How long the part (from 1) is processed in that position [s]."""

@@ -1,7 +1,7 @@
 """What a run of a cell comes to: timed moves, the Schedule of robot, machines and parts that they make, and results."""
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Literal, get_args
 
@@ -112,9 +112,10 @@ class Schedule:
         parts: list[Activity] = []
         machines: list[Activity] = []
         limits: list[FetchBy] = []
+        together = _batches(cell, moves)
         for part in cell.unfinished:
             own = [move for move in moves if move.part == part and move.carries == "part"]
-            rows = _part_activities(cell, part, own, 0.0 if came_s is None else came_s[part - 1], end_s)
+            rows = _part_activities(cell, part, own, 0.0 if came_s is None else came_s[part - 1], end_s, together)
             parts += rows[0]
             machines += rows[1]
             limits += _limits(cell, part, own) if cell.has_windows else ()
@@ -155,11 +156,17 @@ def robot_activities(move: Move) -> list[Activity]:
 
 
 def _part_activities(
-    cell: Cell, part: int, moves: Sequence[Move], came_s: float, end_s: float
+    cell: Cell,
+    part: int,
+    moves: Sequence[Move],
+    came_s: float,
+    end_s: float,
+    together: Mapping[tuple[int, str], tuple[float, float]],
 ) -> tuple[list[Activity], list[Activity]]:
     """Rows of one part, and of the machines that it passes, from its arrival to `end_s`."""
     row, since_s, process_s = cell.part_name(part), came_s, cell.begin_s[part - 1]
     place = cell.names[cell.positions[cell.begin_at[part - 1]].station]
+    begin_s = since_s  # when its processing there begins
     works = False  # whether it is worked on there, be it for no time
     rows: list[Activity] = []
     machines: list[Activity] = []
@@ -167,10 +174,12 @@ def _part_activities(
         station = cell.stations[cell.index(place)]
         # A measured run may fetch a little before the nominal end: processing then ends with the pick.
         until_s = end_s if move is None else move.pick_s
-        done_s = min(since_s + process_s, until_s)
-        if station.kind == "machine" and (works or done_s > since_s):
+        done_s = min(begin_s + process_s, until_s)
+        if begin_s > since_s:
+            rows.append(Activity(row, "store", part, place, place, since_s, begin_s))
+        if station.kind == "machine" and (works or done_s > begin_s):
             for resource, log in ((row, rows), (place, machines)):
-                log.append(Activity(resource, "process", part, place, place, since_s, done_s))
+                log.append(Activity(resource, "process", part, place, place, begin_s, done_s))
         if station.kind == "machine" and station.servers is None:
             for resource, log in ((row, rows), (place, machines)):
                 log.append(Activity(resource, "blocked", part, place, place, done_s, until_s))
@@ -180,9 +189,25 @@ def _part_activities(
         if move is not None:
             if not move.served:
                 rows.append(Activity(row, "carry", part, move.origin, move.target, move.pick_s, move.drop_s))
-            since_s, place, process_s = move.drop_s, move.target, move.process_s
+            since_s, place = move.drop_s, move.target
+            begin_s, process_s = together.get((part, place), (move.drop_s, move.process_s))
             works = move.served or cell.stations[cell.index(place)].servers is None
     return _lasting(rows), _lasting(machines)
+
+
+def _batches(cell: Cell, moves: Sequence[Move]) -> dict[tuple[int, str], tuple[float, float]]:
+    """When, and for how long, each part is worked on in a machine with batches [s], by part and machine."""
+    found: dict[tuple[int, str], tuple[float, float]] = {}
+    for name in [cell.names[station] for station in cell.batches]:
+        batch: list[Move] = []
+        for move in moves:
+            if move.target == name:
+                batch = [*batch, move]
+                at_s, process_s = max(one.drop_s for one in batch), max(one.process_s for one in batch)
+                found |= {(one.part, name): (at_s, process_s) for one in batch}
+            elif move.origin == name:
+                batch = []
+    return found
 
 
 def _limits(cell: Cell, part: int, moves: Sequence[Move]) -> Iterator[FetchBy]:

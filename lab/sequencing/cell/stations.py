@@ -23,7 +23,8 @@ class Station:
     long as you like. servers: how many parts a machine works on at once; None: all that stand in it, each from when it comes.
     Else a part waits in the machine's room until a server takes it, in any order, leaves the server by itself and waits in the
     room until it is fetched. setups: (product before, product, seconds) that a server takes to change over; the first product
-    takes none.
+    takes none. batch: the machine works on all parts that stand in it together, from when the last of them is brought, for the
+    longest of their times: nothing comes in once one has been taken out, until it is empty.
     """
 
     name: str
@@ -33,6 +34,7 @@ class Station:
     at_most_s: float | None = None
     servers: int | None = None
     setups: tuple[tuple[str, str, float], ...] = ()
+    batch: bool = False
 
 
 @dataclass(frozen=True)
@@ -169,6 +171,24 @@ def _check_stations(stations: Sequence[Station]) -> None:
                     f"{where}: at_most_s = {station.at_most_s:g}, but it is a {station.kind}; only a machine has it"
                 )
         _check_servers(station, where)
+        _check_batch(station, where)
+
+
+def _check_batch(station: Station, where: str) -> None:
+    if not station.batch:
+        return
+    if station.kind != "machine":
+        raise BadInput(f"{where}: batch = true, but it is a {station.kind}; only a machine has batches")
+    if not 1 < station.capacity < UNLIMITED:
+        room = "unlimited" if station.capacity >= UNLIMITED else station.capacity
+        raise BadInput(
+            f"{where}: batch = true with capacity = {room}; a batch needs room for 2 parts or more, with a limit"
+        )
+    for name, given in (("servers", station.servers), ("at_most_s", station.at_most_s)):
+        if given is not None:
+            raise BadInput(
+                f"{where}: batch = true and {name} = {given:g}; only one of them is possible: leave {name} away"
+            )
 
 
 def _check_servers(station: Station, where: str) -> None:
@@ -264,6 +284,10 @@ def _check_stage(stage: Stage, station: Station, where: str) -> None:
     for name, given in (("processing_s", stage.processing_s), ("pallet", stage.pallet), ("service_s", stage.service_s)):
         if given and kind != "machine":
             raise BadInput(f"{where}: {name} = {given}, but '{stage.station}' is a {kind}; only a machine has it")
+    if station.batch:
+        for name, wrong in (("at_most_s", stage.at_most_s is not None), ("pallet", stage.pallet)):
+            if wrong:
+                raise BadInput(f"{where}: {name}, but '{stage.station}' has batches; only one of them is possible")
     if stage.at_most_s is not None and kind != "machine":
         raise BadInput(
             f"{where}: at_most_s = {stage.at_most_s:g}, but '{stage.station}' is a {kind}; only a machine has it"

@@ -152,6 +152,10 @@ def check_cyclic(cell: Cell, mix: Sequence[str]) -> None:
                 f"--cyclic: station '{station.name}' has servers and a queue; in a cycle each part is worked on where and "
                 "when it is put down: leave servers away"
             )
+        if station.batch:
+            raise BadInput(
+                f"--cyclic: station '{station.name}' has batch = true, which a cycle does not know: leave it away"
+            )
     if cell.precedences:
         raise BadInput(
             "--cyclic: parts have to wait for others in this cell, which a cycle does not know: leave --cyclic away"

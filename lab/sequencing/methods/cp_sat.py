@@ -72,8 +72,19 @@ def cp_sat(
         raise BadInput(f"time limit = {time_limit_s} s: allowed are finite times above 0")
     if workers < 1:
         raise BadInput(f"workers = {workers}: allowed are whole numbers from 1")
+    check_no_batches(cell)
     known = first_come(cell) if hint is None else hint
     return _searched(_Asked(Shared(cell, objective), seed, workers, time_limit_s), tuple(known))
+
+
+def check_no_batches(cell: Cell) -> None:
+    """BadInput for a cell with batches, which the constraint models do not know."""
+    if cell.batches:
+        name = cell.names[min(cell.batches)]
+        raise BadInput(
+            f"CP-SAT: station '{name}' has batch = true, which its model does not know: --method exact searches the shortest "
+            "makespan, --method srl-time any objective"
+        )
 
 
 def beside(shared: Shared, time_limit_s: float, seed: int, workers: int) -> None:
@@ -83,6 +94,7 @@ def beside(shared: Shared, time_limit_s: float, seed: int, workers: int) -> None
     for a model it gives a bound only. The time limit holds for all of it [s].
     """
     begin_s, cell, large = perf_counter(), shared.cell, not fits(shared.cell)
+    check_no_batches(cell)
     of_use = large or (shared.objective == MAKESPAN and not cell.serial)
     if cell.robots and shared.objective != "robot-idle" and of_use:
         free_robots(shared, time_limit_s, seed, workers)

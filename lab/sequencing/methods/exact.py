@@ -172,7 +172,7 @@ def exact(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceResul
     if found is None or not found.proven:
         from lab.sequencing.methods.cp_sat import cp_sat, fits  # only where it is needed: OR-Tools takes its time
 
-        if found is None or fits(cell):
+        if found is None or (fits(cell) and not cell.batches):
             other = cp_sat(cell, search.objective, hint=sequence or None)
             sequence, cost = min((cost, sequence), (other.cost, other.sequence))[::-1]
     return only_one(cell, search, sequence, cost, bool(sequence))

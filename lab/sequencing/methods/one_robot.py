@@ -54,6 +54,7 @@ def why_not(cell: Cell) -> str:
         "time windows": cell.has_windows,
         "setups": any(station.setups for station in cell.stations),
         "machines with several servers": any((station.servers or 1) > 1 for station in cell.stations),
+        "machines with batches": bool(cell.batches),
         "alternatives": cell.most_choices > 1 or any(len(place.options) > 1 for place in cell.positions),
         "pallets": any(way.carries == "pallet" for place in cell.positions for way in place.options),
         "room that may be full": _may_be_full(cell),

@@ -41,6 +41,10 @@ def rolling(
         check_objective(objective, cell)
         if not cell.serial:
             raise BadInput("rolling decisions are for cells in which one robot does all the work")
+        if cell.batches:
+            raise BadInput(
+                "rolling decisions are for cells without batches: an order says what they are, before it begins"
+            )
         return _Rolling(cell, planned, chance, (seed, futures), objective).choose
 
     return policy

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.sequencing.cell.cell import ARRIVALS_AFTER, Cell
-from lab.sequencing.cell.chance import LAWS, NO_CHANCE, Chance
+from lab.sequencing.cell.chance import LAWS, NO_CHANCE, Chance, check_chance
 from lab.sequencing.cell.objectives import BUILT_IN, MAKESPAN, check_built_in, machine_places, stuck_cost
 from lab.sequencing.cell.routes import from_the_ends
 from lab.sequencing.cell.stations import UNLIMITED, Robot
@@ -36,7 +36,7 @@ class CellArrays(NamedTuple):
     tracked: whether there is a track; first_held (S * S + 1,): where the stretches of each way on it begin in held (H,);
     held_from_s, held_until_s (R, H): from when until when a robot on that way is on each [s].
     ruled: whether there are precedences, R of them; made, ended (R, P): as `Rule` has them; counts (R, K): as many as it
-    has, then 0.
+    has, then 0. batched: whether there are machines with batches; batch (S + 2,): which.
     interval_s, due_s (K,) [s]. many: whether a part may have several choices. The codes are those of this module.
     """
 
@@ -90,6 +90,8 @@ class CellArrays(NamedTuple):
     made: Flags
     ended: Flags
     counts: Ints
+    batched: bool
+    batch: Flags
 
 
 class RunArrays(NamedTuple):
@@ -125,6 +127,7 @@ def cell_arrays(cell: Cell, objective: str = MAKESPAN, chance: Chance = NO_CHANC
     BadInput for an objective that the kernels do not know.
     """
     check_built_in(objective, "the compiled simulation")
+    check_chance(cell, chance)
     size, places = len(cell.stations), cell.positions
     options = [option for place in places for option in place.options]
     return CellArrays(
@@ -172,6 +175,8 @@ def cell_arrays(cell: Cell, objective: str = MAKESPAN, chance: Chance = NO_CHANC
         tracked=bool(cell.track),
         **_held(cell),
         **_ruled(cell),
+        batched=bool(cell.batches),
+        batch=np.array([*(station.batch for station in cell.stations), False, False]),
     )
 
 

@@ -82,6 +82,8 @@ class Execution:
         place = run.cell.positions[run.locations[index]]
         if place.processing_s is not None:
             self._began_s[index], self._mean_s[index] = move.drop_s, place.processing_s
+        for part in run.inside(place.station) if place.station in run.cell.batches else ():
+            self._began_s[part - 1], self._mean_s[part - 1] = move.drop_s, run.ready_s[part - 1] - move.drop_s
 
     def _wait(self) -> None:
         run = self.run

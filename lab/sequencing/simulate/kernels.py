@@ -69,6 +69,27 @@ def _interval(cell: Any, seed: Any, part: int) -> float:
     return _drawn(cell.arrivals_law, cell.spread, cell.interval_s[part], seed, number)
 
 
+@inner
+def _close(cell: Any, run: Any, station: int) -> None:
+    """`Run._close`."""
+    run.room[station] = cell.rooms[station]
+    for place in run.locations:
+        if cell.holds[place, 0] == station:
+            run.room[station] = 0
+
+
+@inner
+def _batch(cell: Any, run: Any, station: int, at_s: float, seed: Any) -> None:
+    """`Run._batch`."""
+    longest_s = 0.0
+    for part in range(len(run.locations)):
+        if cell.holds[run.locations[part], 0] == station:
+            longest_s = max(longest_s, _worked(cell, seed, part, run.locations[part], len(run.locations)))
+    for part in range(len(run.locations)):
+        if cell.holds[run.locations[part], 0] == station:
+            run.ready_s[part] = at_s + longest_s
+
+
 @lean
 def reset(cell: Any, run: Any, seed: Any) -> None:
     """`Run.__init__`, with the times of an episode's seed (uint64)."""
@@ -85,6 +106,10 @@ def reset(cell: Any, run: Any, seed: Any) -> None:
         run.room[cell.holds[place, 1]] -= 1
         if cell.first_option[place] < cell.first_option[place + 1]:
             unfinished += 1
+    if cell.batched:
+        for station in range(len(cell.rooms)):
+            if cell.batch[station]:
+                _close(cell, run, station)
     for i in range(len(cell.coming)):
         if cell.arrivals == CLOCK or (cell.arrivals == PICK and i == 0):
             came_s += _interval(cell, seed, cell.coming[i])
@@ -302,6 +327,11 @@ def take(cell: Any, run: Any, part: int, o: int, seed: Any) -> None:
     run.room[cell.holds[there, 0]] -= 1
     run.room[cell.holds[there, 1]] -= 1
     run.locations[part] = there
+    if cell.batched:
+        if cell.batch[cell.holds[here, 0]]:
+            _close(cell, run, cell.holds[here, 0])
+        if cell.batch[cell.holds[there, 0]] and cell.begins[there]:
+            _batch(cell, run, cell.holds[there, 0], drop_s, seed)
     if robot == SERVER:
         run.servers_s[server], run.worked[server] = end_s, cell.product[part]
     else:

@@ -61,6 +61,7 @@ class MergedCell:
         limits = {n: place.at_most_s for n, place in enumerate(cell.positions) if place.at_most_s is not None}
         self.latest = {n: round((at_most_s + SLACK_S) * TICKS_PER_S) for n, at_most_s in limits.items()}
         later |= set(self.latest)
+        later |= {n for n, place in enumerate(cell.positions) if cell.batches.intersection(place.holds)}
         timed = [n for n, seconds in enumerate(process) if seconds is None or seconds > 0 or n in later]
         self._past = [-1 - self.latest[n] if n in self.latest else 0 for n in timed]  # what is too late is too late
         self.slots = {place: slot for slot, place in enumerate(timed)}
@@ -69,6 +70,11 @@ class MergedCell:
         self.one_by_one = bool(self._intervals) and cell.arrivals is not None and cell.arrivals.after == "pick"
         self.starts = frozenset(cell.starts[part - 1] for part in cell.coming)
         self.ends = [place for place, at in enumerate(cell.positions) if not at.options]
+        # Of a machine with batches: a bit of the code, above all counts, that something was taken out and it is not empty.
+        self._closed = {station: 1 << _BITS * len(process) + n for n, station in enumerate(sorted(cell.batches))}
+        self._inside = {
+            station: [n for n, place in enumerate(cell.positions) if station in place.holds] for station in cell.batches
+        }
         self._ways: list[list[Way]] = [[] for _ in cell.positions]
         for way in ways_of(cell):
             self._ways[way.place].append(way)
@@ -97,7 +103,10 @@ class MergedCell:
         waits = [tuple([max(ready[part - 1], now + least) for part in who[place]]) for place, least in past]
         if self._intervals:
             waits.append(tuple(ready[part - 1] for part in sorted(n for place in self.starts for n in who[place])))
-        return MergedState(now, self._code_of(run.locations), run.robot, tuple(waits), tuple(map(tuple, who)))
+        counts = self._code_of(run.locations)
+        for station, closed in self._closed.items():
+            counts |= closed if run.occupied[station] > len(run.inside(station)) else 0
+        return MergedState(now, counts, run.robot, tuple(waits), tuple(map(tuple, who)))
 
     def code(self, counts: Sequence[int]) -> int:
         """The parts in each position as one number."""
@@ -131,7 +140,7 @@ class MergedCell:
         """The ways that may be taken now: one an option of a position, since its parts are alike."""
         known = self._known.get(state.counts)
         if known is None:
-            known = self._known[state.counts] = self._allowed(self.counted(state.counts))
+            known = self._known[state.counts] = self._allowed(state.counts)
         if self.latest:
             return {at: way for at, way in known.items() if self._in_time(state, way)}
         return known
@@ -168,6 +177,9 @@ class MergedCell:
             at = ready if process is None else now + process
             behind = bisect_right(there, at)
             waits[slot] = (*there[:behind], at, *there[behind:])
+        counts = state.counts + (1 << _BITS * option.to) - (1 << _BITS * place)
+        if self._closed:
+            counts = self._batches(counts, way, now, waits)
         coming = waits.pop() if self._intervals else None
         # A part that finished earlier is ready now: forgetting since when lets more states be equal.
         past = zip(waits, self._past, strict=True)
@@ -176,8 +188,21 @@ class MergedCell:
             pick = now - self._loaded[option.origin][option.target]
             rows.append(self._left_to_come(coming, self.fetched(state), pick) if starts else coming)
         named = None if who is None else self._moved(who, way, first, behind)
-        counts = state.counts + (1 << _BITS * option.to) - (1 << _BITS * place)
         return MergedState(now, counts, option.target, tuple(rows), named, way, part, state, first)
+
+    def _batches(self, counts: int, way: Way, now: int, waits: list[tuple[int, ...]]) -> int:
+        """The code of counts after a way, a machine that something was taken from closed; all parts in the machine that a part
+        was brought to begin together, and `waits` says so."""
+        counted = self.counted(counts)
+        for station, closed in self._closed.items():
+            inside = [n for n in self._inside[station] if counted[n]]
+            if way.place in self._inside[station]:
+                counts = counts | closed if inside else counts & ~closed
+            elif way.option.to in inside:
+                at = now + max(self.process[n] or 0 for n in inside)
+                for n in inside:
+                    waits[self.slots[n]] = (at,) * counted[n]
+        return counts
 
     def waited(self, state: MergedState, ahead: MergedState) -> int:
         """How long the robot waited in the move from a state to the one ahead of it."""
@@ -223,11 +248,13 @@ class MergedCell:
     def _code_of(self, locations: Sequence[int]) -> int:
         return self.code([locations.count(place) for place in range(len(self._ways))])
 
-    def _allowed(self, counted: list[int]) -> Choices:
-        cell, occupied = self.cell, [0] * len(self.cell.stations)
+    def _allowed(self, counts: int) -> Choices:
+        cell, counted, occupied = self.cell, self.counted(counts), [0] * len(self.cell.stations)
         for count, place in zip(counted, cell.positions, strict=True):
             for station in place.holds:
                 occupied[station] += count
+        for station, closed in self._closed.items():
+            occupied[station] = cell.capacities[station] if counts & closed else occupied[station]
         full = [taken >= most for taken, most in zip(occupied, cell.capacities, strict=True)]
         waiting = sum(counted[place] for place in self.starts)
         in_turn = cell.starts[cell.coming[-waiting] - 1] if waiting and self._intervals else None

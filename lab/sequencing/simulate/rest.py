@@ -125,7 +125,7 @@ def _stuck(cell: Cell, begins: Sequence[Begins], closed: set[int]) -> dict[int, 
     while True:
         taken = [station for part in stuck for station in cell.laid_out[begins[part - 1].position or 0].holds]
         for station in taken:
-            if taken.count(station) >= cell.capacities[station]:
+            if station in cell.batches or taken.count(station) >= cell.capacities[station]:
                 inside = next(part for part in stuck if station in cell.laid_out[begins[part - 1].position or 0].holds)
                 shut.setdefault(station, f"taken by {cell.part_name(inside)}")
         positions = open_ways(cell.laid_out, shut)

@@ -24,7 +24,10 @@ class Run:
     server, part or room: a robot that comes to a station before there is room waits there, and nobody ever waits for
     anything else. With one robot and no servers what is decided later also happens later (`Cell.serial`). A decision that
     would pick a part later than it may be picked is not allowed (see `Station.at_most_s`): what was left too long stays where
-    it is, and the run ends as a deadlock does. Nor is one allowed that a precedence lets wait (see `Precedence`).
+    it is, and the run ends as a deadlock does. The order also says what a batch is (see `Station.batch`): all that is brought
+    before one of it is taken out. It begins with the last that is brought: to begin later helps no order, to begin before is
+    another order. `ready_s` is as if nothing more were to come. Parts that stand in such a machine at first have begun.
+    No decision is allowed that a precedence lets wait (see `Precedence`).
     locations: the position of each part, part 1 first. occupied: room taken at each station. ready_s: when each part may be
     picked. finished_s: when each part was finished (None: not yet; 0: before the work began, or nothing is to be done with
     it). robots_at, robots_s: where each robot is after what it was given to do, and when. end_s: when all that was decided
@@ -43,6 +46,8 @@ class Run:
         self.occupied = [0] * len(cell.stations)
         for held in [station for place in self.locations for station in cell.positions[place].holds]:
             self.occupied[held] += 1
+        for held in cell.batches:
+            self._close(held)
         self.robots_at = [cell.index(robot.start) for robot in cell.robots]
         self.robots_s = [0.0] * len(cell.robots)
         self.track_s = [0.0] * len(cell.track)  # since when each stretch is free
@@ -151,6 +156,8 @@ class Run:
             process_s = self.times.processing_s(part, option.to)
             self.ready_s[part - 1] = drop_s + process_s
             self.processed_s += process_s
+        if there.station in cell.batches and there.processing_s is not None:
+            self._batch(there.station, drop_s)
         self._ends(part, there, drop_s)
         way = cell.names[start], cell.names[option.origin], cell.names[option.target]
         times_s = leave_s, reach_s, pick_s, drop_s, process_s
@@ -187,7 +194,8 @@ class Run:
 
     def _leave(self, part: int, option: Option, left_s: float) -> None:
         """A part goes from where it is to where a way leads: what it leaves is free from then on."""
-        here, there = self.cell.positions[self.locations[part - 1]], self.cell.positions[option.to]
+        cell = self.cell
+        here, there = cell.positions[self.locations[part - 1]], cell.positions[option.to]
         for station in here.holds:
             self.occupied[station] -= 1
             if station not in there.holds and station in self._rooms_s:
@@ -195,6 +203,23 @@ class Run:
         for station in there.holds:
             self.occupied[station] += 1
         self.locations[part - 1] = option.to
+        for station in cell.batches.intersection(here.holds):
+            self._close(station)
+
+    def inside(self, station: int) -> list[int]:
+        """The parts, from 1, that take room at a station."""
+        return [n for n, at in enumerate(self.locations, 1) if station in self.cell.positions[at].holds]
+
+    def _close(self, station: int) -> None:
+        """Nothing comes into a machine with batches any more until it is empty: all its room counts as taken."""
+        self.occupied[station] = self.cell.capacities[station] if self.inside(station) else 0
+
+    def _batch(self, station: int, at_s: float) -> None:
+        """All parts in a machine begin together."""
+        parts = self.inside(station)
+        longest_s = max(self.times.processing_s(part, self.locations[part - 1]) for part in parts)
+        for part in parts:
+            self.ready_s[part - 1] = at_s + longest_s
 
     def _ends(self, part: int, there: Position, at_s: float) -> None:
         """A part has come to a position at a time."""
@@ -234,6 +259,9 @@ class Run:
         taken = dict.fromkeys(repr(cell.names[s]) for option in place.options for s in option.needs if full[s])
         if not taken:
             return f"{name} at '{where}' has no choice {choice_of(decision, cell.parts) + 1}"
+        emptied = [s for option in place.options for s in option.needs if full[s] and s in cell.batches]
+        if any(len(self.inside(station)) < cell.capacities[station] for station in emptied):
+            return f"{name} at '{where}' cannot move on: the batch in {' and '.join(taken)} has begun"
         return f"{name} at '{where}' cannot move on: {' and '.join(taken)} full"
 
     def _burns(self, part: int) -> str:
@@ -378,3 +406,16 @@ def take_over(run: Run, state: Run) -> None:
     run.robots_at, run.robots_s, run.fetched = state.robots_at.copy(), state.robots_s.copy(), state.fetched
     run.end_s, run.waited_s, run.processed_s = state.end_s, state.waited_s, state.processed_s
     run.take_times(state)
+
+
+def closes(run: Run, station: int, following: Sequence[int]) -> bool:
+    """Whether nothing more comes into a machine with batches before one of its parts is taken out, by the decisions to come."""
+    ahead = branch(run)
+    for decision in following:
+        option = ahead.option(decision)
+        if option is None or option.origin == station:
+            return True
+        if option.target == station:
+            return False
+        ahead.move(decision)
+    return True
