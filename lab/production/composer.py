@@ -33,6 +33,7 @@ from lab.sim.world import World
 from lab.skills.prepared_scene import Prepared
 from lab.teaching.events import Event, MachineDone, MoveMade, PlanMade, Tell, TroubleMet, unheard
 
+PUT_RIGHT = "; put it right, then go on"  # what a person is asked
 NOBODY: Mapping[int, int] = MappingProxyType({})
 
 
@@ -58,18 +59,32 @@ class Production:
     def carry_out(self, sequence: Sequence[int]) -> str | None:
         """Carry the whole sequence out; None, or why not all parts were made: which, where and why.
 
-        Where the run cannot go on by itself and somebody attends it, it waits until they have put things right.
+        Where the run cannot go on by itself, or ends without a part that a person may help on, and somebody attends it, it
+        waits until they have put things right.
         """
         self.sequence = [*sequence]
         while True:
             try:
-                if not self._next():
-                    return self.recovery.failure()
+                if self._next():
+                    continue
+                why, asked = self.recovery.failure(), self.recovery.to_put_right()
             except RunStopped as stopped:
-                if not self.floor.protected(f"{stopped}; put it right, then go on"):
-                    return str(stopped)
-                self.recovery.forget()
-                self.replan("a person has put things right")
+                why = asked = str(stopped)
+            if not self._put_right(asked):
+                return why
+
+    def _put_right(self, asked: str) -> bool:
+        """Wait until a person has put right what is asked for; whether anybody has, and the run goes on."""
+        while asked and self.floor.protected(f"{asked}{PUT_RIGHT}"):
+            self.recovery.forget()
+            try:
+                found = self.recovery.find_again(attended=True)
+                if not found:
+                    self.replan("a person has put things right")
+                return found or bool(self.sequence)
+            except RunStopped as stopped:
+                asked = str(stopped)
+        return False
 
     def _next(self) -> bool:
         """The next move, or the answer to what keeps it from being made; False when nothing is left. Raises RunStopped."""
@@ -97,7 +112,8 @@ class Production:
         work.begin_batches()
         first = self.sequence[0] if self.sequence and self.floor.bench.held is not None else None
         ready_s = {part: work.left_s(part) for part in range(1, self.cell.parts + 1) if work.work_on(part) is not None}
-        ready_s |= dict.fromkeys([*back, *work.taken_out()], 0.0)
+        taken_up = {*back, *work.taken_out()} - {*ready_s, *work.to_put_back}
+        ready_s |= dict.fromkeys(sorted(taken_up), 0.0)
         mishaps = Mishaps(frozenset(recovery.lost), tuple(recovery.out), ready_s, back)
         try:
             found = plan_again(work.plan, mishaps, first)

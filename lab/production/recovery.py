@@ -4,13 +4,15 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 from lab.errors import LabError
 from lab.production.controls import StopKind
 from lab.production.perception import BELOW_M, Deviation, perceive, seen_at
-from lab.production.standing import too_near
+from lab.production.standing import DELIVERED_M, too_near
 from lab.production.transfers import Transfers
 from lab.production.trouble import RunStopped, Trouble
+from lab.sim.parts.kinds import Spot
 from lab.sim.scene.scene import pallet_of
 from lab.skills.skill import UPRIGHT
 from lab.teaching.events import MachineFailed, MoveRetried, PartLost, RunHeld, RunWentOn, TroubleMet
@@ -30,6 +32,28 @@ TO_DO = {  # by a person, with a part that is left
 }
 
 
+@dataclass(frozen=True)
+class GivenUp:
+    """How a part was when it was given up: its position on its routes, and the spot on which it was believed to stand.
+
+    undone: a machine had begun it and was not done. astray: it could not be taken up, but may be later. finished_s: when it
+    had reached the end of its route [s]; None: it had not.
+    """
+
+    position: int
+    spot: Spot | None
+    undone: bool
+    astray: bool
+    finished_s: float | None
+
+
+class Strange(NamedTuple):
+    """What belongs to nobody: the station that it closes, "" for none, and the spot on which nothing else fits."""
+
+    closes: str = ""
+    spot: Spot | None = None
+
+
 @dataclass
 class Recovery:
     """The answers to trouble, for parts that are being brought on.
@@ -45,27 +69,52 @@ class Recovery:
     lost: dict[int, str] = field(default_factory=dict)
     out: dict[str, str] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
-    _strange: dict[str, str] = field(default_factory=dict)  # what belongs to nobody, and the station that it closes
-    _missing: dict[int, int] = field(
-        default_factory=dict
-    )  # parts that cannot be taken up, and how far on their routes they are
+    _strange: dict[str, Strange] = field(default_factory=dict)  # what belongs to nobody, by its name
+    _given_up: dict[int, GivenUp] = field(default_factory=dict)  # of `lost`, those of which a position is known
     _tries: Counter[tuple[str, str, str]] = field(default_factory=Counter)
     _first: dict[str, str] = field(default_factory=dict)
     _looked_s: float = -LOOK_S
     _right_s: float = -LOOK_S  # when all was seen last to be where it should be
 
-    def find_again(self) -> bool:
-        """Take parts up again that were given up because they could not be taken up, and now can; whether there are any."""
-        found = {part: place for part, place in self._missing.items() if self._can_be_taken_up(part)}
-        for part in found:
-            del self._missing[part], self.lost[part]
-            self.work.left_lying.discard(self.work.name(part))
-            name = self.work.name(part)
-            self.work.spot_of[name] = seen_at(self.work.floor, name)
-            self._tell(Trouble("it can be taken up again", name), "goes on with it")
+    def find_again(self, attended: bool = False) -> bool:
+        """Go on with parts that were given up and can now be brought on; whether there are any.
+
+        Unattended, these are parts that could not be taken up. Attended, a person has put things right: then also those that
+        stand where they were left, as in a machine that was out of order. What a machine had not finished, it begins anew.
+        """
+        found = {part: one for part, one in self._given_up.items() if attended or one.astray}
+        found = {part: one for part, one in found.items() if self._is_back(part, one)}
+        for part, one in found.items():
+            self._take_back(part, one)
         if found:
-            self.replan("a part can be taken up again", found)
+            self.replan("a part can be taken up again", {part: one.position for part, one in found.items()})
         return bool(found)
+
+    def _take_back(self, part: int, left: GivenUp) -> None:
+        """Count on a part again that had been given up."""
+        work, name = self.work, self.work.name(part)
+        del self._given_up[part], self.lost[part]
+        work.left_lying.discard(name)
+        stands = left.spot is not None and self._stands(part, left.spot)
+        work.spot_of[name] = left.spot if left.spot is not None and stands else seen_at(work.floor, name)
+        if left.finished_s is not None:
+            work.finished[part] = left.finished_s
+        if left.undone or (left.finished_s is not None and not stands):
+            work.begin_again(part, stands)
+        self._tell(Trouble("it can be taken up again", name), "goes on with it")
+
+    def _is_back(self, part: int, left: GivenUp) -> bool:
+        """Whether a part that was given up can be brought on: it stands where it was left, or can be taken up elsewhere."""
+        place = self.work.cell.laid_out[left.position].station
+        if left.undone and self.work.cell.names[place] in self.out:
+            return False
+        return (left.spot is not None and self._stands(part, left.spot)) or self._can_be_taken_up(part)
+
+    def _stands(self, part: int, spot: Spot) -> bool:
+        """Whether a part is seen to stand upright on a spot."""
+        floor, name = self.work.floor, self.work.name(part)
+        upright = not floor.world.dark and floor.bench.upright(name) >= UPRIGHT
+        return upright and floor.bench.stands(name, spot, DELIVERED_M)
 
     def _can_be_taken_up(self, part: int) -> bool:
         floor, name = self.work.floor, self.work.name(part)
@@ -76,6 +125,9 @@ class Recovery:
 
     def forget(self) -> None:
         """A person has put things right: what was out of use is used again, and tries are counted anew."""
+        bench = self.work.floor.bench
+        if bench.held is not None and not bench.holds(bench.held):  # it was taken out of the gripper
+            bench.held = None
         self.out.clear()
         self._tries.clear()
         self._first.clear()
@@ -84,6 +136,11 @@ class Recovery:
         """Why not all parts were made; None when they were."""
         why = self.work.spoilt | self.lost
         return "; ".join(dict.fromkeys(why[part] for part in sorted(why))) or None
+
+    def to_put_right(self) -> str:
+        """Why parts were given up that a person may yet help on; "" where there are none."""
+        why = [self.lost[part] for part in sorted(self._given_up)]
+        return "; ".join(dict.fromkeys(why))
 
     def look(self) -> None:
         """See, once a second, whether all is where it should be. Raises Trouble."""
@@ -186,7 +243,9 @@ class Recovery:
         """Believe what was seen of one body."""
         work, part = self.work, self._part_of(seen.name)
         if seen.name in self._strange:  # it was there, and is not any more
-            self.out.pop(self._strange.pop(seen.name), None)
+            closes, spot = self._strange.pop(seen.name)
+            self.out.pop(closes, None)
+            self.work.taken -= {spot}
             work.spot_of.pop(seen.name, None)
         elif seen.sort == "strange part":
             self._avoid(seen)
@@ -200,18 +259,20 @@ class Recovery:
         station is closed."""
         assert seen.at is not None
         floor = self.work.floor
-        self._strange[seen.name] = ""
+        self._strange[seen.name] = Strange()
         self.work.spot_of[seen.name] = seen.at
         if seen.station:
             spots = floor.scene.places.spots(floor.skillset.task.station(seen.station))
             near = min(spots, key=lambda spot: (spot.x - seen.at.x) ** 2 + (spot.y - seen.at.y) ** 2)  # type: ignore[union-attr]
             self.work.taken.add(near)
+            self._strange[seen.name] = Strange("", near)
             if len(spots) == 1 and self._clear_away(seen):
                 self.work.taken.discard(near)
+                self._strange[seen.name] = Strange()
                 self._tell_seen(seen, "sets it aside")
                 return
             if len(spots) == 1:
-                self._strange[seen.name] = seen.station
+                self._strange[seen.name] = Strange(seen.station, near)
                 self.out[seen.station] = seen.words
         self._tell_seen(seen, "brings nothing there")
 
@@ -228,13 +289,11 @@ class Recovery:
     def _leave(self, part: int, seen: Deviation) -> None:
         """A part that cannot be taken up is left; where it lies in a machine, that is closed."""
         work = self.work.work_on(part)
-        place = self.work.plan.locations[part - 1]
-        if (work is None or work.done(self.work.floor.now_s)) and place < len(self.work.cell.laid_out):
-            self._missing[part] = place
+        left = self._as_left(part, astray=True)
         if work is not None and seen.sort == "part fallen":
             self.out[work.station] = f"{seen.name} lies in '{work.station}'"
         self.work.floor.take_out(self.work.name(part))
-        self._lose(part, f"{seen.words}: {TO_DO[seen.sort]}")
+        self._lose(part, f"{seen.words}: {TO_DO[seen.sort]}", left)
         self._tell_seen(seen, "leaves it")
 
     def _follow(self, part: int, seen: Deviation) -> None:
@@ -288,8 +347,19 @@ class Recovery:
                 reasons = ", ".join(f"'{station}': {what}" for station, what in self.out.items())
                 self._lose(part, f"{why}: {reasons}" if reasons else why)
 
-    def _lose(self, part: int, why: str) -> None:
+    def _as_left(self, part: int, astray: bool = False) -> GivenUp | None:
+        """How a part is that is now given up; None where nobody could go on with it."""
+        work, position = self.work.work_on(part), self.work.plan.locations[part - 1]
+        if position >= len(self.work.cell.laid_out):
+            return None
+        undone = part in self.work.to_put_back or (work is not None and not work.done(self.work.floor.now_s))
+        spot, finished_s = self.work.spot_of.get(self.work.name(part)), self.work.finished.get(part)
+        return GivenUp(position, spot, undone, astray, finished_s)
+
+    def _lose(self, part: int, why: str, left: GivenUp | None = None) -> None:
         self.lost[part] = why
+        if (left := left or self._as_left(part)) is not None:
+            self._given_up[part] = left
         self.work.left_lying.add(self.work.name(part))
         self.work.spot_of.pop(self.work.name(part), None)
         self.work.finished.pop(part, None)

@@ -189,6 +189,17 @@ class Transfers:
         self._under_way = _UnderWay((body, Carried(station, station, kind)), station, now_s, smooth=False)
         return self.set_aside()
 
+    def begin_again(self, part: int, stands: bool) -> None:
+        """Let the machine begin a part anew that it had not finished; stands: where it was brought, else it is put back first."""
+        name = self.name(part)
+        way, spot, process_s = self._last[name]
+        self.floor.take_out(name)
+        if stands:
+            self._start_machine(name, way.target, process_s)
+        else:
+            self.spot_of[name] = spot
+            self.to_put_back.append(part)
+
     def _start_machine(self, name: str, station: str, process_s: float) -> None:
         """Let the machine begin that a part has been brought to."""
         floor = self.floor
@@ -373,6 +384,7 @@ class Transfers:
         bench, skillset, body = self.floor.bench, self.floor.skillset, self.floor.scene.body_of(name, way.kind)
         if moved_unseen(self.floor, name, self.spot_of.get(name)):
             raise Trouble(f"{name} is not where it was, and the camera sees nothing", name, way.origin)
+        self.look()  # before the arm goes down to where it is believed
         near = station_near(bench, body, way, skillset)
         if near != way.origin:
             self.over_to(near)

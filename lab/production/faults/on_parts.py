@@ -82,10 +82,10 @@ class PartGone(Fault):
         how = ("standing", "in machine") if self.fields.when is None else (self.fields.when,)
         for name, where in self.parts(floor, *how):
             if is_robot_away(floor, [name]):
+                undone = is_undone(floor, name)
                 stand(floor, [name], (*out_of_sight(self.number), GROUND_M), 0.0)
-                return Happened(
-                    self.what, f"{name} was taken away from '{where.station}'", floor.now_s, name, where.station
-                )
+                words = f"{name} was taken away from '{where.station}'"
+                return Happened(self.what, words, floor.now_s, name, where.station, undone=undone)
         return None
 
 

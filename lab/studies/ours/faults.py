@@ -9,12 +9,15 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
+from lab.production.composer import PUT_RIGHT
 from lab.production.faults import FAULTS
+from lab.production.faults.truth import explained, pieces
 from lab.statistics import share
 from lab.studies.findings import Findings, Row, row
+from lab.studies.ours.attendant import COMES_AFTER_S, Attendant
 from lab.studies.runner import Job, record_of
 from lab.tasks.task_file import load
-from lab.view.canvas import BLUE, INK, ORANGE, RED, picture_bytes
+from lab.view.canvas import BLUE, GREEN, INK, ORANGE, RED, picture_bytes
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -33,13 +36,16 @@ TASKS: dict[str, str | None] = {  # and how many parts, None: as many as its fil
     "sorting": None,
     "fms-arm": None,
 }
-CAME = {"delivered": BLUE, "stopped": ORANGE, "wrong": RED}
+CAME = {"delivered": BLUE, "attended": GREEN, "stopped": ORANGE, "wrong": RED}
 LONGEST = 20.0  # times the predicted time: then a run counts as one that hangs
 ABOUT = (
     "{runs} runs of {tasks}. Each has one or two faults, drawn from its seed: which, on what, and when. They are carried out "
-    "in physics, and nobody tells the composer. Delivered: all parts stand at the end of their routes. Stopped: some do not, "
-    "and each reason that the run gives is about a fault that had struck, and can be true of one of its kind. Wrong: a reason "
-    "that no fault explains, a part that is missing without a word, or a run that lasts {longest:g} times as long as planned."
+    "in physics, and nobody tells the composer. Delivered: all parts stand at the end of their routes, and nobody helped. A run "
+    "that stops is carried out once more with a scripted person, who comes {comes:g} s after each stop, does what the run asks "
+    "for (stands a part up, brings it back, repairs a machine, takes away what is in the way) and lets it go on. Attended: all "
+    "parts were delivered then. Stopped: some were not, and each reason that the run gives is about a fault that had struck, "
+    "and can be true of one of its kind. Wrong: a reason or a question that no fault explains, a part that is missing without a "
+    "word, anything that the audit finds, or a run that lasts {longest:g} times as long as planned."
 )
 COLUMNS = (
     "A run counts under each kind of fault that struck in it. noticed_percent: of the faults of a kind, those that something "
@@ -58,7 +64,10 @@ class Setting:
 
 @dataclass(frozen=True)
 class Ran:
-    """What came of a run: delivered, stopped or wrong, and why; rows: its faults as `verdict` has them. Times in seconds."""
+    """What came of a run: one of CAME, and why; rows: its faults as `verdict` has them. Times in seconds.
+
+    asked: what it asked of the person who attended it, and did: what they did; both empty where nobody attended it.
+    """
 
     came: str
     why: str
@@ -71,6 +80,8 @@ class Ran:
     makespan_s: float
     planned_s: float
     wall_s: float
+    asked: list[str] = field(default_factory=list)
+    did: list[str] = field(default_factory=list)
 
 
 def faults(job: Job, reading: Mapping[str, Any]) -> Findings:
@@ -83,7 +94,7 @@ def faults(job: Job, reading: Mapping[str, Any]) -> Findings:
     rows += rows_of("fault", {kind: [r for r in found.values() if kind in struck(r)] for kind in kinds})
     rows += rows_of("", {"all": [*found.values()]})
     wrong = [f"{s.task}, seed {s.seed}: {r.why}" for s, r in found.items() if r.came == "wrong"]
-    words = ABOUT.format(runs=len(found), tasks=", ".join(names), longest=LONGEST)
+    words = ABOUT.format(runs=len(found), tasks=", ".join(names), longest=LONGEST, comes=COMES_AFTER_S)
     figures = {"What came of the runs, by task": picture(rows, "task"), "and by fault": picture(rows, "fault")}
     return Findings(rows, in_short([*found.values()]), figures, (words, COLUMNS, *(f"Wrong: {one}." for one in wrong)))
 
@@ -155,7 +166,18 @@ def _ready(name: str) -> _Ready:
 
 
 def carried_out(setting: Setting) -> Ran:
-    """One run with its drawn faults."""
+    """One run with its drawn faults: by itself, and where it stops, once more with a person."""
+    alone = _carried_out(setting, None)
+    if alone.came != "stopped":
+        return alone
+    person = Attendant()
+    ran = _carried_out(setting, person)
+    came = "attended" if ran.came == "delivered" else ran.came
+    return replace(ran, came=came, asked=person.asked, did=person.did, wall_s=alone.wall_s + ran.wall_s)
+
+
+def _carried_out(setting: Setting, person: Attendant | None) -> Ran:
+    """One run, attended by a person, or None."""
     from lab.production.composer import carry_out
     from lab.production.conditions import Conditions
     from lab.production.faults.draw import draw
@@ -168,17 +190,26 @@ def carried_out(setting: Setting) -> Ran:
     ran = Ran("wrong", "", "", [], [], [one.what for one in drawn], 0, len(prepared.order), 0.0, planned_s, 0.0)
     try:
         conditions = Conditions(faults=drawn, viewer=_Clock(LONGEST * planned_s))
+        if person is not None:
+            conditions = replace(conditions, controls=person, on_floor=person.on_floor)
         relearner = Relearner(prepared, ready.taught, ready.teacher)
         outcome, _ = carry_out(prepared, ready.taught.cell, ready.sequence, conditions, relearner=relearner)
     except Exception as error:  # whatever a run comes to that is no way to end one
         return replace(ran, why=f"{type(error).__name__}: {error}", wall_s=time.perf_counter() - began)
     cell = ready.taught.cell
     found = outcome.verdict([cell.part_name(part) for part in range(1, cell.parts + 1)])
-    vain = not outcome.happened and outcome.failure is not None  # then no reason can be true
+    wrong = [found.why] if found.came == "wrong" else []
+    if not outcome.happened and outcome.failure is not None:  # then no reason can be true
+        wrong.append("it stopped, and no fault had struck")
+    if outcome.audit is not None and outcome.audit.findings:
+        wrong.append(str(outcome.audit.failure))
+    called = [why.removesuffix(PUT_RIGHT) for why in (person.asked if person else ()) if why.endswith(PUT_RIGHT)]
+    asked = [piece for why in called for piece in pieces(why)]
+    wrong += [f"no fault explains what it asked: {one}" for one in asked if not explained(one, outcome.happened)]
     return replace(
         ran,
-        came="wrong" if vain else found.came,
-        why="it stopped, and no fault had struck" if vain else found.why,
+        came="wrong" if wrong else found.came,
+        why="; ".join(wrong),
         failure=outcome.failure or "",
         rows=[*found.rows],
         unexplained=[*found.unexplained],
@@ -214,6 +245,7 @@ def in_short(runs: Sequence[Ran]) -> Row:
     """How many runs came to what."""
     came = Counter(ran.came for ran in runs)
     says: Row = {"runs": len(runs), **{name: came[name] for name in CAME}}
+    says["delivered or attended percent"] = round(100 * (came["delivered"] + came["attended"]) / max(1, len(runs)), 2)
     says["delivered or stopped percent"] = round(100 * (len(runs) - came["wrong"]) / max(1, len(runs)), 2)
     says["faults that struck"] = sum(len(ran.rows) for ran in runs)
     says["runs without one"] = sum(not ran.rows for ran in runs)
