@@ -15,6 +15,7 @@ from mutated_commands import PART as MUTATED_COMMANDS
 from mutations import PART as MUTATIONS
 from page_attacks import PART as REQUESTS
 from parts import Part
+from proofs import PART as PROOFS
 from resources import PART as RESOURCES
 from rich.console import Console
 from rich.progress import Progress
@@ -30,6 +31,7 @@ PARTS: dict[str, Part] = {
     "resources": RESOURCES,
     "physics": PHYSICS,
     "audits": AUDITS,
+    "proofs": PROOFS,
 }
 
 

@@ -20,7 +20,7 @@ from lab.tasks.task_file import find
 
 TASKS = (
     "toast", "toast-panda", "toast-iiwa", "toast-xarm6", "two-toasters", "breakfast", "sorting", "fms-arm", "palletise",
-    "furnace",
+    "furnace", "kit",
 )  # fmt: skip
 SHIPPED = 4  # every so many attempts
 PARTS = 2  # of a kind, at most

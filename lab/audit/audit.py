@@ -40,14 +40,16 @@ class Audit:
         return f"audit: {about}{f' (and {more} more)' if more else ''}"
 
     def to_json(self) -> dict[str, Any]:
-        """`claimed` and `delivered`: names. `struck`: the faults, each what, part, station. `findings`: rule, part, station,
-        at_s, words. `stays`: part, station, from when to when [s] it stood there.
+        """`claimed` and `delivered`: names. `struck`: the faults, each what, part, station. `plan_kept`: whether the run had a
+        plan that was not changed. `findings`: rule, part, station, at_s, words. `stays`: part, station, from when to when [s] it
+        stood there.
         """
         stays = [{"part": seen.name} | asdict(stay) for seen in self.evidence.parts for stay in seen.stays]
         return {
             "claimed": list(self.claimed),
             "delivered": list(self.delivered),
             "struck": [asdict(one) for one in self.evidence.struck],
+            "plan_kept": bool(self.evidence.planned),
             "findings": [asdict(one) for one in self.findings],
             "stays": [{k: round(v, 3) if isinstance(v, float) else v for k, v in row.items()} for row in stays],
         }
@@ -67,24 +69,29 @@ def kept_evidence(folder: Path, task: Task, order: Order) -> Evidence:
     try:
         run = json_of(read_limited(folder / "run.json"))
         claimed = [str(name) for name in run["audit"]["claimed"]]
+        kept = run["audit"].get("plan_kept") is True
         struck = [Struck(str(one["what"]), str(one["part"]), str(one["station"])) for one in run["audit"]["struck"]]
-        rows = measured_rows(read_limited(folder / "schedule.csv").decode())
+        rows = schedule_rows(read_limited(folder / "schedule.csv").decode())
     except OSError as error:
         raise BadInput(f"{where}: '{error.filename}' cannot be read: {error.strerror or error}") from None
     except (ValueError, KeyError, TypeError) as error:
         why = f"no {error}" if isinstance(error, KeyError) else " ".join(str(error).split())[:120]
         raise BadInput(f"{where}: its run.json or schedule.csv is damaged, or of an older lab: {why}") from None
-    return Evidence(task, order, read_tracks(folder / FILE), rows, claimed, struck)
+    tracks = read_tracks(folder / FILE)
+    return Evidence(task, order, tracks, rows["measured"], claimed, struck, rows["planned"] if kept else ())
 
 
-def measured_rows(text: str) -> list[dict[str, Any]]:
-    """The measured rows of a `schedule.csv`, their times as numbers [s]. Raises ValueError and KeyError for another file."""
+def schedule_rows(text: str) -> dict[str, list[dict[str, Any]]]:
+    """The rows of a `schedule.csv`, "planned" and "measured", their times as numbers [s]. Raises ValueError and KeyError for
+    another file.
+    """
     from csv import DictReader
     from io import StringIO
 
-    rows: list[dict[str, Any]] = [row for row in DictReader(StringIO(text)) if row["when"] == "measured"]
-    for row in rows:
-        row |= {"start_s": float(row["start_s"]), "end_s": float(row["end_s"])}
-        if not {"part", "operation", "station", "target"} <= row.keys():
+    rows: dict[str, list[dict[str, Any]]] = {"planned": [], "measured": []}
+    for row in DictReader(StringIO(text)):
+        if not {"part", "operation", "station", "target", "robot"} <= row.keys():
             raise ValueError("schedule.csv lacks a column")
+        own: dict[str, Any] = row | {"start_s": float(row["start_s"]), "end_s": float(row["end_s"])}
+        rows[row["when"]].append(own)
     return rows

@@ -2,12 +2,15 @@
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
+from math import atan2, cos, sin
 from typing import Any
 
 from lab.audit.stays import PartSeen, parts_seen
-from lab.audit.tracks import BodyTracks
+from lab.audit.tracks import Array, BodyTracks
 from lab.tasks.task import Order, Task
 from lab.tasks.task_fields import Stage
+
+SLACK_S = 0.25  # two frames, and what rounding does
 
 
 @dataclass(frozen=True)
@@ -35,6 +38,7 @@ class Evidence:
     """What a run left: the task and its order, the tracks of its bodies, the measured rows of its schedule, what was claimed.
 
     rows: as `schedule.csv` has them. claimed: the names of the parts that are said to be delivered. struck: the faults.
+    planned: the rows of the plan that the run had; none where it was changed on the way, or there was none.
     """
 
     task: Task
@@ -43,6 +47,7 @@ class Evidence:
     rows: Sequence[dict[str, Any]]
     claimed: Collection[str]
     struck: Sequence[Struck] = ()
+    planned: Sequence[dict[str, Any]] = ()
     parts: list[PartSeen] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -72,3 +77,15 @@ class Evidence:
     def at_most_s(self, stage: Stage) -> float | None:
         """How long it may stay there after that by the task [s]; None: for ever."""
         return stage.at_most_s if stage.at_most_s is not None else self.task.station(stage.station).at_most_s
+
+    def off_pose(self, station: str, place: Array) -> tuple[float, float]:
+        """A point in the frame of a station's body [m], off the station's pose along and across, wherever the body is by now."""
+        x, y, _, *turn = self.tracks.poses[0, self.tracks.number(station)]
+        at_x, at_y, yaw = self.task.station(station).pose
+        along, across = turned(place[0], place[1], 2.0 * atan2(turn[2], turn[3]))
+        return turned(along + x - at_x, across + y - at_y, -yaw)
+
+
+def turned(x: float, y: float, yaw: float) -> tuple[float, float]:
+    """A vector, turned about the vertical."""
+    return cos(yaw) * x - sin(yaw) * y, sin(yaw) * x + cos(yaw) * y

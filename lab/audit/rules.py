@@ -1,28 +1,22 @@
 """What an audit asks of a run, rule by rule; each finding names the part, the station and the time."""
 
 from collections.abc import Iterator, Sequence
-from itertools import combinations
 from math import atan2, cos, hypot, sin
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from lab.audit.evidence import Evidence, Finding
-from lab.audit.stays import HIGH_M, LOW_M, Mask, PartSeen, Stay, floor_of, pallet_of
-from lab.audit.tracks import Array
-from lab.tasks.task_fields import Stage
+from lab.audit.evidence import SLACK_S, Evidence, Finding, turned
+from lab.audit.motion import TAKES_S, in_hand, in_one_another, lasting, one_gripper, stood
+from lab.audit.schedule import one_story, told
+from lab.audit.stays import HIGH_M, LOW_M, PartSeen, Stay, floor_of, pallet_of
+from lab.audit.tracks import Array, Numbers
+from lab.tasks.task_fields import Process, Stage
 
-SLACK_S = 0.25  # two frames, and what rounding does
 UPRIGHT = 0.985  # cosine of the tilt, ten degrees, that a part may have at the end of its route
 ON_SPOT_M = 0.02  # a part this near to a spot that the file names stands on it
-TAKES_S = 4.0  # the gripper may be so long at a part before it stands free, and before it leaves
-BETWEEN_M = 0.002  # by so much two parts may stand in one another: what is recorded is not finer
-LEANS = 0.97  # cosine of the tilt, fourteen degrees, from which on a part does not stand in a station on its way
-NEAR_SPOT_M = 0.03  # a part this near to a station's only spot stands on it on its way
-HELD_M = 0.02  # beyond half its diagonal the middle of a part may be from the robot that carries it
-FASTER = 1.5  # times the robot's speed no part is carried
-RESTS_M = 0.001  # a head that moves less from one frame to the next rests
-SEVERAL_FRAMES = 3  # in a row, for what a single frame may show by chance
+RESTS_M = 0.001  # a head or a hand that moves less from one frame to the next rests
+AT_POSE_M, AT_POSE_RAD = 0.002, 0.02  # so far from its place in the task a body may stand
 
 
 def findings(evidence: Evidence) -> list[Finding]:
@@ -33,13 +27,14 @@ def findings(evidence: Evidence) -> list[Finding]:
             found += _route(evidence, seen)
             found += _end(evidence, seen)
         if evidence.undisturbed(seen.name):
-            found += _stood(evidence, seen)
-            found += _schedule(evidence, seen)
-            found += _in_hand(evidence, seen)
+            found += stood(evidence, seen)
+            found += told(evidence, seen)
+            found += in_hand(evidence, seen)
     found += _stations(evidence)
     found += _capacities(evidence)
-    found += _gripper(evidence)
-    found += _in_one_another(evidence)
+    found += one_gripper(evidence)
+    found += in_one_another(evidence)
+    found += one_story(evidence)
     return sorted(found, key=lambda one: one.at_s)
 
 
@@ -73,6 +68,7 @@ def _along(evidence: Evidence, seen: PartSeen, route: Sequence[Stage]) -> Iterat
         if work_s is not None:
             yield from _times(evidence, seen, stage, stay, work_s)
             yield from _covered(evidence, seen, stage.station, stay)
+        yield from _served(evidence, seen, stage, stay)
     if stays[place:] and evidence.undisturbed(seen.name) and not _repeated(stays[place:], before, route[-1]):
         words = f"went on to '{stays[place].station}' after the end of its route, '{before}'"
         yield Finding("route", seen.name, stays[place].station, stays[place].start_s, words)
@@ -113,21 +109,55 @@ def _covered(evidence: Evidence, seen: PartSeen, where: str, stay: Stay) -> Iter
     head, body = tracks.number(f"{where} head"), tracks.number(seen.name)
     if name is None or head < 0:
         return
-    process = evidence.task.processes[name]
-    during = np.flatnonzero((tracks.times_s >= stay.start_s) & (tracks.times_s <= stay.end_s))
-    at = tracks.inside(body, tracks.poses[:, head, :3])[during][:, [2, 0]]  # up and across, off the part
-    steps = np.diff(at, axis=0)
-    rests_s = np.where(np.linalg.norm(steps, axis=1) < RESTS_M, np.diff(tracks.times_s[during]), 0.0)
-    low, cell = tracks.low[body, [2, 0]], (tracks.high[body] - tracks.low[body])[[2, 0]] / process.grid
-    numbers = np.floor((at[1:] - low) / cell).astype(int)
-    missed = [
-        one
-        for one in np.ndindex(*process.grid)
-        if rests_s[(numbers == one).all(axis=1)].sum() < process.dwell_s - SLACK_S
-    ]
+    process, during = evidence.task.processes[name], _frames(evidence, stay)
+    at = tracks.inside(body, tracks.poses[:, head, :3])[:, [2, 0]]  # up and across, off the part
+    low, size = tracks.low[body, [2, 0]], (tracks.high[body] - tracks.low[body])[[2, 0]]
+    grid = _Grid(process, low, size, at[during], during)
+    yield from _missed(evidence, seen, "process", where, grid)
+
+
+def _served(evidence: Evidence, seen: PartSeen, stage: Stage, stay: Stay) -> Iterator[Finding]:
+    """The robot's hanging hand rested over each cell of a service's area, for its time, while the part was there."""
+    task, tracks, where = evidence.task, evidence.tracks, stage.station
+    process = None if stage.service is None else task.processes[stage.service]
+    if process is None or process.area_m is None or task.robot.tool == "level" or not tracks.fingers:
+        return
+    during = _frames(evidence, stay)
+    hand = np.mean([tracks.middle(finger) for finger in tracks.fingers], axis=0)
+    off = tracks.inside(tracks.number(where), hand)[during]
+    across, along = np.array([evidence.off_pose(where, place) for place in off]).T
+    size = np.array([process.area_m[1], process.area_m[0]])
+    middle = np.array([-process.off_m[1], process.off_m[0]])  # the first row is the farthest
+    grid = _Grid(process, middle - size / 2, size, np.stack([-along, across], axis=1), during)
+    yield from _missed(evidence, seen, "service", where, grid)
+
+
+class _Grid(NamedTuple):
+    """An area from `low`, `size` large (2,) [m], in the cells of a process, and where a point was in it (n, 2) at frames (n,)."""
+
+    process: Process
+    low: Array
+    size: Array
+    at: Array
+    frames: Numbers
+
+
+def _missed(evidence: Evidence, seen: PartSeen, rule: str, where: str, grid: _Grid) -> Iterator[Finding]:
+    """The cells over which the point did not rest for the process's time."""
+    shape, times_s = grid.process.grid, evidence.tracks.times_s[grid.frames]
+    rests_s = np.where(np.linalg.norm(np.diff(grid.at, axis=0), axis=1) < RESTS_M, np.diff(times_s), 0.0)
+    numbers = np.floor((grid.at[1:] - grid.low) / (grid.size / shape)).astype(int)
+    cells = list(np.ndindex(*shape))
+    missed = [one for one in cells if rests_s[(numbers == one).all(axis=1)].sum() < grid.process.dwell_s - SLACK_S]
     if missed:
-        words = f"{len(missed)} of {process.grid[0] * process.grid[1]} cells were not covered in '{where}'"
-        yield Finding("process", seen.name, where, stay.end_s, words)
+        words = f"{len(missed)} of {len(cells)} cells were not covered in '{where}'"
+        yield Finding(rule, seen.name, where, float(times_s[-1]), words)
+
+
+def _frames(evidence: Evidence, stay: Stay) -> Numbers:
+    """The numbers of the frames of a stay (n,)."""
+    times_s = evidence.tracks.times_s
+    return np.flatnonzero((times_s >= stay.start_s) & (times_s <= stay.end_s))
 
 
 def _overlap(row: dict[str, Any], stay: Stay) -> float:
@@ -160,7 +190,7 @@ def _end(evidence: Evidence, seen: PartSeen) -> Iterator[Finding]:
 def _place(evidence: Evidence, seen: PartSeen, last: str, body: int) -> Iterator[str]:
     """What is wrong in the end with where a part, or its pallet `body`, stands at a station whose places the file gives."""
     station, tracks = evidence.task.station(last), evidence.tracks
-    x, y = _off_pose(evidence, last, tracks.inside(tracks.number(last), tracks.poses[:, body, :3])[-1])
+    x, y = evidence.off_pose(last, tracks.inside(tracks.number(last), tracks.poses[:, body, :3])[-1])
     foot_m = tracks.poses[-1, body, 2] + tracks.low[body, 2] - floor_of(station, tracks)[-1]
     level = [one for one in station.own_places if LOW_M <= foot_m - one.height_m <= HIGH_M]
     if not level:
@@ -189,61 +219,12 @@ def _is_carried(evidence: Evidence, body: int) -> bool:
         if not LOW_M <= gap <= HIGH_M:
             continue
         for along, across in under:
-            dx, dy = _turned(along, across, yaw)
+            dx, dy = turned(along, across, yaw)
             point = np.array([[x + dx, y + dy, z]])
             off = tracks.inside(other, np.repeat(point, len(tracks.times_s), axis=0))[-1]
             if (off[:2] >= tracks.low[other, :2]).all() and (off[:2] <= tracks.high[other, :2]).all():
                 return True
     return False
-
-
-def _off_pose(evidence: Evidence, station: str, place: Array) -> tuple[float, float]:
-    """A point in the frame of a station's body [m], off the station's pose along and across, wherever the body is by now."""
-    x, y, _, *turn = evidence.tracks.poses[0, evidence.tracks.number(station)]
-    at_x, at_y, yaw = evidence.task.station(station).pose
-    along, across = _turned(place[0], place[1], 2.0 * atan2(turn[2], turn[3]))
-    return _turned(along + x - at_x, across + y - at_y, -yaw)
-
-
-def _turned(x: float, y: float, yaw: float) -> tuple[float, float]:
-    return cos(yaw) * x - sin(yaw) * y, sin(yaw) * x + cos(yaw) * y
-
-
-def _stood(evidence: Evidence, seen: PartSeen) -> Iterator[Finding]:
-    """On its way it stood straight, and on the spot of each station that has one only and is not where it began."""
-    tracks, body = evidence.tracks, evidence.tracks.number(seen.name)
-    for number, stay in enumerate(seen.stays):
-        during = (tracks.times_s >= stay.start_s) & (tracks.times_s <= stay.end_s)
-        if np.median(tracks.up(body)[during]) < LEANS:
-            yield Finding("stood", seen.name, stay.station, stay.start_s, f"leans in '{stay.station}'")
-        station = evidence.task.station(stay.station)
-        if not number or station.capacity > 1 or station.own_places:
-            continue
-        places = tracks.inside(tracks.number(stay.station), tracks.poses[:, body, :3])[during]
-        off_m = hypot(*_off_pose(evidence, stay.station, np.median(places, axis=0)))
-        if off_m > NEAR_SPOT_M:
-            words = f"stands {off_m:.3f} m off the spot of '{stay.station}'"
-            yield Finding("stood", seen.name, stay.station, stay.start_s, words)
-
-
-def _in_hand(evidence: Evidence, seen: PartSeen) -> Iterator[Finding]:
-    """In the air it is at the robot, and nowhere does it move faster than the robot carries."""
-    tracks, body = evidence.tracks, evidence.tracks.number(seen.name)
-    robot = [n for n, name in enumerate(tracks.names) if name == "robot" or name.startswith("robot ")]
-    point, reach_m = tracks.poses[:, body, :3], HELD_M + float(np.linalg.norm(tracks.high[body] - tracks.low[body])) / 2
-    near = np.zeros(len(point), dtype=bool)
-    for link in robot:
-        off = tracks.within(link, point)
-        beyond = np.maximum(np.maximum(tracks.low[link] - off, off - tracks.high[link]), 0.0)
-        near |= np.linalg.norm(beyond, axis=1) <= reach_m
-    for first in _lasting(seen.carried & ~near):
-        at_s = float(tracks.times_s[first])
-        yield Finding("gripper", seen.name, "", at_s, f"is in the air at {at_s:.1f} s, and the robot is not there")
-    ways, spans = np.linalg.norm(np.diff(point, axis=0), axis=1), np.diff(tracks.times_s)
-    fast = np.flatnonzero(ways > FASTER * evidence.task.robot.speed_m_s * np.maximum(spans, SLACK_S))
-    if len(fast):
-        at_s = float(tracks.times_s[fast[0]])
-        yield Finding("gripper", seen.name, "", at_s, f"moves {ways[fast[0]]:.2f} m within {spans[fast[0]]:.2f} s")
 
 
 def _stations(evidence: Evidence) -> Iterator[Finding]:
@@ -253,6 +234,8 @@ def _stations(evidence: Evidence) -> Iterator[Finding]:
         kind, _, number = name.rpartition(" ")
         if number.isdigit() and kind in [part.name for part in evidence.task.made] and name not in ordered:
             yield Finding("order", name, "", 0.0, f"{name} is in the frames, and not in the order")
+    if tracks.robot and not _at(tracks.poses[0, tracks.robot[0]], (0.0, 0.0, 0.0)):
+        yield Finding("station", "", "", 0.0, "the robot does not stand where the task has it")
     for station in evidence.task.stations:
         own = tracks.number(station.name)
         if own < 0:
@@ -260,45 +243,17 @@ def _stations(evidence: Evidence) -> Iterator[Finding]:
             continue
         at = np.array([[*station.pose[:2], 0.0]])
         off = tracks.inside(own, np.repeat(at, len(tracks.times_s), axis=0))[0, :2]
-        if (off < tracks.low[own, :2]).any() or (off > tracks.high[own, :2]).any():
+        outside = (off < tracks.low[own, :2]).any() or (off > tracks.high[own, :2]).any()
+        fitted = station.stands_on == "slab" and station.size_m is None  # around its parts
+        if outside if fitted else not _at(tracks.poses[0, own], station.pose):
             yield Finding("station", "", station.name, 0.0, f"'{station.name}' does not stand where the task has it")
 
 
-# ---- what the schedule says --------------------------------------------------------------------------------------------
-
-
-def _schedule(evidence: Evidence, seen: PartSeen) -> Iterator[Finding]:
-    """The measured rows say where the part was and when it was carried, and it was carried at no other time."""
-    carries = evidence.own_rows(seen.name, "carry")
-    for row in carries:
-        for place, at_s in ((row["station"], row["start_s"]), (row["target"], row["end_s"])):
-            if not _stood_at(seen, place, at_s):
-                words = f"is not at '{place}' at {at_s:.1f} s, as the schedule has it"
-                yield Finding("schedule", seen.name, place, at_s, words)
-    for row in evidence.own_rows(seen.name, "process"):
-        inside = [s for s in seen.stays if s.station == row["station"] and s.start_s <= row["start_s"] + SLACK_S]
-        if not any(stay.end_s >= row["end_s"] - SLACK_S for stay in inside):
-            when = f"from {row['start_s']:.1f} to {row['end_s']:.1f} s"
-            words = f"did not stand in '{row['station']}' {when}, as the schedule has it"
-            yield Finding("schedule", seen.name, row["station"], row["start_s"], words)
-    for stay in seen.stays if evidence.rows else ():
-        works = evidence.task.station(stay.station).kind == "machine" and stay is not seen.stays[0]
-        rows = [row for row in evidence.own_rows(seen.name, "process") if row["station"] == stay.station]
-        if works and stay is not seen.stays[-1] and not rows:
-            words = f"stood in '{stay.station}', and the schedule has no row of that"
-            yield Finding("schedule", seen.name, stay.station, stay.start_s, words)
-    for before, after in zip(seen.stays, seen.stays[1:], strict=False):
-        if before.station != after.station and not any(
-            row["start_s"] - SLACK_S <= before.end_s and after.start_s <= row["end_s"] + SLACK_S for row in carries
-        ):
-            words = f"went from '{before.station}' to '{after.station}' at {before.end_s:.1f} s, which the schedule does not have"
-            yield Finding("schedule", seen.name, after.station, before.end_s, words)
-
-
-def _stood_at(seen: PartSeen, station: str, at_s: float) -> bool:
-    return any(
-        stay.station == station and stay.start_s - SLACK_S <= at_s <= stay.end_s + SLACK_S for stay in seen.stays
-    )
+def _at(pose: Array, place: Sequence[float]) -> bool:
+    """Whether a body's frame is at x, y and a turn about the vertical."""
+    turn = 2.0 * atan2(pose[5], pose[6]) - place[2]
+    off_rad = abs(atan2(sin(turn), cos(turn)))
+    return bool(hypot(pose[0] - place[0], pose[1] - place[1]) <= AT_POSE_M and off_rad <= AT_POSE_RAD)
 
 
 # ---- what holds how many -----------------------------------------------------------------------------------------------
@@ -308,45 +263,9 @@ def _capacities(evidence: Evidence) -> Iterator[Finding]:
     """No station holds more parts, or pallets of parts, than its capacity."""
     for number, station in enumerate(evidence.task.stations):
         there = np.array([seen.occupies == number for seen in evidence.parts])
-        for first in _lasting(there.sum(axis=0) > station.capacity):
+        for first in lasting(there.sum(axis=0) > station.capacity):
             names = [seen.name for seen, at in zip(evidence.parts, there[:, first], strict=True) if at]
             at_s = float(evidence.tracks.times_s[first])
             words = f"'{station.name}' holds {' and '.join(names)} at {at_s:.1f} s, its capacity is {station.capacity}"
             for name in names:
                 yield Finding("capacity", name, station.name, at_s, words)
-
-
-def _gripper(evidence: Evidence) -> Iterator[Finding]:
-    """The gripper carries one part at a time."""
-    own = [seen for seen in evidence.parts if evidence.undisturbed(seen.name)]
-    carried = np.array([seen.carried for seen in own])
-    if not len(own):
-        return
-    for first in _lasting(carried.sum(axis=0) > 1):
-        names = [seen.name for seen, at in zip(own, carried[:, first], strict=True) if at]
-        at_s = float(evidence.tracks.times_s[first])
-        for name in names:
-            words = f"{' and '.join(names)} are carried at once at {at_s:.1f} s, by one gripper"
-            yield Finding("gripper", name, "", at_s, words)
-
-
-def _in_one_another(evidence: Evidence) -> Iterator[Finding]:
-    """No two parts are in one place: the circles within their feet, and their heights, do not overlap."""
-    tracks = evidence.tracks
-    own = [(seen, tracks.number(seen.name)) for seen in evidence.parts if tracks.number(seen.name) >= 0]
-    for (one, a), (other, b) in combinations(own, 2):
-        off = np.abs(tracks.poses[:, a, :3] - tracks.poses[:, b, :3])
-        sizes = [tracks.high[body] - tracks.low[body] for body in (a, b)]
-        within = sum(min(size[:2]) / 2 for size in sizes) - BETWEEN_M
-        level = off[:, 2] < sum(size[2] / 2 for size in sizes) - BETWEEN_M
-        for first in _lasting(level & (np.hypot(off[:, 0], off[:, 1]) < within)):
-            at_s = float(tracks.times_s[first])
-            for seen in (one, other):
-                words = f"{one.name} and {other.name} are in one place at {at_s:.1f} s"
-                yield Finding("overlap", seen.name, "", at_s, words)
-
-
-def _lasting(mask: Mask) -> list[int]:
-    """The first frame of each run of frames in which something holds, where it lasts."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
-    return [int(first) for first, after in zip(edges[::2], edges[1::2], strict=True) if after - first >= SEVERAL_FRAMES]

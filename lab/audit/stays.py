@@ -88,11 +88,24 @@ def _stands_at(task: Task, tracks: BodyTracks, body: int, foot_m: float, heights
         low, high, off = tracks.low[own], tracks.high[own], tracks.inside(own, point)
         within = (off[:, :2] >= low[:2]).all(axis=1) & (off[:, :2] <= high[:2]).all(axis=1)
         foot = point[:, 2] - foot_m - floor_of(station, tracks)
-        levels = {0.0} if station.places is None else {place.height_m for place in station.places}
-        above = [foot - level - height for level in levels for height in heights]
+        above = [foot - level - height for level in levels_of(station) for height in heights]
         on = np.logical_or.reduce([(gap >= LOW_M) & (gap <= HIGH_M) for gap in above])
         at[within & on & up] = number
     return at
+
+
+def gap_of(task: Task, kind: str, station: Station, tracks: BodyTracks, body: int) -> Array:
+    """How far a part's foot is above the floor or layer of a station, or its pallet there, that is nearest (n,) [m]."""
+    part = task.part(kind)
+    foot = tracks.poses[:, body, 2] - shape_of(part, task.folder).foot_m - floor_of(station, tracks)
+    heights = [0.0] if part.pallet is None else [0.0, shape_of(task.part(part.pallet), task.folder).height_m]
+    gaps = np.array([foot - level - height for level in levels_of(station) for height in heights])
+    return np.asarray(np.take_along_axis(gaps, np.abs(gaps).argmin(axis=0)[None], axis=0)[0])
+
+
+def levels_of(station: Station) -> set[float]:
+    """How high parts may stand above a station's floor [m]."""
+    return {0.0} if station.places is None else {place.height_m for place in station.places}
 
 
 def floor_of(station: Station, tracks: BodyTracks) -> Array:

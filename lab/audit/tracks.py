@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from io import BytesIO
+from itertools import product
 from pathlib import Path
 from typing import Any
 from zipfile import BadZipFile, ZipFile
@@ -18,6 +19,7 @@ from lab.sim.mesh_file import readable
 FILE = "frames.npz"
 MAX_BYTES = 1_000_000_000  # of its arrays: a day of a cell with a hundred bodies has half of them
 Array = NDArray[np.float64]
+Numbers = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,12 +45,22 @@ class BodyTracks:
         x, y = self.poses[:, body, 3], self.poses[:, body, 4]
         return np.asarray(1.0 - 2.0 * (x * x + y * y))
 
-    def within(self, body: int, point: Array) -> Array:
-        """The points (n, 3) [m], one a frame, in the frame of a body that may be turned in any way."""
+    @property
+    def robot(self) -> list[int]:
+        """The numbers of the robot's links, its base first."""
+        return [n for n, name in enumerate(self.names) if name == "robot" or name.startswith("robot ")]
+
+    @property
+    def fingers(self) -> list[int]:
+        """The numbers of the robot's fingers."""
+        return [n for n in self.robot if "finger" in self.names[n]]
+
+    def middle(self, body: int) -> Array:
+        """The middle of a body's bounds at each frame (n, 3) [m]."""
         from scipy.spatial.transform import Rotation
 
-        turns = Rotation.from_quat(self.poses[:, body, 3:])
-        return np.asarray(turns.inv().apply(point - self.poses[:, body, :3]))
+        middle = (self.low[body] + self.high[body]) / 2
+        return np.asarray(self.poses[:, body, :3] + Rotation.from_quat(self.poses[:, body, 3:]).apply(middle))
 
     def inside(self, body: int, point: Array) -> Array:
         """The points (n, 3) [m], one a frame, in the frame of a body that may be turned about the vertical axis."""
@@ -56,6 +68,22 @@ class BodyTracks:
         yaw = 2.0 * np.arctan2(self.poses[:, body, 5], self.poses[:, body, 6])
         c, s = np.cos(yaw), np.sin(yaw)
         return np.stack([c * off[:, 0] + s * off[:, 1], c * off[:, 1] - s * off[:, 0], off[:, 2]], axis=1)
+
+
+def on_grid(low: Array, high: Array) -> Array:
+    """The corners of a box, and the points halfway between them (27, 3) [m]."""
+    shares = np.array(list(product((0.0, 0.5, 1.0), repeat=3)))
+    return np.asarray(low + shares * (high - low))
+
+
+def in_frame(poses: Array, others: Array, points: Array) -> Array:
+    """Points (m, 3) [m] of a body in the frame of another one (m, n, 3), by the poses (n, 7) of both."""
+    from scipy.spatial.transform import Rotation
+
+    to_other = Rotation.from_quat(others[:, 3:]).inv()
+    turn = (to_other * Rotation.from_quat(poses[:, 3:])).as_matrix()
+    turned = (points @ turn.transpose(0, 2, 1)).transpose(1, 0, 2)
+    return np.asarray(turned + to_other.apply(poses[:, :3] - others[:, :3]))
 
 
 def tracks_of(recording: Recording) -> BodyTracks:

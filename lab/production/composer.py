@@ -27,6 +27,7 @@ from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.schedule import Schedule
 from lab.sequencing.cell.schedule_rows import rows_of
 from lab.sequencing.simulate.rest import Mishaps
+from lab.sequencing.simulate.run import simulate
 from lab.sim.frames import Recording
 from lab.sim.world import World
 from lab.skills.prepared_scene import Prepared
@@ -213,16 +214,23 @@ def carry_out(
             program=motions.program(prepared.task, prepared.seed, production.work.moves, cell.part_name),
         )
         recording = floor.recorder.recording  # type: ignore[union-attr]
-        return audited(outcome, recording, prepared, cell), recording
+        return audited(outcome, recording, prepared, cell, sequence), recording
 
 
-def audited(outcome: Outcome, recording: Recording, prepared: Prepared, cell: Cell) -> Outcome:
-    """What came of a run after the audit: delivered is only what the frames show, else it fails for what they show."""
+def audited(
+    outcome: Outcome, recording: Recording, prepared: Prepared, cell: Cell, sequence: Sequence[int] = ()
+) -> Outcome:
+    """What came of a run after the audit: delivered is only what the frames show, else it fails for what they show.
+
+    sequence: what was to be carried out; empty where it was made up on the way.
+    """
     names = {cell.part_name(part): part for part in range(1, cell.parts + 1)}
     claimed = [name for name, part in names.items() if part in outcome.delivered]
     struck = tuple(Struck(one.what, one.part, one.station) for one in outcome.happened)
     rows = rows_of(outcome.schedule, cell, "measured")
-    found = audit(Evidence(prepared.task, prepared.order, tracks_of(recording), rows, claimed, struck))
+    kept = sequence and not any(isinstance(event, TroubleMet) for event in outcome.heard)
+    planned = rows_of(simulate(cell, sequence), cell, "planned") if kept else ()
+    found = audit(Evidence(prepared.task, prepared.order, tracks_of(recording), rows, claimed, struck, planned))
     delivered = tuple(names[name] for name in found.delivered)
     return replace(outcome, audit=found, delivered=delivered, failure=outcome.failure or found.failure)
 

@@ -21,8 +21,9 @@ from lab.sim.scene.places import Layout
 from lab.sim.scene.scene import ABOVE_FOOT_M
 from lab.sim.world import TIME_STEP, World, engine
 from lab.skills import Skill
+from lab.skills.precedences import precedences
 from lab.skills.prepared_scene import Prepared
-from lab.skills.skill import Status
+from lab.skills.skill import Status, stand_below
 from lab.skills.skillset import Carried, Pair, SkillSet, products, stations, ways_of
 from lab.tasks.task import Order, Task
 from lab.toolbox.policy import Policy
@@ -31,6 +32,7 @@ from lab.workers import Workers
 
 RECORDS = "durations"  # the kind of record in the toolbox
 LONGEST_S = 86_400.0  # of a move or a process
+AWAY_M = 5.0  # from its station, where a part is in nobody's way
 
 Way = Pair | Carried
 
@@ -245,7 +247,8 @@ def carried_out(prepared: Prepared, trial: Trial) -> Durations:
 def _more_s(floor: Floor, skill: Skill, spots: Sequence[Spot]) -> float:
     """How much longer a skill takes in the mean over spots of its station than on the first of them [s]; WorkFailed.
 
-    As many parts are there as spots: they are taken up one after the other and put back at once, or set down.
+    As many parts are there as spots: they are taken up one after the other and put back at once, or set down. Of layers the
+    lowest is filled first and emptied last: what is taken up there does not come back.
     """
     scene, bench, pose, times = floor.scene, floor.bench, skill.begins_at(), dict[Spot, float]()
     task, own = scene.task, scene.task.made_as(skill.kind)
@@ -254,6 +257,11 @@ def _more_s(floor: Floor, skill: Skill, spots: Sequence[Spot]) -> float:
         f"{own.name} {n}": (spot, scene.places.raised(skill.kind, task.station(skill.station), spot))
         for n, spot in enumerate(dict.fromkeys((first, *spots)), start=1)
     }
+    station, layered = task.station(skill.station), task.station(skill.station).is_layered
+    standing = {spot for spot, _ in feet.values()}
+    carriers = {spot: [one for one in scene.places.below(station, spot) if one[1] not in standing] for spot in standing}
+    for spot in () if skill.carries else standing:
+        stand_below(scene, station.name, carriers[spot])
     assert pose is not None
     for name, (spot, foot) in feet.items():
         if on_its_pallet(task, skill.kind, skill.station):
@@ -262,14 +270,17 @@ def _more_s(floor: Floor, skill: Skill, spots: Sequence[Spot]) -> float:
             scene.add(name, skill.kind, foot)
             if bench.sight is not None:
                 bench.sight.where[scene.body_of(name, skill.kind)] = foot
-    for name, (spot, foot) in feet.items():
+    for name, (spot, foot) in sorted(feet.items(), key=lambda one: one[1][0].z if skill.carries else -one[1][0].z):
+        if skill.carries:  # others of its kind may have to stand below what carries it
+            stand_below(scene, station.name, carriers[spot])
         floor.stand(pose)
         if skill.carries:
             bench.hold(name, skill.kind, pose)
         times[spot] = _timed(floor, [skill], name, spot)
         if not skill.carries:
             bench.held = None
-            scene.put(name, skill.kind, scene.kinds[skill.kind].held_at(foot.raised(ABOVE_FOOT_M)))
+            at = replace(foot, x=foot.x + AWAY_M) if layered else foot
+            scene.put(name, skill.kind, scene.kinds[skill.kind].held_at(at.raised(ABOVE_FOOT_M)))
     return sum(times[spot] for spot in spots) / len(spots) - times[first]
 
 
@@ -297,7 +308,15 @@ def cell_of(task: Task, durations: Durations, order: Order) -> Cell:
         for (origin, target), seconds in times.items():
             table[names.index(origin), names.index(target)] = seconds
         tables.append(table)
-    return Cell(places, products(wanted, durations.service_s), order, tables[0], tables[1], one_robot(task.robot.start))
+    return Cell(
+        places,
+        products(wanted, durations.service_s),
+        order,
+        tables[0],
+        tables[1],
+        one_robot(task.robot.start),
+        precedences=precedences(task, order),
+    )
 
 
 def cell_without_times(task: Task, order: Order) -> Cell:
@@ -311,6 +330,7 @@ def cell_without_times(task: Task, order: Order) -> Cell:
         no_time,
         no_time,
         one_robot(task.robot.start),
+        precedences=precedences(task, order),
     )
 
 

@@ -63,8 +63,11 @@ def in_another(run: Run, cell: Cell) -> Run:
     other = Run(cell)
     own = run.cell.begins
     for part, place in enumerate(run.locations):
-        stays = place >= len(cell.laid_out)
-        other.locations[part] = (own[part].position if own is not None and stays else place) or 0
+        if place >= len(cell.laid_out) and own is not None:  # a position of its own: it stays there, or is nowhere
+            known, product = own[part].position, run.cell.positions[place].product
+            ends = (n for n, at in enumerate(cell.laid_out) if at.product == product and not at.options)
+            place = next(ends) if known is None else known
+        other.locations[part] = place
     other.ready_s = run.ready_s.copy()
     other.robots_at, other.robots_s = run.robots_at.copy(), run.robots_s.copy()
     return other

@@ -9,6 +9,7 @@ from lab.errors import LabError
 from lab.learning.problem import Problem
 from lab.sim.scene.places import Layout
 from lab.sim.scene.scene_check import check_apart, check_scene, places_of
+from lab.skills.precedences import precedences
 from lab.skills.skillset import SkillSet
 from lab.skills.surveys import Surveys
 from lab.tasks.grid_world import RANDOM, GridWorld
@@ -50,6 +51,7 @@ def prepare(task: Task, order: Order, seed: int, only: str | None = None, worker
     with task.in_its_file():
         check_scene(task)
         check_apart(task, len(order))
+        precedences(task, order)
         skillset = SkillSet.of(task, order)
         layout = lay_out(task, order, seed)
         surveys = Surveys(task, order, layout)

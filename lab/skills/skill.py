@@ -295,8 +295,11 @@ class Skill:
             scene.world.step()
 
     def furnish(self, bench: Bench) -> None:
-        """Put there what its part stands on, or is to be set down on: its pallet, where it stands on one."""
-        task, name = self.surveys.task, self.tried_with()
+        """Put there what its part stands on, or is to be set down on: other parts in a layer, its pallet where it has one."""
+        task, name, places = self.surveys.task, self.tried_with(), self.surveys.places
+        if self.station and self.kind and self.near:
+            station = task.station(self.station)
+            stand_below(bench.scene, self.station, places.below(station, places.spots(station, self.kind)[0]))
         if self.station and self.kind and on_its_pallet(task, self.kind, self.station):
             pallet, spot = (
                 task.part(self.kind).pallet,
@@ -337,6 +340,14 @@ class Skill:
     def stop(self) -> None:
         """Break off; the skill can be started again."""
         self._motion, self.status = None, Status.IDLE
+
+
+def stand_below(scene: Scene, station: str, below: Sequence[tuple[str, Spot]]) -> None:
+    """Stand parts in a scene, kinds and spots, that carry others at a station; those that are there already stay."""
+    for kind, spot in below:
+        name = f"{kind} below at {spot.x:.3f} {spot.y:.3f} {spot.z:.3f} {station}"
+        if name not in scene.kind_of:
+            scene.add(name, kind, spot)
 
 
 def learned_path(policy: "Policy", mdp: TabularMDP, start: int) -> list[int]:

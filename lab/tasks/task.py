@@ -18,6 +18,7 @@ from lab.tasks.task_faults import refusal
 from lab.tasks.task_fields import (
     MAX_PARTS,
     MOST_THINGS,
+    After,
     CameraSettings,
     Obstacle,
     Part,
@@ -60,6 +61,8 @@ class Task(Record):
     """Where parts stand and are worked on."""
     processes: dict[Name, Process] = Field(default={})
     """What is done to a surface cell by cell, such as butter or glue; by the names that stations and stages use."""
+    after: Annotated[tuple[After, ...], BeforeValidator(as_tuple), Field(max_length=MOST_THINGS)] = ()
+    """Which transfers have to wait for others, as tables `[[after]]`."""
     obstacles: Annotated[tuple[Obstacle, ...], BeforeValidator(as_tuple), Field(max_length=MOST_THINGS)] = ()
     """What stands in the way."""
     faults: Annotated[tuple[FaultFields, ...], BeforeValidator(as_tuple), Field(max_length=MOST_THINGS)] = ()
@@ -248,10 +251,12 @@ class Task(Record):
             coming = [part.name for part in self.kinds_at(station.name)]
             routes = [route for part in self.made for route in part.routes]
             inside = any(station.name in (*(s.station for s in r[1:-1]), *(s.buffer for s in r)) for r in routes)
-            if station.is_layered and (inside or any(route[0].station == station.name for route in routes)):
+            begin, end = (any(route[at].station == station.name for route in routes) for at in (0, -1))
+            if station.is_layered and (inside or (begin and end)):
+                what = "routes lead on through it" if inside else "routes begin and end there"
                 raise ValueError(
-                    f"station '{station.name}': places: height_m: parts are taken from it, and one below another cannot be: "
-                    "layers are for stations where routes end"
+                    f"station '{station.name}': places: height_m: {what}, and which part lies on which is not planned: layers "
+                    "are for stations where routes only begin or only end"
                 )
             if station.is_layered and self.perception == "camera":
                 raise BadInput(
@@ -268,6 +273,28 @@ class Task(Record):
                         f"station '{station.name}': places: kind = '{place.kind}': routes lead on through it, and which kinds "
                         "wait there is not planned: nests are for stations where routes begin or end"
                     )
+        return self
+
+    @model_validator(mode="after")
+    def _after_known(self) -> Self:
+        made = [part.name for part in self.made]
+        for number, one in enumerate(self.after, start=1):
+            if one.part == one.of:
+                raise ValueError(f"after {number}: of = '{one.of}': a kind cannot wait for itself, wanted another one")
+            for kind, step, station in (
+                (one.part, one.step, one.station),
+                (one.of, one.of_step, one.of_station or one.station),
+            ):
+                if kind not in made:
+                    raise unknown("part", kind, made, f"after {number}")
+                own = [[stage.station for stage in route] for route in self.part(kind).routes]
+                routes_of = [names[1:] if step == "comes" else names[:-1] for names in own]
+                always = [place for place in routes_of[0] if all(place in other for other in routes_of)]
+                if station not in always:
+                    where = (
+                        f"after {number}: what every route of '{kind}' {'comes to' if step == 'comes' else 'leaves'}"
+                    )
+                    raise unknown("station", station, always, where)
         return self
 
     @model_validator(mode="after")

@@ -16,7 +16,7 @@ MEMBERS = {"part": "parts", "product": "parts", "station": "stations", "machine"
 _THING = re.compile(rf"\b({'|'.join(MEMBERS)})s? '([^']*)'")
 _DOTTED = re.compile(r"\b(robot|workspace|camera|processes|subtasks|sequencing)((?:\.[\w-]+)+)")
 _STAGE = re.compile(r"(?:stage (\d+) of )?(?:the route|route (\d+))\b(?: of '([^']*)')?(?= has|:| \()")
-_FAULT = re.compile(r"\bfault (\d+)\b")
+_NUMBERED = re.compile(r"\b(fault|after) (\d+)\b")
 _QUOTED = re.compile(r"'([^']*)'")
 _SIZE = ("size_m", "file")  # say how wide and how high something is
 _WORD = re.compile(r"[a-z_]+")
@@ -34,8 +34,8 @@ def loc_of(raw: dict[str, Any], message: str) -> Loc:
     """
     if (stage := _stage(raw, message)) is not None:
         return stage
-    if (fault := _FAULT.search(message)) is not None:
-        loc: Loc = ("faults", int(fault[1]) - 1)
+    if (numbered := _NUMBERED.search(message)) is not None:
+        loc: Loc = ("faults" if numbered[1] == "fault" else "after", int(numbered[2]) - 1)
         return loc + within(raw, loc, message)
     things = [(found.start(), loc) for found in _THING.finditer(message) if (loc := _member(raw, *found.groups()))]
     dotted = _DOTTED.search(message)

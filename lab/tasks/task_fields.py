@@ -129,6 +129,25 @@ class Place(Record):
     """The kind that it takes, such as `"pin"`; left out: every kind that has no places of its own at the station."""
 
 
+class After(Record):
+    """What has to wait: parts of a kind for parts of another one. Where parts stand on parts, their places say so already."""
+
+    part: Name
+    """The kind that waits, such as `"label"`."""
+    station: Name
+    """The station on its routes to which it is not brought yet, such as `"tray"`."""
+    step: Literal["comes", "leaves"] = "comes"
+    """Which transfer waits: the one that brings the part to that station ("comes"), or that takes it away ("leaves")."""
+    of: Name
+    """The other kind that it waits for, such as `"box"`."""
+    of_station: Name | None = None
+    """The station that those have to have come to, or left, such as `"sealer"`; left out: the same one."""
+    of_step: Literal["comes", "leaves"] = "comes"
+    """What those have to have done there: stand there ("comes"), or have been taken away and set down elsewhere ("leaves")."""
+    count: Literal["each", "all"] = "each"
+    """How many of those: as many as the part is the so-manyth to go, one for each ("each"), or all of the order ("all")."""
+
+
 class Station(Record):
     """A place where parts stand: storage, a buffer, or a machine with a processing time or a process to learn."""
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lab.errors import BadInput, unknown
+from lab.sequencing.cell.precedence import Precedence, Rule, Step, check_precedences, made_in, signatures
 from lab.sequencing.cell.routes import (
     NeededMoves,
     Position,
@@ -52,7 +53,8 @@ class Cell:
     "busy", a buffer is used only when the station ahead is full; "free", the robot chooses. due_s: when each part is
     wanted [s]. begins: where each part is at time 0, None: all at their first stations; the makespan is then the last
     arrival of those that are not finished yet. closed: stations to which nothing may be brought, such as a machine that is
-    out of order. `lab.sequencing.simulate.rest.rest_of` makes such a cell of a run that has come to its middle.
+    out of order. precedences: transfers that have to wait for others, of one robot and machines without servers.
+    `lab.sequencing.simulate.rest.rest_of` makes such a cell of a run that has come to its middle.
     Raises BadInput for what cannot be a cell, and for a missing time that a route needs (see `needed_moves`).
     Source: thesis ch. 7 (rules), tables 7.1 and 7.2 (times); App. III (pallets, arrivals, vacuuming).
     """
@@ -69,6 +71,7 @@ class Cell:
     begins: tuple[Begins, ...] | None = None
     closed: tuple[str, ...] = ()
     track: tuple[Stretch, ...] = ()
+    precedences: tuple[Precedence, ...] = ()
 
     def __post_init__(self) -> None:
         check_layout(self.stations, self.products)
@@ -78,6 +81,8 @@ class Cell:
         self._check_order()
         for name in self.closed:
             self.index(name)
+        if self.precedences:
+            self._check_precedences()
         self._check_begins()
         self._check_times()
         for field, needed in (("empty_s", self.needed.empty), ("loaded_s", self.needed.loaded)):
@@ -151,7 +156,29 @@ class Cell:
     @cached_property
     def laid_out(self) -> tuple[Position, ...]:
         """The positions with all their ways, whatever is closed, and none for parts that stay where they are."""
-        return positions_of(self.stations, self.products, self.buffers, self.robots)
+        return positions_of(self.stations, [self.products[n] for n, _ in self._classes], self.buffers, self.robots)
+
+    @cached_property
+    def rules(self) -> tuple[Rule, ...]:
+        """The precedences by positions."""
+        own = [
+            [n for n, at in enumerate(self.laid_out) if at.product == number] for number in range(len(self._classes))
+        ]
+        found = []
+        for number, one in enumerate(self.precedences):
+            sides = []
+            for side, step in enumerate((one.step, one.of_step)):
+                members = [n for n, (_, sign) in enumerate(self._classes) if sign[number][side]]
+                made = frozenset().union(*(made_in(self.laid_out, own[n], step, self.names) for n in members))
+                added = enumerate(self._stays_at, len(self.laid_out))
+                standing = {
+                    place
+                    for place, (at, product) in added
+                    if product in members and (step.leaves if at is None else at in made)
+                }
+                sides.append(made | standing)
+            found.append(Rule(sides[0], sides[1], one.counts))
+        return tuple(found)
 
     @cached_property
     def starts(self) -> tuple[int, ...]:
@@ -167,7 +194,7 @@ class Cell:
         stay = iter(range(len(self.laid_out), len(self.laid_out) + len(self._stay)))
         end = {place.product: index for index, place in enumerate(self.laid_out) if not place.options}
         return tuple(
-            end[product] if one.position is None else next(stay) if one.stays else one.position
+            next(stay) if self._is_apart(one) else end[product] if one.position is None else one.position
             for product, one in zip(self._products, self.begins, strict=True)
         )
 
@@ -246,15 +273,53 @@ class Cell:
 
     @cached_property
     def _products(self) -> tuple[int, ...]:
-        """The product of each part, by index."""
+        """Which of the `_classes` each part is of: the `product` of its positions."""
         names = [product.name for product in self.products]
-        return tuple(names.index(name) for name in self.order)
+        signs = signatures(self.precedences, self.parts)
+        return tuple(
+            self._classes.index((names.index(name), sign)) for name, sign in zip(self.order, signs, strict=True)
+        )
+
+    @cached_property
+    def _classes(self) -> list[tuple[int, tuple[tuple[bool, bool], ...]]]:
+        """Parts that are alike: a product, by index, and the sides of the precedences on which they stand."""
+        signs = signatures(self.precedences, self.parts)
+        found = []
+        for number, product in enumerate(self.products):
+            own = dict.fromkeys(sign for name, sign in zip(self.order, signs, strict=True) if name == product.name)
+            found += [(number, sign) for sign in own or {((False, False),) * len(self.precedences): None}]
+        return found
+
+    def _is_apart(self, one: Begins) -> bool:
+        """Whether a part has a position of its own: it stays where it is, or is nowhere where that counts."""
+        return (one.stays and one.position is not None) or (one.position is None and bool(self.precedences))
+
+    @cached_property
+    def _stays_at(self) -> tuple[tuple[int | None, int], ...]:
+        """Where each part stands that has a position of its own (None: nowhere), and what it is of."""
+        begins = zip(self.begins or (), self._products, strict=False)
+        return tuple((one.position, product) for one, product in begins if self._is_apart(one))
 
     @cached_property
     def _stay(self) -> tuple[Position, ...]:
         """A position for each part that stays where it is: it takes its room, and leads nowhere."""
-        stay = [one.position for one in self.begins or () if one.stays and one.position is not None]
-        return tuple(replace(self.laid_out[place], processing_s=0.0, options=()) for place in stay)
+        starts = {place.product: place for place in reversed(self.laid_out)}
+        return tuple(
+            replace(starts[product] if place is None else self.laid_out[place], processing_s=0.0, options=())
+            for place, product in self._stays_at
+        )
+
+    def _check_precedences(self) -> None:
+        if not is_serial(self.laid_out, self.robots):
+            raise BadInput("precedences: they are for cells of one robot, and machines without servers")
+        steps = [Step(name, leaves) for name in self.names for leaves in (False, True)]
+        does = dict[str, list[Step]]()
+        for part, start in enumerate(self.starts, 1):
+            own = sorted(reached_from(self.laid_out, {start}))
+            ends = {place for place in own if not self.laid_out[place].options}
+            does[self.part_name(part)] = [s for s in steps if ends <= made_in(self.laid_out, own, s, self.names)]
+        names = [self.part_name(part) for part in range(1, self.parts + 1)]
+        check_precedences(self.precedences, self.names, names, does)
 
     def _check_begins(self) -> None:
         begins = self.begins if self.begins is not None else [Begins(start) for start in self.starts]

@@ -224,7 +224,10 @@ def _check_route(stations: Sequence[Station], route: Route, one_of: str) -> None
             back = number == len(route) > 2 and name == route[0].station
             again = known[name].servers is not None and name != route[number - 2].station
             if name in visited and not (back or again):
-                raise BadInput(f"{where}: station '{name}' is on the route twice, a cycle; once is allowed")
+                raise BadInput(
+                    f"{where}: station '{name}' is on the route twice, a cycle; once is allowed: give the second visit a "
+                    "station of its own, or the machine servers in a cell file"
+                )
             visited.add(name)
             if is_buffer and kinds[name] != "buffer":
                 raise BadInput(f"{where}: '{name}' is a {kinds[name]}; a buffer fits")

@@ -152,6 +152,10 @@ def check_cyclic(cell: Cell, mix: Sequence[str]) -> None:
                 f"--cyclic: station '{station.name}' has servers and a queue; in a cycle each part is worked on where and "
                 "when it is put down: leave servers away"
             )
+    if cell.precedences:
+        raise BadInput(
+            "--cyclic: parts have to wait for others in this cell, which a cycle does not know: leave --cyclic away"
+        )
     if cell.begins is not None or cell.closed:
         raise BadInput("--cyclic: the work is in its middle, or a station is closed; a cycle needs the whole cell")
     for name in mix:

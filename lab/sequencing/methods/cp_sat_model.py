@@ -67,6 +67,8 @@ class Model:
         self._add_tour()
         self._add_full([visit for station in range(len(cell.stations)) for visit in self._add_room(station)])
         self._add_order(objective)
+        for number in range(len(cell.rules)):
+            self._add_precedence(number)
         self.worth = self._add_objective(objective)
         each = {"machine-idle": machine_places(cell), "mean-tardiness": cell.parts, "tardy-parts": 0}.get(objective, 1)
         self.blur = 2 * each * len(self._tasks) if self.times.rounded_s else 0
@@ -270,6 +272,43 @@ class Model:
             if kind in latest:
                 self.model.add(self._first[part] >= self._taken[latest[kind]])
             latest[kind] = part
+
+    def _add_precedence(self, number: int) -> None:
+        """As many have ended their step as a part needs that is the so-manyth to begin its own.
+
+        A part that is under way (`before` its step) has a moment at which it begins it, and one at which it has ended it.
+        """
+        rule, one, model = self.cell.rules[number], self.cell.precedences[number], self.model
+        mine = {part: self._step(part - 1, rule.made) for part in one.parts if part in self.cell.unfinished}
+        theirs = {part: self._step(part - 1, rule.ended) for part in one.of if part in self.cell.unfinished}
+        waiting = {part: step for part, step in mine.items() if step is not None}
+        made = sum(self.cell.begin_at[part - 1] in rule.made for part in one.parts)
+        ended = sum(self.cell.begin_at[part - 1] in rule.ended for part in one.of)
+        first = {(a, b): model.new_bool_var("first") for a in waiting for b in waiting if a < b}
+        for (a, b), is_first in first.items():
+            model.add(waiting[b][0] >= waiting[a][1]).only_enforce_if(is_first)
+            model.add(waiting[a][0] >= waiting[b][1]).only_enforce_if(~is_first)
+        for part, (begin, _) in waiting.items():
+            before = [is_first if b == part else 1 - is_first for (a, b), is_first in first.items() if part in (a, b)]
+            done = list[cp_model.IntVar]()
+            for step in (step for other, step in theirs.items() if step is not None and other != part):
+                done.append(model.new_bool_var("ended"))
+                model.add(begin >= step[1]).only_enforce_if(done[-1])
+            counts = [*rule.counts, *(0,) * len(one.parts)]
+            needs = model.new_int_var(0, len(one.of), "needs")
+            model.add_element(made + sum(before), counts, needs)
+            model.add(ended + sum(done) >= needs)
+
+    def _step(self, part: int, made: frozenset[int]) -> tuple[cp_model.IntVar, cp_model.IntVar] | None:
+        """When a part, from 0, begins the move to these positions, and when that has ended; None: it is in one of them."""
+        tasks = [t for t in self._tasks if t.part == part and t.way.option.to in made and t.way.place not in made]
+        if not tasks:
+            return None
+        begin, end = self._moment("begins step"), self._moment("ends step")
+        for task in tasks:
+            self.model.add(begin == task.begin).only_enforce_if(task.done)
+            self.model.add(end == task.drop).only_enforce_if(task.done)
+        return begin, end
 
     def _add_objective(self, objective: str) -> float:
         """What is to be as low as possible; the worth of its unit in the cell's."""

@@ -45,7 +45,7 @@ def known_cell(cell: Cell, times: Episode) -> Cell:
 
 def _as_drawn(cell: Cell, times: Episode, part: int) -> Product:
     product = next(one for one in cell.products if one.name == cell.order[part - 1])
-    number = cell.products.index(product)
+    number = cell.positions[cell.starts[part - 1]].product
     working = {station.name for station in cell.stations if station.kind == "machine"}
     # The positions in which work begins stand in the order of the routes and their stages.
     drawn = iter(

@@ -70,7 +70,7 @@ def srl_time(cell: Cell, search: Search, rng: np.random.Generator, bounded: bool
 
 def _many_alike(cell: Cell) -> bool:
     alike = len(set(cell.order)) == 1 and cell.arrivals is None and cell.due_s is None
-    return alike and cell.begins is None and cell.parts > max(SMALL_JOBS)
+    return alike and cell.begins is None and not cell.precedences and cell.parts > max(SMALL_JOBS)
 
 
 class TimeLearner:

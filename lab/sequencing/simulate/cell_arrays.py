@@ -35,6 +35,8 @@ class CellArrays(NamedTuple):
     picked there [s]; coming (C,): the parts, from 0, that begin at a start.
     tracked: whether there is a track; first_held (S * S + 1,): where the stretches of each way on it begin in held (H,);
     held_from_s, held_until_s (R, H): from when until when a robot on that way is on each [s].
+    ruled: whether there are precedences, R of them; made, ended (R, P): as `Rule` has them; counts (R, K): as many as it
+    has, then 0.
     interval_s, due_s (K,) [s]. many: whether a part may have several choices. The codes are those of this module.
     """
 
@@ -84,6 +86,10 @@ class CellArrays(NamedTuple):
     held: Ints
     held_from_s: Floats
     held_until_s: Floats
+    ruled: bool
+    made: Flags
+    ended: Flags
+    counts: Ints
 
 
 class RunArrays(NamedTuple):
@@ -165,6 +171,7 @@ def cell_arrays(cell: Cell, objective: str = MAKESPAN, chance: Chance = NO_CHANC
         late_s=float(chance.late_s),
         tracked=bool(cell.track),
         **_held(cell),
+        **_ruled(cell),
     )
 
 
@@ -222,6 +229,20 @@ def _held(cell: Cell) -> dict[str, Any]:
         "held": np.array([one.stretch for one in held], np.int64),
         "held_from_s": np.array([one.from_s for one in held]) / speeds[:, None],
         "held_until_s": np.array([one.until_s for one in held]) / speeds[:, None],
+    }
+
+
+def _ruled(cell: Cell) -> dict[str, Any]:
+    """The precedences."""
+    places, rules = range(len(cell.positions)), cell.rules
+    shape = len(rules), len(places)
+    return {
+        "ruled": bool(rules),
+        "made": np.array([[n in rule.made for n in places] for rule in rules], np.bool_).reshape(shape),
+        "ended": np.array([[n in rule.ended for n in places] for rule in rules], np.bool_).reshape(shape),
+        "counts": np.array(
+            [[*rule.counts, *(0,) * (cell.parts - len(rule.counts))] for rule in rules], np.int64
+        ).reshape(len(rules), cell.parts),
     }
 
 

@@ -157,6 +157,21 @@ def _too_late(cell: Any, run: Any, part: int, o: int) -> bool:
 
 
 @inner
+def _waits_for(cell: Any, run: Any, part: int, o: int) -> bool:
+    """`Run._waits_for`: whether a precedence lets a part (from 0) wait."""
+    here, there = run.locations[part], cell.to[o]
+    for r in range(len(cell.made)):
+        if cell.made[r, there] and not cell.made[r, here]:
+            made, ended = 0, 0
+            for place in run.locations:
+                made += cell.made[r, place]
+                ended += cell.ended[r, place]
+            if made < cell.counts.shape[1] and ended < cell.counts[r, made]:
+                return True
+    return False
+
+
+@inner
 def server_for(cell: Any, run: Any, part: int, o: int) -> Any:
     """`Run._server`."""
     station, best_s, best = cell.target[o], np.inf, -1
@@ -204,6 +219,8 @@ def list_allowed(cell: Any, run: Any) -> int:
             continue
         for o in range(cell.first_option[place], cell.first_option[place + 1]):
             room = run.room[cell.needs[o, 0]] > 0 and run.room[cell.needs[o, 1]] > 0
+            if cell.ruled and _waits_for(cell, run, part, o):
+                continue
             if room and run.room[cell.if_full[o]] <= 0 and not (cell.windows and _too_late(cell, run, part, o)):
                 run.allowed[count], run.options[count] = part + 1 + cell.choice[o] * parts, o
                 count += 1
@@ -234,6 +251,8 @@ def may(cell: Any, run: Any, part: int, o: int) -> bool:
     """Whether a part (from 0) may take a way of its position now."""
     place = run.locations[part]
     if cell.arrivals != NO_ARRIVALS and place == cell.starts[part] and part != cell.coming[run.whole[0]]:
+        return False
+    if cell.ruled and _waits_for(cell, run, part, o):
         return False
     room = run.room[cell.needs[o, 0]] > 0 and run.room[cell.needs[o, 1]] > 0
     return bool(room and run.room[cell.if_full[o]] <= 0 and not (cell.windows and _too_late(cell, run, part, o)))

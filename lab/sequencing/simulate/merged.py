@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from lab.errors import BadInput
 from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.precedence import allows
 from lab.sequencing.cell.routes import entry
 from lab.sequencing.cell.ways import TICKS_PER_S, Way, distances, empty_ticks, loaded_ticks, ticks, ways_of
 from lab.sequencing.simulate.run import SLACK_S, Run
@@ -235,7 +236,7 @@ class MergedCell:
             for place, count in enumerate(counted)
             if count and (in_turn in (None, place) or place not in self.starts)
             for way in self._ways[place]
-            if way.option.possible(full)
+            if way.option.possible(full) and allows(cell.rules, counted, place, way.option)
         }
 
     def _times_to_fetch(self) -> dict[int, list[int]]:

@@ -1,6 +1,6 @@
 """The work that remains of a run that has come to its middle, as a cell of its own: to plan anew from the state reached."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -142,9 +142,29 @@ def _stuck(cell: Cell, begins: Sequence[Begins], closed: set[int]) -> dict[int, 
                     f"'{cell.names[n]}' is {why}" for n, why in shut.items() if n in _ahead(cell, one.position)
                 )
                 found[part] = f"{cell.part_name(part)} at '{name}' has no way on: {way}"
+        found = found or _waiting(cell, begins, stuck)
         if not found:
             return stuck
         stuck |= found
+
+
+def _waiting(cell: Cell, begins: Sequence[Begins], stuck: Collection[int]) -> dict[int, str]:
+    """The parts that wait, by a precedence, for parts that cannot make their step any more, and for which: too few are left."""
+    found = dict[int, str]()
+    for rule, one in zip(cell.rules, cell.precedences, strict=True):
+        at = {part: begins[part - 1].position for part in (*one.parts, *one.of)}
+        never = [
+            part
+            for part in one.of
+            if (at[part] is None and not one.of_step.leaves) or (part in stuck and at[part] not in rule.ended)
+        ]
+        waiting = [n for n in one.parts if at[n] is not None and at[n] not in rule.made and n not in stuck]
+        made = sum(at[part] in rule.made for part in one.parts)
+        free = sum(count <= len(one.of) - len(never) for count in rule.counts)
+        for part in waiting[max(0, free - made) :]:
+            names = " and ".join(cell.part_name(other) for other in never)
+            found[part] = f"{cell.part_name(part)} may not {one.step}: {names} cannot {one.of_step} before"
+    return found
 
 
 def _ahead(cell: Cell, place: int) -> set[int]:

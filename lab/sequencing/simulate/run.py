@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from lab.errors import BadInput, counted
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import Episode
+from lab.sequencing.cell.precedence import missing
 from lab.sequencing.cell.routes import SERVER, Option, Position, choice_of, entry, part_of
 from lab.sequencing.cell.schedule import Move, Schedule
 from lab.sequencing.cell.stations import UNLIMITED
@@ -23,7 +24,7 @@ class Run:
     server, part or room: a robot that comes to a station before there is room waits there, and nobody ever waits for
     anything else. With one robot and no servers what is decided later also happens later (`Cell.serial`). A decision that
     would pick a part later than it may be picked is not allowed (see `Station.at_most_s`): what was left too long stays where
-    it is, and the run ends as a deadlock does.
+    it is, and the run ends as a deadlock does. Nor is one allowed that a precedence lets wait (see `Precedence`).
     locations: the position of each part, part 1 first. occupied: room taken at each station. ready_s: when each part may be
     picked. finished_s: when each part was finished (None: not yet; 0: before the work began, or nothing is to be done with
     it). robots_at, robots_s: where each robot is after what it was given to do, and when. end_s: when all that was decided
@@ -81,7 +82,7 @@ class Run:
             for part in range(1, parts + 1)
             if self._in_turn(part)
             for option in self.cell.positions[self.locations[part - 1]].options
-            if option.possible(full) and not self.too_late(part, option)
+            if option.possible(full) and not self._waits_for(part, option) and not self.too_late(part, option)
         ]
         return tuple(sorted(found))
 
@@ -92,7 +93,7 @@ class Run:
             return None
         choice, full = choice_of(decision, self.cell.parts), self._full()
         for option in self.cell.positions[self.locations[part - 1]].options:
-            if option.choice == choice and option.possible(full):
+            if option.choice == choice and option.possible(full) and not self._waits_for(part, option):
                 return None if self.too_late(part, option) else option
         return None
 
@@ -109,7 +110,19 @@ class Run:
         if decision < 1 or not self._in_turn(part):
             return False
         options, full = self.cell.positions[self.locations[part - 1]].options, self._full()
-        return any(o.choice == choice and o.possible(full) and self.too_late(part, o) for o in options)
+        own = [o for o in options if o.choice == choice and o.possible(full) and not self._waits_for(part, o)]
+        return any(self.too_late(part, option) for option in own)
+
+    def _waits_for(self, part: int, option: Option) -> str:
+        """What must have been done before a part may take a way, in words; "" when nothing is missing."""
+        cell, place = self.cell, self.locations[part - 1]
+        for rule, one in zip(cell.rules, cell.precedences, strict=True):
+            if rule.applies(place, option):
+                counted = [self.locations.count(n) for n in range(len(cell.positions))]
+                if count := missing(rule, counted):
+                    kinds = " or ".join(dict.fromkeys(cell.order[other - 1] for other in one.of))
+                    return f"{one.step} before {count} more of {kinds} {one.of_step}"
+        return ""
 
     def move(self, decision: int) -> Move:
         """Carry a decision out; BadInput when it may not be taken."""
@@ -215,6 +228,9 @@ class Run:
             for option in cell.laid_out[self.locations[part - 1]].options:
                 if option.choice == choice:
                     return f"{name} at '{where}': the way by '{cell.names[option.target]}' is closed"
+        waits = next((why for o in place.options if o.possible(full) and (why := self._waits_for(part, o))), "")
+        if waits:
+            return f"{name} at '{where}' may not {waits}"
         taken = dict.fromkeys(repr(cell.names[s]) for option in place.options for s in option.needs if full[s])
         if not taken:
             return f"{name} at '{where}' has no choice {choice_of(decision, cell.parts) + 1}"

@@ -7,7 +7,7 @@ from math import ceil, cos, hypot, pi, sin
 
 import numpy as np
 
-from lab.errors import BadInput
+from lab.errors import BadInput, counted
 from lab.sim.frames import Vector
 from lab.sim.parts.kinds import Kind, Spot, beside, comes_as, on_its_pallet
 from lab.sim.scene import station_bodies
@@ -169,6 +169,18 @@ class Places:
             if abs(other.z + kind.height_m - spot.z) <= ON_TOP_M and any(ground.meets(mine) for _, mine in own)
         ]
 
+    def below(self, station: Station, spot: Spot) -> list[tuple[str, Spot]]:
+        """What has to stand for a part to stand on a spot: kinds and their spots, the lowest first."""
+        found = dict[Spot, str]()
+        for under in self.carriers(station, spot):
+            found |= {other: kind for kind, other in self.below(station, under)}
+            found[under] = next(
+                kind.name
+                for kind, _ in self.grounds(station, under)
+                if abs(under.z + kind.height_m - spot.z) <= ON_TOP_M
+            )
+        return [(kind, other) for other, kind in found.items()]
+
     def grounds(self, station: Station, spot: Spot) -> list[tuple[Kind, Rectangle]]:
         """The kinds that may stand on a spot, with the ground that a part of each covers there."""
         found = []
@@ -222,21 +234,21 @@ class Places:
         """
         kept = self.kept_free(len(order))
         places = [_draw_place(obstacle, kept, rng) for obstacle in self.task.obstacles]
-        stand: list[Rectangle] = []
+        stand: list[tuple[float, Rectangle]] = []
         offsets = [self._draw_off(*one, stand, rng) for one in zip(order, self.begins(order), strict=True)]
         return Layout(tuple(places), tuple(offsets))
 
     def _draw_off(
-        self, kind: str, spot: Spot, stand: list[Rectangle], rng: np.random.Generator
+        self, kind: str, spot: Spot, stand: list[tuple[float, Rectangle]], rng: np.random.Generator
     ) -> tuple[float, float, float]:
-        """How far a part stands off its spot, clear of those that `stand` already, to which it is added."""
+        """How far a part stands off its spot, clear of those that `stand` already as high [m], to which it is added."""
         part = self.task.part(kind)
         along, across = (reach + APART_M / 2 for reach in self.kinds[comes_as(part)].footprint_m())
         for _ in range(MAX_DRAWS):
             dx, dy, turn = (float(value) for value in rng.uniform(-1, 1, 3) * part.area)
             ground = Rectangle(*beside((spot.x, spot.y), spot.yaw, (dx, dy)), along, across, spot.yaw + turn)
-            if not any(other.meets(ground) for other in stand):
-                stand.append(ground)
+            if not any(z == spot.z and other.meets(ground) for z, other in stand):
+                stand.append((spot.z, ground))
                 return dx, dy, turn
         raise BadInput(
             f"part '{kind}': area = {list(part.area)}: parts would stand in one another at '{self.task.starts(kind)}'; "
@@ -244,11 +256,21 @@ class Places:
         )
 
     def begins(self, order: Order) -> list[Spot]:
-        """The spot on which each part of an order stands at the start, part 1 first: the stations' first ones."""
+        """The spot on which each part of an order stands at the start, part 1 first: the stations' first ones.
+
+        BadInput where nothing is there to carry one.
+        """
         found: list[Spot] = []
         for kind in order:
             own = self.spots(self.task.station(self.task.starts(kind)), kind)
             found.append(next(spot for spot in own if spot not in found))
+        for kind, spot in zip(order, found, strict=True):
+            station = self.task.station(self.task.starts(kind))
+            if lacks := [name for name, under in self.below(station, spot) if under not in found]:
+                raise BadInput(
+                    f"part '{kind}': count: at '{station.name}' {counted(order.count(kind), kind)} would stand on more than "
+                    f"{counted(order.count(lacks[0]), lacks[0])}: wanted more of '{lacks[0]}', or fewer of '{kind}'"
+                )
         return found
 
     def neighbours(self, station: Station, spot: Spot) -> dict[str, tuple[str, Spot]]:
@@ -274,7 +296,7 @@ class Places:
     def _seen_from(self, station: Station, spot: Spot) -> list[tuple[str, Spot]]:
         """The largest kind on each other spot of the station and where that lies as seen from any of them, seen from this one.
 
-        Lower layers are left away: they are no higher than what this spot lies on.
+        Lower layers are left away: they are no higher than what this spot lies on; and so is what this one carries.
         """
         found: dict[tuple[float, ...], tuple[str, Spot]] = {}
         stand = {one: [kind.name for kind, _ in self.grounds(station, one)] for one in self.spots(station)}
@@ -283,6 +305,8 @@ class Places:
                 # the places of a kind are filled from the lowest on: above it stands none of its own yet
                 up = other.z - one.z
                 if other == one or not own or not kinds or up < 0.0 or (up > 0.0 and own == kinds):
+                    continue
+                if up > 0.0 and one in [under for _, under in self.below(station, other)]:
                     continue
                 along, across = beside((0.0, 0.0), -one.yaw, (other.x - one.x, other.y - one.y))
                 largest = max(kinds, key=lambda kind: self.kinds[kind].footprint_m())

@@ -123,18 +123,12 @@ def _check_carried(places: Places, station: Station, spot: Spot, below: list[Spo
         raise BadInput(
             f"{where}: {what}: wanted a place that carries it, and height_m = the height of the part on that"
         )
-    names = {kind.name for kind, _ in own}
     for under in carriers:
         for kind, _ in places.grounds(station, under):
             if abs(under.z + kind.height_m - spot.z) > ON_TOP_M:
                 raise BadInput(
                     f"{where}: a {kind.name} may stand below it, {kind.height_m:g} m high: give the place at "
                     f"{_off(station, under)} the kind that carries it"
-                )
-            if kind.name not in names:
-                raise BadInput(
-                    f"{where}: it stands on a {kind.name}, which takes places of its own: which of them comes first is "
-                    "not planned: wanted the same kinds in all layers of a stack"
                 )
     for kind, ground in own:
         if not _rests(ground, [covered for under in carriers for _, covered in places.grounds(station, under)]):

@@ -16,6 +16,7 @@ from lab.sim.scene.places import SLAB, Layout, Rectangle
 from lab.sim.scene.scene_check import places_of
 from lab.tasks.task import Order, Task
 from lab.tasks.task_fields import Obstacle, Place
+from lab.tasks.task_file import load
 
 Moved = Callable[..., Task]
 QUARTER = pi / 2
@@ -145,6 +146,24 @@ def test_beside_a_spot_stand_no_lower_layers_and_none_above_that_come_later(pall
     found = [spot for _, spot in places_of(palletise).neighbours(palletise.station("pallet"), here).values()]
     assert len(found) == 8
     assert {spot.z for spot in found} == {0.02}
+
+
+def test_what_stands_below_a_place_is_of_the_kind_that_carries_it() -> None:
+    kit = load("kit")
+    places, tray = places_of(kit), kit.station("tray")
+    boxes, lids = (places.spots(tray, kind) for kind in ("box", "lid"))
+    assert [places.below(tray, spot) for spot in lids] == [[("box", spot)] for spot in boxes]
+    above = [spot for kind, spot in places.neighbours(tray, boxes[1]).values() if kind == "lid"]
+    assert all(spot.y != pytest.approx(boxes[1].y) for spot in above)  # its own lid comes later, or is gone
+
+
+def test_parts_begin_on_what_carries_them() -> None:
+    kit = load("kit")
+    turned = [part.model_copy(update={"routes": (part.routes[0][::-1],)}) for part in kit.parts]
+    places = places_of(kit.changed(parts=tuple(turned)))
+    assert [round(spot.z, 3) for spot in places.begins(("box", "box", "lid"))] == [0.02, 0.02, 0.07]
+    with pytest.raises(BadInput, match="part 'lid': count: at 'tray' 2 lids would stand on more than 1 box"):
+        places.begins(("box", "lid", "lid"))
 
 
 def test_a_nest_takes_its_kind_alone(breakfast: Task, moved: Moved) -> None:

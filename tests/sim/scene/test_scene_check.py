@@ -14,7 +14,7 @@ from lab.tasks.task_fields import Place
 from lab.tasks.task_file import load
 
 Moved = Callable[..., Task]
-SHIPPED = ["toast", "two-toasters", "breakfast", "fms-arm", "sorting", "palletise"]
+SHIPPED = ["toast", "two-toasters", "breakfast", "fms-arm", "sorting", "palletise", "kit"]
 
 
 @pytest.mark.parametrize("name", ["plate", "toaster_buffer", "toaster", "butter_applier", "finished_plate"])
@@ -191,14 +191,8 @@ def test_on_a_body_from_a_file_a_place_may_be_high_alone(palletise: Task, moved:
     check_places(places_of(task), task.station("pallet"))
 
 
-def test_a_kind_stands_on_its_own_kind(breakfast: Task, moved: Moved) -> None:
-    """Which of two kinds comes first is not planned; and a place that takes both is as high as neither."""
+def test_a_place_that_takes_two_kinds_is_as_high_as_neither(breakfast: Task, moved: Moved) -> None:
     slice_m, cup_m = (places_of(breakfast).kinds[kind].height_m for kind in ("slice", "cup"))
-    low, high = Place(at=(0.0, 0.0, 0.0), kind="slice"), Place(at=(0.0, 0.0, 0.0), kind="cup", height_m=slice_m)
-    other = Place(at=(0.0, 0.2, 0.0), kind="slice")
-    mixed = moved(breakfast, "tray", capacity=3, spots=None, places=(low, other, high))
-    with pytest.raises(BadInput, match="it stands on a slice, which takes places of its own"):
-        check_places(places_of(mixed), mixed.station("tray"))
     lowest = min(slice_m, cup_m)
     any_kind = (Place(at=(0.0, 0.0, 0.0)), Place(at=(0.0, 0.2, 0.0)), Place(at=(0.0, 0.0, 0.0), height_m=lowest))
     both = moved(breakfast, "tray", capacity=3, spots=None, places=any_kind)

@@ -1,0 +1,110 @@
+"""What must have been done with some parts before it may be done with others: a part that carries another one comes first."""
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from lab.errors import BadInput
+from lab.sequencing.cell.routes import Option, Position, reached_from
+
+
+@dataclass(frozen=True)
+class Step:
+    """A transfer on a part's route: the one that brings it to a station, or, `leaves`, that takes it away from there."""
+
+    station: str
+    leaves: bool = False
+
+    def __str__(self) -> str:
+        return f"{'leave' if self.leaves else 'come to'} '{self.station}'"
+
+
+@dataclass(frozen=True)
+class Precedence:
+    """Of `parts` (numbers, from 1), the k-th that makes `step` may not begin it before `needs[k - 1]` of the parts `of` have
+    ended `of_step`, by whatever way.
+
+    needs: whole numbers that do not fall, one for each of `parts`; left out: all of `of`. With one part on each side this is the
+    usual constraint from a finish to a start. Source: finish-to-start precedence, Brucker et al. 1999.
+    """
+
+    parts: tuple[int, ...]
+    step: Step
+    of: tuple[int, ...]
+    of_step: Step
+    needs: tuple[int, ...] = ()
+
+    @property
+    def counts(self) -> tuple[int, ...]:
+        """How many of `of` the first, second, ... of `parts` needs."""
+        return self.needs or (len(self.of),) * len(self.parts)
+
+
+class Rule(NamedTuple):
+    """A precedence by positions (indices): those of `parts` that have made their step, those of `of` that have, and the counts.
+
+    Parts count by where they are. lost ones are nowhere: they have left, and have not come.
+    """
+
+    made: frozenset[int]
+    ended: frozenset[int]
+    counts: tuple[int, ...]
+
+    def applies(self, place: int, option: Option) -> bool:
+        """Whether a way from a position is the step that has to wait."""
+        return option.to in self.made and place not in self.made
+
+    def missing(self, made: int, ended: int) -> int:
+        """How many more of `of` must have ended their step before one more part may begin its own; 0: it may."""
+        return max(0, self.counts[made] - ended) if made < len(self.counts) else 0
+
+
+def allows(rules: Sequence[Rule], counted: Sequence[int], place: int, option: Option) -> bool:
+    """Whether no precedence forbids a way from a position; `counted`: how many parts stand in each position."""
+    return not any(rule.applies(place, option) and missing(rule, counted) for rule in rules)
+
+
+def missing(rule: Rule, counted: Sequence[int]) -> int:
+    """`Rule.missing`, by how many parts stand in each position."""
+    return rule.missing(sum(counted[n] for n in rule.made), sum(counted[n] for n in rule.ended))
+
+
+def signatures(precedences: Sequence[Precedence], parts: int) -> list[tuple[tuple[bool, bool], ...]]:
+    """Which sides of the precedences each part stands on, part 1 first: parts that differ in it are not alike."""
+    return [tuple((part in one.parts, part in one.of) for one in precedences) for part in range(1, parts + 1)]
+
+
+def made_in(positions: Sequence[Position], own: Collection[int], step: Step, names: Sequence[str]) -> frozenset[int]:
+    """Of the positions of a product, those in which its part has made a step."""
+    ways = [way for place in own for way in positions[place].options if way.carries == "part"]
+    at = [names[way.origin] if step.leaves else names[way.target] for way in ways]
+    return frozenset(
+        reached_from(positions, {way.to for way, name in zip(ways, at, strict=True) if name == step.station})
+    )
+
+
+def check_precedences(
+    precedences: Sequence[Precedence],
+    names: Sequence[str],
+    part_names: Sequence[str],
+    steps: Mapping[str, Collection[Step]],
+) -> None:
+    """BadInput for a precedence of parts, stations or counts that cannot be; `steps`: what each product's parts all do."""
+    for one in precedences:
+        where = f"precedence of {one.step} after {one.of_step}"
+        for part in (*one.parts, *one.of):
+            if not 1 <= part <= len(part_names):
+                raise BadInput(f"{where}: there is no part {part}, only 1 to {len(part_names)}")
+        for parts, step in ((one.parts, one.step), (one.of, one.of_step)):
+            if not parts or len(set(parts)) < len(parts):
+                raise BadInput(f"{where}: parts {list(parts)}: wanted one or more, each once")
+            for part in parts:
+                if step not in steps[part_names[part - 1]]:
+                    known = dict.fromkeys(str(other) for other in steps[part_names[part - 1]])
+                    raise BadInput(
+                        f"{where}: {part_names[part - 1]} does not {step} on every route; it does {', '.join(known)}"
+                    )
+        if len(one.counts) != len(one.parts) or [*one.counts] != sorted(one.counts):
+            raise BadInput(f"{where}: needs = {list(one.needs)}: wanted {len(one.parts)} counts that do not fall")
+        if one.counts[0] < 0 or one.counts[-1] > len(one.of):
+            raise BadInput(f"{where}: needs = {list(one.counts)}: there are {len(one.of)} parts to wait for")

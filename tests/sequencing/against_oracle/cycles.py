@@ -1,0 +1,68 @@
+"""The shortest periods that the lab finds, held against the oracle: one to three parts a cycle, and the best of these a part."""
+
+from dataclasses import dataclass
+from math import inf
+
+from oracle import cycle as plain
+from oracle.cycle import BestCycle
+
+from against_oracle.compared import cell_of
+from against_oracle.drawn import Raw
+from against_oracle.translated import plain_cell
+from lab.errors import WorkFailed
+from lab.sequencing.cyclic.cycle import best_cycle
+
+MOST_PARTS = 3
+SECONDS = 8.0
+
+
+@dataclass(frozen=True)
+class Periods:
+    """With so many parts a cycle: the lab's shortest period and whether it calls it proven, and the oracle's [s]."""
+
+    parts: int
+    period_s: float
+    proven: bool
+    oracle: BestCycle
+
+
+def fits(raw: Raw) -> bool:
+    """Whether a cycle is looked for in a cell: one robot, machines without servers, and nothing comes."""
+    return "robot" in raw and "arrivals" not in raw and not any("servers" in one for one in raw["stations"])
+
+
+def periods(raw: Raw, seconds: float = SECONDS) -> list[Periods]:
+    """The periods of a cell that makes the first product of its order for ever. BadInput as the lab."""
+    name, found = raw["order"][0], list[Periods]()
+    raw = {key: value for key, value in raw.items() if key not in ("due_s", "release_s", "sequencing")}
+    cell = cell_of(raw | {"order": [name] * MOST_PARTS})
+    for parts in range(1, MOST_PARTS + 1):
+        oracle = plain.best_cycle(plain_cell(cell), (name,) * parts, seconds)
+        try:
+            one = best_cycle(cell, (name,) * parts, seconds)
+        except WorkFailed as error:
+            found.append(Periods(parts, inf, "it is proven" in str(error), oracle))
+            continue
+        found.append(Periods(parts, one.period_s, one.proven, oracle))
+    return found
+
+
+def judged(found: list[Periods]) -> list[tuple[str, str, str]]:
+    """What is wrong with them: kind, method and words."""
+    wrong = list[tuple[str, str, str]]()
+    for one in found:
+        near = one.oracle.tick_s + 1e-6
+        if one.proven and one.period_s > one.oracle.period_s + near:
+            words = f"{one.parts} a cycle: proven {one.period_s:g}, there is one of {one.oracle.period_s:g}"
+            wrong.append(("period is beaten", "cyclic", words))
+        if one.period_s < one.oracle.bound_s - near:
+            words = f"{one.parts} a cycle: {one.period_s:g}, the oracle proves {one.oracle.bound_s:g}"
+            wrong.append(("period is below the oracle", "cyclic", words))
+    best = min(found, key=lambda one: one.oracle.period_s / one.parts)
+    each_s = best.oracle.period_s / best.parts
+    if found[0].proven and each_s < found[0].period_s - best.oracle.tick_s:
+        words = (
+            f"proven that no order repeats faster than {found[0].period_s:g}; {best.parts} a cycle: {each_s:g} a part"
+        )
+        wrong.append(("one part a cycle is beaten", "cyclic", words))
+    return wrong
