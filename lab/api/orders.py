@@ -17,6 +17,7 @@ from lab.sequencing.search import SequenceResult
 from lab.sequencing.simulate.run import simulate
 from lab.tasks.sequencing import Sequencing
 from lab.teaching.teacher import Teacher
+from lab.view.figures import among
 
 if TYPE_CHECKING:
     import pandas
@@ -61,8 +62,13 @@ class OrderResult:
 
     @property
     def proven(self) -> bool:
-        """Whether no order costs less than the best one."""
+        """Whether no order costs less than the best one, of those in `proven_of`."""
         return bool(self.document["proven"])
+
+    @property
+    def proven_of(self) -> str:
+        """Of which plans `bound` and `proven` speak: "every plan", or "orders that never wait on purpose"."""
+        return str(self.document["proven_of"])
 
     @property
     def moves(self) -> list[str]:
@@ -87,6 +93,7 @@ class OrderResult:
 
     def __str__(self) -> str:
         what = "proven: there is none better" if self.proven else f"nothing below {self.bound:g} is possible"
+        what += among(self.proven_of)
         return f"{self.document['objective']} {self.cost:g} (by {self.document['best_by']}; {what})"
 
     def _repr_html_(self) -> str:

@@ -129,7 +129,11 @@ def ordered(cell: Cell, settings: Sequencing, advice: OrderAdvice, seed: int, te
     """
     search, proven = search_for(settings), optimum(cell)
     is_timed = search.objective == MAKESPAN
-    known = Reference(proven.bound_s, proven.proven, "A*") if is_timed else reference(cell, search.objective)
+    known = (
+        Reference(proven.bound_s, proven.proven, "A*", of=cell.proven_of)
+        if is_timed
+        else reference(cell, search.objective)
+    )
     orders = dict[str, SequenceResult]()
     if advice.given:
         taken = checked_order(cell, advice.given)
@@ -167,7 +171,7 @@ def reference(cell: Cell, objective: str, time_limit_s: float = SECOND_OPINION_S
     if objective not in BUILT_IN:
         return Reference(0.0, False, "nothing: CP-SAT has no rule for this objective", unit)
     found = best_known(cell, objective, time_limit_s, workers=workers)
-    return Reference(found.bound, found.proven, found.bound_by, unit, found.sequence, found.found_by)
+    return Reference(found.bound, found.proven, found.bound_by, unit, found.sequence, found.found_by, cell.proven_of)
 
 
 def _cheapest(orders: Mapping[str, SequenceResult]) -> str:

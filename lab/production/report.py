@@ -111,6 +111,7 @@ class Report:
             "bound_s": self.proven.bound_s,
             "optimality_gap": self.gap,
             "optimum_proven": self.proven.proven,
+            "proven_of": self.taught.cell.proven_of,
             "camera_deviation_m": max(outcome.camera_deviations_m, default=None),
             "sim_s": outcome.sim_s - outcome.skipped_s + self.taught.durations.sim_s,
             "skipped_s": outcome.skipped_s,

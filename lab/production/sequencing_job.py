@@ -272,6 +272,7 @@ def _document(
         "optimal_s": optimal if timed else None,
         "optimal_cost": optimal,
         "optimum_proven": known.proven,
+        "proven_of": known.of,
         "bound_s": known.bound if timed else None,
         "bound_cost": known.bound,
         "bound_by": known.method,

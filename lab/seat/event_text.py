@@ -35,7 +35,7 @@ from lab.teaching.events import (
     SkillReady,
 )
 from lab.teaching.lesson_plan import Lesson
-from lab.view.figures import beside, gap_of
+from lab.view.figures import among, beside, gap_of
 
 PHASES = {
     "learn": "Find or learn the skills",
@@ -171,7 +171,7 @@ def sequence_parts(event: SequenceFound) -> tuple[str, str]:
         gap = known.gap(best.cost)
         shown, bound = beside(best.cost, known.bound, known.unit, 1)
         what = "proven optimum" if known.proven else "proven bound"
-        reference = f"{what} {bound}" + ("" if gap is None else f", gap {gap_of(gap, 1)}")
+        reference = f"{what} {bound}" + ("" if gap is None else f", gap {gap_of(gap, 1)}") + among(known.of)
     by = f" by {event.method}" if event.method else ""
     episode, episodes = best.episode_costs.index(best.cost) + 1, len(best.episode_costs)
     found = f"{shown} found{by} in episode {episode} of {episodes}"

@@ -6,7 +6,7 @@ from math import inf
 from typing import TYPE_CHECKING, Literal
 
 from lab.errors import BadInput, WorkFailed, counted, unknown
-from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.cell import EVERY_PLAN, Cell
 from lab.sequencing.cell.chance import NO_CHANCE, Chance
 from lab.sequencing.cell.objectives import MAKESPAN, check_objective
 
@@ -116,7 +116,8 @@ def gap(cost: float, bound: float) -> float:
 class Reference:
     """What no sequence can beat: `bound`, in the objective's unit; `proven`: some sequence reaches it.
 
-    sequence: the best one that was found, without pointless hops, and by which method; empty: none.
+    sequence: the best one that was found, without pointless hops, and by which method; empty: none. of: of which plans that is
+    said (see `Cell.proven_of`).
     """
 
     bound: float
@@ -125,6 +126,7 @@ class Reference:
     unit: str = " s"
     sequence: tuple[int, ...] = ()
     found_by: str = ""
+    of: str = EVERY_PLAN
 
     def gap(self, cost: float) -> float | None:
         """`gap` to the bound; None where the bound is 0 and the cost is not."""

@@ -1,5 +1,7 @@
 """Figures that agree: what differs looks different, and a gap that is not zero is not shown as zero."""
 
+from lab.sequencing.cell.cell import EVERY_PLAN
+
 MOST_DECIMALS = 6
 SAME = 1e-9  # what differs by less, as a fraction, is the same: sums are rounded
 NEAR = 0.1  # a gap worked out from the figures shown is off by this share of the true one, at most
@@ -28,3 +30,8 @@ def gap_of(gap: float, decimals: int) -> str:
     while decimals < MOST_DECIMALS and float(f"{gap:.{decimals}%}"[:-1]) == 0.0:
         decimals += 1
     return f"{gap:.{decimals}%}"
+
+
+def among(of: str) -> str:
+    """Of which plans something is proven, where these are not all (see `Cell.proven_of`): ", among ...", else ""."""
+    return "" if of == EVERY_PLAN else f", among {of}"

@@ -44,7 +44,7 @@ Lab = Callable[..., Any]
 RUN_FIELDS = (
     *("task", "seed", "toasts", "parts", "success", "delivered", "dropped", "failure", "retries", "skills", "sequence"),
     *("method", "predicted_makespan_s", "measured_makespan_s", "optimal_makespan_s", "bound_s"),
-    *("optimality_gap", "optimum_proven"),
+    *("optimality_gap", "optimum_proven", "proven_of"),
     *(
         "camera_deviation_m",
         "sim_s",

@@ -40,6 +40,8 @@ TRACK_SLACK_S = 1e-9  # by what sums of times may differ
 BUFFER_USES = ("busy", "free")
 ARRIVALS_AFTER = ("clock", "pick")
 
+EVERY_PLAN, NEVER_WAIT = "every plan", "orders that never wait on purpose"  # of which something is proven
+
 
 @dataclass(frozen=True, eq=False)
 class Cell:
@@ -134,6 +136,16 @@ class Cell:
     def serial(self) -> bool:
         """Whether one robot does all the work, so that what is decided later also happens later."""
         return is_serial(self.positions, self.robots)
+
+    @cached_property
+    def proven_of(self) -> str:
+        """Of which plans an optimum or a bound is one of: `EVERY_PLAN`, or `NEVER_WAIT` where waiting on purpose may be better.
+
+        With time windows a robot that waits before it brings a part may keep another one from spoiling. Several robots may make
+        room for each other in turn, which no list of whole transfers says. Else nothing becomes worse by being done earlier.
+        """
+        windows = any(place.at_most_s is not None for place in self.positions)
+        return NEVER_WAIT if windows or len(self.robots) > 1 else EVERY_PLAN
 
     @cached_property
     def ways(self) -> Mapping[tuple[int, int], Way]:

@@ -39,13 +39,24 @@ def add_rooms(tasks: Tasks) -> None:
 
 
 def _visits(tasks: Tasks, station: int) -> list[Visit]:
-    holds, found = [station in place.holds for place in tasks.cell.positions], list[Visit]()
+    """Every visit of a part to a station, of which each has takes of its own: a route may lead to it more than once."""
+    positions, found = tasks.cell.positions, list[Visit]()
+    holds = [station in place.holds for place in positions]
+
+    def visit(part: int, bring: Task | None, begin: int) -> Visit:
+        there, ahead = {begin}, [begin]
+        while ahead:
+            more = {way.to for way in positions[ahead.pop()].options if holds[way.to]} - there
+            there |= more
+            ahead += more
+        takes = tuple(t for t in tasks.of(part) if t.place in there and not holds[t.option.to])
+        return Visit(part, bring, takes)
+
     for part, begin in enumerate(tasks.cell.begin_at):
-        own = tasks.of(part)
-        takes = tuple(task for task in own if holds[task.place] and not holds[task.option.to])
         if holds[begin]:
-            found.append(Visit(part, None, takes))
-        found += [Visit(part, t, takes) for t in own if holds[t.option.to] and not holds[t.place]]
+            found.append(visit(part, None, begin))
+        own = tasks.of(part)
+        found += [visit(part, t, t.option.to) for t in own if holds[t.option.to] and not holds[t.place]]
     return found
 
 
@@ -62,7 +73,7 @@ def _add_room(tasks: Tasks, station: int, visits: Sequence[Visit]) -> None:
                 model.add(visit.bring.end <= drop).only_enforce_if(visit.bring.done, ~late[number])
                 model.add_implication(nodes[-3][2], ~late[number])
         for other, after in enumerate(visits, 1):
-            if visit.part == after.part or after.bring is None or not visit.takes:
+            if visit is after or after.bring is None or not visit.takes:
                 continue
             arc = model.new_bool_var("room")
             nodes.append((number, other, arc))

@@ -13,9 +13,6 @@ BEATEN: dict[str, Callable[[set[str]], bool]] = {
         lambda has: "two robots" in has
     ),
     "time windows: nobody waits on purpose": lambda has: "windows" in has,
-    "a machine with servers that is visited twice: CP-SAT says that there is no order": lambda has: (
-        "machine twice" in has
-    ),
 }
 
 
