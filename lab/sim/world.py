@@ -19,6 +19,7 @@ from lab.sim.silence import silence
 
 TIME_STEP = 1.0 / 240.0  # [s]
 PART_SPINNING = 0.001  # [m] what resists a part's turning about a contact
+GROUP, ALL = 1, -1  # the collision group in which movable bodies are, and those that they meet: the engine's own
 PART_ROLLING = 0.0005  # [m] and its rolling, unless it is a box: without, a ball that was set down never rests
 
 Array = NDArray[np.float64]
@@ -324,6 +325,21 @@ class World:
         self._call("changeConstraint", gear, gearRatio=-1.0 / ratio, erp=0.1, maxForce=100)
 
     # ---- questions ----------------------------------------------------------------------------------------------
+
+    def touch_anew(self, name: str, links: Sequence[str]) -> None:
+        """Let the engine find anew, at its next step, where movable bodies touch these links of a body.
+
+        It keeps a contact as long as the two points stay together, with the direction that it had in the world: in a gripper
+        that turned by half a turn a part would press on the fingers from behind, and hold them closed.
+        """
+        entry, movable = self._bodies[name], {one.number for one in self._bodies.values() if one.moves}
+        touched = {
+            int(found[2])
+            for link in links
+            for found in self._call("getContactPoints", entry.number, linkIndexA=entry.links[link])
+        }
+        for number in sorted(touched & movable - {entry.number}):
+            self._call("setCollisionFilterGroupMask", number, -1, GROUP, ALL)
 
     def touching(self, one: str, other: str, link: str = "") -> bool:
         """Whether two bodies touched in the last step (`link`: that link of the first)."""

@@ -85,7 +85,10 @@ def free_above(what: str, survey: Survey, goal: tuple[int, ...]) -> tuple[int, .
     free = [cell for cell in top if not survey.blocked[cell]]
     if survey.blocked[goal] or not free:
         names = survey.names([goal] if survey.blocked[goal] else top)
-        raise BadInput(f"{what}: no room for gripper and part; in the way: {', '.join(names)}")
+        raise BadInput(
+            f"{what}: no room for gripper and part; in the way: {', '.join(names)}: move that, or say spots that are farther "
+            "apart, or let the fingers open less (opening_m)"
+        )
     return free[0]
 
 

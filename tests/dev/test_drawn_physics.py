@@ -1,4 +1,4 @@
-"""The harness's part `physics`: what is drawn into a task file, one refused before any work, and what counts as broken."""
+"""The harness's part `physics`: what is drawn, one that is refused before any work, and what counts as broken."""
 
 import json
 import tomllib
@@ -6,10 +6,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 from commands import Ended
-from drawn_physics import FORCE_N, MASS_KG, MOVED_M, SPEED_M_S, TASKS, attempt, drawn, judged
+from drawn_cells import drawn_cell
+from drawn_features import FEATURES
+from drawn_parts import MESHES, SOLIDS
+from drawn_physics import FORCE_N, MASS_KG, MOVED_M, SHIPPED, SPEED_M_S, TASKS, attempt, drawn, judged
 
-from lab.tasks.task_file import find
+from lab.tasks.robot_fields import MODELS
+from lab.tasks.task_file import find, task_of_text
+
+FMS = SHIPPED * TASKS.index("fms-arm")
 
 NOT_HELD = "lab: robot.grip_force_n = 1: slice of 2 kg, friction 0.1, would slip\n"
 
@@ -32,9 +39,34 @@ def test_one_that_cannot_be_carried_is_refused_before_any_work(
 ) -> None:
     """Slippery pallets in a hurry: a rook would slide off."""
     monkeypatch.setenv("PYTHONPATH", str(root))
-    outcome = attempt(7, 1002, tmp_path)
+    outcome = attempt(FMS, 1001, tmp_path)
     assert (outcome.group, outcome.broke) == ("refused", "")
-    assert "acceleration_m_s2 = 3.37: rook on pallet would slide: friction 0.113" in outcome.case
+    assert "acceleration_m_s2 = 3.77: rook on pallet would slide: friction 0.1" in outcome.case
+
+
+@pytest.mark.parametrize("form", [*SOLIDS, *MESHES])
+def test_what_a_part_looks_like_is_a_closed_solid_as_narrow_as_asked(form: str) -> None:
+    mesh: trimesh.Trimesh = (SOLIDS | MESHES)[form](np.random.default_rng(0), 0.03)
+    assert mesh.is_watertight
+    assert mesh.volume > 0
+    assert mesh.extents[1] <= 0.03 + 1e-9
+
+
+def test_new_cells_are_task_files_and_have_each_arm_form_and_feature(tmp_path: Path) -> None:
+    seen: set[str] = set()
+    for seed in range(60):
+        folder = tmp_path / str(seed)
+        folder.mkdir()
+        text, words = drawn_cell(np.random.default_rng(seed), folder)
+        task = task_of_text(folder / "drawn.toml", text)
+        assert all((folder / part.file).is_file() for part in task.parts if part.file)
+        seen |= set(words.split(", "))
+    assert seen >= {*MODELS, *SOLIDS, *MESHES, *FEATURES}
+
+
+def test_a_seed_draws_the_same_cell(tmp_path: Path) -> None:
+    one, other = (drawn_cell(np.random.default_rng(3), tmp_path) for _ in range(2))
+    assert one == other
 
 
 def ended(code: int, stderr: str = "", **document: object) -> Ended:

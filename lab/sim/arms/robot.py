@@ -21,6 +21,7 @@ _TURNED_RAD = pi / 2  # [rad] from here on the tool begins a path by turning on 
 _SETTLE_STEPS = 12  # after a path ends
 _HELD_RAD = 0.005  # farther off its targets than this something has moved the arm
 GRIP_STEPS = 72  # 0.3 s to close or open
+_TOUCH_RAD, _TOUCH_STEPS = 0.1, 8  # so far the tool turns before contacts are found anew; looked at every so many steps
 _PEDESTAL_M, _PEDESTAL_RGBA = 0.09, (0.22, 0.23, 0.26, 1.0)  # radius
 _POINT_M = 0.002  # the same as PAD_M where a finger touches in a point
 _FINE_ITERATIONS = 200  # of the solver: with 60 a slice creeps 2 mm a second in fingers that a linkage moves
@@ -121,6 +122,7 @@ class Robot:
         self._free = [joint for joint in fingers.joints if joint not in fingers.driven]
         self.closed = False
         self.listener: MotionListener | None = None
+        self._touched_at = 0.0  # the tool's yaw [rad] when the contacts of what it holds were last found anew
         self._half_on = False  # whether the tool is half a turn on from the yaw that was asked for
         self.hold(arm.home)
         self.open_at_once()
@@ -205,6 +207,8 @@ class Robot:
             self._lead(position, velocity)
             if heard is not None:
                 heard.drives(row)
+            if self.closed and row % _TOUCH_STEPS == 0:
+                self._touch_anew()
             yield
         self._lead(way.positions[-1])
         if heard is not None:
@@ -212,6 +216,13 @@ class Robot:
         yield from _stay(_SETTLE_STEPS)
         if heard is not None:
             heard.ended()
+
+    def _touch_anew(self) -> None:
+        """Have the contacts of what is held found anew when the tool has turned with it."""
+        yaw = self.tool().yaw
+        if abs((yaw - self._touched_at + pi) % (2 * pi) - pi) > _TOUCH_RAD:
+            self._touched_at = yaw
+            self.world.touch_anew(NAME, [link for side in self.arm.fingers.links for link in side])
 
     def rest(self, steps: int) -> Iterator[None]:
         """Stay for so many physics steps."""
@@ -222,7 +233,7 @@ class Robot:
     def grip(self, force_n: float | None = None) -> Iterator[None]:
         """Close the fingers and keep pressing, each with a force [N], by default the grip force."""
         self._press(self.arm.fingers.strokes[0], self.grip_force if force_n is None else force_n)
-        self.closed = True
+        self.closed, self._touched_at = True, self.tool().yaw
         yield from self._pressed()
 
     def release(self) -> Iterator[None]:

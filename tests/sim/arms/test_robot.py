@@ -18,7 +18,9 @@ from lab.sim.arms.kinematics import ToolPose
 from lab.sim.arms.robot import NAME, Robot, Trajectory, plan
 from lab.sim.arms.tool_path import YAW_ARM
 from lab.sim.models import FINGER_OPEN, SLICE
+from lab.sim.parts.part_shape import shape_of
 from lab.sim.world import TIME_STEP, World
+from lab.tasks.part_fields import PartFields
 
 UP6 = arm_named("up6")
 FINGERS = UP6.fingers.joints
@@ -224,6 +226,22 @@ def test_friction_alone_holds_a_slice_that_is_swung_about(robot: Robot, world: W
     assert np.linalg.norm(_hangs(robot, world) - before) < 4e-3
     steps(world, robot.rest(240))
     assert np.linalg.norm(_hangs(robot, world) - before) < 4e-3
+
+
+@pytest.mark.parametrize("turn", [pi / 2, pi])
+def test_the_fingers_do_not_push_what_they_turn_out_of_their_middle(turn: float) -> None:
+    """A contact that kept its direction in the world pushes a can aside: by 27 mm and 5 mm here."""
+    can = shape_of(PartFields(name="can", shape="cylinder", size_m=(0.036, 0.09), mass_kg=0.08), assets_folder())
+    at, held = ToolPose(0.7, 0.0, 0.123), ToolPose(0.7, 0.0, 0.173)
+    with World() as world:
+        robot = Robot(world, arm_named("up6"), 0.5, 2.0, 12.0, fine=True)
+        world.box("table", (0.4, 0.4, 0.1), (0.7, 0.0, 0.05), (1.0, 1.0, 1.0, 1.0))
+        world.part("can", can, 0.08, 0.8, (0.7, 0.0, 0.1 + can.foot_m))
+        robot.stand(at)
+        for motion in (robot.rest(60), robot.grip(), robot.follow([held]), robot.follow([held.shifted(dyaw=turn)])):
+            steps(world, motion)
+        steps(world, robot.release())
+        assert world.pose("can")[0][:2] == pytest.approx((0.7, 0.0), abs=0.002)
 
 
 def _hangs(robot: Robot, world: World) -> np.ndarray:
