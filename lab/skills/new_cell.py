@@ -23,7 +23,7 @@ FINGERS_M = 0.016  # that the fingers open beyond the widest part
 ROOM_M = 0.08  # between parts, where what stations have by themselves is not enough for the gripper
 MOST_TRIES = 4  # layouts of which every sub-task is surveyed
 NOT_HELD = "is not held"  # what a trial says of a part that slips, turns or falls over
-OTHER_MASSES = (0.5, 0.2, 0.1, 2, 5, 10)  # times its own, tried for such a part
+OTHER_MASSES = (0.5, 0.2, 0.1, 0.05, 2, 5, 10)  # times its own, tried for such a part
 
 
 def new_cell(new: NewTask, path: Path) -> tuple[str, Task]:

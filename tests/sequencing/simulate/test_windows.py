@@ -134,7 +134,7 @@ def test_exact_methods_agree_with_brute_force(
     cell = data.draw(cells(*size, windows=True))
     all_s = [run.now_s for run in ends(Run(cell))]
     if not all_s:
-        with pytest.raises(WorkFailed, match=r"no order was found .* is proven: all were tried"):
+        with pytest.raises(WorkFailed, match=r"no order .* was found .* is proven: all were tried"):
             optimum(cell)
         return
     best = optimum(cell)
