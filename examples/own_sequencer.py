@@ -4,7 +4,8 @@ import numpy as np
 
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.search import EpisodeSequenced, Search, SequenceResult
-from lab.sequencing.simulate.run import Run, simulate
+from lab.sequencing.simulate.follow import simulate
+from lab.sequencing.simulate.run import Run
 
 
 def last_first(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceResult:

@@ -14,7 +14,7 @@ from lab.production.sequencing_job import Wanted, sequence_cell, sequenced_named
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import NO_CHANCE
 from lab.sequencing.search import SequenceResult, among
-from lab.sequencing.simulate.run import simulate
+from lab.sequencing.simulate.follow import simulate
 from lab.tasks.sequencing import Sequencing
 from lab.teaching.teacher import Teacher
 

@@ -74,7 +74,7 @@ class RunResult:
     @cached_property
     def gantt(self) -> Picture:
         """The Gantt chart: thick as carried out, thin as planned."""
-        from lab.sequencing.simulate.run import simulate
+        from lab.sequencing.simulate.follow import simulate
         from lab.view.gantt import gantt
 
         planned = simulate(self.report.taught.cell, self.report.sequenced.sequence)

@@ -26,8 +26,8 @@ from lab.production.trouble import RunStopped, Trouble
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.schedule import Schedule
 from lab.sequencing.cell.schedule_rows import rows_of
+from lab.sequencing.simulate.follow import simulate
 from lab.sequencing.simulate.rest import Mishaps
-from lab.sequencing.simulate.run import simulate
 from lab.sim.frames import Recording
 from lab.sim.world import World
 from lab.skills.prepared_scene import Prepared

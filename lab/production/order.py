@@ -25,7 +25,8 @@ from lab.sequencing.cell.schedule import Move
 from lab.sequencing.methods.exact import Optimum, optimum
 from lab.sequencing.methods.portfolio import best_known
 from lab.sequencing.search import SAME, Reference, Search, SequenceResult
-from lab.sequencing.simulate.run import Run, branch, follow
+from lab.sequencing.simulate.follow import follow
+from lab.sequencing.simulate.run import Run, branch
 from lab.tasks.sequencing import Sequencing, search_for
 from lab.teaching.events import ORDER, LessonEvent, OrderChosen, SequenceFound, SequencingBegan, Tell, unheard
 from lab.teaching.lesson_sessions import TellingAdvisor

@@ -10,8 +10,9 @@ from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.routes import part_of
 from lab.sequencing.cell.schedule import Schedule
 from lab.sequencing.methods.exact import Optimum, optimum
+from lab.sequencing.simulate.follow import simulate
 from lab.sequencing.simulate.rest import NOTHING, Mishaps, Rest, rest_of
-from lab.sequencing.simulate.run import Run, branch, simulate
+from lab.sequencing.simulate.run import Run, branch
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ from lab.sequencing.cell.schedule import Schedule
 from lab.sequencing.cell.schedule_rows import csv_of, rows_of
 from lab.sequencing.methods.exact import Optimum
 from lab.sequencing.search import SequenceResult
-from lab.sequencing.simulate.run import simulate
+from lab.sequencing.simulate.follow import simulate
 from lab.sim.frames import Recording
 from lab.skills import Skill
 from lab.skills.prepared_scene import Prepared

@@ -20,7 +20,7 @@ from lab.production.report import Report, begin_pictures, write_files
 from lab.production.run_advice import RunAdvice
 from lab.production.run_journal import DurationsKept, RunEnded, RunJournal
 from lab.production.taught import Taught, skill_row
-from lab.sequencing.simulate.run import simulate
+from lab.sequencing.simulate.follow import simulate
 from lab.sim.frames import Recording
 from lab.skills.prepared_scene import Prepared
 from lab.skills.trial import trial_of

@@ -29,7 +29,7 @@ from lab.sequencing.cell.objectives import (
 from lab.sequencing.cell.schedule_rows import check_table, rows_of, write_table
 from lab.sequencing.methods.portfolio import TIME_LIMIT_S, WORKERS
 from lab.sequencing.search import SAME, EpisodeSequenced, LearnedSequence, Reference, Search, SequenceResult
-from lab.sequencing.simulate.run import follow, simulate
+from lab.sequencing.simulate.follow import follow, simulate
 from lab.tasks.carried_policy import read_policy
 from lab.tasks.cell_file import CellFile, order_from_word, toast_case
 from lab.tasks.grid_world import GridWorld

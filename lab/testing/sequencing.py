@@ -4,7 +4,7 @@ from lab.sequencing import SEQUENCERS, Find, find_sequence
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.methods.exact import optimum
 from lab.sequencing.search import EpisodeSequenced, Search, SequenceResult
-from lab.sequencing.simulate.run import simulate
+from lab.sequencing.simulate.follow import simulate
 from lab.tasks.task_file import load_cell
 from lab.testing.requirement import require
 

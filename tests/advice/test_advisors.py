@@ -25,7 +25,8 @@ from lab.learning.session_events import AdviceGiven
 from lab.learning.simulated_advice import Advice, TableAdvisor, advice_chances
 from lab.mdp import FloatArray, TabularMDP, grid, optimal_values, shortest_steps
 from lab.sequencing.request import SequenceRequest, state_of
-from lab.sequencing.simulate.run import Run, follow
+from lab.sequencing.simulate.follow import follow
+from lab.sequencing.simulate.run import Run
 from lab.tasks.task_file import load_cell
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 import lab
-from lab.sequencing.simulate.run import simulate
+from lab.sequencing.simulate.follow import simulate
 from lab.tasks.task_file import load_cell
 
 

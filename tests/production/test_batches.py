@@ -8,7 +8,7 @@ from lab.export.commands import Reset, Start, jobs_of
 from lab.production.composer import carry_out
 from lab.production.durations import cell_of, measure
 from lab.sequencing.methods.exact import optimum
-from lab.sequencing.simulate.run import simulate
+from lab.sequencing.simulate.follow import simulate
 from lab.skills.new_cell import new_cell
 from lab.skills.prepared_scene import Prepared, prepare
 from lab.tasks.new_task import new_task

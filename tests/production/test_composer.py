@@ -16,7 +16,7 @@ from lab.production.machine import Work
 from lab.production.outcome import Outcome
 from lab.production.recovery import MAX_TRIES
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.simulate.run import simulate
+from lab.sequencing.simulate.follow import simulate
 from lab.sim.arms.robot import NAME
 from lab.sim.frames import Body, Frame
 from lab.sim.scene.places import Layout

@@ -10,7 +10,7 @@ from lab.production.cyclic_order import cyclic_order, measured_period, mix_of
 from lab.production.order import OrderAdvice, ordered
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.stations import Stage, Station
-from lab.sequencing.simulate.run import simulate
+from lab.sequencing.simulate.follow import simulate
 from lab.tasks.sequencing import Sequencing
 from lab.tasks.task_file import load_cell
 

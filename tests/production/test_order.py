@@ -17,7 +17,8 @@ from lab.production.run_journal import RunBegan, RunJournal
 from lab.sequencing import find_sequence
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.request import SequenceRequest
-from lab.sequencing.simulate.run import Run, simulate
+from lab.sequencing.simulate.follow import simulate
+from lab.sequencing.simulate.run import Run
 from lab.tasks.sequencing import Sequencing, search_for
 from lab.tasks.task_file import load_cell
 from lab.teaching.events import ORDER, Event, OrderChosen, SequenceFound

@@ -22,7 +22,7 @@ from lab.sequencing.cell.objectives import OBJECTIVES
 from lab.sequencing.cell.schedule_rows import rows_of
 from lab.sequencing.methods.rules import RULES
 from lab.sequencing.search import Reference
-from lab.sequencing.simulate.run import simulate
+from lab.sequencing.simulate.follow import simulate
 from lab.tasks.sequencing import search_for
 from lab.tasks.task import Order
 from lab.tasks.task_file import load, load_cell

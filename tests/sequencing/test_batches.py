@@ -19,8 +19,9 @@ from lab.sequencing.methods.rolling import rolling
 from lab.sequencing.search import Search
 from lab.sequencing.simulate import kernels
 from lab.sequencing.simulate.cell_arrays import cell_arrays, run_arrays
+from lab.sequencing.simulate.follow import follow, simulate
 from lab.sequencing.simulate.rest import Mishaps, rest_of
-from lab.sequencing.simulate.run import Run, branch, follow, simulate
+from lab.sequencing.simulate.run import Run, branch
 
 DRAWN = 60
 

@@ -17,8 +17,9 @@ from lab.sequencing.methods.cp_sat import cp_sat
 from lab.sequencing.methods.exact import optimum
 from lab.sequencing.search import Search
 from lab.sequencing.simulate.cell_arrays import cell_arrays, run_arrays
+from lab.sequencing.simulate.follow import simulate
 from lab.sequencing.simulate.rest import Mishaps, rest_of
-from lab.sequencing.simulate.run import Run, simulate
+from lab.sequencing.simulate.run import Run
 
 IN, MILL, TRAY = Station("in", "storage", 9), Station("mill", "machine", 1, 5.0), Station("tray", "storage", 9)
 ROUTE = (Stage("in"), Stage("mill"), Stage("tray"))

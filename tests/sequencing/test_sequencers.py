@@ -14,7 +14,8 @@ from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import OBJECTIVES, cost
 from lab.sequencing.methods.exact import optimum
 from lab.sequencing.search import Search, SequenceResult
-from lab.sequencing.simulate.run import Run, simulate
+from lab.sequencing.simulate.follow import simulate
+from lab.sequencing.simulate.run import Run
 from lab.testing.sequencing import check_order
 
 CellMaker = Callable[..., Cell]

@@ -15,7 +15,7 @@ from lab.sequencing.cell.chance import Chance
 from lab.sequencing.cell.stations import Arrivals
 from lab.sequencing.methods.exact import optimum
 from lab.sequencing.search import SrlSettings
-from lab.sequencing.simulate.run import simulate
+from lab.sequencing.simulate.follow import simulate
 from lab.tasks.cell_file import TOAST_CASES, CellFile, order_from_word, toast_case
 from lab.tasks.task_file import load_cell, names_of
 from lab.tasks.toml_text import TomlText

@@ -29,7 +29,7 @@ from lab.production.taught import Taught, skill_row
 from lab.sequencing.cell.routes import part_of
 from lab.sequencing.methods.exact import Optimum
 from lab.sequencing.search import SequenceResult
-from lab.sequencing.simulate.run import simulate
+from lab.sequencing.simulate.follow import simulate
 from lab.sim.world import World
 from lab.skills import Skill
 from lab.skills.prepared_scene import Prepared, prepare

@@ -14,7 +14,8 @@ from lab.sequencing.cell.stations import Product
 from lab.sequencing.cyclic.cycle import Cycle
 from lab.sequencing.cyclic.line import at_speed
 from lab.sequencing.cyclic.times import Arc, earliest
-from lab.sequencing.simulate.run import Run, simulate
+from lab.sequencing.simulate.follow import simulate
+from lab.sequencing.simulate.run import Run
 
 
 @dataclass(frozen=True)

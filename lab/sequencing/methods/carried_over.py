@@ -10,7 +10,8 @@ from lab.sequencing.methods.carried_over_weights import DEFAULT
 from lab.sequencing.methods.rules import Rule
 from lab.sequencing.search import SAME, Search, SequenceResult, only_one
 from lab.sequencing.simulate.cell_arrays import Floats, cell_arrays, run_arrays
-from lab.sequencing.simulate.run import Run, follow
+from lab.sequencing.simulate.follow import follow
+from lab.sequencing.simulate.run import Run
 
 
 def rule_of(policy: CarriedPolicy) -> Rule:

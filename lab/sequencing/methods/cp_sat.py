@@ -20,7 +20,8 @@ from lab.sequencing.methods.cp_sat_transport import TransportModel
 from lab.sequencing.methods.rules import first_come
 from lab.sequencing.methods.shared import Shared
 from lab.sequencing.search import SAME, Search, SequenceResult, not_in_time, only_one
-from lab.sequencing.simulate.run import Run, follow
+from lab.sequencing.simulate.follow import follow
+from lab.sequencing.simulate.run import Run
 
 TIME_LIMIT_S = 60.0
 MOST_MOVES = 800  # that parts may make, in a model; what it takes in memory grows with the square, to a gigabyte

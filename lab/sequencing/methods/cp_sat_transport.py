@@ -22,7 +22,8 @@ from lab.sequencing.methods.cp_sat_rooms import add_chains, add_rooms
 from lab.sequencing.methods.cp_sat_tasks import Task, Tasks, Team
 from lab.sequencing.methods.cp_sat_times import Times
 from lab.sequencing.methods.cp_sat_track import Track
-from lab.sequencing.simulate.run import Run, follow
+from lab.sequencing.simulate.follow import follow
+from lab.sequencing.simulate.run import Run
 
 Arcs = dict[tuple[int, int], cp_model.IntVar]
 

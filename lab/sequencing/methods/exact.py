@@ -16,8 +16,8 @@ from lab.sequencing.methods.lower_bound import LowerBound
 from lab.sequencing.methods.one_robot import OneRobot, one_robot, why_not
 from lab.sequencing.methods.rules import first_come
 from lab.sequencing.search import Search, SequenceResult, gap, only_one
+from lab.sequencing.simulate.follow import simulate
 from lab.sequencing.simulate.merged import MergedCell, MergedKey, MergedState
-from lab.sequencing.simulate.run import simulate
 
 MAX_EXPANDED = 300_000
 MOST_KEPT = 20_000_000  # numbers in all states that were reached, half a gigabyte; only large cells come near

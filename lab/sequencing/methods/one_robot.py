@@ -17,7 +17,8 @@ from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.routes import SERVER, Option, entry
 from lab.sequencing.cell.ways import FAR, distances
 from lab.sequencing.methods.cp_sat_times import Times
-from lab.sequencing.simulate.run import Run, simulate
+from lab.sequencing.simulate.follow import simulate
+from lab.sequencing.simulate.run import Run
 
 if TYPE_CHECKING:
     from lab.sequencing.methods.one_robot_kernels import Work

@@ -16,7 +16,7 @@ from lab.sequencing.methods.rules import first_come, work_left_s
 from lab.sequencing.methods.shared import Shared
 from lab.sequencing.search import SAME, Search, SequenceResult, not_in_time, only_one
 from lab.sequencing.simulate.cell_arrays import most_moves
-from lab.sequencing.simulate.run import follow
+from lab.sequencing.simulate.follow import follow
 
 MOVES, ROUND = 12_000_000, 3_000  # of all sequences that annealing tries; how many it tries between two looks at Ctrl-C
 EACH = 500  # how often it tries each of a list's neighbours, on average: a short list takes far fewer moves

@@ -7,7 +7,7 @@ from threading import Event, Lock
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import cost
 from lab.sequencing.search import SAME
-from lab.sequencing.simulate.run import follow
+from lab.sequencing.simulate.follow import follow
 
 
 class Shared:

@@ -3,12 +3,12 @@
 from bisect import insort
 from collections.abc import Sequence
 
-from lab.errors import BadInput, counted
+from lab.errors import BadInput
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import Episode
 from lab.sequencing.cell.precedence import missing
 from lab.sequencing.cell.routes import SERVER, Option, Position, choice_of, entry, part_of
-from lab.sequencing.cell.schedule import Move, Schedule
+from lab.sequencing.cell.schedule import Move
 from lab.sequencing.cell.stations import UNLIMITED
 
 SLACK_S = 1e-6  # so much later is not too late: what sums of times may differ by
@@ -356,47 +356,11 @@ class Run:
         return [taken >= most for taken, most in zip(self.occupied, self.cell.capacities, strict=True)]
 
 
-def simulate(cell: Cell, sequence: Sequence[int], times: Episode | None = None) -> Schedule:
-    """The schedule of a sequence of decisions (see `Run`; one entry a move), with the cell's times or an episode's.
-
-    Raises BadInput, with the position, for a decision that may not be taken there and for a sequence that ends too early.
-    Source: thesis ch. 7.4, 7.5; makespan to the last arrival at the end of a route.
-    """
-    run, moves = Run(cell, times), []
-    came_s: list[float] = [0.0] * cell.parts
-    for position, decision in enumerate(sequence, 1):
-        reason = run.refusal(decision)
-        if reason:
-            allowed = ", ".join(str(other) for other in run.allowed()) or (
-                "none, all are done" if run.done else "none, it is a deadlock"
-            )
-            raise BadInput(f"position {position} of the sequence: {reason}; allowed here: {allowed}")
-        part = part_of(decision, cell.parts)
-        if run.locations[part - 1] == cell.starts[part - 1]:
-            came_s[part - 1] = run.ready_s[part - 1]
-        moves.append(run.move(decision))
-    if not run.done:
-        left = run.finished_s.index(None) + 1
-        where = cell.names[cell.positions[run.locations[left - 1]].station]
-        raise BadInput(
-            f"the sequence ends after {counted(len(moves), 'move')}, but {cell.part_name(left)} is still at '{where}'"
-        )
-    return Schedule.from_moves(cell, moves, sequence, came_s)
-
-
 def branch(run: Run) -> Run:
     """Another run that goes on from where this one is, by the same times."""
     other = Run(run.cell, run.times)
     take_over(other, run)
     return other
-
-
-def follow(cell: Cell, sequence: Sequence[int], times: Episode | None = None) -> Run:
-    """The run of a list of decisions, one after the other whatever the times; BadInput where one may not be taken."""
-    run = Run(cell, times)
-    for decision in sequence:
-        run.move(decision)
-    return run
 
 
 def take_over(run: Run, state: Run) -> None:

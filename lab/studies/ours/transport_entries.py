@@ -13,7 +13,7 @@ from lab.sequencing.cell.objectives import MAKESPAN
 from lab.sequencing.cell.schedule import Schedule
 from lab.sequencing.cell.schedule_rows import rows_of
 from lab.sequencing.search import EpisodeSequenced, Search
-from lab.sequencing.simulate.run import follow, simulate
+from lab.sequencing.simulate.follow import follow, simulate
 from lab.studies.ours.transport_instances import Instance, cell_of
 from lab.studies.runner import record_of
 

@@ -1,7 +1,7 @@
 """Figures IV.1 to IV.3 of Appendix IV: the best order of three toasts as a Gantt chart, and the tree that proves it."""
 
 from lab.sequencing.methods.branch_and_bound import branch_and_bound
-from lab.sequencing.simulate.run import simulate
+from lab.sequencing.simulate.follow import simulate
 from lab.studies.thesis.chapter_7_cells import robot_cell
 from lab.view.gantt import gantt_picture
 from lab.view.search_tree import branch_picture, branches_of

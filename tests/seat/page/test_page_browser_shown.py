@@ -20,7 +20,8 @@ from lab.mdp import TabularMDP, grid, optimal_values
 from lab.seat.page.teaching_page import SeatPage
 from lab.sequencing.request import SequenceRequest
 from lab.sequencing.search import Reference
-from lab.sequencing.simulate.run import Run, follow
+from lab.sequencing.simulate.follow import follow
+from lab.sequencing.simulate.run import Run
 from lab.tasks.task_file import load_cell
 from lab.teaching.events import SequencingBegan
 

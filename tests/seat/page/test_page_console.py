@@ -9,7 +9,7 @@ from lab.production.operation.run_desk import RunDesk
 from lab.production.run_journal import RunJournal
 from lab.seat.page.page_console import changed_by, held_of, measured_of, plan_of, run_of
 from lab.sequencing.cell.schedule import Move
-from lab.sequencing.simulate.run import follow, simulate
+from lab.sequencing.simulate.follow import follow, simulate
 from lab.tasks.task_file import load, load_cell
 from lab.teaching.events import Event, MachineBegan, MoveBegan, MoveMade, PlanMade, SkillBegan
 

@@ -15,7 +15,8 @@ from lab.sequencing.cell.schedule import Move
 from lab.sequencing.methods.srl_advised import advised_srl
 from lab.sequencing.request import SequenceRequest
 from lab.sequencing.search import Search
-from lab.sequencing.simulate.run import Run, follow, simulate
+from lab.sequencing.simulate.follow import follow, simulate
+from lab.sequencing.simulate.run import Run
 from lab.tasks.task_file import load_cell
 
 

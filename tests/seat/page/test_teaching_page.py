@@ -26,7 +26,7 @@ from lab.seat.replay_pace import ReplayPace
 from lab.sequencing.cell.schedule import Move
 from lab.sequencing.request import SequenceRequest
 from lab.sequencing.search import EpisodeSequenced, Reference, SequenceResult
-from lab.sequencing.simulate.run import follow
+from lab.sequencing.simulate.follow import follow
 from lab.tasks.task_file import load_cell
 from lab.teaching.events import (
     ORDER,

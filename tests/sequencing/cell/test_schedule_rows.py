@@ -13,7 +13,7 @@ from lab.errors import BadInput
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.schedule_rows import COLUMNS, csv_of, rows_of, write_table
 from lab.sequencing.cell.stations import Product, Stage, Station, one_robot
-from lab.sequencing.simulate.run import simulate
+from lab.sequencing.simulate.follow import simulate
 
 STATIONS = (Station("in", "storage", 9), Station("oven", "machine", 1, 10.0), Station("out", "storage", 9))
 

@@ -14,7 +14,7 @@ from lab.sequencing.cell.stations import Station
 from lab.sequencing.cyclic.cycle import best_cycle
 from lab.sequencing.cyclic.unrolled import of_parts, period_of, unrolled
 from lab.sequencing.methods.exact import optimum
-from lab.sequencing.simulate.run import simulate
+from lab.sequencing.simulate.follow import simulate
 
 CellMaker = Callable[..., Cell]
 RandomCells = Callable[..., SearchStrategy[Cell]]

@@ -13,7 +13,7 @@ from lab.sequencing.cell.objectives import BUILT_IN, OBJECTIVES, cost
 from lab.sequencing.methods.anneal import Annealing, anneal
 from lab.sequencing.methods.priorities import Orders
 from lab.sequencing.search import EpisodeSequenced, Search
-from lab.sequencing.simulate.run import follow, simulate
+from lab.sequencing.simulate.follow import follow, simulate
 
 CellMaker = Callable[..., Cell]
 Cells = Callable[..., st.SearchStrategy[Cell]]

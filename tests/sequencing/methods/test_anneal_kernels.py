@@ -12,7 +12,7 @@ from lab.sequencing.methods.anneal_kernels import AnnealArrays, anneal
 from lab.sequencing.methods.priorities import Orders
 from lab.sequencing.methods.priority_kernels import cost_of
 from lab.sequencing.simulate.cell_arrays import moves_each
-from lab.sequencing.simulate.run import simulate
+from lab.sequencing.simulate.follow import simulate
 
 Cells = Callable[..., st.SearchStrategy[Cell]]
 

@@ -10,7 +10,8 @@ from lab.errors import BadInput
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.methods.branch_and_bound import branch_and_bound
 from lab.sequencing.methods.exact import optimum
-from lab.sequencing.simulate.run import Run, simulate
+from lab.sequencing.simulate.follow import simulate
+from lab.sequencing.simulate.run import Run
 
 CellMaker = Callable[..., Cell]
 

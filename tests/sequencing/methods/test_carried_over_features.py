@@ -9,7 +9,8 @@ import pytest
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.methods.carried_over_features import feature_arrays, features
 from lab.sequencing.methods.carried_over_policy import FEATURES
-from lab.sequencing.simulate.run import Run, follow
+from lab.sequencing.simulate.follow import follow
+from lab.sequencing.simulate.run import Run
 
 CellMaker = Callable[..., Cell]
 NEAR = ((0, 1, 1), (1, 0, 1), (1, 1, 0))  # one second between any two of LU, M1 and M2

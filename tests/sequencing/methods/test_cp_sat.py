@@ -18,7 +18,8 @@ from lab.sequencing.methods.cp_sat_times import Times, longest, timed
 from lab.sequencing.methods.exact import optimum
 from lab.sequencing.methods.rules import first_come
 from lab.sequencing.search import Search
-from lab.sequencing.simulate.run import Run, follow, simulate
+from lab.sequencing.simulate.follow import follow, simulate
+from lab.sequencing.simulate.run import Run
 
 Ends = Callable[[Run], Iterator[Run]]
 CellMaker = Callable[..., Cell]

@@ -12,7 +12,8 @@ from lab.sequencing.cell.stations import Robot
 from lab.sequencing.methods.cp_sat_free import carried_out, free_robots
 from lab.sequencing.methods.shared import Shared
 from lab.sequencing.search import SAME
-from lab.sequencing.simulate.run import Run, simulate
+from lab.sequencing.simulate.follow import simulate
+from lab.sequencing.simulate.run import Run
 
 NEAR = ((0, 1, 1), (1, 0, 1), (1, 1, 0))  # one second between any two of LU, M1 and M2
 

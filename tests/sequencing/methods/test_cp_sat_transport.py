@@ -15,7 +15,8 @@ from lab.sequencing.cell.stations import Arrivals, Product, Robot, Stage, Statio
 from lab.sequencing.methods.cp_sat import cp_sat
 from lab.sequencing.methods.cp_sat_tasks import possible_tasks
 from lab.sequencing.methods.rules import first_come
-from lab.sequencing.simulate.run import Run, follow, simulate
+from lab.sequencing.simulate.follow import follow, simulate
+from lab.sequencing.simulate.run import Run
 
 Ends = Callable[[Run], Iterator[Run]]
 CellMaker = Callable[..., Cell]

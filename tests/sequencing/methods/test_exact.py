@@ -19,8 +19,9 @@ from lab.sequencing.methods.branch_and_bound import branch_and_bound
 from lab.sequencing.methods.cp_sat import cp_sat
 from lab.sequencing.methods.exact import Optimum, exact, optimum
 from lab.sequencing.search import Reference, Search
+from lab.sequencing.simulate.follow import simulate
 from lab.sequencing.simulate.merged import MergedCell
-from lab.sequencing.simulate.run import Run, simulate
+from lab.sequencing.simulate.run import Run
 
 Ends = Callable[[Run], Iterator[Run]]
 CellMaker = Callable[..., Cell]

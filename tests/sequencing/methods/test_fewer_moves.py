@@ -11,7 +11,8 @@ from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import OBJECTIVES, cost
 from lab.sequencing.cell.stations import Product, Stage, Station, one_robot
 from lab.sequencing.methods.fewer_moves import fewer_moves
-from lab.sequencing.simulate.run import Run, follow, simulate
+from lab.sequencing.simulate.follow import follow, simulate
+from lab.sequencing.simulate.run import Run
 
 
 def buffered_cell(parts: int) -> Cell:

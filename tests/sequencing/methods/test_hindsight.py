@@ -10,7 +10,7 @@ from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import NO_CHANCE, Chance, Episode
 from lab.sequencing.methods.exact import optimum
 from lab.sequencing.methods.hindsight import in_hindsight, known_cell
-from lab.sequencing.simulate.run import follow
+from lab.sequencing.simulate.follow import follow
 
 CellMaker = Callable[..., Cell]
 CHANCE = Chance("exponential", breaks_every_s=50.0, repair_s=20.0, late_s=30.0)

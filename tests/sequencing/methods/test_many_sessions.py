@@ -12,7 +12,7 @@ from lab.sequencing.methods import many_sessions as batch
 from lab.sequencing.methods.many_sessions import METHODS, evaluate, run_sessions, session_seeds
 from lab.sequencing.methods.session_readable import episode_seed, learn
 from lab.sequencing.search import Search
-from lab.sequencing.simulate.run import simulate
+from lab.sequencing.simulate.follow import simulate
 
 CellMaker = Callable[..., Cell]
 

@@ -16,7 +16,8 @@ from lab.sequencing.methods import one_robot as searched
 from lab.sequencing.methods.exact import exact
 from lab.sequencing.methods.one_robot import one_robot, why_not
 from lab.sequencing.search import Search
-from lab.sequencing.simulate.run import Run, simulate
+from lab.sequencing.simulate.follow import simulate
+from lab.sequencing.simulate.run import Run
 
 Ends = Callable[[Run], Iterator[Run]]
 CellMaker = Callable[..., Cell]

@@ -19,7 +19,8 @@ from lab.sequencing.methods.cp_sat import beside, fits
 from lab.sequencing.methods.portfolio import BestKnown, best_known
 from lab.sequencing.methods.shared import Shared
 from lab.sequencing.search import SAME
-from lab.sequencing.simulate.run import Run, follow, simulate
+from lab.sequencing.simulate.follow import follow, simulate
+from lab.sequencing.simulate.run import Run
 
 Ends = Callable[[Run], Iterator[Run]]
 CellMaker = Callable[..., Cell]

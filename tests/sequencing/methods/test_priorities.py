@@ -12,7 +12,8 @@ from lab.sequencing.cell.objectives import BUILT_IN, cost
 from lab.sequencing.methods.priorities import Orders, Priorities
 from lab.sequencing.methods.priority_kernels import cost_of
 from lab.sequencing.simulate.cell_arrays import moves_each
-from lab.sequencing.simulate.run import Run, follow
+from lab.sequencing.simulate.follow import follow
+from lab.sequencing.simulate.run import Run
 
 CellMaker = Callable[..., Cell]
 Cells = Callable[..., st.SearchStrategy[Cell]]

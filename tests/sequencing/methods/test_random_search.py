@@ -11,7 +11,7 @@ from lab.sequencing.cell.chance import Chance
 from lab.sequencing.cell.stations import Arrivals, Product, Stage, Station, one_robot
 from lab.sequencing.methods.random_search import random_search
 from lab.sequencing.search import EpisodeSequenced, Search
-from lab.sequencing.simulate.run import simulate
+from lab.sequencing.simulate.follow import simulate
 
 CellMaker = Callable[..., Cell]
 

@@ -13,7 +13,8 @@ from lab.sequencing.cell.objectives import cost
 from lab.sequencing.methods.rollout import by_rule, replan, rollout
 from lab.sequencing.methods.rules import RULES, dispatch, usable
 from lab.sequencing.simulate.execution import carry_out, replicate
-from lab.sequencing.simulate.run import Run, follow
+from lab.sequencing.simulate.follow import follow
+from lab.sequencing.simulate.run import Run
 
 CellMaker = Callable[..., Cell]
 NORMAL, EXPONENTIAL = Chance("normal", "normal"), Chance("exponential", "exponential")

@@ -12,7 +12,8 @@ from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.stations import Product, Route, Stage, Station, one_robot
 from lab.sequencing.methods.rules import RULES, dispatch, dispatched, first_come, usable, work_left_s
 from lab.sequencing.search import Search
-from lab.sequencing.simulate.run import Run, simulate
+from lab.sequencing.simulate.follow import simulate
+from lab.sequencing.simulate.run import Run
 
 CellMaker = Callable[..., Cell]
 NAMES = ("in", "oven", "mill", "out")

@@ -15,7 +15,7 @@ from lab.sequencing.methods.priorities import Orders
 from lab.sequencing.methods.srl_improved import SPREAD, srl_improved
 from lab.sequencing.search import EpisodeSequenced, Search
 from lab.sequencing.simulate.cell_arrays import moves_each
-from lab.sequencing.simulate.run import follow, simulate
+from lab.sequencing.simulate.follow import follow, simulate
 
 CellMaker = Callable[..., Cell]
 Cells = Callable[..., st.SearchStrategy[Cell]]

@@ -15,7 +15,8 @@ from lab.sequencing.cell.stations import Arrivals, Product, Stage, Station, one_
 from lab.sequencing.methods.rollout import by_rule, rollout
 from lab.sequencing.methods.rules import RULES
 from lab.sequencing.simulate.execution import WAIT, Execution, Observed, carry_out, replicate
-from lab.sequencing.simulate.run import Run, branch, follow, simulate
+from lab.sequencing.simulate.follow import follow, simulate
+from lab.sequencing.simulate.run import Run, branch
 
 CellMaker = Callable[..., Cell]
 NORMAL, EXPONENTIAL = Chance("normal", "normal"), Chance("exponential", "exponential")

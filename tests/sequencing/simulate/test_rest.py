@@ -22,8 +22,9 @@ from lab.sequencing.methods.srl import Srl
 from lab.sequencing.search import Search
 from lab.sequencing.simulate import kernels
 from lab.sequencing.simulate.cell_arrays import cell_arrays, run_arrays
+from lab.sequencing.simulate.follow import follow, simulate
 from lab.sequencing.simulate.rest import Mishaps, Rest, rest_of
-from lab.sequencing.simulate.run import Run, follow, simulate
+from lab.sequencing.simulate.run import Run
 
 CellMaker = Callable[..., Cell]
 Cells = Callable[..., SearchStrategy[Cell]]

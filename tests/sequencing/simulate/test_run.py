@@ -14,7 +14,8 @@ from lab.sequencing.cell.chance import Chance, Episode
 from lab.sequencing.cell.routes import part_of
 from lab.sequencing.cell.schedule import Move
 from lab.sequencing.cell.stations import UNLIMITED, Arrivals, Product, Robot, Route, Stage, Station, one_robot
-from lab.sequencing.simulate.run import Run, simulate
+from lab.sequencing.simulate.follow import simulate
+from lab.sequencing.simulate.run import Run
 
 CellMaker = Callable[..., Cell]
 

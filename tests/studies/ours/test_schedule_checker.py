@@ -16,7 +16,8 @@ from lab.sequencing.cell.schedule_rows import rows_of
 from lab.sequencing.methods.cp_sat import cp_sat
 from lab.sequencing.methods.portfolio import best_known
 from lab.sequencing.search import SAME
-from lab.sequencing.simulate.run import Run, branch, simulate
+from lab.sequencing.simulate.follow import simulate
+from lab.sequencing.simulate.run import Run, branch
 from lab.studies.ours.schedule_checker import faults
 from lab.tasks.cell_file import CellFile
 from lab.tasks.task_file import load_cell

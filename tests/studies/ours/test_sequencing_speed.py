@@ -7,7 +7,7 @@ import pytest
 
 from lab.sequencing.methods.exact import optimum
 from lab.sequencing.methods.rules import first_come
-from lab.sequencing.simulate.run import simulate
+from lab.sequencing.simulate.follow import simulate
 from lab.studies.findings import those
 from lab.studies.ours import sequencing_speed as speed_study
 from lab.studies.ours.sequencing_speed import RATE, SECONDS, sequencing_speed

@@ -5,7 +5,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from lab.sequencing.simulate.run import simulate
+from lab.sequencing.simulate.follow import simulate
 from lab.studies.findings import Row
 from lab.studies.runner import Job
 from lab.studies.thesis import chapter_7_figures as figures

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from lab.errors import BadInput
 from lab.learning.splitmix import uniform
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.simulate.run import simulate
+from lab.sequencing.simulate.follow import simulate
 from lab.studies.thesis import chapter_7_listing_kernels as kernels
 from lab.studies.thesis.chapter_7_listing import LISTING, Listed, Reading, banned_states, run_sessions, work_of
 from lab.studies.thesis.chapter_7_listing_kernels import LATEST_S, STATE, ListingRules, Toasts
