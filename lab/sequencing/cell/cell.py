@@ -147,11 +147,21 @@ class Cell:
     def proven_of(self) -> str:
         """Of which plans an optimum or a bound is one of: `EVERY_PLAN`, or `NEVER_WAIT` where waiting on purpose may be better.
 
-        With time windows a robot that waits before it brings a part may keep another one from spoiling. Several robots may make
-        room for each other in turn, which no list of whole transfers says. Else nothing becomes worse by being done earlier.
+        A list of transfers by one robot that does all the work is timed with the waits that its windows need. Else they may need
+        others, and several robots may make room for each other in turn, which no list of whole transfers says. Without windows,
+        nothing becomes worse by being done earlier.
         """
-        windows = any(place.at_most_s is not None for place in self.positions)
-        return NEVER_WAIT if windows or len(self.robots) > 1 else EVERY_PLAN
+        return NEVER_WAIT if (self.has_windows and not self.serial) or len(self.robots) > 1 else EVERY_PLAN
+
+    @cached_property
+    def without_windows(self) -> "Cell":
+        """The same cell in which parts may stay in a machine as long as they are left there."""
+        stations = tuple(replace(one, at_most_s=None) for one in self.stations)
+        products = tuple(
+            replace(one, routes=tuple(tuple(replace(stage, at_most_s=None) for stage in route) for route in one.routes))
+            for one in self.products
+        )
+        return replace(self, stations=stations, products=products)
 
     @cached_property
     def ways(self) -> Mapping[tuple[int, int], Way]:

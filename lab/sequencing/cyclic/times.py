@@ -5,19 +5,10 @@ from math import inf
 from typing import NamedTuple
 
 from lab.sequencing.cyclic.line import Line
+from lab.sequencing.simulate.constraints import Arc, earliest
 from lab.sequencing.simulate.run import SLACK_S
 
-TINY_S = 1e-9  # sums of times that differ by less are equal
 NEAR_S = 1e-3  # as much as slack may shorten a period that can be kept without
-
-
-class Arc(NamedTuple):
-    """begin[then] >= begin[one] + least_s - periods * period."""
-
-    one: int
-    then: int
-    least_s: float
-    periods: int
 
 
 class Timed(NamedTuple):
@@ -81,23 +72,3 @@ def _shortest(arcs: Sequence[Arc], first: int) -> Timed | None:
         if periods <= 0 or least_s / periods <= period_s:
             return None
         period_s, recurs = least_s / periods, periods
-
-
-def earliest(arcs: Sequence[Arc], moves: int, first: int, period_s: float) -> tuple[list[float], list[Arc]]:
-    """The earliest begins after the first move's, or a circle of arcs that cannot be kept (Bellman and Ford)."""
-    begin_s, by = [-inf] * moves, dict[int, Arc]()
-    begin_s[first], late = 0.0, -1
-    for _ in range(moves + 1):
-        late = -1
-        for arc in arcs:
-            at_s = begin_s[arc.one] + arc.least_s - arc.periods * period_s
-            if at_s > begin_s[arc.then] + TINY_S:
-                begin_s[arc.then], by[arc.then], late = at_s, arc, arc.then
-        if late < 0:
-            return begin_s, []
-    for _ in range(moves):  # then it is on the circle, whatever led there
-        late = by[late].one
-    broken = [by[late]]
-    while broken[-1].one != late:
-        broken.append(by[broken[-1].one])
-    return begin_s, broken

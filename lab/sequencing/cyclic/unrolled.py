@@ -9,12 +9,10 @@ from typing import NamedTuple
 from lab.errors import BadInput, WorkFailed
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.routes import Option, entry, reached_from
-from lab.sequencing.cell.schedule import Move, Schedule
+from lab.sequencing.cell.schedule import Schedule
 from lab.sequencing.cell.stations import Product
 from lab.sequencing.cyclic.cycle import Cycle
-from lab.sequencing.cyclic.line import at_speed
-from lab.sequencing.cyclic.times import Arc, earliest
-from lab.sequencing.simulate.follow import simulate
+from lab.sequencing.simulate.follow import simulate, waits_in
 from lab.sequencing.simulate.run import Run
 
 
@@ -67,8 +65,8 @@ def unrolled(cycle: Cycle, cell: Cell) -> Unrolled:
     The moves of parts before the first and after the last are left out. Where a buffer is used only when the machine ahead is
     full, the first parts go straight on. WorkFailed when the line cannot be filled so, which buffers can lead to.
     """
-    free = _without_windows(cell)  # the order alone counts here
-    run, sequence, made = Run(free), list[int](), list[_Turn]()
+    free = cell.without_windows  # the order alone counts here
+    run, sequence = Run(free), list[int]()
     for turn in _turns(cycle, cell):
         here = run.locations[turn.part - 1]
         if here != turn.place and here in reached_from(cell.positions, {turn.place}):
@@ -81,14 +79,13 @@ def unrolled(cycle: Cycle, cell: Cell) -> Unrolled:
                 f"the cycle cannot be begun with an empty line: {name} at '{where}' cannot do what it does in the cycle"
             )
         sequence.append(decision)
-        made.append(_Turn(turn.part, here, way))
         run.move(decision)
     try:
-        return Unrolled(cell, tuple(sequence), simulate(cell, sequence), False)
+        return Unrolled(cell, tuple(sequence), simulate(cell, sequence), bool(waits_in(cell, sequence)))
     except BadInput:
         if not cell.has_windows:
             raise
-    return Unrolled(cell, tuple(sequence), Schedule.from_moves(cell, _waiting(cell, made), sequence), True)
+    raise WorkFailed("the line cannot be filled and emptied by this cycle: a part would be picked too late")
 
 
 def _turns(cycle: Cycle, cell: Cell) -> Iterator[_Turn]:
@@ -114,51 +111,3 @@ def _turns(cycle: Cycle, cell: Cell) -> Iterator[_Turn]:
 
 def _numbers(cell: Cell, product: Product) -> list[int]:
     return [number for number, name in enumerate(cell.order, 1) if name == product.name]
-
-
-def _without_windows(cell: Cell) -> Cell:
-    products = [
-        replace(one, routes=tuple(tuple(replace(stage, at_most_s=None) for stage in route) for route in one.routes))
-        for one in cell.products
-    ]
-    return replace(
-        cell, stations=tuple(replace(one, at_most_s=None) for one in cell.stations), products=tuple(products)
-    )
-
-
-def _waiting(cell: Cell, made: Sequence[_Turn]) -> list[Move]:
-    """The moves, each as early as all windows allow; WorkFailed when they cannot all be kept."""
-    cell = at_speed(cell)
-    arcs, at = list[Arc](), cell.index(cell.robot_start)
-    work_s, empty_s = [0.0], list[float]()
-    ready = dict[int, tuple[int, float]]()  # by part: the move after which it was last processed, and how long
-    for number, (part, place, option) in enumerate(made, 1):
-        here, there = cell.positions[place], cell.positions[option.to]
-        empty_s.append(0.0 if at == option.origin else float(cell.empty_s[at, option.origin]))
-        arcs.append(Arc(number - 1, number, work_s[-1] + empty_s[-1], 0))
-        work_s.append(option.service_s + float(cell.loaded_s[option.origin, option.target]))
-        if part in ready and option.waits:
-            brought, least_s = ready[part]
-            arcs.append(Arc(brought, number, work_s[brought] + least_s, 0))
-            if here.at_most_s is not None:
-                most_s = work_s[brought] + least_s + here.at_most_s - option.service_s
-                arcs.append(Arc(number, brought, -most_s, 0))
-        if there.processing_s is not None:
-            ready[part] = number, there.processing_s
-        at = option.target
-    begin_s, broken = earliest(arcs, len(made) + 1, 0, 0.0)
-    if broken:
-        raise WorkFailed("the line cannot be filled and emptied by this cycle: a part would be picked too late")
-    moves, start, leave_s = list[Move](), cell.robot_start, 0.0
-    for number, (part, _, option) in enumerate(made, 1):
-        origin, target, pick_s = (
-            cell.names[option.origin],
-            cell.names[option.target],
-            begin_s[number] + option.service_s,
-        )
-        reach_s, drop_s = leave_s + empty_s[number - 1], begin_s[number] + work_s[number]
-        process_s = cell.positions[option.to].processing_s or 0.0
-        times_s = leave_s, reach_s, pick_s, drop_s, process_s
-        moves.append(Move(part, start, origin, target, *times_s, option.service_s, option.carries))
-        start, leave_s = target, drop_s
-    return moves

@@ -20,12 +20,12 @@ from lab.sequencing.methods.cp_sat_transport import TransportModel
 from lab.sequencing.methods.rules import first_come
 from lab.sequencing.methods.shared import Shared
 from lab.sequencing.search import SAME, Search, SequenceResult, not_in_time, only_one
-from lab.sequencing.simulate.follow import follow
-from lab.sequencing.simulate.run import Run
+from lab.sequencing.simulate.follow import follow, steps
 
 TIME_LIMIT_S = 60.0
 MOST_MOVES = 800  # that parts may make, in a model; what it takes in memory grows with the square, to a gigabyte
 
+EFFORT = 20.0  # about so many seconds of a thread, counted in what the solver does: for what is asked on the way
 FIRST_LOOK = 3.0  # about so many seconds of a thread, counted in what the solver does
 GROWS = 2.0
 
@@ -55,10 +55,12 @@ def cp_sat(
     seed: int = 0,
     hint: Sequence[int] | None = None,
     workers: int = 1,
+    effort: float = inf,
 ) -> CpSatResult:
     """The best sequence that CP-SAT finds within the time limit [s], by the cell's own times.
 
-    hint: a complete sequence to begin with (None: `first_come`). workers: threads; with one, the same seed gives the same
+    hint: a complete sequence to begin with (None: `first_come`; empty: nothing). effort: the most work of the solver, in what it
+    counts as seconds, the same on every machine. workers: threads; with one, the same seed gives the same
     result, unless the time limit cuts it off; with several robots six are worth while, even on two cores. Before it begins, the
     model takes up to half a minute to build. Raises BadInput for an objective that the cell has no times for, for a time limit
     that is not above 0, for a hint that cannot be, and for more than MOST_MOVES moves.
@@ -75,7 +77,7 @@ def cp_sat(
         raise BadInput(f"workers = {workers}: allowed are whole numbers from 1")
     check_no_batches(cell)
     known = first_come(cell) if hint is None else hint
-    return _searched(_Asked(Shared(cell, objective), seed, workers, time_limit_s), tuple(known))
+    return _searched(_Asked(Shared(cell, objective), seed, workers, time_limit_s, effort), tuple(known))
 
 
 def check_no_batches(cell: Cell) -> None:
@@ -112,6 +114,7 @@ class _Asked:
     seed: int
     workers: int
     time_limit_s: float
+    effort: float = inf
     until_s: float = inf
 
     @property
@@ -190,6 +193,7 @@ def _result(
     """What the solver makes of a model that was built with an order of this cost, with more parameters of its own."""
     cell, solver = asked.shared.cell, cp_model.CpSolver()
     solver.parameters.max_time_in_seconds = max(0.01, asked.until_s - perf_counter())
+    solver.parameters.max_deterministic_time = asked.effort
     solver.parameters.num_workers = asked.workers
     solver.parameters.random_seed = asked.seed
     # Measured: without these, ten toasts are not proven within a minute; with several robots less is proven.
@@ -223,11 +227,10 @@ def cp_sat_sequencer(cell: Cell, search: Search, rng: np.random.Generator) -> Se
 
 def _spoils(cell: Cell, sequence: Sequence[int]) -> bool:
     """Whether a part would be picked too late after all, by less than the times were rounded."""
-    run = Run(cell)
-    for decision in sequence:
+    for run, decision, wait in steps(cell, sequence):
         if run.spoils(decision):
             return True
-        run.move(decision)
+        run.move(decision, wait)
     return False
 
 

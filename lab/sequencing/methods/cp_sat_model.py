@@ -96,6 +96,8 @@ class Model:
             number = tasks[move.part, move.way]
             task = self._tasks[number - 1]
             hints |= {task.done: 1, task.begin: move.begin, self._arcs[before, number]: 1}
+            if isinstance(task.drop, cp_model.IntVar):
+                hints[task.drop] = move.drop
             hints[self._come[move.part, move.way.option.to]] = move.drop
             before = number
         hints[self._end] = known[-1].drop
@@ -128,19 +130,27 @@ class Model:
                 self.model.add(self._taken[part] == task.drop).only_enforce_if(task.done)
 
     def _task(self, part: int, way: Way) -> Task:
-        """A move that begins when what was begun before is finished; if the robot is there earlier, just then."""
+        """A move that begins when what was begun before is finished; if the robot is there earlier, just then.
+
+        Where a part may be picked too late it may begin later, and its part be held until it is put down.
+        """
         done, begin, waits = self.model.new_bool_var("does"), self._moment("begin"), None
         self.model.add(begin >= self._come[part, way.place]).only_enforce_if(done)
         ready = self._ready(part, way) if way.option.waits else None
         if ready is not None:
             waits = self.model.new_bool_var("waits")
             self.model.add(begin >= ready).only_enforce_if(done)
-            self.model.add(begin <= ready).only_enforce_if(done, waits)
+            if not self.cell.has_windows:
+                self.model.add(begin <= ready).only_enforce_if(done, waits)
         at_most_s = self.cell.positions[way.place].at_most_s
         if at_most_s is not None and ready is not None:
             latest = ready + self.times.whole(at_most_s) - self.times.whole(way.option.service_s)
             self.model.add(begin <= latest).only_enforce_if(done)
-        return Task(part, way, done, begin, begin + self.times.work(way.option), waits)
+        drop = begin + self.times.work(way.option)
+        if self.cell.has_windows:
+            drop, least = self._moment("drop"), drop
+            self.model.add(drop >= least).only_enforce_if(done)
+        return Task(part, way, done, begin, drop, waits)
 
     def _ready(self, part: int, way: Way) -> cp_model.LinearExprT | None:
         """When the part is finished, or has come; None: it always is, when the robot is there."""
@@ -182,7 +192,8 @@ class Model:
         self.model.add(task.begin >= before + travel).only_enforce_if(done)
         # No later either, unless it waits: else the solver would find the same tour again and again, a little later.
         at_once = [done] if task.waits is None else [done, ~task.waits]
-        self.model.add(task.begin <= before + travel).only_enforce_if(*at_once)
+        if not self.cell.has_windows:
+            self.model.add(task.begin <= before + travel).only_enforce_if(*at_once)
         self._travels.append(travel * done)
         self._waits.append(wait * done)
         return done

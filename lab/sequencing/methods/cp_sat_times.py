@@ -11,6 +11,7 @@ from lab.errors import BadInput, counted
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.routes import SERVER, Option, from_the_ends, part_of
 from lab.sequencing.cell.ways import Way
+from lab.sequencing.simulate.follow import steps
 from lab.sequencing.simulate.run import Run
 
 UNITS_PER_S = (1.0, 10.0, 100.0, 1e3, 1e4, 1e5, 1e6)
@@ -95,20 +96,20 @@ def timed(cell: Cell, times: Times, ways: Sequence[Way], sequence: Sequence[int]
     for index, come in zip(coming, accumulate(intervals[index] for index in coming), strict=True):
         if cell.arrivals is not None:
             ready[index] = come if clock else intervals[index]
-    for decision in sequence:
+    for run, decision, wait in steps(cell, sequence):
         part, option = part_of(decision, cell.parts) - 1, run.option(decision)
         place = run.locations[part]
         if option is None:
             raise BadInput(f"hint: {run.refusal(decision)}")
         way = next(way for way in ways if way.place == place and way.option == option)
         begin = now + times.travel(run.robot, option.origin)
-        begin = max(begin, ready[part]) if option.waits else begin
+        begin = (max(begin, ready[part]) if option.waits else begin) + times.whole(wait.pick_s)
         if place in cell.starts and not clock and part != coming[-1]:
             ready[coming[coming.index(part) + 1]] += begin
-        now = begin + times.work(way.option)
+        now = begin + times.work(way.option) + times.whole(wait.drop_s)
         if cell.positions[option.to].processing_s is not None:
             ready[part] = now + times.processing(option.to)
-        run.move(decision)
+        run.move(decision, wait)
         moves.append(Timed(part, way, begin, now))
     if not run.done:
         raise BadInput(f"hint: the sequence ends after {counted(len(moves), 'move')}, but not all parts are finished")

@@ -1,7 +1,7 @@
 """The proven optimum of a cell: best-first search over its decision states, with alike parts merged."""
 
 import heapq
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
 from math import inf
 from operator import le
@@ -9,13 +9,13 @@ from operator import le
 import numpy as np
 
 from lab.errors import WorkFailed, counted
-from lab.sequencing.cell.cell import EVERY_PLAN, Cell
+from lab.sequencing.cell.cell import EVERY_PLAN, NEVER_WAIT, Cell
 from lab.sequencing.cell.objectives import MAKESPAN
 from lab.sequencing.cell.ways import FAR, TICKS_PER_S
 from lab.sequencing.methods.lower_bound import LowerBound
 from lab.sequencing.methods.one_robot import OneRobot, one_robot, why_not
 from lab.sequencing.methods.rules import first_come
-from lab.sequencing.search import Search, SequenceResult, gap, only_one
+from lab.sequencing.search import SAME, Search, SequenceResult, gap, only_one
 from lab.sequencing.simulate.follow import simulate
 from lab.sequencing.simulate.merged import MergedCell, MergedKey, MergedState
 
@@ -128,8 +128,37 @@ class _Search:
 def optimum(cell: Cell, max_expanded: int = MAX_EXPANDED) -> Optimum:
     """The shortest makespan of the cell and a sequence that reaches it, alike parts numbered first in, first out.
 
-    Of all sequences, each carried out as early as it can be (see `Run`). Where parts may be picked too late, a robot that
-    waited on purpose before it brings a part might do better; that is not looked for, and `of` says so.
+    Where parts may be picked too late, waiting on purpose may be better: of one robot that does all the work, a sequence that is
+    no longer than the best one without the windows is optimal; else CP-SAT looks, as long as EFFORT. Raises as `never_waiting`.
+    """
+    if not (cell.has_windows and cell.serial):
+        return never_waiting(cell, max_expanded)
+    bound_s = never_waiting(cell.without_windows, max_expanded).bound_s
+    refused: WorkFailed | None = None
+    try:
+        found = replace(never_waiting(cell, max_expanded), bound_s=bound_s, of=cell.proven_of)
+    except WorkFailed as error:
+        refused, found = error, Optimum(inf, (), False, bound_s, 0, cell.proven_of)
+    if found.gap(found.cost) == 0:
+        return replace(found, proven=True)
+    from lab.sequencing.methods.cp_sat import EFFORT, cp_sat, fits  # only where it is needed: OR-Tools takes its time
+
+    if not fits(cell):
+        if refused is not None:
+            raise refused
+        return replace(found, proven=False)
+    other = cp_sat(cell, hint=found.sequence, effort=EFFORT)
+    if other.status == "impossible" and not other.rounded_s:
+        raise WorkFailed(_none(cell, "is proven"))
+    if not other.sequence and refused is not None:
+        raise refused
+    bound_s = max(bound_s, min(other.bound, other.cost))
+    best = min(found, replace(found, cost=other.cost, sequence=other.sequence), key=lambda one: one.cost)
+    return replace(best, bound_s=bound_s, proven=best.cost <= bound_s + SAME)
+
+
+def never_waiting(cell: Cell, max_expanded: int = MAX_EXPANDED) -> Optimum:
+    """The best of the sequences of which each move is carried out as early as it can be (see `Run`).
 
     States are opened in the order of time so far + a bound on what is still to do, so the first complete one is
     optimal; a deadlock leads nowhere. After `max_expanded` states, or once those that were reached hold MOST_KEPT numbers, it
@@ -138,12 +167,13 @@ def optimum(cell: Cell, max_expanded: int = MAX_EXPANDED) -> Optimum:
     Source: uniform-cost search (Dijkstra 1959) with an admissible bound (A*, Hart et al. 1968); the pruning of later
     states that are otherwise alike is the thesis's branch and bound, App. IV.
     """
+    of = NEVER_WAIT if cell.has_windows else cell.proven_of
     search = _Search(cell)
     state = search.run(max_expanded)
     if state is not None:
         sequence = search.merged.decisions(state)
         cost = simulate(cell, sequence).makespan_s
-        return Optimum(cost, sequence, True, cost, search.expanded, cell.proven_of)
+        return Optimum(cost, sequence, True, cost, search.expanded, of)
     bound_s, expanded = search.bound / TICKS_PER_S, search.expanded
     search.hasten()
     state = search.run(2 * max_expanded)
@@ -151,11 +181,14 @@ def optimum(cell: Cell, max_expanded: int = MAX_EXPANDED) -> Optimum:
     sequence = sequence if state is None else search.merged.decisions(state)
     if not sequence:
         why = "is proven: all were tried" if search.exhausted else f"was not proven, in {search.expanded} states"
-        kind = "order" if cell.proven_of == EVERY_PLAN else "order that never waits on purpose"
-        raise WorkFailed(
-            f"no {kind} was found that finishes {counted(len(cell.unfinished), 'part')}; that there is none {why}"
-        )
-    return Optimum(simulate(cell, sequence).makespan_s, sequence, False, bound_s, expanded, cell.proven_of)
+        raise WorkFailed(_none(cell, why, of))
+    return Optimum(simulate(cell, sequence).makespan_s, sequence, False, bound_s, expanded, of)
+
+
+def _none(cell: Cell, why: str, of: str = EVERY_PLAN) -> str:
+    """That no sequence was found."""
+    kind = "order" if of == EVERY_PLAN else "order that never waits on purpose"
+    return f"no {kind} was found that finishes {counted(len(cell.unfinished), 'part')}; that there is none {why}"
 
 
 def exact(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceResult:

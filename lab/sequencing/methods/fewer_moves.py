@@ -2,11 +2,12 @@
 
 from collections.abc import Iterator, Sequence
 
+from lab.errors import BadInput
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import MAKESPAN, cost
 from lab.sequencing.cell.routes import entry, part_of
 from lab.sequencing.search import SAME
-from lab.sequencing.simulate.run import Run
+from lab.sequencing.simulate.follow import follow, steps
 
 
 def fewer_moves(cell: Cell, sequence: Sequence[int], objective: str = MAKESPAN) -> tuple[int, ...]:
@@ -25,11 +26,8 @@ def fewer_moves(cell: Cell, sequence: Sequence[int], objective: str = MAKESPAN) 
 
 def _straight(cell: Cell, sequence: Sequence[int]) -> Iterator[tuple[int, ...]]:
     """Each sequence that is left when one stopover is left out."""
-    run, came = (
-        Run(cell),
-        dict[int, tuple[int, int]](),
-    )  # by part: where in the sequence it set out last, and from where
-    for number, decision in enumerate(sequence):
+    came = dict[int, tuple[int, int]]()  # by part: where in the sequence it set out last, and from where
+    for number, (run, decision, wait) in enumerate(steps(cell, sequence)):
         part = part_of(decision, cell.parts)
         here, option = run.locations[part - 1], run.option(decision)
         assert option is not None
@@ -41,14 +39,12 @@ def _straight(cell: Cell, sequence: Sequence[int]) -> Iterator[tuple[int, ...]]:
                     yield (*sequence[:before], direct, *sequence[before + 1 : number], *sequence[number + 1 :])
                     yield (*sequence[:before], *sequence[before + 1 : number], direct, *sequence[number + 1 :])
         came[part] = number, here
-        run.move(decision)
+        run.move(decision, wait)
 
 
 def _cost(cell: Cell, sequence: Sequence[int], objective: str) -> float:
     """What a sequence costs; infinite where it may not be carried out, or does not come to its end."""
-    run = Run(cell)
-    for decision in sequence:
-        if run.option(decision) is None:
-            return float("inf")
-        run.move(decision)
-    return cost(run, objective) if run.done else float("inf")
+    try:
+        return cost(run, objective) if (run := follow(cell, sequence)).done else float("inf")
+    except BadInput:
+        return float("inf")

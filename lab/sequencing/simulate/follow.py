@@ -1,42 +1,64 @@
 """A whole list of decisions carried out in a cell."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from lab.errors import BadInput, counted
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import Episode
 from lab.sequencing.cell.routes import part_of
-from lab.sequencing.cell.schedule import Schedule
-from lab.sequencing.simulate.run import Run
+from lab.sequencing.cell.schedule import Move, Schedule
+from lab.sequencing.simulate.run import NO_WAIT, Run, Wait
+from lab.sequencing.simulate.waits import waits_of
+
+
+def waits_in(cell: Cell, sequence: Sequence[int]) -> tuple[Wait, ...]:
+    """The waits on purpose with which a list keeps to all windows, by the cell's own times; none where it needs none, or where
+    none would help."""
+    if not (cell.has_windows and cell.serial):
+        return ()
+    run = Run(cell)
+    for decision in sequence:
+        if run.option(decision) is None:
+            return (waits_of(cell, sequence) or ()) if run.spoils(decision) else ()
+        run.move(decision)
+    return ()
+
+
+def steps(cell: Cell, sequence: Sequence[int], times: Episode | None = None) -> Iterator[tuple[Run, int, Wait]]:
+    """The run before each decision of a list, that decision, and its wait on purpose; whoever asks makes the move."""
+    run, waits = Run(cell, times), waits_in(cell, sequence)
+    for number, decision in enumerate(sequence):
+        yield run, decision, waits[number] if waits else NO_WAIT
 
 
 def follow(cell: Cell, sequence: Sequence[int], times: Episode | None = None) -> Run:
     """The run of a list of decisions, one after the other whatever the times; BadInput where one may not be taken."""
     run = Run(cell, times)
-    for decision in sequence:
-        run.move(decision)
+    for run, decision, wait in steps(cell, sequence, times):
+        run.move(decision, wait)
     return run
 
 
 def simulate(cell: Cell, sequence: Sequence[int], times: Episode | None = None) -> Schedule:
     """The schedule of a sequence of decisions (see `Run`; one entry a move), with the cell's times or an episode's.
 
+    One robot that does all the work waits on purpose where a part would be picked too late else (see `waits_of`).
     Raises BadInput, with the position, for a decision that may not be taken there and for a sequence that ends too early.
     Source: thesis ch. 7.4, 7.5; makespan to the last arrival at the end of a route.
     """
-    run, moves = Run(cell, times), []
+    run, moves = Run(cell, times), list[Move]()
     came_s: list[float] = [0.0] * cell.parts
-    for position, decision in enumerate(sequence, 1):
+    for run, decision, wait in steps(cell, sequence, times):
         reason = run.refusal(decision)
         if reason:
             allowed = ", ".join(str(other) for other in run.allowed()) or (
                 "none, all are done" if run.done else "none, it is a deadlock"
             )
-            raise BadInput(f"position {position} of the sequence: {reason}; allowed here: {allowed}")
+            raise BadInput(f"position {len(moves) + 1} of the sequence: {reason}; allowed here: {allowed}")
         part = part_of(decision, cell.parts)
         if run.locations[part - 1] == cell.starts[part - 1]:
             came_s[part - 1] = run.ready_s[part - 1]
-        moves.append(run.move(decision))
+        moves.append(run.move(decision, wait))
     if not run.done:
         left = run.finished_s.index(None) + 1
         where = cell.names[cell.positions[run.locations[left - 1]].station]

@@ -2,6 +2,7 @@
 
 from bisect import insort
 from collections.abc import Sequence
+from typing import NamedTuple
 
 from lab.errors import BadInput
 from lab.sequencing.cell.cell import Cell
@@ -12,6 +13,16 @@ from lab.sequencing.cell.schedule import Move
 from lab.sequencing.cell.stations import UNLIMITED
 
 SLACK_S = 1e-6  # so much later is not too late: what sums of times may differ by
+
+
+class Wait(NamedTuple):
+    """How long a robot waits on purpose (see `waits_of`): before its work where it picks, and before it drops [s]."""
+
+    pick_s: float = 0.0
+    drop_s: float = 0.0
+
+
+NO_WAIT = Wait()
 
 
 class Run:
@@ -129,8 +140,8 @@ class Run:
                     return f"{one.step} before {count} more of {kinds} {one.of_step}"
         return ""
 
-    def move(self, decision: int) -> Move:
-        """Carry a decision out; BadInput when it may not be taken."""
+    def move(self, decision: int, wait: Wait = NO_WAIT) -> Move:
+        """Carry a decision out, with a wait on purpose; BadInput when it may not be taken."""
         option = self.option(decision)
         if option is None:
             raise BadInput(self.refusal(decision))
@@ -140,12 +151,14 @@ class Run:
         there, robot = cell.positions[option.to], option.robot
         start, free_s = self.robots_at[robot], self.robots_s[robot]
         leave_s, reach_s, served_s, pick_s = self._times_s(part, option)
-        drop_s = carried_s = pick_s + self.carry_s(option)
+        served_s, pick_s = served_s + wait.pick_s, pick_s + wait.pick_s
+        carried_s = pick_s + self.carry_s(option)
+        drop_s = carried_s + wait.drop_s
         if self.locations[part - 1] == cell.starts[part - 1]:
             self._fetch(pick_s)
         if not cell.serial:
             drop_s = max(drop_s, self._room_s(option.needs))
-            self.waited_s += drop_s - carried_s
+        self.waited_s += drop_s - carried_s
         self._leave(part, option, pick_s)
         self._hold(robot, start, option.origin, leave_s)
         self._hold(robot, option.origin, option.target, pick_s)

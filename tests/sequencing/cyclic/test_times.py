@@ -7,7 +7,8 @@ import pytest
 
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cyclic.line import Line, lines
-from lab.sequencing.cyclic.times import Arc, earliest, shortest_period
+from lab.sequencing.cyclic.times import shortest_period
+from lab.sequencing.simulate.constraints import Arc, earliest
 
 CellMaker = Callable[..., Cell]
 
