@@ -12,6 +12,7 @@ from lab.sequencing.cell.objectives import MAKESPAN, check_objective
 
 if TYPE_CHECKING:
     from lab.sequencing.methods.carried_over_policy import CarriedPolicy
+    from lab.sequencing.methods.shared import Shared
 
 FACTORS = ("A", "B")
 VALUES = ("pairs", "states")
@@ -82,7 +83,8 @@ class Search:
     """How long to look, for what, in which environment, and whom to tell. BadInput for fewer than 1 episode.
 
     chance: what the processing times and arrivals are drawn from while it learns. settings: those of SRL and Monte
-    Carlo; the others have none. policy: of the method `carried`; None: the one that ships.
+    Carlo; the others have none. policy: of the method `carried`; None: the one that ships. shared: where a method that has no
+    episodes tells what it finds and proves, and looks whether to go on.
     """
 
     episodes: int = 400
@@ -91,6 +93,7 @@ class Search:
     settings: SrlSettings = field(default_factory=SrlSettings)
     on_episode: OnEpisode | None = None
     policy: "CarriedPolicy | None" = None
+    shared: "Shared | None" = None
 
     def __post_init__(self) -> None:
         if self.episodes < 1:
@@ -99,6 +102,11 @@ class Search:
     def check(self, cell: Cell) -> None:
         """BadInput when the cell does not have what the objective needs."""
         check_objective(self.objective, cell)
+
+    def look(self) -> None:
+        """Ends the search at a limit (see `Shared.look`)."""
+        if self.shared is not None:
+            self.shared.look()
 
 
 def gap(cost: float, bound: float) -> float:

@@ -151,6 +151,17 @@ def first_come(cell: Cell) -> tuple[int, ...]:
     return tuple(sequence)
 
 
+def any_order(cell: Cell) -> tuple[int, ...]:
+    """A sequence that comes to its end, by whatever finds one at once; empty: a rule would have to look ahead."""
+    if found := first_come(cell):
+        return found
+    for rule in usable(cell).values():
+        found = dispatch(run := Run(cell), rule)
+        if run.done:
+            return found
+    return ()
+
+
 @lru_cache(maxsize=16)
 def work_left_s(cell: Cell) -> tuple[float, ...]:
     """Seconds of moves, services and processing from each position to the end, by the shortest way, processing there left out.
