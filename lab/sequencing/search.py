@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import inf
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, Protocol
 
 from lab.errors import BadInput, WorkFailed, counted, unknown
 from lab.sequencing.cell.cell import EVERY_PLAN, Cell
@@ -12,7 +12,6 @@ from lab.sequencing.cell.objectives import MAKESPAN, check_objective
 
 if TYPE_CHECKING:
     from lab.sequencing.methods.carried_over_policy import CarriedPolicy
-    from lab.sequencing.methods.shared import Shared
 
 FACTORS = ("A", "B")
 VALUES = ("pairs", "states")
@@ -78,6 +77,13 @@ class SrlSettings:
             raise BadInput(f"beta = {self.beta}: allowed are finite numbers from 0")
 
 
+class Watched(Protocol):
+    """What is known while a search runs, and whether it goes on: a `methods.shared.Shared`."""
+
+    def look(self) -> None:
+        """Ends the search at a limit, by an error; every method calls it, often."""
+
+
 @dataclass(frozen=True)
 class Search:
     """How long to look, for what, in which environment, and whom to tell. BadInput for fewer than 1 episode.
@@ -93,7 +99,7 @@ class Search:
     settings: SrlSettings = field(default_factory=SrlSettings)
     on_episode: OnEpisode | None = None
     policy: "CarriedPolicy | None" = None
-    shared: "Shared | None" = None
+    shared: Watched | None = None
 
     def __post_init__(self) -> None:
         if self.episodes < 1:
@@ -104,7 +110,7 @@ class Search:
         check_objective(self.objective, cell)
 
     def look(self) -> None:
-        """Ends the search at a limit (see `Shared.look`)."""
+        """Ends the search at a limit (see `Watched.look`)."""
         if self.shared is not None:
             self.shared.look()
 

@@ -13,6 +13,7 @@ from lab.sequencing import SEQUENCERS
 from lab.sequencing.cell.chance import NO_CHANCE
 from lab.sequencing.cell.objectives import OBJECTIVES
 from lab.sequencing.methods import portfolio, shared
+from lab.sequencing.methods.rules import first_come
 from lab.sequencing.methods.shared import Limits, Shared
 from lab.sequencing.search import SAME
 from lab.sequencing.simulate.run import simulate
@@ -173,7 +174,7 @@ def test_an_order_told_by_a_parent_is_not_taken_for_an_own_one() -> None:
     """Its bound is; what is told here is told there."""
     cell = load_cell("fms").cell()
     parent = Shared(cell, "makespan")
-    order = portfolio.first_come(cell)
+    order = first_come(cell)
     parent.tell("somebody", order, bound=100.0)
     own = Shared(cell, "makespan", parent=parent)
     assert (own.sequence, own.bound, own.bound_by) == ((), 100.0, "somebody")

@@ -160,4 +160,4 @@ class Shared:
 
 def shared_of(cell: Cell, search: Search) -> Shared:
     """What a search shares with whoever asked for it, or what is its own."""
-    return Shared(cell, search.objective) if search.shared is None else search.shared
+    return search.shared if isinstance(search.shared, Shared) else Shared(cell, search.objective)
