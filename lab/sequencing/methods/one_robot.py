@@ -120,7 +120,7 @@ class _Search:
             look()
             if self.sequence and perf_counter() > until_s:
                 return False, states
-            layer = kernels.expand(work, self._rest, layer, self._start, self.best)
+            layer = kernels.Layer(*kernels.expand(work, self._rest, layer, self._start, self.best))
             order = np.lexsort((layer.ready.sum(1), layer.now, layer.last, layer.code))
             kept = order[kernels.needed(work, layer, order)]
             if len(kept) > width:
