@@ -14,7 +14,7 @@ from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import MAKESPAN, cost
 from lab.sequencing.methods.exact import MAX_EXPANDED, optimum
 from lab.sequencing.methods.fewer_moves import fewer_moves
-from lab.sequencing.methods.rules import first_come, work_left_s
+from lab.sequencing.methods.rules import first_come, loads_s, work_left_s
 from lab.sequencing.methods.shared import Shared, shared_of
 from lab.sequencing.search import SAME, Search, SequenceResult, not_in_time, only_one
 from lab.sequencing.simulate.cell_arrays import most_moves
@@ -72,7 +72,7 @@ def look_on(
         found = optimum(cell, most, shared)
         shared.tell("A*", found.sequence, found.bound_s)
         return known_of(shared)
-    shared.tell("each part alone", bound=_alone(cell, objective))
+    _tell_alone(shared)
     from lab.sequencing.methods.one_robot import one_robot, why_not  # here and below: numba takes its time
 
     if objective == MAKESPAN and not why_not(cell):
@@ -88,7 +88,7 @@ def look_first(shared: Shared) -> None:
         with suppress(WorkFailed):  # whoever looks longer says so
             look_on(shared, most=FIRST_LOOK)
     else:
-        shared.tell("each part alone", bound=_alone(shared.cell, shared.objective))
+        _tell_alone(shared)
 
 
 def known_of(shared: Shared) -> BestKnown:
@@ -119,6 +119,23 @@ def _look(shared: Shared, time_limit_s: float, seed: int, workers: int) -> None:
         _side_by_side(shared, until_s, seed, workers)
     elif not shared.cell.serial:
         _prove(shared, time_limit_s, seed, workers)
+
+
+def _tell_alone(shared: Shared) -> None:
+    """Tells what is known without any search."""
+    shared.tell("each part alone", bound=_alone(shared.cell, shared.objective))
+    if shared.objective == MAKESPAN:
+        shared.tell("each machine alone", bound=_machines_alone(shared.cell))
+
+
+def _machines_alone(cell: Cell) -> float:
+    """What the machine with the most work takes for it at least [s]; batches are left out."""
+    to_come, total = loads_s(cell, least=True), dict[int, float]()
+    for part in cell.unfinished:
+        for station, seconds in to_come[cell.begin_at[part - 1]].items():
+            total[station] = total.get(station, 0.0) + seconds
+    places = [cell.stations[one].servers or cell.capacities[one] for one in range(len(cell.stations))]
+    return max([seconds / places[one] for one, seconds in total.items() if one not in cell.batches], default=0.0)
 
 
 def _alone(cell: Cell, objective: str) -> float:
