@@ -196,9 +196,9 @@ def loads_s(cell: Cell, least: bool = False) -> tuple[dict[int, float], ...]:
             if there.processing_s and machine is not None:
                 own[machine] = own.get(machine, 0.0) + there.processing_s
             each.append(own)
-        stations = {station for own in each for station in own}
+        stations = dict.fromkeys(station for own in each for station in own)
         ways = {station: [own.get(station, 0.0) for own in each] for station in stations}
-        return {station: min(own) if least else sum(own) / len(own) for station, own in ways.items()}
+        return {at: min(own) if least else sum(one / len(own) for one in own) for at, own in ways.items()}
 
     return tuple(from_the_ends(cell.positions, loads_s))
 
