@@ -36,6 +36,8 @@ class OrderOptions(TypedDict, total=False):
     episodes: int
     sessions: int
     stochastic: bool
+    seconds: float
+    gap: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +65,11 @@ class OrderResult:
     def proven(self) -> bool:
         """Whether no order costs less than the best one, of those in `proven_of`."""
         return bool(self.document["proven"])
+
+    @property
+    def stopped_by(self) -> str | None:
+        """What ended it early: "Ctrl-C", "seconds" or "gap"; None: nothing did."""
+        return None if self.document["stopped_by"] is None else str(self.document["stopped_by"])
 
     @property
     def proven_of(self) -> str:

@@ -30,20 +30,19 @@ def ctrl_c_is_heard() -> Iterator[None]:
         yield
         return
     main_frame = sys._getframe(2)
-    looks, looked_at = 0, (0, 0)
+    looks = 0
+    looked_at: tuple[FrameType | None, int] = None, 0  # the frame itself: another one may come to lie where it lay
 
     def stop(number: int, frame: "FrameType | None") -> None:
         nonlocal looks, looked_at
         if frame is None:
             raise KeyboardInterrupt
-        here = (id(frame), frame.f_lasti)
+        is_stuck = frame is looked_at[0] and frame.f_lasti == looked_at[1]
         impatient = looks > LOOKS or (number == signal.SIGINT and looks > 0)
-        if not _imports(frame, main_frame) and (
-            frame.f_code.co_filename.startswith(OWN) or here == looked_at or impatient
-        ):
-            looks, looked_at = 0, (0, 0)
+        if not _imports(frame, main_frame) and (frame.f_code.co_filename.startswith(OWN) or is_stuck or impatient):
+            looks, looked_at = 0, (None, 0)
             raise KeyboardInterrupt
-        looks, looked_at = looks + 1, here
+        looks, looked_at = looks + 1, (frame, frame.f_lasti)
         signal.setitimer(signal.ITIMER_REAL, AGAIN_S)
 
     def ignored(what: "UnraisableHookArgs") -> None:

@@ -93,6 +93,8 @@ def sequenced(
         options.beside.layout,
         options.robots,
         None if options.policy is None else Path(options.policy),
+        options.seconds,
+        options.gap,
     )
     teacher = teacher_of(toolbox, LessonOptions(advisors=DEFAULT_ADVISORS, seed=options.seed), seat)
     return sequence_named(options.task, options.case, options.toasts, wanted, teacher=teacher, files=files)

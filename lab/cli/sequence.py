@@ -81,6 +81,14 @@ def sequence(
     gate: Annotated[
         str, typer.Option("--gate", help="When srl asks: {order gates}.", autocompletion=offers("order gates"))
     ] = "ccrl",
+    seconds: Annotated[
+        float | None,
+        typer.Option("--seconds", help="End after so many seconds with the best order until then, and its bound."),
+    ] = None,
+    gap: Annotated[
+        float | None,
+        typer.Option("--gap", help="End when the best order costs at most so much more than the bound, such as 0.05."),
+    ] = None,
     cyclic: Annotated[
         bool,
         typer.Option(
@@ -120,6 +128,8 @@ def sequence(
         layout=None if layout is None else str(layout),
         robots=robots,
         policy=None if policy is None else str(policy),
+        seconds=seconds,
+        gap=gap,
     )
     asked = {"plot": plot, "gantt": gantt, "schedule": schedule}
     files = {name: path for name, path in asked.items() if path is not None}

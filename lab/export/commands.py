@@ -3,7 +3,7 @@
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from math import ceil, pi
+from math import ceil, pi, radians
 
 import numpy as np
 
@@ -13,9 +13,14 @@ from lab.sim.arms.robot import GRIP_STEPS
 from lab.sim.arms.tool_path import COUNTED, bending, roundings, timed, way_of
 from lab.sim.world import TIME_STEP
 
-WITHIN_M = 3e-4  # a way is written as lines and arcs that deviate so little from it; a turn counts as YAW_ARM
+WITHIN_M = 2e-4  # a way is written as lines and arcs that deviate so little from it; a turn counts as YAW_ARM
 PASSED_M = 0.0005  # the rounding of a pose that lies on a curve or straight on: it is passed without a stop
+HELD_M = 7e-4  # a pose is left away where the tool keeps so near to its way without it
+_TURN_M = 0.001 / radians(1.0)  # [m/rad]: a tool that is turned by 1 degree is as far off as by 1 mm
 _ALIKE = 1.5  # times as fast: motions that are one line stay two where their speeds differ more
+_BRIEF_M = (
+    0.005  # a line that is shorter is over before it says how fast the tool goes; a way may become so much shorter
+)
 _SAMPLED_M_S = 0.12  # at which a path of lines and arcs has a point every half millimetre
 STILL_M = 1e-5  # a motion that leads no farther than this is left out
 MOST_TURN = pi / 2  # [rad] of one piece: a controller turns the shorter way round
@@ -99,7 +104,7 @@ Command = Joint | Path | Grip | Pause | Await | Start | Reset | Check | Payload
 
 @dataclass(frozen=True)
 class Job:
-    """One transfer's commands, in order; ways: the motions that each `Path` stands for."""
+    """One transfer's commands, in order; ways: the motions that each `Path` stands for, one after the other without a pause."""
 
     words: str
     commands: tuple[Command, ...]
@@ -117,11 +122,6 @@ def jobs_of(program: Program) -> list[Job]:
     if left:
         jobs.append(_job(program, left, None))
     return jobs
-
-
-def moving(program: Program) -> list[tuple[Motion, ...]]:
-    """The motions that lead anywhere, one after the other without a pause: each is a `Path` of its jobs, in order."""
-    return [way for job in jobs_of(program) for way in job.ways]
 
 
 def _more_of_batch(program: Program, transfer: Transfer, following: Sequence[Transfer]) -> set[str]:
@@ -197,10 +197,11 @@ def _path(program: Program, way: Sequence[Motion]) -> Path:
         points += list(new)
         rounded += cuts[-len(new) :].tolist()
         speeds += [_speed(rows if motion.complete else rows[:-1])] * len(new)
-    kept = _needed(np.array(points), rounded, speeds)
-    starts = [0, *(row + 1 for row in kept[:-1])]
-    slowest = [min(speeds[max(1, first) : row + 1] or speeds[:1]) for first, row in zip(starts, kept, strict=True)]
-    return _turning(np.array(points)[kept], np.array(rounded)[kept], np.array(slowest))
+    corners, cuts = np.array(points), np.array(rounded)
+    far = np.diff(way_of(corners))
+    kept = _needed(corners, cuts, speeds)
+    fast = [_pace(far[a:b], speeds[a + 1 : b + 1]) for a, b in pairwise(kept)]
+    return _turning(corners[kept], cuts[kept], np.array(fast))
 
 
 def _corners(motion: Motion, rows: Array) -> tuple[Array, Array]:
@@ -210,46 +211,63 @@ def _corners(motion: Motion, rows: Array) -> tuple[Array, Array]:
     corners = np.vstack([rows[:1], poses])
     corners = corners[bending(corners * COUNTED)]
     cuts = roundings(corners * COUNTED, np.full(len(corners), motion.blend_m))
-    if motion.complete:
-        rounded = [ToolPose(*corner) for corner in corners.tolist()]
-        shape = np.vstack([corners[:1], timed(rounded, _SAMPLED_M_S, 1e3, motion.blend_m)])
-        if _apart(rows, shape) <= WITHIN_M:
-            return corners, cuts
+    if motion.complete and _apart(rows, _shape(corners, cuts)) <= WITHIN_M:
+        return corners, cuts
     points = straightened(rows)
     return points, np.array([0.0, *[PASSED_M] * (len(points) - 2), 0.0])
 
 
 def _apart(rows: Array, shape: Array) -> float:
-    """How far the farthest of poses (n, 4) is off the nearest place of a way (m, 4) [m], a turn counted as way."""
+    """How far the farthest of poses (n, 4) is off the nearest place of a way (m, 4) [m], or turned there, see _TURN_M."""
     from scipy.spatial import cKDTree
 
     lines = np.vstack([shape[:-1] + share * np.diff(shape, axis=0) for share in (0.0, 0.25, 0.5, 0.75)] + [shape[-1:]])
-    return float(cKDTree(lines * COUNTED).query(rows * COUNTED)[0].max())
+    gaps = rows - lines[cKDTree(lines * COUNTED).query(rows * COUNTED)[1]]
+    return float(max(np.linalg.norm(gaps[:, :3], axis=1).max(), _TURN_M * np.abs(gaps[:, 3]).max()))
 
 
-def _needed(points: Array, rounded: Sequence[float], speeds: Sequence[float]) -> list[int]:
-    """The rows of points (n, 4) that lines need: those left out lie on a line that is gone about as fast on both sides."""
-    kept, spans = [0], [0]
-    for row in range(1, len(points)):
-        last = row == len(points) - 1
-        apart = not last and not 1 / _ALIKE < speeds[row + 1] / speeds[row] < _ALIKE
-        if last or rounded[row] > 0.0 or apart:
-            spans.append(row)
-    for first, last_row in pairwise(spans):
-        part = points[first : last_row + 1]
-        kept += [first + row for row in thinned(way_of(part), part * COUNTED, WITHIN_M)[1:]]
+def _shape(points: Array, rounded: Array) -> Array:
+    """Where the tool is (m, 4) on lines through poses (n, 4), rounded by so much [m], every half millimetre."""
+    poses, blends = [ToolPose(*pose) for pose in points.tolist()], (2.0 * rounded).tolist()
+    return np.vstack([points[:1], timed(poses, _SAMPLED_M_S, 1e3, blends)])
+
+
+def _needed(points: Array, rounded: Array, speeds: Sequence[float]) -> list[int]:
+    """The rows of points (n, 4) that lines need, from the last to the first: without any other the tool keeps to its way.
+
+    Lines that are gone about as fast on both sides of what is left away become one; so do brief ones with any other.
+    """
+    kept, far = [*range(len(points))], np.diff(way_of(points))
+    for row in range(len(points) - 2, 0, -1):
+        at = kept.index(row)
+        before, after = kept[at - 1], kept[at + 1]
+        paces = _pace(far[before:row], speeds[before + 1 : row + 1]), _pace(far[row:after], speeds[row + 1 : after + 1])
+        brief = min(far[before:row].sum(), far[row:after].sum()) <= _BRIEF_M
+        if not brief and max(paces) >= _ALIKE * min(paces):
+            continue
+        less = [*kept[max(0, at - 2) : at], *kept[at + 1 : at + 3]]
+        wanted = _shape(points[less[0] : less[-1] + 1], rounded[less[0] : less[-1] + 1])
+        without = _shape(points[less], rounded[less])
+        there_and_back = abs(_length(wanted) - _length(without)) > _BRIEF_M
+        if not there_and_back and _apart(wanted, without) <= HELD_M and _apart(without, wanted) <= HELD_M:
+            kept.remove(row)
     return kept
 
 
+def _pace(far: Array, speeds: Sequence[float]) -> float:
+    """How fast the tool goes [m/s] on lines (n,) [m] that become one: as on the slowest that is not brief."""
+    return min((v for way, v in zip(far, speeds, strict=True) if way > _BRIEF_M), default=max(speeds))
+
+
 def _turning(points: Array, rounded: Array, speeds: Array) -> Path:
-    """The way without its first pose, and with poses between on lines that turn the tool by more than MOST_TURN."""
+    """The way without its first pose, and with poses between on lines (n - 1,) that turn the tool by more than MOST_TURN."""
     rows, cuts, fast = list[Array](), list[float](), list[float]()
     for row in range(1, len(points)):
         start, end = points[row - 1], points[row]
         pieces = max(1, ceil(abs(end[3] - start[3]) / MOST_TURN - 1e-9))
         rows += list(start + (end - start) * (np.arange(1, pieces + 1) / pieces)[:, None])
         cuts += [PASSED_M] * (pieces - 1) + [float(rounded[row])]
-        fast += [float(speeds[row])] * pieces
+        fast += [float(speeds[row - 1])] * pieces
     return Path(np.array(rows), np.array(cuts), np.array(fast))
 
 

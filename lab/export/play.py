@@ -7,7 +7,7 @@ from math import ceil, radians
 import numpy as np
 
 from lab.errors import BadInput
-from lab.export.commands import Await, Check, Command, Grip, Joint, Path, Pause, Payload, Reset, Start, jobs_of, moving
+from lab.export.commands import Await, Check, Command, Grip, Joint, Path, Pause, Payload, Reset, Start, jobs_of
 from lab.export.program import Array, Program
 from lab.export.recorder import SEEN_EVERY, tips
 from lab.export.timed import TimedPoints
@@ -59,14 +59,15 @@ class Deviation:
 def deviation(program: Program, played: "list[Command] | TimedPoints") -> Deviation:
     """Play it and compare. BadInput when it has not the ways, gripper outputs and waits of the run, in their order."""
     arm, robot = program.arm, program.carried.robot
-    wanted = [command for job in jobs_of(program) for command in job.commands]
+    jobs = jobs_of(program)
+    wanted = [command for job in jobs for command in job.commands]
     if isinstance(played, TimedPoints):
         wanted = [command for command in wanted if isinstance(command, Await | Grip)]
     if signals(played, program) != signals(wanted, program):
         raise BadInput("what was read back has other gripper outputs or waits than the run")
     if isinstance(played, TimedPoints):
         return _compared_by_time(program, play_timed(played, arm, robot, program.seen_at_s))
-    motions, ways = moving(program), play(played, arm, robot)
+    motions, ways = [way for job in jobs for way in job.ways], play(played, arm, robot)
     if len(motions) != len(ways):
         raise BadInput(f"{len(ways)} ways were read back, the run had {len(motions)}")
     worst, poses = np.zeros(4), 0

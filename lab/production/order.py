@@ -23,7 +23,7 @@ from lab.sequencing.cell.objectives import BUILT_IN, MAKESPAN, cost
 from lab.sequencing.cell.routes import part_of
 from lab.sequencing.cell.schedule import Move
 from lab.sequencing.methods.exact import Optimum, optimum
-from lab.sequencing.methods.portfolio import best_known
+from lab.sequencing.methods.portfolio import BestKnown, best_known
 from lab.sequencing.search import SAME, Reference, Search, SequenceResult
 from lab.sequencing.simulate.follow import follow
 from lab.sequencing.simulate.run import Run, branch
@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 
 NOBODY = AdvisorName.of("none")
 KeepOrder = Callable[[Cell, str], Journal]  # given the cell and the objective
+UNKNOWN = "nothing: CP-SAT has no rule for this objective"
 SECOND_OPINION_S = 20.0  # how long CP-SAT may look where A* does not apply
 ADVISED, UNADVISED, GIVEN, EXACT, CYCLIC = "advised", "unadvised", "given", "exact", "cyclic"  # by whom an order is
 
@@ -166,11 +167,20 @@ def ordered(cell: Cell, settings: Sequencing, advice: OrderAdvice, seed: int, te
 
 def reference(cell: Cell, objective: str, time_limit_s: float = SECOND_OPINION_S, workers: int = 1) -> Reference:
     """The proven optimum, or the best bound, and the best order that it took to find it (see `best_known`)."""
-    unit = "" if objective == "tardy-parts" else " s"
     if objective not in BUILT_IN:
-        return Reference(0.0, False, "nothing: CP-SAT has no rule for this objective", unit)
-    found = best_known(cell, objective, time_limit_s, workers=workers)
-    return Reference(found.bound, found.proven, found.bound_by, unit, found.sequence, found.found_by, cell.proven_of)
+        return Reference(0.0, False, UNKNOWN, unit_of(objective))
+    return reference_of(cell, objective, best_known(cell, objective, time_limit_s, workers=workers))
+
+
+def reference_of(cell: Cell, objective: str, found: BestKnown) -> Reference:
+    """What is known of a cell, as what no sequence can beat."""
+    by = found.bound_by if objective in BUILT_IN else UNKNOWN
+    return Reference(found.bound, found.proven, by, unit_of(objective), found.sequence, found.found_by, cell.proven_of)
+
+
+def unit_of(objective: str) -> str:
+    """What stands behind a cost."""
+    return "" if objective == "tardy-parts" else " s"
 
 
 def _cheapest(orders: Mapping[str, SequenceResult]) -> str:

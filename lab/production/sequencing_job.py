@@ -13,8 +13,9 @@ from lab.advice.journal import Again, Journal
 from lab.errors import BadInput, unknown
 from lab.learning.requests import Ask
 from lab.learning.settings import GateSettings
+from lab.production.any_time import CTRL_C, looked_for
 from lab.production.drawn_times import stochastic
-from lab.production.order import NOBODY, KeepOrder, OrderAdvice, advised_session, reference
+from lab.production.order import NOBODY, KeepOrder, OrderAdvice, advised_session
 from lab.sequencing import SEQUENCERS, check_method, find_sequence
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import NO_CHANCE, Chance
@@ -27,8 +28,8 @@ from lab.sequencing.cell.objectives import (
     stuck_cost,
 )
 from lab.sequencing.cell.schedule_rows import check_table, rows_of, write_table
-from lab.sequencing.methods.portfolio import TIME_LIMIT_S, WORKERS
-from lab.sequencing.search import SAME, EpisodeSequenced, LearnedSequence, Reference, Search, SequenceResult
+from lab.sequencing.methods.shared import NO_LIMITS, Limits
+from lab.sequencing.search import SAME, LearnedSequence, Reference, Search, SequenceResult
 from lab.sequencing.simulate.follow import follow, simulate
 from lab.tasks.carried_policy import read_policy
 from lab.tasks.cell_file import CellFile, order_from_word, toast_case
@@ -37,7 +38,7 @@ from lab.tasks.instances import Asked
 from lab.tasks.sequencing import Sequencing, search_for
 from lab.tasks.task import Task
 from lab.tasks.task_file import load_beside
-from lab.teaching.events import PhaseBegan, SequenceFound, SequencingBegan, Tell, unheard
+from lab.teaching.events import Event, PhaseBegan, SequenceFound, SequencingBegan, Tell, unheard
 from lab.teaching.teacher import Teacher
 
 PORTFOLIO = "portfolio"  # the method of which it is told what in it found the order
@@ -49,7 +50,7 @@ class Wanted:
 
     keep: gives the journal of what people say, by default one that is not written. durations: those of a task's moves
     (`Durations.to_json`), None: they are measured. layout, robots: beside an instance file (see `Asked`).
-    policy: the file that the method `carried` decides by; None: what ships.
+    policy: the file that the method `carried` decides by; None: what ships. seconds, gap: when to end early (see `Limits.of`).
     """
 
     method: str | None = None
@@ -67,6 +68,8 @@ class Wanted:
     layout: Path | None = None
     robots: int | None = None
     policy: Path | None = None
+    seconds: float | None = None
+    gap: float | None = None
 
 
 def sequence_named(
@@ -128,6 +131,10 @@ def _check_names(wanted: Wanted, settings: Sequencing) -> None:
         read_policy(wanted.policy)
     if wanted.advisor.row != "none" and method != "srl":
         raise BadInput(f"--advisor {wanted.advisor} with --method {method}: only srl asks for advice")
+    if Limits.of(wanted.seconds, wanted.gap) != NO_LIMITS and wanted.advisor.row != "none":
+        raise BadInput(
+            f"--seconds or --gap beside --advisor {wanted.advisor}: a session with advice is as long as its episodes: --episodes"
+        )
 
 
 def ordered_cell(file: CellFile, case: str | None, toasts: int | None) -> Cell:
@@ -187,34 +194,27 @@ def _sessions(
     )
     search = replace(search, policy=None if wanted.policy is None else read_policy(wanted.policy))
     check_objective(search.objective, cell)
-    # The portfolio is what it is compared with: it is asked once, with its own time.
-    own = (TIME_LIMIT_S, WORKERS) if method == PORTFOLIO else ()
-    known = reference(cell, search.objective, *own)
-    found, interrupted = list[SequenceResult](), False
-    shown = known if search.chance == NO_CHANCE else None
-    for session in range(wanted.sessions):
-        heard = _Heard(tell)
-        gate = None if wanted.advisor.row == "none" else GateSettings(wanted.gate, spare_best=True)
-        tell(SequencingBegan(search.episodes, shown, gate))
-        try:
-            if wanted.advisor.row == "none":
-                result: SequenceResult = find_sequence(
-                    cell, method, replace(search, on_episode=heard), wanted.seed, session
-                )
-            else:
-                advice = OrderAdvice("", wanted.advisor, wanted.gate, wanted.people)
-                seeds = wanted.seed, session
-                result = advised_session(cell, replace(search, on_episode=heard), advice, seeds, journal, tell)
-            found.append(result)
-        except KeyboardInterrupt:
-            interrupted = True
-            if heard.best is None and not found:
-                raise KeyboardInterrupt("stopped by Ctrl-C before an order was found") from None
-            found += [] if heard.best is None else [heard.result()]
-            break
-        if journal is None or not journal.folding:
-            tell(SequenceFound(found[-1], shown, cell.parts, method))
-    document = _document(cell, method, search, found, known, wanted) | {"interrupted": interrupted}
+    advised = wanted.advisor.row != "none"
+    gate = GateSettings(wanted.gate, spare_best=True) if advised else None
+    advice = OrderAdvice("", wanted.advisor, wanted.gate, wanted.people)
+
+    def find(search: Search, session: int) -> SequenceResult:
+        if advised:
+            return advised_session(cell, search, advice, (wanted.seed, session), journal, tell)
+        return find_sequence(cell, method, search, wanted.seed, session)
+
+    def began(known: Reference | None) -> SequencingBegan:
+        return SequencingBegan(search.episodes, known, gate)
+
+    def say(event: Event) -> None:
+        if journal is None or not (journal.folding and isinstance(event, SequenceFound)):
+            tell(event)
+
+    limits = Limits.of(wanted.seconds, wanted.gap)
+    looked = looked_for(cell, method, search, wanted.sessions, find, say, limits, began)
+    found, interrupted = looked.sessions, looked.stopped_by == CTRL_C
+    document = _document(cell, looked.method, search, found, looked.known, wanted)
+    document |= {"stopped_by": looked.stopped_by, "interrupted": interrupted}
     if wanted.stochastic and not interrupted:
         document["stochastic"] = stochastic(
             cell, method, search, min(found, key=lambda one: one.cost), chance, wanted.seed
@@ -224,24 +224,6 @@ def _sessions(
         is_best = proven is not None and document["gap"] == 0.0
         journal.closes(Closed(wanted.sessions * search.episodes, document["cost"], proven, is_best, saved_as=""))
     return document, found
-
-
-@dataclass
-class _Heard:
-    """Keeps what a session has found so far, for when it is stopped, and tells of it."""
-
-    tell: Tell
-    best: EpisodeSequenced | None = None
-    costs: list[float] = field(default_factory=list)
-
-    def __call__(self, event: EpisodeSequenced) -> None:
-        self.costs.append(event.cost)
-        self.best = event if event.best else self.best
-        self.tell(event)
-
-    def result(self) -> SequenceResult:
-        assert self.best is not None
-        return SequenceResult(self.best.best, self.best.best_cost, tuple(self.costs))
 
 
 def _document(

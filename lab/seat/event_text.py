@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from math import inf
 from typing import Literal
 
 from lab.errors import counted
@@ -33,6 +34,7 @@ from lab.teaching.events import (
     PolicyAdvises,
     RecordSkipped,
     SequenceFound,
+    SequencingStands,
     SkillReady,
 )
 from lab.teaching.lesson_plan import Lesson
@@ -181,6 +183,16 @@ def sequence_parts(event: SequenceFound) -> tuple[str, str]:
     return f"parts {order}{more}:", f"{found}, {reference}"
 
 
+def stands_text(event: SequencingStands) -> str:
+    """The best order so far, and what no order can cost less than."""
+    known = event.reference
+    if event.cost == inf:
+        return f"no order yet, bound {known.bound:.1f}{known.unit}"
+    shown, bound = beside(event.cost, known.bound, known.unit, 1)
+    gap = known.gap(event.cost)
+    return f"best so far {shown} ({event.found_by}), bound {bound}" + ("" if gap is None else f", gap {gap_of(gap, 1)}")
+
+
 def chosen_text(event: OrderChosen) -> str:
     """Which order is used, and what each that was found costs."""
     unit = " s" if event.objective == MAKESPAN else ""
@@ -215,6 +227,8 @@ def run_text(event: Event) -> str:
             return f"{event.lesson.source} {event.name}: {', '.join(lesson_parts(event.lesson))}"
         case MoveTimed():
             return f"{event.name}: {event.seconds:.2f} s"
+        case SequencingStands():
+            return stands_text(event)
         case SequenceFound():
             return " ".join(sequence_parts(event))
         case OrderChosen():

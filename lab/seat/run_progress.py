@@ -23,6 +23,7 @@ from lab.teaching.events import (
     PolicyAdvises,
     RecordSkipped,
     SequenceFound,
+    SequencingStands,
     SkillReady,
 )
 from lab.teaching.lesson_plan import Lesson
@@ -92,7 +93,7 @@ class RunProgress:
             case SequenceFound():
                 order, found = sequence_parts(event)
                 self._pack([Text(f"  {order}"), Text(found)], gap=" ")
-            case OrderChosen():
+            case OrderChosen() | SequencingStands():
                 self._say(f"  {run_text(event)}")
             case MoveMade():
                 self._say(f"  {event.move.drop_s:7.1f} s  {move_text(event)}")

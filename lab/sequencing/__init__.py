@@ -146,13 +146,15 @@ class Sequencer:
     """A method; called with a cell, a search and a generator it finds a sequence.
 
     load: imports its function. help: what it is, in one line. drawn: where chance is asked for it looks in drawn times;
-    else with the means. react: the policy in its manner, for a cell, an objective and a seed.
+    else with the means. react: the policy in its manner, for a cell, an objective and a seed. alone: nobody looks for a proof
+    beside it unless that is asked for: it answers at once, as a rule does, or proves what can be proven itself.
     """
 
     load: Callable[[], Find]
     help: str
     drawn: bool = False
     react: Callable[["Cell", str, int], Reaction] = _planned_anew
+    alone: bool = False
 
     def __call__(self, cell: "Cell", search: "Search", rng: "np.random.Generator") -> "SequenceResult":
         """One sequence."""
@@ -167,7 +169,7 @@ def _rule(name: str, words: str) -> Sequencer:
 
         return lambda cell, search, rng: dispatched(cell, RULES[name], search)
 
-    return Sequencer(load, f"a dispatching rule: {words}", react=partial(_asked, name))
+    return Sequencer(load, f"a dispatching rule: {words}", react=partial(_asked, name), alone=True)
 
 
 def _adopted(name: str, thing: Any) -> Sequencer:
@@ -188,15 +190,19 @@ _SHIPPED: dict[str, Sequencer] = {
     ),
     "mc": Sequencer(_monte_carlo, "Monte Carlo: averages the returns of the episodes", drawn=True),
     "random": Sequencer(_random, "the best of so many sequences drawn evenly", drawn=True),
-    "fifo": Sequencer(_fifo, "first in, first out: a queue of tasks", react=_queued),
+    "fifo": Sequencer(_fifo, "first in, first out: a queue of tasks", react=_queued, alone=True),
     "ga": Sequencer(_genetic, "a genetic algorithm begun with the rules', each child improved"),
     "anneal": Sequencer(
         _anneal, "simulated annealing of a list of priorities, begun with the best rule's: a search, it learns nothing"
     ),
-    "carried": Sequencer(_carried, "a policy learned on small cells, see --policy: no search", react=_carried_on),
-    "exact": Sequencer(_exact, "best-first search (A*) to the proven optimum"),
+    "carried": Sequencer(
+        _carried, "a policy learned on small cells, see --policy: no search", react=_carried_on, alone=True
+    ),
+    "exact": Sequencer(_exact, "best-first search (A*) to the proven optimum", alone=True),
     "cp-sat": Sequencer(_cp_sat, "constraint programming, for every objective"),
-    "portfolio": Sequencer(_portfolio, "annealing, then the exact search that proves most, begun with what it found"),
+    "portfolio": Sequencer(
+        _portfolio, "annealing, then the exact search that proves most, begun with what it found", alone=True
+    ),
     "shortest-move": _rule("shortest-move", "the shortest move"),
     "longest-remaining-work": _rule("longest-remaining-work", "the part with the most work left"),
     "most-urgent-machine": _rule("most-urgent-machine", "what feeds or empties the machine most behind"),

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import inf
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, Protocol
 
 from lab.errors import BadInput, WorkFailed, counted, unknown
 from lab.sequencing.cell.cell import EVERY_PLAN, Cell
@@ -77,12 +77,20 @@ class SrlSettings:
             raise BadInput(f"beta = {self.beta}: allowed are finite numbers from 0")
 
 
+class Watched(Protocol):
+    """What is known while a search runs, and whether it goes on: a `methods.shared.Shared`."""
+
+    def look(self) -> None:
+        """Ends the search at a limit, by an error; every method calls it, often."""
+
+
 @dataclass(frozen=True)
 class Search:
     """How long to look, for what, in which environment, and whom to tell. BadInput for fewer than 1 episode.
 
     chance: what the processing times and arrivals are drawn from while it learns. settings: those of SRL and Monte
-    Carlo; the others have none. policy: of the method `carried`; None: the one that ships.
+    Carlo; the others have none. policy: of the method `carried`; None: the one that ships. shared: where a method that has no
+    episodes tells what it finds and proves, and looks whether to go on.
     """
 
     episodes: int = 400
@@ -91,6 +99,7 @@ class Search:
     settings: SrlSettings = field(default_factory=SrlSettings)
     on_episode: OnEpisode | None = None
     policy: "CarriedPolicy | None" = None
+    shared: Watched | None = None
 
     def __post_init__(self) -> None:
         if self.episodes < 1:
@@ -99,6 +108,11 @@ class Search:
     def check(self, cell: Cell) -> None:
         """BadInput when the cell does not have what the objective needs."""
         check_objective(self.objective, cell)
+
+    def look(self) -> None:
+        """Ends the search at a limit (see `Watched.look`)."""
+        if self.shared is not None:
+            self.shared.look()
 
 
 def gap(cost: float, bound: float) -> float:

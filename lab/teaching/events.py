@@ -134,6 +134,15 @@ class SequencingBegan:
 
 
 @dataclass(frozen=True)
+class SequencingStands:
+    """What is known while orders are looked for: the best cost, inf where there is no order yet, whose it is, and the bound."""
+
+    cost: float
+    found_by: str
+    reference: Reference
+
+
+@dataclass(frozen=True)
 class SequenceFound:
     """The best order of a sequencer's session, beside what no order can beat; None: costs were drawn. parts: how many.
 
@@ -310,6 +319,7 @@ Event = (
     | MoveTimed
     | SequencingBegan
     | EpisodeSequenced
+    | SequencingStands
     | SequenceFound
     | OrderChosen
     | MoveMade

@@ -48,6 +48,8 @@ class OrderOptions(SessionOptions):
     layout: str | None = None
     robots: Annotated[int, Ge(1)] | None = None
     policy: str | None = None
+    seconds: float | None = None
+    gap: float | None = None
 
     def complete(self) -> "OrderOptions":
         """Themselves; BadInput when nothing is named to sequence."""

@@ -67,7 +67,7 @@ def _drawing(
     ends: what is marked by a line: when [s], its dashes and its name, "" for none; None: the makespan.
     """
     schedule = chart.schedule
-    if not schedule.robot:
+    if not (schedule.robot or schedule.machines):
         raise BadInput("Gantt chart: the schedule has no activities")
     width_inch, height_inch = chart.page_inch(predicted is not None)
     bars = chart.bars(schedule, -0.31 if predicted is None else -0.38, 0.62)
@@ -113,7 +113,7 @@ def _dress(axes: "Axes", chart: Chart, last_s: float, width_inch: float) -> None
     rows, parts = chart.rows, len({activity.resource for activity in chart.schedule.parts})
     for row in range(1, len(rows), 2):
         axes.axhspan(row - 0.5, row + 0.5, color=BAND, linewidth=0, zorder=0.5)
-    for edge in (parts, len(rows) - 1):
+    for edge in (parts, len(rows) - 1) if chart.robots else (parts,):
         axes.axhline(edge - 0.5, color=GREY, linewidth=0.8, zorder=0.8)
     axes.set_yticks(range(len(rows)), rows, parse_math=False)
     axes.set(ylim=(len(rows) - 0.5, -0.5), xlim=(0, last_s), xlabel="time [s]")

@@ -81,8 +81,8 @@ class Chart:
 
     @cached_property
     def begins_s(self) -> dict[str, float]:
-        """When the robot first takes each part [s], by the row's name."""
-        return {a.resource: a.start_s for a in reversed(self.schedule.parts) if a.kind == "carry"}
+        """When each part is first carried or worked on [s], by the row's name."""
+        return {a.resource: a.start_s for a in reversed(self.schedule.parts) if a.kind in ("carry", "process")}
 
     @cached_property
     def finished_s(self) -> dict[str, float]:
@@ -100,9 +100,11 @@ class Chart:
         return {name: PRODUCTS[number % len(PRODUCTS)] for number, name in enumerate(products)}
 
     @property
-    def moves(self) -> int:
-        """How often the robot carries something."""
-        return sum(activity.kind in ("carry", "pallet") for activity in self.schedule.robot)
+    def steps(self) -> tuple[int, str]:
+        """How often a robot carries something; without robots, how often a machine works; and what that is called."""
+        if self.schedule.robot:
+            return sum(activity.kind in ("carry", "pallet") for activity in self.schedule.robot), "move"
+        return sum(activity.kind == "process" for activity in self.schedule.machines), "operation"
 
     def product(self, part: int | None) -> str:
         """The name of a part's product: what it is called, without its number."""
@@ -116,12 +118,12 @@ class Chart:
         """How many of what, and how long it takes."""
         products = [self.product(part) for part in self.names]
         counts = [f"{products.count(name)} × {name}" for name in self.products if name]
-        return f"{', '.join([*counts, counted(self.moves, 'move')])}: {seconds(self.schedule.makespan_s)}"
+        return f"{', '.join([*counts, counted(*self.steps)])}: {seconds(self.schedule.makespan_s)}"
 
     def page_inch(self, strips: bool) -> tuple[float, float]:
         """Width and height of the page [inch]: rows become lower when there are many."""
         row_inch = max(0.25, 0.42 - 0.17 * max(0, len(self.rows) - 8) / 16) * (1.2 if strips else 1.0)
-        return min(max(NARROWEST_INCH, MOVE_INCH * self.moves), WIDEST_INCH), 1.5 + row_inch * len(self.rows)
+        return min(max(NARROWEST_INCH, MOVE_INCH * self.steps[0]), WIDEST_INCH), 1.5 + row_inch * len(self.rows)
 
     def bars(self, schedule: Schedule, top: float, height: float) -> list[Bar]:
         """The bars of a schedule in this one's rows, from `top` of each row's middle on, `height` in rows."""

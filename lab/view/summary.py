@@ -222,6 +222,9 @@ def _advice(lesson: Mapping[str, Any]) -> str:
 MOST_PRODUCTS = 3  # of which an order of one each is told product by product
 
 
+STOPPED = {"Ctrl-C": "stopped by Ctrl-C", "seconds": "the time is over (--seconds)", "gap": "near enough (--gap)"}
+
+
 def sequence_summary(found: Mapping[str, Any]) -> RenderableType:
     """The end of `lab sequence`, from its JSON document."""
     what, unit = _measured(found["objective"])
@@ -237,6 +240,9 @@ def sequence_summary(found: Mapping[str, Any]) -> RenderableType:
         f"in episode {found['found_at_episode']} of {found['episodes']}",
         *_order_of_transfers(found),
     ]
+    if found["stopped_by"] is not None:
+        proven = "which is proven" if found["proven"] else "which is not proven to be the best"
+        lines.insert(0, f"{STOPPED[found['stopped_by']]}: the best order until then, {proven}")
     if found["luckiest_cost"] is not None:
         lines.append(f"by the mean times; in its luckiest drawn episode {found['luckiest_cost']:.2f}{unit}")
     if found["sessions"] > 1:

@@ -10,6 +10,8 @@ from typing import Any
 
 import pytest
 
+from lab.cli.interrupt import ctrl_c_is_heard
+
 Lab = Callable[..., Any]  # the fixture of tests/conftest.py; it returns a Ran
 
 CTRL_C = """
@@ -106,6 +108,32 @@ def test_ctrl_c_is_heard_where_nothing_of_the_lab_runs_any_more(root: Path, hang
         [sys.executable, "-c", HANGS.format(hangs=hangs)], env=env, capture_output=True, text=True, timeout=60
     )
     assert (ran.stdout, ran.stderr) == ("heard\n", "")
+
+
+def test_another_frame_in_the_place_of_one_that_is_gone_is_no_standstill() -> None:
+    """A library calls the same short function again and again: its frames come to lie in one place, and it goes on all the while.
+
+    Ctrl-C was raised in what compiled code called to make a tuple, and the process ended with a segmentation fault.
+    """
+    scope: dict[str, Any] = {"sys": sys}
+    exec(compile("def short(): return sys._getframe()", "<library>", "exec"), scope)
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with ctrl_c_is_heard():
+            hear: Any = signal.getsignal(signal.SIGINT)
+            try:
+                for _ in range(50):
+                    hear(signal.SIGALRM, scope["short"]())
+                    signal.setitimer(signal.ITIMER_REAL, 0.0)
+            except KeyboardInterrupt:  # which would end all tests
+                pytest.fail("it was taken for a standstill")
+            frame = scope["short"]()
+            hear(signal.SIGALRM, frame)
+            with pytest.raises(KeyboardInterrupt):
+                hear(signal.SIGALRM, frame)
+            signal.setitimer(signal.ITIMER_REAL, 0.0)
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 EARLY = """

@@ -1,7 +1,8 @@
-"""Reads job files as a controller's programmer would, by a page of rules; nothing of the lab's own export is used.
+"""Reads job files and URScript as a controller's programmer would, by a page of rules, without the lab's export.
 
-MOVL is a straight line. Position level n begins an arc LEVELS_MM[n] before the position and ends it as far behind, at most half
-of the shorter line; level 0 stops. Angles turn evenly along a line, and along two lines and their arc.
+MOVL and movel are straight lines. Position level n begins an arc LEVELS_MM[n] before the position and ends it as far
+behind, at most half of the shorter line; level 0 stops; r is such a length itself. Angles turn evenly along a line, and along two
+lines and their arc.
 """
 
 import re
@@ -15,10 +16,10 @@ STEP_MM = 0.25
 
 @dataclass
 class Stretch:
-    """Moves between two signals: poses x, y, z [mm], Rz [degrees], and levels."""
+    """Moves between two signals: poses x, y, z [mm], Rz [degrees], and roundings [mm]."""
 
     poses: list[np.ndarray] = field(default_factory=list)
-    levels: list[int] = field(default_factory=list)
+    roundings: list[float] = field(default_factory=list)
 
     def sampled(self) -> np.ndarray:
         """Points (n, 4) every STEP_MM."""
@@ -28,8 +29,8 @@ class Stretch:
         rows, begin = [corners[:1]], corners[0]
         for k in range(1, len(corners)):
             room = 0.0
-            if self.levels[k] and k < len(corners) - 1:
-                room = min(LEVELS_MM[self.levels[k]], lengths[k - 1] / 2, lengths[k] / 2)
+            if self.roundings[k] and k < len(corners) - 1:
+                room = min(self.roundings[k], lengths[k - 1] / 2, lengths[k] / 2)
             entry = corners[k] + (corners[k - 1] - corners[k]) * (room / max(lengths[k - 1], 1e-9))
             rows.append(_line(begin, entry))
             begin = entry
@@ -75,13 +76,39 @@ def stretches(text: str) -> list[Stretch]:
             if move[1] == "L":
                 if not open_:
                     assert here is not None
-                    found.append(Stretch([here], [0]))
+                    found.append(Stretch([here], [0.0]))
                 found[-1].poses.append(at)
-                found[-1].levels.append(int(move[3]))
+                found[-1].roundings.append(LEVELS_MM[int(move[3])])
             here, open_ = at, move[1] == "L"
         else:
             open_ = False
     return found
+
+
+def script_stretches(text: str) -> list[Stretch]:
+    """The same of a part of a URScript program; rx, ry, rz are half a turn about an axis that lies flat, at half of Rz."""
+    found: list[Stretch] = []
+    here, open_ = np.zeros(4), False
+    for line in map(str.strip, text.splitlines()):
+        if not (move := re.fullmatch(r"move([jl])\(p\[(.*)\], a=.*?(?:, r=(.*))?\)", line)):
+            open_ = False
+            continue
+        x, y, z, rx, ry, rz = map(float, move[2].split(","))
+        assert abs(np.hypot(rx, ry) - np.pi) < 1e-4
+        assert rz == 0.0
+        at = np.array([1000.0 * x, 1000.0 * y, 1000.0 * z, np.degrees(2.0 * np.arctan2(ry, rx))])
+        if move[1] == "l":
+            if not open_:
+                found.append(Stretch([here], [0.0]))
+            found[-1].poses.append(at)
+            found[-1].roundings.append(1000.0 * float(move[3]))
+        here, open_ = at, move[1] == "l"
+    return found
+
+
+def moves(text: str) -> int:
+    """How many moves of any kind a text has."""
+    return len(re.findall(r"^ *(?:MOV[A-Z] |move[a-z]\()", text, re.MULTILINE))
 
 
 def signals(text: str) -> list[str]:

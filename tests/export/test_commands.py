@@ -1,5 +1,6 @@
 """A run as commands: few straight pieces that keep to the way driven, and transfers in their order."""
 
+from itertools import pairwise
 from math import pi
 
 import numpy as np
@@ -8,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lab.export.commands import (
+    HELD_M,
     WITHIN_M,
     Await,
     Check,
@@ -20,7 +22,6 @@ from lab.export.commands import (
     Start,
     _needed,
     jobs_of,
-    moving,
     straightened,
     thinned,
 )
@@ -36,12 +37,12 @@ def test_a_straight_line_needs_two_rows_and_a_corner_one_more() -> None:
     assert thinned(np.arange(21.0), corner, 0.01) == [0, 10, 20]
 
 
-def test_a_half_circle_of_10_cm_is_kept_within_three_tenths_of_a_millimetre_by_few_pieces() -> None:
-    """A chord of a circle r misses it by r (1 - cos(a / 2)): at 0.3 mm it spans 8.9 degrees, so 21 pieces at the least."""
+def test_a_half_circle_of_10_cm_is_kept_within_two_tenths_of_a_millimetre_by_few_pieces() -> None:
+    """A chord of a circle r misses it by r (1 - cos(a / 2)): at 0.2 mm it spans 7.25 degrees, so 25 pieces at the least."""
     angles = np.linspace(0.0, pi, 2001)
     circle = np.column_stack([0.1 * np.cos(angles), 0.1 * np.sin(angles), 0 * angles, 0 * angles])
     pieces = straightened(circle)
-    assert 21 <= len(pieces) - 1 <= 42
+    assert 25 <= len(pieces) - 1 <= 50
     middles = (pieces[1:] + pieces[:-1])[:, :2] / 2
     assert np.abs(np.linalg.norm(middles, axis=1) - 0.1).max() <= WITHIN_M * 1.01
 
@@ -94,8 +95,7 @@ def test_motions_that_lead_nowhere_are_left_out(up6: Program) -> None:
     still = motions[0].model_copy(update={"last": motions[0].first + 1})
     actions = (still, *up6.carried.actions[1:])
     cut = Program(up6.carried.model_copy(update={"actions": actions}), *_arrays(up6))
-    assert len(moving(up6)) == len(motions)
-    assert len(moving(cut)) == len(motions) - 1
+    assert [sum(len(job.ways) for job in jobs_of(one)) for one in (up6, cut)] == [len(motions), len(motions) - 1]
     words = [type(command) for command in jobs_of(cut)[0].commands]
     assert words == [Grip, Pause, Check, Payload, Joint, Path, Grip, Pause, Payload, Start]
 
@@ -108,11 +108,57 @@ def test_a_corner_is_one_pose_with_its_rounding(up6: Program) -> None:
     assert way.roundings.tolist() == [0.05, 0.05, 0.0]
 
 
+def needed(*corners: tuple[float, float], rounded: float = 0.0, speeds: tuple[float, ...] = ()) -> list[int]:
+    """The rows of places [mm] that lines need, all inner ones rounded by so much [mm], at 0.3 m/s if no speeds are said."""
+    points = np.array([[x / 1000, y / 1000, 0.3, 0.0] for x, y in corners])
+    cuts = np.array([0.0, *[rounded / 1000] * (len(points) - 2), 0.0])
+    return _needed(points, cuts, speeds or (0.3,) * len(points))
+
+
 def test_motions_on_one_line_are_one_move_unless_their_speeds_differ() -> None:
     """Three steps ahead, a corner, then a step of the same line at a third of the speed."""
-    points = np.array([[0.1 * x, 0.1 * y, 0.3, 0.0] for x, y in ((0, 0), (1, 0), (2, 0), (3, 0), (3, 1), (3, 2))])
-    assert _needed(points, [0.0] * 6, [0.3] * 6) == [0, 3, 5]
-    assert _needed(points, [0.0] * 6, [0.3] * 5 + [0.1]) == [0, 3, 4, 5]
+    steps = ((0, 0), (100, 0), (200, 0), (300, 0), (300, 100), (300, 200))
+    assert needed(*steps) == [0, 3, 5]
+    assert needed(*steps, speeds=(0.3, 0.3, 0.3, 0.3, 0.3, 0.1)) == [0, 3, 4, 5]
+
+
+def test_a_pose_is_left_away_where_a_line_holds_it_within_seven_tenths_of_a_millimetre() -> None:
+    """In the middle of 200 mm, so far beside the line."""
+    assert needed((0, 0), (100, 0.6), (200, 0)) == [0, 2]
+    assert needed((0, 0), (100, 0.8), (200, 0)) == [0, 1, 2]
+
+
+def test_so_is_one_in_a_step_aside_whatever_its_brief_motion_says_of_speed() -> None:
+    """Half a millimetre aside, never faster than 0.02 m/s, after 200 mm and before a rounded corner of 100 mm."""
+    corners, speeds = ((0, 0), (200, 0), (200, 0.5), (300, 0.5), (300, 100)), (0.3, 0.3, 0.02, 0.3, 0.3)
+    assert needed(*corners, rounded=2.0, speeds=speeds) == [0, 3, 4]
+
+
+def test_a_degree_counts_as_a_millimetre() -> None:
+    """A tool that turns by 0.6 degrees and back on 200 mm, and one that turns by 0.8."""
+    for degrees, kept in ((0.6, [0, 2]), (0.8, [0, 1, 2])):
+        points = np.array([[0.0, 0.0, 0.3, 0.0], [0.1, 0.0, 0.3, np.radians(degrees)], [0.2, 0.0, 0.3, 0.0]])
+        assert _needed(points, np.zeros(3), (0.3,) * 3) == kept
+
+
+def test_a_way_there_and_back_and_there_again_is_gone_as_often() -> None:
+    assert needed((0, 0), (100, 0), (0, 0), (100, 0)) == [0, 1, 2, 3]
+
+
+@given(st.lists(st.tuples(*[st.integers(-3, 3)] * 2), min_size=2, max_size=7), st.sampled_from([0.0, 4.0, 15.0]))
+def test_what_is_left_away_is_no_farther_off_than_that(corners: list[tuple[int, int]], rounded: float) -> None:
+    """Of corners on a grid of 0.4 mm and of 20 mm by turns; all of them lie near the lines between those kept."""
+    places = [(x * (20 if k % 2 else 0.4), y * (20 if k % 2 else 0.4)) for k, (x, y) in enumerate(corners)]
+    kept = needed(*places, rounded=rounded)
+    assert [kept[0], kept[-1]] == [0, len(places) - 1]
+    for first, last in pairwise(kept):
+        (x, y), end = places[first], places[last]
+        far = np.hypot(end[0] - x, end[1] - y)
+        for place in places[first + 1 : last]:
+            ahead = [(end[0] - x) / far, (end[1] - y) / far] if far else [0.0, 0.0]
+            along = np.clip((place[0] - x) * ahead[0] + (place[1] - y) * ahead[1], 0.0, far)
+            off = np.hypot(place[0] - x - along * ahead[0], place[1] - y - along * ahead[1])
+            assert off <= 1000 * HELD_M + rounded + 0.1
 
 
 def test_a_machine_is_reset_once_its_part_is_out(up6: Program) -> None:

@@ -4,15 +4,19 @@ import numpy as np
 import pytest
 
 from lab.export import jbi
-from lab.export.commands import moving
+from lab.export.commands import jobs_of
 from lab.export.options import Options
-from lab.export.program import Program
+from lab.export.program import Motion, Program
 from tests.export.job_text import Stretch, farthest, signals, stretches
+
+
+def ways_of(program: Program) -> list[tuple[Motion, ...]]:
+    return [way for job in jobs_of(program) for way in job.ways]
 
 
 def driven(program: Program) -> list[np.ndarray]:
     """Where the tool was told to be on each way (n, 4), x, y, z [mm] from the arm's foot, Rz [degrees]."""
-    ways = [np.concatenate([program.tools(m.first, m.last) for m in way]) for way in moving(program)]
+    ways = [np.concatenate([program.tools(m.first, m.last) for m in way]) for way in ways_of(program)]
     foot = np.array([0.0, 0.0, program.arm.base_up_m, 0.0])
     return [(way - foot) * [1000.0, 1000.0, 1000.0, np.degrees(1.0)] for way in ways]
 
@@ -30,7 +34,9 @@ def jobs(program: Program) -> dict[str, str]:
 
 def test_an_arc_touches_both_lines_by_hand() -> None:
     """A corner of 90 degrees at level 8: a quarter circle of 50 mm, whose middle is 20.7 mm off the corner."""
-    corner = Stretch([np.array([x, y, 0.0, 0.0]) for x, y in ((0.0, 0.0), (200.0, 0.0), (200.0, 200.0))], [0, 8, 0])
+    corner = Stretch(
+        [np.array([x, y, 0.0, 0.0]) for x, y in ((0.0, 0.0), (200.0, 0.0), (200.0, 200.0))], [0.0, 50.0, 0.0]
+    )
     line = corner.sampled()
     gaps = np.hypot(line[:, 0] - 200.0, line[:, 1])
     assert gaps.min() == pytest.approx(50.0 * (np.sqrt(2.0) - 1.0), abs=0.01)

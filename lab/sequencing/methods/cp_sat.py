@@ -14,11 +14,11 @@ from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import MAKESPAN, check_built_in, check_objective, cost
 from lab.sequencing.methods.cp_sat_free import free_robots
 from lab.sequencing.methods.cp_sat_model import Model
-from lab.sequencing.methods.cp_sat_solver import Status, solved
+from lab.sequencing.methods.cp_sat_solver import NAME, Solution, Status, solved
 from lab.sequencing.methods.cp_sat_tasks import possible_tasks
 from lab.sequencing.methods.cp_sat_transport import TransportModel
 from lab.sequencing.methods.rules import first_come
-from lab.sequencing.methods.shared import Shared
+from lab.sequencing.methods.shared import Shared, shared_of
 from lab.sequencing.search import SAME, Search, SequenceResult, not_in_time, only_one
 from lab.sequencing.simulate.follow import follow, steps
 
@@ -56,13 +56,15 @@ def cp_sat(
     hint: Sequence[int] | None = None,
     workers: int = 1,
     effort: float = inf,
+    shared: Shared | None = None,
 ) -> CpSatResult:
     """The best sequence that CP-SAT finds within the time limit [s], by the cell's own times.
 
     hint: a complete sequence to begin with (None: `first_come`; empty: nothing). effort: the most work of the solver, in what it
     counts as seconds, the same on every machine. workers: threads; with one, the same seed gives the same
     result, unless the time limit cuts it off; with several robots six are worth while, even on two cores. Before it begins, the
-    model takes up to half a minute to build. Raises BadInput for an objective that the cell has no times for, for a time limit
+    model takes up to half a minute to build. shared: is told what it finds and proves as it comes, and may end it (see
+    `Shared.look`). Raises BadInput for an objective that the cell has no times for, for a time limit
     that is not above 0, for a hint that cannot be, and for more than MOST_MOVES moves.
     Source: circuit and interval constraints of OR-Tools CP-SAT.
     """
@@ -77,7 +79,7 @@ def cp_sat(
         raise BadInput(f"workers = {workers}: allowed are whole numbers from 1")
     check_no_batches(cell)
     known = first_come(cell) if hint is None else hint
-    return _searched(_Asked(Shared(cell, objective), seed, workers, time_limit_s, effort), tuple(known))
+    return _searched(_Asked(shared or Shared(cell, objective), seed, workers, time_limit_s, effort), tuple(known))
 
 
 def check_no_batches(cell: Cell) -> None:
@@ -145,7 +147,7 @@ def _searched(asked: _Asked, known: tuple[int, ...]) -> CpSatResult:
 def _tell(shared: Shared, found: CpSatResult) -> None:
     """What was found; not that there is nothing where somebody has an order, which rounded times may do."""
     known = found.status == "impossible" and shared.sequence
-    shared.tell("CP-SAT", found.sequence, 0.0 if known else found.bound)
+    shared.tell(NAME, found.sequence, 0.0 if known else found.bound)
 
 
 def _narrowed(asked: _Asked, model: TransportModel, worth: float) -> CpSatResult:
@@ -202,10 +204,21 @@ def _result(
     solver.parameters.absolute_gap_limit = model.blur
     for name, value in more.items():
         setattr(solver.parameters, name, value)
-    status = solved(solver, model.model, asked.shared, worth)
-    sequence = model.sequence(solver) if status in ("optimal", "feasible") else ()
-    if sequence and (model.times.rounded_s or not cell.serial) and _spoils(cell, sequence):
-        status, sequence = "unknown", ()
+
+    def order(solution: Solution) -> tuple[int, ...]:
+        found = model.sequence(solution)
+        return () if (model.times.rounded_s or not cell.serial) and _spoils(cell, found) else found
+
+    def hear(solution: Solution) -> None:
+        asked.shared.tell(NAME, order(solution))
+
+    def hear_bound(bound: float) -> None:
+        asked.shared.tell(NAME, bound=min(bound * model.worth, worth, asked.shared.cost))
+
+    status = solved(solver, model.model, asked.shared, worth, hear, hear_bound)
+    sequence = order(solver) if status in ("optimal", "feasible") else ()
+    if not sequence and status in ("optimal", "feasible"):
+        status = "unknown"
     value = cost(follow(cell, sequence), asked.shared.objective) if sequence else inf
     bound = inf if status == "impossible" else min(value, solver.best_objective_bound * model.worth)
     if status == "optimal" and value > bound + model.blur * model.worth + SAME:
@@ -214,12 +227,13 @@ def _result(
 
 
 def cp_sat_sequencer(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceResult:
-    """CP-SAT as a sequencer: one sequence, found by the mean times within TIME_LIMIT_S; it draws nothing from `rng`.
+    """CP-SAT as a sequencer: one sequence, by the mean times; it draws nothing from `rng`. It ends after TIME_LIMIT_S.
 
     Raises WorkFailed where it proves that there is none, and where it finds none in time.
     """
     search.check(cell)
-    found = cp_sat(cell, search.objective, TIME_LIMIT_S)
+    shared = shared_of(cell, search)
+    found = cp_sat(cell, search.objective, shared.left_s(TIME_LIMIT_S), shared=shared)
     if found.status == "unknown":
         raise not_in_time(cell, f"CP-SAT ({found.wall_s:.0f} s)", found.bound)
     return only_one(cell, search, found.sequence, found.cost, bool(found.sequence))

@@ -25,7 +25,7 @@ def free_robots(shared: Shared, time_limit_s: float, seed: int, workers: int) ->
     solver.parameters.max_time_in_seconds = max(0.01, time_limit_s - (perf_counter() - begin_s))
     solver.parameters.max_deterministic_time = LOOK
     solver.parameters.num_workers, solver.parameters.random_seed = workers, seed
-    status = solved(solver, model.model, shared, 0.0)
+    status = solved(solver, model.model, shared, 0.0, lambda at: None, lambda bound: None)
     if status != "impossible":
         order = () if status == "unknown" else carried_out(shared.cell, model.moves(solver))
         shared.tell("CP-SAT", order, solver.best_objective_bound * model.worth)

@@ -12,6 +12,7 @@ from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import MAKESPAN, WITH_DUE_TIMES, machine_places
 from lab.sequencing.cell.routes import entry
 from lab.sequencing.cell.ways import Way, distances, follows, ways_of
+from lab.sequencing.methods.cp_sat_solver import Solution
 from lab.sequencing.methods.cp_sat_times import Timed, Times, longest, timed
 
 
@@ -75,7 +76,7 @@ class Model:
         if known:
             self._suggest(known)
 
-    def sequence(self, solver: cp_model.CpSolver) -> tuple[int, ...]:
+    def sequence(self, solver: Solution) -> tuple[int, ...]:
         """The decisions of the solution, in the order of the robot's tour."""
         after = {left: then for (left, then), arc in self._arcs.items() if solver.boolean_value(arc)}
         decisions, number = list[int](), 0

@@ -19,6 +19,7 @@ from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import MAKESPAN, WITH_DUE_TIMES, cost, machine_places
 from lab.sequencing.cell.routes import SERVER, choice_of, entry, part_of
 from lab.sequencing.methods.cp_sat_rooms import add_chains, add_rooms
+from lab.sequencing.methods.cp_sat_solver import Solution
 from lab.sequencing.methods.cp_sat_tasks import Task, Tasks, Team
 from lab.sequencing.methods.cp_sat_times import Times
 from lab.sequencing.methods.cp_sat_track import Track
@@ -85,7 +86,7 @@ class TransportModel:
         self.blur = each * rounding
         self._suggest(known)
 
-    def sequence(self, solver: cp_model.CpSolver) -> tuple[int, ...]:
+    def sequence(self, solver: Solution) -> tuple[int, ...]:
         """The decisions of the solution: each after all that it waits for, else in the order of their begins.
 
         On a track, which a `Run` gives out in the order of decisions, in that of their ends where that is cheaper.
@@ -103,7 +104,7 @@ class TransportModel:
         except BadInput:
             return inf
 
-    def _in_order(self, solver: cp_model.CpSolver, when: Callable[[Task], tuple[int, int]]) -> tuple[int, ...]:
+    def _in_order(self, solver: Solution, when: Callable[[Task], tuple[int, int]]) -> tuple[int, ...]:
         number = {task: n for n, task in enumerate(self.tasks.all) if solver.boolean_value(task.done)}
         robot = dict[Task, int]()
         for team, tasks, arcs, firsts in self._tours:
@@ -128,7 +129,7 @@ class TransportModel:
             order.done(task)
         return tuple(found)
 
-    def moves(self, solver: cp_model.CpSolver) -> list[tuple[int, int, int]]:
+    def moves(self, solver: Solution) -> list[tuple[int, int, int]]:
         """The tasks that are done in the order of their times, each as its part from 0, where it is, and where to it comes."""
         done = [task for task in self.tasks.all if solver.boolean_value(task.done)]
         done.sort(key=lambda task: (solver.value(task.begin), solver.value(task.end), task.part))
@@ -333,7 +334,7 @@ class TransportModel:
         return 1.0 / self.times.per_s / self.cell.parts
 
 
-def _routes(solver: cp_model.CpSolver, arcs: Arcs) -> list[list[int]]:
+def _routes(solver: Solution, arcs: Arcs) -> list[list[int]]:
     """The nodes of each tour, the begin left out."""
     taken = [pair for pair, arc in arcs.items() if solver.boolean_value(arc)]
     after, found = {left: then for left, then in taken if left}, list[list[int]]()

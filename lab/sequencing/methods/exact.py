@@ -13,13 +13,17 @@ from lab.sequencing.cell.cell import EVERY_PLAN, NEVER_WAIT, Cell
 from lab.sequencing.cell.objectives import MAKESPAN
 from lab.sequencing.cell.ways import FAR, TICKS_PER_S
 from lab.sequencing.methods.lower_bound import LowerBound
+from lab.sequencing.methods.one_robot import TIME_LIMIT_S as TOURS_S
 from lab.sequencing.methods.one_robot import OneRobot, one_robot, why_not
 from lab.sequencing.methods.rules import first_come
+from lab.sequencing.methods.shared import Shared, shared_of
 from lab.sequencing.search import SAME, Search, SequenceResult, gap, only_one
 from lab.sequencing.simulate.follow import simulate
 from lab.sequencing.simulate.merged import MergedCell, MergedKey, MergedState
 
 MAX_EXPANDED = 300_000
+ROUND = 500  # states opened between two looks at limits and the listener
+STRAIGHT = 5  # of so many states opened, one is on the way straight on to an order
 MOST_KEPT = 20_000_000  # numbers in all states that were reached, half a gigabyte; only large cells come near
 
 
@@ -56,7 +60,7 @@ class _Search:
         self._least = LowerBound(self.merged)
         # What the clock brings is no wait: it comes anyway.
         self._waits = len(self.merged.slots) + self.merged.one_by_one
-        self.expanded = self.bound = self._serial = self.kept = 0
+        self.expanded = self.bound = self._serial = self.kept = self._straight = 0
         self._fronts: dict[tuple[int, int] | MergedKey, list[tuple[int, ...]]] = {}
         self._heap: list[tuple[int, int, MergedState]] = []
         self._greedy, self.most_kept = False, MOST_KEPT
@@ -67,9 +71,9 @@ class _Search:
         """Whether every state that can be reached was opened."""
         return not self._heap
 
-    def run(self, most: int) -> MergedState | None:
+    def run(self, most: int, shared: Shared | None = None) -> MergedState | None:
         """The first complete state; None: when `most` states were opened in all, or all that there are or is room for, there was
-        none."""
+        none. Shared: is told the bound, and orders found by going straight on from where the search stands."""
         while self._heap:
             bound, serial, state = heapq.heappop(self._heap)
             if self._times(state) not in self._fronts[self._group(state)]:
@@ -81,9 +85,28 @@ class _Search:
                 heapq.heappush(self._heap, (bound, serial, state))
                 return None
             self.expanded += 1
+            if shared is not None and self.expanded % ROUND == 1:
+                self._report(shared, state)
             for successor in self.merged.successors(state):
                 self._reach(successor)
         return None
+
+    def _report(self, shared: Shared, state: MergedState) -> None:
+        """Tell the bound, and now and then an order, and look at the limits."""
+        if not self._greedy:
+            order = self._straight_on(state) if self.expanded > STRAIGHT * self._straight else ()
+            shared.tell("A*", order, self.bound / TICKS_PER_S)
+        shared.look()
+
+    def _straight_on(self, state: MergedState) -> tuple[int, ...]:
+        """The decisions of an order that goes on from a state by the least bound, move after move; empty: it gets stuck."""
+        while not self.merged.done(state):
+            ahead = [(one.now + self._least.left(one), n, one) for n, one in enumerate(self.merged.successors(state))]
+            self._straight += 1
+            least, _, state = min(ahead, default=(FAR, 0, state))
+            if least >= FAR:
+                return ()
+        return self.merged.decisions(state)
 
     def hasten(self) -> None:
         """From now on open what has the least left to do first: any end will do."""
@@ -125,18 +148,18 @@ class _Search:
         return (state.now, *chain.from_iterable(state.waits[: self._waits]))
 
 
-def optimum(cell: Cell, max_expanded: int = MAX_EXPANDED) -> Optimum:
+def optimum(cell: Cell, max_expanded: int = MAX_EXPANDED, shared: Shared | None = None) -> Optimum:
     """The shortest makespan of the cell and a sequence that reaches it, alike parts numbered first in, first out.
 
     Where parts may be picked too late, waiting on purpose may be better: of one robot that does all the work, a sequence that is
     no longer than the best one without the windows is optimal; else CP-SAT looks, as long as EFFORT. Raises as `never_waiting`.
     """
     if not (cell.has_windows and cell.serial):
-        return never_waiting(cell, max_expanded)
+        return never_waiting(cell, max_expanded, shared)
     bound_s = never_waiting(cell.without_windows, max_expanded).bound_s
     refused: WorkFailed | None = None
     try:
-        found = replace(never_waiting(cell, max_expanded), bound_s=bound_s, of=cell.proven_of)
+        found = replace(never_waiting(cell, max_expanded, shared), bound_s=bound_s, of=cell.proven_of)
     except WorkFailed as error:
         refused, found = error, Optimum(inf, (), False, bound_s, 0, cell.proven_of)
     if found.gap(found.cost) == 0:
@@ -147,7 +170,7 @@ def optimum(cell: Cell, max_expanded: int = MAX_EXPANDED) -> Optimum:
         if refused is not None:
             raise refused
         return replace(found, proven=False)
-    other = cp_sat(cell, hint=found.sequence, effort=EFFORT)
+    other = cp_sat(cell, hint=found.sequence, effort=EFFORT, shared=shared)
     if other.status == "impossible" and not other.rounded_s:
         raise WorkFailed(_none(cell, "is proven"))
     if not other.sequence and refused is not None:
@@ -157,26 +180,27 @@ def optimum(cell: Cell, max_expanded: int = MAX_EXPANDED) -> Optimum:
     return replace(best, bound_s=bound_s, proven=best.cost <= bound_s + SAME)
 
 
-def never_waiting(cell: Cell, max_expanded: int = MAX_EXPANDED) -> Optimum:
+def never_waiting(cell: Cell, max_expanded: int = MAX_EXPANDED, shared: Shared | None = None) -> Optimum:
     """The best of the sequences of which each move is carried out as early as it can be (see `Run`).
 
     States are opened in the order of time so far + a bound on what is still to do, so the first complete one is
     optimal; a deadlock leads nowhere. After `max_expanded` states, or once those that were reached hold MOST_KEPT numbers, it
     gives up and opens as many again, nearest to the end first, for the sequence it returns: `proven` False, and the bound
-    reached so far. WorkFailed where no sequence comes to its end, or none was found.
+    reached so far. What it finds and proves is told to `shared` as it comes, which may end it (see `Shared.look`).
+    WorkFailed where no sequence comes to its end, or none was found.
     Source: uniform-cost search (Dijkstra 1959) with an admissible bound (A*, Hart et al. 1968); the pruning of later
     states that are otherwise alike is the thesis's branch and bound, App. IV.
     """
     of = NEVER_WAIT if cell.has_windows else cell.proven_of
     search = _Search(cell)
-    state = search.run(max_expanded)
+    state = search.run(max_expanded, shared)
     if state is not None:
         sequence = search.merged.decisions(state)
         cost = simulate(cell, sequence).makespan_s
         return Optimum(cost, sequence, True, cost, search.expanded, of)
     bound_s, expanded = search.bound / TICKS_PER_S, search.expanded
     search.hasten()
-    state = search.run(2 * max_expanded)
+    state = search.run(2 * max_expanded, shared)
     sequence = () if search.exhausted and state is None else first_come(cell)
     sequence = sequence if state is None else search.merged.decisions(state)
     if not sequence:
@@ -198,14 +222,19 @@ def exact(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceResul
     else, by CP-SAT within its time limit, which may not prove its sequence. Raises BadInput as these do.
     """
     search.check(cell)
+    shared = shared_of(cell, search)
     found: Optimum | OneRobot | None = None
-    if search.objective == MAKESPAN:
-        found = optimum(cell) if cell.serial else one_robot(cell) if not why_not(cell) else None
+    if search.objective == MAKESPAN and cell.serial:
+        found = optimum(cell, shared=shared)
+        shared.tell("A*", found.sequence, found.bound_s)
+    elif search.objective == MAKESPAN and not why_not(cell):
+        found = one_robot(cell, shared.left_s(TOURS_S), shared)
     sequence, cost = (found.sequence, found.cost) if found else ((), inf)
     if found is None or not found.proven:
-        from lab.sequencing.methods.cp_sat import cp_sat, fits  # only where it is needed: OR-Tools takes its time
+        from lab.sequencing.methods.cp_sat import TIME_LIMIT_S, cp_sat, fits  # only here: OR-Tools takes its time
 
         if found is None or (fits(cell) and not cell.batches):
-            other = cp_sat(cell, search.objective, hint=sequence or None)
+            left_s = shared.left_s(TIME_LIMIT_S)
+            other = cp_sat(cell, search.objective, left_s, hint=sequence or None, shared=shared)
             sequence, cost = min((cost, sequence), (other.cost, other.sequence))[::-1]
     return only_one(cell, search, sequence, cost, bool(sequence))

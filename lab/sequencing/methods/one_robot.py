@@ -4,7 +4,7 @@ For cells of one robot whose parts have one route each, through machines with on
 Bilge and Ulusoy with one vehicle); `why_not` says what else a cell has.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from time import perf_counter
 from typing import TYPE_CHECKING
@@ -14,9 +14,11 @@ from numpy.typing import NDArray
 
 from lab.errors import BadInput
 from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.objectives import MAKESPAN
 from lab.sequencing.cell.routes import SERVER, Option, entry
 from lab.sequencing.cell.ways import FAR, distances
 from lab.sequencing.methods.cp_sat_times import Times
+from lab.sequencing.methods.shared import Shared
 from lab.sequencing.simulate.follow import simulate
 from lab.sequencing.simulate.run import Run
 
@@ -68,10 +70,11 @@ def why_not(cell: Cell) -> str:
     )
 
 
-def one_robot(cell: Cell, time_limit_s: float = TIME_LIMIT_S) -> OneRobot:
+def one_robot(cell: Cell, time_limit_s: float = TIME_LIMIT_S, shared: Shared | None = None) -> OneRobot:
     """The shortest makespan, proven, unless the time limit [s] or memory ends it: then the best found and the bound.
 
-    The first pass, of a second, is always made; the first use of all compiles, which takes half a minute.
+    The first pass, of a second, is always made; the first use of all compiles, which takes half a minute. Each pass tells
+    `shared` its order and its bound, which may end it (see `Shared.look`).
     Raises BadInput for a cell that it does not know (`why_not`). Source: dynamic programming of job shops with bounding, Gromicho
     et al. 2012, as a beam search that is widened until what it left out cannot be better; bounds by `one_robot_kernels`.
     """
@@ -79,16 +82,20 @@ def one_robot(cell: Cell, time_limit_s: float = TIME_LIMIT_S) -> OneRobot:
     if reason:
         raise BadInput(f"search of one robot's tours: not for {reason}")
     begin, times = perf_counter(), Times(cell, shortest=0)
+    shared = Shared(cell, MAKESPAN) if shared is None else shared
     search = _Search(cell, times)
     width, states = FIRST_WIDTH, 0
     while True:
-        passed, kept = search.widen(width, begin + time_limit_s)
+        passed, kept = search.widen(width, begin + time_limit_s, shared.look)
         states += kept
+        shared.tell("search of tours", search.sequence)
+        shared.tell("search of tours", bound=min(search.low / times.per_s, shared.cost))
         if search.low >= search.best or not passed or width >= MOST_WIDTH:
             break
         width *= 10
     cost = simulate(cell, search.sequence).makespan_s
     bound = cost if search.low >= search.best else search.low / times.per_s
+    shared.tell("search of tours", bound=min(bound, cost))
     return OneRobot(cost, search.sequence, min(bound, cost), states, perf_counter() - begin, times.rounded_s)
 
 
@@ -104,16 +111,17 @@ class _Search:
         self._start = cell.index(cell.robot_start)
         self.best, self.low, self.sequence = kernels.FAR, 0, tuple[int, ...]()
 
-    def widen(self, width: int, until_s: float) -> tuple[bool, int]:
-        """One pass with so many states a layer; whether it came to its end, and how many states it kept."""
+    def widen(self, width: int, until_s: float, look: Callable[[], None]) -> tuple[bool, int]:
+        """One pass with so many states a layer; whether it came to its end, and how many states it kept. look: at each layer."""
         kernels, work, parts = self._kernels, self._work, len(self._work.counts)
         none, zero = np.full(1, -1, np.int64), np.zeros(1, np.int64)
         layer = kernels.Layer(zero, none, zero, work.ready.reshape(1, parts), zero, np.zeros((1, 3), np.int64))
         made, cut, states = list[NDArray[np.int64]](), kernels.FAR, 0
         for _ in range(int(work.counts.sum())):
+            look()
             if self.sequence and perf_counter() > until_s:
                 return False, states
-            layer = kernels.expand(work, self._rest, layer, self._start, self.best)
+            layer = kernels.Layer(*kernels.expand(work, self._rest, layer, self._start, self.best))
             order = np.lexsort((layer.ready.sum(1), layer.now, layer.last, layer.code))
             kept = order[kernels.needed(work, layer, order)]
             if len(kept) > width:

@@ -160,8 +160,13 @@ class Layer(NamedTuple):
 
 
 @compiled
-def expand(work: Work, rest: Whole, layer: Layer, start: int, below: int) -> Layer:
-    """All states after these whose bound is below a value; `start`: where the robot stands in the first state."""
+def expand(
+    work: Work, rest: Whole, layer: Layer, start: int, below: int
+) -> tuple[Whole, Whole, Whole, Whole, Whole, Whole]:
+    """The fields of a layer of all states after these whose bound is below a value; start: where the robot stands at first.
+
+    A plain tuple: a named one is made by Python, where Ctrl-C may be raised, which compiled code does not look at.
+    """
     parts, n, cap = len(work.counts), 0, max(64, 2 * len(layer.code))
     out, times, made = np.empty((cap, 4), np.int64), np.empty((cap, parts), np.int64), np.empty((cap, 3), np.int64)
     c, ready = np.empty(parts, np.int64), np.empty(parts, np.int64)
@@ -196,9 +201,8 @@ def expand(work: Work, rest: Whole, layer: Layer, start: int, below: int) -> Lay
                 made[n, 0], made[n, 1], made[n, 2] = a, j, place
                 n += 1
             c[j] -= 1
-    return Layer(
-        out[:n, 0].copy(), out[:n, 1].copy(), out[:n, 2].copy(), times[:n].copy(), out[:n, 3].copy(), made[:n].copy()
-    )
+    last_ones, nows, bounds = out[:n, 1].copy(), out[:n, 2].copy(), out[:n, 3].copy()
+    return out[:n, 0].copy(), last_ones, nows, times[:n].copy(), bounds, made[:n].copy()
 
 
 @compiled

@@ -1,6 +1,7 @@
 """The methods together: rules, annealing, and the exact search that proves most, each going on from the best order so far."""
 
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
 from math import inf
@@ -8,12 +9,13 @@ from time import perf_counter
 
 import numpy as np
 
+from lab.errors import WorkFailed
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import MAKESPAN, cost
-from lab.sequencing.methods.exact import optimum
+from lab.sequencing.methods.exact import MAX_EXPANDED, optimum
 from lab.sequencing.methods.fewer_moves import fewer_moves
-from lab.sequencing.methods.rules import first_come, work_left_s
-from lab.sequencing.methods.shared import Shared
+from lab.sequencing.methods.rules import first_come, loads_s, work_left_s
+from lab.sequencing.methods.shared import Shared, shared_of
 from lab.sequencing.search import SAME, Search, SequenceResult, not_in_time, only_one
 from lab.sequencing.simulate.cell_arrays import most_moves
 from lab.sequencing.simulate.follow import follow
@@ -23,6 +25,7 @@ EACH = 500  # how often it tries each of a list's neighbours, on average: a shor
 TIME_LIMIT_S = 60.0
 WORKERS = 6  # threads of CP-SAT, also on two cores: they look in different ways
 ANNEALERS, ANNEALINGS = 2, 40  # threads beside CP-SAT, with seeds of their own; how often each begins at the most
+FIRST_LOOK = 2_000  # states of A*
 SHORTEST_S, WAIT_S = 0.1, 0.05  # what CP-SAT is left at least; between two looks at the clock
 
 
@@ -49,35 +52,57 @@ class BestKnown:
 def best_known(
     cell: Cell, objective: str = MAKESPAN, time_limit_s: float = TIME_LIMIT_S, seed: int = 0, workers: int = 1
 ) -> BestKnown:
+    """What `look_on` comes to in a cell of which nothing is known yet."""
+    return look_on(Shared(cell, objective), time_limit_s, seed, workers)
+
+
+def look_on(
+    shared: Shared, time_limit_s: float = TIME_LIMIT_S, seed: int = 0, workers: int = 1, most: int = MAX_EXPANDED
+) -> BestKnown:
     """The best order by the mean times, and what is proven of it; CP-SAT is looked at only where nothing faster proves it.
 
-    Of a cell with one robot that does all the work the shortest makespan is searched by states (`optimum`), of a job shop with
-    one robot by its tours (`one_robot`). Else annealing and CP-SAT look: with one worker one after the other, the same seed
-    giving the same order; with more side by side, each going on from the best order of both, until it is proven.
+    Of a cell with one robot that does all the work the shortest makespan is searched by states (`optimum`), `most` of them; of a
+    job shop with one robot by its tours (`one_robot`). Else annealing and CP-SAT look: with one worker one after the other, the
+    same seed giving the same order; with more side by side, each going on from the best order of all, until it is proven.
     time_limit_s: of the search of tours, and of CP-SAT, or of both together [s].
-    Raises BadInput as they do, WorkFailed where it is proven, or seems, that no order comes to its end.
+    Raises BadInput as they do, WorkFailed where it is proven, or seems, that no order comes to its end, and as `Shared.look`.
     """
+    cell, objective = shared.cell, shared.objective
     if objective == MAKESPAN and cell.serial:
-        found = optimum(cell)
-        return BestKnown(fewer_moves(cell, found.sequence), found.cost, "A*", found.bound_s, "A*")
-    shared = Shared(cell, objective)
-    shared.tell("each part alone", bound=_alone(cell, objective))
+        found = optimum(cell, most, shared)
+        shared.tell("A*", found.sequence, found.bound_s)
+        return known_of(shared)
+    _tell_alone(shared)
     from lab.sequencing.methods.one_robot import one_robot, why_not  # here and below: numba takes its time
 
     if objective == MAKESPAN and not why_not(cell):
-        tour = one_robot(cell, time_limit_s)
-        shared.tell("search of tours", tour.sequence, tour.bound)
+        one_robot(cell, time_limit_s, shared)
     if not shared.over.is_set():
         _look(shared, time_limit_s, seed, workers)
-    sequence = fewer_moves(cell, shared.sequence, objective) if shared.sequence else ()
-    value = cost(follow(cell, sequence), objective) if sequence else inf
+    return known_of(shared)
+
+
+def look_first(shared: Shared) -> None:
+    """What is proven within a second: of a small cell all that `look_on` would, of a large one a bound, and an order."""
+    if shared.objective == MAKESPAN and shared.cell.serial:
+        with suppress(WorkFailed):  # whoever looks longer says so
+            look_on(shared, most=FIRST_LOOK)
+    else:
+        _tell_alone(shared)
+
+
+def known_of(shared: Shared) -> BestKnown:
+    """What is shared, without pointless hops."""
+    sequence = fewer_moves(shared.cell, shared.sequence, shared.objective) if shared.sequence else ()
+    value = cost(follow(shared.cell, sequence), shared.objective) if sequence else inf
     return BestKnown(sequence, value, shared.found_by, min(shared.bound, value), shared.bound_by)
 
 
 def portfolio(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceResult:
     """The best order that any method finds within its time, one sequence; it draws nothing from `rng`."""
     search.check(cell)
-    found = best_known(cell, search.objective, TIME_LIMIT_S, workers=WORKERS)
+    shared = shared_of(cell, search)
+    found = look_on(shared, shared.left_s(TIME_LIMIT_S), workers=WORKERS)
     if not found.sequence and found.bound < inf:
         raise not_in_time(cell, "any method", found.bound)
     return only_one(cell, search, found.sequence, found.cost, bool(found.sequence))
@@ -94,6 +119,23 @@ def _look(shared: Shared, time_limit_s: float, seed: int, workers: int) -> None:
         _side_by_side(shared, until_s, seed, workers)
     elif not shared.cell.serial:
         _prove(shared, time_limit_s, seed, workers)
+
+
+def _tell_alone(shared: Shared) -> None:
+    """Tells what is known without any search."""
+    shared.tell("each part alone", bound=_alone(shared.cell, shared.objective))
+    if shared.objective == MAKESPAN:
+        shared.tell("each machine alone", bound=_machines_alone(shared.cell))
+
+
+def _machines_alone(cell: Cell) -> float:
+    """What the machine with the most work takes for it at least [s]; batches are left out."""
+    to_come, total = loads_s(cell, least=True), dict[int, float]()
+    for part in cell.unfinished:
+        for station, seconds in to_come[cell.begin_at[part - 1]].items():
+            total[station] = total.get(station, 0.0) + seconds
+    places = [cell.stations[one].servers or cell.capacities[one] for one in range(len(cell.stations))]
+    return max([seconds / places[one] for one, seconds in total.items() if one not in cell.batches], default=0.0)
 
 
 def _alone(cell: Cell, objective: str) -> float:
@@ -117,6 +159,7 @@ def _side_by_side(shared: Shared, until_s: float, seed: int, workers: int) -> No
         working += [pool.submit(_anneal_on, shared, seed + ANNEALINGS * number) for number in range(ANNEALERS)]
         try:
             while perf_counter() < until_s and not shared.over.wait(WAIT_S):
+                shared.look()
                 if any(one.done() and one.exception() for one in working):
                     break
         finally:  # Ctrl-C, too
@@ -151,5 +194,6 @@ def _anneal(shared: Shared, seed: int, again: int) -> None:
         annealing.advance(ROUND, done / steps)
         if annealing.best and annealing.best_cost < shared.cost - SAME:
             shared.tell("annealing", annealing.best)
+        shared.look()
         if shared.over.is_set():
             return

@@ -151,6 +151,17 @@ def first_come(cell: Cell) -> tuple[int, ...]:
     return tuple(sequence)
 
 
+def any_order(cell: Cell) -> tuple[int, ...]:
+    """A sequence that comes to its end, by whatever finds one at once; empty: a rule would have to look ahead."""
+    if found := first_come(cell):
+        return found
+    for rule in usable(cell).values():
+        found = dispatch(run := Run(cell), rule)
+        if run.done:
+            return found
+    return ()
+
+
 @lru_cache(maxsize=16)
 def work_left_s(cell: Cell) -> tuple[float, ...]:
     """Seconds of moves, services and processing from each position to the end, by the shortest way, processing there left out.
@@ -174,19 +185,20 @@ def work_left_s(cell: Cell) -> tuple[float, ...]:
 
 
 @lru_cache(maxsize=16)
-def loads_s(cell: Cell) -> tuple[dict[int, float], ...]:
-    """For each position, station index -> processing still to come there [s], averaged over the ways on."""
+def loads_s(cell: Cell, least: bool = False) -> tuple[dict[int, float], ...]:
+    """For each position, station index -> processing still to come there [s]: the mean, or the least, of the ways on."""
 
     def loads_s(place: int, ahead: list[dict[int, float]]) -> dict[int, float]:
-        total: dict[int, float] = {}
+        each = list[dict[int, float]]()
         for option, then in zip(cell.positions[place].options, ahead, strict=True):
             there, own = cell.positions[option.to], dict(then)
             machine = option.target if option.robot == SERVER else machine_of(cell, option.to)
             if there.processing_s and machine is not None:
                 own[machine] = own.get(machine, 0.0) + there.processing_s
-            for station, seconds in own.items():
-                total[station] = total.get(station, 0.0) + seconds / len(ahead)
-        return total
+            each.append(own)
+        stations = dict.fromkeys(station for own in each for station in own)
+        ways = {station: [own.get(station, 0.0) for own in each] for station in stations}
+        return {at: min(own) if least else sum(one / len(own) for one in own) for at, own in ways.items()}
 
     return tuple(from_the_ends(cell.positions, loads_s))
 

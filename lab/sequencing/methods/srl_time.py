@@ -56,6 +56,7 @@ def srl_time(cell: Cell, search: Search, rng: np.random.Generator, bounded: bool
         practice, tries = search.episodes // PRACTICE, search.episodes // TRIES
         small = TimeLearner(replace(cell, order=cell.order[:parts]), search.objective, rng, bounded)
         for _ in range(practice):
+            search.look()
             small.episode()
         for _ in range(tries):
             sequence, cost, done = small.tried_on(learner)

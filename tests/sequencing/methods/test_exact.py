@@ -226,7 +226,7 @@ def test_the_sequencer_is_exact_for_every_objective(toast_cell: CellMaker, objec
 def test_what_is_not_proven_is_improved_by_cp_sat(toast_cell: CellMaker, monkeypatch: pytest.MonkeyPatch) -> None:
     cell = toast_cell("II", 3)
     rough = optimum(cell, max_expanded=0)
-    monkeypatch.setattr("lab.sequencing.methods.exact.optimum", lambda cell: rough)
+    monkeypatch.setattr("lab.sequencing.methods.exact.optimum", lambda cell, shared: rough)
     assert rough.cost > exact(cell, Search(), np.random.default_rng(0)).cost == 700
     monkeypatch.setattr("lab.sequencing.methods.cp_sat.MOST_MOVES", 20)
     assert exact(cell, Search(), np.random.default_rng(0)).cost == rough.cost

@@ -1,0 +1,130 @@
+"""Sessions of a method on a cell, then the proof beside it: whenever that is stopped, there is an order, and its bound."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+from lab.production.order import SECOND_OPINION_S, reference_of, unit_of
+from lab.sequencing import SEQUENCERS
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.chance import NO_CHANCE
+from lab.sequencing.cell.objectives import BUILT_IN
+from lab.sequencing.methods.portfolio import known_of, look_first, look_on
+from lab.sequencing.methods.rules import any_order
+from lab.sequencing.methods.shared import NO_LIMITS, Limits, SearchOver, Shared
+from lab.sequencing.search import SAME, EpisodeSequenced, Reference, Search, SequenceResult, not_in_time
+from lab.teaching.events import SequenceFound, SequencingBegan, SequencingStands, Tell
+
+CTRL_C, FIRST_COME = "Ctrl-C", "first come, first served"
+Session = Callable[[Search, int], SequenceResult]  # given the search and the session's number, from 0
+
+
+@dataclass(frozen=True)
+class Found:
+    """What was found and what is known. sessions: one at least; method: by what.
+
+    stopped_by: "Ctrl-C", "seconds" or "gap", then all is as it was until then; None: everything came to its end.
+    """
+
+    sessions: list[SequenceResult]
+    method: str
+    known: Reference
+    stopped_by: str | None
+
+
+@dataclass
+class _Heard:
+    """What a session has found so far, of which it tells. whole: its result, once it has come to its end."""
+
+    method: str
+    search: Search
+    shared: Shared
+    tell: Tell
+    best: EpisodeSequenced | None = None
+    costs: list[float] = field(default_factory=list)
+    whole: SequenceResult | None = None
+
+    def __call__(self, event: EpisodeSequenced) -> None:
+        self.costs.append(event.cost)
+        if event.best and (self.best is None or event.best != self.best.best):
+            self.shared.tell(self.method, event.best)
+        self.best = event if event.best else self.best
+        self.tell(event)
+        self.shared.look()
+
+    def result(self) -> SequenceResult | None:
+        """What has come of it; None: nothing yet."""
+        if self.whole is not None or (self.best is None and not self.shared.sequence):
+            return self.whole
+        if self.best is not None and self.search.chance != NO_CHANCE:  # each episode has times of its own
+            return SequenceResult(self.best.best, self.best.best_cost, tuple(self.costs))
+        # Of episodes that are tried many at once, the best one may not have been told of yet.
+        cost = next((one for one in self.costs if abs(one - self.shared.cost) <= SAME), self.shared.cost)
+        return SequenceResult(
+            self.shared.sequence, cost, tuple(self.costs if cost in self.costs else [*self.costs, cost])
+        )
+
+
+def looked_for(
+    cell: Cell,
+    method: str,
+    search: Search,
+    sessions: int,
+    find: Session,
+    tell: Tell,
+    limits: Limits = NO_LIMITS,
+    began: Callable[[Reference | None], SequencingBegan] | None = None,
+) -> Found:
+    """What so many sessions find, and what is proven of the best order, unless the method's answer stands alone.
+
+    A bound is known within a second, of small cells the optimum. limits: a session ends within their gap, everything at their
+    moment; where they are given a proof is looked for beside any method. Raises KeyboardInterrupt and WorkFailed only where
+    there is no order at all, and as `find` does.
+    """
+    best = Shared(cell, search.objective, limits, lambda shared: tell(_stands(shared)))
+    heard, stopped_by = list[_Heard](), ""
+    try:
+        if search.objective in BUILT_IN:
+            look_first(best)
+        for number in range(sessions):
+            shown = _known(best) if search.chance == NO_CHANCE else None
+            one = _Heard(method, search, Shared(cell, search.objective, limits, parent=best), tell)
+            heard.append(one)
+            tell(SequencingBegan(search.episodes, shown) if began is None else began(shown))
+            try:
+                one.whole = find(replace(search, on_episode=one, shared=one.shared), number)
+                best.tell(method, one.whole.sequence)
+            except SearchOver as over:
+                if over.by == "seconds":
+                    raise
+                stopped_by = over.by
+            if result := one.result():
+                shown = None if shown is None else _known(best)
+                tell(SequenceFound(result, shown, cell.parts, method))
+        asked = limits != NO_LIMITS or not SEQUENCERS[method].alone
+        if asked and search.objective in BUILT_IN and not best.over.is_set():
+            look_on(best, best.left_s(SECOND_OPINION_S))
+    except SearchOver as over:
+        stopped_by = over.by
+    except KeyboardInterrupt:
+        stopped_by = CTRL_C
+    found = [result for one in heard if (result := one.result())]
+    if not best.sequence:
+        best.tell(FIRST_COME, any_order(cell))
+    if not (found or best.sequence):
+        if stopped_by == CTRL_C:
+            raise KeyboardInterrupt("stopped by Ctrl-C before an order was found") from None
+        raise not_in_time(cell, method, best.bound) from None
+    if not found:
+        found, method = [SequenceResult(best.sequence, best.cost, (best.cost,))], best.found_by
+    return Found(found, method, _known(best), stopped_by or None)
+
+
+def _known(best: Shared) -> Reference:
+    return reference_of(best.cell, best.objective, known_of(best))
+
+
+def _stands(shared: Shared) -> SequencingStands:
+    of, unit = shared.cell.proven_of, unit_of(shared.objective)
+    return SequencingStands(
+        shared.cost, shared.found_by, Reference(shared.bound, shared.proven, shared.bound_by, unit, of=of)
+    )
