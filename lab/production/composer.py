@@ -123,7 +123,8 @@ class Production:
             self.replan(why, back)
             return
         recovery.lose(dict(found.stuck))
-        work.plan, self.sequence = found.run, [*found.sequence]
+        self.sequence = [*found.sequence]
+        work.go_by(found.run)
         if found.schedule is not None and found.proven is not None:
             gap = found.proven.gap(found.schedule.makespan_s)
             plan = found.schedule.later(now_s)
@@ -136,7 +137,7 @@ class Production:
         floor, work = self.floor, self.work
         cell = self.relearner.learn(scene_seen(floor.scene.task, floor.scene.layout, [*seen]))
         adopt(floor, self.relearner.prepared, work.spot_of)
-        work.plan = in_another(work.plan, cell)
+        work.go_by(in_another(work.plan, cell))
 
     def watch(self) -> None:
         """After each physics step: tell of machines that are done, and show what they have done to their parts."""

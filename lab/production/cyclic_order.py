@@ -6,7 +6,6 @@ from functools import reduce
 from math import gcd
 from typing import TYPE_CHECKING, Any
 
-from lab.errors import BadInput
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.schedule import Schedule
 
@@ -56,15 +55,9 @@ def measured_period(cycle: "Cycle", planned: Schedule, measured: Schedule) -> di
 
 
 def cyclic_order(cell: Cell, seed: int) -> "tuple[Cycle, Unrolled]":
-    """The cycle of a cell's products and its order for the cell's parts, as a run carries it out: as early as can be.
-
-    BadInput where the robot would have to wait on purpose, and as `best_cycle`.
-    """
+    """The cycle of a cell's products and its order for the cell's parts, as a run carries it out. BadInput as `best_cycle`."""
     from lab.sequencing.cyclic.cycle import best_cycle
     from lab.sequencing.cyclic.unrolled import unrolled
 
     cycle = best_cycle(cell, mix_of(cell.order), seed=seed)
-    found = unrolled(cycle, cell)
-    if found.waits:
-        raise BadInput("--cyclic: the robot would have to wait on purpose to keep to a time window; a run never does")
-    return cycle, found
+    return cycle, unrolled(cycle, cell)

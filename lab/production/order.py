@@ -25,8 +25,8 @@ from lab.sequencing.cell.schedule import Move
 from lab.sequencing.methods.exact import Optimum, optimum
 from lab.sequencing.methods.portfolio import BestKnown, best_known
 from lab.sequencing.search import SAME, Reference, Search, SequenceResult
-from lab.sequencing.simulate.follow import follow
-from lab.sequencing.simulate.run import Run, branch
+from lab.sequencing.simulate.follow import follow, waits_in
+from lab.sequencing.simulate.run import NO_WAIT, Run, branch
 from lab.tasks.sequencing import Sequencing, search_for
 from lab.teaching.events import ORDER, LessonEvent, OrderChosen, SequenceFound, SequencingBegan, Tell, unheard
 from lab.teaching.lesson_sessions import TellingAdvisor
@@ -61,11 +61,11 @@ def checked_order(cell: Cell, words: str, where: str = "--order") -> tuple[int, 
 
 def moves_from(start: Run, sequence: Sequence[int], what: str) -> list[Move]:
     """The moves of a sequence from where a run is to the end of the work; the run stays where it is. BadInput, of `what`."""
-    run, moves = branch(start), list[Move]()
+    run, moves, waits = branch(start), list[Move](), waits_in(start, sequence)
     for position, decision in enumerate(sequence, 1):
         if reason := run.refusal(decision):
             raise BadInput(f"{what}: move {position} '{decision}': {reason}; {_allowed(run)}")
-        moves.append(run.move(decision))
+        moves.append(run.move(decision, waits[position - 1] if waits else NO_WAIT))
     if not run.done:
         part = run.finished_s.index(None) + 1
         station = run.cell.names[run.cell.positions[run.locations[part - 1]].station]

@@ -30,7 +30,7 @@ from lab.sequencing.cell.objectives import (
 from lab.sequencing.cell.schedule_rows import check_table, rows_of, write_table
 from lab.sequencing.methods.shared import NO_LIMITS, Limits
 from lab.sequencing.search import SAME, LearnedSequence, Reference, Search, SequenceResult
-from lab.sequencing.simulate.follow import follow, simulate
+from lab.sequencing.simulate.follow import follow, simulate, steps
 from lab.tasks.carried_policy import read_policy
 from lab.tasks.cell_file import CellFile, order_from_word, toast_case
 from lab.tasks.grid_world import GridWorld
@@ -312,11 +312,9 @@ def _advice(found: "Sequence[Any]") -> list[dict[str, Any]]:
 
 def _in_words(cell: Cell, sequence: Sequence[int]) -> list[str]:
     """What each decision of a sequence does."""
-    from lab.sequencing.simulate.run import Run
-
-    run, words = Run(cell), []
-    for decision in sequence:
-        move = run.move(decision)
+    words = []
+    for run, decision, wait in steps(cell, sequence):
+        move = run.move(decision, wait)
         what = cell.part_name(move.part) + ("'s pallet" if move.carries == "pallet" else "")
         words.append(f"{what}: {move.origin} > {move.target}")
     return words

@@ -14,14 +14,15 @@ from lab.production.trouble import Trouble
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.routes import Option, part_of
 from lab.sequencing.cell.schedule import Move
-from lab.sequencing.simulate.run import Run, closes
+from lab.sequencing.simulate.run import NO_WAIT, Run, Wait, Windowless, branch, closes
+from lab.sequencing.simulate.waits import waits_of
 from lab.sim.parts.kinds import Spot, comes_as, on_its_pallet
 from lab.sim.scene.scene import pallet_of
 from lab.sim.world import TIME_STEP
 from lab.skills import Skill
 from lab.skills.free_way import by_free_cells
 from lab.skills.skill import Status
-from lab.skills.skillset import Carried, ways_of
+from lab.skills.skillset import WINDOW_MARGIN_S, Carried, ways_of
 from lab.teaching.events import (
     MachineBegan,
     MoveBegan,
@@ -47,6 +48,7 @@ def _unseen() -> None:
 class _UnderWay:
     """The times [s] of a move under way; leg: what of the carrying comes next; smooth: nothing had to be done twice.
 
+    stayed_s: how long it has waited above its target.
     picked: when it reached its part, was served and took it up for the first time; None: not yet.
     """
 
@@ -57,6 +59,7 @@ class _UnderWay:
     served_s: float = 0.0
     pick_s: float = 0.0
     leg: int = 0
+    stayed_s: float = 0.0
     smooth: bool = True
     picked: tuple[float, float, float] | None = None
 
@@ -87,7 +90,7 @@ class Transfers:
     waiting: set[str] = field(default_factory=set)
 
     def __post_init__(self) -> None:
-        self.plan = Run(self.cell)  # where parts are and may go; its times are the predicted ones
+        self.go_by(Run(self.cell))
         self.place = self.cell.robot_start
         self.look: Callable[[], None] = _unseen
         self._under_way: _UnderWay | None = None
@@ -98,6 +101,11 @@ class Transfers:
         for number, spot in enumerate(scene.places.begins(scene.order), start=1):
             for body in scene.bodies_of(self.name(number), comes_as(scene.task.part(scene.order[number - 1]))):
                 self.spot_of[body] = spot
+
+    def go_by(self, state: Run) -> None:
+        """From now on a run is the plan: it says where parts are and may go. Its clock is the floor's, so much later."""
+        self.plan = Windowless(state.cell, state.times, state)
+        self._later_s = self.floor.now_s - state.now_s
 
     def name(self, part: int) -> str:
         """What a part is called."""
@@ -123,6 +131,7 @@ class Transfers:
             self._go(way.origin, name, move)
             if option.waits:
                 self._await(name, way.origin)
+            self._stay(self._waits(sequence, way.origin, floor.now_s).pick_s, name, way.origin)
             move.served_s = floor.now_s
             if option.service_s:
                 self._serve(part, way.origin)
@@ -132,7 +141,7 @@ class Transfers:
             move.picked = move.picked or (move.reach_s, move.served_s, move.pick_s)
         else:
             move.smooth = False  # it was taken up before this move, or before it was interrupted
-        self._bring(way, spot, move)
+        self._bring(way, spot, move, sequence)
         self._finish(sequence, way, spot, move)
 
     @property
@@ -240,11 +249,12 @@ class Transfers:
         decision, *following = sequence
         part, floor, name = part_of(decision, self.cell.parts), self.floor, move.what[0]
         if move.smooth:
-            self.timed.append(TimedMove(way, floor.now_s - move.pick_s))
+            self.timed.append(TimedMove(way, floor.now_s - move.pick_s - move.stayed_s))
         self.place, self._under_way = way.target, None
         for body in floor.scene.bodies_of(name, way.kind):
             self.spot_of[body] = spot
         planned = self.plan.move(decision)
+        self.plan.robots_s = [floor.now_s - self._later_s]
         reach_s, served_s, pick_s = move.picked or (move.reach_s, move.served_s, move.pick_s)
         pick_s = self._left_s.pop(name, pick_s)  # of a part that was set aside on its way: when it left its station
         leave_s, reach_s, served_s = (min(at_s, pick_s) for at_s in (move.leave_s, reach_s, served_s))
@@ -258,6 +268,8 @@ class Transfers:
             self.waiting |= {name} if batch else set()
             if batch and closes(self.plan, self.cell.index(way.target), following):
                 self._begin_batch(way.target)
+        later_s = self._later_s
+        self.plan.ready_s = [self._ready_s(n, s + later_s) - later_s for n, s in enumerate(self.plan.ready_s, 1)]
         self.tell(MoveMade(self.moves[-1], name))
         if self.plan.finished_s[part - 1] is not None:
             self.finished[part] = floor.now_s
@@ -327,6 +339,42 @@ class Transfers:
                 raise Trouble("it is not done when it should be", name, station, late=True)
             floor.wait(work.expected_s if late_s < 0 else floor.now_s + 1.0)
             self.look()
+
+    def _waits(self, sequence: Sequence[int], origin: str, at_s: float) -> Wait:
+        """How long the first of the decisions still to come has to wait on purpose, if its work at its origin begins at a time:
+        so that no part is left too long in a machine, by what the machines have really begun and done."""
+        if not self.plan.cell.has_windows:
+            return NO_WAIT
+        run = branch(self.plan)
+        run.robots_at, run.robots_s = [self.cell.index(origin)], [at_s]
+        run.ready_s = [self._ready_s(part, at_s) for part in range(1, self.cell.parts + 1)]
+        for beyond_s in (0.0, WINDOW_MARGIN_S):
+            if waits := waits_of(run, sequence, beyond_s):
+                return waits[0]
+        return NO_WAIT
+
+    def _ready_s(self, part: int, else_s: float) -> float:
+        """When the machine that a part stands in is done with it; of a part that stands in none, and of a spoilt one, another
+        time."""
+        work, now_s = self.work_on(part), self.floor.now_s
+        if work is None or part in self.spoilt:
+            return else_s
+        return work.until_s if work.done(now_s) else max(now_s, work.expected_s)
+
+    def _stay_above(self, sequence: Sequence[int], way: Carried, move: _UnderWay) -> None:
+        """Wait with what is in the gripper, so that what follows is not left too long in the machine that it comes to."""
+        option = self.plan.option(sequence[0])
+        assert option is not None
+        carry_s = self.plan.carry_s(option)
+        taken_s = max(self.floor.now_s, move.pick_s + carry_s) - carry_s - option.service_s
+        began_s = self.floor.now_s
+        self._stay(sum(self._waits(sequence, way.origin, taken_s)), move.what[0], way.target)
+        move.stayed_s += self.floor.now_s - began_s
+
+    def _stay(self, seconds: float, name: str, station: str) -> None:
+        """Let the arm rest. Raises Trouble where it is stopped."""
+        if why := self.floor.follow(self.floor.scene.robot.rest(round(seconds / TIME_STEP))):
+            raise Trouble(why, name, station, held=self.floor.was_held)
 
     def work_on(self, part: int) -> Work | None:
         """What the machine that a part stands in does with it, or has done; None where it stands in none."""
@@ -409,13 +457,18 @@ class Transfers:
         if abs(worked_s - brought.process_s) > TIME_STEP:
             self.moves[own[-1]] = replace(brought, process_s=worked_s)
 
-    def _bring(self, way: Carried, spot: Spot, move: _UnderWay) -> None:
-        """Carry what is in the gripper to its target and set it down; from a station near the target, that is all."""
+    def _bring(self, way: Carried, spot: Spot, move: _UnderWay, sequence: Sequence[int] = ()) -> None:
+        """Carry what is in the gripper to its target and set it down; from a station near the target, that is all.
+
+        sequence: what is still to be done, this first; above the target the robot waits as long as that wants.
+        """
         name, legs = move.what[0], [skill for skill in self.floor.skillset.legs[way] if skill.carries]
         if self.place:
             move.leg = len(legs) - 1 if self.place == way.target else 0
         for skill in legs[move.leg :]:
             if skill is legs[-1]:
+                if sequence:
+                    self._stay_above(sequence, way, move)
                 self.look()  # before anything is set down
             self._to_begin(skill, name, way.target)
             self.place = ""

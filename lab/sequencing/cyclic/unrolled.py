@@ -81,7 +81,7 @@ def unrolled(cycle: Cycle, cell: Cell) -> Unrolled:
         sequence.append(decision)
         run.move(decision)
     try:
-        return Unrolled(cell, tuple(sequence), simulate(cell, sequence), bool(waits_in(cell, sequence)))
+        return Unrolled(cell, tuple(sequence), simulate(cell, sequence), bool(waits_in(Run(cell), sequence)))
     except BadInput:
         if not cell.has_windows:
             raise

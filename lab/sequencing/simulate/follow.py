@@ -7,26 +7,27 @@ from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import Episode
 from lab.sequencing.cell.routes import part_of
 from lab.sequencing.cell.schedule import Move, Schedule
-from lab.sequencing.simulate.run import NO_WAIT, Run, Wait
+from lab.sequencing.simulate.run import NO_WAIT, Run, Wait, branch
 from lab.sequencing.simulate.waits import waits_of
 
 
-def waits_in(cell: Cell, sequence: Sequence[int]) -> tuple[Wait, ...]:
-    """The waits on purpose with which a list keeps to all windows, by the cell's own times; none where it needs none, or where
-    none would help."""
-    if not (cell.has_windows and cell.serial):
+def waits_in(start: Run, sequence: Sequence[int]) -> tuple[Wait, ...]:
+    """The waits on purpose with which a list keeps to all windows from where a run is; none where it needs none, or where none
+    would help."""
+    if not (start.cell.has_windows and start.cell.serial):
         return ()
-    run = Run(cell)
+    run = branch(start)
     for decision in sequence:
         if run.option(decision) is None:
-            return (waits_of(cell, sequence) or ()) if run.spoils(decision) else ()
+            return (waits_of(start, sequence) or ()) if run.spoils(decision) else ()
         run.move(decision)
     return ()
 
 
 def steps(cell: Cell, sequence: Sequence[int], times: Episode | None = None) -> Iterator[tuple[Run, int, Wait]]:
-    """The run before each decision of a list, that decision, and its wait on purpose; whoever asks makes the move."""
-    run, waits = Run(cell, times), waits_in(cell, sequence)
+    """The run before each decision of a list, that decision, and its wait on purpose, by the cell's own times; whoever asks makes
+    the move."""
+    run, waits = Run(cell, times), waits_in(Run(cell), sequence)
     for number, decision in enumerate(sequence):
         yield run, decision, waits[number] if waits else NO_WAIT
 

@@ -369,6 +369,19 @@ class Run:
         return [taken >= most for taken, most in zip(self.occupied, self.cell.capacities, strict=True)]
 
 
+class Windowless(Run):
+    """A run in which no part is ever picked too late: where somebody else sees to that."""
+
+    def __init__(self, cell: Cell, times: Episode | None = None, state: Run | None = None) -> None:
+        """state: where it begins; None: where the cell does."""
+        super().__init__(cell, times)
+        if state is not None:
+            take_over(self, state)
+
+    def too_late(self, part: int, option: Option) -> bool:
+        return False
+
+
 def branch(run: Run) -> Run:
     """Another run that goes on from where this one is, by the same times."""
     other = Run(run.cell, run.times)
@@ -387,7 +400,7 @@ def take_over(run: Run, state: Run) -> None:
 
 def closes(run: Run, station: int, following: Sequence[int]) -> bool:
     """Whether nothing more comes into a machine with batches before one of its parts is taken out, by the decisions to come."""
-    ahead = branch(run)
+    ahead = Windowless(run.cell, run.times, run)
     for decision in following:
         option = ahead.option(decision)
         if option is None or option.origin == station:

@@ -1,58 +1,57 @@
 """Waits on purpose: how long a robot stays before it picks and before it drops, so that no part of a list is picked too late."""
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
-from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.routes import Option, part_of
 from lab.sequencing.simulate.constraints import Arc, earliest
-from lab.sequencing.simulate.run import Run, Wait
+from lab.sequencing.simulate.run import Run, Wait, Windowless
 
 
-def waits_of(cell: Cell, sequence: Sequence[int], spare_s: float = 0.0) -> tuple[Wait, ...] | None:
-    """The least waits with which a list of decisions keeps to all windows, one a decision; None: no waits do.
+def waits_of(start: Run, sequence: Sequence[int], beyond_s: float = 0.0) -> tuple[Wait, ...] | None:
+    """The least waits with which a list of decisions keeps to all windows from where a run is, one a decision; None: no waits do.
 
     Of one robot that does all the work: the list says in which order it makes its moves, and everything is done as early as that
     order and the windows allow. That is the least solution of difference constraints, and no other way of timing the moves ends
-    any of them earlier. spare_s: how much of each window is left.
+    any of them earlier. beyond_s: how much later than its window says a part may be picked, at most as much as the window [s].
     Source: simple temporal networks, Dechter, Meiri and Pearl 1991; hoist scheduling, Che and Chu 2004.
     """
-    run, network = _Windowless(cell), _Network(cell, spare_s)
+    run, network = Windowless(start.cell, start.times, start), _Network(start, beyond_s)
     for decision in sequence:
         option = run.option(decision)
         if option is None:
             return None
-        network.add(part_of(decision, cell.parts), run, option)
+        network.add(part_of(decision, start.cell.parts), run, option)
         run.move(decision)
     return network.waits()
 
 
-class _Windowless(Run):
-    """A run in which no part is ever picked too late."""
+class _Timed(NamedTuple):
+    """What a move demands: what its begin comes after, its drop after that, and, if it may not be put off, no later than what."""
 
-    def too_late(self, part: int, option: Option) -> bool:
-        return False
+    comes: Sequence[Arc]
+    carried: Arc
+    latest: Arc | None
 
 
 class _Network:
     """What the moves demand of one another. Moment 0 is time 0; of move n, 2 n - 1 begins its work where it picks, 2 n drops."""
 
-    def __init__(self, cell: Cell, spare_s: float) -> None:
-        self._cell, self._spare_s = cell, spare_s
-        self._arcs, self._least = (
-            list[Arc](),
-            list[tuple[list[Arc], Arc]](),
-        )  # by move: what leads to its begin, and to its drop
+    def __init__(self, start: Run, beyond_s: float) -> None:
+        self._cell, self._begins_s, self._beyond_s = start.cell, start.now_s, beyond_s
+        self._moves = list[_Timed]()
         self._ready = dict[int, tuple[int, float]]()  # by part: since which moment it is ready, and how much later [s]
         self._next: tuple[int, float] | None = None  # where parts come after a pick: when the next one does
 
     def add(self, part: int, run: Run, option: Option) -> None:
         """The next move of a run, before it is made."""
-        cell, drop = self._cell, 2 * len(self._least)
+        cell, drop = self._cell, 2 * len(self._moves)
         begin, robot, place = drop + 1, cell.robots[option.robot], run.locations[part - 1]
         at, at_most_s = run.robots_at[option.robot], cell.positions[place].at_most_s
         empty_s = 0.0 if at == option.origin else float(cell.empty_s[at, option.origin]) / robot.speed
-        comes = [Arc(drop, begin, empty_s, 0)]
+        comes = [Arc(drop, begin, empty_s if drop else self._begins_s + empty_s, 0)]
         after_pick = cell.arrivals is not None and cell.arrivals.after == "pick" and place == cell.starts[part - 1]
+        latest = Arc(begin, begin, 0.0, 0) if after_pick else None
         since, later_s = 0, run.ready_s[part - 1]
         if part in self._ready:
             since, later_s = self._ready[part]
@@ -61,11 +60,9 @@ class _Network:
         if option.waits:
             comes.append(Arc(since, begin, later_s, 0))
             if at_most_s is not None:
-                latest_s = later_s + max(0.0, at_most_s - self._spare_s) - option.service_s
-                self._arcs.append(Arc(begin, since, -latest_s, 0))
-        carried = Arc(begin, begin + 1, option.service_s + run.carry_s(option), 0)
-        self._arcs += [*comes, carried]
-        self._least.append((comes, carried))
+                latest_s = later_s + at_most_s + min(at_most_s, self._beyond_s) - option.service_s
+                latest = Arc(begin, since, -latest_s, 0)
+        self._moves.append(_Timed(comes, Arc(begin, begin + 1, option.service_s + run.carry_s(option), 0), latest))
         if after_pick and run.fetched + 1 < len(cell.coming):
             interval_s = run.times.interval_s(cell.coming[run.fetched + 1])
             self._next = begin, option.service_s + interval_s
@@ -73,14 +70,22 @@ class _Network:
             self._ready[part] = begin + 1, run.times.processing_s(part, option.to)
 
     def waits(self) -> tuple[Wait, ...] | None:
-        """How much later than they could be begins and drops have to be; None: there is no way."""
-        at_s, broken = earliest(self._arcs, 2 * len(self._least) + 1, 0, 0.0)
-        if broken:
-            return None
-        return tuple(
-            Wait(
-                at_s[carried.one] - max(at_s[arc.one] + arc.least_s for arc in comes),
-                at_s[carried.then] - at_s[carried.one] - carried.least_s,
-            )
-            for comes, carried in self._least
-        )
+        """How much later than they could be begins and drops have to be; None: there is no way.
+
+        A drop that is to be late has its part picked as late as may be, too: better it lies than it is held.
+        """
+        arcs = [
+            arc for comes, carried, latest in self._moves for arc in (*comes, carried, *((latest,) if latest else ()))
+        ]
+        at_s, broken = earliest(arcs, 2 * len(self._moves) + 1, 0, 0.0)
+        return None if broken else tuple(_wait(move, at_s) for move in self._moves)
+
+
+def _wait(move: _Timed, at_s: Sequence[float]) -> Wait:
+    """The waits of a move by the moments' times."""
+    begin_s = at_s[move.carried.one]
+    earliest_s = max(at_s[arc.one] + arc.least_s for arc in move.comes)
+    held_s = at_s[move.carried.then] - begin_s - move.carried.least_s
+    later_s = held_s if move.latest is None else at_s[move.latest.then] - move.latest.least_s - begin_s
+    later_s = min(held_s, max(0.0, later_s))
+    return Wait(begin_s + later_s - earliest_s, held_s - later_s)
