@@ -21,7 +21,6 @@ from lab.production.run_options import RunOptions, begun
 from lab.sequencing.cell.schedule_rows import rows_of
 from lab.sequencing.search import among
 from lab.skills.prepared_scene import prepare
-from lab.tasks.task_file import load
 from lab.teaching.teacher import Teacher
 from lab.workers import Workers
 
@@ -38,6 +37,7 @@ class TaskOptions(TypedDict, total=False):
     faults: int
     order: str
     cyclic: bool
+    method: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,11 +119,12 @@ def run(
     given = checked(options, TaskOptions, "lab.run")
     if workers is not None and workers < 1:
         raise BadInput(f"workers {workers} (lab.run): at least 1, or None for one a core")
-    loaded, advisors = load(str(task)), several(advisor)
+    advisors = several(advisor)
     advising = advising_of(advisors, toolbox)
     if out is not None and not all(isinstance(one, str) for one in advisors):
         raise BadInput(f"out '{out}' with the advisor {advising}: a journal can only name advisors that have a name")
     words = RunOptions(task=str(task), advisors=tuple(map(str, advising.names)), seed=seed, **given)
+    loaded = words.load()
     with ExitStack() as stack:
         beside = stack.enter_context(Workers(workers))
         prepared = prepare(loaded, loaded.ordered(words.toasts, words.parts), seed, workers=beside)

@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from lab.cli.families import from_files, offers
 from lab.cli.lessons import lesson_seat, teacher_of
 from lab.cli.options import AdvisorNames, Asked, Decide, Json, Parts, Port, Seed, ShowPage, Toasts, ToolboxPlace, Wait
 from lab.cli.output import end, show
@@ -38,6 +39,15 @@ def run(
     ] = None,
     order: Annotated[
         str | None, typer.Option("--order", help="The order of the moves by part numbers, such as 1,2,1,1,2,2.")
+    ] = None,
+    method: Annotated[
+        str | None,
+        typer.Option(
+            "--method",
+            help="Who finds the order: {methods}; default: whom the task says.",
+            autocompletion=offers("methods"),
+            callback=from_files("methods"),
+        ),
     ] = None,
     cyclic: Annotated[
         bool, typer.Option("--cyclic", help="Repeat the robot's shortest cycle, and measure its period.")
@@ -79,18 +89,30 @@ def run(
         from lab.production.run_journal import RunJournal
         from lab.production.run_options import RunOptions, begun, gone_on
         from lab.skills.prepared_scene import prepare
-        from lab.tasks.task_file import load
         from lab.teaching.lesson_options import DEFAULT_ADVISORS
         from lab.view.summary import delivered_in_words, run_summary
 
         if cyclic and order is not None:
             raise BadInput(f"--cyclic and --order {order}: an order is one or the other")
         given = RunOptions(
-            task or "", toasts, parts, tuple(advisor or ()), asked, decide, override, seed, faults, order, cyclic
+            *(
+                task or "",
+                toasts,
+                parts,
+                tuple(advisor or ()),
+                asked,
+                decide,
+                override,
+                seed,
+                faults,
+                order,
+                cyclic,
+                method,
+            )
         )
         if resume is None:
             options = replace(given, task=task or "toast", advisors=given.advisors or DEFAULT_ADVISORS)
-            loaded = load(options.task)
+            loaded = options.load()
         else:
             options, loaded = gone_on(given, resume, out)
         folder = resume or out or Path(f"{loaded.name}-run")

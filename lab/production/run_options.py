@@ -10,6 +10,7 @@ from annotated_types import Ge, Le
 
 from lab.errors import BadInput
 from lab.production.run_journal import RunBegan, RunJournal, read_run
+from lab.sequencing import check_method
 from lab.tasks.task import Task
 from lab.tasks.task_file import load
 from lab.teaching.kept_session import check_alone
@@ -18,7 +19,10 @@ from lab.teaching.lesson_options import LessonOptions, SessionOptions, recorded_
 
 @dataclass(frozen=True)
 class RunOptions(SessionOptions):
-    """What a run depends on, by name; None or empty: not given. override: of the arm's speed [%]; faults: their seed."""
+    """What a run depends on, by name; None or empty: not given.
+
+    override: of the arm's speed [%]; faults: their seed; method: who finds the order, None: whom the task says.
+    """
 
     command = "run"
     wanted = "it is no run"
@@ -35,6 +39,15 @@ class RunOptions(SessionOptions):
     faults: Annotated[int, Ge(0)] | None = None
     order: str | None = None
     cyclic: bool = False
+    method: str | None = None
+
+    def load(self) -> Task:
+        """The task, its order found as these options say. BadInput as `task_file.load`, and for an unknown method."""
+        task = load(self.task)
+        if self.method is None:
+            return task
+        check_method(self.method)
+        return task.changed(sequencing=task.sequencing.model_copy(update={"method": self.method}))
 
     def to_json(self) -> dict[str, Any]:
         """A plain dict, files by their whole paths, so that they are found from another folder."""
@@ -77,7 +90,7 @@ def kept_task(folder: Path, where: str) -> tuple[RunOptions, Task]:
     """What the run in a folder was begun with, and its task. BadInput when the task has changed since."""
     head, _, _ = read_run(folder, where)
     options = RunOptions.from_json(head.words, f"journal in '{folder}' ({where})")
-    task = load(options.task)
+    task = options.load()
     if hash_of(task) != head.task_hash:
         raise BadInput(f"run in '{folder}' ({where}): its task '{options.task}' has changed since it was begun")
     return options, task

@@ -373,7 +373,8 @@ class Transfers:
 
     def _stay(self, seconds: float, name: str, station: str) -> None:
         """Let the arm rest. Raises Trouble where it is stopped."""
-        if why := self.floor.follow(self.floor.scene.robot.rest(round(seconds / TIME_STEP))):
+        steps = round(seconds / TIME_STEP)
+        if steps and (why := self.floor.follow(self.floor.scene.robot.rest(steps))):
             raise Trouble(why, name, station, held=self.floor.was_held)
 
     def work_on(self, part: int) -> Work | None:
