@@ -118,13 +118,14 @@ def sequenced_named(
 
 def _check_names(wanted: Wanted, settings: Sequencing) -> None:
     """BadInput for a name that no table holds, and for advice to a method that asks for none; before any work."""
-    from lab.sequencing.methods.srl_advised import check_gate
-
     method, objective = wanted.method or settings.method, wanted.objective or settings.objective
     check_method(method)
     if objective not in OBJECTIVES:
         raise unknown("objective", objective, OBJECTIVES, "--objective")
-    check_gate(wanted.gate)
+    if wanted.advisor.row != "none" or wanted.gate != Wanted.gate:
+        from lab.sequencing.methods.srl_advised import check_gate  # only where it counts: the compiler takes its time
+
+        check_gate(wanted.gate)
     if wanted.policy is not None:
         if method != "carried":
             raise BadInput(f"--policy {wanted.policy} with --method {method}: only carried decides by one")
