@@ -118,6 +118,14 @@ class CellStage(Record):
     """How long this product may stay in the machine after that before it is spoilt [s], such as `4.0`; left out: the
     station's.
     """
+    alternatives: Annotated[
+        tuple[Annotated["CellStage", BeforeValidator(_as_stage)], ...], BeforeValidator(as_tuple), Field(max_length=98)
+    ] = ()
+    """Other stages, any of which may be taken in place of this one, such as `["oven2"]`."""
+
+    def built(self) -> Stage:
+        """As the sequencer has it."""
+        return Stage(**dict(self) | {"alternatives": tuple(way.built() for way in self.alternatives)})
 
 
 Route = Annotated[
@@ -137,7 +145,7 @@ class CellProduct(Record):
 
     def built(self) -> Product:
         """As the sequencer has it."""
-        return Product(self.name, tuple(tuple(Stage(**dict(stage)) for stage in route) for route in self.routes))
+        return Product(self.name, tuple(tuple(stage.built() for stage in route) for route in self.routes))
 
 
 class CellArrivals(Record):
@@ -277,4 +285,6 @@ class CellFields(Record):
         for i, product in enumerate(self.products):
             for j, route in enumerate(product.routes):
                 for k, stage in enumerate(route):
-                    yield ("products", i, "routes", j, k), stage
+                    where: Loc = ("products", i, "routes", j, k)
+                    yield where, stage
+                    yield from (((*where, "alternatives", n), way) for n, way in enumerate(stage.alternatives))

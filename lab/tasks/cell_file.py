@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from functools import partial
-from itertools import pairwise
+from math import inf
 from typing import Self
 
 import numpy as np
@@ -142,16 +142,22 @@ class CellFile(CellFields):
         return seconds
 
     def _route_s(self, route: tuple[CellStage, ...]) -> float:
-        """What one part takes along a route when it never waits, its pallets' moves included [s]."""
+        """The least that one part takes along a route when it never waits, its pallets' moves included [s]."""
         own_s = {station.name: station.processing_s or 0.0 for station in self.stations}
-        legs = [*pairwise(stage.station for stage in route)]
-        work_s = 0.0
+
+        def carried_s(origin: str, target: str) -> float:
+            return self.loaded.get(origin, {}).get(target, self.travel.get(origin, {}).get(target, 0.0))
+
+        at_s = {route[0].station: 0.0}  # by station of the stage, the least until a part can leave it
         for number, stage in enumerate(route):
-            work_s += stage.service_s + (own_s[stage.station] if stage.processing_s is None else stage.processing_s)
-            if stage.pallet:
-                legs.append((route[number - 1].station, route[number + 1].station))
-        carried_s = [self.loaded.get(a, {}).get(b, self.travel.get(a, {}).get(b, 0.0)) for a, b in legs]
-        return work_s + sum(carried_s)
+            before_s, at_s = at_s, dict[str, float]()
+            for way in (stage, *stage.alternatives):
+                work_s = way.service_s + (own_s[way.station] if way.processing_s is None else way.processing_s)
+                if way.pallet:
+                    work_s += carried_s(route[number - 1].station, route[number + 1].station)
+                comes_s = min(s + carried_s(origin, way.station) for origin, s in before_s.items())
+                at_s[way.station] = min(at_s.get(way.station, inf), comes_s + work_s)
+        return min(at_s.values())
 
 
 def toast_case(word: str) -> str:

@@ -4,7 +4,7 @@ What a route says in words (a buffer when the machine is busy, a pallet that has
 options to leave them. The simulations, the bound and the searches know these only.
 """
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from graphlib import TopologicalSorter
 from typing import Literal, TypeVar
@@ -196,58 +196,66 @@ class _Positions:
             self._add_route(product, route, start, ends)
 
     def _add_route(self, product: int, route: Route, start: int, ends: dict[str, int]) -> None:
-        leave, service_s = start, 0.0
+        leaves = {start: 0.0}  # the positions that the next stage is reached from, and the service there
         for before, stage, after in zip(route[:-1], route[1:], [*route[2:], None], strict=True):
-            if self._stations[self._index[stage.station]].servers is not None:
-                leave = self._add_served(leave, stage, service_s, after is None)
-                service_s = stage.service_s
-                continue
-            if after is None:
-                reach = ends.get(stage.station)
-                if reach is None:
-                    reach = ends[stage.station] = self._position(product, stage.station, ())
-            elif stage.pallet:
-                holds = (stage.station, before.station)
-                reach = self._position(
-                    product, before.station, holds, self._processing_s(stage), self._at_most_s(stage)
-                )
-            else:
-                own = (stage.station,)
-                reach = self._position(product, stage.station, own, self._processing_s(stage), self._at_most_s(stage))
-            self._link(leave, reach, stage, service_s)
-            leave, service_s = reach, stage.service_s
-            if stage.pallet and after is not None:
-                holds = (stage.station, after.station)
-                leave = self._position(product, stage.station, holds, None, self._at_most_s(stage))
-                self._carry(reach, leave, replace(self._way(after.station), waits=False, carries="pallet"))
+            reached = dict[int, float]()
+            for way in stage.ways:
+                if self._stations[self._index[way.station]].servers is not None:
+                    reach = self._add_served(leaves, way, after is None)
+                elif after is None:
+                    known = ends.get(way.station)
+                    reach = self._position(product, way.station, ()) if known is None else known
+                    ends[way.station] = reach
+                    self._link(leaves, reach, way)
+                else:
+                    holds = (way.station, before.station) if way.pallet else (way.station,)
+                    where = before.station if way.pallet else way.station
+                    reach = self._position(product, where, holds, self._processing_s(way), self._at_most_s(way))
+                    self._link(leaves, reach, way)
+                if way.pallet and after is not None:
+                    holds = (way.station, after.station)
+                    left = self._position(product, way.station, holds, None, self._at_most_s(way))
+                    self._carry(reach, left, replace(self._way(after.station), waits=False, carries="pallet"))
+                    reach = left
+                reached[reach] = way.service_s
+            leaves = reached
 
-    def _add_served(self, leave: int, stage: Stage, service_s: float, last: bool) -> int:
-        """A machine with servers: a position in its room, and one when it has been worked on; without robots only that."""
-        product, room = self.positions[leave].product, (stage.station,) if self._robots else ()
-        if self._robots:
+    def _add_served(self, leaves: Mapping[int, float], stage: Stage, last: bool) -> int:
+        """A machine with servers: a position in its room, and one when it has been worked on; without robots only that.
+
+        What was worked on there before is in its room.
+        """
+        product, room = self.positions[next(iter(leaves))].product, (stage.station,) if self._robots else ()
+        there = [leave for leave in leaves if self._names(leave) == stage.station or not self._robots]
+        if come := {leave: service_s for leave, service_s in leaves.items() if leave not in there}:
             queue = self._position(product, stage.station, room)
-            self._link(leave, queue, stage, service_s)
-            leave = queue
+            self._link(come, queue, stage)
+            there.append(queue)
         at_most_s = None if last else self._at_most_s(stage)
         done = self._position(product, stage.station, () if last else room, self._processing_s(stage), at_most_s)
-        self._join(leave, done, replace(self._way(stage.station), robot=SERVER))
+        for leave in there:
+            self._join(leave, done, replace(self._way(stage.station), robot=SERVER))
         return done
 
-    def _link(self, leave: int, reach: int, stage: Stage, service_s: float) -> None:
-        """The ways from a position to a stage: directly, and through its buffer."""
-        choices = self._carry(leave, reach, self._way(stage.station, service_s))
+    def _names(self, position: int) -> str:
+        return self._stations[self.positions[position].station].name
+
+    def _link(self, leaves: Mapping[int, float], reach: int, stage: Stage) -> None:
+        """The ways from positions, with the service there, to a stage: directly, and through its buffer."""
+        choices = {leave: self._carry(leave, reach, self._way(stage.station, s)) for leave, s in leaves.items()}
         if stage.buffer is None:
             return
-        wait = self._position(self.positions[leave].product, stage.buffer, (stage.buffer,))
-        way = self._way(stage.buffer, service_s)
-        if self._buffers == "busy":
+        wait = self._position(self.positions[reach].product, stage.buffer, (stage.buffer,))
+        for leave, service_s in leaves.items():
+            way = self._way(stage.buffer, service_s)
+            if self._buffers != "busy":
+                self._carry(leave, wait, way)
+                continue
             # Never both at once: the decision is the same, and the cell says where it leads.
-            for robot, choice in choices.items():
+            for robot, choice in choices[leave].items():
                 full = replace(way, choice=choice, if_full=self._index[stage.station], robot=robot)
                 if self._serves(robot, self.positions[leave].station, full.target):
                     self._join(leave, wait, full)
-        else:
-            self._carry(leave, wait, way)
         self._carry(wait, reach, self._way(stage.station))
 
     def _carry(self, leave: int, to: int, way: Option) -> dict[int, int]:

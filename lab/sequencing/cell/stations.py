@@ -62,7 +62,7 @@ class Stage:
     processing_s: this product's time there, and at_most_s, how long after it a part may stay (None: the station's). service_s:
     what the robot has to do there before it can take the part out, such as vacuuming a mill [s]. pallet: the part is lifted
     off its pallet for this machine; the pallet stays at the station before, and has to be brought to the station after before
-    the part can leave.
+    the part can leave. alternatives: other stages, any of which may be taken in place of this one.
     """
 
     station: str
@@ -71,6 +71,12 @@ class Stage:
     service_s: float = 0.0
     pallet: bool = False
     at_most_s: float | None = None
+    alternatives: tuple["Stage", ...] = ()
+
+    @property
+    def ways(self) -> tuple["Stage", ...]:
+        """This stage and its alternatives."""
+        return (self, *self.alternatives)
 
 
 Route = tuple[Stage, ...]
@@ -141,9 +147,10 @@ def check_layout(stations: Sequence[Station], products: Sequence[Product]) -> No
     if not products:
         raise BadInput("a cell needs at least one product")
     served = {station.name for station in stations if station.servers is not None}
-    ends = {stage.station for p in products for route in p.routes for stage in (route[0], route[-1])} - served
-    inner = {stage.station for p in products for route in p.routes for stage in route[1:-1]}
-    inner |= {stage.buffer for p in products for route in p.routes for stage in route if stage.buffer}
+    routes = [route for product in products for route in product.routes]
+    ends = {way.station for route in routes for stage in (route[0], route[-1]) for way in stage.ways} - served
+    inner = {way.station for route in routes for stage in route[1:-1] for way in stage.ways}
+    inner |= {way.buffer for route in routes for stage in route for way in stage.ways if way.buffer}
     if ends & inner:
         raise BadInput(f"station '{min(ends & inner)}' is an end of one route and inside another; it can only be one")
 
@@ -233,22 +240,31 @@ def _check_route(stations: Sequence[Station], route: Route, one_of: str) -> None
         raise BadInput(f"{one_of} has {len(route)} stages; it needs at least 2, a start and an end")
     if route[0].buffer is not None:
         raise BadInput(f"stage 1 of {one_of} ('{route[0].station}'): buffer '{route[0].buffer}' before the start")
-    visited: set[str] = set()
-    for number, stage in enumerate(route, 1):
+    if route[0].alternatives:
+        raise BadInput(f"stage 1 of {one_of} ('{route[0].station}'): alternatives of the start; a route has one")
+    visited, here = set[str](), set[str]()
+    for number, stage in ((number, way) for number, step in enumerate(route, 1) for way in step.ways):
         where = f"stage {number} of {one_of}"
+        if stage is route[number - 1]:
+            visited |= here
+            here.clear()
         for name, is_buffer in ((stage.station, False), (stage.buffer, True)):
             if name is None:
                 continue
             if name not in kinds:
                 raise unknown("station", name, kinds, where)
+            if name in here and not is_buffer:
+                raise BadInput(
+                    f"{where}: '{name}' stands there twice; each of the alternatives has a station of its own"
+                )
             back = number == len(route) > 2 and name == route[0].station
-            again = known[name].servers is not None and name != route[number - 2].station
+            again = known[name].servers is not None
             if name in visited and not (back or again):
                 raise BadInput(
                     f"{where}: station '{name}' is on the route twice, a cycle; once is allowed: give the second visit a "
                     "station of its own, or the machine servers in a cell file"
                 )
-            visited.add(name)
+            here.add(name)
             if is_buffer and kinds[name] != "buffer":
                 raise BadInput(f"{where}: '{name}' is a {kinds[name]}; a buffer fits")
         ends_here = number == len(route) and known[stage.station].servers is not None
@@ -258,8 +274,12 @@ def _check_route(stations: Sequence[Station], route: Route, one_of: str) -> None
             )
         if stage.pallet and known[stage.station].servers is not None:
             raise BadInput(f"{where}: pallet = true, but '{stage.station}' has servers; only one of them is possible")
+        if stage.alternatives and any(way.alternatives for way in stage.alternatives):
+            raise BadInput(f"{where}: alternatives of an alternative; name all of them beside one another")
         _check_stage(stage, known[stage.station], where)
     for number, stage in enumerate(route, 1):
+        if any(way.pallet for way in stage.ways) and any(one.alternatives for one in route[number - 2 : number + 1]):
+            raise BadInput(f"stage {number} of {one_of}: pallet = true, but it or a stage beside it has alternatives")
         if stage.pallet and not _takes_pallet(route, number - 1, kinds):
             raise BadInput(
                 f"stage {number} of {one_of}: pallet = true needs a buffer or storage before and after it, which are no "

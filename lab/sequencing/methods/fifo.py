@@ -93,7 +93,8 @@ def _route_of_choice(cell: Cell) -> dict[str, tuple[int, ...]]:
         product.name: tuple(
             number
             for number, route in enumerate(product.routes)
-            for _ in range(2 if route[1].buffer is not None and cell.buffers == "free" else 1)
+            for way in route[1].ways
+            for _ in range(2 if way.buffer is not None and cell.buffers == "free" else 1)
         )
         for product in cell.products
     }

@@ -1,5 +1,6 @@
 """The best order of an episode whose times are known beforehand: what no policy can beat."""
 
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
 
 from lab.errors import WorkFailed
@@ -53,14 +54,14 @@ def _as_drawn(cell: Cell, times: Episode, part: int) -> Product:
         for place, at in enumerate(cell.positions)
         if at.product == number and at.processing_s is not None and at.holds and cell.names[at.holds[0]] in working
     )
-    routes = tuple(
-        tuple(_timed(stage, next(drawn)) if stage.station in working else stage for stage in route)
-        for route in product.routes
-    )
+    routes = tuple(tuple(_timed(stage, drawn, working) for stage in route) for route in product.routes)
     return Product(f"{product.name} {part}", routes)
 
 
-def _timed(stage: Stage, drawn: tuple[str, float]) -> Stage:
-    station, processing_s = drawn
-    assert station == stage.station
-    return replace(stage, processing_s=processing_s)
+def _timed(stage: Stage, drawn: Iterator[tuple[str, float]], working: Collection[str]) -> Stage:
+    """The stage, and its alternatives, with the next of the drawn times where there is work."""
+    if stage.station in working:
+        station, processing_s = next(drawn)
+        assert station == stage.station
+        stage = replace(stage, processing_s=processing_s)
+    return replace(stage, alternatives=tuple(_timed(way, drawn, working) for way in stage.alternatives))

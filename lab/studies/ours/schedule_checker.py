@@ -106,10 +106,11 @@ def _way(
     stages: list[Row] = [{"station": one} if isinstance(one, str) else one for one in route]
     at, since_s, ready_s, first_s, most_s, service_s = stages[0]["station"], NEVER, free_s, NEVER, NEVER, 0.0
     pallet: list[tuple[str, float]] = []  # where the part's own one stands, and since when, if it waits for it
-    for stage in stages[1:]:
+    for one in stages[1:]:
+        stage = _taken(one, left)
         place, own_s, buffer = stations[stage["station"]], stage.get("processing_s"), stage.get("buffer")
         through = [buffer] if any(row["operation"] == "carry" and row["target"] == buffer for row in left) else []
-        for target in [*through, place["name"]] if robots else []:
+        for target in [*through, place["name"]] if robots and at != place["name"] else []:
             pick_s, came_s = take("carry", at, target)
             within(f"picked in '{at}'", ready_s + service_s, pick_s, ready_s + most_s)
             served_s = take("service", at) if service_s > EPS else (ready_s, pick_s)
@@ -133,6 +134,15 @@ def _way(
             service_s = stage.get("service_s") or 0.0
     rooms += [(at, since_s, ready_s)] if stations[at]["kind"] == "machine" else []
     return wrong + [f"not on its route: {row}" for row in left[:1]], rooms, ready_s, first_s
+
+
+def _taken(stage: Row, rows: Sequence[Row]) -> Row:
+    """Which of a stage and its alternatives a part took, by what is left of its rows: where it is worked on, or goes to, next."""
+    ways = [{"station": one} if isinstance(one, str) else one for one in (stage, *stage.get("alternatives", ()))]
+    done = sorted(rows, key=lambda row: (row["start_s"], row["end_s"]))
+    names = [row["target"] for row in done if row["operation"] in ("carry", "process")]
+    places = [name for name in names if name in {way["station"] for way in ways}]
+    return next((way for way in ways if way["station"] == places[0]), stage) if places else stage
 
 
 def _crowd(station: Row, spans: Sequence[tuple[float, float]]) -> list[str]:

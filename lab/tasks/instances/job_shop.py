@@ -2,8 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import product
-from math import prod
 from typing import Any
 
 from pydantic import ValidationError
@@ -15,7 +13,6 @@ from lab.tasks.instances.layout import Layout, read_layout
 from lab.tasks.instances.source import MOST_OPERATIONS, Asked, Source
 from lab.tasks.toml_text import explain
 
-MOST_WAYS = 50  # routes of a product
 IN = "in"  # where the jobs of a shop without travel times wait
 Operation = tuple[tuple[int, float], ...]  # (machine, time) for each machine that can do it
 
@@ -99,14 +96,11 @@ def _cell(
     for name, job, line in zip(names, shop.jobs, shop.lines, strict=True):
         if not 1 <= len(job) <= MOST_OPERATIONS:
             raise source.refusal(line, f"1 to {MOST_OPERATIONS} operations of a job", len(job))
-        if (ways := prod(len(operation) for operation in job)) > MOST_WAYS:
-            raise source.refusal(line, f"up to {MOST_WAYS} ways through the machines for a job", ways)
-        routes = []
-        for way in product(*job):
-            stages: list[Any] = [start]
-            stages += [{"station": machines[number], "processing_s": time} for number, time in way]
-            routes.append([*stages, *([] if end is None else [end])])
-        products.append({"name": name, "routes": routes})
+        stages: list[Any] = [start]
+        for operation in job:
+            (first, *others) = [{"station": machines[number], "processing_s": time} for number, time in operation]
+            stages.append(first | {"alternatives": others} if others else first)
+        products.append({"name": name, "routes": [[*stages, *([] if end is None else [end])]]})
     kept = {station["name"] for station in stations}
     times = {a: {b: t for b, t in row.items() if b in kept and b != a} for a, row in travel.items() if a in kept}
     raw: dict[str, Any] = {

@@ -3,7 +3,7 @@
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import chain, pairwise
 from math import prod
 from typing import Any
 
@@ -13,7 +13,7 @@ from lab.errors import BadInput
 from lab.sequencing.cell.cell import MAX_PARTS
 from lab.tasks.cell_fields import CellProduct
 from lab.tasks.cell_file import CellFile
-from lab.tasks.instances.job_shop import MOST_WAYS, JobShop, Operation, cell_of_shop
+from lab.tasks.instances.job_shop import JobShop, Operation, cell_of_shop
 from lab.tasks.instances.source import MOST_MACHINES, MOST_OPERATIONS, MOST_TIME, Asked, Source
 
 NEVER = 2**25  # how PyJobShop writes that a deadline never comes; larger ones are taken for it, too
@@ -289,16 +289,16 @@ def _operations(product: CellProduct, index: Mapping[str, int], own: Mapping[str
     """The machines that can do each step of a product, and their times. BadInput where its routes are no choice step by step."""
     stages = [
         [
-            (stage.station, own[stage.station] if stage.processing_s is None else stage.processing_s)
-            for stage in route[1:]
+            tuple(
+                (w.station, own[w.station] if w.processing_s is None else w.processing_s) for w in (s, *s.alternatives)
+            )
+            for s in route[1:]
         ]
         for route in product.routes
     ]
-    steps = [[*dict.fromkeys(way)] for way in zip(*stages, strict=False)]
-    alike = len({len(route) for route in stages}) == 1 and prod(len(step) for step in steps) == len(
-        {*map(tuple, stages)}
-    )
-    if not alike or len(stages) > MOST_WAYS:
+    steps = [[*dict.fromkeys(chain(*ways))] for ways in zip(*stages, strict=False)]
+    alike = len({len(route) for route in stages}) == 1 and prod(map(len, steps)) == len({*map(tuple, stages)})
+    if len(stages) > 1 and not (alike and all(len(ways) == 1 for route in stages for ways in route)):
         raise BadInput(
             f"product '{product.name}' as PyJobShop's JSON: its routes are no choice of machines step by step, which is wanted"
         )

@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from math import inf
 from pathlib import Path
+from typing import Any
 
 from oracle.cell import Objective
 from oracle.model import Best, best
@@ -57,8 +58,26 @@ class Compared:
 
 
 def cell_of(raw: Raw) -> Cell:
-    """The lab's cell of the values of a cell file. BadInput for what cannot be one."""
+    """The lab's cell of the values of a cell file. BadInput for what cannot be one.
+
+    Of every other one, by how many parts it has, two routes that differ in one stage are one route with alternatives there.
+    """
+    if len(raw["order"]) % 2:
+        raw = raw | {"products": [one | {"routes": _with_alternatives(one["routes"])} for one in raw["products"]]}
     return CellFile.checked(TomlText.parsed(Path("drawn.toml"), as_toml(raw))).cell()
+
+
+def _with_alternatives(routes: list[list[Any]]) -> list[list[Any]]:
+    """One route for two that differ in the station of one stage, which is no pallet's; else the same routes."""
+    if len(routes) != 2 or len(routes[0]) != len(routes[1]):
+        return routes
+    names = [[one if isinstance(one, str) else one["station"] for one in route] for route in routes]
+    apart = [n for n, (a, b) in enumerate(zip(*names, strict=True)) if a != b]
+    if len(apart) != 1 or any(isinstance(one, dict) and "pallet" in one for route in routes for one in route):
+        return routes
+    at, other = routes[0][apart[0]], routes[1][apart[0]]
+    merged = ({"station": at} if isinstance(at, str) else at) | {"alternatives": [other]}
+    return [[*routes[0][: apart[0]], merged, *routes[0][apart[0] + 1 :]]]
 
 
 def compared(raw: Raw, methods: Sequence[str] = METHODS, lab_s: float = LAB_S, oracle_s: float = ORACLE_S) -> Compared:

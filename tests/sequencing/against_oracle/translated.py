@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from itertools import product
 
 from oracle import cell as plain
 
@@ -19,7 +20,10 @@ def plain_cell(cell: Cell) -> plain.Cell:
         raise ValueError("the work is in its middle")
     return plain.Cell(
         tuple(_station(one) for one in cell.stations),
-        {product.name: tuple(_route(cell, route) for route in product.routes) for product in cell.products},
+        {
+            one.name: tuple(_route(cell, way) for route in one.routes for way in product(*(s.ways for s in route)))
+            for one in cell.products
+        },
         cell.order,
         _table(cell, cell.empty_s.tolist()),
         _table(cell, cell.loaded_s.tolist()),
