@@ -26,6 +26,7 @@ from lab.sequencing.cell.stations import (
     Product,
     Robot,
     Route,
+    Stage,
     Station,
     check_layout,
     check_robots,
@@ -158,7 +159,7 @@ class Cell:
         """The same cell in which parts may stay in a machine as long as they are left there."""
         stations = tuple(replace(one, at_most_s=None) for one in self.stations)
         products = tuple(
-            replace(one, routes=tuple(tuple(replace(stage, at_most_s=None) for stage in route) for route in one.routes))
+            replace(one, routes=tuple(tuple(stage.each(_no_window) for stage in route) for route in one.routes))
             for one in self.products
         )
         return replace(self, stations=stations, products=products)
@@ -413,8 +414,12 @@ class Cell:
                 raise BadInput(f"due_s of part {part} = {due_s:g} s, but it only arrives at {came_s:g} s")
 
 
+def _no_window(stage: Stage) -> Stage:
+    return replace(stage, at_most_s=None)
+
+
 def _ends_of(product: Product) -> set[str]:
-    return {stage.station for route in product.routes for stage in (route[0], route[-1])}
+    return {way.station for route in product.routes for stage in (route[0], route[-1]) for way in stage.ways}
 
 
 def needed_moves(

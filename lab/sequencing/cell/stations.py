@@ -1,7 +1,7 @@
 """What a cell is laid out of: stations, stages, routes and products, when parts arrive; and what cannot be."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from math import isfinite
 from typing import Literal
 
@@ -77,6 +77,10 @@ class Stage:
     def ways(self) -> tuple["Stage", ...]:
         """This stage and its alternatives."""
         return (self, *self.alternatives)
+
+    def each(self, change: Callable[["Stage"], "Stage"]) -> "Stage":
+        """The stage with a change made to it and to each of its alternatives, in this order."""
+        return replace(change(self), alternatives=tuple(map(change, self.alternatives)))
 
 
 Route = tuple[Stage, ...]

@@ -1,6 +1,5 @@
 """The best order of an episode whose times are known beforehand: what no policy can beat."""
 
-from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
 
 from lab.errors import WorkFailed
@@ -54,14 +53,13 @@ def _as_drawn(cell: Cell, times: Episode, part: int) -> Product:
         for place, at in enumerate(cell.positions)
         if at.product == number and at.processing_s is not None and at.holds and cell.names[at.holds[0]] in working
     )
-    routes = tuple(tuple(_timed(stage, drawn, working) for stage in route) for route in product.routes)
-    return Product(f"{product.name} {part}", routes)
 
-
-def _timed(stage: Stage, drawn: Iterator[tuple[str, float]], working: Collection[str]) -> Stage:
-    """The stage, and its alternatives, with the next of the drawn times where there is work."""
-    if stage.station in working:
+    def timed(stage: Stage) -> Stage:
+        if stage.station not in working:
+            return stage
         station, processing_s = next(drawn)
         assert station == stage.station
-        stage = replace(stage, processing_s=processing_s)
-    return replace(stage, alternatives=tuple(_timed(way, drawn, working) for way in stage.alternatives))
+        return replace(stage, processing_s=processing_s)
+
+    routes = tuple(tuple(stage.each(timed) for stage in route) for route in product.routes)
+    return Product(f"{product.name} {part}", routes)

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 
@@ -68,7 +68,12 @@ def manufactured(rng: np.random.Generator, least: int, most: int) -> Cell:
     cell = _fms(rng, int(rng.integers(least, most + 1)))
     factors = dict(zip(("rook", "sign"), rng.uniform(0.6, 1.5, 2), strict=True))
     products = tuple(
-        replace(one, routes=tuple(tuple(_slower(stage, factors[one.name]) for stage in route) for route in one.routes))
+        replace(
+            one,
+            routes=tuple(
+                tuple(s.each(partial(_slower, factor=factors[one.name])) for s in route) for route in one.routes
+            ),
+        )
         for one in cell.products
     )
     assert cell.arrivals is not None  # App. III has them

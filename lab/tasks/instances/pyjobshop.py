@@ -281,7 +281,8 @@ def _check_written(file: CellFile) -> None:
         if station.at_most_s is not None:
             raise BadInput(f"{where}: station '{station.name}' has at_most_s: PyJobShop has no such limit")
     for product in file.products:
-        if any(stage.at_most_s is not None for route in product.routes for stage in route):
+        stages = [way for route in product.routes for stage in route for way in (stage, *stage.alternatives)]
+        if any(stage.at_most_s is not None for stage in stages):
             raise BadInput(f"{where}: product '{product.name}' has at_most_s: PyJobShop has no such limit")
 
 

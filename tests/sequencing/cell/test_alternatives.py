@@ -72,6 +72,14 @@ def test_the_optimum_is_that_of_all_ways(parts: int, alternatives: list[Stage], 
     assert cp_sat(cell).cost == pytest.approx(optimum(cell).cost)
 
 
+def test_what_is_changed_is_changed_in_the_alternatives_too() -> None:
+    """The window of an alternative goes with the others."""
+    either = Stage("first", alternatives=(Stage("second", at_most_s=3.0),))
+    cell = cell_of(Stage("in"), either, Stage("out"))
+    assert cell.has_windows
+    assert not cell.without_windows.has_windows
+
+
 def test_what_stays_at_its_machine_is_not_carried() -> None:
     """Two operations on the same machine with a server: in there at 2 s, done at 5 s and at 9 s, out at 11 s."""
     twice = (Stage("in"), Stage("first"), Stage("first", processing_s=4.0), Stage("out"))
