@@ -23,11 +23,11 @@ const labGantt = (() => {
 
   function tickOf(last, wide) {
     const most = Math.max(2, Math.floor(wide / 64));
-    return [1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1200, 3600].find((step) => last / step <= most) || last;
+    return [1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1200, 3600, 7200, 14400, 43200, 86400, 604800, 2592000].find((step) => last / step <= most) || last;
   }
 
   function words(one) {
-    const what = one.part === null || one.kind === "empty" ? "" : ` part ${one.part}`;
+    const what = one.part === null || one.kind === "empty" ? "" : ` ${one.name || `part ${one.part}`}`;
     const way = one.origin === one.target ? "" : ` from ${one.origin} to ${one.target}`;
     return `${one.resource} ${SAYS[one.kind] || one.kind}${what}${way}, ${one.start_s.toFixed(1)} to ${one.end_s.toFixed(1)} s`;
   }
@@ -39,9 +39,11 @@ const labGantt = (() => {
       class: outline ? "planned" : `k-${one.kind}`,
     });
     made.append(node("title", {}, `${outline ? "planned: " : ""}${words(one)}`));
-    const wide = x(one.end_s) - x(one.start_s) > 11 && ["carry", "pallet", "process"].includes(one.kind) && !outline;
-    if (!wide) return [made];
-    return [made, node("text", { x: (x(one.start_s) + x(one.end_s)) / 2, y: top + 10, "text-anchor": "middle", class: `on-${one.kind}` }, one.part)];
+    if (outline) return [made];
+    if (one.color) made.style.fill = one.color;
+    const text = one.name || String(one.part ?? ""), wide = x(one.end_s) - x(one.start_s) > 4 + 6.4 * text.length;
+    if (!text || !wide || !["carry", "pallet", "process"].includes(one.kind)) return [made];
+    return [made, node("text", { x: (x(one.start_s) + x(one.end_s)) / 2, y: top + 10, "text-anchor": "middle", class: one.color ? "" : `on-${one.kind}` }, text)];
   }
 
   // chart: { rows, measured, planned, marks, end_s }; gives back how to move the line of time, and which time a place is

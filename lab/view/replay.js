@@ -72,7 +72,7 @@ const player = (() => {
     el("marks").replaceChildren(...story.marks.map(markButton));
     for (const id of ["back", "next"]) el(id).hidden = !story.begins_s.length;
     el("chart").hidden = !story.measured.length && !story.planned.length;
-    for (const kind of el("key").querySelectorAll("[data-kind]")) kind.hidden = !story.measured.some((one) => one.kind === kind.dataset.kind);
+    for (const kind of el("key").querySelectorAll("[data-kind]")) kind.hidden = !story.measured.some((one) => one.kind === kind.dataset.kind && !one.color);
     listen();
     drawChart();
     move(0);
