@@ -83,9 +83,10 @@ class _Record:
         """Under which word there is a value for this field."""
         return next((word for word in WORDS[name] if self.values.get(word) not in (None, "")), None)
 
-    def refusal(self, wanted: str, got: object) -> BadInput:
+    def refusal(self, wanted: str, got: object = None) -> BadInput:
+        """The error for what is not as it is wanted, with file and line."""
         line = self.way if isinstance(self.way, int) else json_line(self.source.text, self.way)
-        return self.source.refusal(line, wanted, printable(str(got)))
+        return self.source.refusal(line, wanted, None if got is None else printable(str(got)))
 
     def names(self, name: str) -> list[str]:
         """What is meant by a field: a bare number with the word before it, such as "machine 3"."""
@@ -99,8 +100,8 @@ class _Record:
     def name(self, field_name: str) -> str | None:
         return next(iter(self.names(field_name)), None)
 
-    def number(self, name: str, least: float = -MOST_TIME_S) -> float | None:
-        """A number in the field's unit, or seconds since 1970 for a date."""
+    def number(self, name: str, least: float = 0.0) -> float | None:
+        """A number from `least` in the field's unit, or seconds since 1970 for a date."""
         word = self.word(name)
         if word is None:
             return None
@@ -196,23 +197,21 @@ def _nothing(source: Source, timed: Sequence[_Record]) -> BadInput:
 
 
 def _place(record: _Record) -> Iterator[tuple[str, tuple[float, float]]]:
-    x, y, name = record.number("x"), record.number("y"), record.name("station")
+    x, y, name = record.number("x", -MOST_TIME_S), record.number("y", -MOST_TIME_S), record.name("station")
     if x is not None and y is not None and name is not None:
         yield name, (x, y)
 
 
 def _rows(record: _Record, problem: "Mapping[str, Any] | None") -> Iterator[tuple[str, TimedRow]]:
     """The rows of a record, one for each of its stations, each with when: "planned", "measured" or ""."""
-    start_s, end_s, lasts_s = record.number("start"), record.number("end"), record.number("duration", 0.0)
+    start_s, end_s, lasts_s = record.number("start"), record.number("end"), record.number("duration")
     if start_s is None and end_s is not None and lasts_s is not None:
         start_s = end_s - lasts_s
     if end_s is None and start_s is not None and lasts_s is not None:
         end_s = start_s + lasts_s
     if start_s is None or end_s is None:
         lacks = "a start" if start_s is None else "an end or a duration"
-        raise record.refusal(f"{lacks} in every row", "nothing")
-    if start_s < 0.0 and not record.dated:
-        raise record.refusal("a start from 0 on", record.values.get(record.word("start") or "", start_s))
+        raise record.refusal(f"{lacks} in every row")
     if end_s < start_s:
         raise record.refusal(f"an end that is not before the start, {start_s:g} s", f"{end_s:g} s")
     part, stations = record.name("part"), record.names("station")
@@ -284,15 +283,16 @@ def _of_csv(source: Source) -> list[_Record]:
 
 def _check_columns(source: Source, line: int, columns: Sequence[str], there: set[str]) -> None:
     """BadInput, with the nearest word, where a column is missing that every schedule has."""
-    groups = (("start",), ("end", "duration"), ("station", "vehicle"))
-    for group in groups:
+    for group in (("start",), ("end", "duration"), ("station", "vehicle")):
         known = [word for name in group for word in WORDS[name]]
         if there & set(known):
             continue
-        near = [(one, close[0]) for one in columns if (close := get_close_matches(_word(one)[0], known, n=1))]
-        hint = f": did you mean '{near[0][1]}' by '{shortened(near[0][0], 40)}'?" if near else ""
+        free = [(one, _word(one)[0]) for one in columns if _word(one)[0] not in _KNOWN]
+        near = [(one, close[0]) for one, word in free if (close := get_close_matches(word, known, n=1))]
+        hint = f"; did you mean '{near[0][1]}' by '{shortened(near[0][0], 40)}'?" if near else ";"
+        wanted = ", ".join(word for name in group for word in WORDS[name][:4])
         shown = shortened(", ".join(columns))
-        raise source.refusal(line, f"a column for the {group[0]} ({', '.join(known)}) among '{shown}'{hint}")
+        raise BadInput(f"{source.path}: line {line}: no column among '{shown}' is a {group[0]}{hint} known: {wanted}")
 
 
 def _of_json(source: Source, problems: list[Any]) -> list[_Record]:
@@ -337,6 +337,8 @@ def _walk(
         for key, one in value.items()
         for record in _walk(source, one, (*way, key), _inside(way, key, around), problems)
     ]
+    if len(way) > 1 and _word(str(way[-2]))[0] in _KNOWN and isinstance(way[-1], int):
+        values.pop("id", None)  # it says which part, machine or vehicle of the list this is, see `around`
     own = _Record(source, values, units, way)
     if (own.timed and not any(one.timed for one in found)) or (own.word("x") and own.word("y")):
         yield own

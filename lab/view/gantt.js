@@ -40,9 +40,10 @@ const labGantt = (() => {
     });
     made.append(node("title", {}, `${outline ? "planned: " : ""}${words(one)}`));
     if (outline) return [made];
-    if (one.color) made.style.fill = one.color;
-    const text = one.name || String(one.part ?? ""), wide = x(one.end_s) - x(one.start_s) > 4 + 6.4 * text.length;
-    if (!text || !wide || !["carry", "pallet", "process"].includes(one.kind)) return [made];
+    if (one.color) Object.assign(made.style, { fill: one.color, fillOpacity: one.kind === "blocked" ? 0.35 : 1 });
+    const room = x(one.end_s) - x(one.start_s), name = one.name || String(one.part ?? "");
+    const text = [name, (name.match(/\d+$/) || [""])[0]].find((words) => room > 4 + 6.4 * words.length);
+    if (!text || !["carry", "pallet", "process"].includes(one.kind)) return [made];
     return [made, node("text", { x: (x(one.start_s) + x(one.end_s)) / 2, y: top + 10, "text-anchor": "middle", class: one.color ? "" : `on-${one.kind}` }, text)];
   }
 
@@ -58,6 +59,11 @@ const labGantt = (() => {
     }
     const kept = (one) => rows.includes(one.resource), bars = (all, outline) => all.filter(kept).flatMap((one) => bar(one, rows.indexOf(one.resource), x, outline));
     parts.push(...bars(planned, true));
+    if (measured.some((one) => one.color)) { // a schedule that is known from the beginning: what is to come is pale
+      const all = node("g", { opacity: 0.3 });
+      all.append(...bars(measured, false));
+      parts.push(all);
+    }
     const clip = node("clipPath", { id: `${svg.id}-until` }), cut = node("rect", { x: 0, y: 0, width: wide, height: foot });
     const done = node("g", { "clip-path": `url(#${svg.id}-until)` });
     clip.append(cut);

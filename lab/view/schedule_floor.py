@@ -20,6 +20,7 @@ OPENING = radians(80.0)  # of the ring of stations around an arm, towards who lo
 HAND_M, LIFT_M = 1.05, 0.22  # [m] the arm's links are so high above the floor, and it lifts parts so much
 PAPER: Rgba = (0.91, 0.92, 0.93, 1.0)
 STEEL: Rgba = (0.62, 0.66, 0.71, 1.0)
+PANEL: Rgba = (0.74, 0.78, 0.83, 1.0)
 DARK: Rgba = (0.30, 0.34, 0.39, 1.0)
 IDLE: Rgba = (0.55, 0.58, 0.62, 1.0)
 WORKS: Rgba = (0.16, 0.72, 0.36, 1.0)
@@ -81,15 +82,18 @@ class Spot:
             Shape("box", (wide - 0.06, deep - 0.06, HIGH_M - 0.04), None, STEEL, (0.0, 0.0, HIGH_M / 2 - 0.02)),
             Shape("box", (wide, deep, 0.04), None, PAPER, (0.0, 0.0, HIGH_M - 0.02)),
         ]
-        top = HIGH_M + 0.16
-        if self.kind == "machine":
-            top = HIGH_M + 0.52
-            shapes.append(Shape("box", (wide, 0.08, 0.34), None, DARK, (0.0, deep / 2 - 0.04, HIGH_M + 0.17)))
-        shapes.append(Shape("label", (0.15,), None, INK, (0.0, deep / 2 - 0.04, top), text=self.name))
+        back = deep / 2 - 0.04
+        panel = 0.0 if self.kind != "machine" else 0.34 if cos(self.turn) > 0 else 0.1  # it must not hide the part
+        if panel:
+            shapes.append(Shape("box", (wide, 0.08, panel), None, PANEL, (0.0, back, HIGH_M + panel / 2)))
+        high = HIGH_M + panel + 0.17
+        below = (-0.58 * sin(self.turn), -0.58 * cos(self.turn), 0.06)  # on the floor, towards who looks
+        name = (0.0, back, high) if cos(self.turn) > 0 else below
+        shapes.append(Shape("label", (0.15,), None, INK, name, text=self.name))
         station = Body(f"station {number}", tuple(shapes))
-        if self.kind != "machine":
+        if not panel:
             return (station,)
-        lamp = Shape("sphere", (0.05,), None, IDLE, (wide / 2 - 0.08, deep / 2 - 0.04, HIGH_M + 0.37))
+        lamp = Shape("sphere", (0.05,), None, IDLE, (wide / 2 - 0.08, back, HIGH_M + panel + 0.03))
         return station, Body(f"lamp {number}", (lamp,))
 
     @property
@@ -99,11 +103,12 @@ class Spot:
 
 
 def laid_out(
-    kinds: Mapping[str, str], places_m: Mapping[str, tuple[float, float]], parts: int, around: bool
+    kinds: Mapping[str, str], places_m: Mapping[str, tuple[float, float]], parts: int, around: bool, wide: float
 ) -> dict[str, Spot]:
     """A spot for each station by its name: where it is said to stand, on a ring around an arm, or in rows from the back.
 
     places_m are brought closer or apart, so that no two stations overlap; a station without a place stands in a row in front.
+    parts: how many there are. wide: how wide the floor is to how deep, about.
     """
     names = [name for name, kind in kinds.items() if kind != "tile"]
     said = {name: places_m[name] for name in names if name in places_m}
@@ -122,7 +127,7 @@ def laid_out(
             angle = -pi / 2 - OPENING / 2 - (number + 0.5) * step  # from the left of the opening, clockwise
             at[name] = (radius * cos(angle), radius * sin(angle), angle - pi / 2)
     rest = [name for name in names if name not in at]
-    columns = ceil(sqrt(1.7 * len(rest)))
+    columns = ceil(sqrt(wide * len(rest)))
     front = min((y for _, y, _ in at.values()), default=DOWN_M) - DOWN_M
     for number, name in enumerate(rest):
         row, column = divmod(number, columns)
@@ -167,11 +172,11 @@ class Vehicle:
     def __init__(self, number: int, name: str, of: int, straight: bool) -> None:
         """The `number`th of so many; straight: there are no aisles to keep to."""
         self.name, self._straight = f"vehicle {number}", straight
-        self._aside = (number - (of - 1) / 2) * min(0.38, 1.1 / of)
+        self._aside = (number - (of - 1) / 2) * min(0.48, 1.2 / of)
         wheel = Shape("box", (0.07, 0.05, 0.07), None, DARK)
         wheels = [Shape(wheel.kind, wheel.size, None, DARK, (x, y, 0.035)) for x in (-0.1, 0.1) for y in (-0.13, 0.13)]
         deck = Shape("box", (0.32, 0.26, CARRIER_M - 0.05), None, BLUE, (0.0, 0.0, CARRIER_M / 2 + 0.025))
-        label = Shape("label", (0.11,), None, BLUE, (0.0, -0.2, 0.1), text=name)
+        label = Shape("label", (0.11,), None, INK, (0.0, -0.28, 0.02), text=name)
         self.bodies: tuple[Body, ...] = (Body(self.name, (deck, *wheels, label)),)
 
     def dock(self, spot: Spot) -> Vector:
@@ -207,7 +212,7 @@ class Arm:
         column = [
             Shape("cylinder", (0.16, 0.06), None, DARK, (0.0, 0.0, 0.03)),
             Shape("cylinder", (0.09, high), None, STEEL, (0.0, 0.0, high / 2)),
-            Shape("label", (0.13,), None, BLUE, (0.0, 0.0, high + 0.32), text=name),
+            Shape("label", (0.13,), None, INK, (0.0, -0.34, 0.02), text=name),
         ]
         upper = Shape("box", (link + 0.12, 0.12, 0.1), None, BLUE, (link / 2, 0.0, high + 0.05))
         fore = Shape("box", (link + 0.1, 0.1, 0.08), None, BLUE, (link / 2, 0.0, high + 0.14))

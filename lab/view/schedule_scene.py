@@ -4,7 +4,7 @@ from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from math import inf, radians
+from math import ceil, inf, log2, radians
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +15,7 @@ from lab.sequencing.cell.schedule import Activity, Schedule
 from lab.sim.frames import Body, Frame, Recording, Rgba, Shape, Vector
 from lab.tasks.schedule_table import ScheduleTable, TimedRow
 from lab.view.camera_placement import camera_for
-from lab.view.canvas import SKY, seconds
+from lab.view.canvas import seconds
 from lab.view.gantt_bars import PRODUCTS, mixed
 from lab.view.keyframes import Motion, Track, continuous
 from lab.view.schedule_floor import IDLE, INK, PART_M, WORKS, Arm, Carrier, Spot, Stop, Vehicle, laid_out
@@ -29,6 +29,7 @@ SHADES = 1.0, 0.6, 0.35  # of each colour, before the first begins again
 WATCHED_S = 40.0  # a page takes about so long to play
 QUICK = 1 / 110  # of the whole: so long a part takes to go by itself
 MOST_LABELS = 40  # parts with their names above them
+MOST_ROWS = 8  # of a chart below the picture; with more it stands beside it (replay.js)
 MOVES = ("carry", "pallet", "empty")
 _CLOSE_S = 1e-9
 Keys = list[tuple[float, Vector]]
@@ -76,10 +77,14 @@ def scene_of(table: ScheduleTable, name: str) -> Scene:
     quick_s = max(last_s * QUICK, _CLOSE_S)
     moves = {vehicle: _moves(own, quick_s) for vehicle, own in _by_vehicle(rows).items()}
     departs = {id(move.row): move.begin_s for own in moves.values() for move in own if move.row is not None}
-    stays = {part: _stays(part, [row for row in rows if row.part == part], quick_s, departs) for part in parts}
+    own_rows = defaultdict[str, list[TimedRow]](list)
+    for row in rows:
+        own_rows[row.part or ""].append(row)
+    stays = {part: _stays(part, own_rows[part], quick_s, departs) for part in parts}
     kinds = _kinds(rows, [stay for own in stays.values() for stay in own])
     around = table.has_arm and not table.places_m
-    floor = laid_out(kinds, table.places_m, len(parts), around)
+    wide = 1.7 if len({row.vehicle or row.origin for row in rows}) <= MOST_ROWS else 0.9
+    floor = laid_out(kinds, table.places_m, len(parts), around, wide)
     for own in _by_place(stays.values()).values():
         _place(own, floor)
     carriers: dict[str, Carrier] = {
@@ -118,8 +123,8 @@ def scene_of(table: ScheduleTable, name: str) -> Scene:
     counts = [counted(len(parts), "part"), counted(stations, "station")]
     counts += [counted(len(moves), "vehicle")] if moves and not around else []
     title = f"{name}: {', '.join(counts)}, {seconds(last_s)}"
-    speed = next((one for one in (0.5, 1, 2, 4, 8, 16) if one >= last_s / WATCHED_S), float(round(last_s / WATCHED_S)))
-    camera = camera_for(_seen(floor.values()), -radians(90.0), radians(50.0))
+    speed = 2.0 ** max(-1, ceil(log2(max(last_s, _CLOSE_S) / WATCHED_S)))
+    camera = camera_for(_seen(floor.values()), -radians(75.0 if around else 90.0), radians(50.0), wide)
     return Scene(title, Recording(tuple(bodies), frames, camera), tracks, story, speed)
 
 
@@ -335,15 +340,14 @@ def _steps(rows: Sequence[TimedRow]) -> tuple[tuple[float, Rgba], ...]:
 def _part_body(number: int, name: str, colour: str, *, labelled: bool) -> Body:
     red, green, blue = (int(colour[k : k + 2], 16) / 255 for k in (1, 3, 5))
     shapes = [Shape("box", (PART_M,) * 3, None, (red, green, blue, 1.0))]
-    shapes += [Shape("label", (0.09,), None, INK, (0.0, 0.0, PART_M / 2 + 0.07), text=name)] if labelled else []
+    shapes += [Shape("label", (0.09,), None, INK, (0.0, 0.0, PART_M / 2 + 0.13), text=name)] if labelled else []
     return Body(f"part {number}", tuple(shapes))
 
 
 def _colour(number: int) -> str:
-    """A colour for each part, the first that are free of those for the colour-blind."""
-    colours = (*PRODUCTS, SKY)
-    shade, colour = divmod(number - 1, len(colours))
-    return mixed(colours[colour], SHADES[shade % len(SHADES)])
+    """A colour for each part, in three shades before the first begins again."""
+    shade, colour = divmod(number - 1, len(PRODUCTS))
+    return mixed(PRODUCTS[colour], SHADES[shade % len(SHADES)])
 
 
 def _schedule(rows: Sequence[TimedRow], numbers: Mapping[str, int]) -> Schedule:
@@ -362,26 +366,27 @@ def _schedule(rows: Sequence[TimedRow], numbers: Mapping[str, int]) -> Schedule:
 
 def _captions(rows: Sequence[TimedRow]) -> Iterable[tuple[float, str]]:
     """What begins when, in words."""
-    begins = defaultdict[float, list[str]](list)
+    begins = defaultdict[float, dict[str, list[str]]](dict)
     for row in rows:
         if row.part and row.kind == "carry":
-            begins[row.start_s].append(f"{row.vehicle} carries {row.part} to {row.target}")
+            begins[row.start_s].setdefault(f"{row.vehicle} carries {row.part} to", []).append(row.target or "")
         elif row.part and row.kind == "process" and not row.vehicle:
-            begins[row.start_s].append(f"{row.part} begins in {row.origin}")
+            begins[row.start_s].setdefault(f"{row.part} begins in", []).append(row.origin or "")
     for at_s, said in begins.items():
-        more = f" and {len(said) - 3} more" if len(said) > 3 else ""
-        yield at_s, f"{'; '.join(said[:3])}{more}"
+        words = [f"{what} {', '.join(where)}" for what, where in said.items()]
+        more = f" and {len(words) - 3} more" if len(words) > 3 else ""
+        yield at_s, f"{'; '.join(words[:3])}{more}"
 
 
 def _seen(spots: Iterable[Spot]) -> FloatArray:
-    """Points (n, 3) that are to be in the picture."""
-    edges = [(spot, *spot.edges) for spot in spots]
+    """Points (n, 3) that are to be in the picture: stations, their names, and vehicles in front of them."""
+    ends = [(spot, spot.edges[0] / 2 + 0.1) for spot in spots]
     return np.array(
         [
-            (spot.x + x * wide, spot.y + y * wide, z)
-            for spot, wide, _ in edges
-            for x in (-0.6, 0.6)
-            for y in (-0.6, 0.6)
-            for z in (0.0, 0.95)
+            (spot.x + x * edge, spot.y + y, z)
+            for spot, edge in ends
+            for x in (-1, 1)
+            for y in (-edge - 0.35, edge)
+            for z in (0.0, 0.9)
         ]
     )

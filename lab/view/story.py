@@ -54,5 +54,6 @@ class Story:
 
     def _row(self, activity: Activity) -> dict[str, Any]:
         times = {"start_s": round(activity.start_s, 3), "end_s": round(activity.end_s, 3)}
-        look = dict(zip(("name", "color"), self.looks.get(activity.part or 0, ()), strict=False))
-        return asdict(activity) | times | look
+        name, color = self.looks.get(activity.part or 0, ("", ""))
+        look = {"color": color} if color and activity.kind in ("carry", "process", "blocked") else {}
+        return asdict(activity) | times | ({"name": name} if name else {}) | look
