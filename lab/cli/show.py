@@ -14,8 +14,8 @@ def show(
     schedule: Annotated[
         list[Path],
         typer.Argument(
-            help="A table (.csv) or .json file: who is worked on where, or carried by whom, from when to when. More files: "
-            "where stations stand (station,x,y), or the problem of PyJobShop's solution."
+            help="A table (.csv) or .json file: who is worked on where, or carried by whom, from when to when; or the "
+            "folder of a run. More files: where stations stand (station,x,y), or the problem of PyJobShop's solution."
         ),
     ],
     out: Annotated[Path | None, typer.Option("--out", help="The .html file; default: SCHEDULE.html, here.")] = None,
@@ -34,7 +34,7 @@ def write_page(schedule: list[Path], out: Path | None) -> dict[str, Any]:
     from lab.view.meshcat import replay_html
     from lab.view.schedule_scene import scene_of
 
-    table = read_schedule(schedule)
+    table = read_schedule([one / "schedule.csv" if one.is_dir() else one for one in schedule])
     shown = scene_of(table, schedule[0].stem)
     replay_html(shown.recording, page, shown.speed, shown.title, shown.story, tracks=shown.tracks)
     rows, measured = table.rows, shown.story.measured

@@ -159,18 +159,18 @@ def _moves(rows: Sequence[TimedRow], quick_s: float) -> list[_Move]:
     """What a vehicle does: what its rows say, and its ways to where the next part is."""
     moves, here, free_s = list[_Move](), rows[0].origin or "", 0.0
     for row in rows:
-        begin_s, end_s, origin = max(row.start_s, free_s), row.end_s, row.origin or ""
+        begin_s, origin = max(row.start_s, free_s), row.origin or ""
+        end_s = max(row.end_s, begin_s)  # of rows that overlap the later one is carried out at once
         if origin != here and row.kind != "empty":
             if begin_s - free_s > _CLOSE_S:
                 moves.append(_Move(max(free_s, begin_s - 3 * quick_s), begin_s, here, origin, None))
             else:  # no time is left for it: it is a part of the carry
-                until_s = begin_s + max(end_s - begin_s, 0.0) / 3
+                until_s = begin_s + (end_s - begin_s) / 3
                 moves.append(_Move(begin_s, until_s, here, origin, None))
                 begin_s = until_s
         loaded = row if row.kind == "carry" else None
-        begin_s = min(begin_s, end_s)
         moves.append(_Move(begin_s, end_s, origin if row.kind != "empty" else here, row.target or "", loaded))
-        here, free_s = row.target or "", max(free_s, end_s)
+        here, free_s = row.target or "", end_s
     return moves
 
 

@@ -53,6 +53,23 @@ def test_the_plan_of_lab_sequence(lab: Lab) -> None:
     assert told["rows"] == again["rows"]
 
 
+def test_a_runs_folder_and_a_place_for_each_station(lab: Lab) -> None:
+    Path("run").mkdir()
+    Path("run/schedule.csv").write_text(PLAN)
+    Path("places.csv").write_text("station,x,y\nsaw,0,0\nmill,0,3\n")
+    assert json.loads(lab("show", "run", "places.csv", "--json").out)["file"] == "run.html"
+    ran = lab("show", "places.csv")
+    assert ran.code == 2
+    assert "none has a start and an end" in ran.err
+
+
+def test_the_table_in_the_docs(lab: Lab, root: Path) -> None:
+    page = (root / "docs" / "ordering.md").read_text(encoding="utf-8")
+    Path("agvs.csv").write_text(page.partition("```csv\n")[2].partition("```")[0])
+    told = json.loads(lab("show", "agvs.csv", "--json").out)
+    assert (told["vehicles"], told["parts"], told["makespan_s"]) == (["AGV 1"], ["frame 1", "frame 2"], 90.0)
+
+
 def test_a_bad_table_writes_nothing(lab: Lab) -> None:
     Path("plan.csv").write_text(PLAN + "B,saw,9,8\n")
     ran = lab("show", "plan.csv")
