@@ -18,6 +18,7 @@ from lab.tasks.instances.source import Source, json_line
 
 MOST_BYTES = 32 << 20
 MOST = {"row": 20_000, "part": 1000, "station": 200, "vehicle": 100}
+MOST_DEEP = 50  # of what is nested in a JSON document
 MOST_TIME_S = 1e8  # three years
 WORDS: Mapping[str, tuple[str, ...]] = {  # what a column, or a key, may be called: the first that is there counts
     "part": ("part", "job", "workpiece", "item", "lot", "order", "task"),
@@ -108,7 +109,7 @@ class _Record:
         value = self.values[word]
         try:
             number = float(value) * self.units.get(word, 1.0)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             try:
                 date = datetime.fromisoformat(str(value))
                 return (date if date.tzinfo else date.replace(tzinfo=UTC)).timestamp()
@@ -312,6 +313,8 @@ def _walk(
 
     around: what it stands in is called, by its word: what stands below "jobs" is of the job that is called so.
     """
+    if len(way) > MOST_DEEP:
+        raise source.refusal(None, f"JSON in which nothing is more than {MOST_DEEP} deep")
     if isinstance(value, list):
         word = _word(str(way[-1]))[0] if way else ""
         for number, one in enumerate(value):

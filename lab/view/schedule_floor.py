@@ -88,8 +88,8 @@ class Spot:
             shapes.append(Shape("box", (wide, 0.08, panel), None, PANEL, (0.0, back, HIGH_M + panel / 2)))
         high = HIGH_M + panel + 0.17
         below = (-0.58 * sin(self.turn), -0.58 * cos(self.turn), 0.06)  # on the floor, towards who looks
-        name = (0.0, back, high) if cos(self.turn) > 0 else below
-        shapes.append(Shape("label", (0.15,), None, INK, name, text=self.name))
+        over = (0.0, back, high)
+        shapes.append(Shape("label", (0.15,), None, INK, over if cos(self.turn) > 0 else below, text=self.name))
         station = Body(f"station {number}", tuple(shapes))
         if not panel:
             return (station,)

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from lab.mdp import FloatArray
 from lab.tasks.schedule_table import read_schedule
 from lab.view.meshcat import replay_html
 from lab.view.replay_file import Replay, read_replay
@@ -26,14 +27,14 @@ class Shown:
         self.replay: Replay = read_replay(page)
         self.names = [body.name for body in self.scene.recording.bodies]
 
-    def at(self, body: str, *times_s: float) -> np.ndarray:
+    def at(self, body: str, *times_s: float) -> FloatArray:
         """Places (n, 3) [m] of a body."""
-        return self.replay.at(times_s).places[:, self.names.index(body)]
+        return np.asarray(self.replay.at(times_s).places[:, self.names.index(body)])
 
-    def label(self, station: str) -> np.ndarray:
+    def label(self, station: str) -> FloatArray:
         """Where the station of this name is."""
         body = next(b for b in self.scene.recording.bodies if any(shape.text == station for shape in b.shapes))
-        return self.at(body.name, 0.0)[0]
+        return np.asarray(self.at(body.name, 0.0)[0])
 
 
 def test_parts_stand_in_the_station_that_works_on_them_and_wait_in_the_next(tmp_path: Path) -> None:
