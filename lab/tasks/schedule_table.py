@@ -194,7 +194,15 @@ def _nothing(source: Source, timed: Sequence[_Record]) -> BadInput:
     words = sorted({word for one in timed for word in one.values})
     what = "a machine" if timed else "a start and an end"
     there = f", not only {', '.join(words)}" if words else ""
-    return source.refusal(None, f"rows with a part, a station or vehicle, a start and an end: none has {what}{there}")
+    keys = list(dict.fromkeys(re.findall(r'"([^"\n]{1,30})"\s*:', source.text)))[:100]
+    known = [word for name in ("start", "end", "station") for word in WORDS[name]]
+    near = [
+        (key, close[0]) for key in keys if _word(key)[0] not in _KNOWN and (close := get_close_matches(key, known, 1))
+    ]
+    hint = f"; did you mean '{near[0][1]}' by '{near[0][0]}'?" if near else ""
+    return source.refusal(
+        None, f"rows with a part, a station or vehicle, a start and an end: none has {what}{there}{hint}"
+    )
 
 
 def _place(record: _Record) -> Iterator[tuple[str, tuple[float, float]]]:

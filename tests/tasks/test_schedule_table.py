@@ -145,6 +145,7 @@ def test_where_stations_stand(tmp_path: Path) -> None:
         ("job,machine,start,end\n", "none has a start and an end"),
         ("", "wanted a header such as part,station,start,end"),
         ('{"a": 1}', "none has a start and an end"),
+        ('[{"job": "A", "machine": 1, "strat": 0}]', "none has a start and an end; did you mean 'start' by 'strat'"),
         ('[{"job": "A", "start": 0, "end": 1}]', "none has a machine, not only end, job, start"),
         ('{\n"tasks": [\n{"job": 1, "machine": 2, "start": 4, "end": 2}]}', "line 3: wanted an end that is not before"),
         ('[{"job": 1, "machine": 2, "start": 0, "end": 1%s}]' % ("0" * 400), "line 1: wanted a number from 0 .* as 'end'"),
