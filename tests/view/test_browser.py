@@ -148,13 +148,13 @@ def test_a_label_is_as_high_as_it_says_and_a_page_of_one_picture_has_no_player(
 def test_the_replay_plays_from_disk_without_a_network(
     browser_page: "Page", recording: Recording, tmp_path: Path, until: Until
 ) -> None:
-    path = replay_html(recording, tmp_path / "replay.html", speed=2, title="Toast <b>bold</b>")
+    path = replay_html(recording, tmp_path / "replay.html", speed=0.05, title="Toast <b>bold</b>")
     asked: list[str] = []
     browser_page.on("request", lambda request: asked.append(request.url))
     browser_page.context.set_offline(True)
     browser_page.goto(path.as_uri())
     until(browser_page, "player.state().playing && player.state().time > 0")
-    assert "2 × real time" in browser_page.inner_text("#caption")
+    assert "0.05 × real time" in browser_page.inner_text("#caption")
     assert browser_page.inner_text("#caption").startswith("Toast <b>bold</b>")
 
     browser_page.click("#play")
