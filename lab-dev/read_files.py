@@ -20,6 +20,11 @@ INSTANCES = {
 }
 LAYOUT = "from,to,time\nLU,M1,6\nLU,M2,8\nM1,LU,12\nM1,M2,6\nM2,LU,10\nM2,M1,6\n"
 JOBS = "set,job,operation,machine,time\n7,1,1,M1,8\n7,1,2,M2,16\n"
+SCHEDULES = {
+    "agvs.csv": "job,machine,agv,from,to,start,end\nA,,v1,load,saw,0,20\nA,saw,,,,20,50\nA,,v1,saw,out,60,80\n",
+    "shop.json": '{"tasks": [{"mode": 0, "resources": [0], "start": 0, "end": 3},\n'
+    ' {"mode": 1, "resources": [1, 0], "start": 3, "end": 5}]}\n',
+}
 FAULTS = """
 [[faults]]
 what = "part moved"
@@ -269,6 +274,13 @@ def _instance(path: Path) -> object:
             beside / "phillips-unger-tanks.csv", Asked(beside / "phillips-unger-empty.csv", None, None)
         ).cell()
     return read_instance(path).cell() if is_instance(path) else load_any(str(path))
+
+
+def _schedule(path: Path) -> object:
+    from lab.tasks.schedule_table import read_schedule
+    from lab.view.schedule_scene import scene_of
+
+    return scene_of(read_schedule([path]), path.stem).story.to_json()
 
 
 def _policy(path: Path) -> object:
@@ -523,6 +535,7 @@ KINDS: dict[str, Kind] = {
     "text grid": Kind("text", _texts({"grid.txt": GRID}), "*.txt", _any, QUICK),
     "instance": Kind("text", _instances, "*", _instance, QUICK),
     "jobs and layout": Kind("text", _texts({"jobs.csv": JOBS, "layout.csv": LAYOUT}), "*.csv", _instance, QUICK),
+    "schedule": Kind("text", _texts(SCHEDULES), "*", _schedule, QUICK),
     "policy": Kind("tensors", _copied("toolbox/mine.safetensors"), "mine.safetensors", _policy, QUICK),
     "archive": Kind("zip", _copied("mine.zip"), "mine.zip", _archive, QUICK),
     "folder for the Hub, model": Kind("tensors", _hub, "model.safetensors", _hub_read, QUICK),

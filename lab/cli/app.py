@@ -81,6 +81,11 @@ COMMANDS = {  # what is typed after `lab` -> the command
         "Look at a task's scene, at a grid world in 3D or at a run's replay, on a page on 127.0.0.1, until Ctrl-C.",
         "lab view toast",
     ),
+    "show": Command(
+        "show",
+        "Show any schedule in 3D, with its Gantt chart: a page that plays offline in any browser, in one file.",
+        "lab show plan.csv --out plan.html",
+    ),
     "new": Command(
         "new",
         "Write a task file that runs: parts go from an input through machines to an output, laid out around the arm.",

@@ -14,17 +14,18 @@ _WIDE = 1.2  # the narrowest picture, width to height, in which all is to be see
 _MARGIN = 1.06
 
 
-def camera_for(points: ArrayLike, azimuth: float, elevation: float) -> Viewpoint:
+def camera_for(points: ArrayLike, azimuth: float, elevation: float, wide: float = _WIDE) -> Viewpoint:
     """The nearest camera on one side of the `points` (n, 3) [m] that has them all in its picture.
 
-    `azimuth` [rad] from the x axis, counter-clockwise as seen from above; `elevation` [rad] above the horizon.
+    `azimuth` [rad] from the x axis, counter-clockwise as seen from above; `elevation` [rad] above the horizon. wide: the
+    picture's width to its height, at least.
     """
     seen = np.asarray(points, dtype=np.float64)
     target = (seen.min(axis=0) + seen.max(axis=0)) / 2
     back = np.array([cos(elevation) * cos(azimuth), cos(elevation) * sin(azimuth), sin(elevation)])
     right = np.array([-sin(azimuth), cos(azimuth), 0.0])
     off = seen - target
-    aside = np.maximum(abs(off @ np.cross(back, right)), abs(off @ right) / _WIDE)
+    aside = np.maximum(abs(off @ np.cross(back, right)), abs(off @ right) / wide)
     eye = target + back * float((_MARGIN * aside / tan(_HALF_VIEW) + off @ back).max())
     return Viewpoint(vector(eye), vector(target))
 

@@ -23,11 +23,11 @@ const labGantt = (() => {
 
   function tickOf(last, wide) {
     const most = Math.max(2, Math.floor(wide / 64));
-    return [1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1200, 3600].find((step) => last / step <= most) || last;
+    return [1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1200, 3600, 7200, 14400, 43200, 86400, 604800, 2592000].find((step) => last / step <= most) || last;
   }
 
   function words(one) {
-    const what = one.part === null || one.kind === "empty" ? "" : ` part ${one.part}`;
+    const what = one.part === null || one.kind === "empty" ? "" : ` ${one.name || `part ${one.part}`}`;
     const way = one.origin === one.target ? "" : ` from ${one.origin} to ${one.target}`;
     return `${one.resource} ${SAYS[one.kind] || one.kind}${what}${way}, ${one.start_s.toFixed(1)} to ${one.end_s.toFixed(1)} s`;
   }
@@ -39,9 +39,12 @@ const labGantt = (() => {
       class: outline ? "planned" : `k-${one.kind}`,
     });
     made.append(node("title", {}, `${outline ? "planned: " : ""}${words(one)}`));
-    const wide = x(one.end_s) - x(one.start_s) > 11 && ["carry", "pallet", "process"].includes(one.kind) && !outline;
-    if (!wide) return [made];
-    return [made, node("text", { x: (x(one.start_s) + x(one.end_s)) / 2, y: top + 10, "text-anchor": "middle", class: `on-${one.kind}` }, one.part)];
+    if (outline) return [made];
+    if (one.color) Object.assign(made.style, { fill: one.color, fillOpacity: one.kind === "blocked" ? 0.35 : 1 });
+    const room = x(one.end_s) - x(one.start_s), name = one.name || String(one.part ?? "");
+    const text = [name, (name.match(/\d+$/) || [""])[0]].find((words) => room > 4 + 6.4 * words.length);
+    if (!text || !["carry", "pallet", "process"].includes(one.kind)) return [made];
+    return [made, node("text", { x: (x(one.start_s) + x(one.end_s)) / 2, y: top + 10, "text-anchor": "middle", class: one.color ? "" : `on-${one.kind}` }, text)];
   }
 
   // chart: { rows, measured, planned, marks, end_s }; gives back how to move the line of time, and which time a place is
@@ -56,6 +59,11 @@ const labGantt = (() => {
     }
     const kept = (one) => rows.includes(one.resource), bars = (all, outline) => all.filter(kept).flatMap((one) => bar(one, rows.indexOf(one.resource), x, outline));
     parts.push(...bars(planned, true));
+    if (measured.some((one) => one.color)) { // a schedule that is known from the beginning: what is to come is pale
+      const all = node("g", { opacity: 0.3 });
+      all.append(...bars(measured, false));
+      parts.push(all);
+    }
     const clip = node("clipPath", { id: `${svg.id}-until` }), cut = node("rect", { x: 0, y: 0, width: wide, height: foot });
     const done = node("g", { "clip-path": `url(#${svg.id}-until)` });
     clip.append(cut);

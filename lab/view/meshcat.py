@@ -166,12 +166,13 @@ def replay_html(
     title: str = "Teaching lab",
     story: "Story | None" = None,
     scene: "Json | None" = None,
+    tracks: "Mapping[str, Motion] | None" = None,
 ) -> Path:
     """Write the recording as one HTML file that plays from disk without a network, with keys and buttons to move in it.
 
     `speed` is how many times faster than real time it begins; `story`: what is told beside the picture. scene: as `describe`
-    gives it for this recording, None: it is described now. Returns `path`, written whole or not at all; its folder is made
-    when it is missing. Raises BadInput for a speed that is not above 0, a
+    gives it for this recording, None: it is described now. tracks: how each body moves, None: as the frames say. Returns `path`,
+    written whole or not at all; its folder is made when it is missing. Raises BadInput for a speed that is not above 0, a
     recording that contradicts itself, an unreadable mesh and a path that cannot be written.
     """
     from lab.view.keyframes import motions
@@ -181,7 +182,7 @@ def replay_html(
         raise BadInput(f"replay speed {speed}: must be finite and above 0 (1 is real time)")
     recording.check()
     scene = scene or describe(recording.bodies, recording.camera)
-    tracks = motions(recording)
+    tracks = motions(recording) if tracks is None else tracks
     for body in scene["bodies"]:
         body["motion"] = _motion(tracks[body["name"]])
     start_s = recording.frames[0].time_s if recording.frames else 0.0

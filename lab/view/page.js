@@ -65,10 +65,17 @@ function furnish() {
 function layFloor() {
   const box = new THREE.Box3().setFromObject(viewer.scene_tree.find([LAB]).object);
   if (box.isEmpty()) return;
-  const shade = new THREE.Mesh(new THREE.PlaneGeometry(40, 40), new THREE.ShadowMaterial({ opacity: 0.2 }));
+  const reach = Math.max(1, box.getSize(new THREE.Vector3()).length() / 5), lamp = viewer.scene_tree.find(["Lights", "Lamp", "<object>"]).object;
+  if (reach > 1) { // a larger scene than a cell: its lamp is farther away, for all of it has a shadow
+    lamp.position.multiplyScalar(reach);
+    const { camera } = lamp.shadow;
+    for (const side of ["left", "right", "top", "bottom", "near", "far"]) camera[side] *= reach;
+    camera.updateProjectionMatrix();
+  }
+  const shade = new THREE.Mesh(new THREE.PlaneGeometry(40 * reach, 40 * reach), new THREE.ShadowMaterial({ opacity: 0.2 }));
   shade.receiveShadow = true;
   add(["Floor", "shade"], shade, [0, 0, box.min.y - 0.002]);
-  const lines = new THREE.GridHelper(12, 24, 0x9aa7b2, 0x9aa7b2).rotateX(Math.PI / 2);
+  const lines = new THREE.GridHelper(12 * Math.ceil(reach), 24 * Math.ceil(reach), 0x9aa7b2, 0x9aa7b2).rotateX(Math.PI / 2);
   Object.assign(lines.material, { transparent: true, opacity: 0.3 });
   add(["Floor", "lines"], lines, [0, 0, box.min.y - 0.001]);
   floorPending = false;

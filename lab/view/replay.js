@@ -3,6 +3,7 @@
 
 const SPEEDS = [0.5, 1, 2, 4, 8, 16];
 const LEAP_S = 1, LONG_LEAP_S = 10; // of an arrow key, without and with Shift
+const MOST_ROWS = 8; // of a chart below the picture; with more it stands beside it where the page is wide
 const LATE_MS = 1000; // a picture that comes later is not caught up with
 
 function smoothTrack(name, type, { times, values }) {
@@ -72,7 +73,7 @@ const player = (() => {
     el("marks").replaceChildren(...story.marks.map(markButton));
     for (const id of ["back", "next"]) el(id).hidden = !story.begins_s.length;
     el("chart").hidden = !story.measured.length && !story.planned.length;
-    for (const kind of el("key").querySelectorAll("[data-kind]")) kind.hidden = !story.measured.some((one) => one.kind === kind.dataset.kind);
+    for (const kind of el("key").querySelectorAll("[data-kind]")) kind.hidden = !story.measured.some((one) => one.kind === kind.dataset.kind && !one.color);
     listen();
     drawChart();
     move(0);
@@ -113,8 +114,9 @@ const player = (() => {
   function drawChart() {
     const { measured, planned, marks } = story, all = [...measured, ...planned], svg = el("gantt");
     if (el("chart").hidden) return;
-    const end_s = Math.max(start + length, ...all.map((one) => one.end_s));
-    chart = labGantt.draw(svg, { rows: labGantt.rowsOf(all), measured, planned, marks, end_s });
+    const end_s = Math.max(start + length, ...all.map((one) => one.end_s)), rows = labGantt.rowsOf(all);
+    document.body.classList.toggle("many", rows.length > MOST_ROWS);
+    chart = labGantt.draw(svg, { rows, measured, planned, marks, end_s });
     // the slider's thumb stands under the chart's line
     const room = svg.clientWidth - chart.left - chart.right, x = (at) => chart.left + (room * at) / end_s;
     Object.assign(el("seek").style, { marginLeft: `${x(start) - 8}px`, width: `${x(start + length) - x(start) + 16}px` });

@@ -1,6 +1,7 @@
 """What a replay tells beside the picture: the schedule beside its plan, what the robot does in words, what went wrong."""
 
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
 from typing import Any, Literal, get_args
 
 from lab.errors import unknown
@@ -27,7 +28,8 @@ class Mark:
 class Story:
     """A run beside its recording, on the same clock [s].
 
-    captions: from when on which words say what happens. begins_s: when each move began.
+    captions: from when on which words say what happens. begins_s: when each move began. looks: what parts are called, and
+    their colours, by number; without it bars have the colours of what is done.
     """
 
     measured: Schedule
@@ -35,22 +37,23 @@ class Story:
     captions: tuple[tuple[float, str], ...] = ()
     marks: tuple[Mark, ...] = ()
     begins_s: tuple[float, ...] = ()
+    looks: Mapping[int, tuple[str, str]] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, Any]:
         """For the page: rows of robot and machines, activities as in `Schedule.to_json`, the rest in the order of time."""
         return {
-            "measured": _rows(self.measured),
-            "planned": [] if self.planned is None else _rows(self.planned),
+            "measured": self._rows(self.measured),
+            "planned": [] if self.planned is None else self._rows(self.planned),
             "captions": sorted(self.captions, key=lambda caption: caption[0]),
             "marks": [asdict(mark) for mark in sorted(self.marks, key=lambda mark: mark.at_s)],
             "begins_s": sorted(self.begins_s),
         }
 
+    def _rows(self, schedule: Schedule) -> list[dict[str, Any]]:
+        return [self._row(activity) for activity in (*schedule.robot, *schedule.machines)]
 
-def _rows(schedule: Schedule) -> list[dict[str, Any]]:
-    return [_rounded(activity) for activity in (*schedule.robot, *schedule.machines)]
-
-
-def _rounded(activity: Activity) -> dict[str, Any]:
-    times = {"start_s": round(activity.start_s, 3), "end_s": round(activity.end_s, 3)}
-    return asdict(activity) | times
+    def _row(self, activity: Activity) -> dict[str, Any]:
+        times = {"start_s": round(activity.start_s, 3), "end_s": round(activity.end_s, 3)}
+        name, color = self.looks.get(activity.part or 0, ("", ""))
+        look = {"color": color} if color and activity.kind in ("carry", "process", "blocked") else {}
+        return asdict(activity) | times | ({"name": name} if name else {}) | look

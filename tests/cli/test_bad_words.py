@@ -32,6 +32,7 @@ ADVISORS, LEARNERS, GATES = (
         ("sequence toas", f"unknown task 'toas' (TASK): did you mean 'toast'? {TASKS}"),
         ("teach insert --task toas", f"unknown task 'toas' (TASK): did you mean 'toast'? {TASKS}"),
         ("view toas", f"unknown task 'toas' (TASK): did you mean 'toast'? {TASKS}"),
+        ("show no.csv", "schedule 'no.csv' cannot be read: No such file or directory"),
         ("task show toas", f"unknown task 'toas' (TASK): did you mean 'toast'? {TASKS}"),
         ("task check toas", f"unknown task 'toas' (TASK): did you mean 'toast'? {TASKS}"),
         (

@@ -9,7 +9,10 @@ import trimesh
 
 from lab.sequencing.cell.schedule import Activity, Schedule
 from lab.sim.frames import IDENTITY, Body, Frame, Recording, Shape
+from lab.tasks.schedule_table import read_schedule
 from lab.view.meshcat import LiveView, replay_html
+from lab.view.schedule_floor import HIGH_M, PART_M
+from lab.view.schedule_scene import scene_of
 from lab.view.story import Mark, Story
 
 if TYPE_CHECKING:
@@ -145,13 +148,13 @@ def test_a_label_is_as_high_as_it_says_and_a_page_of_one_picture_has_no_player(
 def test_the_replay_plays_from_disk_without_a_network(
     browser_page: "Page", recording: Recording, tmp_path: Path, until: Until
 ) -> None:
-    path = replay_html(recording, tmp_path / "replay.html", speed=2, title="Toast <b>bold</b>")
+    path = replay_html(recording, tmp_path / "replay.html", speed=0.05, title="Toast <b>bold</b>")
     asked: list[str] = []
     browser_page.on("request", lambda request: asked.append(request.url))
     browser_page.context.set_offline(True)
     browser_page.goto(path.as_uri())
     until(browser_page, "player.state().playing && player.state().time > 0")
-    assert "2 × real time" in browser_page.inner_text("#caption")
+    assert "0.05 × real time" in browser_page.inner_text("#caption")
     assert browser_page.inner_text("#caption").startswith("Toast <b>bold</b>")
 
     browser_page.click("#play")
@@ -217,3 +220,42 @@ def test_keys_go_from_move_to_move_and_the_words_the_chart_and_the_slider_follow
     browser_page.click("#marks button")
     assert browser_page.input_value("#seek") == "1"
     assert browser_page.locator("#gantt rect.planned").count() == 1
+
+
+def test_a_schedule_is_pale_where_it_is_still_to_come_and_its_bars_are_called_as_its_parts(
+    browser_page: "Page", tmp_path: Path, until: Until
+) -> None:
+    (tmp_path / "plan.csv").write_text("job,machine,start,end\norder 7,saw,0,30\norder 8,mill,10,40\n,saw,30,35\n")
+    scene = scene_of(read_schedule([tmp_path / "plan.csv"]), "plan")
+    page = replay_html(scene.recording, tmp_path / "plan.html", 1, scene.title, scene.story, tracks=scene.tracks)
+    browser_page.set_viewport_size({"width": 700, "height": 400})
+    browser_page.goto(page.as_uri())
+    until(browser_page, "player.state().playing")
+    browser_page.keyboard.press(" ")
+    browser_page.evaluate("(() => { const at = document.getElementById('seek'); at.value = 20; at.oninput(); })()")
+    assert pose_of(browser_page, "part 1")[2] == pytest.approx(HIGH_M + PART_M / 2)
+    assert browser_page.inner_text("#doing") == "order 8 begins in mill"
+    bars = "[...document.querySelectorAll('#gantt rect.k-process')].map((bar) => [bar.style.fill, bar.textContent])"
+    first, second = browser_page.evaluate(bars)[:2]
+    assert first == ["rgb(230, 159, 0)", "saw works on order 7, 0.0 to 30.0 s"]
+    assert second == ["rgb(0, 158, 115)", "mill works on order 8, 10.0 to 40.0 s"]
+    assert browser_page.locator("#gantt text", has_text="order 7").count() == 2  # once pale, once as far as it is done
+    assert browser_page.locator("#gantt g[opacity]").count() == 1
+    assert [text.strip() for text in browser_page.locator("#key span:visible").all_inner_texts()] == ["serves"]
+
+
+@pytest.mark.parametrize(("machines", "beside"), [(8, False), (9, True)])
+def test_a_long_chart_stands_beside_the_picture(
+    machines: int, beside: bool, browser_page: "Page", tmp_path: Path, until: Until
+) -> None:
+    rows = "".join(f"A,m{k},{k},{k + 1}\n" for k in range(machines))
+    (tmp_path / "plan.csv").write_text(f"job,machine,start,end\n{rows}")
+    scene = scene_of(read_schedule([tmp_path / "plan.csv"]), "plan")
+    browser_page.set_viewport_size({"width": 1200, "height": 300})
+    browser_page.goto(
+        replay_html(scene.recording, tmp_path / "p.html", story=scene.story, tracks=scene.tracks).as_uri()
+    )
+    until(browser_page, "player.state().playing")
+    player = browser_page.locator("#player").bounding_box()
+    assert player is not None
+    assert (player["x"] > 500) is beside

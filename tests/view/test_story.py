@@ -25,6 +25,15 @@ def test_a_story_has_the_rows_of_robot_and_machines_and_all_else_in_the_order_of
     assert [mark["kind"] for mark in said["marks"]] == ["fault", "stop"]
 
 
+def test_a_bar_is_called_as_its_part_and_has_its_colour_where_the_part_is_worked_on_or_carried() -> None:
+    waits = Activity("robot", "wait", 1, "plate", "plate", 0.0, 1.0)
+    schedule = Schedule((waits, CARRY), (TOASTS,), (), 64.0, (1,))
+    rows = Story(schedule, looks={1: ("slice 1", "#E69F00")}).to_json()["measured"]
+    assert [row["name"] for row in rows] == ["slice 1"] * 3
+    assert [row.get("color") for row in rows] == [None, "#E69F00", "#E69F00"]
+    assert "name" not in Story(schedule).to_json()["measured"][0]
+
+
 def test_a_mark_is_of_a_known_kind() -> None:
     with pytest.raises(BadInput, match=r"'fualt'.*did you mean 'fault'"):
         Mark(1.0, "fualt", "")  # type: ignore[arg-type]

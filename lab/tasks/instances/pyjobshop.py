@@ -7,14 +7,12 @@ from itertools import chain, pairwise
 from math import prod
 from typing import Any
 
-import yaml
-
 from lab.errors import BadInput
 from lab.sequencing.cell.cell import MAX_PARTS
 from lab.tasks.cell_fields import CellProduct
 from lab.tasks.cell_file import CellFile
 from lab.tasks.instances.job_shop import JobShop, Operation, cell_of_shop
-from lab.tasks.instances.source import MOST_MACHINES, MOST_OPERATIONS, MOST_TIME, Asked, Source
+from lab.tasks.instances.source import MOST_MACHINES, MOST_OPERATIONS, MOST_TIME, Asked, Source, json_line
 
 NEVER = 2**25  # how PyJobShop writes that a deadline never comes; larger ones are taken for it, too
 LISTS = {"jobs": MAX_PARTS, "resources": MOST_MACHINES, "tasks": 20_000, "modes": 200_000}
@@ -36,7 +34,7 @@ class _Json:
 
     def refusal(self, wanted: str, got: object = None) -> BadInput:
         where = ".".join(str(part) for part in self.way)
-        return self.source.refusal(_line(self.source.text, self.way), f"{wanted} as '{where}'", got)
+        return self.source.refusal(json_line(self.source.text, self.way), f"{wanted} as '{where}'", got)
 
     def get(self, key: str, default: Any = None) -> "_Json":
         """What stands under a key of this mapping, or the default."""
@@ -56,20 +54,6 @@ class _Json:
         if not isinstance(self.value, int) or isinstance(self.value, bool) or not least <= self.value <= most:
             raise self.refusal(f"a whole number from {least} to {most}", json.dumps(self.value))
         return self.value
-
-
-def _line(text: str, way: Sequence[str | int]) -> int:
-    """The line of a value of a JSON text; of what has none, of what is around it. JSON is YAML, which knows its lines."""
-    try:
-        node = yaml.compose(text, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader))
-    except yaml.YAMLError:  # a tab, which YAML does not take for a space
-        return 1
-    for step in way:
-        if isinstance(step, int) and isinstance(node, yaml.SequenceNode) and step < len(node.value):
-            node = node.value[step]
-        elif isinstance(node, yaml.MappingNode):
-            node = next((value for name, value in node.value if name.value == step), node)
-    return int(node.start_mark.line) + 1 if node is not None else 1
 
 
 def read(source: Source, asked: Asked) -> CellFile:

@@ -1,9 +1,11 @@
 """The text of an instance file, what is asked for beside it, and how a fault in one is said: file, line, what was expected."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+
+import yaml
 
 from lab.errors import BadInput
 from lab.sequencing.cell.cell import MAX_PARTS
@@ -74,3 +76,17 @@ class Source:
             raise self.refusal(line, "how many jobs and how many machines", " ".join(words))
         jobs = self.whole(words[0], line, "how many jobs", 1, MAX_PARTS)
         return jobs, self.whole(words[1], line, "how many machines", 1, MOST_MACHINES)
+
+
+def json_line(text: str, way: Sequence[str | int]) -> int:
+    """The line of a value of a JSON text; of what has none, of what is around it. JSON is YAML, which knows its lines."""
+    try:
+        node = yaml.compose(text, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader))
+    except yaml.YAMLError:  # a tab, which YAML does not take for a space
+        return 1
+    for step in way:
+        if isinstance(step, int) and isinstance(node, yaml.SequenceNode) and step < len(node.value):
+            node = node.value[step]
+        elif isinstance(node, yaml.MappingNode):
+            node = next((value for name, value in node.value if name.value == step), node)
+    return int(node.start_mark.line) + 1 if node is not None else 1

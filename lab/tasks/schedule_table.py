@@ -1,0 +1,381 @@
+"""A schedule as others write it: rows of who is worked on where, or carried by whom, from when to when, read from CSV or JSON."""
+
+import csv
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from datetime import UTC, datetime
+from difflib import get_close_matches
+from json import JSONDecodeError
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+from lab.errors import BadInput, printable, shortened
+from lab.files import json_of, read_limited
+from lab.sequencing.cell.schedule import KINDS, Kind
+from lab.tasks.instances.source import Source, json_line
+
+MOST_BYTES = 32 << 20
+MOST = {"row": 20_000, "part": 1000, "station": 200, "vehicle": 100}
+MOST_DEEP = 50  # of what is nested in a JSON document
+MOST_TIME_S = 1e8  # three years
+WORDS: Mapping[str, tuple[str, ...]] = {  # what a column, or a key, may be called: the first that is there counts
+    "part": ("part", "job", "workpiece", "item", "lot", "order", "task"),
+    "station": ("station", "machine", "workstation", "workcenter", "workcentre", "resource", "id"),
+    "start": ("start", "begin"),
+    "end": ("end", "finish", "completion", "stop"),
+    "duration": ("duration", "processing", "length"),
+    "vehicle": ("vehicle", "robot", "arm", "agv", "amr", "transport", "transporter", "carrier", "crane", "hoist"),
+    "origin": ("origin", "from", "source", "pickup"),
+    "target": ("target", "to", "destination", "dropoff"),
+    "kind": ("operation", "kind", "type", "activity"),
+    "when": ("when",),
+    "present": ("present",),
+    "x": ("x",),
+    "y": ("y",),
+}
+UNITS = {"ms": 0.001, "s": 1.0, "sec": 1.0, "seconds": 1.0, "min": 60.0, "minutes": 60.0, "h": 3600.0, "hours": 3600.0}
+_KNOWN = frozenset(word for words in WORDS.values() for word in words)
+_UNIT = re.compile(rf"[\s_(\[]+({'|'.join(UNITS)})[\])]?$")
+_ARMS = ("robot", "arm")
+
+
+@dataclass(frozen=True)
+class TimedRow:
+    """A part in a station, or with a vehicle, from `start_s` to `end_s`; part None: without one, such as an upkeep.
+
+    origin, target: from where to where a vehicle goes, None where the row does not say it. vehicle None: in the station
+    `origin`, which is `target`, too.
+    """
+
+    part: str | None
+    kind: Kind
+    vehicle: str | None
+    origin: str | None
+    target: str | None
+    start_s: float
+    end_s: float
+
+
+@dataclass(frozen=True)
+class ScheduleTable:
+    """What files say: rows by start, rows that were planned where others were measured, and where stations stand, if said.
+
+    has_arm: what carries is called a robot or an arm, and it is one.
+    """
+
+    rows: tuple[TimedRow, ...]
+    planned: tuple[TimedRow, ...] = ()
+    places_m: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    has_arm: bool = False
+
+
+@dataclass(frozen=True)
+class _Record:
+    """Values by the word of their column or key, with the units of times, and where they stand."""
+
+    source: Source
+    values: Mapping[str, Any]
+    units: Mapping[str, float]
+    way: tuple[str | int, ...] | int  # through a JSON document, or the line
+
+    def word(self, name: str) -> str | None:
+        """Under which word there is a value for this field."""
+        return next((word for word in WORDS[name] if self.values.get(word) not in (None, "")), None)
+
+    def refusal(self, wanted: str, got: object = None) -> BadInput:
+        """The error for what is not as it is wanted, with file and line."""
+        line = self.way if isinstance(self.way, int) else json_line(self.source.text, self.way)
+        return self.source.refusal(line, wanted, None if got is None else printable(str(got)))
+
+    def names(self, name: str) -> list[str]:
+        """What is meant by a field: a bare number with the word before it, such as "machine 3"."""
+        word = self.word(name)
+        if word is None:
+            return []
+        value = self.values[word]
+        found = [" ".join(str(one).split()) for one in (value if isinstance(value, list) else [value])]
+        return [shortened(f"{word} {one}" if one.isdigit() else one, 40) for one in found]
+
+    def name(self, field_name: str) -> str | None:
+        return next(iter(self.names(field_name)), None)
+
+    def number(self, name: str, least: float = 0.0) -> float | None:
+        """A number from `least` in the field's unit, or seconds since 1970 for a date."""
+        word = self.word(name)
+        if word is None:
+            return None
+        value = self.values[word]
+        try:
+            number = float(value) * self.units.get(word, 1.0)
+        except (TypeError, ValueError, OverflowError):
+            try:
+                date = datetime.fromisoformat(str(value))
+                return (date if date.tzinfo else date.replace(tzinfo=UTC)).timestamp()
+            except ValueError:
+                number = float("nan")
+        if isinstance(value, bool) or not isfinite(number) or not least <= number <= MOST_TIME_S:
+            dated = ", or a date such as 2026-05-04T06:30" if name in ("start", "end") else ""
+            raise self.refusal(f"a number from {least:g} to {MOST_TIME_S:g} as '{word}'{dated}", value)
+        return number
+
+    @property
+    def dated(self) -> bool:
+        """Whether it begins at a date."""
+        value = self.values.get(self.word("start") or "")
+        return isinstance(value, str) and bool(re.match(r"\s*\d{4}-?\d\d-?\d\d", value)) and not _is_number(value)
+
+    @property
+    def timed(self) -> bool:
+        return self.word("start") is not None or self.word("end") is not None
+
+
+def read_schedule(paths: Sequence[Path]) -> ScheduleTable:
+    """The schedule in the first file, with what others say beside it: where stations stand, or PyJobShop's problem.
+
+    Times are seconds; dates count from the first. Raises BadInput, with file and line, for a file that cannot be read, a column
+    that is missing, a value that is none, and more than MOST of anything.
+    """
+    records, problems = list[_Record](), list[Any]()
+    for path in paths:
+        source = _source(path)
+        if path.suffix.lower() == ".json" or source.text.lstrip()[:1] in ("{", "["):
+            records += _of_json(source, problems)
+        else:
+            records += _of_csv(source)
+    places = {name: at for one in records for name, at in _place(one)}
+    timed = [one for one in records if one.timed and str(one.values.get("present", True)).lower() != "false"]
+    carrying = [one for one in timed if one.word("station") or one.word("vehicle")]
+    if not carrying:
+        raise _nothing(_source(paths[0]), timed)
+    _check_count("row", carrying, paths[0])
+    told = [row for one in carrying for row in _rows(one, problems[0] if problems else None)]
+    dates = {one.dated for one in carrying}
+    if len(dates) > 1:
+        odd = next(one for one in carrying if one.dated != carrying[0].dated)
+        raise odd.refusal("all times to be numbers or all to be dates", odd.values.get(odd.word("start") or ""))
+    first_s = min(row.start_s for _, row in told) if True in dates else 0.0
+    if (last_s := max(row.end_s for _, row in told) - first_s) > MOST_TIME_S:
+        raise BadInput(f"schedule '{paths[0]}': it lasts {last_s:g} s: at most {MOST_TIME_S:g} s are shown")
+    rows = sorted(
+        ((when, replace(row, start_s=row.start_s - first_s, end_s=row.end_s - first_s)) for when, row in told),
+        key=lambda one: (one[1].start_s, one[1].end_s),
+    )
+    measured = tuple(row for when, row in rows if when != "planned")
+    planned = tuple(row for when, row in rows if when == "planned")
+    vehicles = {row.vehicle for _, row in rows if row.vehicle}
+    for kind, names in (
+        ("part", {row.part for _, row in rows if row.part}),
+        ("station", {name for _, row in rows for name in (row.origin, row.target) if name}),
+        ("vehicle", vehicles),
+    ):
+        _check_count(kind, names, paths[0])
+    arms = len(vehicles) == 1 and all((one.word("vehicle") or "robot") in _ARMS for one in carrying)
+    return ScheduleTable(measured or planned, planned if measured else (), places, arms)
+
+
+def _source(path: Path) -> Source:
+    try:
+        return Source(path, read_limited(path, MOST_BYTES).decode("utf-8-sig"))
+    except OSError as error:
+        raise BadInput(f"schedule '{path}' cannot be read: {error.strerror or error}") from None
+    except ValueError:
+        raise BadInput(f"schedule '{path}' is no text: wanted a table (.csv) or a .json file") from None
+
+
+def _check_count(kind: str, found: Any, path: Path) -> None:
+    if len(found) > MOST[kind]:
+        raise BadInput(f"schedule '{path}': {len(found)} {kind}s: at most {MOST[kind]} are shown")
+
+
+def _nothing(source: Source, timed: Sequence[_Record]) -> BadInput:
+    """The error for a file in which no row says where and when."""
+    words = sorted({word for one in timed for word in one.values})
+    what = "a machine" if timed else "a start and an end"
+    there = f", not only {', '.join(words)}" if words else ""
+    keys = list(dict.fromkeys(re.findall(r'"([^"\n]{1,30})"\s*:', source.text)))[:100]
+    known = [word for name in ("start", "end", "station") for word in WORDS[name]]
+    near = [
+        (key, close[0]) for key in keys if _word(key)[0] not in _KNOWN and (close := get_close_matches(key, known, 1))
+    ]
+    hint = f"; did you mean '{near[0][1]}' by '{near[0][0]}'?" if near else ""
+    return source.refusal(
+        None, f"rows with a part, a station or vehicle, a start and an end: none has {what}{there}{hint}"
+    )
+
+
+def _place(record: _Record) -> Iterator[tuple[str, tuple[float, float]]]:
+    x, y, name = record.number("x", -MOST_TIME_S), record.number("y", -MOST_TIME_S), record.name("station")
+    if x is not None and y is not None and name is not None:
+        yield name, (x, y)
+
+
+def _rows(record: _Record, problem: "Mapping[str, Any] | None") -> Iterator[tuple[str, TimedRow]]:
+    """The rows of a record, one for each of its stations, each with when: "planned", "measured" or ""."""
+    start_s, end_s, lasts_s = record.number("start"), record.number("end"), record.number("duration")
+    if start_s is None and end_s is not None and lasts_s is not None:
+        start_s = end_s - lasts_s
+    if end_s is None and start_s is not None and lasts_s is not None:
+        end_s = start_s + lasts_s
+    if start_s is None or end_s is None:
+        lacks = "a start" if start_s is None else "an end or a duration"
+        raise record.refusal(f"{lacks} in every row")
+    if end_s < start_s:
+        raise record.refusal(f"an end that is not before the start, {start_s:g} s", f"{end_s:g} s")
+    part, stations = record.name("part"), record.names("station")
+    if problem is not None and "mode" in record.values and not isinstance(record.way, int):
+        part, stations = _of_problem(problem, record)
+    word = str(record.values.get(record.word("kind") or "", "")).strip().lower()
+    vehicle, origin = record.name("vehicle"), record.name("origin")
+    if word == "transport" and vehicle is None and stations:
+        vehicle, stations = stations[0], []
+    when = str(record.values.get("when", "")).strip().lower()
+    if vehicle is not None:
+        kind: Kind = word if word in KINDS else "carry" if part else "empty"
+        start = origin or next(iter(stations), None)
+        yield when, TimedRow(part, kind, vehicle, start, record.name("target"), start_s, end_s)
+        return
+    kind = word if word in KINDS else "process" if part else "service"
+    for station in stations:
+        yield when, TimedRow(part, kind, None, station, station, start_s, end_s)
+
+
+def _of_problem(problem: Mapping[str, Any], record: _Record) -> tuple[str | None, list[str]]:
+    """The job and the resources of a task of a solution, as PyJobShop's problem calls them."""
+
+    def called(what: str, number: Any) -> str:
+        known = problem[what]
+        if not isinstance(number, int) or not 0 <= number < len(known):
+            raise record.refusal(f"one of the problem's {len(known)} {what}", number)
+        name = known[number].get("name") if isinstance(known[number], dict) else None
+        return shortened(str(name), 40) if name else f"{what[:-1]} {number}"
+
+    number = record.values.get("task")
+    task = called("tasks", number)
+    told = problem["tasks"][number]
+    job = told.get("job") if isinstance(told, dict) else None
+    found = record.values.get("resource")
+    resources = found if isinstance(found, list) else [found]
+    return task if job is None else called("jobs", job), [called("resources", one) for one in resources]
+
+
+# ---- the two kinds of files
+
+
+def _of_csv(source: Source) -> list[_Record]:
+    lines = [(number, line) for number, line in enumerate(source.text.splitlines(), 1) if line.strip()]
+    lines = [(number, line) for number, line in lines if not line.startswith("#")]
+    if not lines:
+        raise source.refusal(None, "a header such as part,station,start,end, and rows below it: it is empty")
+    head = lines[0][1]
+    comma = max((",", ";", "\t"), key=head.count)
+    columns = next(csv.reader([head], delimiter=comma))
+    words = [_word(one) for one in columns]
+    there = {word for word, _ in words}
+    if not (there & {"x", "y"}):
+        _check_columns(source, lines[0][0], columns, there)
+    units = {word: unit for word, unit in words if unit is not None}
+    records = []
+    for number, line in lines[1:]:
+        cells = next(csv.reader([line], delimiter=comma))
+        if len(cells) != len(columns):
+            raise source.refusal(number, f"{len(columns)} values, as the header has", f"{len(cells)}: {line}")
+        values: dict[str, Any] = {}
+        for (word, _), cell in zip(words, cells, strict=True):
+            text = cell.strip()
+            decimal = comma != "," and re.fullmatch(r"-?\d+,\d+", text)
+            values.setdefault(word, text.replace(",", ".") if decimal else text)
+        records.append(_Record(source, values, units, number))
+    return records
+
+
+def _check_columns(source: Source, line: int, columns: Sequence[str], there: set[str]) -> None:
+    """BadInput, with the nearest word, where a column is missing that every schedule has."""
+    for group in (("start",), ("end", "duration"), ("station", "vehicle")):
+        known = [word for name in group for word in WORDS[name]]
+        if there & set(known):
+            continue
+        free = [(one, _word(one)[0]) for one in columns if _word(one)[0] not in _KNOWN]
+        near = [(one, close[0]) for one, word in free if (close := get_close_matches(word, known, n=1))]
+        hint = f"; did you mean '{near[0][1]}' by '{shortened(near[0][0], 40)}'?" if near else ";"
+        wanted = ", ".join(word for name in group for word in WORDS[name][:4])
+        shown = shortened(", ".join(columns))
+        raise BadInput(f"{source.path}: line {line}: no column among '{shown}' is a {group[0]}{hint} known: {wanted}")
+
+
+def _of_json(source: Source, problems: list[Any]) -> list[_Record]:
+    try:
+        document = json_of(source.text)
+    except JSONDecodeError as error:
+        raise source.refusal(error.lineno, f"JSON: {error.msg}") from None
+    except ValueError as error:
+        raise source.refusal(None, f"JSON that can be read: {error}") from None
+    return list(_walk(source, document, (), {}, problems))
+
+
+def _walk(
+    source: Source, value: Any, way: tuple[str | int, ...], around: Mapping[str, Any], problems: list[Any]
+) -> Iterator[_Record]:
+    """Every mapping with times, or with a place, in the order of the document.
+
+    around: what it stands in is called, by its word: what stands below "jobs" is of the job that is called so.
+    """
+    if len(way) > MOST_DEEP:
+        raise source.refusal(None, f"JSON in which nothing is more than {MOST_DEEP} deep")
+    if isinstance(value, list):
+        word = _word(str(way[-1]))[0] if way else ""
+        for number, one in enumerate(value):
+            own = next((one[key] for key in ("id", "name") if isinstance(one, dict) and one.get(key)), number)
+            inside = {**around, word: own} if word in _KNOWN else around
+            yield from _walk(source, one, (*way, number), inside, problems)
+        return
+    if not isinstance(value, dict):
+        return
+    if all(isinstance(value.get(key), list) for key in ("jobs", "tasks", "resources", "modes")):
+        problems.append(value)  # PyJobShop's ProblemData
+        return
+    values, units = dict(around), dict[str, float]()
+    for key, one in value.items():
+        word, unit = _word(key)
+        plain = one["time"] if isinstance(one, dict) and set(one) == {"time"} else one
+        scalars = isinstance(plain, list) and all(isinstance(each, str | int) for each in plain)
+        if scalars or not isinstance(plain, list | dict):
+            values[word] = plain
+            units |= {} if unit is None else {word: unit}
+    found = [
+        record
+        for key, one in value.items()
+        for record in _walk(source, one, (*way, key), _inside(way, key, around), problems)
+    ]
+    if len(way) > 1 and _word(str(way[-2]))[0] in _KNOWN and isinstance(way[-1], int):
+        values.pop("id", None)  # it says which part, machine or vehicle of the list this is, see `around`
+    own = _Record(source, values, units, way)
+    if (own.timed and not any(one.timed for one in found)) or (own.word("x") and own.word("y")):
+        yield own
+    yield from found
+
+
+def _inside(way: tuple[str | int, ...], key: str, around: Mapping[str, Any]) -> Mapping[str, Any]:
+    """What stands below "machines": {"M1": ...} is of the machine M1."""
+    word = _word(str(way[-1]))[0] if way and isinstance(way[-1], str) else ""
+    return {**around, word: key} if word in _KNOWN else around
+
+
+def _word(column: str) -> tuple[str, float | None]:
+    """The word that a column or key stands for, and the unit in its name: "Start time [min]" is "start", 60."""
+    text = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", column.strip()).lower()
+    unit = _UNIT.search(text)
+    plain = re.sub(r"[\W_]", "", text[: unit.start()] if unit else text)
+    for end in ("", "id", "name", "time", "date", "at", "s"):
+        if plain.endswith(end) and (found := plain.removesuffix(end)) in _KNOWN:
+            return found, UNITS[unit[1]] if unit else None
+    return plain, UNITS[unit[1]] if unit else None
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
