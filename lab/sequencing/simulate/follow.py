@@ -7,7 +7,7 @@ from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import Episode
 from lab.sequencing.cell.routes import part_of
 from lab.sequencing.cell.schedule import Move, Schedule
-from lab.sequencing.simulate.run import NO_WAIT, Run, Wait
+from lab.sequencing.simulate.run import NO_WAIT, SLACK_S, Run, Wait
 from lab.sequencing.simulate.waits import waits_of
 
 
@@ -19,7 +19,9 @@ def waits_in(cell: Cell, sequence: Sequence[int]) -> tuple[Wait, ...]:
     run = Run(cell)
     for decision in sequence:
         if run.option(decision) is None:
-            return (waits_of(cell, sequence) or ()) if run.spoils(decision) else ()
+            # Where rounded times make a circle, it is kept to by as much as they may be off.
+            waits = run.spoils(decision) and (waits_of(cell, sequence) or waits_of(cell, sequence, -SLACK_S / 2))
+            return waits or ()
         run.move(decision)
     return ()
 

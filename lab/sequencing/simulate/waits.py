@@ -69,8 +69,12 @@ class _Network:
         if after_pick and run.fetched + 1 < len(cell.coming):
             interval_s = run.times.interval_s(cell.coming[run.fetched + 1])
             self._next = begin, option.service_s + interval_s
-        if cell.positions[option.to].processing_s is not None:
-            self._ready[part] = begin + 1, run.times.processing_s(part, option.to)
+        there, does = cell.positions[option.to], {part: option.to}
+        if there.processing_s is not None:
+            if there.station in cell.batches:  # all that stand in it begin together
+                does |= {other: run.locations[other - 1] for other in run.inside(there.station)}
+            longest_s = max(run.times.processing_s(*one) for one in does.items())
+            self._ready |= dict.fromkeys(does, (begin + 1, longest_s))
 
     def waits(self) -> tuple[Wait, ...] | None:
         """How much later than they could be begins and drops have to be; None: there is no way."""

@@ -112,14 +112,12 @@ def _put_off(state: MergedState, slot: int, nth: int, gap: int) -> MergedState |
     own = state.rows[slot][nth]
     if own.now + gap > _SLACK or state.now + gap > own.until + _SLACK:
         return None
-    rows = []
-    for there in state.rows:
-        rows.append(
-            tuple([_follows(row, own, row.now + gap) if row.waits[slot][nth] < row.now + gap else row for row in there])
-        )
     if state.waits[slot][nth] < state.now + gap:
         now, waits = _latest(state, own, state.now + gap)
         state = state._replace(now=now, waits=waits)
+    if not any(row.waits[slot][nth] < row.now + gap for row in chain.from_iterable(state.rows)):
+        return state
+    rows = [tuple([_follows(row, own, row.now + gap) for row in there]) for there in state.rows]
     return state._replace(rows=tuple(rows))
 
 
