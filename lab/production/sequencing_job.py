@@ -312,11 +312,11 @@ def _advice(found: "Sequence[Any]") -> list[dict[str, Any]]:
 
 def _in_words(cell: Cell, sequence: Sequence[int]) -> list[str]:
     """What each decision of a sequence does."""
-    from lab.sequencing.simulate.run import Run
+    from lab.sequencing.simulate.follow import steps
 
-    run, words = Run(cell), []
-    for decision in sequence:
-        move = run.move(decision)
+    words = []
+    for run, decision, wait in steps(cell, sequence):
+        move = run.move(decision, wait)
         what = cell.part_name(move.part) + ("'s pallet" if move.carries == "pallet" else "")
         words.append(f"{what}: {move.origin} > {move.target}")
     return words

@@ -60,9 +60,9 @@ def cp_sat(
 
     hint: a complete sequence to begin with (None: `first_come`; empty: nothing). workers: threads; with one, the same seed gives
     the same result, unless the time limit cuts it off; with several robots six are worth while, even on two cores. Before it
-    begins, the model takes up to half a minute to build. shared: is told what it finds and proves as it comes, and may end it (see
-    `Shared.look`). Raises BadInput for an objective that the cell has no times for, for a time limit
-    that is not above 0, for a hint that cannot be, and for more than MOST_MOVES moves.
+    begins, the model takes up to half a minute to build. shared: is told what it finds and proves as it comes, and may end it
+    (see `Shared.look`). Raises BadInput for an objective that the cell has no times for, for a time limit that is not above 0,
+    for a hint that cannot be, and for more than MOST_MOVES moves.
     Source: circuit and interval constraints of OR-Tools CP-SAT.
     """
     check_objective(objective, cell)
