@@ -250,6 +250,13 @@ def test_moves_in_words(lab: Lab) -> None:
     ]
 
 
+def test_moves_with_waits_in_words(lab: Lab) -> None:
+    """Without the waits on purpose that it needs, the order would end at a carrier that was left too long."""
+    document = asked(lab, "hoist-pu -n 3 --method exact")
+    assert (document["best_s"], document["proven_of"], document["optimum_proven"]) == (2023.0, "every plan", True)
+    assert len(document["moves"]) == len(document["best_moves"]) == 3 * 13
+
+
 # ---- other objectives ---------------------------------------------------------------------------------------------
 
 

@@ -25,7 +25,6 @@ from lab.sequencing.simulate.follow import follow, steps
 TIME_LIMIT_S = 60.0
 MOST_MOVES = 800  # that parts may make, in a model; what it takes in memory grows with the square, to a gigabyte
 
-EFFORT = 20.0  # about so many seconds of a thread, counted in what the solver does: for what is asked on the way
 FIRST_LOOK = 3.0  # about so many seconds of a thread, counted in what the solver does
 GROWS = 2.0
 
@@ -55,17 +54,15 @@ def cp_sat(
     seed: int = 0,
     hint: Sequence[int] | None = None,
     workers: int = 1,
-    effort: float = inf,
     shared: Shared | None = None,
 ) -> CpSatResult:
     """The best sequence that CP-SAT finds within the time limit [s], by the cell's own times.
 
-    hint: a complete sequence to begin with (None: `first_come`; empty: nothing). effort: the most work of the solver, in what it
-    counts as seconds, the same on every machine. workers: threads; with one, the same seed gives the same
-    result, unless the time limit cuts it off; with several robots six are worth while, even on two cores. Before it begins, the
-    model takes up to half a minute to build. shared: is told what it finds and proves as it comes, and may end it (see
-    `Shared.look`). Raises BadInput for an objective that the cell has no times for, for a time limit
-    that is not above 0, for a hint that cannot be, and for more than MOST_MOVES moves.
+    hint: a complete sequence to begin with (None: `first_come`; empty: nothing). workers: threads; with one, the same seed gives
+    the same result, unless the time limit cuts it off; with several robots six are worth while, even on two cores. Before it
+    begins, the model takes up to half a minute to build. shared: is told what it finds and proves as it comes, and may end it
+    (see `Shared.look`). Raises BadInput for an objective that the cell has no times for, for a time limit that is not above 0,
+    for a hint that cannot be, and for more than MOST_MOVES moves.
     Source: circuit and interval constraints of OR-Tools CP-SAT.
     """
     check_objective(objective, cell)
@@ -79,7 +76,7 @@ def cp_sat(
         raise BadInput(f"workers = {workers}: allowed are whole numbers from 1")
     check_no_batches(cell)
     known = first_come(cell) if hint is None else hint
-    return _searched(_Asked(shared or Shared(cell, objective), seed, workers, time_limit_s, effort), tuple(known))
+    return _searched(_Asked(shared or Shared(cell, objective), seed, workers, time_limit_s), tuple(known))
 
 
 def check_no_batches(cell: Cell) -> None:
@@ -116,7 +113,6 @@ class _Asked:
     seed: int
     workers: int
     time_limit_s: float
-    effort: float = inf
     until_s: float = inf
 
     @property
@@ -195,7 +191,6 @@ def _result(
     """What the solver makes of a model that was built with an order of this cost, with more parameters of its own."""
     cell, solver = asked.shared.cell, cp_model.CpSolver()
     solver.parameters.max_time_in_seconds = max(0.01, asked.until_s - perf_counter())
-    solver.parameters.max_deterministic_time = asked.effort
     solver.parameters.num_workers = asked.workers
     solver.parameters.random_seed = asked.seed
     # Measured: without these, ten toasts are not proven within a minute; with several robots less is proven.

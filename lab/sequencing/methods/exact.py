@@ -1,7 +1,7 @@
 """The proven optimum of a cell: best-first search over its decision states, with alike parts merged."""
 
 import heapq
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import chain
 from math import inf
 from operator import le
@@ -9,7 +9,7 @@ from operator import le
 import numpy as np
 
 from lab.errors import WorkFailed, counted
-from lab.sequencing.cell.cell import EVERY_PLAN, NEVER_WAIT, Cell
+from lab.sequencing.cell.cell import EVERY_PLAN, Cell
 from lab.sequencing.cell.objectives import MAKESPAN
 from lab.sequencing.cell.ways import FAR, TICKS_PER_S
 from lab.sequencing.methods.lower_bound import LowerBound
@@ -17,9 +17,10 @@ from lab.sequencing.methods.one_robot import TIME_LIMIT_S as TOURS_S
 from lab.sequencing.methods.one_robot import OneRobot, one_robot, why_not
 from lab.sequencing.methods.rules import first_come
 from lab.sequencing.methods.shared import Shared, shared_of
-from lab.sequencing.search import SAME, Search, SequenceResult, gap, only_one
+from lab.sequencing.search import Search, SequenceResult, gap, only_one
 from lab.sequencing.simulate.follow import simulate
-from lab.sequencing.simulate.merged import MergedCell, MergedKey, MergedState
+from lab.sequencing.simulate.merged import MergedCell, MergedState
+from lab.sequencing.simulate.windowed import WindowedCell
 
 MAX_EXPANDED = 300_000
 ROUND = 500  # states opened between two looks at limits and the listener
@@ -56,12 +57,12 @@ class _Search:
     """The states that are queued and those that were reached; `expanded`: how many were opened; `kept`: numbers in all."""
 
     def __init__(self, cell: Cell) -> None:
-        self.merged = MergedCell(cell)
+        self.merged = WindowedCell(cell) if cell.has_windows else MergedCell(cell)
         self._least = LowerBound(self.merged)
         # What the clock brings is no wait: it comes anyway.
         self._waits = len(self.merged.slots) + self.merged.one_by_one
         self.expanded = self.bound = self._serial = self.kept = self._straight = 0
-        self._fronts: dict[tuple[int, int] | MergedKey, list[tuple[int, ...]]] = {}
+        self._fronts: dict[tuple[int, int], list[tuple[int, ...]]] = {}
         self._heap: list[tuple[int, int, MergedState]] = []
         self._greedy, self.most_kept = False, MOST_KEPT
         self._reach(self.merged.start())
@@ -76,7 +77,7 @@ class _Search:
         none. Shared: is told the bound, and orders found by going straight on from where the search stands."""
         while self._heap:
             bound, serial, state = heapq.heappop(self._heap)
-            if self._times(state) not in self._fronts[self._group(state)]:
+            if self._times(state) not in self._fronts[state.counts, state.robot]:
                 continue  # overtaken since it was queued
             self.bound = max(self.bound, bound)
             if self.merged.done(state):
@@ -123,67 +124,30 @@ class _Search:
         if left >= FAR:
             return
         times = self._times(state)
-        front = self._fronts.setdefault(self._group(state), [])
+        front = self._fronts.setdefault((state.counts, state.robot), [])
         if any(all(map(le, other, times)) for other in front):
             return
         front[:] = [other for other in front if not all(map(le, times, other))]
         front.append(times)
-        self.kept += len(times) + len(state.waits)
+        self.kept += len(times) + len(state.waits) * (1 + sum(map(len, state.rows)))
         # Of equally promising states the newest comes first, hence the falling serial number.
         self._serial -= 1
         heapq.heappush(self._heap, (left if self._greedy else state.now + left, self._serial, state))
 
-    def _group(self, state: MergedState) -> tuple[int, int] | MergedKey:
-        """What states have in common that are compared by their times."""
-        return self.merged.key(state) if self.merged.latest else (state.counts, state.robot)
-
     def _times(self, state: MergedState) -> tuple[int, ...]:
-        """Now and all that is waited for: of states with equal counts and robot, one that is nowhere later is no worse.
-
-        Where a part may be picked too late, what is earlier may be worse: then only states that differ in nothing but now are
-        compared.
-        """
-        if self.merged.latest:
-            return (state.now,)
-        return (state.now, *chain.from_iterable(state.waits[: self._waits]))
+        """Now, all that is waited for, and rows: of states with equal counts and robot, one that is nowhere later is no worse."""
+        waited = self._waits
+        moments = [(state.now,), *state.waits[:waited]]
+        for row in chain.from_iterable(state.rows):
+            moments += [(row.now, -row.until), *row.waits[:waited]]
+        return tuple(chain.from_iterable(moments))
 
 
 def optimum(cell: Cell, max_expanded: int = MAX_EXPANDED, shared: Shared | None = None) -> Optimum:
     """The shortest makespan of the cell and a sequence that reaches it, alike parts numbered first in, first out.
 
-    Where parts may be picked too late, waiting on purpose may be better: of one robot that does all the work, a sequence that is
-    no longer than the best one without the windows is optimal; else CP-SAT looks, as long as EFFORT. Raises as `never_waiting`.
-    """
-    if not (cell.has_windows and cell.serial):
-        return never_waiting(cell, max_expanded, shared)
-    bound_s = never_waiting(cell.without_windows, max_expanded).bound_s
-    refused: WorkFailed | None = None
-    try:
-        found = replace(never_waiting(cell, max_expanded, shared), bound_s=bound_s, of=cell.proven_of)
-    except WorkFailed as error:
-        refused, found = error, Optimum(inf, (), False, bound_s, 0, cell.proven_of)
-    if found.gap(found.cost) == 0:
-        return replace(found, proven=True)
-    from lab.sequencing.methods.cp_sat import EFFORT, cp_sat, fits  # only where it is needed: OR-Tools takes its time
-
-    if not fits(cell):
-        if refused is not None:
-            raise refused
-        return replace(found, proven=False)
-    other = cp_sat(cell, hint=found.sequence, effort=EFFORT, shared=shared)
-    if other.status == "impossible" and not other.rounded_s:
-        raise WorkFailed(_none(cell, "is proven"))
-    if not other.sequence and refused is not None:
-        raise refused
-    bound_s = max(bound_s, min(other.bound, other.cost))
-    best = min(found, replace(found, cost=other.cost, sequence=other.sequence), key=lambda one: one.cost)
-    return replace(best, bound_s=bound_s, proven=best.cost <= bound_s + SAME)
-
-
-def never_waiting(cell: Cell, max_expanded: int = MAX_EXPANDED, shared: Shared | None = None) -> Optimum:
-    """The best of the sequences of which each move is carried out as early as it can be (see `Run`).
-
-    States are opened in the order of time so far + a bound on what is still to do, so the first complete one is
+    Where parts may be picked too late, the robot waits on purpose where that is better (see `WindowedCell`). States are opened in
+    the order of time so far + a bound on what is still to do, so the first complete one is
     optimal; a deadlock leads nowhere. After `max_expanded` states, or once those that were reached hold MOST_KEPT numbers, it
     gives up and opens as many again, nearest to the end first, for the sequence it returns: `proven` False, and the bound
     reached so far. What it finds and proves is told to `shared` as it comes, which may end it (see `Shared.look`).
@@ -191,13 +155,12 @@ def never_waiting(cell: Cell, max_expanded: int = MAX_EXPANDED, shared: Shared |
     Source: uniform-cost search (Dijkstra 1959) with an admissible bound (A*, Hart et al. 1968); the pruning of later
     states that are otherwise alike is the thesis's branch and bound, App. IV.
     """
-    of = NEVER_WAIT if cell.has_windows else cell.proven_of
     search = _Search(cell)
     state = search.run(max_expanded, shared)
     if state is not None:
         sequence = search.merged.decisions(state)
         cost = simulate(cell, sequence).makespan_s
-        return Optimum(cost, sequence, True, cost, search.expanded, of)
+        return Optimum(cost, sequence, True, cost, search.expanded)
     bound_s, expanded = search.bound / TICKS_PER_S, search.expanded
     search.hasten()
     state = search.run(2 * max_expanded, shared)
@@ -205,14 +168,9 @@ def never_waiting(cell: Cell, max_expanded: int = MAX_EXPANDED, shared: Shared |
     sequence = sequence if state is None else search.merged.decisions(state)
     if not sequence:
         why = "is proven: all were tried" if search.exhausted else f"was not proven, in {search.expanded} states"
-        raise WorkFailed(_none(cell, why, of))
-    return Optimum(simulate(cell, sequence).makespan_s, sequence, False, bound_s, expanded, of)
-
-
-def _none(cell: Cell, why: str, of: str = EVERY_PLAN) -> str:
-    """That no sequence was found."""
-    kind = "order" if of == EVERY_PLAN else "order that never waits on purpose"
-    return f"no {kind} was found that finishes {counted(len(cell.unfinished), 'part')}; that there is none {why}"
+        parts = counted(len(cell.unfinished), "part")
+        raise WorkFailed(f"no order was found that finishes {parts}; that there is none {why}")
+    return Optimum(simulate(cell, sequence).makespan_s, sequence, False, bound_s, expanded)
 
 
 def exact(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceResult:

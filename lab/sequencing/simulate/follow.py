@@ -7,7 +7,7 @@ from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import Episode
 from lab.sequencing.cell.routes import part_of
 from lab.sequencing.cell.schedule import Move, Schedule
-from lab.sequencing.simulate.run import NO_WAIT, Run, Wait, branch
+from lab.sequencing.simulate.run import NO_WAIT, SLACK_S, Run, Wait, branch
 from lab.sequencing.simulate.waits import waits_of
 
 
@@ -19,7 +19,9 @@ def waits_in(start: Run, sequence: Sequence[int]) -> tuple[Wait, ...]:
     run = branch(start)
     for decision in sequence:
         if run.option(decision) is None:
-            return (waits_of(start, sequence) or ()) if run.spoils(decision) else ()
+            # Where rounded times make a circle, it is kept to by as much as they may be off.
+            waits = run.spoils(decision) and (waits_of(start, sequence) or waits_of(start, sequence, SLACK_S / 2))
+            return waits or ()
         run.move(decision)
     return ()
 

@@ -9,7 +9,7 @@ from lab.errors import BadInput
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.precedence import allows
 from lab.sequencing.cell.routes import entry
-from lab.sequencing.cell.ways import TICKS_PER_S, Way, distances, empty_ticks, loaded_ticks, ticks, ways_of
+from lab.sequencing.cell.ways import FAR, TICKS_PER_S, Way, distances, empty_ticks, loaded_ticks, ticks, ways_of
 from lab.sequencing.simulate.run import SLACK_S, Run
 
 _BITS = 8  # a count in the code of all counts; MAX_PARTS fits
@@ -17,6 +17,18 @@ _LOW = (1 << _BITS) - 1
 Choices = Mapping[tuple[int, int], Way]  # by position and choice, in their order
 MergedKey = tuple[int, int, tuple[int, ...]]
 Who = tuple[tuple[int, ...], ...]
+Waits = tuple[tuple[int, ...], ...]
+
+
+class Row(NamedTuple):
+    """How much later than a part is ready `now` is at the least, and each of `waits`, however far that is put off [ticks].
+
+    until: to when it may be put off, by what was picked since; FAR: as far as one likes.
+    """
+
+    now: int
+    waits: Waits
+    until: int = FAR
 
 
 class MergedState(NamedTuple):
@@ -25,19 +37,21 @@ class MergedState(NamedTuple):
     Of the parts of one product in one position the first that is ready, and not too late, goes first. waits: by slot (see
     `MergedCell`), when each part there is finished, ascending, never before `now` unless it may be picked too late; where
     parts arrive, the last slot has when each comes that has not been fetched. who: by position, the parts on their way, each
-    in the order of its waits; None: nobody asks. `way`, `part` (0: nobody asks) and `nth`, which of its position's parts from 0,
+    in the order of its waits; None: nobody asks. rows: by slot, of each part there that may be picked too late; none but in a
+    `WindowedCell`. `way`, `part` (0: nobody asks) and `nth`, which of its position's parts from 0,
     led here from `parent`.
     """
 
     now: int
     counts: int
     robot: int
-    waits: tuple[tuple[int, ...], ...]
+    waits: Waits
     who: Who | None = None
     way: Way | None = None
     part: int = 0
     parent: "MergedState | None" = None
     nth: int = 0
+    rows: tuple[tuple[Row, ...], ...] = ()
 
 
 class MergedCell:
@@ -156,39 +170,50 @@ class MergedCell:
 
         Or by the `nth` from 0 of those in that position, or, where they are named, by `part`.
         """
-        place, option, work = way
-        waits, who, first = list(state.waits), state.who, nth
+        place, option, _ = way
+        who, first = state.who, nth
         if nth < 0:
             first = self._in_time(state, way)[0] if self.latest else 0
         if who is not None:
             first = who[place].index(part) if part else first
             part = who[place][first]
-        ready, slot, starts = 0, self.slots.get(place), bool(self._intervals) and place in self.starts
+        now, counts, rows, behind = self.moments(state, state.now, state.waits, way, first)
+        named = None if who is None else self._moved(who, way, first, behind)
+        return MergedState(now, counts, option.target, rows, named, way, part, state, first)
+
+    def moments(
+        self, state: MergedState, now: int, waits: Waits, way: Way, first: int, behind: int | None = None
+    ) -> tuple[int, int, Waits, int | None]:
+        """What `now` and `waits` become by a way from a state, with the `first` part of its position, and the counts.
+
+        behind: how many of those that wait where it leads stay before it; None: those that are ready no later, and that is
+        returned as well. Each moment is the latest of some before, and times: so are differences of moments.
+        """
+        (place, option, work), there = way, list(waits)
+        ready, slot, starts = now, self.slots.get(place), bool(self._intervals) and place in self.starts
         if slot is not None:
-            there = waits[slot]
-            ready, waits[slot] = there[first], there[:first] + there[first + 1 :]
+            ready, there[slot] = waits[slot][first], waits[slot][:first] + waits[slot][first + 1 :]
         elif starts:
             ready = waits[-1][0]
-        now = state.now + self._empty[state.robot][option.origin]
+        now += self._empty[state.robot][option.origin]
         now = (max(now, ready) if option.waits else now) + work
-        slot, behind = self.slots.get(option.to), None
+        slot = self.slots.get(option.to)
         if slot is not None:
-            process, there = self.process[option.to], waits[slot]
+            process, row = self.process[option.to], there[slot]
             at = ready if process is None else now + process
-            behind = bisect_right(there, at)
-            waits[slot] = (*there[:behind], at, *there[behind:])
+            behind = bisect_right(row, at) if behind is None else behind
+            there[slot] = (*row[:behind], at, *row[behind:])
         counts = state.counts + (1 << _BITS * option.to) - (1 << _BITS * place)
         if self._closed:
-            counts = self._batches(counts, way, now, waits)
-        coming = waits.pop() if self._intervals else None
+            counts = self._batches(counts, way, now, there)
+        coming = there.pop() if self._intervals else None
         # A part that finished earlier is ready now: forgetting since when lets more states be equal.
-        past = zip(waits, self._past, strict=True)
+        past = zip(there, self._past, strict=True)
         rows = [tuple([max(tick, now + least) for tick in row]) if row else () for row, least in past]
         if coming is not None:
             pick = now - self._loaded[option.origin][option.target]
             rows.append(self._left_to_come(coming, self.fetched(state), pick) if starts else coming)
-        named = None if who is None else self._moved(who, way, first, behind)
-        return MergedState(now, counts, option.target, tuple(rows), named, way, part, state, first)
+        return now, counts, tuple(rows), behind
 
     def _batches(self, counts: int, way: Way, now: int, waits: list[tuple[int, ...]]) -> int:
         """The code of counts after a way, a machine that something was taken from closed; all parts in the machine that a part

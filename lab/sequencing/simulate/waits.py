@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from lab.sequencing.cell.routes import Option, part_of
 from lab.sequencing.simulate.constraints import Arc, earliest
-from lab.sequencing.simulate.run import Run, Wait, Windowless
+from lab.sequencing.simulate.run import SLACK_S, Run, Wait, Windowless
 
 
 def waits_of(start: Run, sequence: Sequence[int], beyond_s: float = 0.0) -> tuple[Wait, ...] | None:
@@ -60,14 +60,18 @@ class _Network:
         if option.waits:
             comes.append(Arc(since, begin, later_s, 0))
             if at_most_s is not None:
-                latest_s = later_s + at_most_s + min(at_most_s, self._beyond_s) - option.service_s
+                latest_s = later_s + at_most_s + min(max(at_most_s, SLACK_S), self._beyond_s) - option.service_s
                 latest = Arc(begin, since, -latest_s, 0)
         self._moves.append(_Timed(comes, Arc(begin, begin + 1, option.service_s + run.carry_s(option), 0), latest))
         if after_pick and run.fetched + 1 < len(cell.coming):
             interval_s = run.times.interval_s(cell.coming[run.fetched + 1])
             self._next = begin, option.service_s + interval_s
-        if cell.positions[option.to].processing_s is not None:
-            self._ready[part] = begin + 1, run.times.processing_s(part, option.to)
+        there, does = cell.positions[option.to], {part: option.to}
+        if there.processing_s is not None:
+            if there.station in cell.batches:  # all that stand in it begin together
+                does |= {other: run.locations[other - 1] for other in run.inside(there.station)}
+            longest_s = max(run.times.processing_s(*one) for one in does.items())
+            self._ready |= dict.fromkeys(does, (begin + 1, longest_s))
 
     def waits(self) -> tuple[Wait, ...] | None:
         """How much later than they could be begins and drops have to be; None: there is no way.

@@ -12,7 +12,9 @@ BEATEN: dict[str, Callable[[set[str]], bool]] = {
     "several robots: a part is picked before the room for it is free, or held; an order of decisions gives no such plan": (
         lambda has: "two robots" in has
     ),
-    "time windows: nobody waits on purpose": lambda has: "windows" in has,
+    "time windows, and machines with servers, or several robots: nobody waits on purpose": (
+        lambda has: "windows" in has and bool(has & {"servers", "two robots", "no robot"})
+    ),
 }
 
 

@@ -87,3 +87,10 @@ def test_every_cycle_can_be_begun_and_ended(windows: bool, cells: RandomCells, d
         assert made.schedule == simulate(made.cell, made.sequence)
     assert made.schedule.makespan_s >= (parts // len(mix) - 1) * cycle.period_s - 1e-6
     assert period_of(made.schedule, cycle) == pytest.approx(cycle.period_s, abs=1e-5)
+
+
+def test_no_cycle_beats_what_is_proven_of_its_parts(hoist_cell: CellMaker) -> None:
+    """Issue 33: a cycle waits on purpose, and so does the optimum. Four carriers by orders that never wait take 2626 s."""
+    best = optimum(hoist_cell(4))
+    assert (best.cost, best.proven) == (2551.0, True)
+    assert unrolled(best_cycle(hoist_cell(), ("carrier",)), hoist_cell(4)).schedule.makespan_s >= best.cost
