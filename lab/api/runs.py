@@ -38,6 +38,7 @@ class TaskOptions(TypedDict, total=False):
     faults: int
     order: str
     cyclic: bool
+    parts_per_cycle: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,7 +127,7 @@ def run(
     words = RunOptions(task=str(task), advisors=tuple(map(str, advising.names)), seed=seed, **given)
     with ExitStack() as stack:
         beside = stack.enter_context(Workers(workers))
-        prepared = prepare(loaded, loaded.ordered(words.toasts, words.parts), seed, workers=beside)
+        prepared = prepare(loaded, words.ordered(loaded), seed, workers=beside)
         nowhere = stack.enter_context(TemporaryDirectory())
         folder = Path(nowhere) / "run" if out is None else Path(out)
         check_out(folder)
@@ -134,6 +135,7 @@ def run(
         stack.callback(journal.close)
         teacher = Teacher(toolbox_of(toolbox, f"{nowhere}/toolbox"), advising, seed)
         advice = RunAdvice(teacher.toolbox, words.lessons(), journal, words.order or "", cyclic=words.cyclic)
+        advice.parts_per_cycle = words.parts_per_cycle
         conditions = Conditions(words.override / 100, journal=journal, fault_seed=words.faults, advice=advice)
         report = run_task(prepared, teacher, folder, conditions, beside)
         replay = (folder / "replay.html").read_text(encoding="utf-8")

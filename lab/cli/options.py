@@ -88,3 +88,11 @@ Toasts = Annotated[
 Parts = Annotated[
     str | None, typer.Option("--parts", help="How many parts of each kind, such as slice=2,cup=1; others: none.")
 ]
+PartsPerCycle = Annotated[
+    int | None,
+    typer.Option(
+        "--parts-per-cycle",
+        min=1,
+        help="Of a cycle: as many parts at the most, as a mix of them once, twice, ...; default: up to 4, if quickly found.",
+    ),
+]
