@@ -92,7 +92,6 @@ PartsPerCycle = Annotated[
     int | None,
     typer.Option(
         "--parts-per-cycle",
-        min=1,
-        help="Of a cycle: as many parts at the most, as a mix of them once, twice, ...; default: up to 4, if quickly found.",
+        help="A cycle has up to so many parts: their mix once, twice, ...; default: up to 4, while 1 % could be gained.",
     ),
 ]

@@ -83,14 +83,10 @@ def cyclic_order(cell: Cell, seed: int, most_parts: int | None = None) -> "tuple
     most_parts: of a cycle, see `best_rhythm`; never more than the cell has. BadInput where the robot would have to wait on
     purpose, and as `best_rhythm`.
     """
-    from lab.sequencing.cyclic.cycle import check_cyclic
-    from lab.sequencing.cyclic.several import best_rhythm, usual_parts
+    from lab.sequencing.cyclic.several import best_rhythm
     from lab.sequencing.cyclic.unrolled import unrolled
 
-    mix = mix_of(cell.order)
-    check_cyclic(cell, mix)
-    most = usual_parts(cell, mix) if most_parts is None else most_parts
-    rhythm = best_rhythm(cell, mix, min(most, cell.parts), seed)
+    rhythm = best_rhythm(cell, mix_of(cell.order), most_parts and min(most_parts, cell.parts), seed)
     found = unrolled(rhythm.cycle, cell)
     if found.waits:
         raise BadInput("--cyclic: the robot would have to wait on purpose to keep to a time window; a run never does")

@@ -41,7 +41,7 @@ class RunOptions(SessionOptions):
     faults: Annotated[int, Ge(0)] | None = None
     order: str | None = None
     cyclic: bool = False
-    parts_per_cycle: Annotated[int, Ge(1)] | None = None
+    parts_per_cycle: int | None = None
 
     def to_json(self) -> dict[str, Any]:
         """A plain dict, files by their whole paths, so that they are found from another folder."""

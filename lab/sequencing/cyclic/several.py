@@ -12,7 +12,8 @@ from lab.sequencing.cyclic.cycle import TIME_LIMIT_S, Cycle, check_cyclic, short
 from lab.sequencing.cyclic.fluid import least_s
 from lab.sequencing.cyclic.line import at_speed, away_s, lines
 
-MOST_PARTS, MOST_MOVES, MOST_LINES = 4, 30, 10  # of a cycle, where nobody says how many parts may enter in it
+MOST_PARTS, MOST_MOVES, MOST_LINES = 4, 30, 100  # of a cycle, where nobody says how many parts may enter in it
+WORTH = 0.01  # and more are not tried where so small a share of the time is all that could be gained
 NEAR_S = 3e-6  # longer than the bound, a mix takes as long: the bound is less by what its solver may be wrong by
 EVERY_CYCLE = "all cycles"
 
@@ -86,19 +87,22 @@ def best_rhythm(
 ) -> Rhythm:
     """The cycle of a mix (products) that needs the least time a part: with one mix, then two, up to so many parts a cycle.
 
-    most_parts: None: `usual_parts`; a mix at the least. More are not tried once it is proven that no cycle needs less. Raises
-    BadInput and WorkFailed as `best_cycle` does.
+    most_parts: None: `usual_parts`, and no more once less than `WORTH` could be gained. More are never tried once it is proven
+    that no cycle needs less. Raises BadInput and WorkFailed as `best_cycle` does.
     """
     began, mix = time.perf_counter(), tuple(mix)
     check_cyclic(cell, mix)
     cell = at_speed(cell)
-    most_parts = usual_parts(cell, mix) if most_parts is None else most_parts
+    worth, most_parts = (WORTH, usual_parts(cell, mix)) if most_parts is None else (0.0, most_parts)
     least_mix_s = least_s(cell, mix, away_s(cell))
     best: Cycle | None = None
     tried, why, mix_s = list[Tried](), "", inf
     for times in range(1, max(1, most_parts // len(mix)) + 1):
         left_s = time_limit_s - (time.perf_counter() - began)
         if mix_s - least_mix_s <= NEAR_S:
+            break
+        if 1.0 - least_mix_s / mix_s < worth:
+            why = f"less than {worth:.0%} of the time could be gained"
             break
         if tried and left_s <= 0:
             why = f"the {time_limit_s:g} s were over"
@@ -125,9 +129,10 @@ def best_rhythm(
 
 
 def usual_parts(cell: Cell, mix: Sequence[str]) -> int:
-    """How many parts a cycle has at the most where nobody says: few, of few moves and choices of ways; a mix at the least."""
+    """How many parts a cycle has at the most where nobody says: few, of few moves and choices of ways, and no more than the cell
+    has; a mix at the least."""
     most = len(mix)
-    while most + len(mix) <= MOST_PARTS:
+    while most + len(mix) <= min(MOST_PARTS, cell.parts):
         try:
             ahead = [*lines(cell, [*mix] * (most // len(mix) + 1))]
         except BadInput:
