@@ -38,6 +38,7 @@ class TaskOptions(TypedDict, total=False):
     order: str
     cyclic: bool
     method: str
+    parts_per_cycle: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +128,7 @@ def run(
     loaded = words.load()
     with ExitStack() as stack:
         beside = stack.enter_context(Workers(workers))
-        prepared = prepare(loaded, loaded.ordered(words.toasts, words.parts), seed, workers=beside)
+        prepared = prepare(loaded, words.ordered(loaded), seed, workers=beside)
         nowhere = stack.enter_context(TemporaryDirectory())
         folder = Path(nowhere) / "run" if out is None else Path(out)
         check_out(folder)
@@ -135,6 +136,7 @@ def run(
         stack.callback(journal.close)
         teacher = Teacher(toolbox_of(toolbox, f"{nowhere}/toolbox"), advising, seed)
         advice = RunAdvice(teacher.toolbox, words.lessons(), journal, words.order or "", cyclic=words.cyclic)
+        advice.parts_per_cycle = words.parts_per_cycle
         conditions = Conditions(words.override / 100, journal=journal, fault_seed=words.faults, advice=advice)
         report = run_task(prepared, teacher, folder, conditions, beside)
         replay = (folder / "replay.html").read_text(encoding="utf-8")

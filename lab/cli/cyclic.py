@@ -12,7 +12,9 @@ if TYPE_CHECKING:
 OF_A_CYCLE = ("task", "case", "toasts", "parts", "seed", "layout", "robots")
 
 
-def cyclic_found(given: "OrderOptions", toolbox: str | None, files: dict[str, Path]) -> dict[str, Any]:
+def cyclic_found(
+    given: "OrderOptions", toolbox: str | None, files: dict[str, Path], parts_per_cycle: int | None
+) -> dict[str, Any]:
     """The document of the shortest cycle; BadInput for options that say how an order is looked for, which a cycle is not."""
     from dataclasses import asdict
 
@@ -35,5 +37,7 @@ def cyclic_found(given: "OrderOptions", toolbox: str | None, files: dict[str, Pa
     with lesson_seat(()) as seat, seat.progress:
         teacher = teacher_of(toolbox, options, seat)
         beside = given.beside
-        wanted = CyclicWanted(given.case, given.toasts, given.parts, given.seed, beside.layout, beside.robots)
+        wanted = CyclicWanted(
+            given.case, given.toasts, given.parts, given.seed, beside.layout, beside.robots, parts_per_cycle
+        )
         return cyclic_named(given.task, wanted, teacher, files)

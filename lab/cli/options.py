@@ -88,3 +88,10 @@ Toasts = Annotated[
 Parts = Annotated[
     str | None, typer.Option("--parts", help="How many parts of each kind, such as slice=2,cup=1; others: none.")
 ]
+PartsPerCycle = Annotated[
+    int | None,
+    typer.Option(
+        "--parts-per-cycle",
+        help="A cycle has up to so many parts: their mix once, twice, ...; default: up to 4, while 1 % could be gained.",
+    ),
+]

@@ -8,7 +8,20 @@ import typer
 
 from lab.cli.families import from_files, offers
 from lab.cli.lessons import lesson_seat, teacher_of
-from lab.cli.options import AdvisorNames, Asked, Decide, Json, Parts, Port, Seed, ShowPage, Toasts, ToolboxPlace, Wait
+from lab.cli.options import (
+    AdvisorNames,
+    Asked,
+    Decide,
+    Json,
+    Parts,
+    PartsPerCycle,
+    Port,
+    Seed,
+    ShowPage,
+    Toasts,
+    ToolboxPlace,
+    Wait,
+)
 from lab.cli.output import end, show
 from lab.errors import BadInput
 
@@ -52,6 +65,7 @@ def run(
     cyclic: Annotated[
         bool, typer.Option("--cyclic", help="Repeat the robot's shortest cycle, and measure its period.")
     ] = False,
+    parts_per_cycle: PartsPerCycle = None,
     seed: Seed = 0,
     workers: Annotated[
         int | None,
@@ -92,23 +106,10 @@ def run(
         from lab.teaching.lesson_options import DEFAULT_ADVISORS
         from lab.view.summary import delivered_in_words, run_summary
 
-        if cyclic and order is not None:
-            raise BadInput(f"--cyclic and --order {order}: an order is one or the other")
         given = RunOptions(
-            *(
-                task or "",
-                toasts,
-                parts,
-                tuple(advisor or ()),
-                asked,
-                decide,
-                override,
-                seed,
-                faults,
-                order,
-                cyclic,
-                method,
-            )
+            *(task or "", toasts, parts, tuple(advisor or ()), asked, decide, override, seed, faults, order, cyclic),
+            method=method,
+            parts_per_cycle=parts_per_cycle,
         )
         if resume is None:
             options = replace(given, task=task or "toast", advisors=given.advisors or DEFAULT_ADVISORS)
@@ -121,12 +122,13 @@ def run(
         controls = Controls(pace(speed or ("4" if watched else "max")))
         lessons = options.lessons()
         lessons.advising()
-        prepared = prepare(loaded, loaded.ordered(options.toasts, options.parts), options.seed, workers=beside)
+        prepared = prepare(loaded, options.ordered(loaded), options.seed, workers=beside)
         journal = begun(options, loaded, folder) if resume is None else RunJournal.resume(folder)
         try:
             with lesson_seat(options.advisors, page=page or view, port=port, wait_s=wait) as seat:
                 teacher = teacher_of(toolbox, lessons, seat)
                 advice = RunAdvice(teacher.toolbox, lessons, journal, options.order or "", cyclic=options.cyclic)
+                advice.parts_per_cycle = options.parts_per_cycle
                 teacher = replace(teacher, keep=advice.keep)
                 share = options.override / 100
                 conditions = Conditions(share, seat.page, controls, journal, fault_seed=options.faults, advice=advice)

@@ -8,7 +8,19 @@ import typer
 from lab.cli.cyclic import cyclic_found
 from lab.cli.families import from_files, offers
 from lab.cli.lessons import lesson_seat, say_read, sequenced
-from lab.cli.options import MAX_EPISODES, MAX_SESSIONS, Json, Parts, Plain, Port, Seed, ShowPage, ToolboxPlace, Wait
+from lab.cli.options import (
+    MAX_EPISODES,
+    MAX_SESSIONS,
+    Json,
+    Parts,
+    PartsPerCycle,
+    Plain,
+    Port,
+    Seed,
+    ShowPage,
+    ToolboxPlace,
+    Wait,
+)
 from lab.cli.output import end, show
 from lab.errors import BadInput
 
@@ -96,6 +108,7 @@ def sequence(
             help="The shortest cycle that the robot can repeat; -n, --parts, --case: the parts of one cycle.",
         ),
     ] = False,
+    parts_per_cycle: PartsPerCycle = None,
     resume: Annotated[
         Path | None, typer.Option("--resume", help="Go on with the advice in this folder, as it was begun.")
     ] = None,
@@ -136,8 +149,10 @@ def sequence(
     if cyclic:
         if resume is not None:
             raise BadInput(f"--cyclic beside --resume {resume}: nobody is asked about a cycle: leave one of them away")
-        show(cyclic_found(given.complete(), toolbox, files), as_json, cyclic_summary)
+        show(cyclic_found(given.complete(), toolbox, files, parts_per_cycle), as_json, cyclic_summary)
         return
+    if parts_per_cycle is not None:
+        raise BadInput(f"--parts-per-cycle {parts_per_cycle}: only a cycle has as many: add --cyclic")
     box = Toolbox(toolbox)
     kept = OrderSession(given.complete(), box) if resume is None else gone_on(given, resume, box)
     if resume is not None:

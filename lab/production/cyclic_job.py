@@ -8,10 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from lab.errors import BadInput, LabError
-from lab.production.cyclic_order import cycle_document, mix_of
+from lab.production.cyclic_order import check_parts, cycle_document, mix_of
 from lab.production.run import teach_all
 from lab.sequencing.cell.cell import MAX_PARTS, Cell
-from lab.sequencing.cyclic.cycle import Cycle, best_cycle
+from lab.sequencing.cyclic.cycle import Cycle
+from lab.sequencing.cyclic.several import best_rhythm
 from lab.sequencing.cyclic.steady import steady
 from lab.sequencing.cyclic.unrolled import of_parts, unrolled
 from lab.sequencing.methods.exact import optimum
@@ -31,7 +32,8 @@ MAX_EXPANDED = 50_000  # states, for the best finite order
 
 @dataclass(frozen=True)
 class CyclicWanted:
-    """What is asked for: which parts enter in a cycle, as `lab sequence` names an order; the seed; see `Asked`."""
+    """What is asked for: which parts enter in a cycle, as `lab sequence` names an order, and how many at the most; the seed;
+    see `Asked`."""
 
     case: str | None = None
     toasts: int | None = None
@@ -39,13 +41,15 @@ class CyclicWanted:
     seed: int = 0
     layout: Path | None = None
     robots: int | None = None
+    parts_per_cycle: int | None = None
 
 
 def cyclic_named(name: str, wanted: CyclicWanted, teacher: Teacher, files: dict[str, Path]) -> dict[str, Any]:
     """The document of `lab sequence --cyclic` on a cell file, or on a task over durations measured in simulation.
 
-    Without a word on the order one part enters in a cycle, or, of several products, what the file orders. Raises BadInput for
-    what has no cycle, WorkFailed when none was found.
+    Without a word on the order one part enters in a cycle, or, of several products, what the file orders, or several times as
+    much, up to parts_per_cycle parts (see `best_rhythm`); where the parts are named, just these, if it is not given. Raises
+    BadInput for what has no cycle, WorkFailed when none was found.
     """
     from lab.view.canvas import check_picture
 
@@ -58,15 +62,20 @@ def cyclic_named(name: str, wanted: CyclicWanted, teacher: Teacher, files: dict[
     if isinstance(loaded, GridWorld):
         raise BadInput(f"{name}: it is a world, there is nothing to sequence: learn it with lab teach {name}")
     mix, own = _mix(loaded, case, wanted)
+    named = (case, wanted.toasts, wanted.parts) != (None, None, None)
+    parts = len(mix) if named and wanted.parts_per_cycle is None else wanted.parts_per_cycle
+    if parts is not None:
+        check_parts(parts, mix, cyclic=True)
     most = max(FEWEST_CYCLES, ceil(own / len(mix))) * len(mix)
     cell = _largest(lambda parts: _cell(loaded, mix, parts, teacher), most, len(mix))
     teacher.tell(PhaseBegan("sequence", 1))
-    cycle = best_cycle(cell, mix, seed=wanted.seed)
-    document = {"task": loaded.name, "seed": wanted.seed} | cycle_document(cycle) | {"finite": _finite(cycle, cell)}
+    rhythm = best_rhythm(cell, mix, parts, wanted.seed)
+    document = {"task": loaded.name, "seed": wanted.seed} | cycle_document(rhythm)
+    document["finite"] = _finite(rhythm.cycle, cell)
     if "gantt" in files:
         from lab.view.gantt import cycle_gantt
 
-        cycle_gantt(steady(cycle, SHOWN_PERIODS), files["gantt"])
+        cycle_gantt(steady(rhythm.cycle, SHOWN_PERIODS), files["gantt"])
     return document | {"files": {name: str(path) for name, path in files.items()}}
 
 

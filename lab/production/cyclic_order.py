@@ -6,19 +6,20 @@ from functools import reduce
 from math import gcd
 from typing import TYPE_CHECKING, Any
 
+from lab.errors import BadInput, counted
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.schedule import Schedule
 
 if TYPE_CHECKING:  # and below where it is needed: OR-Tools takes its time
-    from lab.sequencing.cyclic.cycle import Cycle
+    from lab.sequencing.cyclic.several import Rhythm
     from lab.sequencing.cyclic.unrolled import Unrolled
 
 SECONDS_PER_HOUR = 3600.0
 
 
-def cycle_document(cycle: "Cycle") -> dict[str, Any]:
-    """What is told of a cycle, for JSON."""
-    per_part_s = cycle.period_s / cycle.parts
+def cycle_document(rhythm: "Rhythm") -> dict[str, Any]:
+    """What is told of the best cycle, and of those that were tried, for JSON."""
+    cycle, per_part_s = rhythm.cycle, rhythm.per_part_s
     products = {move.slot: cycle.product(move) for move in cycle.line.moves}
     return {
         "robots": 1,
@@ -27,11 +28,20 @@ def cycle_document(cycle: "Cycle") -> dict[str, Any]:
         "period_s": cycle.period_s,
         "per_part_s": per_part_s,
         "parts_per_hour": SECONDS_PER_HOUR / per_part_s,
-        "bound_s": cycle.bound_s,
-        "proven": cycle.proven,
+        "bound_s": rhythm.bound_part_s * cycle.parts,
+        "bound_per_part_s": rhythm.bound_part_s,
+        "proven": rhythm.proven,
+        "proven_of": rhythm.proven_of,
+        "least_per_part_s": rhythm.least_part_s,
+        "most_parts_a_cycle": rhythm.most_parts,
+        "why_no_more": rhythm.why_no_more or None,
+        "tried": [
+            {"parts_a_cycle": one.parts, "period_s": one.period_s, "bound_s": one.bound_s, "proven": one.proven}
+            for one in rhythm.tried
+        ],
         "most_in_work": cycle.most_in_work,
         "moves": cycle.to_json(),
-        "wall_s": cycle.wall_s,
+        "wall_s": rhythm.wall_s,
     }
 
 
@@ -42,22 +52,38 @@ def mix_of(order: Sequence[str]) -> tuple[str, ...]:
     return tuple(name for name, count in counts.items() for _ in range(count // cycles))
 
 
-def measured_period(cycle: "Cycle", planned: Schedule, measured: Schedule) -> dict[str, Any]:
+def check_parts(most_parts: int, mix: Sequence[str], cyclic: bool) -> None:
+    """BadInput for so many parts a cycle (--parts-per-cycle) where none is looked for, and where a mix has more."""
+    if not cyclic:
+        raise BadInput(f"--parts-per-cycle {most_parts}: only a cycle has as many: add --cyclic")
+    if most_parts < len(mix):
+        enter = ", ".join(counted(count, name) for name, count in Counter(mix).items())
+        raise BadInput(
+            f"--parts-per-cycle {most_parts}: a cycle has {enter} at the least: allowed are {len(mix)} or more"
+        )
+
+
+def measured_period(rhythm: "Rhythm", planned: Schedule, measured: Schedule) -> dict[str, Any]:
     """The period of a run that carried a cycle out, beside the planned one; None where too few parts were delivered."""
     from lab.sequencing.cyclic.unrolled import period_of
 
+    cycle = rhythm.cycle
     found_s = period_of(measured, cycle)
-    return cycle_document(cycle) | {
+    return cycle_document(rhythm) | {
         "planned_period_s": period_of(planned, cycle),
         "measured_period_s": found_s,
         "period_deviation": None if found_s is None else found_s / cycle.period_s - 1.0,
     }
 
 
-def cyclic_order(cell: Cell, seed: int) -> "tuple[Cycle, Unrolled]":
-    """The cycle of a cell's products and its order for the cell's parts, as a run carries it out. BadInput as `best_cycle`."""
-    from lab.sequencing.cyclic.cycle import best_cycle
+def cyclic_order(cell: Cell, seed: int, most_parts: int | None = None) -> "tuple[Rhythm, Unrolled]":
+    """The cycle of a cell's products that needs the least time a part, and its order for the cell's parts, as a run carries it
+    out.
+
+    most_parts: of a cycle, see `best_rhythm`; never more than the cell has. BadInput as `best_rhythm`.
+    """
+    from lab.sequencing.cyclic.several import best_rhythm
     from lab.sequencing.cyclic.unrolled import unrolled
 
-    cycle = best_cycle(cell, mix_of(cell.order), seed=seed)
-    return cycle, unrolled(cycle, cell)
+    rhythm = best_rhythm(cell, mix_of(cell.order), most_parts and min(most_parts, cell.parts), seed)
+    return rhythm, unrolled(rhythm.cycle, cell)

@@ -32,7 +32,7 @@ from lab.teaching.events import ORDER, LessonEvent, OrderChosen, SequenceFound, 
 from lab.teaching.lesson_sessions import TellingAdvisor
 
 if TYPE_CHECKING:
-    from lab.sequencing.cyclic.cycle import Cycle
+    from lab.sequencing.cyclic.several import Rhythm
     from lab.sequencing.methods.srl_advised import AdvisedResult
 
 NOBODY = AdvisorName.of("none")
@@ -88,8 +88,9 @@ def _allowed(run: Run) -> str:
 class OrderAdvice:
     """Whose word counts on the order: one that is given whole, or whom SRL may ask which part to move next, and when.
 
-    given: the words of an order, "" for none. cyclic: the order is to repeat the shortest cycle, and nobody is asked. people:
-    those behind such names as "terminal"; keep: gives the journal of what they say, by default one that is not written.
+    given: the words of an order, "" for none. cyclic: the order is to repeat the shortest cycle, of at most parts_per_cycle
+    parts, and nobody is asked. people: those behind such names as "terminal"; keep: gives the journal of what they say, by
+    default one that is not written.
     """
 
     given: str = ""
@@ -98,6 +99,7 @@ class OrderAdvice:
     people: Mapping[str, Ask] = field(default_factory=dict)
     keep: KeepOrder = lambda cell, objective: Journal()
     cyclic: bool = False
+    parts_per_cycle: int | None = None
 
 
 def person_of(names: Sequence[str]) -> AdvisorName:
@@ -109,8 +111,8 @@ def person_of(names: Sequence[str]) -> AdvisorName:
 class Ordered:
     """The order that is used, and by whom it is; what each order that was found costs; what the advice was worth.
 
-    receipt: None where nobody was asked and nothing was given; `guided_best` in it: the cheapest episode with advice. cycle: what
-    the order repeats, where that was asked for.
+    receipt: None where nobody was asked and nothing was given; `guided_best` in it: the cheapest episode with advice. rhythm:
+    what the order repeats, where that was asked for.
     """
 
     found: SequenceResult
@@ -118,7 +120,7 @@ class Ordered:
     used: str
     costs: dict[str, float]
     receipt: dict[str, Any] | None = None
-    cycle: "Cycle | None" = None
+    rhythm: "Rhythm | None" = None
 
 
 def ordered(cell: Cell, settings: Sequencing, advice: OrderAdvice, seed: int, tell: Tell = unheard) -> Ordered:
@@ -139,9 +141,9 @@ def ordered(cell: Cell, settings: Sequencing, advice: OrderAdvice, seed: int, te
         taken = checked_order(cell, advice.given)
         own = cost(follow(cell, taken), search.objective)
         orders[GIVEN] = SequenceResult(taken, own, (own,))
-    cycle = None
+    rhythm = None
     if advice.cyclic:
-        cycle, repeated = cyclic_order(cell, seed)
+        rhythm, repeated = cyclic_order(cell, seed, advice.parts_per_cycle)
         own = cost(follow(cell, repeated.sequence), search.objective)
         orders[CYCLIC] = SequenceResult(repeated.sequence, own, (own,))
     said: dict[str, Any] = {}
@@ -162,7 +164,7 @@ def ordered(cell: Cell, settings: Sequencing, advice: OrderAdvice, seed: int, te
         return Ordered(orders[used], proven, used, costs)
     tell(OrderChosen(used, costs, search.objective))
     worth = {"used": used, "costs": costs, "objective": search.objective, "bound": known.bound}
-    return Ordered(orders[used], proven, used, costs, worth | said, cycle)
+    return Ordered(orders[used], proven, used, costs, worth | said, rhythm)
 
 
 def reference(cell: Cell, objective: str, time_limit_s: float = SECOND_OPINION_S, workers: int = 1) -> Reference:

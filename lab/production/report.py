@@ -33,7 +33,7 @@ from lab.toolbox.policy import Policy
 from lab.workers import Task, Workers
 
 if TYPE_CHECKING:
-    from lab.sequencing.cyclic.cycle import Cycle
+    from lab.sequencing.cyclic.several import Rhythm
 
 FILES = {
     "gantt": "gantt.png",
@@ -71,7 +71,7 @@ class Report:
     files: dict[str, str] = field(default_factory=dict)
     missing: dict[str, str] = field(default_factory=dict)
     receipts: dict[str, Any] | None = None
-    cycle: "Cycle | None" = None
+    rhythm: "Rhythm | None" = None
 
     @property
     def success(self) -> bool:
@@ -128,10 +128,10 @@ class Report:
 
     def _cyclic(self) -> dict[str, Any] | None:
         """The cycle that was carried out, and its period as planned and as measured; None where none was asked for."""
-        if self.cycle is None:
+        if self.rhythm is None:
             return None
         planned = simulate(self.taught.cell, self.sequenced.sequence)
-        return measured_period(self.cycle, planned, self.outcome.schedule)
+        return measured_period(self.rhythm, planned, self.outcome.schedule)
 
 
 Drawn = dict[str, Task[bytes]]  # PNG files by their names in FILES, drawn or being drawn

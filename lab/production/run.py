@@ -149,7 +149,7 @@ def run(
     report = Report(
         *(prepared, taught, order.found, order.used, order.proven, outcome, recording, began),
         receipts=receipts,
-        cycle=order.cycle,
+        rhythm=order.rhythm,
     )
     teacher.tell(PhaseBegan("draw", 1))
     scene = next((scene for filmed, scene in scenes if filmed is recording), None)

@@ -24,8 +24,8 @@ class RunAdvice:
     """Who is asked in a run; where people are, what they say is kept in the toolbox's sessions, each named in the run's journal.
 
     given: the words of an order that is not to be looked for, "" for none; gate: when SRL asks about the order;
-    cyclic: the order is to repeat the shortest cycle. Of a run that is
-    gone on with, the sessions that it began go on.
+    cyclic: the order is to repeat the shortest cycle, of at most parts_per_cycle parts. Of a run that is gone on with, the
+    sessions that it began go on.
     """
 
     toolbox: Toolbox
@@ -34,6 +34,7 @@ class RunAdvice:
     given: str = ""
     gate: str = "ccrl"
     cyclic: bool = False
+    parts_per_cycle: int | None = None
     sessions: dict[str, SessionInFolder] = field(default_factory=dict)
 
     @property
@@ -86,7 +87,8 @@ class RunAdvice:
                 self.journal.write(SessionKept(ORDER, str(session.folder)))
             return made
 
-        return OrderAdvice(self.given, person_of(self.options.advisors), self.gate, people, keep, self.cyclic)
+        cyclic = self.cyclic, self.parts_per_cycle
+        return OrderAdvice(self.given, person_of(self.options.advisors), self.gate, people, keep, *cyclic)
 
     def _new_order(self, durations: Mapping[str, Any]) -> OrderSession:
         options = OrderOptions(

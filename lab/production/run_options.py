@@ -9,6 +9,7 @@ from typing import Annotated, Any, ClassVar
 from annotated_types import Ge, Le
 
 from lab.errors import BadInput
+from lab.production.cyclic_order import check_parts, mix_of
 from lab.production.run_journal import RunBegan, RunJournal, read_run
 from lab.sequencing import check_method
 from lab.tasks.task import Task
@@ -26,7 +27,12 @@ class RunOptions(SessionOptions):
 
     command = "run"
     wanted = "it is no run"
-    typed: ClassVar[Mapping[str, str]] = {"task": "TASK", "advisors": "--advisor", "asked": "--ask"}
+    typed: ClassVar[Mapping[str, str]] = {
+        "task": "TASK",
+        "advisors": "--advisor",
+        "asked": "--ask",
+        "parts_per_cycle": "--parts-per-cycle",
+    }
 
     task: str = "toast"
     toasts: int | None = None
@@ -40,6 +46,7 @@ class RunOptions(SessionOptions):
     order: str | None = None
     cyclic: bool = False
     method: str | None = None
+    parts_per_cycle: int | None = None
 
     def load(self) -> Task:
         """The task, its order found as these options say. BadInput as `task_file.load`, and for an unknown method."""
@@ -52,6 +59,15 @@ class RunOptions(SessionOptions):
     def to_json(self) -> dict[str, Any]:
         """A plain dict, files by their whole paths, so that they are found from another folder."""
         return asdict(self) | {"task": whole_path(self.task), "advisors": [recorded_whole(a) for a in self.advisors]}
+
+    def ordered(self, task: Task) -> tuple[str, ...]:
+        """The parts of the order, by their kinds; BadInput, too, where the words on their order do not go together."""
+        if self.cyclic and self.order is not None:
+            raise BadInput(f"--cyclic and --order {self.order}: an order is one or the other")
+        order = task.ordered(self.toasts, self.parts)
+        if self.parts_per_cycle is not None:
+            check_parts(self.parts_per_cycle, mix_of(order), self.cyclic)
+        return order
 
     def lessons(self) -> LessonOptions:
         """What they say of the lessons in it."""

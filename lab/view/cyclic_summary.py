@@ -9,19 +9,43 @@ from rich.text import Text
 
 from lab.errors import counted
 
+SAME_S = 0.005  # what is less is not seen
+
 
 def cyclic_summary(found: Mapping[str, Any]) -> RenderableType:
     """The end of `lab sequence --cyclic`, from its JSON document."""
     mix = ", ".join(counted(count, name) for name, count in Counter(found["mix"]).items())
-    proven = f"proven: no cycle of {mix} is shorter" if found["proven"] else f"proven bound {found['bound_s']:.2f} s"
     each = "" if found["parts_a_cycle"] == 1 else f", {found['per_part_s']:.2f} s a part"
     lines = [
         f"every {found['period_s']:.2f} s: {mix}{each}, {found['parts_per_hour']:.1f} parts an hour (seed {found['seed']})",
-        f"{proven}; {counted(found['most_in_work'], 'part')} in work at once at the most",
+        f"{counted(found['most_in_work'], 'part')} in work at once at the most",
+        *_tried(found),
         *(_move(move, found["parts_a_cycle"]) for move in found["moves"]),
         *_finite(found["finite"]),
     ]
     return Group(*map(Text, [*lines, *found["files"].values()]))
+
+
+def _tried(found: Mapping[str, Any]) -> list[str]:
+    """What is proven of the time a part, and what each number of parts a cycle came to."""
+    of, least_s = found["proven_of"], found["least_per_part_s"]
+    lines = [f"proven: of {of} none needs less a part"]
+    if not found["proven"]:
+        lines = [f"proven: of {of} none needs less than {found['bound_per_part_s']:.2f} s a part"]
+    if found["bound_per_part_s"] - least_s > SAME_S:
+        lines[0] += f"; of all cycles none less than {least_s:.2f} s"
+    if len(found["tried"]) > 1:
+        lines.append(f"parts a cycle: {'; '.join(map(_one_tried, found['tried']))}")
+    if found["why_no_more"] is not None:
+        lines.append(f"more parts a cycle were not tried: {found['why_no_more']}")
+    return lines
+
+
+def _one_tried(tried: Mapping[str, Any]) -> str:
+    parts, period_s = tried["parts_a_cycle"], tried["period_s"]
+    if period_s is not None:
+        return f"{parts}, {period_s / parts:.2f} s a part"
+    return f"{parts}, none is better" if tried["proven"] else f"{parts}, none better was found"
 
 
 def period_in_words(cyclic: Mapping[str, Any]) -> str:

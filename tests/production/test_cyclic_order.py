@@ -30,28 +30,28 @@ def test_the_smallest_mix_repeats(order: str, mix: str) -> None:
 
 
 def test_a_cyclic_order_is_used_though_others_are_better() -> None:
-    found = ordered(SIX, Sequencing(method="fifo"), OrderAdvice(cyclic=True), 0)
+    found = ordered(SIX, Sequencing(method="fifo"), OrderAdvice(cyclic=True, parts_per_cycle=1), 0)
     assert found.used == "cyclic"
-    assert found.cycle is not None
-    assert found.cycle.period_s == 150.0
+    assert found.rhythm is not None
+    assert found.rhythm.per_part_s == 150.0
     assert found.costs["cyclic"] == simulate(SIX, found.found.sequence).makespan_s == 967.0
     assert found.costs["exact"] == 963.0
 
 
 def test_the_measured_period_stands_beside_the_planned_one() -> None:
     """All takes a tenth longer than planned."""
-    cycle, made = cyclic_order(SIX, 0)
+    rhythm, made = cyclic_order(SIX, 0, 1)
     slow = replace(SIX, empty_s=1.1 * SIX.empty_s, loaded_s=1.1 * SIX.loaded_s)
     slow = replace(slow, stations=tuple(replace(one, processing_s=1.1 * one.processing_s) for one in slow.stations))
-    told = measured_period(cycle, made.schedule, simulate(slow, made.sequence))
+    told = measured_period(rhythm, made.schedule, simulate(slow, made.sequence))
     assert (told["period_s"], told["planned_period_s"]) == (150.0, 150.0)
     assert told["measured_period_s"] == pytest.approx(165.0)
     assert told["period_deviation"] == pytest.approx(0.1)
 
 
 def test_one_part_has_no_period() -> None:
-    cycle, made = cyclic_order(SIX, 0)
-    told = measured_period(cycle, made.schedule, simulate(load_cell("toast-case-1").cell(1), (1, 1, 1)))
+    rhythm, made = cyclic_order(SIX, 0, 1)
+    told = measured_period(rhythm, made.schedule, simulate(load_cell("toast-case-1").cell(1), (1, 1, 1)))
     assert (told["measured_period_s"], told["period_deviation"]) == (None, None)
 
 
@@ -69,7 +69,7 @@ def test_a_cycle_may_wait_on_purpose() -> None:
     table = np.ones((4, 4)) - np.eye(4)
     route = tuple(Stage(station.name) for station in stations)
     cell = Cell.alike(stations, route, table, 2 * table, "in", 4)
-    cycle, made = cyclic_order(cell, 0)
-    assert (made.waits, cycle.period_s) == (True, 25.0)
-    told = measured_period(cycle, made.schedule, simulate(cell, made.sequence))
+    rhythm, made = cyclic_order(cell, 0)
+    assert (made.waits, rhythm.cycle.period_s) == (True, 25.0)
+    told = measured_period(rhythm, made.schedule, simulate(cell, made.sequence))
     assert told["planned_period_s"] == told["measured_period_s"] == 25.0

@@ -15,7 +15,12 @@ FOUND: dict[str, Any] = {
     "per_part_s": 30.0,
     "parts_per_hour": 120.0,
     "bound_s": 85.5,
+    "bound_per_part_s": 28.5,
+    "least_per_part_s": 28.5,
     "proven": False,
+    "proven_of": "cycles of 2 slices, 1 cup",
+    "why_no_more": None,
+    "tried": [{"parts_a_cycle": 3, "period_s": 90.0, "bound_s": 85.5, "proven": False}],
     "most_in_work": 2,
     "seed": 7,
     "moves": [
@@ -53,11 +58,23 @@ def lines(found: dict[str, Any]) -> list[str]:
 def test_a_cycle_in_words() -> None:
     assert lines(FOUND) == [
         "every 90.00 s: 2 slices, 1 cup, 30.00 s a part, 120.0 parts an hour (seed 7)",
-        "proven bound 85.50 s; 2 parts in work at once at the most",
+        "2 parts in work at once at the most",
+        "proven: of cycles of 2 slices, 1 cup none needs less than 28.50 s a part",
         "       0.00 s  slice 1: in > oven",
         "      12.50 s  cup 3's pallet: a > b  (entered 1 period before)",
         "carried out for 6 parts: 210.00 s, with waits on purpose",
         "the best order of as many: 205.00 s, 34.17 s a part",
+    ]
+
+
+def test_what_other_numbers_of_parts_came_to() -> None:
+    periods = [(3, 90.0, True), (6, None, True), (9, None, False)]
+    tried = [dict(zip(("parts_a_cycle", "period_s", "proven"), one, strict=True)) for one in periods]
+    changed = {"proven": True, "bound_per_part_s": 30.0, "proven_of": "cycles of up to 9 parts", "tried": tried}
+    assert lines(FOUND | changed | {"why_no_more": "the 60 s were over"})[2:5] == [
+        "proven: of cycles of up to 9 parts none needs less a part; of all cycles none less than 28.50 s",
+        "parts a cycle: 3, 30.00 s a part; 6, none is better; 9, none better was found",
+        "more parts a cycle were not tried: the 60 s were over",
     ]
 
 

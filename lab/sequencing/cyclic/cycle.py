@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import floor, inf
-from typing import Any
+from typing import Any, NamedTuple
 
 from lab.errors import BadInput, WorkFailed, counted
 from lab.sequencing.cell.cell import Cell
@@ -32,7 +32,6 @@ class Cycle:
     recurs: int = 1
     bound_s: float = 0.0
     proven: bool = False
-    wall_s: float = 0.0
 
     @property
     def parts(self) -> int:
@@ -103,39 +102,60 @@ def best_cycle(cell: Cell, mix: Sequence[str], time_limit_s: float = TIME_LIMIT_
     Raises BadInput for a cell that has no such cycle (`check_cyclic`) or too large a one, WorkFailed when none was found.
     Source: Phillips and Unger 1976, AIIE Transactions 8(2) (one hoist, time windows).
     """
+    check_cyclic(cell, mix)
+    found = shortest(at_speed(cell), mix, time_limit_s, seed)
+    if found.cycle is None:
+        why = "it is proven that there is none" if found.above_s == inf else f"none was found in {time_limit_s:g} s"
+        raise WorkFailed(f"no order of {counted(len(mix), 'part')} a cycle can be repeated for ever: {why}")
+    return found.cycle
+
+
+class Found(NamedTuple):
+    """The shortest cycle that was found, None: none; no period of those that were looked for is below above_s, inf: there is
+    none; proven: none is shorter than the one that was found, or at all."""
+
+    cycle: Cycle | None
+    above_s: float
+    proven: bool
+
+
+def shortest(
+    cell: Cell, mix: Sequence[str], time_limit_s: float, seed: int, least_s: float = 0.0, below_s: float = inf
+) -> Found:
+    """The shortest cycle of a mix, of those with a period below below_s; it is known that none is below least_s.
+
+    cell: with the times of its one robot (`at_speed`).
+    """
     from lab.sequencing.cyclic.model import CycleModel, Units  # only here: OR-Tools takes its time
 
     began = time.perf_counter()
-    check_cyclic(cell, mix)
-    cell = at_speed(cell)
     away = away_s(cell)
     # Of equal periods that with the fewest moves is found first, and stays.
-    ahead = [(len(line.moves), line.bound_s(away), n, line) for n, line in enumerate(lines(cell, mix))]
+    ahead = [(len(line.moves), max(line.bound_s(away), least_s), n, line) for n, line in enumerate(lines(cell, mix))]
     ahead.sort(key=lambda one: one[:3])
     best: Cycle | None = None
     above_s, resolution_s = inf, 0.0
-    for _, least_s, _, line in ahead:
+    for _, bound_s, _, line in ahead:
         units = Units.of(line)
         resolution_s = max(resolution_s, units.resolution_s)
         # A quick look for a good cycle, a bound, and the rest of the way between the two.
         steps = (units.coarse, False), (units.coarse, True), (units.fine, units.rounded)
         for step, (unit, loose) in enumerate(steps):
-            best_s = inf if best is None else best.period_s
+            best_s = below_s if best is None else best.period_s
             left_s = time_limit_s - (time.perf_counter() - began)
-            if least_s >= best_s - units.resolution_s or left_s <= 0:
+            if bound_s >= best_s - units.resolution_s or left_s <= 0:
                 break
-            answer = CycleModel(line, away, least_s, best_s, unit, loose).solve(left_s, seed)
-            least_s = max(least_s, answer.above_s) if step else least_s
+            answer = CycleModel(line, away, bound_s, best_s, unit, loose).solve(left_s, seed)
+            bound_s = max(bound_s, answer.above_s) if step else bound_s
             timed = shortest_period(line, answer.order, answer.wraps) if answer.order else None
             if timed is not None and timed.period_s < best_s:
                 best = Cycle(line, timed.period_s, timed.begin_s, answer.order, answer.wraps, timed.recurs)
-        above_s = min(above_s, least_s)
+        above_s = min(above_s, bound_s)
     if best is None:
-        why = "it is proven that there is none" if above_s == inf else f"none was found in {time_limit_s:g} s"
-        raise WorkFailed(f"no order of {counted(len(mix), 'part')} a cycle can be repeated for ever: {why}")
+        return Found(None, above_s, above_s >= below_s - resolution_s)
     proven = best.period_s - above_s <= resolution_s
-    wall_s = time.perf_counter() - began
-    return replace(best, bound_s=best.period_s if proven else above_s, proven=proven, wall_s=wall_s)
+    bound_s = best.period_s if proven else above_s
+    return Found(replace(best, bound_s=bound_s, proven=proven), bound_s, proven)
 
 
 def check_cyclic(cell: Cell, mix: Sequence[str]) -> None:

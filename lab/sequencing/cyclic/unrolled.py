@@ -46,7 +46,7 @@ def of_parts(cell: Cell, mix: Sequence[str], parts: int) -> Cell:
 
 def period_of(schedule: Schedule, cycle: Cycle) -> float | None:
     """The period of a schedule that repeats a cycle: the median time between the end of a part and that of the part so many
-    cycles later as come in the same intervals again, without those at the beginning and the end where there are enough.
+    cycles later as come in the same intervals again, without those at the end and the beginning where there are enough.
 
     While the line is filled and emptied parts end in other intervals. None: there are too few parts.
     """
@@ -54,8 +54,9 @@ def period_of(schedule: Schedule, cycle: Cycle) -> float | None:
     apart_s = [
         (later - end) / cycle.recurs for end, later in zip(ends_s, ends_s[cycle.parts * cycle.recurs :], strict=False)
     ]
-    if len(apart_s) > 2 * cycle.parts:
-        apart_s = apart_s[cycle.parts : -cycle.parts]
+    inside = cycle.parts * max(1, *cycle.passed)  # as many parts are still there when the last ones have entered
+    apart_s = apart_s[:-inside] or apart_s[:1]
+    apart_s = apart_s[cycle.parts :] or apart_s[-1:]
     return median(apart_s) if apart_s else None
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from hypothesis import HealthCheck, Phase, assume, given, settings
 from hypothesis import strategies as st
@@ -10,8 +11,9 @@ from hypothesis.strategies import SearchStrategy
 
 from lab.errors import WorkFailed
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.cell.stations import Station
+from lab.sequencing.cell.stations import Product, Stage, Station, one_robot
 from lab.sequencing.cyclic.cycle import best_cycle
+from lab.sequencing.cyclic.several import best_rhythm
 from lab.sequencing.cyclic.unrolled import of_parts, period_of, unrolled
 from lab.sequencing.methods.exact import optimum
 from lab.sequencing.simulate.follow import simulate
@@ -45,6 +47,20 @@ def test_more_parts_than_whole_cycles(oven_cell: CellMaker) -> None:
     made = unrolled(cycle, of_parts(oven_cell(), ("toast", "toast"), 5))
     assert made.schedule.makespan_s == 2 + 10 + 4 * 15 + 2
     assert period_of(made.schedule, cycle) == 30.0
+
+
+def test_two_parts_a_cycle_are_carried_out_as_planned() -> None:
+    """Two machines of 30 s, and 1 s out, back and in: two parts in 33 s, as long as parts are brought between them."""
+    stations = [Station(name, "storage", 9) for name in ("in", "out")] + [Station("m", "machine", 1, 30.0)]
+    stations += [Station("n", "machine", 1, 30.0), Station("washer", "machine", 1, 10.0)]
+    product = Product("part", tuple(tuple(map(Stage, ("in", machine, "washer", "out"))) for machine in "mn"))
+    table = 1.0 - np.eye(5)
+    cell = Cell(tuple(stations), (product,), ("part",) * 8, table, table, one_robot("in"))
+    cycle = best_rhythm(cell, ("part",)).cycle
+    made = unrolled(cycle, cell)
+    assert (cycle.parts, cycle.period_s, period_of(made.schedule, cycle)) == (2, 33.0, 33.0)
+    taken = [one.resource for one in made.schedule.machines if one.kind == "process" and one.resource != "washer"]
+    assert sorted(taken) == ["m"] * 4 + ["n"] * 4
 
 
 def test_too_few_parts_have_no_period(oven_cell: CellMaker) -> None:
