@@ -241,8 +241,9 @@ class _Positions:
         wait = self._position(self.positions[leave].product, stage.buffer, (stage.buffer,))
         way = self._way(stage.buffer, service_s)
         if self._buffers == "busy":
-            # Never both at once: the decision is the same, and the cell says where it leads.
+            # One robot never may choose: the decision is the same, and the cell says where it leads.
             for robot, choice in choices.items():
+                choice = choice if len(self._robots) == 1 else -1
                 full = replace(way, choice=choice, if_full=self._index[stage.station], robot=robot)
                 if self._serves(robot, self.positions[leave].station, full.target):
                     self._join(leave, wait, full)
