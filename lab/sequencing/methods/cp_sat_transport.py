@@ -304,7 +304,7 @@ class TransportModel:
             self._arc(arcs, 0, number, None, task, 0)
             arcs[number, 0] = self.model.new_bool_var("last")
             for other, then in enumerate(own, 1):
-                if task.part != then.part:
+                if task.part != then.part or self.tasks.least.between(task.option.to, then.place) is not None:
                     change_s = setups.get((self.cell.order[task.part], self.cell.order[then.part]), 0.0)
                     self._arc(arcs, number, other, task, then, self.times.whole(change_s))
         self._chain(own, arcs, servers)
