@@ -14,7 +14,8 @@ from lab.production.trouble import Trouble
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.routes import Option, part_of
 from lab.sequencing.cell.schedule import Move
-from lab.sequencing.simulate.run import NO_WAIT, Run, Wait, Windowless, branch, closes
+from lab.sequencing.simulate.follow import closes
+from lab.sequencing.simulate.run import NO_WAIT, Run, Wait, Windowless, branch
 from lab.sequencing.simulate.waits import waits_of
 from lab.sim.parts.kinds import Spot, comes_as, on_its_pallet
 from lab.sim.scene.scene import pallet_of

@@ -2,13 +2,19 @@
 
 from itertools import count, islice
 
+import numpy as np
 import pytest
 from against_oracle.beaten import BEATEN, classes
 from against_oracle.compared import cell_of, compared
 from against_oracle.cycles import fits, judged, periods
 from against_oracle.drawn import FEATURES, as_toml, drawn, features, smaller
+from against_oracle.translated import plain_cell, plain_plan
+from oracle.rules import violations
 
 from lab.sequencing.cell.cell import EVERY_PLAN
+from lab.sequencing.simulate import kernels
+from lab.sequencing.simulate.cell_arrays import cell_arrays, run_arrays
+from lab.sequencing.simulate.run import Run
 
 SEED = 1
 CELLS = 30
@@ -18,6 +24,7 @@ QUICK = (
     if cell_of(raw := drawn(SEED, number)).proven_of == EVERY_PLAN and len(raw["order"]) < 4
 )
 NUMBERS = [*islice(QUICK, CELLS)]
+SEVERAL = [*islice((number for number in count() if "two robots" in features(drawn(SEED, number))), 40)]
 SMALL = (number for number in count() if fits(raw := drawn(SEED, number)) and len(raw["stations"]) < 6)
 CYCLIC = [*islice(SMALL, 10)]
 
@@ -26,6 +33,23 @@ CYCLIC = [*islice(SMALL, 10)]
 def test_proofs_bounds_and_plans_hold(number: int) -> None:
     found = compared(drawn(SEED, number), ("fifo", "nearest-ready"))
     assert found.wrong == ()
+
+
+@pytest.mark.parametrize("number", SEVERAL)
+def test_any_order_of_several_robots_keeps_to_all_rules(number: int) -> None:
+    """Decisions drawn one after the other: both simulations are alike, and what they say can be carried out as it stands."""
+    cell, rng = cell_of(drawn(SEED, number)), np.random.default_rng(number)
+    for _ in range(5):
+        run, arrays, there = Run(cell), cell_arrays(cell), run_arrays(cell)
+        kernels.reset(arrays, there, np.uint64(0))
+        while allowed := run.allowed():
+            assert there.allowed[: kernels.list_allowed(arrays, there)].tolist() == [*allowed]
+            place = int(rng.integers(len(allowed)))
+            run.move(allowed[place])
+            kernels.move(arrays, there, place, np.uint64(0))
+            assert there.ready_s.tolist() == pytest.approx(run.ready_s)
+        assert there.clock.tolist() == pytest.approx([run.now_s, run.waited_s, run.processed_s, run.end_s])
+        assert not run.done or violations(plain_cell(cell), plain_plan(cell, run.moves)) == []
 
 
 def test_where_the_lab_proves_less_a_class_says_why() -> None:

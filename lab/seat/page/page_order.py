@@ -41,7 +41,9 @@ def _allowed(move: OrderMove) -> Json:
 def made_until(request: SequenceRequest) -> list[Move]:
     """The moves of the episode that is asked about, until now."""
     run = Run(request.run.cell, request.run.times)
-    return [run.move(decision) for decision in request.made]
+    for decision in request.made:
+        run.move(decision)
+    return run.moves
 
 
 def bars_of(moves: Sequence[Move], now_s: float | None = None) -> Json:

@@ -148,11 +148,21 @@ class Cell:
     def proven_of(self) -> str:
         """Of which plans an optimum or a bound is one of: `EVERY_PLAN`, or `NEVER_WAIT` where waiting on purpose may be better.
 
-        A list of transfers by one robot that does all the work is timed with the waits that its windows need. Else they may need
-        others, and several robots may make room for each other in turn, which no list of whole transfers says. Without windows,
-        nothing becomes worse by being done earlier.
+        A list of transfers by one robot that does all the work is timed with the waits that its windows need; else they may need
+        others. On a track robots set out as they pick; held at its origin, a part would make room before. Else nothing becomes
+        worse by being done earlier.
         """
-        return NEVER_WAIT if (self.has_windows and not self.serial) or len(self.robots) > 1 else EVERY_PLAN
+        return NEVER_WAIT if (self.has_windows and not self.serial) or self.track else EVERY_PLAN
+
+    @cached_property
+    def takers(self) -> tuple[frozenset[int], ...]:
+        """By station: which robots, or its servers (`SERVER`), may make room there; none where there are not several robots."""
+        found = [set[int]() for _ in self.stations]
+        for place in self.positions if len(self.robots) > 1 else ():
+            for way in place.options:
+                for station in set(place.holds) - set(self.positions[way.to].holds):
+                    found[station].add(way.robot)
+        return tuple(map(frozenset, found))
 
     @cached_property
     def without_windows(self) -> "Cell":

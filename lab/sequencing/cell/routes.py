@@ -251,8 +251,9 @@ class _Positions:
             if self._buffers != "busy":
                 self._carry(leave, wait, way)
                 continue
-            # Never both at once: the decision is the same, and the cell says where it leads.
+            # One robot never may choose: the decision is the same, and the cell says where it leads.
             for robot, choice in choices[leave].items():
+                choice = choice if len(self._robots) == 1 else -1
                 full = replace(way, choice=choice, if_full=self._index[stage.station], robot=robot)
                 if self._serves(robot, self.positions[leave].station, full.target):
                     self._join(leave, wait, full)

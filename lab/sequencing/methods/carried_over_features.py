@@ -122,7 +122,7 @@ def features(run: Run, allowed: tuple[int, ...], known: FeatureArrays) -> Floats
             "load-ahead": survey.share(ahead) - 1.0 if ahead != last else 0.0,
             "load-behind": survey.share(behind) if full else 0.0,
             "server": float(served),
-            "room": 1.0 / (cell.capacities[way.needs[0]] - run.occupied[way.needs[0]]) if way.needs else 0.0,
+            "room": 1.0 / max(1, cell.capacities[way.needs[0]] - run.occupied[way.needs[0]]) if way.needs else 0.0,
             "moves-left": known.moves[here],
             "enters": float(enters),
             "load-after": survey.share(int(known.following[there])) - 1.0 if known.following[there] != last else 0.0,

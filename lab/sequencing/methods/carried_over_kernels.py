@@ -188,7 +188,7 @@ def _describe(cell: Any, run: Any, known: Any, work: Any, count: int, i: int) ->
     if ahead < last:
         f[LOAD_AHEAD] = work.load_s[ahead] / work.compared[2] - 1.0
     if cell.needs[o, 0] < last:
-        f[ROOM] = 1.0 / run.room[cell.needs[o, 0]]
+        f[ROOM] = 1.0 / max(1, run.room[cell.needs[o, 0]])
     f[MOVES_LEFT] = known.moves[here]
     if known.due:
         f[SLACK] = (cell.due_s[part] - begin_s - left_s) / scale_s

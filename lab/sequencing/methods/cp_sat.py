@@ -202,7 +202,7 @@ def _result(
 
     def order(solution: Solution) -> tuple[int, ...]:
         found = model.sequence(solution)
-        return () if (model.times.rounded_s or not cell.serial) and _spoils(cell, found) else found
+        return () if model.times.rounded_s and cell.serial and _spoils(cell, found) else found
 
     def hear(solution: Solution) -> None:
         asked.shared.tell(NAME, order(solution))

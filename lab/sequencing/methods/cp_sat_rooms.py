@@ -30,7 +30,7 @@ def add_chains(model: cp_model.CpModel, nodes: Nodes, most: int, chains: int) ->
 
 
 def add_rooms(tasks: Tasks) -> None:
-    """No station ever holds more than it can, in the list of decisions and in time; buffers are used where they may be."""
+    """No station ever holds more than it can, and buffers are used where they may be."""
     for station in tasks.blocking:
         _add_room(tasks, station, _visits(tasks, station))
     for task in tasks.all:
@@ -77,16 +77,20 @@ def _add_room(tasks: Tasks, station: int, visits: Sequence[Visit]) -> None:
                 continue
             arc = model.new_bool_var("room")
             nodes.append((number, other, arc))
+            if visit.bring is not None:
+                tasks.brings.append((visit.bring, after.bring, (arc,)))
             for take in visit.takes:
                 model.add(after.bring.end >= take.left).only_enforce_if(arc, take.done)
-                tasks.after(after.bring, take, arc, take.done)
+                tasks.frees.append((take, after.bring, (arc, take.done)))
+                if after.bring.put is not None and take.rank is not None:
+                    model.add(after.bring.put >= take.rank + 1).only_enforce_if(arc, take.done)
                 if tasks.tight:
                     model.add(after.bring.end <= take.left).only_enforce_if(arc, take.done, late[other])
     add_chains(model, nodes, len(visits), tasks.cell.capacities[station])
 
 
 def _add_full(tasks: Tasks, task: Task, station: int) -> None:
-    """A buffer is used only when the station ahead is full at that point of the list, where the cell says so."""
+    """A buffer is used only when the station ahead is full, or will be by what is on its way there, where the cell says so."""
     model, inside = tasks.model, list[cp_model.IntVar]()
     for visit in _visits(tasks, station):
         if visit.part == task.part:
@@ -95,7 +99,9 @@ def _add_full(tasks: Tasks, task: Task, station: int) -> None:
         inside.append(then)
         if visit.bring is not None:
             model.add_implication(then, visit.bring.done)
-            tasks.after(task, visit.bring, then, task.done)
+            tasks.after(task, visit.bring, then, task.done, begun=True)
+            model.add(visit.bring.left <= task.left).only_enforce_if(then, task.done)
         for take in visit.takes:
-            tasks.after(take, task, then, take.done, task.done)
+            tasks.after(take, task, then, take.done, task.done, begun=True)
+            model.add(take.left >= task.left).only_enforce_if(then, take.done, task.done)
     model.add(sum(inside) >= tasks.cell.capacities[station]).only_enforce_if(task.done)

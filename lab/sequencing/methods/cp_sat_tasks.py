@@ -27,7 +27,8 @@ class Task:
     """What is done with a part at a position: a team's robot carries it on, or a server of a station works on it.
 
     options: one for each robot of the team. begin: the service before the pick, or the server's work. left: when the part
-    leaves its place. end: when it is dropped, or finished. rank: its number in the list of decisions; None: any that fits times.
+    leaves its place. end: when it is dropped, or finished. rank, put: the places of its begin and end in the order of all that
+    happens; None: any that fits times.
     """
 
     part: int
@@ -38,6 +39,7 @@ class Task:
     left: cp_model.LinearExprT
     end: cp_model.LinearExprT
     rank: cp_model.IntVar | None
+    put: cp_model.IntVar | None
     waits: cp_model.IntVar | None
 
     @property
@@ -108,23 +110,30 @@ def possible_tasks(cell: Cell) -> int:
     return sum(tasks[place] for at in cell.begin_at for place in ahead[at])
 
 
+Follows = tuple[Task, Task, tuple[cp_model.LiteralT, ...]]
+
+
 class Tasks:
     """The tasks of all parts: each part takes one way from its begin to an end, and each task begins when it may.
 
-    Parts are numbered from 0 here. ranked: whether the list of decisions has to be known, not only times. tight: whether nobody
-    may wait without need, since something may be spoilt then. blocking: stations that may be full. follows: see `after`.
+    Parts are numbered from 0 here. ranked: whether the order of what happens has to be known, not only times. tight: whether
+    nobody may wait without need, since something may be spoilt then. blocking: stations that may be full. follows: see `after`.
+    frees: a task that frees room for another one, which a list may have in either order where another robot frees it. brings: a
+    task after another one to the same room. Both if all of their literals hold.
     """
 
     def __init__(self, cell: Cell, model: cp_model.CpModel, times: Times, horizon: int) -> None:
         self.cell, self.model, self.times, self.horizon = cell, model, times, horizon
         self.least, self.teams = Least(cell, times), teams_of(cell)
         self.tight = cell.has_windows
+        options = [way for at in cell.positions for way in at.options]
+        # Where one may have to wait for more than its robot and its part.
+        self.loose = bool(cell.track) or any(not way.waits or way.if_full is not None for way in options)
         self._ahead = {at: reached_from(cell.positions, {at}) for at in set(cell.begin_at)}
         self.blocking = [s for s in range(len(cell.stations)) if self._may_be_full(s)]
-        options = [way for at in cell.positions for way in at.options]
         self.ranked = bool(self.blocking) or cell.arrivals is not None or any(o.if_full is not None for o in options)
         self.all: list[Task] = []
-        self.follows: list[tuple[Task, Task, tuple[cp_model.LiteralT, ...]]] = []
+        self.follows, self.frees, self.brings = list[Follows](), list[Follows](), list[Follows]()
         self._ready: dict[tuple[int, int], cp_model.LinearExprT] = {}
         self._certain: set[tuple[int, int]] = set()  # (part, place): wherever it may go, it comes there
         for part in cell.unfinished:
@@ -138,11 +147,15 @@ class Tasks:
         """A time of the model."""
         return self.model.new_int_var(0, self.horizon, name)
 
-    def after(self, task: Task, before: Task, *when: cp_model.LiteralT) -> None:
-        """A task stands after another one in the list of decisions, if all of these hold."""
+    def after(self, task: Task, before: Task, *when: cp_model.LiteralT, begun: bool = False) -> None:
+        """A task stands after another one in the list of decisions, and begins after its end, if all of these hold.
+
+        begun: it only begins after its begin.
+        """
         self.follows.append((before, task, when))
-        if task.rank is not None and before.rank is not None:
-            self.model.add(task.rank >= before.rank + 1).only_enforce_if(*when)
+        passed = before.rank if begun else before.put
+        if task.rank is not None and passed is not None:
+            self.model.add(task.rank >= passed + 1).only_enforce_if(*when)
 
     def _may_be_full(self, station: int) -> bool:
         cell = self.cell
@@ -166,6 +179,8 @@ class Tasks:
             for task in own:
                 for before in into[place]:
                     self.after(task, before, task.done, before.done)
+                    if not task.option.waits or cell.positions[place].processing_s is None:
+                        self.model.add(task.left >= before.end).only_enforce_if(task.done, before.done)
                 into[task.option.to].append(task)
                 left[task.option.to] -= len(task.options)
                 if left[task.option.to] == 0:
@@ -228,8 +243,12 @@ class Tasks:
         elif any(station in self.blocking for station in option.needs):
             end = self.moment("drop")
             model.add(end >= begin + takes)
-        rank = model.new_int_var(0, self.cell.possible_moves, "rank") if self.ranked else None
-        return Task(part, place, options, done, begin, left, end, rank, waits)
+        most = 2 * self.cell.possible_moves
+        rank = put = model.new_int_var(0, most, "rank") if self.ranked else None
+        if rank is not None and option.robot != SERVER and isinstance(end, cp_model.IntVar):
+            put = model.new_int_var(0, most, "put")
+            model.add(put >= rank)
+        return Task(part, place, options, done, begin, left, end, rank, put, waits)
 
     def _first_ready(self, part: int) -> cp_model.LinearExprT:
         """When a part may leave the place where it begins."""

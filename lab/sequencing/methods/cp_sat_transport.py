@@ -6,7 +6,7 @@ the cells that it knows.
 
 from collections import Counter
 from collections.abc import Callable, Sequence
-from graphlib import TopologicalSorter
+from graphlib import CycleError, TopologicalSorter
 from heapq import heappop, heappush
 from itertools import pairwise
 from math import inf
@@ -20,10 +20,9 @@ from lab.sequencing.cell.objectives import MAKESPAN, WITH_DUE_TIMES, cost, machi
 from lab.sequencing.cell.routes import SERVER, choice_of, entry, part_of
 from lab.sequencing.methods.cp_sat_rooms import add_chains, add_rooms
 from lab.sequencing.methods.cp_sat_solver import Solution
-from lab.sequencing.methods.cp_sat_tasks import Task, Tasks, Team
+from lab.sequencing.methods.cp_sat_tasks import Follows, Task, Tasks, Team
 from lab.sequencing.methods.cp_sat_times import Times
 from lab.sequencing.methods.cp_sat_track import Track
-from lab.sequencing.simulate.follow import follow
 from lab.sequencing.simulate.run import Run
 
 Arcs = dict[tuple[int, int], cp_model.IntVar]
@@ -46,8 +45,9 @@ class TransportModel:
 
     below: only makespans shorter than the hint's are looked for. free: robots are wherever they are wanted, rooms are never
     full, setups take no time: a small model, for a bound and an order to begin with. blur: by how many units rounding may
-    change a sequence's cost; 0 when no time is rounded. Where a station has room for several parts, or several servers, the
-    model lets any of them be taken; a `Run` takes the first: what is proven is a bound.
+    change a sequence's cost; 0 when no time is rounded. Without windows every plan is one of the model's, whatever list says it:
+    where a station has room for several parts, or several servers, any of them may be taken, and robots hold parts as long as
+    they like. A `Run` takes the first: what is proven is a bound, and an optimum where a run comes to it.
     """
 
     def __init__(
@@ -87,24 +87,47 @@ class TransportModel:
         self._suggest(known)
 
     def sequence(self, solver: Solution) -> tuple[int, ...]:
-        """The decisions of the solution: each after all that it waits for, else in the order of their begins.
+        """The decisions of the solution: each after all that it waits for, else in the order of their begins; empty: none work.
 
-        On a track, which a `Run` gives out in the order of decisions, in that of their ends where that is cheaper.
+        Where several robots make room for each other, also in the order of their picks, and on a track, which a `Run` gives out
+        in the order of decisions, also in that of their ends; the cheapest. A decision that may not be taken yet, since a robot
+        holds something for longer than it has to, is taken as soon as it may.
         """
-        by_begin = self._in_order(solver, lambda task: (solver.value(task.begin), solver.value(task.end)))
-        if not self.cell.track:
-            return by_begin
-        by_end = self._in_order(solver, lambda task: (solver.value(task.end), solver.value(task.begin)))
-        return min(by_begin, by_end, key=self._cost)
+        value, tasks = solver.value, self.tasks
+        found = [self._in_order(solver, tasks.frees, lambda task: (value(task.begin), value(task.end)))]
+        if self.cell.track:
+            found.append(self._in_order(solver, tasks.frees, lambda task: (value(task.end), value(task.begin))))
+        if any(self.cell.takers):
+            found += [self._in_order(solver, more, self._picked(solver)) for more in (tasks.brings, ())]
+        runs = [self._carried_out(sequence) for sequence in dict.fromkeys(found)]
+        return min(runs, key=lambda one: one[1])[0]
 
-    def _cost(self, sequence: tuple[int, ...]) -> float:
-        """What a run of the decisions costs; endless where it spoils a part that a track keeps waiting."""
-        try:
-            return cost(follow(self.cell, sequence), self._objective)
-        except BadInput:
-            return inf
+    @staticmethod
+    def _picked(solver: Solution) -> Callable[[Task], tuple[int, int]]:
+        """When a part leaves its place."""
+        value = solver.value
+        return lambda task: (value(task.begin if task.option.robot == SERVER else task.left), value(task.end))
 
-    def _in_order(self, solver: Solution, when: Callable[[Task], tuple[int, int]]) -> tuple[int, ...]:
+    def _carried_out(self, order: tuple[int, ...]) -> tuple[tuple[int, ...], float]:
+        """The decisions in an order in which they may be taken, and what they cost; endless where they get stuck."""
+        run, left, found = Run(self.cell), list(order), list[int]()
+        while left:
+            tried = set[int]()
+            for n, decision in enumerate(left):
+                part = part_of(decision, self.cell.parts)
+                if part not in tried and run.option(decision) is not None:
+                    run.move(decision)
+                    found.append(left.pop(n))
+                    break
+                tried.add(part)
+            else:
+                return (), inf
+        return tuple(found), cost(run, self._objective) if run.done else inf
+
+    def _in_order(
+        self, solver: Solution, more: Sequence[Follows], when: Callable[[Task], tuple[int, int]]
+    ) -> tuple[int, ...]:
+        """The decisions by a time, as far as they may follow one another so; empty: some would wait for one another."""
         number = {task: n for n, task in enumerate(self.tasks.all) if solver.boolean_value(task.done)}
         robot = dict[Task, int]()
         for team, tasks, arcs, firsts in self._tours:
@@ -115,10 +138,13 @@ class TransportModel:
                 free.remove(own)
                 robot |= {tasks[node - 1]: own for node in tour}
         order = TopologicalSorter[Task](dict.fromkeys(number, ()))
-        for before, task, literals in self.tasks.follows:
+        for before, task, literals in (*self.tasks.follows, *more):
             if all(solver.boolean_value(literal) for literal in literals):
                 order.add(task, before)
-        order.prepare()
+        try:
+            order.prepare()
+        except CycleError:
+            return ()
         ready, found = list[tuple[int, int, int, Task]](), list[int]()
         while order.is_active():
             for task in order.get_ready():
@@ -148,8 +174,9 @@ class TransportModel:
                 if robot is None:
                     continue
                 hints[task.begin.index] = task.begin, begin
-                if task.rank is not None:
-                    hints[task.rank.index] = task.rank, rank
+                for number in (task.rank, task.put):
+                    if number is not None:
+                        hints[number.index] = number, 2 * rank
                 if robot != SERVER:
                     follows.add((last.get(robot), task))
                     begins |= {(self._start(robot), task)} if robot not in last else set()
@@ -243,7 +270,7 @@ class TransportModel:
         done = arcs[left, then] = self.model.new_bool_var("follows")
         free = gap if before is None else before.end + gap
         self.model.add(task.begin >= free).only_enforce_if(done)
-        if task.waits is not None and not self.cell.track:  # there one may have to wait for it
+        if task.waits is not None and not self.tasks.loose:
             self.model.add(task.begin <= free).only_enforce_if(done, ~task.waits)
         if before is not None:
             self.tasks.after(task, before, done)
@@ -277,7 +304,7 @@ class TransportModel:
             self._arc(arcs, 0, number, None, task, 0)
             arcs[number, 0] = self.model.new_bool_var("last")
             for other, then in enumerate(own, 1):
-                if task.part != then.part:
+                if task.part != then.part or self.tasks.least.between(task.option.to, then.place) is not None:
                     change_s = setups.get((self.cell.order[task.part], self.cell.order[then.part]), 0.0)
                     self._arc(arcs, number, other, task, then, self.times.whole(change_s))
         self._chain(own, arcs, servers)
@@ -293,7 +320,9 @@ class TransportModel:
         for part, then in pairwise(coming):
             for before in first[part]:
                 for task in first[then]:
-                    self.tasks.after(task, before, before.done, task.done)
+                    self.tasks.after(task, before, before.done, task.done, begun=True)
+                    first_s = [t.begin if t.option.robot == SERVER else t.left for t in (before, task)]
+                    self.model.add(first_s[1] >= first_s[0]).only_enforce_if(before.done, task.done)
         due_s = cell.due_s if cell.due_s and objective in WITH_DUE_TIMES else (0.0,) * cell.parts
         latest: dict[object, int] = {}
         for part, own in first.items():
@@ -348,16 +377,17 @@ def _routes(solver: Solution, arcs: Arcs) -> list[list[int]]:
 
 def _known(cell: Cell, times: Times, sequence: Sequence[int]) -> dict[tuple[int, int, int], tuple[int, int]]:
     """When each task of a sequence begins and ends, by part, place and choice, in units; BadInput where it cannot be."""
-    run, found = Run(cell), dict[tuple[int, int, int], tuple[int, int]]()
+    run, done = Run(cell), list[tuple[int, int, int]]()
     for decision in sequence:
         part, option = part_of(decision, cell.parts) - 1, run.option(decision)
         place = run.locations[part]
         if option is None:
             raise BadInput(f"hint: {run.refusal(decision)}")
-        begin = times.whole(run.pick_s(part + 1, option) - option.service_s)
         run.move(decision)
-        end_s = run.ready_s[part] if option.robot == SERVER else run.robots_s[option.robot]
-        found[part, place, choice_of(decision, cell.parts)] = begin, times.whole(end_s)
+        done.append((part, place, choice_of(decision, cell.parts)))
     if not run.done:
-        raise BadInput(f"hint: the sequence ends after {counted(len(found), 'move')}, but not all parts are finished")
-    return found
+        raise BadInput(f"hint: the sequence ends after {counted(len(done), 'move')}, but not all parts are finished")
+    return {
+        key: (times.whole(move.pick_s - (0.0 if move.served else move.service_s)), times.whole(move.end_s))
+        for key, move in zip(done, run.moves, strict=True)
+    }

@@ -7,7 +7,8 @@ import numpy as np
 from lab.learning import splitmix
 from lab.learning.compiled import inlined, inner, lean
 from lab.sequencing.simulate.cell_arrays import Flags, Floats, Ints
-from lab.sequencing.simulate.kernels import cost, fraction, may, mixed, reset, take
+from lab.sequencing.simulate.chance_kernels import fraction, mixed
+from lab.sequencing.simulate.kernels import cost, may, reset, take
 
 _following: Any = inner(splitmix.following, inline="always")
 

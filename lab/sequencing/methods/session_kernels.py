@@ -8,7 +8,8 @@ from lab.learning import splitmix
 from lab.learning.compiled import inner, lean
 from lab.sequencing.methods import session_updates as updates
 from lab.sequencing.methods.session_arrays import LEARNER_CODES
-from lab.sequencing.simulate.kernels import cost, fraction, list_allowed, mixed, move, reset, uniform
+from lab.sequencing.simulate.chance_kernels import fraction, mixed, uniform
+from lab.sequencing.simulate.kernels import cost, list_allowed, move, reset
 
 RANDOM, SRL, MONTE_CARLO = (LEARNER_CODES[name] for name in ("random", "srl", "mc"))
 _explore, _best_of, _log_sum = inner(updates.explore), inner(updates.best_of), inner(updates.log_sum)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from lab.sequencing.cell.cell import ARRIVALS_AFTER, Cell
 from lab.sequencing.cell.chance import LAWS, NO_CHANCE, Chance, check_chance
 from lab.sequencing.cell.objectives import BUILT_IN, MAKESPAN, check_built_in, machine_places, stuck_cost
-from lab.sequencing.cell.routes import from_the_ends
+from lab.sequencing.cell.routes import SERVER, from_the_ends
 from lab.sequencing.cell.stations import UNLIMITED, Robot
 
 Ints = NDArray[np.int64]
@@ -35,6 +35,7 @@ class CellArrays(NamedTuple):
     picked there [s]; coming (C,): the parts, from 0, that begin at a start.
     tracked: whether there is a track; first_held (S * S + 1,): where the stretches of each way on it begin in held (H,);
     held_from_s, held_until_s (R, H): from when until when a robot on that way is on each [s].
+    takers (S + 2, R + 1): whether a robot, or a server, may make room in a station; shared: whether one may for another one.
     ruled: whether there are precedences, R of them; made, ended (R, P): as `Rule` has them; counts (R, K): as many as it
     has, then 0. batched: whether there are machines with batches; batch (S + 2,): which.
     interval_s, due_s (K,) [s]. many: whether a part may have several choices. The codes are those of this module.
@@ -62,6 +63,8 @@ class CellArrays(NamedTuple):
     serial: bool
     first_room: Ints
     first_server: Ints
+    takers: Flags
+    shared: bool
     starts: Ints
     begin_at: Ints
     begin_s: Floats
@@ -101,8 +104,9 @@ class RunArrays(NamedTuple):
     processed, the end of all that was decided [s]. whole (2,): parts fetched, parts not yet finished. robots_at,
     robots_s (R,): the robots. track_s: since when each stretch is free.
     rooms_s, servers_s: since when each room and server is free, those of a station ascending as
-    far as they are free; worked: the last product of each server, -1: none. allowed: decisions, ascending; options: what
-    each means.
+    far as they are free; worked: the last product of each server, -1: none. held (R, 4): the part that a robot holds while
+    it waits for room, from 0, how many wait longer, and the stations in which it waits; -1: none. fetched_s, put_s (K,),
+    kept_s (S + 2,): as in `Run`. allowed: decisions, ascending; options: what each means.
     """
 
     locations: Ints
@@ -117,6 +121,10 @@ class RunArrays(NamedTuple):
     rooms_s: Floats
     servers_s: Floats
     worked: Ints
+    held: Ints
+    fetched_s: Floats
+    put_s: Floats
+    kept_s: Floats
     allowed: Ints
     options: Ints
 
@@ -128,7 +136,7 @@ def cell_arrays(cell: Cell, objective: str = MAKESPAN, chance: Chance = NO_CHANC
     """
     check_built_in(objective, "the compiled simulation")
     check_chance(cell, chance)
-    size, places = len(cell.stations), cell.positions
+    size, places, robots = len(cell.stations), cell.positions, len(cell.robots)
     options = [option for place in places for option in place.options]
     return CellArrays(
         first_option=np.cumsum([0, *(len(place.options) for place in places)]),
@@ -153,6 +161,8 @@ def cell_arrays(cell: Cell, objective: str = MAKESPAN, chance: Chance = NO_CHANC
         serial=cell.serial,
         first_room=np.cumsum([0, *_rooms(cell), 0, 0]),
         first_server=np.cumsum([0, *_servers(cell)]),
+        takers=np.array([[n in own for n in (*range(robots), SERVER)] for own in (*cell.takers, (), ())], np.bool_),
+        shared=any(cell.takers),
         starts=np.array(cell.starts),
         begin_at=np.array(cell.begin_at),
         begin_s=np.array(cell.begin_s, np.float64),
@@ -196,6 +206,10 @@ def run_arrays(cell: Cell) -> RunArrays:
         rooms_s=np.zeros(sum(_rooms(cell))),
         servers_s=np.zeros(sum(_servers(cell))),
         worked=np.zeros(sum(_servers(cell)), np.int64),
+        held=np.full((len(cell.robots), 2 + WIDTH), -1),
+        fetched_s=np.zeros(cell.parts),
+        put_s=np.zeros(cell.parts),
+        kept_s=np.zeros(len(cell.stations) + 2),
         allowed=np.zeros(decisions, np.int64),
         options=np.zeros(decisions, np.int64),
     )

@@ -30,6 +30,7 @@ class Observed(Run):
     def __init__(self, run: Run) -> None:
         super().__init__(run.cell)
         take_over(self, run)
+        self.moves.clear()  # they say how long the work will take
         self.ready: tuple[bool, ...] = ()
         self.began_s: list[float] = []
 
@@ -43,20 +44,24 @@ class Execution:
 
     def __init__(self, cell: Cell, times: Episode | None = None) -> None:
         self.run = Run(cell, times)
-        self.moves: list[Move] = []
         self.sequence: list[int] = []
         # For each part: when its latest process began, and how long that takes on average; when it came to its first
-        # station, and when it was picked there.
+        # station, and when it was picked there. And the parts that were held for want of room.
         self._began_s, self._mean_s = list(cell.begin_s), [0.0] * cell.parts
         self._came_s, self._left_s = [0.0] * cell.parts, [0.0] * cell.parts
+        self._held = set[int]()
+
+    @property
+    def moves(self) -> list[Move]:
+        """What was done."""
+        return self.run.moves
 
     def observe(self) -> Observed:
         """What is known now; nothing of it changes when the run goes on."""
         run, seen = self.run, Observed(self.run)
         seen.began_s = self._began_s.copy()
-        seen.ready = tuple(
-            ready_s <= run.now_s and not self._coming(index) for index, ready_s in enumerate(run.ready_s)
-        )
+        known = enumerate(run.ready_s)
+        seen.ready = tuple(s <= run.now_s and not self._coming(n) and n + 1 not in run.held for n, s in known)
         for index, ready in enumerate(seen.ready):
             if not ready and self._at_start(index):
                 seen.ready_s[index] = max(run.now_s, run.cell.begin_s[index])  # those that arrive are looked at below
@@ -75,13 +80,17 @@ class Execution:
         run, index = self.run, part_of(decision, self.run.cell.parts) - 1
         at_start, came_s = self._at_start(index), run.ready_s[index]
         move = run.move(decision)
-        self.moves.append(move)
         self.sequence.append(decision)
         if at_start:
             self._came_s[index], self._left_s[index] = came_s, move.pick_s
         place = run.cell.positions[run.locations[index]]
         if place.processing_s is not None:
             self._began_s[index], self._mean_s[index] = move.drop_s, place.processing_s
+        for part in self._held:
+            brought = next(other for other in reversed(run.moves) if other.part == part)
+            if run.cell.positions[run.locations[part - 1]].processing_s is not None:
+                self._began_s[part - 1] = brought.drop_s
+        self._held = set(run.held) - {0}
         for part in run.inside(place.station) if place.station in run.cell.batches else ():
             self._began_s[part - 1], self._mean_s[part - 1] = move.drop_s, run.ready_s[part - 1] - move.drop_s
 

@@ -6,8 +6,8 @@ from lab.errors import BadInput, counted
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import Episode
 from lab.sequencing.cell.routes import part_of
-from lab.sequencing.cell.schedule import Move, Schedule
-from lab.sequencing.simulate.run import NO_WAIT, SLACK_S, Run, Wait, branch
+from lab.sequencing.cell.schedule import Schedule
+from lab.sequencing.simulate.run import NO_WAIT, SLACK_S, Run, Wait, Windowless, branch
 from lab.sequencing.simulate.waits import waits_of
 
 
@@ -49,7 +49,7 @@ def simulate(cell: Cell, sequence: Sequence[int], times: Episode | None = None) 
     Raises BadInput, with the position, for a decision that may not be taken there and for a sequence that ends too early.
     Source: thesis ch. 7.4, 7.5; makespan to the last arrival at the end of a route.
     """
-    run, moves = Run(cell, times), list[Move]()
+    run = Run(cell, times)
     came_s: list[float] = [0.0] * cell.parts
     for run, decision, wait in steps(cell, sequence, times):
         reason = run.refusal(decision)
@@ -57,15 +57,28 @@ def simulate(cell: Cell, sequence: Sequence[int], times: Episode | None = None) 
             allowed = ", ".join(str(other) for other in run.allowed()) or (
                 "none, all are done" if run.done else "none, it is a deadlock"
             )
-            raise BadInput(f"position {len(moves) + 1} of the sequence: {reason}; allowed here: {allowed}")
+            raise BadInput(f"position {len(run.moves) + 1} of the sequence: {reason}; allowed here: {allowed}")
         part = part_of(decision, cell.parts)
         if run.locations[part - 1] == cell.starts[part - 1]:
             came_s[part - 1] = run.ready_s[part - 1]
-        moves.append(run.move(decision, wait))
+        run.move(decision, wait)
     if not run.done:
         left = run.finished_s.index(None) + 1
         where = cell.names[cell.positions[run.locations[left - 1]].station]
         raise BadInput(
-            f"the sequence ends after {counted(len(moves), 'move')}, but {cell.part_name(left)} is still at '{where}'"
+            f"the sequence ends after {counted(len(run.moves), 'move')}, but {cell.part_name(left)} is still at '{where}'"
         )
-    return Schedule.from_moves(cell, moves, sequence, came_s)
+    return Schedule.from_moves(cell, run.moves, sequence, came_s)
+
+
+def closes(run: Run, station: int, following: Sequence[int]) -> bool:
+    """Whether nothing more comes into a machine with batches before one of its parts is taken out, by the decisions to come."""
+    ahead = Windowless(run.cell, run.times, run)
+    for decision in following:
+        option = ahead.option(decision)
+        if option is None or option.origin == station:
+            return True
+        if option.target == station:
+            return False
+        ahead.move(decision)
+    return True

@@ -4,69 +4,17 @@ from typing import Any
 
 import numpy as np
 
-from lab.learning import splitmix
 from lab.learning.compiled import inner, lean
-from lab.sequencing.cell import chance
 from lab.sequencing.cell.routes import SERVER
-from lab.sequencing.simulate.cell_arrays import ARRIVAL_CODES, LAW_CODES, NO_ARRIVALS, OBJECTIVE_CODES, WIDTH
+from lab.sequencing.simulate.cell_arrays import ARRIVAL_CODES, NO_ARRIVALS, OBJECTIVE_CODES, WIDTH
+from lab.sequencing.simulate.chance_kernels import apart, interval, uniform, worked
+from lab.sequencing.simulate.room_kernels import free, grant, hold_part, may_go_s, possible, room_s
 from lab.sequencing.simulate.run import SLACK_S
 
 CLOCK, PICK = ARRIVAL_CODES["clock"], ARRIVAL_CODES["pick"]
-CONSTANT, NORMAL = LAW_CODES["constant"], LAW_CODES["normal"]
 MAKESPAN, TARDINESS, ROBOT_IDLE, MACHINE_IDLE = (
     OBJECTIVE_CODES[name] for name in ("makespan", "mean-tardiness", "robot-idle", "machine-idle")
 )
-
-mixed: Any = inner(splitmix.mixed, inline="always")
-fraction: Any = inner(splitmix.fraction, inline="always")
-_state_at: Any = inner(splitmix.state_at, inline="always")
-_normal, _exponential = inner(chance.normal), inner(chance.exponential)
-
-
-@lean
-def uniform(seed: Any, number: int) -> float:
-    """`splitmix.uniform`."""
-    return float(fraction(mixed(_state_at(seed, np.uint64(number)))))
-
-
-@inner
-def _drawn(law: int, spread: float, mean_s: float, seed: Any, number: int) -> float:
-    """`chance.Episode`: one time [s]."""
-    if law == CONSTANT or mean_s == 0.0:
-        return mean_s
-    u, v = uniform(seed, 2 * number), uniform(seed, 2 * number + 1)
-    if law == NORMAL:
-        return _normal(mean_s, spread, u, v)
-    return _exponential(mean_s, spread, u, v)
-
-
-@inner
-def _apart(cell: Any, parts: int) -> int:
-    """`chance.Episode._apart`."""
-    return 2 * (parts + 1) * len(cell.begins)
-
-
-@inner
-def _worked(cell: Any, seed: Any, part: int, there: int, parts: int) -> float:
-    """`chance.Episode.processing_s` of a part (from 0)."""
-    number = (part + 1) * len(cell.begins) + there
-    work_s = _drawn(cell.processing_law, cell.spread, cell.processing_s[there], seed, number)
-    if cell.breaks_every_s == 0.0 or work_s == 0.0:
-        return work_s
-    first, worked_s, repaired_s = _apart(cell, parts) + parts + 2 * chance.MOST_BREAKS * number, 0.0, 0.0
-    for n in range(chance.MOST_BREAKS):
-        worked_s -= cell.breaks_every_s * np.log(1.0 - uniform(seed, first + 2 * n))
-        if worked_s >= work_s:
-            break
-        repaired_s -= cell.repair_s * np.log(1.0 - uniform(seed, first + 2 * n + 1))
-    return work_s + repaired_s
-
-
-@inner
-def _interval(cell: Any, seed: Any, part: int) -> float:
-    """`chance.Episode.interval_s` of a part (from 0)."""
-    number = (part + 1) * len(cell.begins) + cell.starts[part]
-    return _drawn(cell.arrivals_law, cell.spread, cell.interval_s[part], seed, number)
 
 
 @inner
@@ -84,7 +32,7 @@ def _batch(cell: Any, run: Any, station: int, at_s: float, seed: Any) -> None:
     longest_s = 0.0
     for part in range(len(run.locations)):
         if cell.holds[run.locations[part], 0] == station:
-            longest_s = max(longest_s, _worked(cell, seed, part, run.locations[part], len(run.locations)))
+            longest_s = max(longest_s, worked(cell, seed, part, run.locations[part], len(run.locations)))
     for part in range(len(run.locations)):
         if cell.holds[run.locations[part], 0] == station:
             run.ready_s[part] = at_s + longest_s
@@ -100,7 +48,7 @@ def reset(cell: Any, run: Any, seed: Any) -> None:
         place = cell.begin_at[part]
         run.locations[part], run.ready_s[part], run.finished_s[part] = place, cell.begin_s[part], 0.0
         if cell.late_s > 0.0 and place == cell.starts[part]:
-            late = _apart(cell, len(run.locations)) + part
+            late = apart(cell, len(run.locations)) + part
             run.ready_s[part] -= cell.late_s * np.log(1.0 - uniform(seed, late))
         run.room[cell.holds[place, 0]] -= 1
         run.room[cell.holds[place, 1]] -= 1
@@ -112,7 +60,7 @@ def reset(cell: Any, run: Any, seed: Any) -> None:
                 _close(cell, run, station)
     for i in range(len(cell.coming)):
         if cell.arrivals == CLOCK or (cell.arrivals == PICK and i == 0):
-            came_s += _interval(cell, seed, cell.coming[i])
+            came_s += interval(cell, seed, cell.coming[i])
             run.ready_s[cell.coming[i]] = came_s
     run.clock[:] = 0.0
     run.whole[0], run.whole[1] = 0, unfinished
@@ -121,6 +69,8 @@ def reset(cell: Any, run: Any, seed: Any) -> None:
     if not cell.serial:
         run.rooms_s[:], run.servers_s[:], run.worked[:] = 0.0, 0.0, -1
         run.track_s[:] = 0.0
+        run.held[:] = -1
+        run.fetched_s[:], run.put_s[:], run.kept_s[:] = 0.0, 0.0, 0.0
 
 
 @inner
@@ -161,6 +111,8 @@ def pick_times(cell: Any, run: Any, part: int, o: int) -> Any:
     robot, begin_s = cell.robot[o], reached_s(cell, run, o)
     if cell.waits[o]:
         begin_s = max(begin_s, run.ready_s[part])
+    if not cell.serial:
+        begin_s = max(begin_s, may_go_s(cell, run, part, o) - cell.service_s[o])
     pick_s = begin_s + cell.service_s[o]
     if cell.tracked:
         pick_s = _clear_s(cell, run, robot, cell.origin[o], cell.target[o], pick_s)
@@ -199,39 +151,18 @@ def _waits_for(cell: Any, run: Any, part: int, o: int) -> bool:
 @inner
 def server_for(cell: Any, run: Any, part: int, o: int) -> Any:
     """`Run._server`."""
-    station, best_s, best = cell.target[o], np.inf, -1
+    station, there, best_s, best = cell.target[o], cell.to[o], np.inf, -1
+    ready_s = max(run.ready_s[part], run.put_s[part])
+    if cell.holds[there, 0] != station and run.kept_s[station] > 0.0:
+        ready_s = max(ready_s, run.kept_s[station] - cell.processing_s[there])
     for server in range(cell.first_server[station], cell.first_server[station + 1]):
         free_s = run.servers_s[server]
         if run.worked[server] >= 0:
             free_s += cell.setup_s[station, run.worked[server], cell.product[part]]
-        begin_s = max(run.ready_s[part], free_s)
+        begin_s = max(ready_s, free_s)
         if begin_s < best_s:
             best_s, best = begin_s, server
     return best_s, best
-
-
-@inner
-def _room(cell: Any, run: Any, station: int) -> float:
-    """Since when the room of a station that is free first is free; it is taken: the row's last place is then left."""
-    first, left = cell.first_room[station], run.room[station]
-    if cell.first_room[station + 1] == first:
-        return 0.0
-    at_s = run.rooms_s[first]
-    for i in range(first, first + left - 1):
-        run.rooms_s[i] = run.rooms_s[i + 1]
-    return float(at_s)
-
-
-@inner
-def _free(cell: Any, run: Any, station: int, at_s: float) -> None:
-    """A room of a station is free from then on; those that are free stand ascending."""
-    first, i = cell.first_room[station], cell.first_room[station] + run.room[station]
-    if cell.first_room[station + 1] == first:
-        return
-    while i > first and run.rooms_s[i - 1] > at_s:
-        run.rooms_s[i] = run.rooms_s[i - 1]
-        i -= 1
-    run.rooms_s[i] = at_s
 
 
 @lean
@@ -243,10 +174,9 @@ def list_allowed(cell: Any, run: Any) -> int:
         if cell.arrivals != NO_ARRIVALS and place == cell.starts[part] and part != cell.coming[run.whole[0]]:
             continue
         for o in range(cell.first_option[place], cell.first_option[place + 1]):
-            room = run.room[cell.needs[o, 0]] > 0 and run.room[cell.needs[o, 1]] > 0
             if cell.ruled and _waits_for(cell, run, part, o):
                 continue
-            if room and run.room[cell.if_full[o]] <= 0 and not (cell.windows and _too_late(cell, run, part, o)):
+            if possible(cell, run, part, o) and not (cell.windows and _too_late(cell, run, part, o)):
                 run.allowed[count], run.options[count] = part + 1 + cell.choice[o] * parts, o
                 count += 1
     if cell.many:
@@ -279,8 +209,7 @@ def may(cell: Any, run: Any, part: int, o: int) -> bool:
         return False
     if cell.ruled and _waits_for(cell, run, part, o):
         return False
-    room = run.room[cell.needs[o, 0]] > 0 and run.room[cell.needs[o, 1]] > 0
-    return bool(room and run.room[cell.if_full[o]] <= 0 and not (cell.windows and _too_late(cell, run, part, o)))
+    return bool(possible(cell, run, part, o) and not (cell.windows and _too_late(cell, run, part, o)))
 
 
 @lean
@@ -303,16 +232,25 @@ def take(cell: Any, run: Any, part: int, o: int, seed: Any) -> None:
         run.clock[1] += begin_s - reach_s
     if here == cell.starts[part]:
         run.whole[0] += 1
-        if cell.arrivals == PICK and run.whole[0] < len(cell.coming):
+        if cell.arrivals != NO_ARRIVALS and run.whole[0] < len(cell.coming):
             following = cell.coming[run.whole[0]]
-            run.ready_s[following] = pick_s + _interval(cell, seed, following)
+            run.put_s[following] = pick_s
+            if cell.arrivals == PICK:
+                run.ready_s[following] = pick_s + interval(cell, seed, following)
     if robot != SERVER and not cell.serial:
         carried_s = drop_s
-        drop_s = max(drop_s, _room(cell, run, cell.needs[o, 0]), _room(cell, run, cell.needs[o, 1]))
+        drop_s = max(drop_s, room_s(cell, run, cell.needs[o, 0]), room_s(cell, run, cell.needs[o, 1]))
         run.clock[1] += drop_s - carried_s
+        if cell.shared:
+            hold_part(cell, run, part, o)
+        if cell.if_full[o] < len(cell.rooms) - 2:
+            run.kept_s[cell.if_full[o]] = max(run.kept_s[cell.if_full[o]], pick_s)
+        if cell.waits[o]:
+            run.fetched_s[part] = pick_s
+        run.put_s[part] = drop_s
     process_s = 0.0
     if cell.begins[there]:
-        process_s = _worked(cell, seed, part, there, len(run.locations))
+        process_s = worked(cell, seed, part, there, len(run.locations))
         run.ready_s[part] = drop_s + process_s
         run.clock[2] += process_s
     end_s = drop_s + process_s if robot == SERVER else drop_s
@@ -321,7 +259,10 @@ def take(cell: Any, run: Any, part: int, o: int, seed: Any) -> None:
         for h in range(WIDTH):
             station = cell.holds[here, h]
             if station != cell.holds[there, 0] and station != cell.holds[there, 1]:
-                _free(cell, run, station, left_s)
+                if run.room[station] < 0:
+                    grant(cell, run, station, left_s, seed)
+                else:
+                    free(cell, run, station, left_s)
     run.room[cell.holds[here, 0]] += 1  # WIDTH stations, written out: a loop takes twice the time of the whole move
     run.room[cell.holds[here, 1]] += 1
     run.room[cell.holds[there, 0]] -= 1

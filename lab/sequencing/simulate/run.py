@@ -1,7 +1,7 @@
 """One pass through a cell, decision by decision: the readable simulation. `kernels` holds the compiled one."""
 
-from bisect import insort
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 from lab.errors import BadInput
@@ -10,7 +10,8 @@ from lab.sequencing.cell.chance import Episode
 from lab.sequencing.cell.precedence import missing
 from lab.sequencing.cell.routes import SERVER, Option, Position, choice_of, entry, part_of
 from lab.sequencing.cell.schedule import Move
-from lab.sequencing.cell.stations import UNLIMITED
+from lab.sequencing.simulate.refusals import refusal
+from lab.sequencing.simulate.rooms import Rooms, rooms_of
 
 SLACK_S = 1e-6  # so much later is not too late: what sums of times may differ by
 
@@ -33,17 +34,22 @@ class Run:
     service work and carries it on; processing starts at arrival, or, where a machine has servers, with the decision that
     lets one of them take the part. All is done as early as it can be, after what was decided before with the same robot,
     server, part or room: a robot that comes to a station before there is room waits there, and nobody ever waits for
-    anything else. With one robot and no servers what is decided later also happens later (`Cell.serial`). A decision that
-    would pick a part later than it may be picked is not allowed (see `Station.at_most_s`): what was left too long stays where
-    it is, and the run ends as a deadlock does. The order also says what a batch is (see `Station.batch`): all that is brought
-    before one of it is taken out. It begins with the last that is brought: to begin later helps no order, to begin before is
-    another order. `ready_s` is as if nothing more were to come. Parts that stand in such a machine at first have begun.
+    anything else. With one robot and no servers what is decided later also happens later (`Cell.serial`). Where another robot
+    can still make the room, it need not be there yet: the robot picks, goes there and holds the part until what is decided
+    later frees the room, which those who wait get in the order of their decisions; meanwhile nothing is decided for robot or
+    part. A buffer for a full station is used while it is full: not before its parts were picked to come, none leaves before.
+    A decision that would pick a part later than it may be picked is not allowed (see `Station.at_most_s`): what was left too
+    long stays where it is, and the run ends as a deadlock does. The order also says what a batch is (see `Station.batch`): all
+    that is brought before one of it is taken out. It begins with the last that is brought: to begin later helps no order, to
+    begin before is another order. `ready_s` is as if nothing more were to come. Parts that stand in such a machine at first
+    have begun.
     No decision is allowed that a precedence lets wait (see `Precedence`).
     locations: the position of each part, part 1 first. occupied: room taken at each station. ready_s: when each part may be
     picked. finished_s: when each part was finished (None: not yet; 0: before the work began, or nothing is to be done with
     it). robots_at, robots_s: where each robot is after what it was given to do, and when. end_s: when all that was decided
     is done. fetched: how many parts were taken from the start of their routes. waited_s: how long the robots have waited.
-    processed_s: how long machines were given work for.
+    processed_s: how long machines were given work for. moves: what was decided, in its order, a drop that waits for room as
+    early as it may be. held: the part that each robot holds and cannot drop yet; 0: none.
     On a track a robot stands beside it at a station, drives the shortest way without stopping, and holds each stretch while it
     is on it; it sets out, and picks what it carries, as soon as the stretches will be free when it comes to them, after what
     was decided before.
@@ -66,14 +72,16 @@ class Run:
         self.finished_s: list[float | None] = [None if n in cell.unfinished else 0.0 for n in range(1, cell.parts + 1)]
         self.fetched = 0
         self.ready_s = self._first_ready_s()
+        self.moves: list[Move] = []
+        self.held = [0] * len(cell.robots)
         # What is decided later may happen earlier: since when each room is free, and each server, and what it worked on last.
-        self._rooms_s: dict[int, list[float]] = {}
-        self._servers: dict[int, list[tuple[float, str]]] = {}
-        if not cell.serial:
-            for index, station in enumerate(cell.stations):
-                if station.capacity < UNLIMITED:
-                    self._rooms_s[index] = [0.0] * (station.capacity - self.occupied[index])
-                self._servers[index] = [(0.0, "")] * (station.servers or 0)
+        self.rooms = Rooms() if cell.serial else rooms_of(cell.capacities, self.occupied)
+        servers = enumerate(() if cell.serial else cell.stations)
+        self._servers = {n: [(0.0, "")] * (station.servers or 0) for n, station in servers}
+        # When each part was picked to come where it is; when it, or its pallet, was put down, or the one that came before it was
+        # taken; before when nothing leaves a station.
+        self._fetched_s, self._put_s = [0.0] * cell.parts, [0.0] * cell.parts
+        self._kept_s = [0.0] * len(cell.stations)
 
     @property
     def robot(self) -> int:
@@ -92,24 +100,25 @@ class Run:
 
     def allowed(self) -> tuple[int, ...]:
         """The decisions that may be taken now, ascending; none when all is done, or when nothing can move any more."""
-        parts, full = self.cell.parts, self._full()
+        parts, full = self.cell.parts, self.full()
         found = [
             entry(part, option.choice, parts)
             for part in range(1, parts + 1)
-            if self._in_turn(part)
+            if self.in_turn(part)
             for option in self.cell.positions[self.locations[part - 1]].options
-            if option.possible(full) and not self._waits_for(part, option) and not self.too_late(part, option)
+            if self._possible(part, option, full) and not self.waits_for(part, option)
+            if not self.too_late(part, option)
         ]
         return tuple(sorted(found))
 
     def option(self, decision: int) -> Option | None:
         """The way on that a decision means now; None when it may not be taken."""
         part = part_of(decision, self.cell.parts)
-        if decision < 1 or not self._in_turn(part):
+        if decision < 1 or not self.in_turn(part):
             return None
-        choice, full = choice_of(decision, self.cell.parts), self._full()
+        choice, full = choice_of(decision, self.cell.parts), self.full()
         for option in self.cell.positions[self.locations[part - 1]].options:
-            if option.choice == choice and option.possible(full) and not self._waits_for(part, option):
+            if option.choice == choice and self._possible(part, option, full) and not self.waits_for(part, option):
                 return None if self.too_late(part, option) else option
         return None
 
@@ -123,13 +132,30 @@ class Run:
     def spoils(self, decision: int) -> bool:
         """Whether a decision is not allowed only because it would pick its part too late."""
         part, choice = part_of(decision, self.cell.parts), choice_of(decision, self.cell.parts)
-        if decision < 1 or not self._in_turn(part):
+        if decision < 1 or not self.in_turn(part):
             return False
-        options, full = self.cell.positions[self.locations[part - 1]].options, self._full()
-        own = [o for o in options if o.choice == choice and o.possible(full) and not self._waits_for(part, o)]
-        return any(self.too_late(part, option) for option in own)
+        options, full = self.cell.positions[self.locations[part - 1]].options, self.full()
+        own = [o for o in options if o.choice == choice and self._possible(part, o, full)]
+        return any(self.too_late(part, option) for option in own if not self.waits_for(part, option))
 
-    def _waits_for(self, part: int, option: Option) -> str:
+    def _possible(self, part: int, option: Option, full: Sequence[bool]) -> bool:
+        """Whether there is room for a way, or will be by another robot, and neither the part nor the robot waits for room."""
+        if part in self.held or (option.robot != SERVER and self.held[option.robot]):
+            return False
+        if option.possible(full):
+            return True
+        fits = option.if_full is None or full[option.if_full]
+        return fits and all(not full[station] or self._comes_free(station, option) for station in option.needs)
+
+    def _comes_free(self, station: int, option: Option) -> bool:
+        """Whether a server may free a full station, or another robot that does not wait, or only for what this way frees."""
+        return any(
+            other == SERVER
+            or (other != option.robot and (not self.held[other] or other in self.rooms.waiting(option.origin)))
+            for other in self.cell.takers[station]
+        )
+
+    def waits_for(self, part: int, option: Option) -> str:
         """What must have been done before a part may take a way, in words; "" when nothing is missing."""
         cell, place = self.cell, self.locations[part - 1]
         for rule, one in zip(cell.rules, cell.precedences, strict=True):
@@ -156,25 +182,52 @@ class Run:
         drop_s = carried_s + wait.drop_s
         if self.locations[part - 1] == cell.starts[part - 1]:
             self._fetch(pick_s)
-        if not cell.serial:
-            drop_s = max(drop_s, self._room_s(option.needs))
+        lacking = self.rooms.lacking(option.needs)
+        drop_s = max(drop_s, self.rooms.take([s for s in option.needs if s not in lacking]))
+        for station in lacking:
+            self.rooms.wait(robot, station)
+            self.held[robot] = part
         self.waited_s += drop_s - carried_s
+        if option.if_full is not None:
+            self._kept_s[option.if_full] = max(self._kept_s[option.if_full], pick_s)
+        if option.waits:
+            self._fetched_s[part - 1] = pick_s
         self._leave(part, option, pick_s)
         self._hold(robot, start, option.origin, leave_s)
         self._hold(robot, option.origin, option.target, pick_s)
         self.robots_at[robot], self.robots_s[robot] = option.target, drop_s
         self.waited_s += leave_s - free_s + served_s - reach_s
-        process_s = 0.0
-        if there.processing_s is not None:
-            process_s = self.times.processing_s(part, option.to)
-            self.ready_s[part - 1] = drop_s + process_s
-            self.processed_s += process_s
+        process_s = 0.0 if there.processing_s is None else self.times.processing_s(part, option.to)
+        self.processed_s += process_s
+        self._put(part, drop_s, process_s)
         if there.station in cell.batches and there.processing_s is not None:
             self._batch(there.station, drop_s)
-        self._ends(part, there, drop_s)
         way = cell.names[start], cell.names[option.origin], cell.names[option.target]
         times_s = leave_s, reach_s, pick_s, drop_s, process_s
-        return Move(part, *way, *times_s, option.service_s, option.carries, cell.robots[robot].name)
+        self.moves.append(Move(part, *way, *times_s, option.service_s, option.carries, cell.robots[robot].name))
+        return self.moves[-1]
+
+    def _put(self, part: int, at_s: float, process_s: float) -> None:
+        """A part, or its pallet, is put down where it is now."""
+        there = self.cell.positions[self.locations[part - 1]]
+        self._put_s[part - 1] = at_s
+        if there.processing_s is not None:
+            self.ready_s[part - 1] = at_s + process_s
+        self._ends(part, there, at_s)
+
+    def _grant(self, robot: int, at_s: float) -> None:
+        """A robot that waits for room with a part has it from a time on."""
+        part, drop_s = self.held[robot], max(at_s, self.robots_s[robot])
+        self.waited_s += drop_s - self.robots_s[robot]
+        self.robots_s[robot] = drop_s
+        own = [n for n, move in enumerate(self.moves) if move.by == self.cell.robots[robot].name][
+            -1:
+        ]  # none: not known
+        for number in own:
+            self.moves[number] = replace(self.moves[number], drop_s=drop_s)
+        self._put(part, drop_s, self.times.processing_s(part, self.locations[part - 1]))
+        if not self.rooms.awaited(robot):
+            self.held[robot] = 0
 
     def _serve(self, part: int, option: Option) -> Move:
         """A server of a machine takes a part and works on it."""
@@ -190,20 +243,17 @@ class Run:
         self.processed_s += process_s
         self._ends(part, cell.positions[option.to], end_s)
         way, times_s = (cell.names[option.origin], cell.names[option.target]), (begin_s, begin_s, begin_s, begin_s)
-        return Move(part, way[0], *way, *times_s, process_s, by=way[1])
+        self.moves.append(Move(part, way[0], *way, *times_s, process_s, by=way[1]))
+        return self.moves[-1]
 
     def _server(self, part: int, option: Option) -> tuple[float, int]:
         """When a part may begin at a machine with servers, and with which of them: the one that lets it begin first."""
         product, setups = self.cell.order[part - 1], self.cell.setups[option.target]
-        free_s = [
-            max(self.ready_s[part - 1], free + setups.get((last, product), 0.0))
-            for free, last in self._servers[option.target]
-        ]
+        ready_s, there = max(self.ready_s[part - 1], self._put_s[part - 1]), self.cell.positions[option.to]
+        if option.target not in there.holds:
+            ready_s = max(ready_s, self._kept_s[option.target] - (there.processing_s or 0.0))
+        free_s = [max(ready_s, free + setups.get((last, product), 0.0)) for free, last in self._servers[option.target]]
         return min(free_s), free_s.index(min(free_s))
-
-    def _room_s(self, stations: Sequence[int]) -> float:
-        """When there is room in all of these; it is taken."""
-        return max((self._rooms_s[s].pop(0) for s in stations if s in self._rooms_s), default=0.0)
 
     def _leave(self, part: int, option: Option, left_s: float) -> None:
         """A part goes from where it is to where a way leads: what it leaves is free from then on."""
@@ -211,8 +261,8 @@ class Run:
         here, there = cell.positions[self.locations[part - 1]], cell.positions[option.to]
         for station in here.holds:
             self.occupied[station] -= 1
-            if station not in there.holds and station in self._rooms_s:
-                insort(self._rooms_s[station], left_s)
+            if station not in there.holds and (robot := self.rooms.free(station, left_s)) is not None:
+                self._grant(robot, left_s)
         for station in there.holds:
             self.occupied[station] += 1
         self.locations[part - 1] = option.to
@@ -247,43 +297,7 @@ class Run:
 
     def refusal(self, decision: int) -> str:
         """Why the decision may not be taken now, in words; empty when it may."""
-        cell, part = self.cell, part_of(decision, self.cell.parts)
-        if decision < 1 or choice_of(decision, cell.parts) >= cell.most_choices:
-            return f"there is no part {decision}, only 1 to {cell.parts}"
-        if self.option(decision) is not None:
-            return ""
-        if self.spoils(decision):
-            return self._burns(part)
-        place = cell.positions[self.locations[part - 1]]
-        name, where = cell.part_name(part), cell.names[place.station]
-        if not place.options:
-            return f"{name} {'is already' if not place.holds else 'stays'} at '{where}'"
-        if not self._in_turn(part):
-            return f"{name} has not come yet: {cell.part_name(cell.coming[self.fetched])} is before it"
-        full = self._full()
-        choice = choice_of(decision, cell.parts)
-        if all(option.choice != choice for option in place.options):
-            for option in cell.laid_out[self.locations[part - 1]].options:
-                if option.choice == choice:
-                    return f"{name} at '{where}': the way by '{cell.names[option.target]}' is closed"
-        waits = next((why for o in place.options if o.possible(full) and (why := self._waits_for(part, o))), "")
-        if waits:
-            return f"{name} at '{where}' may not {waits}"
-        taken = dict.fromkeys(repr(cell.names[s]) for option in place.options for s in option.needs if full[s])
-        if not taken:
-            return f"{name} at '{where}' has no choice {choice_of(decision, cell.parts) + 1}"
-        emptied = [s for option in place.options for s in option.needs if full[s] and s in cell.batches]
-        if any(len(self.inside(station)) < cell.capacities[station] for station in emptied):
-            return f"{name} at '{where}' cannot move on: the batch in {' and '.join(taken)} has begun"
-        return f"{name} at '{where}' cannot move on: {' and '.join(taken)} full"
-
-    def _burns(self, part: int) -> str:
-        """That a part would be picked too late, in words."""
-        cell, place = self.cell, self.cell.positions[self.locations[part - 1]]
-        option = next(option for option in place.options if self.too_late(part, option))
-        times_s = f"done at {self.ready_s[part - 1]:g} s, fetched at {self.pick_s(part, option):g} s"
-        where = f"{cell.part_name(part)} in '{cell.names[place.station]}'"
-        return f"{where} would burn: {times_s}, allowed {place.at_most_s:g} s"
+        return "" if self.option(decision) is not None else refusal(self, decision)
 
     def free_s(self, station: int) -> float:
         """When the first of a station's servers is through with what it was given; 0 where there is none."""
@@ -332,8 +346,18 @@ class Run:
         """When the robot sets out, when it is there, when it begins its service, and when it picks the part, that done."""
         leave_s, reach_s = self._reached_s(option)
         ready_s = max(reach_s, self.ready_s[part - 1]) if option.waits else reach_s
+        if not self.cell.serial:
+            ready_s = max(ready_s, self._may_go_s(part, option) - option.service_s)
         pick_s = self._clear_s(option.robot, option.origin, option.target, ready_s + option.service_s)
         return leave_s, reach_s, pick_s - option.service_s if self.track_s else ready_s, pick_s
+
+    def _may_go_s(self, part: int, option: Option) -> float:
+        """Before when a way may not pick, whoever takes it: where the part or its pallet is still carried, the part before it
+        has not been taken, or what was decided depends on a full station."""
+        here, there = self.cell.positions[self.locations[part - 1]], self.cell.positions[option.to]
+        inside = self.inside(option.if_full) if option.if_full is not None else ()
+        kept_s = [self._kept_s[station] for station in here.holds if station not in there.holds]
+        return max([self._put_s[part - 1], *(self._fetched_s[other - 1] for other in inside), *kept_s])
 
     def _first_ready_s(self) -> list[float]:
         arrivals, came_s = self.cell.arrivals, 0.0
@@ -349,22 +373,19 @@ class Run:
         """A part was taken from its first station: where the next one is brought only now, it sets out."""
         self.fetched += 1
         arrivals, coming = self.cell.arrivals, self.cell.coming
-        if arrivals is not None and arrivals.after == "pick" and self.fetched < len(coming):
-            following = coming[self.fetched]
+        if arrivals is None or self.fetched == len(coming):
+            return
+        following = coming[self.fetched]
+        self._put_s[following - 1] = pick_s
+        if arrivals.after == "pick":
             self.ready_s[following - 1] = pick_s + self.times.interval_s(following)
 
-    def _in_turn(self, part: int) -> bool:
+    def in_turn(self, part: int) -> bool:
         """Whether it is there: parts that arrive are taken in their order."""
         waits = self.locations[part - 1] == self.cell.starts[part - 1]
         return self.cell.arrivals is None or not waits or part == self.cell.coming[self.fetched]
 
-    def take_times(self, state: "Run") -> None:
-        """Since when rooms, servers and the track are free is as in another run of the cell."""
-        self.track_s = state.track_s.copy()
-        self._rooms_s = {station: times_s.copy() for station, times_s in state._rooms_s.items()}
-        self._servers = {station: servers.copy() for station, servers in state._servers.items()}
-
-    def _full(self) -> list[bool]:
+    def full(self) -> list[bool]:
         """Whether each station is."""
         return [taken >= most for taken, most in zip(self.occupied, self.cell.capacities, strict=True)]
 
@@ -395,17 +416,11 @@ def take_over(run: Run, state: Run) -> None:
     run.ready_s, run.finished_s = state.ready_s.copy(), state.finished_s.copy()
     run.robots_at, run.robots_s, run.fetched = state.robots_at.copy(), state.robots_s.copy(), state.fetched
     run.end_s, run.waited_s, run.processed_s = state.end_s, state.waited_s, state.processed_s
-    run.take_times(state)
-
-
-def closes(run: Run, station: int, following: Sequence[int]) -> bool:
-    """Whether nothing more comes into a machine with batches before one of its parts is taken out, by the decisions to come."""
-    ahead = Windowless(run.cell, run.times, run)
-    for decision in following:
-        option = ahead.option(decision)
-        if option is None or option.origin == station:
-            return True
-        if option.target == station:
-            return False
-        ahead.move(decision)
-    return True
+    run.track_s, run.moves, run.held, run.rooms = (
+        state.track_s.copy(),
+        state.moves.copy(),
+        state.held.copy(),
+        state.rooms.copy(),
+    )
+    run._servers = {station: servers.copy() for station, servers in state._servers.items()}
+    run._fetched_s, run._put_s, run._kept_s = state._fetched_s.copy(), state._put_s.copy(), state._kept_s.copy()

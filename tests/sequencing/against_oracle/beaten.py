@@ -9,8 +9,8 @@ from collections.abc import Callable
 from against_oracle.drawn import Raw, features
 
 BEATEN: dict[str, Callable[[set[str]], bool]] = {
-    "several robots: a part is picked before the room for it is free, or held; an order of decisions gives no such plan": (
-        lambda has: "two robots" in has
+    "several robots on a track: a part is picked, and makes room, before its robot can set out": lambda has: (
+        "track" in has
     ),
     "time windows, and machines with servers, or several robots: nobody waits on purpose": (
         lambda has: "windows" in has and bool(has & {"servers", "two robots", "no robot"})

@@ -9,7 +9,7 @@ from oracle import cell as plain
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.schedule import Move
 from lab.sequencing.cell.stations import UNLIMITED, Stage, Station
-from lab.sequencing.simulate.follow import steps
+from lab.sequencing.simulate.follow import follow
 
 
 def plain_cell(cell: Cell) -> plain.Cell:
@@ -56,7 +56,7 @@ def plain_plan(cell: Cell, moves: Sequence[Move]) -> plain.Plan:
 
 def moves_of(cell: Cell, sequence: Sequence[int]) -> list[Move]:
     """The timed moves of a sequence of decisions."""
-    return [run.move(decision, wait) for run, decision, wait in steps(cell, sequence)]
+    return follow(cell, sequence).moves
 
 
 def _station(one: Station) -> plain.Station:

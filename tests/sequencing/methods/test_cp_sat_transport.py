@@ -68,15 +68,26 @@ def rooms_cell(**change: object) -> Cell:
     return Cell((*stations, Station("out", "storage", 2)), products, order, table, table, **described)  # type: ignore[arg-type]
 
 
-def test_parts_do_not_change_places_at_once() -> None:
-    """Each in the other one's way could be taken out at once by two robots, but neither of the two has room to come first.
-
-    So one goes all the way through A first: 1 + 3 + 1 + 3 + 1 s, and the other one's A begins when it has left.
-    """
+def test_parts_change_places_where_two_robots_hold_them() -> None:
+    """Each is in the other one's way, and both are taken out at 4 s: 1 + 3 + 1 + 3 + 1 s, as if each were alone."""
     cell = rooms_cell()
     found = cp_sat(cell)
     assert found.status == "optimal"
-    assert simulate(cell, found.sequence).makespan_s == found.cost == found.bound
+    assert simulate(cell, found.sequence).makespan_s == found.cost == found.bound == 9.0
+
+
+def test_a_server_works_on_a_part_twice_in_a_row() -> None:
+    """Part a is in A from 1 to 3 s, in B from 4 to 7 s, in A again from 8 to 10 s; b, after it in A, is late anyhow."""
+    served = (
+        Station(name, "machine", 2, 2.0, None, 1, setups) for name, setups in (("A", (("b", "a", 9.0),)), ("B", ()))
+    )
+    routes = {"a": (Stage("A"), Stage("B", processing_s=3.0), Stage("A")), "b": (Stage("A", processing_s=20.0),)}
+    products = tuple(Product(name, ((Stage("in"), *stages),)) for name, stages in routes.items())
+    table = 1.0 - np.eye(3)
+    stations = (Station("in", "storage", 2), *served)
+    cell = Cell(stations, products, ("a", "b"), table, table, (Robot("r", "in"),), due_s=(10.0, 10.0))
+    found = cp_sat(cell, "tardy-parts")
+    assert (found.status, found.cost) == ("optimal", 1.0)
 
 
 def test_every_list_of_crossing_parts(ends: Ends) -> None:

@@ -340,6 +340,83 @@ def test_a_robot_waits_with_its_part_until_there_is_room() -> None:
     assert run.waited_s == 20.0
 
 
+TWO = tuple(Robot(name, "in") for name in ("r1", "r2"))
+
+
+def test_two_robots_exchange_what_stands_in_each_others_way() -> None:
+    """Both are done at 12 s and picked; each robot is at the other machine at 14 s. Done there at 24 s, out at 26 s.
+
+    Decision 1 is part 1 by r1, 4 is part 2 by r2. Until part 2 is decided on, r1 holds part 1.
+    """
+    run = Run(build("mn", way("m", "n"), way("n", "m"), robots=TWO))
+    moved(run, 1, 4)
+    assert run.allowed() == (1, 2, 3, 4)
+    assert run.move(1).pick_s == 12.0
+    assert (run.held, run.allowed()) == ([1, 0], (4,))
+    assert [run.refusal(decision) for decision in (2, 3)] == ["'r1' holds type 1 1 until there is room in 'n'"] * 2
+    run.move(4)
+    assert (run.held, run.ready_s, run.waited_s) == ([0, 0], [24.0, 24.0], 20.0)
+    assert [(move.pick_s, move.drop_s) for move in run.moves[2:]] == [(12.0, 14.0), (12.0, 14.0)]
+    assert simulate(run.cell, (1, 4, 1, 4, 3, 2)).makespan_s == 26.0
+
+
+def test_a_robot_holds_a_part_only_for_what_another_one_can_free() -> None:
+    """r2 never comes to m: r1 alone takes part 1 out, so it may not hold part 2; r2 may hold part 3, for p, which r1 empties."""
+    robots = Robot("r1", "in"), Robot("r2", "in", 1.0, ("in", "p"))
+    run = Run(build("pm", way("p", "m"), parts=3, robots=robots))
+    moved(run, 1, 1, 5)
+    assert run.allowed() == (1, 6), "part 2 into m by r1 would wait for ever, part 3 into p by r2 waits for part 2"
+    moved(run, 6)
+    assert (run.held, run.allowed()) == ([0, 3], (1,))
+    assert "'m' full" in run.refusal(2)
+
+
+def test_the_order_of_those_who_wait_is_that_of_their_decisions() -> None:
+    """Part 1 leaves m at 12 s: r3, decided on first, drops part 3 then; r1 takes that out at 22 s, and r2 drops part 2."""
+    run = Run(build("m", way("m"), parts=3, robots=(*TWO, Robot("r3", "in"))))
+    moved(run, 1, 9, 5)
+    assert run.held == [0, 2, 3]
+    moved(run, 1, 3)
+    assert [move.drop_s for move in run.moves] == [2.0, 12.0, 22.0, 14.0, 24.0]
+
+
+def test_a_pallet_stays_until_its_part_has_been_put_down() -> None:
+    """r2 is at p at 1 s already; part 1 goes from p, where it came at 2 s, into m at 4 s: only then its pallet is taken to q."""
+    run = Run(replace(palletised(), robots=TWO))
+    moved(run, 1, 1)
+    assert [(run.option(d).robot, run.option(d).carries) for d in (1, 2)] == [(0, "pallet"), (1, "pallet")]  # type: ignore[union-attr]
+    pallet = run.move(2)
+    assert (pallet.reach_s, pallet.pick_s, pallet.drop_s) == (1.0, 4.0, 6.0)
+    assert run.move(1).pick_s == 14.0
+
+
+def test_a_part_that_does_not_wait_for_its_machine_waits_for_its_pallet() -> None:
+    """Done at 5 s, but its pallet is in q only at 6 s."""
+    run = Run(replace(build("pmq", way("p", Stage("m", processing_s=1.0, pallet=True), "q"), parts=1), robots=TWO))
+    moved(run, 1, 1, 2)
+    assert run.move(1).pick_s == 6.0
+
+
+def test_several_robots_use_a_busy_buffer_while_the_machine_is_full_in_time() -> None:
+    """Of several robots the buffer is a choice of its own: 1 + 2 * 2 = 5 by r1, 7 by r2.
+
+    Part 1 goes to m by r1, which is at "out" and picks at 1 s: part 2, by r2 at once, may be put into b only from then on.
+    """
+    robots = Robot("r1", "out"), Robot("r2", "in")
+    run = Run(build("bm", way(Stage("m", "b")), robots=robots))
+    assert run.allowed() == (1, 2, 3, 4)
+    run.move(1)
+    assert run.allowed() == (1, 2, 3, 4, 6, 8)
+    assert (run.move(8).pick_s, run.move(1).pick_s) == (1.0, 13.0)
+
+
+def test_parts_that_arrive_are_taken_in_their_order_in_time() -> None:
+    """Both come at 0 s; r1 takes part 1 at 1 s, so r2, which stands there, takes part 2 no sooner."""
+    robots = Robot("r1", "out"), Robot("r2", "in")
+    run = Run(build("mn", way("m"), way("n"), arrivals=Arrivals((0.0, 0.0), "clock"), robots=robots))
+    assert [move.pick_s for move in moved(run, 1, 4)] == [1.0, 1.0]
+
+
 def test_a_server_changes_over_between_products() -> None:
     """From a to b takes 3 s more, after what it did before; the first product takes none."""
     stations = list(shop().stations)

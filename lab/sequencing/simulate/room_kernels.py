@@ -1,0 +1,119 @@
+"""Rooms that are free or come free, where what is decided later may happen earlier; held equal to `run` and `rooms`."""
+
+from typing import Any
+
+from lab.learning.compiled import inner
+from lab.sequencing.cell.routes import SERVER
+from lab.sequencing.simulate.cell_arrays import WIDTH
+from lab.sequencing.simulate.chance_kernels import worked
+
+
+@inner
+def may_go_s(cell: Any, run: Any, part: int, o: int) -> float:
+    """`Run._may_go_s`."""
+    here, there, at_s = run.locations[part], cell.to[o], run.put_s[part]
+    for h in range(WIDTH):
+        station = cell.holds[here, h]
+        if station != cell.holds[there, 0] and station != cell.holds[there, 1]:
+            at_s = max(at_s, run.kept_s[station])
+    if cell.if_full[o] < len(cell.rooms) - 2:
+        for other in range(len(run.locations)):
+            place = run.locations[other]
+            if cell.holds[place, 0] == cell.if_full[o] or cell.holds[place, 1] == cell.if_full[o]:
+                at_s = max(at_s, run.fetched_s[other])
+    return float(at_s)
+
+
+@inner
+def possible(cell: Any, run: Any, part: int, o: int) -> bool:
+    """`Run._possible`."""
+    first, second = cell.needs[o, 0], cell.needs[o, 1]
+    if run.room[cell.if_full[o]] > 0:
+        return False
+    if not cell.shared:
+        return bool(run.room[first] > 0 and run.room[second] > 0)
+    for robot in range(len(run.held)):
+        if run.held[robot, 0] == part or (run.held[robot, 0] >= 0 and cell.robot[o] == robot):
+            return False
+    return bool(
+        (run.room[first] > 0 or _comes_free(cell, run, first, o))
+        and (run.room[second] > 0 or _comes_free(cell, run, second, o))
+    )
+
+
+@inner
+def _comes_free(cell: Any, run: Any, station: int, o: int) -> bool:
+    """`Run._comes_free`; in a full station as many robots wait as its room is below 0."""
+    if cell.takers[station, SERVER]:  # the last column
+        return True
+    for other in range(len(run.held)):
+        freed = run.held[other, 2] == cell.origin[o] or run.held[other, 3] == cell.origin[o]
+        if cell.takers[station, other] and other != cell.robot[o] and (run.held[other, 0] < 0 or freed):
+            return True
+    return False
+
+
+@inner
+def room_s(cell: Any, run: Any, station: int) -> float:
+    """Since when the room of a station that is free first is free; it is taken: the row's last place is then left."""
+    first, left = cell.first_room[station], run.room[station]
+    if cell.first_room[station + 1] == first or left <= 0:
+        return 0.0
+    at_s = run.rooms_s[first]
+    for i in range(first, first + left - 1):
+        run.rooms_s[i] = run.rooms_s[i + 1]
+    return float(at_s)
+
+
+@inner
+def free(cell: Any, run: Any, station: int, at_s: float) -> None:
+    """A room of a station is free from then on; those that are free stand ascending."""
+    first, i = cell.first_room[station], cell.first_room[station] + run.room[station]
+    if cell.first_room[station + 1] == first:
+        return
+    while i > first and run.rooms_s[i - 1] > at_s:
+        run.rooms_s[i] = run.rooms_s[i - 1]
+        i -= 1
+    run.rooms_s[i] = at_s
+
+
+@inner
+def grant(cell: Any, run: Any, station: int, at_s: float, seed: Any) -> None:
+    """`Run._grant`."""
+    robot = -1
+    for other in range(len(run.held)):
+        waits = run.held[other, 0] >= 0 and (run.held[other, 2] == station or run.held[other, 3] == station)
+        if waits and (robot < 0 or run.held[other, 1] < run.held[robot, 1]):
+            robot = other
+    drop_s = max(at_s, run.robots_s[robot])
+    run.clock[1] += drop_s - run.robots_s[robot]
+    run.robots_s[robot] = drop_s
+    _put(cell, run, run.held[robot, 0], drop_s, seed)
+    for w in range(WIDTH):
+        if run.held[robot, 2 + w] == station:
+            run.held[robot, 2 + w] = -1
+    if run.held[robot, 2] < 0 and run.held[robot, 3] < 0:
+        run.held[robot, 0] = -1
+
+
+@inner
+def _put(cell: Any, run: Any, part: int, at_s: float, seed: Any) -> None:
+    """`Run._put`, but for the end of a part's routes, which needs no room."""
+    there = run.locations[part]
+    run.put_s[part] = at_s
+    if cell.begins[there]:
+        run.ready_s[part] = at_s + worked(cell, seed, part, there, len(run.locations))
+    run.clock[3] = max(run.clock[3], at_s)
+
+
+@inner
+def hold_part(cell: Any, run: Any, part: int, o: int) -> None:
+    """A robot waits for room with a part: for each station in which there is none."""
+    number, robot = 0, cell.robot[o]
+    for other in range(len(run.held)):
+        if run.held[other, 0] >= 0:
+            number = max(number, run.held[other, 1] + 1)
+    run.held[robot, 1], run.held[robot, 2], run.held[robot, 3] = number, -1, -1
+    for w in range(WIDTH):
+        if run.room[cell.needs[o, w]] <= 0:
+            run.held[robot, 0], run.held[robot, 2 + w] = part, cell.needs[o, w]
