@@ -110,3 +110,18 @@ def test_no_cycle_beats_what_is_proven_of_its_parts(hoist_cell: CellMaker) -> No
     best = optimum(hoist_cell(4))
     assert (best.cost, best.proven) == (2551.0, True)
     assert unrolled(best_cycle(hoist_cell(), ("carrier",)), hoist_cell(4)).schedule.makespan_s >= best.cost
+
+
+def test_a_cycle_of_five_tanks_is_an_optimum() -> None:
+    """As issue 33's first row: six carriers whose cycle takes less than all orders that never wait, 1410 s here."""
+    soak_s, size = [(71.0, 6.0), (80.0, 22.0), (36.0, 4.0), (98.0, 5.0), (76.0, 20.0)], 7
+    tanks = [Station(f"tank {n}", "machine", 1, *both) for n, both in enumerate(soak_s)]
+    stations = (Station("load", "storage", 9), *tanks, Station("unload", "storage", 9))
+    empty = 2.0 * np.abs(np.subtract.outer(np.arange(size), np.arange(size)))
+    loaded = np.full((size, size), np.nan)
+    loaded[np.arange(size - 1), np.arange(1, size)] = 12.0
+    route = tuple(Stage(station.name) for station in stations)
+    cell = Cell(stations, (Product("carrier", (route,)),), ("carrier",) * 6, empty, loaded, one_robot("unload"))
+    best = optimum(cell)
+    assert best.proven
+    assert best.cost == unrolled(best_cycle(cell, ("carrier",)), cell).schedule.makespan_s == 1147.0
