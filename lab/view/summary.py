@@ -128,7 +128,7 @@ def run_replay_summary(replay: Mapping[str, Any]) -> RenderableType:
     for event in replay["events"]:
         if text := _event_text(event):
             table.add_row(f"{event['at_s']:.1f} s" if "at_s" in event else "", Text(text))
-    over = f"not over: lab run --resume {quote(replay['run'])} goes on with it"
+    over = f"not over: lab {replay['command']} --resume {quote(replay['run'])} goes on with it"
     if replay["over"]:
         over = replay["failure"] or f"all of {counted(replay['delivered'], 'part')} delivered"
     skills = counted(len(replay["skills"]), "skill")
