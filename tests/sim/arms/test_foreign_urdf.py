@@ -1,5 +1,6 @@
 """URDFs of arms from elsewhere: where they are settled."""
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -14,7 +15,7 @@ def test_folders_of_processes_that_are_gone_are_removed(tmp_path: Path, monkeypa
     """One of a process that ended; kept: one of this process, one whose name says none, and a link."""
     gone = subprocess.Popen([sys.executable, "-c", ""])
     gone.wait()
-    kept = [tmp_path / f"lab-arms-{foreign_urdf.os.getpid()}-a", tmp_path / "lab-arms-mine-b"]
+    kept = [tmp_path / f"lab-arms-{os.getpid()}-a", tmp_path / "lab-arms-mine-b"]
     for folder in (*kept, tmp_path / f"lab-arms-{gone.pid}-c"):
         folder.mkdir()
     (tmp_path / f"lab-arms-{gone.pid}-link").symlink_to(kept[1])
