@@ -74,7 +74,7 @@ def replay(
     from lab.teaching.kept_session import KeptSession
     from lab.teaching.lesson import replay as replay_session
     from lab.teaching.session_list import session_rows
-    from lab.teaching.step_record import StepRecord
+    from lab.teaching.step_record import StepRecord, check_libraries
     from lab.toolbox.registry import Toolbox
     from lab.view.summary import replay_summary, table_of
 
@@ -94,6 +94,7 @@ def replay(
         return
     from lab.teaching.subjects import subject_of
 
+    check_libraries(minari, tensorboard)
     box = Toolbox(toolbox)
     kept: KeptSession | OrderSession
     if read_journal(folder, "DIR").session.command == "sequence":

@@ -377,6 +377,7 @@ def replayed_run(folder: Path, where: str) -> dict[str, Any]:
     return {
         "run": str(folder),
         "task": head.task,
+        "command": head.command,
         "words": head.words,
         "lab": head.lab,
         "skills": [entry.row["name"] for entry in entries if isinstance(entry, SkillKept)],

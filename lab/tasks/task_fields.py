@@ -109,7 +109,9 @@ class Process(Record):
     def _area_for_the_robot(self) -> Self:
         if (self.by == "robot") == (self.area_m is None):
             raise ValueError(
-                f"by = '{self.by}': area_m is the surface that the robot covers, and only the robot needs it"
+                "by = 'robot': area_m is missing: the surface that the robot covers, such as area_m = [0.1, 0.08] [m]"
+                if self.area_m is None
+                else f"by = 'head': area_m = {list(self.area_m)} is only of by = 'robot': leave it away, or set by = 'robot'"
             )
         if self.grid[0] * self.grid[1] > 12:
             raise ValueError(

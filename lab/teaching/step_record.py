@@ -85,8 +85,8 @@ class StepRecord:
         """
         from gymnasium.spaces import Discrete
 
+        check_libraries(dataset_id)
         with optional(f"dataset '{dataset_id}'"):
-            import h5py  # type: ignore[import-untyped]  # noqa: F401  # Minari misses it only with a folder half made
             from minari import create_dataset_from_buffers
             from minari.data_collector import EpisodeBuffer
             from minari.storage import get_dataset_path
@@ -140,6 +140,17 @@ class StepRecord:
             writer.add_event(Event(wall_time=time.time(), step=n, summary=Summary(value=said)))
         writer.close()
         return folder
+
+
+def check_libraries(minari: str | None, tensorboard: Path | None = None) -> None:
+    """BadInput where a library is missing that writing these would need; None: that one is not wanted."""
+    if minari is not None:
+        with optional(f"dataset '{minari}'"):
+            import h5py  # type: ignore[import-untyped]  # noqa: F401  # Minari misses it only with a folder half made
+            import minari as _  # noqa: F401
+    if tensorboard is not None:
+        with optional(f"folder '{tensorboard}'"):
+            from tensorboard.summary.writer import event_file_writer  # noqa: F401
 
 
 def _recorded(inner: Environment, record: StepRecord) -> Environment:

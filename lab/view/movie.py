@@ -48,17 +48,14 @@ def write_movie(
         raise BadInput(f"'{page}' has a single picture: nothing moves in it")
     count = max(2, round(seconds * FRAMES_PER_S))
     times_s = np.linspace(0.0, replay.duration_s, count)
-    pictures = []
-    for picture in _pictures(replay, times_s, replay.duration_s / seconds):
-        pictures.append(picture)
-        tell(len(pictures), count)
-    content = _encoded(pictures, FORMATS[out.suffix.lower()])
+    form, speed = FORMATS[out.suffix.lower()], replay.duration_s / seconds
+    samples = list(_pictures(replay, times_s[:: max(1, count // 8)], speed)) if form == "GIF" else []
+    content = _encoded(_told(_pictures(replay, times_s, speed), tell, count), count, form, samples)
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
         write_whole(out, content)
     except OSError as reason:
         raise BadInput(f"movie '{out}' cannot be written: {reason.strerror or reason}") from None
-    speed = replay.duration_s / seconds
     size = {"width": WIDTH, "height": HEIGHT + STRIP, "bytes": len(content)}
     return {"file": str(out), "frames": count, "speed": speed} | size
 
@@ -120,21 +117,41 @@ def readable(replay: Replay, speed: float) -> list[tuple[float, str]]:
     return kept
 
 
-def _encoded(pictures: "list[Image]", form: str) -> bytes:
+def _told(pictures: "Iterator[Image]", tell: Callable[[int, int], None], count: int) -> "Iterator[Image]":
+    for number, picture in enumerate(pictures, 1):
+        tell(number, count)
+        yield picture
+
+
+class _Film:
+    """Pictures to come as one image of so many frames: Pillow puts several images of a WebP in a list, but seeks in one."""
+
+    def __init__(self, pictures: "Iterator[Image]", count: int) -> None:
+        self._pictures, self.n_frames = pictures, count
+
+    def seek(self, frame: int) -> None:
+        self._picture = next(self._pictures)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._picture, name)
+
+
+def _encoded(pictures: "Iterator[Image]", count: int, form: str, samples: "list[Image]") -> bytes:
+    """The pictures as a file of this form; each is held only until the next one is drawn. samples: what a GIF's palette is of."""
     from PIL import Image
 
     buffer = BytesIO()
-    durations = [round(1000 / FRAMES_PER_S)] * (len(pictures) - 1) + [round(1000 * STAYS_S)]
+    durations = [round(1000 / FRAMES_PER_S)] * (count - 1) + [round(1000 * STAYS_S)]
     how: dict[str, Any] = {"save_all": True, "duration": durations, "loop": 0}
     if form == "GIF":  # one palette for all, without dithering: what does not change costs nothing
-        samples = pictures[:: max(1, len(pictures) // 8)]
         together = Image.new("RGB", (samples[0].width, sum(one.height for one in samples)))
         for row, one in enumerate(samples):
             together.paste(one, (0, row * one.height))
         palette = together.quantize(COLOURS, Image.Quantize.MAXCOVERAGE)
-        pictures = [one.quantize(palette=palette, dither=Image.Dither.NONE) for one in pictures]
+        pictures = (one.quantize(palette=palette, dither=Image.Dither.NONE) for one in pictures)
         how |= {"optimize": False, "disposal": 1}
+        how["append_images"] = pictures
     else:
-        how |= {"quality": 80, "method": 4}
-    pictures[0].save(buffer, form, append_images=pictures[1:], **how)
+        how |= {"quality": 80, "method": 4, "append_images": [_Film(pictures, count - 1)]}
+    next(pictures).save(buffer, form, **how)
     return buffer.getvalue()

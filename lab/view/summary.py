@@ -55,7 +55,9 @@ def run_summary(report: Mapping[str, Any]) -> RenderableType:
         text += f", {measured:.1f} s measured ({measured / report['predicted_makespan_s'] - 1:+.2%})"
     table.add_row("makespan", text)
     proven = "proven optimum" if report["optimum_proven"] else "proven bound"
-    table.add_row(proven, f"{bound}, gap {gap_of(report['optimality_gap'], 2)}{among(report['proven_of'])}")
+    table.add_row(
+        proven, f"{bound} by the planned times, gap {gap_of(report['optimality_gap'], 2)}{among(report['proven_of'])}"
+    )
     if report["cyclic"] is not None:
         table.add_row("period", period_in_words(report["cyclic"]))
     for what, lines in _worth(report["receipts"] or {}):
@@ -128,7 +130,7 @@ def run_replay_summary(replay: Mapping[str, Any]) -> RenderableType:
     for event in replay["events"]:
         if text := _event_text(event):
             table.add_row(f"{event['at_s']:.1f} s" if "at_s" in event else "", Text(text))
-    over = f"not over: lab run --resume {quote(replay['run'])} goes on with it"
+    over = f"not over: lab {replay['command']} --resume {quote(replay['run'])} goes on with it"
     if replay["over"]:
         over = replay["failure"] or f"all of {counted(replay['delivered'], 'part')} delivered"
     skills = counted(len(replay["skills"]), "skill")
@@ -310,11 +312,11 @@ def _drawn(stochastic: Mapping[str, Any], unit: str) -> list[str]:
     ]
 
 
-def table_of(rows: Sequence[Mapping[str, Any]], columns: Sequence[str]) -> Table:
-    """Rows as a table with these columns."""
+def table_of(rows: Sequence[Mapping[str, Any]], columns: Sequence[str], whole: str = "") -> Table:
+    """Rows as a table with these columns; what stands in the column `whole` is never broken: the others get narrower."""
     table = Table(box=None, header_style="bold", pad_edge=False)
     for column in columns:
-        table.add_column(column.replace("_", " "), overflow="fold")
+        table.add_column(column.replace("_", " "), overflow="fold", no_wrap=column == whole)
     for row in rows:
         table.add_row(*(Text(str(row[column])) for column in columns))
     return table

@@ -27,7 +27,7 @@ def toolbox_summary(box: Mapping[str, Any]) -> RenderableType:
         }
         for row in box["policies"]
     ]
-    return table_of(rows, columns)
+    return table_of(rows, columns, whole="name")
 
 
 def policy_summary(policy: Mapping[str, Any]) -> RenderableType:

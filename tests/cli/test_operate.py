@@ -47,6 +47,16 @@ def test_what_is_wrong_ends_it_with_exit_code_2(
     assert len(ran.out.splitlines()) == 1
 
 
+def test_a_refused_line_does_not_end_the_pipe(lab: Lab, tmp_path: Path) -> None:
+    """The run is replayed with the command that goes on with it."""
+    out = str(tmp_path / "out")
+    ran = lab("operate", "toast", "--toasts", "1", "--json", "--out", out, stdin="gresp\njog +z 20\n")
+    assert (ran.code, [row["words"] for row in ran.json["commands"]][-1]) == (2, "jog +z 20")
+    assert "did you mean 'grasp'?" in ran.err.splitlines()[-1]
+    assert lab("replay", out, "--json").json["command"] == "operate"
+    assert f"not over: lab operate --resume {out}" in lab("replay", out).out.replace("\n", " ")
+
+
 def test_a_motion_that_is_stopped_ends_it_with_exit_code_1(lab: Lab, tmp_path: Path) -> None:
     lines = "close\n" + 80 * "jog -z 10\n" + "home\n"
     ran = lab("operate", "toast", "--toasts", "1", "--json", "--out", str(tmp_path), stdin=lines)

@@ -1,5 +1,6 @@
 """Every step of a lesson: as data that Minari and TensorBoard read, of a lesson that is taught and of one that is told again."""
 
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -86,3 +87,16 @@ def test_a_kept_lesson_is_told_again_into_both(
     told = command("replay", "kept", *words)
     assert told.json["files"]["tensorboard"] == "curves"
     assert minari.load_dataset("lab/kept-v0").total_episodes == 5
+
+
+def test_a_missing_library_is_told_before_anything_is_shown(
+    request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    command = request.getfixturevalue("lab")
+    monkeypatch.chdir(tmp_path)
+    Path("small.txt").write_text(ROWS)
+    command("teach", "small.txt", "--advisor", "none", "--episodes", "2", "--out", "kept")
+    monkeypatch.setitem(sys.modules, "minari", None)
+    told = command("replay", "kept", "--minari", "lab/kept-v0")
+    assert (told.code, told.out, told.err.count("\n")) == (2, "", 1)
+    assert "the library 'minari' is not installed" in told.err

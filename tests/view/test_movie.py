@@ -1,6 +1,9 @@
 """A replay as a moving picture."""
 
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
+from weakref import ReferenceType, ref
 
 import numpy as np
 import pytest
@@ -9,6 +12,7 @@ from PIL import Image
 from lab.errors import BadInput
 from lab.sequencing.cell.schedule import Schedule
 from lab.sim.frames import Body, Frame, Recording, Shape
+from lab.view import movie
 from lab.view.meshcat import replay_html
 from lab.view.movie import FRAMES_PER_S, readable, write_movie
 from lab.view.replay_file import read_replay
@@ -47,6 +51,24 @@ def test_it_moves_for_as_long_as_was_asked_for(page: Path, tmp_path: Path, form:
             columns.append(np.argwhere(red)[:, 1].mean())
         assert columns[1] - columns[0] > document["width"] / 4
     assert [path.name for path in out.parent.iterdir()] == [out.name]
+
+
+@pytest.mark.parametrize("form", ["gif", "webp"])
+def test_few_pictures_are_held_at_a_time(
+    page: Path, tmp_path: Path, form: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of 40; of a GIF 8 stay, whose colours its palette has."""
+    drawn, held, draw = list[ReferenceType[Image.Image]](), list[int](), movie._pictures
+
+    def counted(*given: Any) -> Iterator[Image.Image]:
+        for picture in draw(*given):
+            drawn.append(ref(picture))
+            held.append(sum(one() is not None for one in drawn))
+            yield picture
+
+    monkeypatch.setattr(movie, "_pictures", counted)
+    assert write_movie(page, tmp_path / f"ball.{form}", 4.0)["frames"] == 40
+    assert max(held) <= 12
 
 
 def test_words_that_stay_too_short_give_way_to_those_of_the_move(page: Path) -> None:

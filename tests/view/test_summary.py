@@ -94,7 +94,7 @@ def test_a_run_that_went_well() -> None:
         "       sequence  1 2 1 2",
         "       found by  the given order",
         "       makespan  100.0 s predicted, 101.0 s measured (+1.00%)",
-        " proven optimum  80.0 s, gap 25.00%",
+        " proven optimum  80.0 s by the planned times, gap 25.00%",
         "           time  10.0 s for 300 simulated seconds (30 x real time)",
         "          gantt  out/gantt.png",
         "learning curves  [out]/learning-curves.png",
@@ -115,7 +115,7 @@ def test_a_run_that_failed_says_which_part_where_and_why() -> None:
         "                 try 2: b",
     ]
     assert "       makespan  100.0 s predicted" in lines
-    assert "   proven bound  75.0 s, gap 25.00%" in lines
+    assert "   proven bound  75.0 s by the planned times, gap 25.00%" in lines
 
 
 def test_a_gap_that_is_none_or_small_is_said_truly() -> None:
@@ -123,9 +123,9 @@ def test_a_gap_that_is_none_or_small_is_said_truly() -> None:
     near = RUN | {"predicted_makespan_s": 118.84, "bound_s": 118.8, "optimality_gap": 118.84 / 118.8 - 1}
     lines = "\n".join(shown(run_summary(near)))
     assert "118.84 s predicted" in lines
-    assert "118.80 s, gap 0.03%" in lines
+    assert "118.80 s by the planned times, gap 0.03%" in lines
     rounded = RUN | {"predicted_makespan_s": 80.0 + 1e-12, "optimality_gap": -5e-12}
-    assert " proven optimum  80.0 s, gap 0.00%" in shown(run_summary(rounded))
+    assert " proven optimum  80.0 s by the planned times, gap 0.00%" in shown(run_summary(rounded))
 
 
 @pytest.mark.parametrize("width", [40, 80])

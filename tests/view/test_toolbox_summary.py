@@ -105,3 +105,10 @@ def test_a_verified_toolbox() -> None:
         "1 of 2 files in /box are sound",
         "/box/b: cut off",
     ]
+
+
+def test_a_long_name_is_whole_in_a_narrow_list() -> None:
+    name = "transfer-plate-to-insert-with-slice-and-lid"
+    row = {"name": name, "subtask": "transfer plate to insert", "task": "toast", "solved": True, "version": 1}
+    box = {"folder": "box", "policies": [row | {"signature": 16 * "f", "created": "2026-01-02T03:04:05"}]}
+    assert any(line.startswith(name) for line in shown(toolbox_summary(box), 80))

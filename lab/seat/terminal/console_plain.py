@@ -19,9 +19,10 @@ def told(done: Done) -> str:
 
 
 class PlainConsole:
-    """Reads a line when the one before is done, or waits in a pause; ends at the first that was not carried out.
+    """Reads a line when the one before is done, or waits in a pause. It goes on after a refusal, and ends at the first failure.
 
-    Beside a page, where more may be said, nothing ends it but `quit`.
+    What failed has left the cell otherwise than the next line takes for granted. Beside a page, where more may be said, nothing
+    ends it but `quit`.
 
     write: where the lines go that tell what came of it.
     """
@@ -34,7 +35,7 @@ class PlainConsole:
         desk.operation.on_done.append(self._done)
 
     def run(self, lines: Iterable[str], *, stay: bool = False) -> Done | None:
-        """The command that was refused or failed, None when all went well. Raises what the simulation raised.
+        """The command that failed, else the first that was refused, None when all went well. Raises what the simulation raised.
 
         stay: until somebody leaves, whatever becomes of the lines.
         """
@@ -61,7 +62,7 @@ class PlainConsole:
                 self._desk.leave()
                 break
             self._desk.settle()
-            if self._bad is not None:
+            if self._bad is not None and self._bad.failed:
                 break
 
     def _simulate(self) -> None:
@@ -89,5 +90,5 @@ class PlainConsole:
 
     def _done(self, done: Done) -> None:
         self._write(told(done))
-        if not done.well and self._bad is None and not self._stays:
+        if not done.well and not self._stays and (self._bad is None or done.failed):
             self._bad = done

@@ -3,12 +3,16 @@
 What physics could not make sense of is refused in one line; what only says less than it could is filled in.
 """
 
+import os
 from collections.abc import Sequence
+from contextlib import suppress
 from copy import deepcopy
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from shutil import rmtree
+from stat import S_ISDIR
+from tempfile import TemporaryDirectory, gettempdir
 from xml.etree import ElementTree as Xml
 
 import numpy as np
@@ -234,4 +238,21 @@ def written(root: Xml.Element, name: str) -> Path:
 
 @cache
 def _folder() -> TemporaryDirectory[str]:
-    return TemporaryDirectory(prefix="lab-arms-")
+    """The folder, `lab-arms-` and this process's number; those that processes left which were killed are removed first."""
+    for left in Path(gettempdir()).glob("lab-arms-*-*"):
+        with suppress(OSError, ValueError):
+            if _is_stale(left):
+                rmtree(left, ignore_errors=True)
+    return TemporaryDirectory(prefix=f"lab-arms-{os.getpid()}-")
+
+
+def _is_stale(folder: Path) -> bool:
+    """Whether a folder is this user's own, no link, and its process is gone. ValueError for a name that says no process."""
+    seen = folder.lstat()
+    if os.name != "posix" or not S_ISDIR(seen.st_mode) or seen.st_uid != os.getuid():
+        return False
+    try:
+        os.kill(max(1, int(folder.name.split("-")[2])), 0)
+    except ProcessLookupError:
+        return True
+    return False

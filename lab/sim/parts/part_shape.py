@@ -268,12 +268,19 @@ def _mesh(part: PartFields, path: Path) -> "Trimesh":
     return mesh
 
 
+_UNITS_M = {"mm": 0.001, "cm": 0.01, "inches": 0.0254, "m": 1.0}  # what a mesh's numbers may be
+
+
 def _check_size(part: PartFields, where: str, longest: float) -> None:
     if SMALLEST_M <= longest <= LARGEST_M:
         return
-    factor = 0.001 if longest > LARGEST_M else 1000.0
-    other = longest * factor
-    may = f"; scale = {part.scale * factor:g} would make it {other:.3g} m" if SMALLEST_M <= other <= LARGEST_M else ""
+    fits = {
+        unit: metres for unit, metres in _UNITS_M.items() if SMALLEST_M <= longest / part.scale * metres <= LARGEST_M
+    }
+    sizes = [
+        f"{metres:g} ({unit}) would make it {longest / part.scale * metres:.3g} m" for unit, metres in fits.items()
+    ]
+    may = f"; scale = {', '.join(sizes)}" if sizes else ""
     raise BadInput(
         f"{where}, scale = {part.scale:g}: it is {longest:.3g} m long: allowed are {SMALLEST_M} to {LARGEST_M} m{may}"
     )

@@ -141,9 +141,10 @@ def test_lines_of_a_pipe_are_carried_out_in_turn(desk: Desk) -> None:
     assert "part slice 1: waiting at plate" in out.getvalue()
 
 
-def test_a_pipe_ends_at_the_first_command_that_is_refused(desk: Desk) -> None:
+def test_a_pipe_goes_on_after_a_command_that_is_refused_and_remembers_it(desk: Desk) -> None:
     told: list[str] = []
-    bad = PlainConsole(desk, told.append).run(["run\n", "open\n"])
+    bad = PlainConsole(desk, told.append).run(["run\n", "pause\n", "go\n"])
     assert bad is not None
     assert bad.refused == "there is no plan yet: policy finds one"
-    assert told == ["run: refused: there is no plan yet: policy finds one"]
+    assert told[0] == "run: refused: there is no plan yet: policy finds one"
+    assert said(desk)[-2:] == ["pause", "go"]

@@ -293,7 +293,8 @@ def test_a_mesh_with_a_hole_is_refused_unless_its_hull_is_taken(write: Callable[
 def test_a_mesh_in_millimetres_is_refused_with_the_scale_that_was_meant(write: Callable[..., Path]) -> None:
     folder = write(trimesh.creation.box((80, 30, 20)))
     says = refusal(mesh_part(), folder)
-    assert "it is 80 m long: allowed are 0.002 to 2.0 m; scale = 0.001 would make it 0.08 m" in says
+    scales = "scale = 0.001 (mm) would make it 0.08 m, 0.01 (cm) would make it 0.8 m"
+    assert f"it is 80 m long: allowed are 0.002 to 2.0 m; {scales}" in says
     assert ground(shape_of(mesh_part(scale=0.001), folder)) == pytest.approx((0.08, 0.03))
 
 
