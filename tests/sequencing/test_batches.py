@@ -249,13 +249,13 @@ def _brute_force(
 
 def test_a_list_waits_for_a_batch_so_that_nothing_is_spoilt() -> None:
     """A mixer of 5 s, to be left within 2 s, before the oven. Buns 1 and 2 begin at 19 s and are ready at 29 s; with both out at
-    34 s, bun 3 is picked at 35 s. It would be mixed at 27 s: the robot holds it for 6 s before."""
+    34 s, bun 3 is picked at 35 s. It would be mixed at 27 s: the robot picks it 6 s later."""
     mixer, stations = Station("mixer", "machine", 1, 5.0, 2.0), oven().stations
     route = tuple(Stage(name) for name in ("in", "mixer", "oven", "out"))
     table = 1.0 - np.eye(4)
     stations = (stations[0], mixer, *stations[1:])
     cell = Cell(stations, (Product("bun", (route,)),), ("bun",) * 3, table, 2.0 * table, one_robot("in"))
     waits = [tuple(wait) for *_, wait in steps(cell, [1, 1, 2, 2, 3, 1, 2, 3, 3])]
-    assert waits == [*[(0.0, 0.0)] * 4, (0.0, 6.0), *[(0.0, 0.0)] * 4]
+    assert waits == [*[(0.0, 0.0)] * 4, (6.0, 0.0), *[(0.0, 0.0)] * 4]
     assert simulate(cell, [1, 1, 2, 2, 3, 1, 2, 3, 3]).makespan_s == 49.0
     assert optimum(cell).cost == 49.0
