@@ -220,6 +220,7 @@ FOUND: dict[str, Any] = {
     "sequence": [2, 1, 2, 1],
     "optimum_proven": True,
     "proven_of": "every plan",
+    "stopped_by": None,
     "bound_cost": 100.0,
     "bound_by": "A*",
     "gap": 0.1,
