@@ -1,14 +1,33 @@
 """Why a decision may not be taken in a run, in words."""
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from typing import Protocol
 
-from lab.sequencing.cell.routes import choice_of, part_of
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.routes import Option, choice_of, part_of
+from lab.sequencing.simulate.rooms import Rooms
 
-if TYPE_CHECKING:
-    from lab.sequencing.simulate.run import Run
+
+class Decided(Protocol):
+    """What is asked of a run: see `Run`."""
+
+    cell: Cell
+    locations: list[int]
+    ready_s: list[float]
+    held: list[int]
+    rooms: Rooms
+    fetched: int
+
+    def full(self) -> Sequence[bool]: ...
+    def inside(self, station: int) -> Sequence[int]: ...
+    def in_turn(self, part: int) -> bool: ...
+    def spoils(self, decision: int) -> bool: ...
+    def too_late(self, part: int, option: Option) -> bool: ...
+    def waits_for(self, part: int, option: Option) -> str: ...
+    def pick_s(self, part: int, option: Option) -> float: ...
 
 
-def refusal(run: "Run", decision: int) -> str:
+def refusal(run: Decided, decision: int) -> str:
     """Why a decision, which is not, may not be taken now, in words."""
     cell, part = run.cell, part_of(decision, run.cell.parts)
     if decision < 1 or choice_of(decision, cell.parts) >= cell.most_choices:
@@ -43,7 +62,7 @@ def refusal(run: "Run", decision: int) -> str:
     return f"{name} at '{where}' cannot move on: {' and '.join(taken)} full"
 
 
-def _burns(run: "Run", part: int) -> str:
+def _burns(run: Decided, part: int) -> str:
     """That a part would be picked too late, in words."""
     cell, place = run.cell, run.cell.positions[run.locations[part - 1]]
     option = next(option for option in place.options if run.too_late(part, option))
