@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from errno import EAGAIN, ELOOP
 from pathlib import Path
+from stat import S_ISDIR
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -130,3 +131,20 @@ def most_descriptors() -> int | None:
 
     soft, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
     return None if soft == resource.RLIM_INFINITY else soft
+
+
+def is_own_folder(path: Path) -> bool:
+    """Whether it is a folder of this user, and no link; False on Windows, where that is not known. Raises OSError."""
+    seen = path.lstat()
+    return not WINDOWS and S_ISDIR(seen.st_mode) and seen.st_uid == os.getuid()
+
+
+def is_gone(process: int) -> bool:
+    """Whether there is no such process any more; False on Windows, where to ask would end it. Raises OSError."""
+    if WINDOWS or process < 1:
+        return False
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return True
+    return False

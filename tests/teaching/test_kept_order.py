@@ -115,7 +115,7 @@ def test_simulated_advisors_keep_no_journal(lab: Lab) -> None:
     assert lab("replay", "--json").json["sessions"] == before
 
 
-def test_stopped_before_an_order_was_found_it_goes_on_too(lab: Lab) -> None:
+def test_stopped_in_its_first_episode_it_has_an_order_and_goes_on_too(lab: Lab) -> None:
     stopped = advised(lab, "2", "quit")
     assert stopped.code == 130
-    assert "before an order was found; go on with: lab sequence --resume " in stopped.err
+    assert "the best order until then is above; go on with: lab sequence --resume " in stopped.err

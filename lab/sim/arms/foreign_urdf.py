@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from shutil import rmtree
-from stat import S_ISDIR
 from tempfile import TemporaryDirectory, gettempdir
 from xml.etree import ElementTree as Xml
 
@@ -19,6 +18,7 @@ import numpy as np
 
 from lab.errors import BadInput, unknown
 from lab.files import is_file, write_whole
+from lab.operating_system import is_gone, is_own_folder
 from lab.sim import mesh_file
 from lab.sim.urdf_reader import check_inertial, check_joint, check_mesh, check_numbers, finite, floats, read
 
@@ -241,18 +241,6 @@ def _folder() -> TemporaryDirectory[str]:
     """The folder, `lab-arms-` and this process's number; those that processes left which were killed are removed first."""
     for left in Path(gettempdir()).glob("lab-arms-*-*"):
         with suppress(OSError, ValueError):
-            if _is_stale(left):
+            if is_own_folder(left) and is_gone(int(left.name.split("-")[2])):
                 rmtree(left, ignore_errors=True)
     return TemporaryDirectory(prefix=f"lab-arms-{os.getpid()}-")
-
-
-def _is_stale(folder: Path) -> bool:
-    """Whether a folder is this user's own, no link, and its process is gone. ValueError for a name that says no process."""
-    seen = folder.lstat()
-    if os.name != "posix" or not S_ISDIR(seen.st_mode) or seen.st_uid != os.getuid():
-        return False
-    try:
-        os.kill(max(1, int(folder.name.split("-")[2])), 0)
-    except ProcessLookupError:
-        return True
-    return False
