@@ -17,7 +17,6 @@ from tests.export.test_job_text import dense, ways_of
 
 MOST_MOVES = {
     "kit": 20,
-    "toast-window": 20,
     "breakfast": 24,
 }  # a transfer on average; breakfast's ways have more corners
 
