@@ -37,6 +37,15 @@ GateName = Annotated[
         callback=from_files("gates"),
     ),
 ]
+MethodName = Annotated[
+    str | None,
+    typer.Option(
+        "--method",
+        help="Who finds the order: {methods}; default: as the file says.",
+        autocompletion=offers("methods"),
+        callback=from_files("methods"),
+    ),
+]
 ProblemName = Annotated[
     str,
     typer.Argument(

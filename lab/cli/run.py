@@ -6,13 +6,13 @@ from typing import Annotated
 
 import typer
 
-from lab.cli.families import from_files, offers
 from lab.cli.lessons import lesson_seat, teacher_of
 from lab.cli.options import (
     AdvisorNames,
     Asked,
     Decide,
     Json,
+    MethodName,
     Parts,
     PartsPerCycle,
     Port,
@@ -53,15 +53,7 @@ def run(
     order: Annotated[
         str | None, typer.Option("--order", help="The order of the moves by part numbers, such as 1,2,1,1,2,2.")
     ] = None,
-    method: Annotated[
-        str | None,
-        typer.Option(
-            "--method",
-            help="Who finds the order: {methods}; default: whom the task says.",
-            autocompletion=offers("methods"),
-            callback=from_files("methods"),
-        ),
-    ] = None,
+    method: MethodName = None,
     cyclic: Annotated[
         bool, typer.Option("--cyclic", help="Repeat the robot's shortest cycle, and measure its period.")
     ] = False,

@@ -6,12 +6,13 @@ from typing import Annotated
 import typer
 
 from lab.cli.cyclic import cyclic_found
-from lab.cli.families import from_files, offers
+from lab.cli.families import offers
 from lab.cli.lessons import lesson_seat, say_read, sequenced
 from lab.cli.options import (
     MAX_EPISODES,
     MAX_SESSIONS,
     Json,
+    MethodName,
     Parts,
     PartsPerCycle,
     Plain,
@@ -57,15 +58,7 @@ def sequence(
         typer.Option("--toasts", "-n", help="How many parts of the only product, or of a task's first kind."),
     ] = None,
     parts: Parts = None,
-    method: Annotated[
-        str | None,
-        typer.Option(
-            "--method",
-            help="{methods}; default: the file's.",
-            autocompletion=offers("methods"),
-            callback=from_files("methods"),
-        ),
-    ] = None,
+    method: MethodName = None,
     policy: Annotated[
         Path | None,
         typer.Option("--policy", help="What --method carried decides by: a file of lab study run carried-over."),
