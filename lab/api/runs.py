@@ -21,6 +21,7 @@ from lab.production.run_options import RunOptions, begun
 from lab.sequencing.cell.schedule_rows import rows_of
 from lab.sequencing.search import among
 from lab.skills.prepared_scene import prepare
+from lab.tasks.task_file import load
 from lab.teaching.teacher import Teacher
 from lab.workers import Workers
 
@@ -125,10 +126,11 @@ def run(
     if out is not None and not all(isinstance(one, str) for one in advisors):
         raise BadInput(f"out '{out}' with the advisor {advising}: a journal can only name advisors that have a name")
     words = RunOptions(task=str(task), advisors=tuple(map(str, advising.names)), seed=seed, **given)
-    loaded = words.load()
+    loaded = load(words.task)
+    wanted = words.by_method(loaded)
     with ExitStack() as stack:
         beside = stack.enter_context(Workers(workers))
-        prepared = prepare(loaded, words.ordered(loaded), seed, workers=beside)
+        prepared = prepare(wanted, words.ordered(loaded), seed, workers=beside)
         nowhere = stack.enter_context(TemporaryDirectory())
         folder = Path(nowhere) / "run" if out is None else Path(out)
         check_out(folder)

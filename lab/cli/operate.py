@@ -54,6 +54,7 @@ def operate(
     from lab.production.operation.operation import Operation
     from lab.production.run_journal import RunJournal
     from lab.production.run_options import RunOptions, begun, gone_on
+    from lab.tasks.task_file import load
     from lab.teaching.events import unheard
     from lab.teaching.lesson_options import DEFAULT_ADVISORS
 
@@ -63,7 +64,7 @@ def operate(
     options = RunOptions(task or "", toasts, parts, seed=seed, faults=faults)
     if resume is None:
         options = replace(options, task=task or "toast", advisors=DEFAULT_ADVISORS)
-        loaded = options.load()
+        loaded = load(options.task)
     else:
         options, loaded = gone_on(options, resume, out, "operate")
     order, folder = loaded.ordered(options.toasts, options.parts), resume or out or Path(f"{loaded.name}-run")

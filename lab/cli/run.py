@@ -95,6 +95,7 @@ def run(
         from lab.production.run_journal import RunJournal
         from lab.production.run_options import RunOptions, begun, gone_on
         from lab.skills.prepared_scene import prepare
+        from lab.tasks.task_file import load
         from lab.teaching.lesson_options import DEFAULT_ADVISORS
         from lab.view.summary import delivered_in_words, run_summary
 
@@ -105,16 +106,16 @@ def run(
         )
         if resume is None:
             options = replace(given, task=task or "toast", advisors=given.advisors or DEFAULT_ADVISORS)
-            loaded = options.load()
+            loaded = load(options.task)
         else:
             options, loaded = gone_on(given, resume, out)
-        folder = resume or out or Path(f"{loaded.name}-run")
+        wanted, folder = options.by_method(loaded), resume or out or Path(f"{loaded.name}-run")
         check_out(folder)
         watched = page or view or "web" in options.advisors
         controls = Controls(pace(speed or ("4" if watched else "max")))
         lessons = options.lessons()
         lessons.advising()
-        prepared = prepare(loaded, options.ordered(loaded), options.seed, workers=beside)
+        prepared = prepare(wanted, options.ordered(loaded), options.seed, workers=beside)
         journal = begun(options, loaded, folder) if resume is None else RunJournal.resume(folder)
         try:
             with lesson_seat(options.advisors, page=page or view, port=port, wait_s=wait) as seat:

@@ -2,7 +2,7 @@
 
 import hashlib
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
@@ -11,7 +11,7 @@ from annotated_types import Ge, Le
 from lab.errors import BadInput
 from lab.production.cyclic_order import check_parts, mix_of
 from lab.production.run_journal import RunBegan, RunJournal, read_run
-from lab.sequencing import check_method
+from lab.sequencing import SEQUENCERS, check_method
 from lab.tasks.task import Task
 from lab.tasks.task_file import load
 from lab.teaching.kept_session import check_alone
@@ -48,9 +48,8 @@ class RunOptions(SessionOptions):
     method: str | None = None
     parts_per_cycle: int | None = None
 
-    def load(self) -> Task:
-        """The task, its order found as these options say. BadInput as `task_file.load`, and for an unknown method."""
-        task = load(self.task)
+    def by_method(self, task: Task) -> Task:
+        """The task, its order found as these options say. BadInput for an unknown method."""
         if self.method is None:
             return task
         check_method(self.method)
@@ -98,6 +97,13 @@ def gone_on(given: RunOptions, folder: Path, out: Path | None, command: str = "r
             f"the run in '{folder}' (--resume) was begun otherwise: go on with lab {head.command} --resume {folder}"
         )
     options, task = kept_task(folder, "--resume")
+    if options.method is not None and options.method not in SEQUENCERS:
+        raise BadInput(
+            f"the run in '{folder}' (--resume) finds its order by '{options.method}', which is not the lab's: name its code "
+            "again, --method FILE.py:NAME"
+        )
+    if given.method == options.method:  # one's own has to be named again: no file says which code runs
+        given = replace(given, method=None)
     check_alone(given, RunOptions(task=""), folder)
     return options, task
 
@@ -106,7 +112,7 @@ def kept_task(folder: Path, where: str) -> tuple[RunOptions, Task]:
     """What the run in a folder was begun with, and its task. BadInput when the task has changed since."""
     head, _, _ = read_run(folder, where)
     options = RunOptions.from_json(head.words, f"journal in '{folder}' ({where})")
-    task = options.load()
+    task = load(options.task)
     if hash_of(task) != head.task_hash:
         raise BadInput(f"run in '{folder}' ({where}): its task '{options.task}' has changed since it was begun")
     return options, task
