@@ -91,6 +91,7 @@ def robot(tab: "Page") -> list[float]:
     return found
 
 
+ASKED = "document.querySelector('#moves button:enabled')"  # a question that can be answered; the words are refused without
 OVER = "document.getElementById('says').textContent === 'The lesson is over.'"
 
 
@@ -107,6 +108,7 @@ def test_a_whole_session_by_keys(tab: "Page", page: SeatPage, until: Until) -> N
     assert "Episode 1 reached the goal in 3 steps" in tab.inner_text("#notices")
     tab.keyboard.press("s")  # this one is the learner's own
     until(tab, "document.getElementById('standing').textContent.includes('1 left to it')")
+    until(tab, ASKED)
     tab.keyboard.press("q")  # as in the terminal it ends the session, once it is sure
     until(tab, "document.querySelector('[data-word=quit]').classList.contains('armed')")
     tab.keyboard.press("a")
@@ -129,12 +131,12 @@ def test_a_whole_session_by_clicks(tab: "Page", page: SeatPage, until: Until) ->
     assert robot(tab) == pytest.approx([1, 0, 0])
     tab.click("text=You choose")
     until(tab, "document.getElementById('standing').textContent.includes('1 left to it')")
-    until(tab, "document.querySelector('#moves button:enabled')")
+    until(tab, ASKED)
     tab.click("text=Why?")
     assert "softmax" in tab.inner_text("#because")
     tab.click("text=Good: do that")
     until(tab, "document.getElementById('standing').textContent.includes('Moves helped2')")
-    until(tab, "document.querySelector('#moves button:enabled')")
+    until(tab, ASKED)
     tab.click("text=End the session")
     tab.click("text=Sure? Once more")
     until(tab, OVER)
