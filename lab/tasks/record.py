@@ -34,9 +34,7 @@ class Record(BaseModel):
     brackets, [-] for a bare number, and an example after "such as". A key is added as one field with such a text.
     """
 
-    model_config = ConfigDict(
-        frozen=True, extra="forbid", strict=True, allow_inf_nan=False, use_attribute_docstrings=True
-    )
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False, defer_build=True)
 
 
 class _FromTable:

@@ -1,10 +1,14 @@
 """The keys of task, cell and world files: as a JSON Schema, which editors complete with, and as a page; made from the records."""
 
+import ast
 import json
 import re
 import tomllib
 from collections.abc import Iterator
 from dataclasses import fields
+from inspect import cleandoc, getsource
+from itertools import pairwise
+from textwrap import dedent
 from typing import Any, NamedTuple, get_type_hints
 
 from annotated_types import DocInfo
@@ -41,7 +45,9 @@ def schema_of(kind: str) -> Schema:
     """
     if kind not in KINDS:
         raise unknown("kind", kind, KINDS, "of file")
-    raw = _records()[kind].model_json_schema(ref_template=f"#/{TABLES}/{{model}}")
+    record = _records()[kind]
+    raw = record.model_json_schema(ref_template=f"#/{TABLES}/{{model}}")
+    _describe(raw, record)
     tables = {name: _plain(table) for name, table in raw.pop("$defs").items()}
     for name, described in _from_dataclasses().items():
         if name in tables:
@@ -58,6 +64,39 @@ def schema_of(kind: str) -> Schema:
         del whole["properties"]["kind"]["default"]
         whole["required"] = ["kind", *whole["required"]]
     return {"$schema": DRAFT, "title": f"A {kind} file of the Teaching Lab", **whole, TABLES: tables}
+
+
+def _describe(raw: Schema, whole: type[Record]) -> None:
+    """Give a schema and its tables the texts below the fields of their records.
+
+    Pydantic can do it as it makes the classes, and then reads their sources in each command that reads a file.
+    """
+    tables = raw["$defs"] | {whole.__name__: raw}
+    for record in _below(Record):
+        if record.__name__ in tables:
+            for key, text in field_texts(record).items():
+                tables[record.__name__]["properties"][key].setdefault("description", text)
+
+
+def _below(record: type[Record]) -> Iterator[type[Record]]:
+    """All records that are made of one."""
+    for below in record.__subclasses__():
+        yield below
+        yield from _below(below)
+
+
+def field_texts(record: type[Record]) -> dict[str, str]:
+    """The text below each field of a record, its parents' fields among them; a field may have none."""
+    found: dict[str, str] = {}
+    for kind in reversed(record.__mro__):
+        if issubclass(kind, Record):
+            [made] = ast.parse(dedent(getsource(kind))).body
+            assert isinstance(made, ast.ClassDef)
+            for field, below in pairwise(made.body):
+                match field, below:
+                    case ast.AnnAssign(target=ast.Name(name)), ast.Expr(ast.Constant(str(text))):
+                        found[name] = cleandoc(text)
+    return found
 
 
 def _from_dataclasses() -> dict[str, dict[str, str]]:
