@@ -85,7 +85,7 @@ class Process(Record):
     grid: Annotated[
         tuple[Annotated[int, Field(ge=1, le=4)], Annotated[int, Field(ge=1, le=4)]], BeforeValidator(as_tuple)
     ]
-    """How many cells the surface has along and across, such as `[3, 3]`: each 1 to 4, at most 12 in all."""
+    """How many cells the surface has along and across, such as `[3, 3]`: each 1 to 4, 2 to 12 in all."""
     dwell_s: Time = 3.0
     """How long the head stays at each cell [s]."""
     speed_m_s: Annotated[float, Field(ge=0.001, le=2)] = 0.02
@@ -113,9 +113,10 @@ class Process(Record):
                 if self.area_m is None
                 else f"by = 'head': area_m = {list(self.area_m)} is only of by = 'robot': leave it away, or set by = 'robot'"
             )
-        if self.grid[0] * self.grid[1] > 12:
+        if not 2 <= self.grid[0] * self.grid[1] <= 12:
             raise ValueError(
-                f"grid = {list(self.grid)}: at most 12 cells are covered, for each doubles what is learned"
+                f"grid = {list(self.grid)}: allowed are 2 to 12 cells in all; one has no order that could be learned (a time of its "
+                "own, processing_s, serves), and each more doubles what is learned"
             )
         return self
 
