@@ -17,7 +17,10 @@ SLACK_S = 1e-6  # so much later is not too late: what sums of times may differ b
 
 
 class Wait(NamedTuple):
-    """How long a robot waits on purpose (see `waits_of`): before its work where it picks, and before it drops [s]."""
+    """How long a robot waits on purpose (see `waits_of`): before its work where it picks, and before it drops [s].
+
+    A server waits before it begins.
+    """
 
     pick_s: float = 0.0
     drop_s: float = 0.0
@@ -33,9 +36,9 @@ class Run:
     on. A robot travels empty to where the part, or its pallet, is picked, waits there until it is ready, does its
     service work and carries it on; processing starts at arrival, or, where a machine has servers, with the decision that
     lets one of them take the part. All is done as early as it can be, after what was decided before with the same robot,
-    server, part or room: a robot that comes to a station before there is room waits there, and nobody ever waits for
-    anything else. With one robot and no servers what is decided later also happens later (`Cell.serial`). Where another robot
-    can still make the room, it need not be there yet: the robot picks, goes there and holds the part until what is decided
+    server, part or room: a robot that comes to a station before there is room waits there, and nobody waits for anything
+    else, unless `move` is told so. With one robot and no servers what is decided later also happens later (`Cell.serial`).
+    Where another robot can still make the room, it need not be there yet: the robot picks, goes there and holds the part until what is decided
     later frees the room, which those who wait get in the order of their decisions; meanwhile nothing is decided for robot or
     part. A buffer for a full station is used while it is full: not before its parts were picked to come, none leaves before.
     A decision that would pick a part later than it may be picked is not allowed (see `Station.at_most_s`): what was left too
@@ -173,7 +176,7 @@ class Run:
             raise BadInput(self.refusal(decision))
         cell, part = self.cell, part_of(decision, self.cell.parts)
         if option.robot == SERVER:
-            return self._serve(part, option)
+            return self._serve(part, option, wait)
         there, robot = cell.positions[option.to], option.robot
         start, free_s = self.robots_at[robot], self.robots_s[robot]
         leave_s, reach_s, served_s, pick_s = self._times_s(part, option)
@@ -229,10 +232,11 @@ class Run:
         if not self.rooms.awaited(robot):
             self.held[robot] = 0
 
-    def _serve(self, part: int, option: Option) -> Move:
+    def _serve(self, part: int, option: Option, wait: Wait) -> Move:
         """A server of a machine takes a part and works on it."""
         cell = self.cell
         begin_s, server = self._server(part, option)
+        begin_s += wait.pick_s
         process_s = self.times.processing_s(part, option.to)
         end_s = begin_s + process_s
         if self.locations[part - 1] == cell.starts[part - 1]:

@@ -12,9 +12,6 @@ BEATEN: dict[str, Callable[[set[str]], bool]] = {
     "several robots on a track: a part is picked, and makes room, before its robot can set out": lambda has: (
         "track" in has
     ),
-    "time windows, and machines with servers, or several robots: nobody waits on purpose": (
-        lambda has: "windows" in has and bool(has & {"servers", "two robots", "no robot"})
-    ),
 }
 
 

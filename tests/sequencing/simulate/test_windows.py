@@ -21,8 +21,8 @@ from lab.sequencing.methods.branch_and_bound import branch_and_bound
 from lab.sequencing.methods.cp_sat import cp_sat
 from lab.sequencing.methods.exact import optimum
 from lab.sequencing.methods.lower_bound import LowerBound
-from lab.sequencing.methods.srl_time import TimeLearner
 from lab.sequencing.methods.many_sessions import evaluate
+from lab.sequencing.methods.srl_time import TimeLearner
 from lab.sequencing.search import Search
 from lab.sequencing.simulate import kernels
 from lab.sequencing.simulate.cell_arrays import cell_arrays, run_arrays
