@@ -233,7 +233,7 @@ class Tasks:
             left = end
         elif self.cell.has_windows or any(station in self.blocking for station in option.needs):
             end = self.moment("drop")
-            model.add(end >= begin + takes)
+            model.add(end >= begin + takes).only_enforce_if(done)
         most = 2 * self.cell.possible_moves
         rank = put = model.new_int_var(0, most, "rank") if self.ranked else None
         if rank is not None and option.robot != SERVER and isinstance(end, cp_model.IntVar):
