@@ -41,7 +41,7 @@ TRACK_SLACK_S = 1e-9  # by what sums of times may differ
 BUFFER_USES = ("busy", "free")
 ARRIVALS_AFTER = ("clock", "pick")
 
-EVERY_PLAN, AT_ONCE = "every plan", "orders in which robots pick as they set out"  # of which something is proven
+EVERY_PLAN = "every plan"  # of which something is proven
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,13 +143,6 @@ class Cell:
     def serial(self) -> bool:
         """Whether one robot does all the work, so that what is decided later also happens later."""
         return is_serial(self.positions, self.robots)
-
-    @cached_property
-    def proven_of(self) -> str:
-        """Of which plans an optimum or a bound is one of: `EVERY_PLAN`, or `AT_ONCE` on a track, where a part that is
-        picked before its robot can set out, and held, makes room before.
-        """
-        return AT_ONCE if self.track else EVERY_PLAN
 
     @cached_property
     def takers(self) -> tuple[frozenset[int], ...]:

@@ -231,7 +231,7 @@ class Tasks:
         left, end = begin + self.times.whole(option.service_s), begin + takes
         if option.robot == SERVER:
             left = end
-        elif self.cell.has_windows or any(station in self.blocking for station in option.needs):
+        elif self.cell.has_windows or self.cell.track or any(s in self.blocking for s in option.needs):
             end = self.moment("drop")
             model.add(end >= begin + takes).only_enforce_if(done)
         most = 2 * self.cell.possible_moves

@@ -76,7 +76,7 @@ class TransportModel:
             for task in self.tasks.all:
                 if task.option.robot != SERVER:
                     ends = task.option.origin, task.option.target
-                    self._track.drive(task.option.robot, ends, task.left, task.done)
+                    self._track.drive_between(task.option.robot, ends, task.left, task.end, task.done)
             self._track.close()
         self._add_order(objective)
         for task in self.tasks.all:
@@ -211,7 +211,7 @@ class TransportModel:
                 for at, gap in gaps.items():
                     arc = self._arc(begun, at if len(starts) > 1 else 0, number, None, task, gap)
                     if self._track is not None:
-                        self._track.drive_before(team.robots[0], (at, option.origin), 0, task.begin, arc)
+                        self._track.drive_between(team.robots[0], (at, option.origin), 0, task.begin, arc)
                     spent.append(max(gap, head) * arc)
                     travels.append(gap * arc)
                 if len(starts) > 1:
@@ -228,7 +228,7 @@ class TransportModel:
                     arc = self._arc(arcs, number, other, task, then, travel)
                     if self._track is not None:
                         way = option.target, then.option.origin
-                        self._track.drive_before(team.robots[0], way, task.end, then.begin, arc)
+                        self._track.drive_between(team.robots[0], way, task.end, then.begin, arc)
                     spent.append(max(between, travel) * arc)
                     travels.append(travel * arc)
         if not self._free:

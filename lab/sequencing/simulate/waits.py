@@ -48,7 +48,7 @@ def waits_of_several(start: Run, sequence: Sequence[int], beyond_s: float) -> tu
             if option is None:
                 return None
             pick_s, at_most_s = run.pick_s(part, option), cell.positions[run.locations[part - 1]].at_most_s
-            begun_s = pick_s if option.robot == SERVER else pick_s + run.carry_s(option)
+            begun_s = pick_s if option.robot == SERVER else run.drop_s(part, option)
             begins = cell.positions[option.to].processing_s is not None
             least_s = ready_s[number] - run.times.processing_s(part, option.to) if begins else 0.0
             wait_s = max(0.0, least_s - begun_s)
