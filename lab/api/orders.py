@@ -73,7 +73,7 @@ class OrderResult:
 
     @property
     def proven_of(self) -> str:
-        """Of which plans `bound` and `proven` speak: "every plan", or "orders that never wait on purpose"."""
+        """Of which plans `bound` and `proven` speak: "every plan"."""
         return str(self.document["proven_of"])
 
     @property

@@ -124,7 +124,5 @@ def _known(best: Shared) -> Reference:
 
 
 def _stands(shared: Shared) -> SequencingStands:
-    of, unit = shared.cell.proven_of, unit_of(shared.objective)
-    return SequencingStands(
-        shared.cost, shared.found_by, Reference(shared.bound, shared.proven, shared.bound_by, unit, of=of)
-    )
+    known = Reference(shared.bound, shared.proven, shared.bound_by, unit_of(shared.objective))
+    return SequencingStands(shared.cost, shared.found_by, known)

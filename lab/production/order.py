@@ -177,7 +177,7 @@ def reference(cell: Cell, objective: str, time_limit_s: float = SECOND_OPINION_S
 def reference_of(cell: Cell, objective: str, found: BestKnown) -> Reference:
     """What is known of a cell, as what no sequence can beat."""
     by = found.bound_by if objective in BUILT_IN else UNKNOWN
-    return Reference(found.bound, found.proven, by, unit_of(objective), found.sequence, found.found_by, cell.proven_of)
+    return Reference(found.bound, found.proven, by, unit_of(objective), found.sequence, found.found_by)
 
 
 def unit_of(objective: str) -> str:

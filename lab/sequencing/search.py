@@ -127,7 +127,7 @@ def gap(cost: float, bound: float) -> float:
 
 
 def among(of: str) -> str:
-    """Of which plans something is proven, where these are not all (see `Cell.proven_of`): ", among ...", else ""."""
+    """Of which plans something is proven, where these are not all: ", among ...", else ""."""
     return "" if of == EVERY_PLAN else f", among {of}"
 
 
@@ -136,7 +136,7 @@ class Reference:
     """What no sequence can beat: `bound`, in the objective's unit; `proven`: some sequence reaches it.
 
     sequence: the best one that was found, without pointless hops, and by which method; empty: none. of: of which plans that is
-    said (see `Cell.proven_of`).
+    said.
     """
 
     bound: float

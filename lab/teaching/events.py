@@ -184,7 +184,7 @@ class PlanMade:
     """An order for the work that remains was found: its schedule, how many moves, and the proven gap (None: not known).
 
     at_s: when; the schedule's times are counted from the same beginning of the run [s], as all of a run's. why: what
-    made a new plan necessary, "" at first. of: of which plans it is proven (see `Cell.proven_of`).
+    made a new plan necessary, "" at first. of: of which plans it is proven.
     """
 
     schedule: Schedule

@@ -33,7 +33,7 @@ def sequence_plot(
 
     Several sessions (a list of lists): the best so far of each as a pale line, their mean, and the mean cost of an
     episode. deadlock: the cost of episodes that ended in one (`stuck_cost`), drawn as marks at the upper edge; they
-    count in no mean. proven_of: see `Cell.proven_of`. Raises BadInput without episodes, and as all plots here do.
+    count in no mean. proven_of: of which plans. Raises BadInput without episodes, and as all plots here do.
     Source: thesis fig. 7.3.
     """
     from matplotlib.ticker import MaxNLocator

@@ -18,7 +18,7 @@ from lab.sequencing.simulate.run import Run
 class TypedOrder:
     """A sequence that may be carried out: when it ends [s] and how much longer that is than the proven optimum or bound.
 
-    gap: a fraction; proven: against an optimum, not only a bound. of: of which plans (see `Cell.proven_of`).
+    gap: a fraction; proven: against an optimum, not only a bound. of: of which plans.
     """
 
     sequence: tuple[int, ...]

@@ -41,7 +41,7 @@ TRACK_SLACK_S = 1e-9  # by what sums of times may differ
 BUFFER_USES = ("busy", "free")
 ARRIVALS_AFTER = ("clock", "pick")
 
-EVERY_PLAN, NEVER_WAIT = "every plan", "orders that never wait on purpose"  # of which something is proven
+EVERY_PLAN = "every plan"  # of which something is proven
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,16 +143,6 @@ class Cell:
     def serial(self) -> bool:
         """Whether one robot does all the work, so that what is decided later also happens later."""
         return is_serial(self.positions, self.robots)
-
-    @cached_property
-    def proven_of(self) -> str:
-        """Of which plans an optimum or a bound is one of: `EVERY_PLAN`, or `NEVER_WAIT` where waiting on purpose may be better.
-
-        A list of transfers by one robot that does all the work is timed with the waits that its windows need; else they may need
-        others. On a track robots set out as they pick; held at its origin, a part would make room before. Else nothing becomes
-        worse by being done earlier.
-        """
-        return NEVER_WAIT if (self.has_windows and not self.serial) or self.track else EVERY_PLAN
 
     @cached_property
     def takers(self) -> tuple[frozenset[int], ...]:

@@ -37,7 +37,8 @@ class Move:
     """One decision carried out: the robot leaves `start`, reaches what it picks at `origin`, and drops it at `target`.
 
     process_s: the processing that begins with the drop [s]. service_s: the robot's work that ends with the pick [s]. by: the
-    robot's name; the name of `target` where a server of that machine takes the part, at `pick_s` and `drop_s` alike.
+    robot's name; the name of `target` where a server of that machine takes the part, at `pick_s` and `drop_s` alike. held_s: how
+    long the robot stays at `origin` with what it has picked, until its way is free [s].
     """
 
     part: int
@@ -52,6 +53,7 @@ class Move:
     service_s: float = 0.0
     carries: Literal["part", "pallet"] = "part"
     by: str = ROBOT
+    held_s: float = 0.0
 
     @property
     def served(self) -> bool:

@@ -131,8 +131,8 @@ def _times(cell: Any, run: Any, work: Any, count: int) -> None:
             begin_s = server_for(cell, run, part, o)[0]
             end_s = begin_s + cell.processing_s[cell.to[o]]
         else:
-            begin_s, pick_s = pick_times(cell, run, part, o)
-            end_s = pick_s + cell.loaded_s[cell.robot[o], cell.origin[o], cell.target[o]]
+            begin_s, _, out_s = pick_times(cell, run, part, o)
+            end_s = out_s + cell.loaded_s[cell.robot[o], cell.origin[o], cell.target[o]]
         work.begin_s[i], work.end_s[i] = begin_s, end_s
         first_s = min(first_s, begin_s)
         work.least_s[part] = min(work.least_s[part], end_s)

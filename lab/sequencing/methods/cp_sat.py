@@ -20,7 +20,7 @@ from lab.sequencing.methods.cp_sat_transport import TransportModel
 from lab.sequencing.methods.rules import first_come
 from lab.sequencing.methods.shared import Shared, shared_of
 from lab.sequencing.search import SAME, Search, SequenceResult, not_in_time, only_one
-from lab.sequencing.simulate.follow import follow, steps
+from lab.sequencing.simulate.follow import follow, spoils
 
 TIME_LIMIT_S = 60.0
 MOST_MOVES = 800  # that parts may make, in a model; what it takes in memory grows with the square, to a gigabyte
@@ -202,7 +202,7 @@ def _result(
 
     def order(solution: Solution) -> tuple[int, ...]:
         found = model.sequence(solution)
-        return () if model.times.rounded_s and cell.serial and _spoils(cell, found) else found
+        return () if model.times.rounded_s and spoils(cell, found) else found
 
     def hear(solution: Solution) -> None:
         asked.shared.tell(NAME, order(solution))
@@ -232,15 +232,6 @@ def cp_sat_sequencer(cell: Cell, search: Search, rng: np.random.Generator) -> Se
     if found.status == "unknown":
         raise not_in_time(cell, f"CP-SAT ({found.wall_s:.0f} s)", found.bound)
     return only_one(cell, search, found.sequence, found.cost, bool(found.sequence))
-
-
-def _spoils(cell: Cell, sequence: Sequence[int]) -> bool:
-    """Whether a part would be picked too late after all, by less than the times were rounded."""
-    for run, decision, wait in steps(cell, sequence):
-        if run.spoils(decision):
-            return True
-        run.move(decision, wait)
-    return False
 
 
 def fits(cell: Cell) -> bool:

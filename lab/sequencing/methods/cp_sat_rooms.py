@@ -63,15 +63,10 @@ def _visits(tasks: Tasks, station: int) -> list[Visit]:
 def _add_room(tasks: Tasks, station: int, visits: Sequence[Visit]) -> None:
     """Each place has one part after the other: the next is dropped when the one before was taken out."""
     model, nodes = tasks.model, list[tuple[int, int, cp_model.LiteralT]]()
-    late = {n: model.new_bool_var("late") for n, visit in enumerate(visits, 1) if visit.bring is not None}
     for number, visit in enumerate(visits, 1):
         nodes += [(0, number, model.new_bool_var("first")), (number, 0, model.new_bool_var("last"))]
         if visit.bring is not None:
             nodes.append((number, number, ~visit.bring.done))
-            if tasks.tight:
-                drop = visit.bring.begin + tasks.least.takes(visit.bring.option)
-                model.add(visit.bring.end <= drop).only_enforce_if(visit.bring.done, ~late[number])
-                model.add_implication(nodes[-3][2], ~late[number])
         for other, after in enumerate(visits, 1):
             if visit is after or after.bring is None or not visit.takes:
                 continue
@@ -84,8 +79,6 @@ def _add_room(tasks: Tasks, station: int, visits: Sequence[Visit]) -> None:
                 tasks.frees.append((take, after.bring, (arc, take.done)))
                 if after.bring.put is not None and take.rank is not None:
                     model.add(after.bring.put >= take.rank + 1).only_enforce_if(arc, take.done)
-                if tasks.tight:
-                    model.add(after.bring.end <= take.left).only_enforce_if(arc, take.done, late[other])
     add_chains(model, nodes, len(visits), tasks.cell.capacities[station])
 
 

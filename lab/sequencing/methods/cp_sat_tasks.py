@@ -40,7 +40,6 @@ class Task:
     end: cp_model.LinearExprT
     rank: cp_model.IntVar | None
     put: cp_model.IntVar | None
-    waits: cp_model.IntVar | None
 
     @property
     def option(self) -> Option:
@@ -116,8 +115,8 @@ Follows = tuple[Task, Task, tuple[cp_model.LiteralT, ...]]
 class Tasks:
     """The tasks of all parts: each part takes one way from its begin to an end, and each task begins when it may.
 
-    Parts are numbered from 0 here. ranked: whether the order of what happens has to be known, not only times. tight: whether
-    nobody may wait without need, since something may be spoilt then. blocking: stations that may be full. follows: see `after`.
+    Parts are numbered from 0 here. ranked: whether the order of what happens has to be known, not only times. blocking: stations
+    that may be full. follows: see `after`.
     frees: a task that frees room for another one, which a list may have in either order where another robot frees it. brings: a
     task after another one to the same room. Both if all of their literals hold.
     """
@@ -125,10 +124,7 @@ class Tasks:
     def __init__(self, cell: Cell, model: cp_model.CpModel, times: Times, horizon: int) -> None:
         self.cell, self.model, self.times, self.horizon = cell, model, times, horizon
         self.least, self.teams = Least(cell, times), teams_of(cell)
-        self.tight = cell.has_windows
         options = [way for at in cell.positions for way in at.options]
-        # Where one may have to wait for more than its robot and its part.
-        self.loose = bool(cell.track) or any(not way.waits or way.if_full is not None for way in options)
         self._ahead = {at: reached_from(cell.positions, {at}) for at in set(cell.begin_at)}
         self.blocking = [s for s in range(len(cell.stations)) if self._may_be_full(s)]
         self.ranked = bool(self.blocking) or cell.arrivals is not None or any(o.if_full is not None for o in options)
@@ -227,28 +223,23 @@ class Tasks:
         begin = model.new_int_var(min(head, self.horizon), self.horizon, "begin")
         model.add(begin + takes + self.least.tail[option.to] <= self.horizon).only_enforce_if(done)
         ready = self._ready[part, place]
-        waits = model.new_bool_var("waits") if self.tight else None
         if option.waits:
             model.add(begin >= ready).only_enforce_if(done)
-            if waits is not None:
-                model.add(begin <= ready).only_enforce_if(done, waits)
             if at.at_most_s is not None:
                 latest = ready + self.times.whole(at.at_most_s) - self.times.whole(option.service_s)
                 model.add(begin <= latest).only_enforce_if(done)
-        elif waits is not None:
-            model.add(waits == 0)
         left, end = begin + self.times.whole(option.service_s), begin + takes
         if option.robot == SERVER:
             left = end
-        elif any(station in self.blocking for station in option.needs):
+        elif self.cell.has_windows or self.cell.track or any(s in self.blocking for s in option.needs):
             end = self.moment("drop")
-            model.add(end >= begin + takes)
+            model.add(end >= begin + takes).only_enforce_if(done)
         most = 2 * self.cell.possible_moves
         rank = put = model.new_int_var(0, most, "rank") if self.ranked else None
         if rank is not None and option.robot != SERVER and isinstance(end, cp_model.IntVar):
             put = model.new_int_var(0, most, "put")
             model.add(put >= rank)
-        return Task(part, place, options, done, begin, left, end, rank, put, waits)
+        return Task(part, place, options, done, begin, left, end, rank, put)
 
     def _first_ready(self, part: int) -> cp_model.LinearExprT:
         """When a part may leave the place where it begins."""

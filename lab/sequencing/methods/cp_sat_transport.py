@@ -23,7 +23,8 @@ from lab.sequencing.methods.cp_sat_solver import Solution
 from lab.sequencing.methods.cp_sat_tasks import Follows, Task, Tasks, Team
 from lab.sequencing.methods.cp_sat_times import Times
 from lab.sequencing.methods.cp_sat_track import Track
-from lab.sequencing.simulate.run import Run
+from lab.sequencing.simulate.follow import follow, spoils, steps
+from lab.sequencing.simulate.run import Run, Windowless
 
 Arcs = dict[tuple[int, int], cp_model.IntVar]
 
@@ -45,9 +46,9 @@ class TransportModel:
 
     below: only makespans shorter than the hint's are looked for. free: robots are wherever they are wanted, rooms are never
     full, setups take no time: a small model, for a bound and an order to begin with. blur: by how many units rounding may
-    change a sequence's cost; 0 when no time is rounded. Without windows every plan is one of the model's, whatever list says it:
-    where a station has room for several parts, or several servers, any of them may be taken, and robots hold parts as long as
-    they like. A `Run` takes the first: what is proven is a bound, and an optimum where a run comes to it.
+    change a sequence's cost; 0 when no time is rounded. Every plan is one of the model's, whatever list says it:
+    where a station has room for several parts, or several servers, any of them may be taken, and robots and servers wait, and
+    hold parts, as long as they like. A `Run` takes the first: what is proven is a bound, and an optimum where a run comes to it.
     """
 
     def __init__(
@@ -75,7 +76,7 @@ class TransportModel:
             for task in self.tasks.all:
                 if task.option.robot != SERVER:
                     ends = task.option.origin, task.option.target
-                    self._track.drive(task.option.robot, ends, task.left, task.done)
+                    self._track.drive_between(task.option.robot, ends, task.left, task.end, task.done)
             self._track.close()
         self._add_order(objective)
         for task in self.tasks.all:
@@ -110,7 +111,7 @@ class TransportModel:
 
     def _carried_out(self, order: tuple[int, ...]) -> tuple[tuple[int, ...], float]:
         """The decisions in an order in which they may be taken, and what they cost; endless where they get stuck."""
-        run, left, found = Run(self.cell), list(order), list[int]()
+        run, left, found = Windowless(self.cell), list(order), list[int]()
         while left:
             tried = set[int]()
             for n, decision in enumerate(left):
@@ -122,7 +123,9 @@ class TransportModel:
                 tried.add(part)
             else:
                 return (), inf
-        return tuple(found), cost(run, self._objective) if run.done else inf
+        if not run.done or spoils(self.cell, found):
+            return (), inf
+        return tuple(found), cost(follow(self.cell, found) if self.cell.has_windows else run, self._objective)
 
     def _in_order(
         self, solver: Solution, more: Sequence[Follows], when: Callable[[Task], tuple[int, int]]
@@ -208,7 +211,7 @@ class TransportModel:
                 for at, gap in gaps.items():
                     arc = self._arc(begun, at if len(starts) > 1 else 0, number, None, task, gap)
                     if self._track is not None:
-                        self._track.drive_before(team.robots[0], (at, option.origin), 0, task.begin, arc)
+                        self._track.drive_between(team.robots[0], (at, option.origin), 0, task.begin, arc)
                     spent.append(max(gap, head) * arc)
                     travels.append(gap * arc)
                 if len(starts) > 1:
@@ -225,7 +228,7 @@ class TransportModel:
                     arc = self._arc(arcs, number, other, task, then, travel)
                     if self._track is not None:
                         way = option.target, then.option.origin
-                        self._track.drive_before(team.robots[0], way, task.end, then.begin, arc)
+                        self._track.drive_between(team.robots[0], way, task.end, then.begin, arc)
                     spent.append(max(between, travel) * arc)
                     travels.append(travel * arc)
         if not self._free:
@@ -270,8 +273,6 @@ class TransportModel:
         done = arcs[left, then] = self.model.new_bool_var("follows")
         free = gap if before is None else before.end + gap
         self.model.add(task.begin >= free).only_enforce_if(done)
-        if task.waits is not None and not self.tasks.loose:
-            self.model.add(task.begin <= free).only_enforce_if(done, ~task.waits)
         if before is not None:
             self.tasks.after(task, before, done)
         return done
@@ -297,7 +298,7 @@ class TransportModel:
             self.model.add_no_overlap(spans)
         elif len(own) > servers:
             self.model.add_cumulative(spans, [1] * len(spans), servers)
-        if self._free or not (setups or self.tasks.ranked or self.tasks.tight):
+        if self._free or not (setups or self.tasks.ranked):
             return
         arcs = Arcs()
         for number, task in enumerate(own, 1):
@@ -378,12 +379,12 @@ def _routes(solver: Solution, arcs: Arcs) -> list[list[int]]:
 def _known(cell: Cell, times: Times, sequence: Sequence[int]) -> dict[tuple[int, int, int], tuple[int, int]]:
     """When each task of a sequence begins and ends, by part, place and choice, in units; BadInput where it cannot be."""
     run, done = Run(cell), list[tuple[int, int, int]]()
-    for decision in sequence:
+    for run, decision, wait in steps(cell, sequence):
         part, option = part_of(decision, cell.parts) - 1, run.option(decision)
         place = run.locations[part]
         if option is None:
             raise BadInput(f"hint: {run.refusal(decision)}")
-        run.move(decision)
+        run.move(decision, wait)
         done.append((part, place, choice_of(decision, cell.parts)))
     if not run.done:
         raise BadInput(f"hint: the sequence ends after {counted(len(done), 'move')}, but not all parts are finished")

@@ -33,7 +33,7 @@ class Optimum:
     """The best sequence known, and what is proven: no sequence is shorter than `bound_s`.
 
     cost: its makespan [s]. `proven`: the sequence is optimal (to a nanosecond a move) and `bound_s` is its makespan.
-    `expanded`: states opened. `of`: of which plans that is said (see `Cell.proven_of`).
+    `expanded`: states opened. `of`: of which plans that is said.
     """
 
     cost: float

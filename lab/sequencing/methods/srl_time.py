@@ -146,13 +146,14 @@ class TimeLearner:
 
     def actions(self, state: MergedState) -> Iterator[Action]:
         """What may be done now: from which position, by which of its ways, and with which part where that matters."""
-        for place, choice in self.merged.choices(state):
+        for (place, choice), way in self.merged.choices(state).items():
             if not self.distinct or state.who is None:
                 yield place, choice, 0
                 continue
             in_order = self._cell.arrivals is not None and place in self.merged.starts
-            for part in state.who[place][:1] if in_order else state.who[place]:
-                yield place, choice, part
+            for nth, part in enumerate(state.who[place][:1] if in_order else state.who[place]):
+                if self.merged.in_time(state, way, nth):
+                    yield place, choice, part
 
     def _as_if_small(self, job: MergedCell, state: MergedState, done: int) -> MergedKey:
         """The state of a larger job as it would be with this one's few: those that wait and those that are done are fewer."""

@@ -14,7 +14,7 @@ from lab.sequencing.simulate.waits import waits_of
 def waits_in(start: Run, sequence: Sequence[int]) -> tuple[Wait, ...]:
     """The waits on purpose with which a list keeps to all windows from where a run is; none where it needs none, or where none
     would help."""
-    if not (start.cell.has_windows and start.cell.serial):
+    if not start.cell.has_windows:
         return ()
     run = branch(start)
     for decision in sequence:
@@ -34,6 +34,15 @@ def steps(cell: Cell, sequence: Sequence[int], times: Episode | None = None) -> 
         yield run, decision, waits[number] if waits else NO_WAIT
 
 
+def spoils(cell: Cell, sequence: Sequence[int]) -> bool:
+    """Whether a part would be picked too late by a list of decisions, whatever the waits."""
+    for run, decision, wait in steps(cell, sequence) if cell.has_windows else ():
+        if run.spoils(decision):
+            return True
+        run.move(decision, wait)
+    return False
+
+
 def follow(cell: Cell, sequence: Sequence[int], times: Episode | None = None) -> Run:
     """The run of a list of decisions, one after the other whatever the times; BadInput where one may not be taken."""
     run = Run(cell, times)
@@ -45,7 +54,7 @@ def follow(cell: Cell, sequence: Sequence[int], times: Episode | None = None) ->
 def simulate(cell: Cell, sequence: Sequence[int], times: Episode | None = None) -> Schedule:
     """The schedule of a sequence of decisions (see `Run`; one entry a move), with the cell's times or an episode's.
 
-    One robot that does all the work waits on purpose where a part would be picked too late else (see `waits_of`).
+    Robots and servers wait on purpose where a part would be picked too late else (see `waits_of`).
     Raises BadInput, with the position, for a decision that may not be taken there and for a sequence that ends too early.
     Source: thesis ch. 7.4, 7.5; makespan to the last arrival at the end of a route.
     """

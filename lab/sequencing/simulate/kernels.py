@@ -107,17 +107,14 @@ def reached_s(cell: Any, run: Any, o: int) -> float:
 
 @inner
 def pick_times(cell: Any, run: Any, part: int, o: int) -> Any:
-    """When a robot, if it goes there now, begins the service that ends with the pick of a part (from 0), and when it picks."""
+    """When a robot, if it goes there now, begins the service that ends with the pick of a part (from 0), picks, and sets out."""
     robot, begin_s = cell.robot[o], reached_s(cell, run, o)
     if cell.waits[o]:
         begin_s = max(begin_s, run.ready_s[part])
     if not cell.serial:
         begin_s = max(begin_s, may_go_s(cell, run, part, o) - cell.service_s[o])
     pick_s = begin_s + cell.service_s[o]
-    if cell.tracked:
-        pick_s = _clear_s(cell, run, robot, cell.origin[o], cell.target[o], pick_s)
-        begin_s = pick_s - cell.service_s[o]
-    return begin_s, pick_s
+    return begin_s, pick_s, _clear_s(cell, run, robot, cell.origin[o], cell.target[o], pick_s)
 
 
 @inner
@@ -222,14 +219,14 @@ def take(cell: Any, run: Any, part: int, o: int, seed: Any) -> None:
         drop_s = pick_s
     else:
         reach_s = reached_s(cell, run, o)
-        begin_s, pick_s = pick_times(cell, run, part, o)
-        drop_s = pick_s + cell.loaded_s[robot, cell.origin[o], cell.target[o]]
+        begin_s, pick_s, out_s = pick_times(cell, run, part, o)
+        drop_s = out_s + cell.loaded_s[robot, cell.origin[o], cell.target[o]]
         if cell.tracked:
             leave_s = _leaves_s(cell, run, o)
             run.clock[1] += leave_s - run.robots_s[robot]
             _hold(cell, run, robot, run.robots_at[robot], cell.origin[o], leave_s)
-            _hold(cell, run, robot, cell.origin[o], cell.target[o], pick_s)
-        run.clock[1] += begin_s - reach_s
+            _hold(cell, run, robot, cell.origin[o], cell.target[o], out_s)
+        run.clock[1] += begin_s - reach_s + out_s - pick_s
     if here == cell.starts[part]:
         run.whole[0] += 1
         if cell.arrivals != NO_ARRIVALS and run.whole[0] < len(cell.coming):

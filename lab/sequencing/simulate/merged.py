@@ -259,16 +259,19 @@ class MergedCell:
                 return True
         return False
 
+    def in_time(self, state: MergedState, way: Way, nth: int) -> bool:
+        """Whether the `nth` part from 0 in a way's position would be picked in time."""
+        place, option, work = way
+        if place not in self.latest or not option.waits:
+            return True
+        ready, service = state.waits[self.slots[place]][nth], work - self._loaded[option.origin][option.target]
+        return max(state.now + self._empty[state.robot][option.origin], ready) + service <= ready + self.latest[place]
+
     def _in_time(self, state: MergedState, way: Way) -> list[int]:
         """Which of the parts in a way's position, from 0, would be picked in time; one of those that are alike in all."""
-        place, option, work = way
-        there = state.waits[self.slots[place]] if place in self.slots else (0,)
+        there = state.waits[self.slots[way.place]] if way.place in self.slots else (0,)
         differ = [nth for nth, ready in enumerate(there) if nth == 0 or ready != there[nth - 1]]
-        if place not in self.latest or not option.waits:
-            return differ
-        service = work - self._loaded[option.origin][option.target]
-        reach, latest = state.now + self._empty[state.robot][option.origin], self.latest[place]
-        return [nth for nth in differ if max(reach, there[nth]) + service <= there[nth] + latest]
+        return [nth for nth in differ if self.in_time(state, way, nth)]
 
     def _code_of(self, locations: Sequence[int]) -> int:
         return self.code([locations.count(place) for place in range(len(self._ways))])

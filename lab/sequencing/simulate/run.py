@@ -17,7 +17,10 @@ SLACK_S = 1e-6  # so much later is not too late: what sums of times may differ b
 
 
 class Wait(NamedTuple):
-    """How long a robot waits on purpose (see `waits_of`): before its work where it picks, and before it drops [s]."""
+    """How long a robot waits on purpose (see `waits_of`): before its work where it picks, and before it drops [s].
+
+    A server waits before it begins.
+    """
 
     pick_s: float = 0.0
     drop_s: float = 0.0
@@ -29,20 +32,20 @@ NO_WAIT = Wait()
 class Run:
     """Where parts and robots are, and at what time; `move` carries one decision out.
 
-    A decision is an entry of a sequence: the part's number, + the number of parts for the second choice it has, and so
-    on. A robot travels empty to where the part, or its pallet, is picked, waits there until it is ready, does its
-    service work and carries it on; processing starts at arrival, or, where a machine has servers, with the decision that
-    lets one of them take the part. All is done as early as it can be, after what was decided before with the same robot,
-    server, part or room: a robot that comes to a station before there is room waits there, and nobody ever waits for
-    anything else. With one robot and no servers what is decided later also happens later (`Cell.serial`). Where another robot
-    can still make the room, it need not be there yet: the robot picks, goes there and holds the part until what is decided
-    later frees the room, which those who wait get in the order of their decisions; meanwhile nothing is decided for robot or
-    part. A buffer for a full station is used while it is full: not before its parts were picked to come, none leaves before.
-    A decision that would pick a part later than it may be picked is not allowed (see `Station.at_most_s`): what was left too
-    long stays where it is, and the run ends as a deadlock does. The order also says what a batch is (see `Station.batch`): all
-    that is brought before one of it is taken out. It begins with the last that is brought: to begin later helps no order, to
-    begin before is another order. `ready_s` is as if nothing more were to come. Parts that stand in such a machine at first
-    have begun.
+    A decision is an entry of a sequence: the part's number, + the number of parts for the second choice it has, and so on. A
+    robot travels empty to where the part, or its pallet, is picked, waits there until it is ready, does its service work and
+    carries it on; processing starts at arrival, or, where a machine has servers, with the decision that lets one of them take
+    the part. All is done as early as it can be, after what was decided before with the same robot, server, part or room: a
+    robot that comes to a station before there is room waits there, and nobody waits for anything else, unless `move` is told
+    so. With one robot and no servers what is decided later also happens later (`Cell.serial`). Where another robot can still
+    make the room, it need not be there yet: the robot picks, goes there and holds the part until what is decided later frees
+    the room, which those who wait get in the order of their decisions; meanwhile nothing is decided for robot or part. A
+    buffer for a full station is used while it is full: not before its parts were picked to come, none leaves before. A
+    decision that would pick a part later than it may be picked is not allowed (see `Station.at_most_s`): what was left too
+    long stays where it is, and the run ends as a deadlock does. The order also says what a batch is (see `Station.batch`):
+    all that is brought before one of it is taken out. It begins with the last that is brought: to begin later helps no order,
+    to begin before is another order. `ready_s` is as if nothing more were to come. Parts that stand in such a machine at
+    first have begun.
     No decision is allowed that a precedence lets wait (see `Precedence`).
     locations: the position of each part, part 1 first. occupied: room taken at each station. ready_s: when each part may be
     picked. finished_s: when each part was finished (None: not yet; 0: before the work began, or nothing is to be done with
@@ -51,8 +54,8 @@ class Run:
     processed_s: how long machines were given work for. moves: what was decided, in its order, a drop that waits for room as
     early as it may be. held: the part that each robot holds and cannot drop yet; 0: none.
     On a track a robot stands beside it at a station, drives the shortest way without stopping, and holds each stretch while it
-    is on it; it sets out, and picks what it carries, as soon as the stretches will be free when it comes to them, after what
-    was decided before.
+    is on it; it sets out, also with what it has picked, as soon as the stretches will be free when it comes to them, after
+    what was decided before.
     Source: thesis ch. 7.4, 7.5; App. III; serial schedule generation, Kolisch 1996.
     """
 
@@ -173,12 +176,13 @@ class Run:
             raise BadInput(self.refusal(decision))
         cell, part = self.cell, part_of(decision, self.cell.parts)
         if option.robot == SERVER:
-            return self._serve(part, option)
+            return self._serve(part, option, wait)
         there, robot = cell.positions[option.to], option.robot
         start, free_s = self.robots_at[robot], self.robots_s[robot]
         leave_s, reach_s, served_s, pick_s = self._times_s(part, option)
         served_s, pick_s = served_s + wait.pick_s, pick_s + wait.pick_s
-        carried_s = pick_s + self.carry_s(option)
+        out_s = self._clear_s(robot, option.origin, option.target, pick_s)
+        carried_s = out_s + self.carry_s(option)
         drop_s = carried_s + wait.drop_s
         if self.locations[part - 1] == cell.starts[part - 1]:
             self._fetch(pick_s)
@@ -194,9 +198,9 @@ class Run:
             self._fetched_s[part - 1] = pick_s
         self._leave(part, option, pick_s)
         self._hold(robot, start, option.origin, leave_s)
-        self._hold(robot, option.origin, option.target, pick_s)
+        self._hold(robot, option.origin, option.target, out_s)
         self.robots_at[robot], self.robots_s[robot] = option.target, drop_s
-        self.waited_s += leave_s - free_s + served_s - reach_s
+        self.waited_s += leave_s - free_s + served_s - reach_s + out_s - pick_s
         process_s = 0.0 if there.processing_s is None else self.times.processing_s(part, option.to)
         self.processed_s += process_s
         self._put(part, drop_s, process_s)
@@ -204,7 +208,8 @@ class Run:
             self._batch(there.station, drop_s)
         way = cell.names[start], cell.names[option.origin], cell.names[option.target]
         times_s = leave_s, reach_s, pick_s, drop_s, process_s
-        self.moves.append(Move(part, *way, *times_s, option.service_s, option.carries, cell.robots[robot].name))
+        by = cell.robots[robot].name
+        self.moves.append(Move(part, *way, *times_s, option.service_s, option.carries, by, out_s - pick_s))
         return self.moves[-1]
 
     def _put(self, part: int, at_s: float, process_s: float) -> None:
@@ -229,10 +234,11 @@ class Run:
         if not self.rooms.awaited(robot):
             self.held[robot] = 0
 
-    def _serve(self, part: int, option: Option) -> Move:
+    def _serve(self, part: int, option: Option, wait: Wait) -> Move:
         """A server of a machine takes a part and works on it."""
         cell = self.cell
         begin_s, server = self._server(part, option)
+        begin_s += wait.pick_s
         process_s = self.times.processing_s(part, option.to)
         end_s = begin_s + process_s
         if self.locations[part - 1] == cell.starts[part - 1]:
@@ -336,7 +342,8 @@ class Run:
         """When a way brings a part to its end, by the cell's own times, as soon as there is room."""
         if option.robot == SERVER:
             return self.pick_s(part, option) + (self.cell.positions[option.to].processing_s or 0.0)
-        return self.pick_s(part, option) + self.carry_s(option)
+        out_s = self._clear_s(option.robot, option.origin, option.target, self.pick_s(part, option))
+        return out_s + self.carry_s(option)
 
     def carry_s(self, option: Option) -> float:
         """How long a robot's way with a part is [s]."""
@@ -348,8 +355,7 @@ class Run:
         ready_s = max(reach_s, self.ready_s[part - 1]) if option.waits else reach_s
         if not self.cell.serial:
             ready_s = max(ready_s, self._may_go_s(part, option) - option.service_s)
-        pick_s = self._clear_s(option.robot, option.origin, option.target, ready_s + option.service_s)
-        return leave_s, reach_s, pick_s - option.service_s if self.track_s else ready_s, pick_s
+        return leave_s, reach_s, ready_s, ready_s + option.service_s
 
     def _may_go_s(self, part: int, option: Option) -> float:
         """Before when a way may not pick, whoever takes it: where the part or its pallet is still carried, the part before it

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from lab.sequencing.cell.routes import Option, part_of
+from lab.sequencing.cell.routes import SERVER, Option, part_of
 from lab.sequencing.simulate.constraints import Arc, earliest
 from lab.sequencing.simulate.run import SLACK_S, Run, Wait, Windowless
 
@@ -11,11 +11,13 @@ from lab.sequencing.simulate.run import SLACK_S, Run, Wait, Windowless
 def waits_of(start: Run, sequence: Sequence[int], beyond_s: float = 0.0) -> tuple[Wait, ...] | None:
     """The least waits with which a list of decisions keeps to all windows from where a run is, one a decision; None: no waits do.
 
-    Of one robot that does all the work: the list says in which order it makes its moves, and everything is done as early as that
-    order and the windows allow. That is the least solution of difference constraints, and no other way of timing the moves ends
+    The list says what comes first at the same robot, server, room or stretch of a track, and everything is done as early as that
+    and the windows allow. That is the least solution of difference constraints, and no other way of timing the moves ends
     any of them earlier. beyond_s: how much later than its window says a part may be picked, at most as much as the window [s].
     Source: simple temporal networks, Dechter, Meiri and Pearl 1991; hoist scheduling, Che and Chu 2004.
     """
+    if not start.cell.serial:
+        return waits_of_several(start, sequence, beyond_s)
     run, network = Windowless(start.cell, start.times, start), _Network(start, beyond_s)
     for decision in sequence:
         option = run.option(decision)
@@ -24,6 +26,45 @@ def waits_of(start: Run, sequence: Sequence[int], beyond_s: float = 0.0) -> tupl
         network.add(part_of(decision, start.cell.parts), run, option)
         run.move(decision)
     return network.waits()
+
+
+def _window_s(at_most_s: float, beyond_s: float) -> float:
+    return at_most_s + min(max(at_most_s, SLACK_S), beyond_s)
+
+
+def waits_of_several(start: Run, sequence: Sequence[int], beyond_s: float) -> tuple[Wait, ...] | None:
+    """The least waits of several robots or servers: a part that would be picked too late is to be ready later, by a later drop
+    or begin of work, and all is carried out again, until none is too late.
+
+    Each pass keeps to all that comes first. Only windows lead back in the list, so a wait that still grows after as many passes
+    as there are decisions lies on a circle, and grows for ever (Bellman and Ford). A part is picked as early as may be, since
+    what it leaves is room for others.
+    """
+    cell, ready_s = start.cell, [0.0] * len(sequence)  # by decision: before when its part is not to be ready
+    for _ in range(len(sequence) + 1):
+        run, waits, last, late = Windowless(cell, start.times, start), list[Wait](), dict[int, int](), False
+        for number, decision in enumerate(sequence):
+            part, option = part_of(decision, cell.parts), run.option(decision)
+            if option is None:
+                return None
+            pick_s, at_most_s = run.pick_s(part, option), cell.positions[run.locations[part - 1]].at_most_s
+            begun_s = pick_s if option.robot == SERVER else run.drop_s(part, option)
+            begins = cell.positions[option.to].processing_s is not None
+            least_s = ready_s[number] - run.times.processing_s(part, option.to) if begins else 0.0
+            wait_s = max(0.0, least_s - begun_s)
+            waits.append(Wait(pick_s=wait_s) if option.robot == SERVER else Wait(drop_s=wait_s))
+            if at_most_s is not None and option.waits:
+                least_s = pick_s + waits[-1].pick_s - _window_s(at_most_s, beyond_s)
+                if least_s > run.ready_s[part - 1] + SLACK_S / 2:
+                    if part not in last:
+                        return None
+                    ready_s[last[part]], late = least_s, True
+            if begins:
+                last[part] = number
+            run.move(decision, waits[-1])
+        if not late:
+            return tuple(waits)
+    return None
 
 
 class _Timed(NamedTuple):
@@ -60,7 +101,7 @@ class _Network:
         if option.waits:
             comes.append(Arc(since, begin, later_s, 0))
             if at_most_s is not None:
-                latest_s = later_s + at_most_s + min(max(at_most_s, SLACK_S), self._beyond_s) - option.service_s
+                latest_s = later_s + _window_s(at_most_s, self._beyond_s) - option.service_s
                 latest = Arc(begin, since, -latest_s, 0)
         self._moves.append(_Timed(comes, Arc(begin, begin + 1, option.service_s + run.carry_s(option), 0), latest))
         if after_pick and run.fetched + 1 < len(cell.coming):

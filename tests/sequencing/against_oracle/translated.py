@@ -44,8 +44,8 @@ def plain_plan(cell: Cell, moves: Sequence[Move]) -> plain.Plan:
     """What the lab's simulation says happens, as it says it."""
     carried = [
         plain.Carried(
-            move.part, move.by, move.origin, move.target, move.leave_s, move.pick_s, move.pick_s, move.drop_s,
-            move.service_s, move.carries,
+            move.part, move.by, move.origin, move.target, move.leave_s, move.pick_s, move.pick_s + move.held_s,
+            move.drop_s, move.service_s, move.carries,
         )
         for move in moves
         if not move.served

@@ -51,7 +51,7 @@ def test_two_robots_meet_and_one_waits() -> None:
     """left carries part 1 from in to a, 0 to 10 s; right drives from out to in: 10 + 5 + 10 s, the last stretch from 15 s on.
 
     It is free then: right does not wait. With part 2, from in to b, it sets out at 25 s, drives in-a till 35 s and a-b till 40 s.
-    left fetches part 1 at a, which is done at 30 s: to b it would meet right on a-b, so it waits until 40 s, beside a.
+    left takes part 1 up at a when it is done, at 30 s: to b it would meet right on a-b, so it holds it until 40 s, beside a.
     """
     run = Run(line())
     left, right = 1, 1 + 2  # decisions of part 1 by left, and by right
@@ -60,7 +60,7 @@ def test_two_robots_meet_and_one_waits() -> None:
     second = run.move(right + 1)
     assert (second.leave_s, second.reach_s, second.pick_s, second.drop_s) == (0.0, 25.0, 25.0, 40.0)
     third = run.move(left)
-    assert (third.reach_s, third.pick_s, third.drop_s) == (10.0, 40.0, 55.0)
+    assert (third.reach_s, third.pick_s, third.held_s, third.drop_s) == (10.0, 30.0, 10.0, 55.0)
     assert run.waited_s == 30.0  # beside a: 20 s for the part, 10 s for the track
 
 
@@ -69,7 +69,7 @@ def test_who_sets_out_against_another_waits_before_it() -> None:
     run = Run(line())
     run.move(1 + 1 + 2)  # part 2 by right: there at 25 s, and on in-a again until 35 s, on a-b until 40 s
     first = run.move(1)
-    assert (first.pick_s, first.drop_s) == (35.0, 45.0)
+    assert (first.pick_s, first.held_s, first.drop_s) == (0.0, 35.0, 45.0)
 
 
 def test_without_a_track_nobody_waits_for_it() -> None:

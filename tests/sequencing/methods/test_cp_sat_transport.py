@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from math import inf
 
 import numpy as np
 import pytest
@@ -76,6 +77,18 @@ def test_parts_change_places_where_two_robots_hold_them() -> None:
     assert simulate(cell, found.sequence).makespan_s == found.cost == found.bound == 9.0
 
 
+def test_a_detour_that_takes_longer_than_the_best_order_does_not_hide_it() -> None:
+    """Two robots bring parts to a machine, 1 s, where a server works for 4 s on each; by its buffer it would take 40 s."""
+    far = np.array([[0, 1, 20], [1, 0, 20], [20, 20, 0]], float)
+    stations = Station("in", "storage", 9), Station("m", "machine", 2, 4.0, servers=1), Station("b", "buffer", 1)
+    product = Product("p", ((Stage("in"), Stage("m", "b")),))
+    robots = Robot("r1", "in"), Robot("r2", "in")
+    cell = Cell(stations, (product,), ("p",) * 3, far, far, robots, buffers="free")
+    assert cost(follow(cell, first_come(cell)), "makespan") == 13.0
+    found = cp_sat(cell)
+    assert (found.status, found.cost, found.bound) == ("optimal", 13.0, 13.0)
+
+
 def test_a_server_works_on_a_part_twice_in_a_row() -> None:
     """Part a is in A from 1 to 3 s, in B from 4 to 7 s, in A again from 8 to 10 s; b, after it in A, is late anyhow."""
     served = (
@@ -136,15 +149,18 @@ def drawn_cells(draw: st.DrawFn) -> Cell:
 @settings(max_examples=25, deadline=None)
 @given(cell=drawn_cells(), objective=st.sampled_from(sorted(OBJECTIVES)))
 def test_random_cells(ends: Ends, cell: Cell, objective: str) -> None:
-    """Rooms, windows, buffers, arrivals, routes to choose from: as good as the best list of all, or proven to have none."""
-    best = min((cost(run, objective) for run in ends(Run(cell))), default=None)
+    """Rooms, windows, buffers, arrivals, routes to choose from: no list that never waits on purpose is below the bound.
+
+    A plan of two robots may be one that no list says.
+    """
+    best = min((cost(run, objective) for run in ends(Run(cell))), default=inf)
     found = cp_sat(cell, objective)
-    if best is None:
-        assert found.status == "impossible"
-    else:
-        assert found.status == "optimal"
-        assert found.cost == pytest.approx(best, abs=1e-6)
+    assert found.bound <= best + 1e-6
+    if found.sequence:
         assert found.cost == cost(follow(cell, found.sequence), objective)
+    if len(cell.robots) == 1:
+        assert found.status in ("optimal", "impossible")
+        assert found.cost == pytest.approx(best, abs=1e-6) if not cell.has_windows else found.cost <= best + 1e-6
 
 
 def test_it_begins_with_the_sequence_it_is_given(ex11: Callable[[int], Cell]) -> None:

@@ -1,18 +1,25 @@
 """Waits on purpose, by hand: a part is brought late where it could not leave in time, and lies rather than is held."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.strategies import DataObject, SearchStrategy
 
 from lab.errors import BadInput
 from lab.production.order import checked_order, moves_from
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.cell.stations import Arrivals, Stage, Station
+from lab.sequencing.cell.stations import UNLIMITED, Arrivals, Product, Robot, Stage, Station
+from lab.sequencing.methods.cp_sat import cp_sat
 from lab.sequencing.methods.exact import optimum
 from lab.sequencing.simulate.follow import follow, simulate, waits_in
-from lab.sequencing.simulate.run import NO_WAIT, Run, Wait
-from lab.sequencing.simulate.waits import waits_of
+from lab.sequencing.simulate.run import NO_WAIT, Run, Wait, Windowless
+from lab.sequencing.simulate.waits import waits_of, waits_of_several
+
+Cells = Callable[..., SearchStrategy[Cell]]
 
 IN_TURN = (1, 1, 2, 1, 2, 2)
 
@@ -91,6 +98,55 @@ def test_beyond_the_window(slow_second: Cell) -> None:
         if (waits := waits_of(Run(cell), IN_TURN, beyond_s)) is not None
     ]
     assert first == pytest.approx([10.0, 6.0, 5.0, 2.0], abs=1e-5)
+
+
+def test_of_two_robots_one_holds_a_part_until_the_other_can_fetch_it_in_time(slow_second: Cell) -> None:
+    """The first robot only brings parts to m1. The second one has 1 in m2 at 14 s and out at 36 s, and is back at m1 at 37 s.
+
+    So 2 comes to m1 at 27 s, though there is room from 12 s on, and it is picked at 3 s.
+    """
+    cell = replace(
+        slow_second, robots=(Robot("a", "in", serves=("in", "m1")), Robot("b", "m1", serves=("m1", "m2", "out")))
+    )
+    assert waits_of(Run(cell), IN_TURN) == (NO_WAIT, NO_WAIT, Wait(0.0, 22.0), NO_WAIT, NO_WAIT, NO_WAIT)
+    picks_s = [(move.pick_s, move.drop_s) for move in follow(cell, IN_TURN).moves]
+    assert picks_s == [(0, 2), (12, 14), (3, 27), (34, 36), (37, 39), (59, 61)]
+    found = cp_sat(cell)
+    assert (found.status, found.cost) == ("optimal", 61.0)
+    assert simulate(cell, found.sequence).makespan_s == 61.0
+
+
+def test_a_server_begins_late_so_that_the_next_one_is_free_in_time(slow_second: Cell) -> None:
+    """Nobody carries: 1 is in m1 until 10 s and in m2 until 30 s, so 2 begins in m1 at 20 s."""
+    machines = [replace(one, capacity=UNLIMITED, servers=1) for one in slow_second.stations[1:3]]
+    stations, route = (
+        (slow_second.stations[0], *machines, slow_second.stations[-1]),
+        (Stage("in"), Stage("m1"), Stage("m2")),
+    )
+    cell = replace(slow_second, stations=stations, products=(Product("toast", (route,)),), robots=())
+    assert waits_in(Run(cell), (1, 1, 2, 2)) == (NO_WAIT, NO_WAIT, Wait(10.0, 0.0), NO_WAIT)
+    assert [move.end_s for move in follow(cell, (1, 1, 2, 2)).moves] == [10.0, 30.0, 30.0, 50.0]
+    assert (found := cp_sat(cell)).status == "optimal"
+    assert found.cost == 50.0
+
+
+@settings(max_examples=60, deadline=None)
+@given(data=st.data())
+def test_all_again_until_none_is_late_and_the_network_come_to_the_same(cells: Cells, data: DataObject) -> None:
+    """Of one robot, any list: what times several robots has a solution where the network has, and the same earliest ends."""
+    cell = data.draw(cells(many=True, max_parts=4, windows=True))
+    run = Windowless(cell)
+    found = list[int]()
+    while allowed := run.allowed():
+        found.append(data.draw(st.sampled_from(allowed)))
+        run.move(found[-1])
+    both = waits_of(Run(cell), found), waits_of_several(Run(cell), found, 0.0)
+    assert (both[0] is None) == (both[1] is None)
+    ends_s = []
+    for waits in both:
+        timed = Windowless(cell)
+        ends_s.append([timed.move(*one).drop_s for one in zip(found, waits or (), strict=False)])
+    assert ends_s[0] == pytest.approx(ends_s[1], abs=1e-5)
 
 
 def test_where_parts_come_after_a_pick_none_is_put_off(slow_second: Cell) -> None:

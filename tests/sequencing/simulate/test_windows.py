@@ -22,6 +22,7 @@ from lab.sequencing.methods.cp_sat import cp_sat
 from lab.sequencing.methods.exact import optimum
 from lab.sequencing.methods.lower_bound import LowerBound
 from lab.sequencing.methods.many_sessions import evaluate
+from lab.sequencing.methods.srl_time import TimeLearner
 from lab.sequencing.search import Search
 from lab.sequencing.simulate import kernels
 from lab.sequencing.simulate.cell_arrays import cell_arrays, run_arrays
@@ -200,6 +201,21 @@ def test_every_sequencer_keeps_the_windows(toast_cell: CellMaker, name: str) -> 
     found = SEQUENCERS[name](cell, Search(60), np.random.default_rng(0))
     assert simulate(cell, found.sequence).makespan_s == pytest.approx(found.cost)
     assert found.cost >= optimum(cell).cost
+
+
+@settings(max_examples=30, deadline=None)
+@given(data=st.data(), objective=st.sampled_from(["makespan", "mean-tardiness"]))
+def test_what_srl_time_learns_keeps_the_windows(cells: Cells, data: DataObject, objective: str) -> None:
+    """Each episode, also where parts are told apart: one that waited too long stays where another one may go on."""
+    cell = data.draw(cells(many=True, max_parts=4, windows=True))
+    learner = TimeLearner(cell, objective, np.random.default_rng(0))
+    for _ in range(5):
+        sequence, worth, done = learner.episode()
+        run = Run(cell)
+        for decision in sequence:
+            run.move(decision)
+        assert run.done == done
+        assert cost(run, objective) == pytest.approx(worth)
 
 
 def test_a_list_that_spoils_by_chance_is_stuck_then(toast_cell: CellMaker) -> None:
