@@ -14,7 +14,7 @@ from lab.production.faults.injector import Injector
 from lab.production.floor import Floor
 from lab.production.machine import NEVER
 from lab.production.outcome import Outcome
-from lab.production.perception import Deviation, scene_seen
+from lab.production.perception import Deviation, moved_off, scene_seen
 from lab.production.recorder import burnt_name, finish_name
 from lab.production.recovery import Recovery
 from lab.production.relearning import Relearner, adopt
@@ -140,10 +140,16 @@ class Production:
         work.go_by(in_another(work.plan, cell))
 
     def watch(self) -> None:
-        """After each physics step: tell of machines that are done, and show what they have done to their parts."""
+        """After each physics step: tell of machines that are done, and show what they have done to their parts.
+
+        A machine is never done with a part that is seen not to stand in it.
+        """
         floor, now_s = self.floor, self.floor.now_s
         for work in (work for machine in floor.machines.values() for work in machine.works.values()):
             if not work.told and work.done(now_s):
+                if not floor.world.dark and moved_off(floor, work.part, self.work.spot_of.get(work.part)):
+                    work.until_s = NEVER
+                    continue
                 work.told = True
                 if work.skill is not None:
                     work.until_s = now_s

@@ -94,10 +94,10 @@ def _parts(floor: Floor, task: Task, spot_of: Mapping[str, Spot], delivered: Con
                 yield Deviation("part moved", body, words, where, at, far)
 
 
-def moved_unseen(floor: Floor, name: str, spot: Spot | None) -> bool:
-    """Whether a part is not on its spot any more and the camera sees nothing: it is found only where it was set down."""
+def moved_off(floor: Floor, name: str, spot: Spot | None) -> bool:
+    """Whether a part is not on its spot any more, seen or unseen: unseen it is found only where it was set down."""
     x, y, _ = floor.world.pose(name)[0]
-    return spot is not None and floor.world.dark and hypot(float(x) - spot.x, float(y) - spot.y) > PART_M
+    return spot is not None and hypot(float(x) - spot.x, float(y) - spot.y) > PART_M
 
 
 def _held(floor: Floor) -> set[str]:

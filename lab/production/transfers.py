@@ -8,7 +8,7 @@ from math import hypot
 from lab.production.durations import TimedMove
 from lab.production.floor import Floor
 from lab.production.machine import Work
-from lab.production.perception import moved_unseen
+from lab.production.perception import moved_off
 from lab.production.standing import free_spot, set_down, spots_aside, station_near
 from lab.production.trouble import Trouble
 from lab.sequencing.cell.cell import Cell
@@ -432,7 +432,7 @@ class Transfers:
     def _take_up(self, name: str, way: Carried, spot: Spot) -> None:
         """Take a part up: by the way of the station that it stands near to, or of its own where it stands astray."""
         bench, skillset, body = self.floor.bench, self.floor.skillset, self.floor.scene.body_of(name, way.kind)
-        if moved_unseen(self.floor, name, self.spot_of.get(name)):
+        if self.floor.world.dark and moved_off(self.floor, name, self.spot_of.get(name)):
             raise Trouble(f"{name} is not where it was, and the camera sees nothing", name, way.origin)
         self.look()  # before the arm goes down to where it is believed
         near = station_near(bench, body, way, skillset)

@@ -47,8 +47,8 @@ class RobotSettings(Record):
     acceleration_m_s2: Annotated[float, Field(ge=0.01, le=10)] = 2.0
     """How fast the tool gains and loses speed, at most [m/s2]."""
     grip_force_n: Annotated[float, Field(gt=0, le=STRONGEST_N)] | None = None
-    """With what force each finger presses, at most [N], such as `25.0`: a part that is light for it is held with 1000
-    N/kg. Left out, it is chosen for each kind of part from its mass and friction.
+    """With what force each finger presses, at most [N], such as `25.0`: a part that would creep is held more
+    gently. Left out, it is chosen for each kind of part from its mass, size and friction.
     """
     force_limit_n: Annotated[float, Field(ge=10, le=5000)] | None = None
     """With what force the arm may press on something hard before a protective stop holds it [N], such as `150.0`; left

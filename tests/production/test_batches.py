@@ -6,11 +6,13 @@ import pytest
 
 from lab.export.commands import Reset, Start, jobs_of
 from lab.production.composer import carry_out
+from lab.production.conditions import Conditions
 from lab.production.durations import cell_of, measure
 from lab.sequencing.methods.exact import optimum
 from lab.sequencing.simulate.follow import simulate
 from lab.skills.new_cell import new_cell
 from lab.skills.prepared_scene import Prepared, prepare
+from lab.tasks.fault_fields import FaultFields
 from lab.tasks.new_task import new_task
 from lab.tasks.task_file import load
 from lab.teaching.events import Event, MachineBegan
@@ -61,3 +63,15 @@ def test_parts_one_by_one_are_batches_of_one(oven_of_two: Prepared) -> None:
     assert (outcome.failure, outcome.delivered) == (None, (1, 2, 3))
     rows = {one.part: one.start_s for one in outcome.schedule.machines if one.kind == "process"}
     assert rows[1] < rows[2] == rows[3]
+
+
+def test_what_is_moved_out_of_a_batch_just_before_its_end_is_put_back(oven_of_two: Prepared) -> None:
+    """The batch ends 60 s after box 2 has come, at 84.4 s; once it counted as done, and only the audit found that it was not."""
+    cell = cell_of(oven_of_two.task, measure(oven_of_two), oven_of_two.order)
+    moved = {"what": "part moved", "part": "box 1", "at_s": 83.1, "when": "in machine", "by_m": [0.0, 0.25]}
+    conditions = Conditions(faults=(FaultFields.model_validate(moved),))
+    outcome, _ = carry_out(oven_of_two, cell, (1, 2, 1, 2, 3, 3), conditions)
+    assert [one.undone for one in outcome.happened] == [True]
+    assert (outcome.failure, outcome.delivered) == (None, (1, 2, 3))
+    assert outcome.audit is not None
+    assert outcome.audit.findings == ()

@@ -19,9 +19,12 @@ GRAVITY_M_S2 = 9.81
 SLOW = 0.6  # of the robot's speed and acceleration, as skills rise with a part
 MARGIN = 6.0  # times what friction needs a force is chosen; measured: with 2.5 parts are lost where they touch machines
 USUAL_N = 25.0  # chosen where friction needs less, unless a part is lighter than this is gentle to
-GENTLE_N_KG = 1000.0  # at most for each kilogram: pressed harder, light parts creep in physics, or are squeezed out
-GENTLE_ROUND_N_KG = (
-    150.0  # the same of a cylinder or a hull, touched in lines and points; picked among twenty drawn parts
+GENTLE_N_KG = 1000.0  # at most for each kilogram: pressed harder, parts creep in physics, or are squeezed out
+GENTLER_N_KG = (
+    150.0  # the same of what is round, touched in lines and points, and of light, slippery and unsteady boxes
+)
+STEADY_M = (
+    0.012  # friction times the radius of gyration; measured: with 0.010 boxes of 3 cm creep, with 0.014 none does
 )
 GENTLE_N, USUAL_KG = 50.0, (0.02, 0.35)  # with a stronger grip, or others, forces are not found in a usual step
 STAYS = 2.0  # times the acceleration friction holds a part on a pallet that is far from sliding off
@@ -33,7 +36,8 @@ class Load:
     """A part in the gripper, or a pallet with what stands on it: its mass, and the friction where the fingers touch it.
 
     lever_m: from the finger tips up or down to its middle. solid: what the fingers touch, for physics. carries: the friction,
-    of both, by which the part stays on its pallet; endless where nothing rides.
+    of both, by which the part stays on its pallet; endless where nothing rides. gyration_m: radius about the axis along
+    which the fingers close.
     """
 
     name: str
@@ -42,6 +46,7 @@ class Load:
     lever_m: float = 0.0
     carries: float = inf
     solid: ShapeKind = "box"
+    gyration_m: float = inf
 
     @classmethod
     def of(cls, kind: Kind) -> "Load":
@@ -53,7 +58,7 @@ class Load:
             foot_m += one.height_m
         carries = inf if kind.rider is None else kind.part.friction * kind.rider.part.friction
         lever_m = abs(moment / mass_kg - kind.grip.up_m)
-        return cls(kind.name, mass_kg, kind.part.friction, lever_m, carries, kind.shape.solid)
+        return cls(kind.name, mass_kg, kind.part.friction, lever_m, carries, kind.shape.solid, kind.gyration_m)
 
     def needs_n(self, acceleration_m_s2: float) -> float:
         """The least force [N] of each finger that friction needs to lift it; endless for what has none."""
@@ -69,8 +74,8 @@ class Load:
         return self.mass_kg * hypot(GRAVITY_M_S2, acceleration_m_s2, turning) / (2 * self.friction)
 
     def held_n(self, asked_n: float, acceleration_m_s2: float) -> float:
-        """The force [N] with which it is held when one is asked for: gentler where it is light, and friction needs less."""
-        gentle_n_kg = GENTLE_N_KG if self.solid == "box" else GENTLE_ROUND_N_KG
+        """The force [N] with which it is held when one is asked for: gentler where it would creep, and friction needs less."""
+        gentle_n_kg = GENTLE_N_KG if self._is_firm and self.mass_kg >= USUAL_KG[0] else GENTLER_N_KG
         return min(asked_n, max(MARGIN * self.needs_n(acceleration_m_s2), gentle_n_kg * self.mass_kg))
 
     def chosen_n(self, acceleration_m_s2: float) -> float:
@@ -83,7 +88,12 @@ class Load:
         strong = force_n >= MARGIN * self.needs_n(acceleration_m_s2)
         gentle = USUAL_KG[0] <= self.mass_kg <= USUAL_KG[1] and force_n <= GENTLE_N
         rides = self.carries * GRAVITY_M_S2 >= STAYS * acceleration_m_s2
-        return strong and gentle and rides and self.friction >= ROUGH and self.solid != "mesh"
+        return strong and gentle and rides and (self._is_firm or (self.solid == "cylinder" and self.friction >= ROUGH))
+
+    @property
+    def _is_firm(self) -> bool:
+        """Whether it is a box with so much friction and so large that pressing does not make it creep or turn."""
+        return self.solid == "box" and self.friction >= ROUGH and self.friction * self.gyration_m >= STEADY_M
 
 
 def grip_force_n(robot: RobotSettings, load: Load) -> float:

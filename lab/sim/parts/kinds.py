@@ -13,6 +13,7 @@ from lab.sim.arms.gripper import Gripper
 from lab.sim.arms.kinematics import ToolPose
 from lab.sim.parts.grip import Grip, grip_of
 from lab.sim.parts.part_shape import PartShape, shape_of
+from lab.sim.urdf_reader import rotation
 from lab.tasks.task import Task
 from lab.tasks.task_fields import Part
 
@@ -51,6 +52,12 @@ class Kind:
     def height_m(self) -> float:
         """From the foot to the top."""
         return sum(kind.shape.height_m for kind in self.stack())
+
+    @property
+    def gyration_m(self) -> float:
+        """The radius of gyration [m] about the axis along which the fingers close, of what they hold alone."""
+        across = np.array([-sin(self.grip.yaw), cos(self.grip.yaw), 0.0]) @ rotation(self.shape.turn)
+        return float(np.sqrt(across**2 @ self.shape.inertia_m2))
 
     def stack(self) -> "list[Kind]":
         """What stands on one another, from the foot upwards: the part itself, or its pallet and the part."""

@@ -42,7 +42,8 @@ def test_pads_hold_force_and_moment_of_what_is_swung() -> None:
     ("mass_kg", "friction", "force_n"),
     [
         (0.04, 0.8, 25.0),  # needs 0.28 N: as usual
-        (0.01, 0.8, 10.0),  # 1000 N/kg
+        (0.01, 0.8, 1.5),  # light: 150 N/kg
+        (0.1, 0.4, 15.0),  # slippery
         (1.0, 0.5, 6 * 11.01),
         (6.0, 0.2, 200.0),  # needs 165 N: with less of a margin
     ],
@@ -55,13 +56,28 @@ def test_where_nothing_is_said_the_force_is_chosen(mass_kg: float, friction: flo
     ("mass_kg", "friction", "force_n"),
     [
         (5.0, 0.8, 30.0),
-        (0.01, 0.8, 10.0),  # light: 1000 N/kg
+        (0.01, 0.8, 1.5),  # light: 150 N/kg
         (0.01, 0.02, 6 * 0.01 * 11.01 / 0.04),  # and slippery
         (0.01, 0.0, 30.0),
     ],
 )
 def test_a_force_that_the_task_gives_is_the_most(mass_kg: float, friction: float, force_n: float) -> None:
     assert grip_force_n(robot_of(30.0), Load("box", mass_kg, friction)) == pytest.approx(force_n)
+
+
+@pytest.mark.parametrize(
+    ("gyration_m", "friction", "force_n", "usual"),
+    [
+        (0.0152, 0.8, 20.0, True),  # 0.8 x 1.52 cm are 1.2 cm
+        (0.0148, 0.8, 3.0, False),  # 150 N/kg
+        (0.0148, 1.0, 20.0, True),
+        (0.0152, 0.5, 3.0, False),
+    ],
+)
+def test_a_small_box_is_held_gently_and_finely(gyration_m: float, friction: float, force_n: float, usual: bool) -> None:
+    load = Load("lid", 0.02, friction, gyration_m=gyration_m)
+    assert grip_force_n(robot_of(), load) == pytest.approx(force_n)
+    assert load.is_usual(force_n, 2.0) == usual
 
 
 @pytest.mark.parametrize(

@@ -29,7 +29,7 @@ def kinds(fms: Task) -> dict[str, Kind]:
 
 @pytest.fixture(scope="module")
 def sign(kinds: dict[str, Kind]) -> Kind:
-    """A box, 60 mm long, 12 mm wide and 50 mm high."""
+    """A box, 60 mm long, 18 mm wide and 44 mm high."""
     return kinds["sign"]
 
 
@@ -43,6 +43,12 @@ def test_a_part_is_held_where_its_grip_says(sign: Kind) -> None:
     pose = gripped(sign, x=0.01).held_at(Spot(0.5, 0.1, 0.3, QUARTER))
     assert (pose.x, pose.y, pose.z, pose.yaw) == pytest.approx((0.5, 0.11, 0.32, QUARTER))
     assert gripped(sign, yaw=0.4).held_at(Spot(0.5, 0.1, 0.3, 0.3)).yaw == pytest.approx(0.7)
+
+
+def test_the_radius_of_gyration_is_that_about_the_way_the_fingers_close(sign: Kind) -> None:
+    """60 x 18 x 44 mm: across its width sqrt((60^2 + 44^2) / 12) = 21.5 mm, along its length sqrt((18^2 + 44^2) / 12) = 13.7."""
+    assert gripped(sign).gyration_m == pytest.approx(0.0215, abs=1e-4)
+    assert gripped(sign, yaw=QUARTER).gyration_m == pytest.approx(0.0137, abs=1e-4)
 
 
 @given(spots, angles, st.floats(-0.1, 0.1), st.floats(-0.1, 0.1))

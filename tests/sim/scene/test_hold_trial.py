@@ -4,6 +4,7 @@ import pytest
 
 from lab.errors import BadInput
 from lab.sim.arms.arm_models import arm_of
+from lab.sim.parts.holding import Load, grip_force_n, needs_fine
 from lab.sim.parts.kinds import kinds_of
 from lab.sim.scene import hold_trial
 from lab.sim.scene.hold_trial import Trial, check_held, tried
@@ -44,6 +45,17 @@ def test_a_heavy_slice_is_held_by_the_force_that_is_chosen(arm: str) -> None:
 def test_a_light_and_slippery_slice_is_not_squeezed_out() -> None:
     """It is held with 3 N; with the 100 that are given it was lost as it was lifted, between tapered fingers."""
     check(load("toast-panda"), 100.0, mass_kg=0.003, friction=0.06)
+
+
+@pytest.mark.parametrize("size_m", [(0.03, 0.03, 0.012), (0.04, 0.03, 0.014), (0.03, 0.03, 0.03)])
+def test_a_small_box_does_not_creep(size_m: tuple[float, float, float]) -> None:
+    """Held with 20 N, of 20 g, each crept 8 mm or more on its way, or was lost."""
+    task = load("palletise")
+    part = task.parts[0].model_copy(update={"size_m": size_m, "mass_kg": 0.02})
+    arm, robot = arm_of(task.robot), task.robot
+    kind = kinds_of(task.changed(parts=(part, *task.parts[1:])), arm.gripper)[part.name]
+    force_n = grip_force_n(robot, Load.of(kind))
+    assert tried(Trial(arm, kind, force_n, 0.5, 2.0, needs_fine(robot, [kind]), laps=2)) == ""
 
 
 def test_a_slice_that_slips_when_it_is_swung_is_refused() -> None:
