@@ -60,7 +60,7 @@ class RunOptions(SessionOptions):
         return asdict(self) | {"task": whole_path(self.task), "advisors": [recorded_whole(a) for a in self.advisors]}
 
     def ordered(self, task: Task) -> tuple[str, ...]:
-        """The parts of the order, by their kinds; BadInput, too, for words on their order that do not go together or cannot be."""
+        """The parts of the order, by their kinds; BadInput, too, for words on their order that cannot be, or not together."""
         if self.cyclic and self.order is not None:
             raise BadInput(f"--cyclic and --order {self.order}: an order is one or the other")
         order = task.ordered(self.toasts, self.parts)

@@ -155,7 +155,11 @@ PLATE, BUFFER = "pose = [0.0, 0.80, 0.0]", "pose = [0.42, 0.56, 0.0]"
             "capacity = 2",
             "t.toml: line 47: station 'plate': capacity = 2: 3 slices (the sum of their counts) begin or end there, wanted",
         ),
-        ("processing_s = 60.0", "processing_s = -1.0", "t.toml: line 60: stations.2.processing_s of station 'toaster': "),
+        (
+            "processing_s = 60.0",
+            "processing_s = -1.0",
+            "t.toml: line 60: stations.2.processing_s of station 'toaster': ",
+        ),
         (
             'station = "toaster"',
             'station = "toster"',
