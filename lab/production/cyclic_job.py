@@ -9,6 +9,7 @@ from typing import Any
 
 from lab.errors import BadInput, LabError
 from lab.production.cyclic_order import check_parts, cycle_document, mix_of
+from lab.production.order import check_order
 from lab.production.run import teach_all
 from lab.sequencing.cell.cell import MAX_PARTS, Cell
 from lab.sequencing.cyclic.cycle import Cycle
@@ -66,6 +67,8 @@ def cyclic_named(name: str, wanted: CyclicWanted, teacher: Teacher, files: dict[
     parts = len(mix) if named and wanted.parts_per_cycle is None else wanted.parts_per_cycle
     if parts is not None:
         check_parts(parts, mix, cyclic=True)
+    if isinstance(loaded, Task):
+        check_order(loaded, mix, None, cyclic=True)
     most = max(FEWEST_CYCLES, ceil(own / len(mix))) * len(mix)
     cell = _largest(lambda parts: _cell(loaded, mix, parts, teacher), most, len(mix))
     teacher.tell(PhaseBegan("sequence", 1))

@@ -319,6 +319,17 @@ def cell_of(task: Task, durations: Durations, order: Order) -> Cell:
     )
 
 
+def untimed(task: Task, order: Order) -> Cell:
+    """The sequencing problem before anything is timed, every move taking 1 s and nothing having a window: what an order may do.
+
+    With one robot that hangs on no other time. BadInput, with its place in the file, for a task that makes no such problem.
+    """
+    with task.in_its_file():
+        skillset = SkillSet.of(task, order)
+        once = Durations(dict.fromkeys(skillset.travels, 1.0), dict.fromkeys(skillset.legs, 1.0), {})
+        return cell_of(task, once, order).without_windows
+
+
 def kept_durations(toolbox: Toolbox, key: str, skillset: SkillSet) -> Durations | None:
     """The durations kept under a key, None when there are none; BadInput for a record that does not hold them."""
     record = toolbox.load_record(RECORDS, key)

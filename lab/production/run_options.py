@@ -60,12 +60,16 @@ class RunOptions(SessionOptions):
         return asdict(self) | {"task": whole_path(self.task), "advisors": [recorded_whole(a) for a in self.advisors]}
 
     def ordered(self, task: Task) -> tuple[str, ...]:
-        """The parts of the order, by their kinds; BadInput, too, where the words on their order do not go together."""
+        """The parts of the order, by their kinds; BadInput, too, for words on their order that cannot be, or not together."""
         if self.cyclic and self.order is not None:
             raise BadInput(f"--cyclic and --order {self.order}: an order is one or the other")
         order = task.ordered(self.toasts, self.parts)
         if self.parts_per_cycle is not None:
             check_parts(self.parts_per_cycle, mix_of(order), self.cyclic)
+        if self.order is not None or self.cyclic:
+            from lab.production.order import check_order  # and with it all that finds one
+
+            check_order(task, order, self.order, self.cyclic)
         return order
 
     def lessons(self) -> LessonOptions:

@@ -69,11 +69,15 @@ class AroundPart(Skill):
         return self.surveys.approach(self.station)
 
     def down(self, bench: Bench, policy: "Policy", goal: ToolPose) -> Iterator[None]:
-        """Above the part, or ahead of it where it is taken from the side, and along the learned cells to the tool pose `goal`."""
+        """Above the part, or ahead of it where it is taken from the side, and to the tool pose `goal`
+        as the learned cells lead, straight where that is free.
+        """
         robot, mdp = bench.scene.robot, self.problem.mdp
         entry = entry_cell(goal, robot.tool(), self.surveys.into(self.station) is not None)[: len(mdp.shape)]
         path = learned_path(policy, mdp, int(np.ravel_multi_index(entry, mdp.shape)))
-        poses = [self.pose(state, goal) for state in path]
+        cells = tuple(mdp.state_cell(state) for state in path)
+        kept = self.surveys.around_corners(self.station, self.kind, self.carries, cells)
+        poses = [self.pose(path[n], goal) for n in kept]
         high = max(robot.tool().z, poses[0].z)
         yield from robot.follow([ToolPose(poses[0].x, poses[0].y, high, poses[0].yaw)], slow=SLOW)
         yield from robot.follow(poses, blend=_BLEND_M, slow=SLOW)

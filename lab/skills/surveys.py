@@ -17,6 +17,7 @@ from lab.sim.scene.scene_check import places_of
 from lab.sim.world import World
 from lab.skills.camera_grids import RELEASE_ABOVE, TOUCH_CLEARANCE, SurveyedGrid
 from lab.skills.once import Made, once
+from lab.skills.shortcuts import corners
 from lab.tasks.task import Order, Task
 from lab.tasks.task_fields import CameraGrid
 from lab.workers import Workers
@@ -34,6 +35,7 @@ OUT_M = NEAR_STEP_M[2] * (
 LIFT_M = 0.006  # a part is lifted so high before it is taken out to the side
 _TRAVEL_MARGIN = 0.01  # [m] beyond half a cell: a move between free cells then touches nothing
 _DOCK_CLEARANCE = 0.012  # [m]
+_NEAR_STEP_M = 0.003  # lines around a part are looked at so often
 FINGER_SHARE = 0.6  # of the room between an open finger and a wide part: as near may the finger come
 INSERT = "insert"  # the start of a camera's grid, as a place that transfers lead to
 
@@ -96,14 +98,27 @@ class Surveys:
     def workspace(self, carried: str) -> Survey:
         grid = self.task.workspace
         with World() as world:
-            scene = self._cell(world)
-            surveyor = Surveyor(scene, carried or None, clearance=max(grid.cell_m) / 2 + _TRAVEL_MARGIN)
-            survey = surveyor.grid(grid.shape, self.cell_pose)
+            survey = self._traveller(world, carried).grid(grid.shape, self.cell_pose)
         for cell in np.ndindex(*grid.shape):
-            pose = self.cell_pose(cell)
-            if pose.x < 0 and abs(pose.y) <= grid.cell_m[1] / 2 + 1e-9 and not survey.causes[cell]:
-                survey.causes[cell] = OUT_OF_REACH  # no arm turns through there, from one side of itself to the other
+            if self._is_behind(self.cell_pose(cell)) and not survey.causes[cell]:
+                survey.causes[cell] = OUT_OF_REACH
         return survey
+
+    @once
+    def travel_corners(self, carried: str, path: tuple[ToolPose, ...]) -> tuple[int, ...]:
+        """Which poses of a path through the workspace are left when the tool goes straight where that is as free as cells are."""
+        with World() as world:
+            surveyor, step_m = self._traveller(world, carried), min(self.task.workspace.cell_m) / 2
+            return corners(path, step_m, lambda line: not any(map(self._is_behind, line)) and surveyor.free(line))
+
+    def _traveller(self, world: World, carried: str) -> Surveyor:
+        """It wants as much room around the tool that moves between free cells touch nothing."""
+        clearance = max(self.task.workspace.cell_m) / 2 + _TRAVEL_MARGIN
+        return Surveyor(self._cell(world), carried or None, clearance=clearance)
+
+    def _is_behind(self, pose: ToolPose) -> bool:
+        """Whether it is behind the arm, where none turns through, from one side of itself to the other."""
+        return pose.x < 0 and abs(pose.y) <= self.task.workspace.cell_m[1] / 2 + 1e-9
 
     @once
     def dock(self, place: str, carried: str) -> Cell:
@@ -185,25 +200,37 @@ class Surveys:
     @once
     def around(self, station_name: str, kind: str, loaded: bool) -> Survey:
         """Around the part that stands (or, loaded, is to stand) on a station's first spot, with neighbours on all sides."""
-        station, own = self.task.station(station_name), self.kinds[kind]
-        spot = self.places.spots(station, kind)[0]
         with World() as world:
-            scene = Scene(world, self.task, (), Layout(self.layout.obstacles, ()))
-            for name, (neighbour, other) in self.places.neighbours(station, spot).items():
-                self._stand(scene, name, neighbour, other)
-            foot = self.places.raised(kind, station, spot)
-            if foot != spot:
-                self._stand(scene, "the part", str(self.task.part(kind).pallet), spot)
-            goal = own.held_at(foot)
-            if loaded:
-                goal = goal.shifted(dz=RELEASE_ABOVE)
-            else:
-                self._stand(scene, "the part", kind, foot)
-            beside_finger = (scene.robot.arm.gripper.opening_m - own.grip.width_m) / 2
-            clearance = min(TOUCH_CLEARANCE[loaded], FINGER_SHARE * beside_finger)
-            surveyor = Surveyor(scene, kind if loaded else None, clearance=clearance)
+            surveyor, goal = self._around(world, station_name, kind, loaded)
             shape = NEAR_SHAPE if loaded else (*NEAR_SHAPE, NEAR_YAWS)
             return surveyor.grid(shape, lambda cell: near_pose(goal, cell, self.into(station_name)))
+
+    @once
+    def around_corners(self, station: str, kind: str, loaded: bool, cells: tuple[Cell, ...]) -> tuple[int, ...]:
+        """Which of the cells of a path around a part are left when the tool goes straight where that is as free as cells are."""
+        with World() as world:
+            surveyor, goal = self._around(world, station, kind, loaded)
+            path = [near_pose(goal, cell, self.into(station)) for cell in cells]
+            return corners(path, _NEAR_STEP_M, surveyor.free)
+
+    def _around(self, world: World, station_name: str, kind: str, loaded: bool) -> tuple[Surveyor, ToolPose]:
+        """What surveys around a part, and where the tool closes or opens."""
+        station, own = self.task.station(station_name), self.kinds[kind]
+        spot = self.places.spots(station, kind)[0]
+        scene = Scene(world, self.task, (), Layout(self.layout.obstacles, ()))
+        for name, (neighbour, other) in self.places.neighbours(station, spot).items():
+            self._stand(scene, name, neighbour, other)
+        foot = self.places.raised(kind, station, spot)
+        if foot != spot:
+            self._stand(scene, "the part", str(self.task.part(kind).pallet), spot)
+        goal = own.held_at(foot)
+        if loaded:
+            goal = goal.shifted(dz=RELEASE_ABOVE)
+        else:
+            self._stand(scene, "the part", kind, foot)
+        beside_finger = (scene.robot.arm.gripper.opening_m - own.grip.width_m) / 2
+        clearance = min(TOUCH_CLEARANCE[loaded], FINGER_SHARE * beside_finger)
+        return Surveyor(scene, kind if loaded else None, clearance=clearance), goal
 
     def check_free(self, what: str, poses: Sequence[ToolPose]) -> None:
         """BadInput when the empty tool cannot be at one of these poses, naming what is in the way."""

@@ -89,14 +89,13 @@ class Transfer(Skill):
         return what, f"the end of its way{', where the camera takes over' if camera else f' over {plain(self.target)}'}"
 
     def motion(self, bench: Bench, policy: "Policy") -> Iterator[None]:
-        """Along the learned cells from where the tool is, then to the target's approach."""
-        mdp = self.problem.mdp
+        """From where the tool is to the target's approach, as the learned cells lead, straight where that is free."""
+        mdp, robot = self.problem.mdp, bench.scene.robot
         poses = [self.pose(state) for state in learned_path(policy, mdp, mdp.start)]
-        end = self.surveys.approach(self.target)
-        robot = bench.scene.robot
-        yield from robot.follow(
-            [_still(robot.tool(), poses[0]), *poses, ToolPose(end.x, end.y, end.z, 0.0)], blend=_BLEND_M
-        )
+        begin, end = self.surveys.approach(self.origin), self.surveys.approach(self.target)
+        path = (_still(begin, poses[0]), *poses, _still(end, poses[-1]))
+        _, *kept = self.surveys.travel_corners(self.kind, path)
+        yield from robot.follow([_still(robot.tool(), poses[0]), *(path[n] for n in kept)], blend=_BLEND_M)
         if end.yaw:
             yield from robot.follow([end])
         grid = grid_of(self.surveys.task, self.target)

@@ -33,7 +33,7 @@ class CellFile(CellFields):
         try:
             found = cls.model_validate(toml.raw)
         except ValidationError as error:
-            raise toml.refusal(finding(error)["loc"], explain(error, partial(fields_at, cls))) from None
+            raise toml.refusal(finding(error)["loc"], explain(error, partial(fields_at, cls), raw=toml.raw)) from None
         found._toml = toml
         found.cell()
         return found

@@ -186,7 +186,7 @@ def _checked(model: type[Checked], toml: TomlText, raw: dict[str, Any]) -> Check
         return model.model_validate(raw)
     except ValidationError as error:
         first = finding(error)
-        said = explain(error, partial(fields_at, model), partial(own_loc, toml.raw))
+        said = explain(error, partial(fields_at, model), partial(own_loc, toml.raw), toml.raw)
         at = first["loc"]
         if first["type"] in _OF_WHOLE:
             at = at + within(raw, at, first["msg"]) if at else loc_of(raw, first["msg"])

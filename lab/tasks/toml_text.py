@@ -220,20 +220,29 @@ def finding(error: ValidationError) -> "ErrorDetails":
     return next((one for one in findings if one["type"] in _NO_SUCH_KEY), findings[0])
 
 
-def explain(error: ValidationError, fields: Fields | None = None, own: Callable[[Loc], Loc] = tuple) -> str:
+def explain(
+    error: ValidationError, fields: Fields | None = None, own: Callable[[Loc], Loc] = tuple, raw: Any = None
+) -> str:
     """The first finding of a validation as one line: the field, the bad value, what is allowed; and how many more there are.
 
-    fields: those of the record to which a way leads, to say which one may have been meant; own: the way as the file has it.
+    fields: those of the record to which a way leads, to say which one may have been meant; own: the way as the file has it;
+    raw: the file's values, to say the name of what the field is of.
     """
     findings, first = error.errors(), finding(error)
-    where = ".".join(str(part) for part in own(first["loc"]))
-    message = _WORDS.get(first["type"], first["msg"].removeprefix("Value error, "))
+    loc, message = first["loc"], _WORDS.get(first["type"], first["msg"].removeprefix("Value error, "))
+    if first["type"] == "missing" and loc and isinstance(loc[-1], int):
+        loc, short = loc[:-1], [one for one in findings if one["type"] == "missing" and one["loc"][:-1] == loc[:-1]]
+        findings = [one for one in findings if one not in short[1:]]
+        message = f"wanted a list of {1 + max(int(one['loc'][-1]) for one in short)}"
+    elif first["type"] == "too_long" and isinstance(first["input"], tuple):
+        message = f"wanted a list of {first['ctx']['max_length']}"
+    where = ".".join(map(str, own(loc))) + _whose(raw, own(loc))
     if first["type"] in _NO_SUCH_KEY:
         message = "there is no such key"
         known = fields(first["loc"][:-1]) if fields else []
         if near := get_close_matches(str(first["loc"][-1]), known, n=1):
             message += f", did you mean '{near[0]}'?"
-    got = repr(first["input"])
+    got = repr([*first["input"]] if isinstance(first["input"], tuple) else first["input"])
     got = got if len(got) <= _MOST_SHOWN else f"{got[:_MOST_SHOWN]} ..."
     shown = "" if isinstance(first["input"], dict) or not where else f" (got {got})"
     if first["type"] == "literal_error":
@@ -242,3 +251,16 @@ def explain(error: ValidationError, fields: Fields | None = None, own: Callable[
     more = f" (and {len(findings) - 1} more)" if len(findings) > 1 else ""
     of_whole = first["type"] == "value_error" and first["loc"][-1:] and isinstance(first["loc"][-1], int)
     return f"{where + ': ' if where and not of_whole else ''}{message}{shown}{more}"
+
+
+def _whose(raw: Any, loc: Loc) -> str:
+    """The name of the innermost table of an array that a way leads through, as in " of station 'oven'"; "": it has none."""
+    name = ""
+    for before, part, after in zip(("", *loc), loc, (*loc[1:], ""), strict=False):
+        try:
+            raw = raw[part]
+        except (TypeError, LookupError):
+            break
+        if isinstance(part, int) and isinstance(raw, dict) and isinstance(raw.get("name"), str) and after != "name":
+            name = f" of {str(before).removesuffix('s')} {raw['name'][:_MOST_SHOWN]!r}"
+    return name

@@ -148,14 +148,18 @@ PLATE, BUFFER = "pose = [0.0, 0.80, 0.0]", "pose = [0.42, 0.56, 0.0]"
         (
             "capacity = 4",
             "capacity = 0",
-            "t.toml: line 53: stations.1.capacity: Input should be greater than or equal to 1",
+            "t.toml: line 53: stations.1.capacity of station 'toaster_buffer': Input should be greater than or equal to 1",
         ),
         (
             "capacity = 50",
             "capacity = 2",
             "t.toml: line 47: station 'plate': capacity = 2: 3 slices (the sum of their counts) begin or end there, wanted",
         ),
-        ("processing_s = 60.0", "processing_s = -1.0", "t.toml: line 60: stations.2.processing_s: "),
+        (
+            "processing_s = 60.0",
+            "processing_s = -1.0",
+            "t.toml: line 60: stations.2.processing_s of station 'toaster': ",
+        ),
         (
             'station = "toaster"',
             'station = "toster"',
@@ -182,7 +186,7 @@ PLATE, BUFFER = "pose = [0.0, 0.80, 0.0]", "pose = [0.42, 0.56, 0.0]"
             "height_m = 0.1",
             "t.toml: line 71: station 'toaster': grid.height_m 0.1: a carried slice would hit it",
         ),
-        ("mass_kg", "weight", "t.toml: line 20: parts.0.weight: there is no such key"),
+        ("mass_kg", "weight", "t.toml: line 20: parts.0.weight of part 'slice': there is no such key"),
     ],
 )
 def test_bad_task_files(lab: Lab, folder: Path, toml: str, old: str, new: str, line: str, tree: Tree) -> None:

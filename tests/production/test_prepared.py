@@ -87,6 +87,8 @@ def test_a_bad_cell_ends_the_command_with_2_and_one_line(tmp_path: Path, root: P
     path.write_text(text.replace("service_s = 240", "service_s = nan"))
     ran = lab("task", "check", str(path))
     assert (ran.code, ran.out) == (2, "")
-    assert ran.err.startswith(f"lab: {path}: line 66: products.1.routes.0.2.service_s: Input should be a finite number")
+    assert ran.err.startswith(
+        f"lab: {path}: line 66: products.1.routes.0.2.service_s of product 'sign': Input should be a finite number"
+    )
     assert ran.err.count("\n") == 1
     assert lab("task", "check", "fms").out == "fms is sound\n"

@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -47,3 +48,30 @@ def test_a_method_of_ones_own_has_to_be_named_again(tmp_path: Path) -> None:
         BadInput, match=r"'mine.first', which is not the lab's: name its code again, --method FILE.py:NAME"
     ):
         gone_on(RunOptions(""), tmp_path, None)
+
+
+@pytest.mark.parametrize(
+    ("task", "words", "told"),
+    [
+        ("toast", {"order": "1,2,7"}, "move 3 '7': there is no part 7, only 1 to 3"),
+        ("toast", {"order": "1,1"}, "slice 1 is still at 'butter_applier'"),
+        ("toast", {"order": ""}, "no moves"),
+        ("kit", {"order": "4 1"}, "move 1 '4': lid 4 at 'magazine' may not come to 'tray'"),
+        ("kit", {"cyclic": True}, "a cycle does not know"),
+        ("toast", {"cyclic": True, "order": "1,1,1"}, "an order is one or the other"),
+    ],
+)
+def test_an_order_that_cannot_be_is_refused_before_anything_is_surveyed_or_learned(
+    task: str, words: dict[str, Any], told: str
+) -> None:
+    with pytest.raises(BadInput) as caught:
+        RunOptions(task, **words).ordered(load(task))
+    assert told in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_an_order_that_can_be_passes_whatever_the_windows_say() -> None:
+    """In `toast-window` toast burns: whether an order is in time is not known before its moves are timed."""
+    kept_long = RunOptions("toast-window", parts="slice=2", order="1,2,1,2,1,2,2")
+    assert kept_long.ordered(load("toast-window")) == ("slice", "slice")
+    assert RunOptions("toast", cyclic=True).ordered(load("toast")) == ("slice", "slice", "slice")

@@ -58,9 +58,13 @@ def test_where_a_value_is_in_the_file_itself(loc: tuple[str | int, ...], own: tu
         (
             "dwell_s = 3.0",
             "dwell_s = -0.1",
-            "stations.4.dwell_s: Input should be greater than or equal to 0 (got -0.1)",
+            "stations.4.dwell_s of station 'butter_applier': Input should be greater than or equal to 0 (got -0.1)",
         ),
-        ("dwell_s = 3.0", "dwell_s = inf", "stations.4.dwell_s: Input should be a finite number (got inf)"),
+        (
+            "dwell_s = 3.0",
+            "dwell_s = inf",
+            "stations.4.dwell_s of station 'butter_applier': Input should be a finite number (got inf)",
+        ),
         ("shape = [12, 12]", "shape = [12, 1000000]", "insert.shape.1: Input should be less than or equal to 100"),
         ('station = "toaster"', "station = 3", "route.1.station: Input should be a valid string (got 3)"),
         (

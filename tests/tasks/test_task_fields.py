@@ -46,11 +46,23 @@ NUMBERS = [path for path, value in leaves(SHIPPED) if isinstance(value, int | fl
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("capacity = 50", "capacity = 0", "stations.0.capacity: Input should be greater than or equal to 1 (got 0)"),
-        ("capacity = 4", "capacity = -2", "stations.1.capacity: Input should be greater than or equal to 1 (got -2)"),
-        ("capacity = 4", "capacity = 1.5", "stations.1.capacity: Input should be a valid integer"),
+        (
+            "capacity = 50",
+            "capacity = 0",
+            "stations.0.capacity of station 'plate': Input should be greater than or equal to 1 (got 0)",
+        ),
+        (
+            "capacity = 4",
+            "capacity = -2",
+            "stations.1.capacity of station 'toaster_buffer': Input should be greater than or equal to 1 (got -2)",
+        ),
+        (
+            "capacity = 4",
+            "capacity = 1.5",
+            "stations.1.capacity of station 'toaster_buffer': Input should be a valid integer",
+        ),
         ("processing_s = 60.0", "processing_s = -1.0", "greater than or equal to 0 (got -1.0)"),
-        ("processing_s = 60.0", "processing_s = nan", "stations.2.processing_s: "),
+        ("processing_s = 60.0", "processing_s = nan", "stations.2.processing_s of station 'toaster': "),
         ("dwell_s = 3.0", "dwell_s = -0.1", "processes.butter.dwell_s: Input should be greater than or equal to 0"),
         ("dwell_s = 3.0", "dwell_s = inf", "processes.butter.dwell_s: Input should be a finite number (got inf)"),
         (
@@ -107,7 +119,11 @@ NUMBERS = [path for path, value in leaves(SHIPPED) if isinstance(value, int | fl
         ),
         ("speed_m_s = 0.5", "sped_m_s = 0.5", "robot.sped_m_s: there is no such key, did you mean 'speed_m_s'?"),
         ("beta = 1.3", "bta = 1.3", "subtasks.transfer.learner.bta: there is no such key, did you mean 'beta'?"),
-        ('kind = "buffer"', 'kind = "bufer"', "stations.1.kind: Input should be 'storage', 'buffer' or 'machine'"),
+        (
+            'kind = "buffer"',
+            'kind = "bufer"',
+            "stations.1.kind of station 'toaster_buffer': Input should be 'storage', 'buffer' or 'machine'",
+        ),
         ("processing_s = 60.0", "", "machine 'toaster' needs either processing_s or process, a sub-task to learn"),
         (
             'process = "butter"',
@@ -115,11 +131,17 @@ NUMBERS = [path for path, value in leaves(SHIPPED) if isinstance(value, int | fl
             "machine 'butter_applier' needs either processing_s or",
         ),
         ("shape = [14, 18, 3]", "shape = [14, 18, 0]", "workspace.shape.2: Input should be greater than or equal to 1"),
-        ("shape = [14, 18, 3]", "shape = [14, 18]", "workspace.shape.2: Field required"),
+        (
+            "area = [0.04, 0.03]",
+            "area = [0, 0, 0]",
+            "obstacles.0.area of obstacle 'cubes A': wanted a list of 2 (got [0, 0, 0])",
+        ),
+        ("area = [0.020, 0.006, 0.12]", "area = [0]", "parts.0.area of part 'slice': wanted a list of 3 (got [0])"),
+        ("shape = [14, 18, 3]", "shape = [14, 18]", "workspace.shape: wanted a list of 3 (got [14, 18])"),
         (
             "shape = [12, 12]",
             "shape = [12, 1000000]",
-            "stations.2.grid.shape.1: Input should be less than or equal to 100",
+            "stations.2.grid.shape.1 of station 'toaster': Input should be less than or equal to 100",
         ),
         (
             "speed_m_s = 0.5",
@@ -148,9 +170,21 @@ NUMBERS = [path for path, value in leaves(SHIPPED) if isinstance(value, int | fl
         ),
         ("omega = 7", "omega = true", "subtasks.transfer.gate.omega: Input should be a valid integer (got True)"),
         ("speed_m_s = 0.5", "speed_m_s = true", "robot.speed_m_s: Input should be a valid number (got True)"),
-        ("capacity = 4", 'capacity = "4"', "stations.1.capacity: Input should be a valid integer (got '4')"),
-        ("capacity = 4", "capacity = true", "stations.1.capacity: Input should be a valid integer (got True)"),
-        ("[0.42, 0.56, 0.0]", '[0.42, "0.56", 0.0]', "stations.1.pose.1: Input should be a valid number (got '0.56')"),
+        (
+            "capacity = 4",
+            'capacity = "4"',
+            "stations.1.capacity of station 'toaster_buffer': Input should be a valid integer (got '4')",
+        ),
+        (
+            "capacity = 4",
+            "capacity = true",
+            "stations.1.capacity of station 'toaster_buffer': Input should be a valid integer (got True)",
+        ),
+        (
+            "[0.42, 0.56, 0.0]",
+            '[0.42, "0.56", 0.0]',
+            "stations.1.pose.1 of station 'toaster_buffer': Input should be a valid number (got '0.56')",
+        ),
         (
             "capacity = 4",
             "capacity = 4\nprocessing_s = 5.0",

@@ -1,6 +1,6 @@
 """A scene -> the cells of a grid that are free, out of reach or blocked, and by what. Run it in a world of its own."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from math import hypot
 
@@ -50,20 +50,22 @@ class Surveyor:
 
     def cause(self, pose: ToolPose) -> str:
         """'' when the tool can be at `pose`, else why not."""
-        return self._causes([pose])[0]
+        return next(self._causes([pose]))
 
-    def _causes(self, poses: Sequence[ToolPose]) -> list[str]:
+    def free(self, poses: Sequence[ToolPose]) -> bool:
+        """Whether the tool can be at all of these poses."""
+        return not any(self._causes(poses))
+
+    def _causes(self, poses: Sequence[ToolPose]) -> Iterator[str]:
         """The cause of each of many poses: their joints are found all at once."""
         robot = self.scene.robot
         joints = robot.arm.inverse_each(np.array([[p.x, p.y, p.z, p.yaw] for p in poses]))  # (n, k)
-        found = []
         for pose, own in zip(poses, joints, strict=True):
             if hypot(pose.x, pose.y) < robot.arm.nearest_m or np.isnan(own[0]):
-                found.append(OUT_OF_REACH)
+                yield OUT_OF_REACH
                 continue
             robot.hold(own)
-            found.append(self._touched(pose))
-        return found
+            yield self._touched(pose)
 
     def _touched(self, pose: ToolPose) -> str:
         """'' when the arm, which is at `pose`, and what it carries are clear of everything, else what is too near."""
@@ -80,5 +82,5 @@ class Surveyor:
 
     def grid(self, shape: tuple[int, ...], pose_of: Callable[[tuple[int, ...]], ToolPose]) -> Survey:
         """Survey every cell of a grid whose cell i has the tool at pose_of(i)."""
-        causes = np.array(self._causes([pose_of(cell) for cell in np.ndindex(*shape)]), dtype="U40")
+        causes = np.array([*self._causes([pose_of(cell) for cell in np.ndindex(*shape)])], dtype="U40")
         return Survey(causes.reshape(shape))
