@@ -115,8 +115,8 @@ class Process(Record):
             )
         if not 2 <= self.grid[0] * self.grid[1] <= 12:
             raise ValueError(
-                f"grid = {list(self.grid)}: allowed are 2 to 12 cells in all; one has no order that could be learned (a time of its "
-                "own, processing_s, serves), and each more doubles what is learned"
+                f"grid = {list(self.grid)}: allowed are 2 to 12 cells in all; one has no order that could be learned (a time of "
+                "its own, processing_s, serves), and each more doubles what is learned"
             )
         return self
 

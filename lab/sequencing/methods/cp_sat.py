@@ -14,6 +14,7 @@ from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import MAKESPAN, check_built_in, check_objective, cost
 from lab.sequencing.methods.cp_sat_free import free_robots
 from lab.sequencing.methods.cp_sat_model import Model
+from lab.sequencing.methods.cp_sat_shop import ShopModel, shop_of
 from lab.sequencing.methods.cp_sat_solver import NAME, Solution, Status, solved
 from lab.sequencing.methods.cp_sat_tasks import possible_tasks
 from lab.sequencing.methods.cp_sat_transport import TransportModel
@@ -124,11 +125,17 @@ class _Asked:
 def _searched(asked: _Asked, known: tuple[int, ...]) -> CpSatResult:
     """What the solver makes of a cell, beginning with an order; empty: with nothing."""
     cell, objective, shared = asked.shared.cell, asked.shared.objective, asked.shared
+    shop = None if cell.serial else shop_of(cell, objective)
     while True:
-        model = Model(cell, objective, known) if cell.serial else TransportModel(cell, objective, known)
+        if shop is not None:
+            model: Model | ShopModel | TransportModel = ShopModel(cell, shop, objective, known)
+        else:
+            model = Model(cell, objective, known) if cell.serial else TransportModel(cell, objective, known)
         asked.until_s = min(asked.until_s, perf_counter() + asked.time_limit_s)
         worth = cost(follow(cell, known), objective) if known else inf
-        if isinstance(model, TransportModel) and objective == MAKESPAN and not model.times.rounded_s:
+        if isinstance(model, ShopModel):
+            found = _result(asked, model, worth, model.parameters)
+        elif isinstance(model, TransportModel) and objective == MAKESPAN and not model.times.rounded_s:
             found = _narrowed(asked, model, worth)
         else:
             found = _result(asked, model, worth)
@@ -184,7 +191,7 @@ def _narrowed(asked: _Asked, model: TransportModel, worth: float) -> CpSatResult
 
 def _result(
     asked: _Asked,
-    model: Model | TransportModel,
+    model: Model | ShopModel | TransportModel,
     worth: float,
     more: Mapping[str, object] = MappingProxyType({}),
 ) -> CpSatResult:

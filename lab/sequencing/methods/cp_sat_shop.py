@@ -1,0 +1,262 @@
+"""A shop as a constraint model: an operation has one begin, whichever machine it takes; robots go from trip to trip.
+
+It knows cells whose machines have servers, room for all, and no setups, windows or rules: the field's job shops and flexible job
+shops, without robots or with alike ones. Where a part may take one of several machines it is much smaller than that of
+`cp_sat_transport`, whose tasks are pairs of a place and the next one.
+"""
+
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from itertools import product
+from types import MappingProxyType
+from typing import NamedTuple
+
+from ortools.sat.python import cp_model
+
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.objectives import MAKESPAN, WITH_DUE_TIMES, cost
+from lab.sequencing.cell.routes import SERVER, Option, entry
+from lab.sequencing.methods.cp_sat_rooms import add_chains
+from lab.sequencing.methods.cp_sat_solver import Solution
+from lab.sequencing.methods.cp_sat_tasks import teams_of
+from lab.sequencing.methods.cp_sat_times import Times
+from lab.sequencing.simulate.follow import follow
+
+
+class Step(NamedTuple):
+    """How a part gets from one stop to the next: by a robot, if it has to go, and by a server, if it is worked on there.
+
+    A stop is a position where a part begins, has been worked on, or is finished. trip: the ways of the robots, one each; none:
+    it stays where it is. work: the server's way; None: the stop is the end of a route.
+    """
+
+    to: int
+    trip: tuple[Option, ...]
+    work: Option | None
+
+
+class Shop(NamedTuple):
+    """What the parts of a cell may do. steps: from each stop; layers: of each part, the stops that it may come to, in turn."""
+
+    steps: Mapping[int, tuple[Step, ...]]
+    layers: tuple[tuple[tuple[int, ...], ...], ...]
+
+
+def shop_of(cell: Cell, objective: str) -> Shop | None:
+    """The cell as a shop; None: it is more than one, or is judged by what a shop does not know.
+
+    None, too, of robots where no part has a choice: of Bilge and Ulusoy's instances the other model proves more.
+    """
+    alike = len(teams_of(cell)) <= 1 and len({robot.start for robot in cell.robots}) <= 1
+    begun = cell.begin_at != cell.starts
+    more = cell.rules or cell.has_windows or cell.track or cell.arrivals or begun or any(cell.setups)
+    full = any(0 < room < cell.parts for room in _rooms(cell))
+    if more or full or not alike or objective not in (MAKESPAN, *WITH_DUE_TIMES):
+        return None
+    steps, layers = dict[int, tuple[Step, ...]](), list[tuple[tuple[int, ...], ...]]()
+    for start in cell.begin_at:
+        found: list[tuple[int, ...]] = [(start,)]
+        while any(cell.positions[stop].options for stop in found[-1]):
+            for stop in found[-1]:
+                if stop not in steps:
+                    known = _steps(cell, stop)
+                    if known is None:
+                        return None
+                    steps[stop] = known
+            found.append(tuple(sorted({step.to for stop in found[-1] for step in steps[stop]})))
+        stops = [stop for layer in found for stop in layer]
+        ends = [not cell.positions[stop].options for stop in stops]
+        if len(set(stops)) < len(stops) or sum(ends) > len(found[-1]):
+            return None  # some routes are longer than others
+        layers.append(tuple(found))
+    flexible = any(len(layer) > 1 for of_part in layers for layer in of_part)
+    return Shop(steps, tuple(layers)) if flexible or not cell.robots else None
+
+
+def _rooms(cell: Cell) -> list[int]:
+    """The room at each station that parts take room at."""
+    return [cell.capacities[station] for station in {s for place in cell.positions for s in place.holds}]
+
+
+def _steps(cell: Cell, stop: int) -> tuple[Step, ...] | None:
+    """The steps from a stop; None: one of its ways is none that a shop has."""
+    found, trips = list[Step](), defaultdict[tuple[int, int], list[Option]](list)
+    for way in cell.positions[stop].options:
+        if way.if_full is not None or way.carries == "pallet":
+            return None
+        if way.robot == SERVER:
+            found.append(Step(way.to, (), way))
+        else:
+            trips[way.target, way.to].append(way)
+    for (_, to), ways in trips.items():
+        works = cell.positions[to].options
+        if any(work.robot != SERVER for work in works) or (works and cell.positions[to].processing_s):
+            return None
+        found += [Step(work.to, tuple(ways), work) for work in works] or [Step(to, tuple(ways), None)]
+    return tuple(found)
+
+
+class _Operation(NamedTuple):
+    """A part's way from one layer to the next. takes: whether it takes a step from a stop; at: whether it comes to a stop."""
+
+    part: int
+    takes: dict[tuple[int, Step], cp_model.IntVar]
+    at: dict[int, cp_model.IntVar]
+    depart: cp_model.IntVar
+    begin: cp_model.IntVar
+    end: cp_model.IntVar
+
+    def trips(self) -> dict[Step, cp_model.IntVar]:
+        """The steps for which a robot goes, each once, for a step says where it begins."""
+        return {step: taken for (_, step), taken in self.takes.items() if step.trip}
+
+
+class ShopModel:
+    """The variables and constraints. worth: what a unit of the model's objective is in the cell's; blur: by how many units
+    rounding may change a sequence's cost. parameters: of the solver, with which it was measured to be fastest.
+    """
+
+    parameters = MappingProxyType({"linearization_level": 0})
+
+    def __init__(self, cell: Cell, shop: Shop, objective: str, hint: Sequence[int]) -> None:
+        self.cell, self.model, self.times, self._shop = cell, cp_model.CpModel(), Times(cell, shortest=0), shop
+        rounding = 2 * cell.possible_moves if self.times.rounded_s else 0
+        known = cost(follow(cell, hint), MAKESPAN) if hint and objective == MAKESPAN else cell.longest_s
+        self._horizon = self.times.whole(known) + (rounding or cell.possible_moves)
+        self._servers = {step.to: step.work.target for steps in shop.steps.values() for step in steps if step.work}
+        self._operations: list[_Operation] = []
+        self._arcs: dict[tuple[int, int], cp_model.IntVar] = {}
+        ends = [self._add_part(part) for part in range(cell.parts)]
+        self._add_servers()
+        self._end = self._moment()
+        self.model.add_max_equality(self._end, ends)
+        if cell.robots:
+            self._add_robots()
+        self.worth = self._add_objective(objective, ends)
+        self.blur = {"mean-tardiness": cell.parts, "tardy-parts": 0}.get(objective, 1) * rounding
+
+    def _moment(self) -> cp_model.IntVar:
+        return self.model.new_int_var(0, self._horizon, "")
+
+    def _add_part(self, part: int) -> cp_model.LinearExprT:
+        """The operations of a part, one after the other; when it is finished."""
+        model, times = self.model, self.times
+        layers, free = self._shop.layers[part], cp_model.LinearExpr.sum([times.whole(self.cell.begin_s[part])])
+        at = {layers[0][0]: model.new_constant(1)}
+        for layer in layers[1:]:
+            before, at = at, {stop: model.new_bool_var("") for stop in layer}
+            takes = {(stop, step): model.new_bool_var("") for stop in before for step in self._shop.steps[stop]}
+            model.add_exactly_one(takes.values())
+            model.add_exactly_one(at.values())
+            one = _Operation(part, takes, at, self._moment(), self._moment(), self._moment())
+            model.add(one.depart >= free)
+            for (stop, step), taken in takes.items():
+                model.add_implication(taken, before[stop])
+                model.add_implication(taken, at[step.to])
+                model.add(one.begin >= one.depart + self._carried(step)).only_enforce_if(taken)
+            for stop, comes in at.items():
+                model.add(one.end == one.begin + self._worked(stop)).only_enforce_if(comes)
+            self._operations.append(one)
+            free = one.end
+        return free
+
+    def _carried(self, step: Step) -> int:
+        return self.times.work(step.trip[0]) if step.trip else 0
+
+    def _worked(self, stop: int) -> int:
+        return self.times.processing(stop) if stop in self._servers else 0
+
+    def _add_servers(self) -> None:
+        """A server works on one part after the other."""
+        spans = defaultdict[int, list[cp_model.IntervalVar]](list)
+        for one in self._operations:
+            for stop, comes in one.at.items():
+                if stop in self._servers:
+                    span = self.model.new_optional_interval_var(one.begin, self._worked(stop), one.end, comes, "")
+                    spans[self._servers[stop]].append(span)
+        for station, own in spans.items():
+            servers = self.cell.stations[station].servers or 1
+            if servers == 1:
+                self.model.add_no_overlap(own)
+            elif len(own) > servers:
+                self.model.add_cumulative(own, [1] * len(own), servers)
+
+    def _add_robots(self) -> None:
+        """Each robot goes from one trip to the next; those of one part are in their order."""
+        model, times = self.model, self.times
+        start, robots = self.cell.index(self.cell.robots[0].start), len(self.cell.robots)
+        nodes, spent = list[tuple[int, int, cp_model.LiteralT]](), list[cp_model.LinearExprT]()
+        moved = [one.trips() for one in self._operations]
+        for number, (one, trips) in enumerate(zip(self._operations, moved, strict=True), 1):
+            stays = model.new_bool_var("")
+            if not trips:
+                nodes.append((number, number, stays))
+                continue
+            model.add_exactly_one([stays, *trips.values()])
+            first, last = model.new_bool_var(""), model.new_bool_var("")
+            nodes += [(number, number, stays), (0, number, first), (number, 0, last)]
+            self._arcs[0, number], self._arcs[number, 0] = first, last
+            ways = {step: times.travel(start, step.trip[0].origin) for step in trips}
+            for step, taken in trips.items():
+                model.add(one.depart >= ways[step]).only_enforce_if(first, taken)
+                spent.append(self._carried(step) * taken)
+            spent.append(min(ways.values()) * first)
+            for other, (then, more) in enumerate(zip(self._operations, moved, strict=True), 1):
+                if other == number or not more or (then.part == one.part and other < number):
+                    continue
+                follows = self._arcs[number, other] = model.new_bool_var("")
+                nodes.append((number, other, follows))
+                gaps = {
+                    pair: times.travel(pair[0].trip[0].target, pair[1].trip[0].origin) for pair in product(trips, more)
+                }
+                least = min(gaps.values())
+                for (step, after), gap in gaps.items():
+                    begin = one.depart + self._carried(step) + gap
+                    model.add(then.depart >= begin).only_enforce_if(follows, trips[step], more[after])
+                spent.append(least * follows)
+        add_chains(model, nodes, len(self._operations), robots)
+        model.add(robots * self._end >= sum(spent))
+
+    def _add_objective(self, objective: str, ends: Sequence[cp_model.LinearExprT]) -> float:
+        """What is to be as low as possible; the worth of its unit in the cell's."""
+        due = [self.times.whole(due_s) for due_s in self.cell.due_s or ()]
+        if objective == MAKESPAN:
+            self.model.minimize(self._end)
+        elif objective == "tardy-parts":
+            late = [self.model.new_bool_var("") for _ in due]
+            for is_late, end, until in zip(late, ends, due, strict=True):
+                self.model.add(end <= until).only_enforce_if(~is_late)
+            self.model.minimize(sum(late))
+            return 1.0
+        else:
+            lateness = [self._moment() for _ in due]
+            for late_by, end, until in zip(lateness, ends, due, strict=True):
+                self.model.add(late_by >= end - until)
+            self.model.minimize(sum(lateness))
+            return 1.0 / self.times.per_s / self.cell.parts
+        return 1.0 / self.times.per_s
+
+    def sequence(self, solver: Solution) -> tuple[int, ...]:
+        """The decisions of the solution: the parts' own ones in their order, else those that begin earlier first."""
+        robot, after = dict[int, int](), {a: b for (a, b), arc in self._arcs.items() if a and solver.boolean_value(arc)}
+        firsts = [number for (a, number), arc in self._arcs.items() if not a and solver.boolean_value(arc)]
+        for own, number in enumerate(firsts):
+            while number:
+                robot[number], number = own, after[number]
+        queues = defaultdict[int, list[tuple[int, int, int]]](list)  # a part's decisions, the last one first
+        for number, one in enumerate(self._operations, 1):
+            step = next(step for (_, step), taken in one.takes.items() if solver.boolean_value(taken))
+            own = [option for option in step.trip if option.robot == robot[number]]
+            begins = [(option, solver.value(one.depart), self._carried(step)) for option in own]
+            if step.work is not None:
+                begins.append((step.work, solver.value(one.begin), self._worked(step.to)))
+            for option, begin, takes in begins:
+                queues[one.part].append((begin, begin + takes, entry(one.part + 1, option.choice, self.cell.parts)))
+        found = list[int]()
+        waiting = {part: queue[::-1] for part, queue in queues.items()}
+        while waiting:
+            part = min(waiting, key=lambda part: waiting[part][-1])
+            found.append(waiting[part].pop()[-1])
+            if not waiting[part]:
+                del waiting[part]
+        return tuple(found)
