@@ -1,7 +1,9 @@
-"""A plain model of a shop for OR-Tools' CP-SAT, as somebody writes it in an hour: `python lab-dev/plain_model.py SHOP.json [SECONDS [WORKERS]]`.
+"""A plain model of a shop for OR-Tools' CP-SAT, as somebody writes it in an hour; it imports nothing of the lab.
 
-It imports nothing of the lab. What it reads: `jobs`, for each operation a table from machine to time; `due`, a time for each job or
-none; `travel`, a matrix of times whose first place is where jobs and vehicles begin, the machines after it, or none; `vehicles`.
+    python lab-dev/plain_model.py SHOP.json [SECONDS [WORKERS]]
+
+It reads `jobs`, for each operation a table from machine to time; `due`, a time for each job, or none; `travel`, a matrix of
+times whose first place is where jobs and vehicles begin and whose others are the machines, or none; `vehicles`.
 """
 
 import json
@@ -12,6 +14,8 @@ from time import perf_counter
 
 from ortools.sat.python import cp_model
 
+Trip = tuple[cp_model.IntVar, cp_model.IntVar, dict[tuple[int, int], cp_model.IntVar]]  # departs, arrives, by which way
+
 
 def main() -> None:
     """Print the status, the cost, its bound and the seconds of the search as one line of JSON."""
@@ -21,7 +25,7 @@ def main() -> None:
     most += sum(map(len, jobs)) * 2 * max((max(row) for row in travel or [[0]]), default=0)
     model, ends = cp_model.CpModel(), []
     on_machine: dict[str, list[cp_model.IntervalVar]] = {}
-    carried: list[tuple[cp_model.IntVar, cp_model.IntVar, dict[tuple[int, int], cp_model.IntVar]]] = []
+    carried = list[Trip]()
     for job in jobs:
         end, at = model.new_constant(0), {0: model.new_constant(1)}
         for times in job:
@@ -55,7 +59,7 @@ def main() -> None:
     if travel is not None:
         _add_vehicles(model, carried, travel, shop["vehicles"])
     if due is None:
-        cost = model.new_int_var(0, most, "makespan")
+        cost: cp_model.LinearExprT = model.new_int_var(0, most, "makespan")
         model.add_max_equality(cost, ends)
     else:
         late = [model.new_int_var(0, most, "") for _ in jobs]
@@ -68,12 +72,12 @@ def main() -> None:
     solver.parameters.max_time_in_seconds = float(sys.argv[2]) if len(sys.argv) > 2 else 60.0
     status = solver.status_name(solver.solve(model))
     found = {"status": status, "cost": solver.objective_value, "bound": solver.best_objective_bound}
-    print(json.dumps(found | {"seconds": perf_counter() - began}))
+    sys.stdout.write(json.dumps(found | {"seconds": perf_counter() - began}) + "\n")
 
 
-def _add_vehicles(model, carried, travel, vehicles) -> None:
+def _add_vehicles(model: cp_model.CpModel, carried: list[Trip], travel: list[list[int]], vehicles: int) -> None:
     """Each vehicle goes one route through the trips that it makes, and drives empty between them."""
-    arcs, out = [], []
+    arcs, out = list[tuple[int, int, cp_model.IntVar]](), list[cp_model.IntVar]()
     for one, (depart, arrive, ways) in enumerate(carried, 1):
         none = model.new_bool_var("")
         model.add_exactly_one([none, *ways.values()])

@@ -2,8 +2,8 @@
 
     python lab-dev/plain_pairs.py [--seed 1] [--each 5] [--rounds 3] [--seconds 60] [--out FOLDER]
 
-Shops are drawn: job shops, with due dates, flexible, and each with vehicles. The plain program (`plain_model.py`) is one that somebody
-writes in an hour. Both are new processes on the same machine in turn; what each pays before it searches is counted.
+Shops are drawn: job shops, with due dates, flexible, and with vehicles. The plain program (`plain_model.py`) is one that
+somebody writes in an hour. Both are new processes on the same machine in turn; what each pays before it searches is counted.
 """
 
 import argparse
@@ -15,6 +15,7 @@ import sys
 import tempfile
 import time
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +27,7 @@ SAME = 1e-6
 
 @dataclass(frozen=True)
 class Kind:
-    """What is drawn: how many jobs, machines and operations a job, machines an operation, vehicles (None: no travel), due dates."""
+    """What is drawn. operations: of a job; choices: machines an operation at most; vehicles: None, there is no travel."""
 
     name: str
     jobs: int
@@ -61,7 +62,10 @@ def drawn(kind: Kind, seed: int) -> dict[str, Any]:
         first = rng.permutation(kind.machines)[: kind.operations]
         more = [rng.choice(kind.machines, int(rng.integers(1, kind.choices + 1)), replace=False) for _ in first]
         jobs.append(
-            [{int(m): int(rng.integers(3, 31)) for m in {one, *others[1:]}} for one, others in zip(first, more)]
+            [
+                {int(m): int(rng.integers(3, 31)) for m in {one, *others[1:]}}
+                for one, others in zip(first, more, strict=True)
+            ]
         )
     points = rng.integers(0, 12, (kind.machines + 1, 2))
     far = 2 + abs(points[:, None] - points[None]).sum(axis=2)
@@ -84,7 +88,7 @@ def written(shop: dict[str, Any], kind: Kind, folder: Path) -> tuple[list[str], 
         tasks = [(job, times) for job, own in enumerate(jobs) for times in own]
         numbers = [[n for n, (job, _) in enumerate(tasks) if job == one] for one in range(len(jobs))]
         document = {
-            "jobs": [{"tasks": own, "due_date": due} for own, due in zip(numbers, shop["due"])],
+            "jobs": [{"tasks": own, "due_date": due} for own, due in zip(numbers, shop["due"], strict=True)],
             "resources": [{"type": "machine"} for _ in range(kind.machines)],
             "tasks": [{"job": job} for job, _ in tasks],
             "modes": [
@@ -93,9 +97,7 @@ def written(shop: dict[str, Any], kind: Kind, folder: Path) -> tuple[list[str], 
                 for m, t in times.items()
             ],
             "constraints": {
-                "end_before_start": [
-                    {"task1": a, "task2": b, "delay": 0} for own in numbers for a, b in zip(own, own[1:])
-                ]
+                "end_before_start": [{"task1": a, "task2": b, "delay": 0} for own in numbers for a, b in pairwise(own)]
             },
         }
         file = folder / "shop.json"
@@ -113,7 +115,10 @@ def written(shop: dict[str, Any], kind: Kind, folder: Path) -> tuple[list[str], 
     if shop["travel"] is None:
         return [str(file)], plain
     names = ["LU", *(f"M{n}" for n in range(1, kind.machines + 1))]
-    table = [",".join(["station", *names]), *(",".join([n, *map(str, row)]) for n, row in zip(names, shop["travel"]))]
+    table = [
+        ",".join(["station", *names]),
+        *(",".join([n, *map(str, row)]) for n, row in zip(names, shop["travel"], strict=True)),
+    ]
     layout = folder / "travel.csv"
     layout.write_text("\n".join(table) + "\n", encoding="utf-8")
     return [str(file), "--layout", str(layout), "--robots", str(kind.vehicles)], plain
@@ -126,6 +131,12 @@ def timed(command: list[str]) -> tuple[float, float, dict[str, Any]]:
     wall, after = time.perf_counter() - began, os.times()
     spent = after.children_user + after.children_system - before.children_user - before.children_system
     return wall, spent, json.loads(done.stdout.splitlines()[-1])
+
+
+def say(line: str) -> None:
+    """Print a line at once."""
+    sys.stdout.write(f"{line}\n")
+    sys.stdout.flush()
 
 
 def main() -> None:
@@ -169,15 +180,14 @@ def main() -> None:
             if proven and (lab_cost < cost - SAME or (lab_proven and abs(lab_cost - cost) > SAME)):
                 wrong += 1
             middle = [statistics.median(each) for each in (*walls, *spent)]
-            ratio = statistics.median(b / a for a, b in zip(*walls))
+            ratio = statistics.median(b / a for a, b in zip(*walls, strict=True))
             ratios.append(ratio)
             sure = ["no proof", "proven"]
-            print(
+            say(
                 f"{kind.name} {number}: plain {cost:g} {sure[proven]} {middle[0]:.2f} s ({middle[2]:.2f} s of processor), "
-                f"lab {lab_cost:g} {sure[bool(lab_proven)]} {middle[1]:.2f} s ({middle[3]:.2f}), ratio {ratio:.2f}",
-                flush=True,
+                f"lab {lab_cost:g} {sure[bool(lab_proven)]} {middle[1]:.2f} s ({middle[3]:.2f}), ratio {ratio:.2f}"
             )
-    print(
+    say(
         f"{len(ratios)} shops: median ratio {statistics.median(ratios):.2f}, worst {max(ratios):.2f}; {wrong} proofs differ"
     )
     sys.exit(wrong > 0)

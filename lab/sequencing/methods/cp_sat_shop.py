@@ -245,13 +245,13 @@ class ShopModel:
                 robot[number], number = own, after[number]
         queues = defaultdict[int, list[tuple[int, int, int]]](list)  # a part's decisions, the last one first
         for number, one in enumerate(self._operations, 1):
-            step = next(step for (_, step), taken in one.takes.items() if solver.boolean_value(taken))
-            own = [option for option in step.trip if option.robot == robot[number]]
-            begins = [(option, solver.value(one.depart), self._carried(step)) for option in own]
+            step = next(step for (_, step), takes in one.takes.items() if solver.boolean_value(takes))
+            taken = [option for option in step.trip if option.robot == robot[number]]
+            begins = [(option, solver.value(one.depart), self._carried(step)) for option in taken]
             if step.work is not None:
                 begins.append((step.work, solver.value(one.begin), self._worked(step.to)))
-            for option, begin, takes in begins:
-                queues[one.part].append((begin, begin + takes, entry(one.part + 1, option.choice, self.cell.parts)))
+            for option, begin, long in begins:
+                queues[one.part].append((begin, begin + long, entry(one.part + 1, option.choice, self.cell.parts)))
         found = list[int]()
         waiting = {part: queue[::-1] for part, queue in queues.items()}
         while waiting:
