@@ -29,11 +29,11 @@ def asked(lab: Lab, words: str, **more: Any) -> dict[str, Any]:
 
 
 REACTING = {
-    "srl": "planned anew at every decision",
+    "srl": "planned anew at every decision, by rollout",
     "srl-time": "it goes on learning before every decision",
     "fifo": "a queue of tasks as they become possible",
     "shortest-move": "the rule shortest-move, asked at every decision",
-    "exact": "planned anew at every decision",
+    "exact": "planned anew at every decision, by rollout",
     "carried": "the carried-over policy, asked at every decision",
 }
 
@@ -53,7 +53,8 @@ def test_drawn_times(lab: Lab, monkeypatch: pytest.MonkeyPatch, method: str) -> 
     assert list(document) == list(plain)
     drawn = document["stochastic"]
     assert list(drawn) == [
-        *("processing", "arrivals", "spread", "replications", "fixed", "reacting", "saved_by_reacting")
+        *("processing", "arrivals", "spread", "robot_breaks_every_s", "robot_repair_s"),
+        *("replications", "fixed", "reacting", "saved_by_reacting"),
     ]
     assert (drawn["processing"], drawn["arrivals"], drawn["spread"]) == ("normal", None, 0.1)
     assert (drawn["replications"], drawn["reacting"]["policy"]) == (5, REACTING[method])

@@ -91,7 +91,9 @@ def robot(tab: "Page") -> list[float]:
     return found
 
 
-ASKED = "document.querySelector('#moves button:enabled')"  # a question that can be answered; the words are refused without
+ASKED = (
+    "document.querySelector('#moves button:enabled')"  # a question that can be answered; the words are refused without
+)
 OVER = "document.getElementById('says').textContent === 'The lesson is over.'"
 
 
