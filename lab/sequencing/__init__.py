@@ -148,7 +148,7 @@ class Sequencer:
     """A method; called with a cell, a search and a generator it finds a sequence.
 
     load: imports its function. help: what it is, in one line. drawn: where chance is asked for it looks in drawn times;
-    else with the means. react: the policy in its manner, for a cell, an objective, a seed and the list that is planned. alone: nobody
+    else with the means. react: the policy in its manner, for a cell, an objective, a seed and the planned list. alone: nobody
     looks for a proof beside it unless that is asked for: it answers at once, as a rule does, or proves what can be proven itself.
     """
 

@@ -70,13 +70,14 @@ class Dispatch(Execution):
     stands there and waits, it is decided anew, and of what a robot that breaks down was on its way to, too; on its way it
     keeps to what it was given. What it holds when it breaks down waits with it. A server changes over for a part only once
     that is there. drives: the ways without a part; moves: all others.
+    done: when each of either was begun, and a decision, or a robot and where it drives to, by index.
     """
 
     def __init__(self, cell: Cell, times: Episode | None = None) -> None:
         super().__init__(cell, times)
         self.now_s = 0.0
         self.drives: list[Drive] = []
-        self._done: list[tuple[float, int, int | None]] = []  # when, a decision, or a robot and where it drives to
+        self.done: list[tuple[float, int, int | None]] = []
         self._tasks: dict[int, _Task] = {}
 
     def decide(self, choose: Choose) -> None:
@@ -114,7 +115,7 @@ class Dispatch(Execution):
     def observe(self) -> Observed:
         """What is known now: all that was begun, by the times that are over and the means of the others."""
         run = Windowless(self.run.cell, Known(self.run.cell, real=self.run.times, now_s=self.now_s))
-        for at_s, what, station in self._done:
+        for at_s, what, station in self.done:
             _decided(run, at_s, what) if station is None else _set_out(run, at_s, what, station)
         run.robots_s = [run.in_order_s(n, max(self.now_s, at_s)) for n, at_s in enumerate(run.robots_s)]
         run.servers = {n: [(max(self.now_s, s), last) for s, last in own] for n, own in run.servers.items()}
@@ -173,15 +174,15 @@ class Dispatch(Execution):
             if leave_s == self.now_s:  # else it waits beside the track
                 self.drives.append(Drive(robot, run.robots_at[robot], option.origin, leave_s, reach_s))
                 self._tasks[robot] = _Task(decision, seen.locations[index])
-                self._done.append((self.now_s, robot, option.origin))
-                _set_out(run, *self._done[-1])  # type: ignore[arg-type]
+                self.done.append((self.now_s, robot, option.origin))
+                _set_out(run, *self.done[-1])  # type: ignore[arg-type]
         elif run.locations[index] == seen.locations[index]:
             _rest(run, robot, self.now_s)
             if (own := run.option(decision)) is not None and run.begin_s(index + 1, own) <= self.now_s:
                 self._commit(decision)
 
     def _commit(self, decision: int) -> None:
-        self._done.append((self.now_s, decision, None))
+        self.done.append((self.now_s, decision, None))
         _decided(self.run, self.now_s, decision)
         self.sequence.append(decision)
 
