@@ -81,8 +81,14 @@ class Dispatch(Execution):
         self._tasks: dict[int, _Task] = {}
 
     def decide(self, choose: Choose) -> None:
-        """Ask for all that can be begun now, and begin it."""
-        free, told = self._free(), set[int]()
+        """Ask for all that can be begun now, and begin it; again where what was begun takes no time."""
+        driven = set[int]()
+        while self._round(choose, driven):
+            pass
+
+    def _round(self, choose: Choose, driven: set[int]) -> bool:
+        """Ask once for whoever is free; whether something was begun that is over by now. driven: who had a way of no time."""
+        free, told, over = self._free(), set[int](), False
         self._tasks = {n: task for n, task in self._tasks.items() if n not in free and self._works(n)}
         seen = self.observe()
         for decision, place in self._tasks.values():
@@ -92,13 +98,20 @@ class Dispatch(Execution):
             seen.ready = self._ready(seen)
             decision = choose(seen, allowed)
             if decision == WAIT:
-                return
+                break
             option = seen.option(decision)
             if option is None or decision not in allowed:
                 raise BadInput(f"decision {decision} at {self.now_s:g} s: allowed are {', '.join(map(str, allowed))}")
             told.add(option.robot)
+            begun = len(self.sequence)
             self._begin(decision, option, seen)
+            if len(self.sequence) > begun:
+                over = over or self.moves[-1].end_s <= self.now_s
+            elif option.robot in self._free() - driven and option.robot in self._tasks:
+                over = True
+                driven.add(option.robot)
             seen.move(decision)
+        return over
 
     def goes_on(self) -> bool:
         """Whether anything is still to happen by itself; the time is then that of the next event."""

@@ -18,7 +18,7 @@ from lab.sequencing.cell.objectives import cost
 from lab.sequencing.cell.stations import Product, Robot, Stage, Station
 from lab.sequencing.methods.fifo import first_in_first_out
 from lab.sequencing.methods.rollout import by_rule, replan
-from lab.sequencing.methods.rules import RULES
+from lab.sequencing.methods.rules import RULES, any_order
 from lab.sequencing.simulate.execution import WAIT, Observed, Policy
 from lab.sequencing.simulate.follow import follow
 from lab.sequencing.simulate.several import Dispatch, Known, dispatched
@@ -275,3 +275,14 @@ def test_shops_are_as_the_plain_simulation_has_them(shops: Shops, data: st.DataO
     times = drawn(cell, np.random.default_rng(seed))
     assume(dispatched(cell, POLICIES[name], times).run.done)  # a rule may end in a deadlock
     held_against_it(cell, times, POLICIES[name])
+
+
+@settings(max_examples=30, deadline=None)
+@given(data=st.data())
+def test_where_nothing_is_drawn_the_planned_list_is_the_worst(shops: Shops, data: st.DataObject) -> None:
+    """Planned anew from a list, it costs no more than the list; but where a server changes over before its part is there."""
+    cell = data.draw(shops())
+    assume(not cell.serial and not any(station.setups for station in cell.stations))
+    listed = any_order(cell)
+    assume(listed)
+    assert dispatched(cell, replan(planned=listed)).run.end_s <= follow(cell, listed).end_s + 1e-6
