@@ -524,7 +524,7 @@ def _compiled() -> None:
     compared(Compared("world-1"), Job(2, 0))
 
 
-_CELLS = ("fms", "hoist-pu", "two-on-a-track")
+_CELLS = ("fms", "hoist-pu", "two-carriers", "two-on-a-track")
 _MADE_BY_HAND = ("toast", "breakfast", "sorting", "toast-window", "two-toasters", "toast-case-1", "fms-arm")
 
 KINDS: dict[str, Kind] = {

@@ -22,20 +22,22 @@ def stochastic(
     """The list as it is and a policy that reacts, in the same drawn episodes; means with 95 % intervals."""
     from lab.sequencing.simulate.execution import replicate
 
-    reaction = SEQUENCERS[method].react(cell, search.objective, seed)
+    fixed = _planned(cell, method, search, found, seed)
+    reaction = SEQUENCERS[method].react(cell, search.objective, seed, fixed)
     if search.policy is not None:
         reaction = carried_reaction(search.policy)
-    fixed = _planned(cell, method, search, found, seed)
-    episodes = max(FEWEST, min(REPLICATIONS, PLANNED // cell.parts**2)) if reaction.plans else REPLICATIONS
+    episodes = max(FEWEST, min(REPLICATIONS, PLANNED // cell.parts**2)) if reaction.replans else REPLICATIONS
     costs = [replicate(cell, how, chance, episodes, seed, search.objective) for how in (fixed, reaction.policy)]
     difference = costs[0] - costs[1]
     return {
         "processing": chance.processing,
         "arrivals": chance.arrivals if cell.arrivals else None,
         "spread": chance.spread,
+        "robot_breaks_every_s": chance.robot_breaks_every_s,
+        "robot_repair_s": chance.robot_repair_s,
         "replications": episodes,
         "fixed": _mean(costs[0]) | {"sequence": list(fixed)},
-        "reacting": _mean(costs[1]) | {"policy": reaction.words},
+        "reacting": _mean(costs[1]) | {"policy": reaction.words, "replans": reaction.replans},
         "saved_by_reacting": _mean(difference),
     }
 

@@ -1,6 +1,6 @@
 """The high level: in which order one robot serves the parts of a cell."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -20,11 +20,12 @@ Find = Callable[["Cell", "Search", "np.random.Generator"], "SequenceResult"]
 
 
 class Reaction(NamedTuple):
-    """A policy for times that are drawn, and what it does in words; plans: it does so at every decision, in its time."""
+    """A policy for times that are drawn, and what it does in words; replans: by which method it plans at every decision, in its
+    time; None: it does not."""
 
     policy: "Policy"
     words: str
-    plans: bool = True
+    replans: str | None = None
 
 
 # Each method is imported when it is used: numba and OR-Tools take their time.
@@ -102,25 +103,26 @@ def _cp_sat() -> Find:
     return cp_sat_sequencer
 
 
-def _planned_anew(cell: "Cell", objective: str, seed: int) -> Reaction:
+def _planned_anew(cell: "Cell", objective: str, seed: int, planned: Sequence[int]) -> Reaction:
     from lab.sequencing.methods.rollout import replan
 
-    return Reaction(replan(objective), "planned anew at every decision")
+    when = "at every decision" if cell.serial else "whenever something happens"
+    return Reaction(replan(objective, planned), f"planned anew {when}, by rollout", "rollout")
 
 
-def _learned_on(cell: "Cell", objective: str, seed: int) -> Reaction:
+def _learned_on(cell: "Cell", objective: str, seed: int, planned: Sequence[int]) -> Reaction:
     from lab.sequencing.methods.srl_time_reacting import reacting
 
-    return Reaction(reacting(cell, objective, seed), "it goes on learning before every decision")
+    return Reaction(reacting(cell, objective, seed), "it goes on learning before every decision", "srl-time")
 
 
-def _queued(cell: "Cell", objective: str, seed: int) -> Reaction:
+def _queued(cell: "Cell", objective: str, seed: int, planned: Sequence[int]) -> Reaction:
     from lab.sequencing.methods.fifo import first_in_first_out
 
-    return Reaction(first_in_first_out, "a queue of tasks as they become possible", plans=False)
+    return Reaction(first_in_first_out, "a queue of tasks as they become possible")
 
 
-def _carried_on(cell: "Cell", objective: str, seed: int) -> Reaction:
+def _carried_on(cell: "Cell", objective: str, seed: int, planned: Sequence[int]) -> Reaction:
     from lab.sequencing.methods.carried_over_weights import DEFAULT
 
     return carried_reaction(DEFAULT)
@@ -131,14 +133,14 @@ def carried_reaction(policy: "CarriedPolicy") -> Reaction:
     from lab.sequencing.methods.carried_over import rule_of
     from lab.sequencing.methods.rollout import by_rule
 
-    return Reaction(by_rule(rule_of(policy)), "the carried-over policy, asked at every decision", plans=False)
+    return Reaction(by_rule(rule_of(policy)), "the carried-over policy, asked at every decision")
 
 
-def _asked(name: str, cell: "Cell", objective: str, seed: int) -> Reaction:
+def _asked(name: str, cell: "Cell", objective: str, seed: int, planned: Sequence[int]) -> Reaction:
     from lab.sequencing.methods.rollout import by_rule
     from lab.sequencing.methods.rules import RULES
 
-    return Reaction(by_rule(RULES[name]), f"the rule {name}, asked at every decision", plans=False)
+    return Reaction(by_rule(RULES[name]), f"the rule {name}, asked at every decision")
 
 
 @dataclass(frozen=True)
@@ -146,14 +148,14 @@ class Sequencer:
     """A method; called with a cell, a search and a generator it finds a sequence.
 
     load: imports its function. help: what it is, in one line. drawn: where chance is asked for it looks in drawn times;
-    else with the means. react: the policy in its manner, for a cell, an objective and a seed. alone: nobody looks for a proof
-    beside it unless that is asked for: it answers at once, as a rule does, or proves what can be proven itself.
+    else with the means. react: the policy in its manner, for a cell, an objective, a seed and the planned list. alone: nobody
+    looks for a proof beside it unless that is asked for: it answers at once, as a rule does, or proves what can be proven itself.
     """
 
     load: Callable[[], Find]
     help: str
     drawn: bool = False
-    react: Callable[["Cell", str, int], Reaction] = _planned_anew
+    react: Callable[["Cell", str, int, Sequence[int]], Reaction] = _planned_anew
     alone: bool = False
 
     def __call__(self, cell: "Cell", search: "Search", rng: "np.random.Generator") -> "SequenceResult":

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from lab.errors import BadInput, unknown
 from lab.sequencing.cell.cell import MAX_PARTS, needed_moves
+from lab.sequencing.cell.chance import check_robot_breaks
 from lab.sequencing.cell.stations import check_layout
 from lab.sequencing.cell.track import check_track
 from lab.tasks.cell_fields import CellFields, CellRobot
@@ -29,6 +30,7 @@ def file_faults(cell: CellFields) -> Iterator[Fault]:
     yield from _order_faults(cell)
     yield from _robot_faults(cell)
     yield from _track_faults(cell)
+    yield from _chance_faults(cell)
     if cell.due_s is not None and cell.due_factor is not None:
         yield Fault(("due_factor",), "due_s and due_factor: wanted is one of them, a time for each part or a rule")
     for field, error in cell.sequencing.faults(due=cell.due_s is not None or cell.due_factor is not None):
@@ -60,6 +62,13 @@ def _track_faults(cell: CellFields) -> Iterator[Fault]:
         check_track(cell.track.built(), cell.station_names)
     except BadInput as error:
         yield Fault(("track", "stretches"), str(error))
+
+
+def _chance_faults(cell: CellFields) -> Iterator[Fault]:
+    try:
+        check_robot_breaks(len(cell.built_robots), cell.track is not None, cell.stochastic.built())
+    except BadInput as error:
+        yield Fault(("stochastic", "robot_breaks_every_s"), str(error))
 
 
 def _order_faults(cell: CellFields) -> Iterator[Fault]:

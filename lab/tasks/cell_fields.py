@@ -175,6 +175,12 @@ class Stochastic(Record):
     """The mean time of a repair [s], such as `120.0`."""
     late_s: Seconds = 0.0
     """By how much a part with a release_s comes later than that, in the mean [s], such as `30.0`."""
+    robot_breaks_every_s: Seconds = 0.0
+    """The mean time that a robot is in order, at work or not, between two breakdowns [s], such as `600.0`; 0: none. It then
+    stops where it is, with what it holds. At least 1 s; not beside a track.
+    """
+    robot_repair_s: Seconds = 0.0
+    """The mean time of a robot's repair [s], such as `60.0`."""
 
     def built(self) -> Chance:
         """As the sequencer has it."""

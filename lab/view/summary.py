@@ -305,8 +305,10 @@ def _drawn(stochastic: Mapping[str, Any], unit: str) -> list[str]:
         low, high = stochastic[name]["ci95"]
         return f"{stochastic[name]['mean']:.2f}{unit} ({low:.2f} to {high:.2f})"
 
+    every_s, repair_s = stochastic["robot_breaks_every_s"], stochastic["robot_repair_s"]
+    robots = f", robots in order for {every_s:g} s on average, repaired for {repair_s:g} s" if every_s else ""
     return [
-        f"{counted(stochastic['replications'], 'drawn episode')}: the list as it is {mean('fixed')}",
+        f"{counted(stochastic['replications'], 'drawn episode')}{robots}: the list as it is {mean('fixed')}",
         f"reacting {mean('reacting')}: {stochastic['reacting']['policy']}",
         f"saved by reacting {mean('saved_by_reacting')}",
     ]

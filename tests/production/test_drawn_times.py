@@ -29,11 +29,11 @@ def asked(lab: Lab, words: str, **more: Any) -> dict[str, Any]:
 
 
 REACTING = {
-    "srl": "planned anew at every decision",
+    "srl": "planned anew at every decision, by rollout",
     "srl-time": "it goes on learning before every decision",
     "fifo": "a queue of tasks as they become possible",
     "shortest-move": "the rule shortest-move, asked at every decision",
-    "exact": "planned anew at every decision",
+    "exact": "planned anew at every decision, by rollout",
     "carried": "the carried-over policy, asked at every decision",
 }
 
@@ -53,7 +53,8 @@ def test_drawn_times(lab: Lab, monkeypatch: pytest.MonkeyPatch, method: str) -> 
     assert list(document) == list(plain)
     drawn = document["stochastic"]
     assert list(drawn) == [
-        *("processing", "arrivals", "spread", "replications", "fixed", "reacting", "saved_by_reacting")
+        *("processing", "arrivals", "spread", "robot_breaks_every_s", "robot_repair_s"),
+        *("replications", "fixed", "reacting", "saved_by_reacting"),
     ]
     assert (drawn["processing"], drawn["arrivals"], drawn["spread"]) == ("normal", None, 0.1)
     assert (drawn["replications"], drawn["reacting"]["policy"]) == (5, REACTING[method])
@@ -148,3 +149,22 @@ def test_the_times_of_a_task_are_drawn_as_the_thesis_has_it(lab: Lab, monkeypatc
     assert drawn["saved_by_reacting"] == {"mean": 0.0, "ci95": [0.0, 0.0]}
     costs = replicate(load_cell("oven.toml").cell(2), drawn["fixed"]["sequence"], Chance(), 6, 0)  # of the same times
     assert drawn["fixed"]["mean"] == pytest.approx(costs.mean())
+
+
+@pytest.mark.parametrize(("method", "replans"), [("exact", "rollout"), ("fifo", None), ("nearest-ready", None)])
+def test_several_robots_that_break_down(
+    lab: Lab, monkeypatch: pytest.MonkeyPatch, method: str, replans: str | None
+) -> None:
+    """The document and the lines say which method replans, and the same seed gives the same."""
+    few(monkeypatch, 4)
+    words = f"two-carriers --toasts 3 --method {method} --stochastic"
+    drawn = asked(lab, words)["stochastic"]
+    assert drawn["reacting"]["replans"] == replans
+    assert (drawn["robot_breaks_every_s"], drawn["robot_repair_s"]) == (100.0, 60.0)
+    assert asked(lab, words)["stochastic"] == drawn
+    ran = lab("sequence", *words.split())
+    says = (
+        "planned anew whenever something happens, by rollout" if replans else "asked" if "ready" in method else "queue"
+    )
+    assert says in ran.out
+    assert "robots in order for 100 s on average, repaired for 60 s" in ran.out

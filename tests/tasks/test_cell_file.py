@@ -66,7 +66,7 @@ def test_what_ships_loads_by_name_and_by_path(name: str) -> None:
     file = load_cell(name)
     assert file.name == name
     assert file == load_cell(str(tasks_folder() / f"{name}.toml"))
-    assert file.cell().parts == (4 if name in ("hoist-pu", "two-on-a-track") else 3)
+    assert file.cell().parts == (4 if name in ("hoist-pu", "two-carriers", "two-on-a-track") else 3)
 
 
 @pytest.mark.parametrize(

@@ -73,3 +73,9 @@ def test_the_one_that_ships_is_slower_than_without_hindrance() -> None:
 def test_what_cannot_be_is_said_with_its_line(text: str, fault: str) -> None:
     with pytest.raises(BadInput, match=rf"^line\.toml: line \d+.*{fault}"):
         load_cell(written(text))
+
+
+def test_robots_that_break_down_are_refused_with_their_line() -> None:
+    """Beside a track, and where there are none."""
+    with pytest.raises(BadInput, match=r"line\.toml: line \d+: robot_breaks_every_s = 50 and a track: "):
+        load_cell(written(FILE + TRACK + "[stochastic]\nrobot_breaks_every_s = 50\n"))

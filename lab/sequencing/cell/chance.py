@@ -1,4 +1,4 @@
-"""What chance does to a cell: times drawn around their means, machines that break down, parts that come late.
+"""What chance does to a cell: times drawn around their means, machines and robots that break down, parts that come late.
 
 Laws are compiled as they are.
 
@@ -6,7 +6,7 @@ A draw depends on the episode's seed, the part and the position only, not on the
 same episode meet the same times.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from math import cos, isfinite, log, pi, sqrt
 from types import MappingProxyType
@@ -40,6 +40,7 @@ LAWS: Mapping[str, Callable[[float, float, float, float], float]] = MappingProxy
 
 
 MOST_BREAKS = 8  # of a machine while it works on one part
+SHORTEST_S = 1.0  # that a robot is in order on average, where it breaks down
 
 
 def repairs(work_s: float, breaks_every_s: float, repair_s: float, draw: Callable[[int], float]) -> float:
@@ -57,14 +58,31 @@ def repairs(work_s: float, breaks_every_s: float, repair_s: float, draw: Callabl
     return found_s
 
 
+def through(outages: Iterable[tuple[float, float]], start_s: float, work_s: float) -> float:
+    """When a robot has done work of so many seconds, begun at `start_s` or once it is repaired; what it began it goes on with.
+
+    outages: from when until when it is out of order, ascending [s].
+    """
+    for from_s, until_s in outages:
+        if from_s > start_s and from_s >= start_s + work_s:
+            break
+        if until_s > start_s:
+            work_s -= max(0.0, from_s - start_s)
+            start_s = until_s
+    return start_s + work_s
+
+
 @dataclass(frozen=True)
 class Chance:
     """The laws of processing times and of intervals between arrivals; `spread` of a normal one as a share of its mean.
 
     breaks_every_s: how long a machine works between two breakdowns on average (0: it never breaks down), repair_s: how long it
     is then repaired. late_s: by how much a part that is there at first comes later than it should, exponentially distributed.
-    Raises BadInput for unknown laws, for spreads that are not 0 to 1 and times that are not finite and 0 or more.
-    Source: thesis 7.6 (normal, 10 %), App. III.
+    robot_breaks_every_s: how long a robot is in order, at work or not, between two breakdowns on average (0: it never breaks
+    down), robot_repair_s: how long it then stops where it is, with what it holds; both exponentially distributed.
+    Raises BadInput for unknown laws, for spreads that are not 0 to 1, times that are not finite and 0 or more, and robots that
+    break down more often than once in SHORTEST_S.
+    Source: thesis 7.6 (normal, 10 %), App. III; time-dependent failures, Buzacott and Hanifin 1978.
     """
 
     processing: str = "normal"
@@ -73,6 +91,8 @@ class Chance:
     breaks_every_s: float = 0.0
     repair_s: float = 0.0
     late_s: float = 0.0
+    robot_breaks_every_s: float = 0.0
+    robot_repair_s: float = 0.0
 
     def __post_init__(self) -> None:
         for field in ("processing", "arrivals"):
@@ -80,20 +100,38 @@ class Chance:
                 raise unknown("law", getattr(self, field), LAWS, f"chance, {field}")
         if not (isfinite(self.spread) and 0 <= self.spread <= 1):
             raise BadInput(f"chance, spread = {self.spread}: allowed are 0 to 1")
-        for field in ("breaks_every_s", "repair_s", "late_s"):
+        for field in ("breaks_every_s", "repair_s", "late_s", "robot_breaks_every_s", "robot_repair_s"):
             if not (isfinite(getattr(self, field)) and getattr(self, field) >= 0):
                 raise BadInput(f"chance, {field} = {getattr(self, field)}: allowed are finite times from 0")
+        if 0 < self.robot_breaks_every_s < SHORTEST_S:
+            raise BadInput(
+                f"chance, robot_breaks_every_s = {self.robot_breaks_every_s}: allowed are 0 and times from {SHORTEST_S:g}"
+            )
 
 
 NO_CHANCE = Chance("constant", "constant")
 
 
+def check_robot_breaks(robots: int, track: bool, chance: Chance) -> None:
+    """BadInput for robots that break down where there are none, and on a track."""
+    if not chance.robot_breaks_every_s:
+        return
+    every = f"robot_breaks_every_s = {chance.robot_breaks_every_s:g}"
+    if not robots:
+        raise BadInput(f"{every}, but the cell has no robots; breaks_every_s is for machines")
+    if track:
+        raise BadInput(
+            f"{every} and a track: a robot that stops there bars it, and a way is taken only where it is free"
+        )
+
+
 def check_chance(cell: Cell, chance: Chance) -> None:
-    """BadInput for chance in a cell with batches.
+    """BadInput for chance in a cell with batches, and for robots that break down where they cannot (`check_robot_breaks`).
 
     An order tells with what is brought, or taken out, next whether a machine has begun: who decides on the way would decide
     afterwards that it had begun before.
     """
+    check_robot_breaks(len(cell.robots), bool(cell.track), chance)
     if cell.batches and chance != NO_CHANCE:
         name = cell.names[min(cell.batches)]
         raise BadInput(
@@ -121,6 +159,30 @@ class Episode:
         first = self._apart + self.cell.parts + 2 * MOST_BREAKS * number
         return work_s + repairs(work_s, every_s, self.chance.repair_s, lambda n: uniform(self.seed, first + n))
 
+    def lasts_s(self, part: int, position: int, begin_s: float) -> float:
+        """How long the part is processed in that position from a time on [s]."""
+        return self.processing_s(part, position)
+
+    def comes_s(self, part: int, since_s: float) -> float:
+        """When the part (from 1) arrives, where the arrival (or pick) before it was at a time [s]."""
+        return since_s + self.interval_s(part)
+
+    def until_s(self, robot: int, start_s: float, work_s: float) -> float:
+        """When a robot (from 0) has driven or served for so long, from a time on or once it is repaired (see `through`) [s]."""
+        return through(self.outages(robot), start_s, work_s)
+
+    def outages(self, robot: int) -> Iterator[tuple[float, float]]:
+        """From when until when a robot (from 0) is out of order, ascending, without end; none where robots never break down."""
+        every_s, repair_s = self.chance.robot_breaks_every_s, self.chance.robot_repair_s
+        if not every_s:
+            return
+        first, until_s, n = self._apart * (1 + MOST_BREAKS) + self.cell.parts, 0.0, robot
+        while True:
+            from_s = until_s - every_s * log(1.0 - uniform(self.seed, first + 2 * n))
+            until_s = from_s - repair_s * log(1.0 - uniform(self.seed, first + 2 * n + 1))
+            yield from_s, until_s
+            n += len(self.cell.robots)
+
     def late_s(self, part: int) -> float:
         """By how much the part (from 1) comes later than it should [s]."""
         if not self.chance.late_s:
@@ -129,7 +191,7 @@ class Episode:
 
     @property
     def _apart(self) -> int:
-        """The first number that no law draws: there lateness begins, and after it breakdowns."""
+        """The first number that no law draws: there lateness begins, after it breakdowns of machines, then of robots."""
         return 2 * (self.cell.parts + 1) * len(self.cell.positions)
 
     def interval_s(self, part: int) -> float:

@@ -1,12 +1,14 @@
 """First in, first out: what is possible first is served first, as a list and as a policy."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import cost
 from lab.sequencing.cell.routes import choice_of, part_of
 from lab.sequencing.search import Search, SequenceResult, only_one
-from lab.sequencing.simulate.execution import WAIT, Choose, Observed, carry_out
+from lab.sequencing.simulate.execution import WAIT, Choose, Observed, one_by_one
 
 
 def fifo(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceResult:
@@ -16,7 +18,7 @@ def fifo(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceResult
     its simulation does. Raises BadInput and WorkFailed as `lab.sequencing.methods.random_search`.
     """
     search.check(cell)
-    execution = carry_out(cell, lambda cell: _Queue(cell, stays=False))
+    execution = one_by_one(cell, lambda cell: _Queue(cell, stays=False))
     run = execution.run
     return only_one(cell, search, tuple(execution.sequence), cost(run, search.objective), run.done)
 
@@ -43,7 +45,7 @@ class _Queue:
     def __call__(self, seen: Observed, allowed: tuple[int, ...]) -> int:
         parts = seen.cell.parts
         tasks: dict[int, int] = {}
-        for decision in allowed:
+        for decision in self._soonest_first(seen, allowed):
             if self._in_turn(seen, decision):
                 tasks.setdefault(part_of(decision, parts), decision)
         self._room_since_s = {part: self._room_since_s.get(part, seen.now_s) for part in tasks}
@@ -60,6 +62,14 @@ class _Queue:
 
         ready = [part for part in tasks if part not in waiting]
         return tasks[min(ready or tasks, key=order)]
+
+    def _soonest_first(self, seen: Observed, allowed: tuple[int, ...]) -> Sequence[int]:
+        """Of several robots that are free the one that is there first takes a task."""
+        if seen.cell.serial or not self._stays:
+            return allowed
+        ways = {decision: seen.option(decision) for decision in allowed}
+        picks_s = {d: seen.pick_s(part_of(d, seen.cell.parts), way) for d, way in ways.items() if way is not None}
+        return sorted(allowed, key=lambda decision: (picks_s[decision], decision))
 
     def _in_turn(self, seen: Observed, decision: int) -> bool:
         """Whether the route that a part is about to take is the next one of its product; True once it is on one."""

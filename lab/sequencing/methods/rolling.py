@@ -1,6 +1,7 @@
 """A policy that averages over drawn futures: at every decision each that may be taken is tried in all of them."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +31,8 @@ def rolling(
     So many futures are drawn anew at every decision, from what can be known: what goes on is not over yet. In each of them each
     decision that may be taken is followed by the rest of the list, and by what each dispatching rule makes of the rest; the
     least mean is taken, of equal ones what the list has. All decisions meet the same futures. Raises BadInput for fewer than 1
-    future, and when it is run in a cell with several robots or servers.
+    future, and when it is run in a cell with several robots or servers: its futures are compiled for one robot, whose decisions
+    follow one another in time. That one robot breaks down delays whatever it does, so futures leave it out.
     Source: rollout with several heuristics, Bertsekas, Tsitsiklis and Wu 1997; Monte Carlo policy improvement, Tesauro and
     Galperin 1997.
     """
@@ -40,7 +42,9 @@ def rolling(
     def policy(cell: Cell) -> Choose:
         check_objective(objective, cell)
         if not cell.serial:
-            raise BadInput("rolling decisions are for cells in which one robot does all the work")
+            raise BadInput(
+                "rolling decisions are for cells in which one robot does all the work: several are planned anew by rollout"
+            )
         if cell.batches:
             raise BadInput(
                 "rolling decisions are for cells without batches: an order says what they are, before it begins"
@@ -56,8 +60,9 @@ class _Rolling:
     def __init__(
         self, cell: Cell, planned: Sequence[int], chance: Chance, drawn: tuple[int, int], objective: str
     ) -> None:
-        self.cell, self.chance, (self.seed, self.futures) = cell, chance, drawn
-        self._arrays = cell_arrays(cell, objective, chance)
+        self.cell, self.chance = cell, replace(chance, robot_breaks_every_s=0.0)
+        self.seed, self.futures = drawn
+        self._arrays = cell_arrays(cell, objective, self.chance)
         self._run, self._now = run_arrays(cell), run_arrays(cell)
         self._left, self._decisions = [*planned], 0
 

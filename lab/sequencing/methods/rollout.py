@@ -1,10 +1,14 @@
 """Policies that look ahead: a rule asked at every decision, and the rest of the work planned anew."""
 
+from collections.abc import Collection, Sequence
+from math import inf
+
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import MAKESPAN, check_objective, cost
 from lab.sequencing.cell.routes import choice_of, part_of
 from lab.sequencing.methods.rules import Rule, dispatch, usable
-from lab.sequencing.simulate.execution import Choose, Policy
+from lab.sequencing.search import SAME
+from lab.sequencing.simulate.execution import WAIT, Choose, Observed, Policy
 from lab.sequencing.simulate.run import Run, branch
 
 
@@ -13,17 +17,85 @@ def by_rule(rule: Rule) -> Policy:
     return lambda cell: rule
 
 
-def replan(objective: str = MAKESPAN) -> Policy:
+def replan(objective: str = MAKESPAN, planned: Sequence[int] = ()) -> Policy:
     """A policy that plans the rest of the work anew at every decision (`rollout`), and takes the first step of it.
 
-    It plans by mean times. A run of the policy raises BadInput for an objective that the cell does not allow.
+    It plans by mean times. With several robots or servers it is asked whenever something happens, keeps to its last plan, at
+    first `planned`, as long as that costs no more than a new one, and takes the first step that is asked for, or waits. A run of
+    the policy raises BadInput for an objective that the cell does not allow.
     """
 
     def policy(cell: Cell) -> Choose:
         check_objective(objective, cell)
-        return lambda seen, allowed: rollout(seen, objective)[0]
+        if cell.serial:
+            return lambda seen, allowed: rollout(seen, objective)[0]
+        return _Replanning(cell, planned, objective).choose
 
     return policy
+
+
+class _Replanning:
+    """An episode of several robots or servers: the plan that is kept, each decision with where its part stands before it."""
+
+    def __init__(self, cell: Cell, planned: Sequence[int], objective: str) -> None:
+        self.objective = objective
+        self._plan = _placed(Run(cell), planned)
+
+    def choose(self, seen: Observed, allowed: tuple[int, ...]) -> int:
+        """The first step, in the best plan known, that is allowed; WAIT: none."""
+        found = rollout(seen, self.objective)
+        kept = self._left(seen)
+        costs = [inf if run is None else cost(run, self.objective) for run in (_moved(seen, kept), _moved(seen, found))]
+        if costs[0] > costs[1] + SAME or not kept:
+            kept, self._plan = found, _placed(seen, found)
+        return first_of(seen, kept, allowed, self.objective)
+
+    def _left(self, seen: Observed) -> tuple[int, ...]:
+        """What is left of the plan, from where each part stands."""
+        parts, reached, left = seen.cell.parts, set[int](), list[int]()
+        for decision, place in self._plan:
+            part = part_of(decision, parts)
+            if place == seen.locations[part - 1]:
+                reached.add(part)
+            if part in reached:
+                left.append(decision)
+        return tuple(left)
+
+
+def _placed(run: Run, plan: Sequence[int]) -> list[tuple[int, int]]:
+    """A plan, each decision with where its part stands before it."""
+    ahead, found = branch(run), list[tuple[int, int]]()
+    for decision in plan:
+        found.append((decision, ahead.locations[part_of(decision, run.cell.parts) - 1]))
+        ahead.move(decision)
+    return found
+
+
+def first_of(run: Run, plan: Sequence[int], allowed: Collection[int], objective: str = MAKESPAN) -> int:
+    """The first decision of a plan that is allowed, and the first one there of its part and of its robot; WAIT: there is none.
+
+    What robots that are busy or out of order are to do before it must not cost more for its being taken first.
+    """
+    ahead, taken = branch(run), set[str]()
+    by = [ahead.move(decision).by for decision in plan]
+    for n, decision in enumerate(plan):
+        part = run.cell.part_name(part_of(decision, run.cell.parts))  # never the name of a robot or a station
+        if decision in allowed and not taken & {by[n], part}:
+            again = _moved(run, (decision, *plan[:n], *plan[n + 1 :]))
+            if again is not None and cost(again, objective) <= cost(ahead, objective) + SAME:
+                return decision
+        taken |= {by[n], part}
+    return WAIT
+
+
+def _moved(run: Run, sequence: Sequence[int]) -> Run | None:
+    """Where a list of decisions leads from a run; None where one of them may not be taken."""
+    ahead = branch(run)
+    for decision in sequence:
+        if ahead.option(decision) is None:
+            return None
+        ahead.move(decision)
+    return ahead
 
 
 def rollout(run: Run, objective: str = MAKESPAN, depth: int = 1) -> tuple[int, ...]:

@@ -84,6 +84,8 @@ class CellArrays(NamedTuple):
     breaks_every_s: float
     repair_s: float
     late_s: float
+    robot_breaks_every_s: float
+    robot_repair_s: float
     tracked: bool
     first_held: Ints
     held: Ints
@@ -106,7 +108,8 @@ class RunArrays(NamedTuple):
     rooms_s, servers_s: since when each room and server is free, those of a station ascending as
     far as they are free; worked: the last product of each server, -1: none. held (R, 4): the part that a robot holds while
     it waits for room, from 0, how many wait longer, and the stations in which it waits; -1: none. fetched_s, put_s (K,),
-    kept_s (S + 2,): as in `Run`. allowed: decisions, ascending; options: what each means.
+    kept_s (S + 2,): as in `Run`. seed (1,): of the episode, by which robots break down.
+    allowed: decisions, ascending; options: what each means.
     """
 
     locations: Ints
@@ -125,6 +128,7 @@ class RunArrays(NamedTuple):
     fetched_s: Floats
     put_s: Floats
     kept_s: Floats
+    seed: NDArray[np.uint64]
     allowed: Ints
     options: Ints
 
@@ -182,6 +186,8 @@ def cell_arrays(cell: Cell, objective: str = MAKESPAN, chance: Chance = NO_CHANC
         breaks_every_s=float(chance.breaks_every_s),
         repair_s=float(chance.repair_s),
         late_s=float(chance.late_s),
+        robot_breaks_every_s=float(chance.robot_breaks_every_s),
+        robot_repair_s=float(chance.robot_repair_s),
         tracked=bool(cell.track),
         **_held(cell),
         **_ruled(cell),
@@ -210,6 +216,7 @@ def run_arrays(cell: Cell) -> RunArrays:
         fetched_s=np.zeros(cell.parts),
         put_s=np.zeros(cell.parts),
         kept_s=np.zeros(len(cell.stations) + 2),
+        seed=np.zeros(1, np.uint64),
         allowed=np.zeros(decisions, np.int64),
         options=np.zeros(decisions, np.int64),
     )

@@ -57,6 +57,23 @@ def worked(cell: Any, seed: Any, part: int, there: int, parts: int) -> float:
 
 
 @inner
+def until(cell: Any, seed: Any, parts: int, robot: int, start_s: float, work_s: float) -> float:
+    """`chance.Episode.until_s`, and `chance.through`."""
+    if cell.robot_breaks_every_s == 0.0:
+        return start_s + work_s
+    first, until_s, n = apart(cell, parts) * (1 + chance.MOST_BREAKS) + parts, 0.0, robot
+    while True:
+        from_s = until_s - cell.robot_breaks_every_s * np.log(1.0 - uniform(seed, first + 2 * n))
+        until_s = from_s - cell.robot_repair_s * np.log(1.0 - uniform(seed, first + 2 * n + 1))
+        if from_s > start_s and from_s >= start_s + work_s:
+            return start_s + work_s
+        if until_s > start_s:
+            work_s -= max(0.0, from_s - start_s)
+            start_s = until_s
+        n += len(cell.robot_starts)
+
+
+@inner
 def interval(cell: Any, seed: Any, part: int) -> float:
     """`chance.Episode.interval_s` of a part (from 0)."""
     number = (part + 1) * len(cell.begins) + cell.starts[part]

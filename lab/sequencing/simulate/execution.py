@@ -24,7 +24,8 @@ class Observed(Run):
 
     ready: whether each part may be picked now, part 1 first. ready_s: when it was ready or, as long as it is not, when
     it should be: by the mean time since it began, and now when it is later than that. processed_s counts means for what
-    is not finished. began_s: when what goes on with it began, or when it was to come.
+    is not finished. began_s: when what goes on with it began, or when it was to come. clock_s: the time, where robots that
+    are busy do not tell it.
     """
 
     def __init__(self, run: Run) -> None:
@@ -33,6 +34,11 @@ class Observed(Run):
         self.moves.clear()  # they say how long the work will take
         self.ready: tuple[bool, ...] = ()
         self.began_s: list[float] = []
+        self.clock_s: float | None = None
+
+    @property
+    def now_s(self) -> float:
+        return super().now_s if self.clock_s is None else self.clock_s
 
 
 Choose = Callable[[Observed, tuple[int, ...]], int]  # (what is known, allowed decisions) -> one of them, or WAIT
@@ -127,7 +133,16 @@ class Execution:
 
 
 def carry_out(cell: Cell, policy: Policy, times: Episode | None = None) -> Execution:
-    """What a policy makes of one episode, to the end or to a deadlock."""
+    """What a policy makes of one episode, to the end or to a deadlock; several robots or servers as `several.Dispatch` says."""
+    if not cell.serial:
+        from lab.sequencing.simulate.several import dispatched
+
+        return dispatched(cell, policy, times)
+    return one_by_one(cell, policy, times)
+
+
+def one_by_one(cell: Cell, policy: Policy, times: Episode | None = None) -> Execution:
+    """What a policy makes of one episode, to the end or to a deadlock, one decision after the other."""
     execution, choose = Execution(cell, times), policy(cell)
     while allowed := execution.run.allowed():
         execution.step(choose(execution.observe(), allowed))

@@ -7,8 +7,8 @@ import numpy as np
 from lab.learning.compiled import inner, lean
 from lab.sequencing.cell.routes import SERVER
 from lab.sequencing.simulate.cell_arrays import ARRIVAL_CODES, NO_ARRIVALS, OBJECTIVE_CODES, WIDTH
-from lab.sequencing.simulate.chance_kernels import apart, interval, uniform, worked
-from lab.sequencing.simulate.room_kernels import free, grant, hold_part, may_go_s, possible, room_s
+from lab.sequencing.simulate.chance_kernels import apart, interval, uniform, until, worked
+from lab.sequencing.simulate.room_kernels import free, grant, hold_part, in_order, may_go_s, possible, room_s
 from lab.sequencing.simulate.run import SLACK_S
 
 CLOCK, PICK = ARRIVAL_CODES["clock"], ARRIVAL_CODES["pick"]
@@ -42,6 +42,7 @@ def _batch(cell: Any, run: Any, station: int, at_s: float, seed: Any) -> None:
 def reset(cell: Any, run: Any, seed: Any) -> None:
     """`Run.__init__`, with the times of an episode's seed (uint64)."""
     unfinished, came_s = 0, 0.0
+    run.seed[0] = seed
     for station in range(len(cell.rooms)):
         run.room[station] = cell.rooms[station]
     for part in range(len(run.locations)):
@@ -94,15 +95,20 @@ def _hold(cell: Any, run: Any, robot: int, origin: int, target: int, leave_s: fl
 @inner
 def _leaves_s(cell: Any, run: Any, o: int) -> float:
     """When the robot of a way sets out for where it picks."""
-    robot = cell.robot[o]
-    return float(_clear_s(cell, run, robot, run.robots_at[robot], cell.origin[o], run.robots_s[robot]))
+    robot, at = cell.robot[o], run.robots_at[cell.robot[o]]
+    if at == cell.origin[o]:
+        return float(run.robots_s[robot])
+    return float(_clear_s(cell, run, robot, at, cell.origin[o], in_order(cell, run, robot, run.robots_s[robot])))
 
 
 @inner
 def reached_s(cell: Any, run: Any, o: int) -> float:
     """`Run.reach_s`."""
-    robot = cell.robot[o]
-    return float(_leaves_s(cell, run, o) + cell.empty_s[robot, run.robots_at[robot], cell.origin[o]])
+    robot, at = cell.robot[o], run.robots_at[cell.robot[o]]
+    if at == cell.origin[o]:
+        return float(run.robots_s[robot])
+    empty_s = cell.empty_s[robot, at, cell.origin[o]]
+    return float(until(cell, run.seed[0], len(run.locations), robot, _leaves_s(cell, run, o), empty_s))
 
 
 @inner
@@ -113,7 +119,7 @@ def pick_times(cell: Any, run: Any, part: int, o: int) -> Any:
         begin_s = max(begin_s, run.ready_s[part])
     if not cell.serial:
         begin_s = max(begin_s, may_go_s(cell, run, part, o) - cell.service_s[o])
-    pick_s = begin_s + cell.service_s[o]
+    pick_s = until(cell, run.seed[0], len(run.locations), robot, begin_s, cell.service_s[o])
     return begin_s, pick_s, _clear_s(cell, run, robot, cell.origin[o], cell.target[o], pick_s)
 
 
@@ -220,10 +226,11 @@ def take(cell: Any, run: Any, part: int, o: int, seed: Any) -> None:
     else:
         reach_s = reached_s(cell, run, o)
         begin_s, pick_s, out_s = pick_times(cell, run, part, o)
-        drop_s = out_s + cell.loaded_s[robot, cell.origin[o], cell.target[o]]
+        loaded_s = cell.loaded_s[robot, cell.origin[o], cell.target[o]]
+        drop_s = until(cell, seed, len(run.locations), robot, out_s, loaded_s)
+        leave_s = _leaves_s(cell, run, o)
+        run.clock[1] += leave_s - run.robots_s[robot]
         if cell.tracked:
-            leave_s = _leaves_s(cell, run, o)
-            run.clock[1] += leave_s - run.robots_s[robot]
             _hold(cell, run, robot, run.robots_at[robot], cell.origin[o], leave_s)
             _hold(cell, run, robot, cell.origin[o], cell.target[o], out_s)
         run.clock[1] += begin_s - reach_s + out_s - pick_s
@@ -237,6 +244,8 @@ def take(cell: Any, run: Any, part: int, o: int, seed: Any) -> None:
     if robot != SERVER and not cell.serial:
         carried_s = drop_s
         drop_s = max(drop_s, room_s(cell, run, cell.needs[o, 0]), room_s(cell, run, cell.needs[o, 1]))
+        if drop_s > carried_s:
+            drop_s = in_order(cell, run, robot, drop_s)
         run.clock[1] += drop_s - carried_s
         if cell.shared:
             hold_part(cell, run, part, o)

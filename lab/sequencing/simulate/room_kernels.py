@@ -5,7 +5,7 @@ from typing import Any
 from lab.learning.compiled import inner
 from lab.sequencing.cell.routes import SERVER
 from lab.sequencing.simulate.cell_arrays import WIDTH
-from lab.sequencing.simulate.chance_kernels import worked
+from lab.sequencing.simulate.chance_kernels import until, worked
 
 
 @inner
@@ -22,6 +22,12 @@ def may_go_s(cell: Any, run: Any, part: int, o: int) -> float:
             if cell.holds[place, 0] == cell.if_full[o] or cell.holds[place, 1] == cell.if_full[o]:
                 at_s = max(at_s, run.fetched_s[other])
     return float(at_s)
+
+
+@inner
+def in_order(cell: Any, run: Any, robot: int, at_s: float) -> float:
+    """`Run._in_order_s`."""
+    return float(until(cell, run.seed[0], len(run.locations), robot, at_s, 0.0))
 
 
 @inner
@@ -85,7 +91,9 @@ def grant(cell: Any, run: Any, station: int, at_s: float, seed: Any) -> None:
         waits = run.held[other, 0] >= 0 and (run.held[other, 2] == station or run.held[other, 3] == station)
         if waits and (robot < 0 or run.held[other, 1] < run.held[robot, 1]):
             robot = other
-    drop_s = max(at_s, run.robots_s[robot])
+    drop_s = run.robots_s[robot]
+    if at_s > drop_s:
+        drop_s = in_order(cell, run, robot, at_s)
     run.clock[1] += drop_s - run.robots_s[robot]
     run.robots_s[robot] = drop_s
     _put(cell, run, run.held[robot, 0], drop_s, seed)

@@ -80,10 +80,10 @@ class Run:
         # What is decided later may happen earlier: since when each room is free, and each server, and what it worked on last.
         self.rooms = Rooms() if cell.serial else rooms_of(cell.capacities, self.occupied)
         servers = enumerate(() if cell.serial else cell.stations)
-        self._servers = {n: [(0.0, "")] * (station.servers or 0) for n, station in servers}
+        self.servers = {n: [(0.0, "")] * (station.servers or 0) for n, station in servers}
         # When each part was picked to come where it is; when it, or its pallet, was put down, or the one that came before it was
         # taken; before when nothing leaves a station.
-        self._fetched_s, self._put_s = [0.0] * cell.parts, [0.0] * cell.parts
+        self._fetched_s, self.put_s = [0.0] * cell.parts, [0.0] * cell.parts
         self._kept_s = [0.0] * len(cell.stations)
 
     @property
@@ -182,12 +182,13 @@ class Run:
         leave_s, reach_s, served_s, pick_s = self._times_s(part, option)
         served_s, pick_s = served_s + wait.pick_s, pick_s + wait.pick_s
         out_s = self._clear_s(robot, option.origin, option.target, pick_s)
-        carried_s = out_s + self.carry_s(option)
+        carried_s = self.times.until_s(robot, out_s, self.carry_s(option))
         drop_s = carried_s + wait.drop_s
         if self.locations[part - 1] == cell.starts[part - 1]:
             self._fetch(pick_s)
         lacking = self.rooms.lacking(option.needs)
         drop_s = max(drop_s, self.rooms.take([s for s in option.needs if s not in lacking]))
+        drop_s = self.in_order_s(robot, drop_s) if drop_s > carried_s else drop_s
         for station in lacking:
             self.rooms.wait(robot, station)
             self.held[robot] = part
@@ -201,7 +202,7 @@ class Run:
         self._hold(robot, option.origin, option.target, out_s)
         self.robots_at[robot], self.robots_s[robot] = option.target, drop_s
         self.waited_s += leave_s - free_s + served_s - reach_s + out_s - pick_s
-        process_s = 0.0 if there.processing_s is None else self.times.processing_s(part, option.to)
+        process_s = 0.0 if there.processing_s is None else self.times.lasts_s(part, option.to, drop_s)
         self.processed_s += process_s
         self._put(part, drop_s, process_s)
         if there.station in cell.batches and there.processing_s is not None:
@@ -215,14 +216,15 @@ class Run:
     def _put(self, part: int, at_s: float, process_s: float) -> None:
         """A part, or its pallet, is put down where it is now."""
         there = self.cell.positions[self.locations[part - 1]]
-        self._put_s[part - 1] = at_s
+        self.put_s[part - 1] = at_s
         if there.processing_s is not None:
             self.ready_s[part - 1] = at_s + process_s
         self._ends(part, there, at_s)
 
     def _grant(self, robot: int, at_s: float) -> None:
         """A robot that waits for room with a part has it from a time on."""
-        part, drop_s = self.held[robot], max(at_s, self.robots_s[robot])
+        part, drop_s = self.held[robot], self.robots_s[robot]
+        drop_s = self.in_order_s(robot, at_s) if at_s > drop_s else drop_s
         self.waited_s += drop_s - self.robots_s[robot]
         self.robots_s[robot] = drop_s
         own = [n for n, move in enumerate(self.moves) if move.by == self.cell.robots[robot].name][
@@ -230,7 +232,7 @@ class Run:
         ]  # none: not known
         for number in own:
             self.moves[number] = replace(self.moves[number], drop_s=drop_s)
-        self._put(part, drop_s, self.times.processing_s(part, self.locations[part - 1]))
+        self._put(part, drop_s, self.times.lasts_s(part, self.locations[part - 1], drop_s))
         if not self.rooms.awaited(robot):
             self.held[robot] = 0
 
@@ -239,11 +241,11 @@ class Run:
         cell = self.cell
         begin_s, server = self._server(part, option)
         begin_s += wait.pick_s
-        process_s = self.times.processing_s(part, option.to)
+        process_s = self.times.lasts_s(part, option.to, begin_s)
         end_s = begin_s + process_s
         if self.locations[part - 1] == cell.starts[part - 1]:
             self._fetch(begin_s)
-        self._servers[option.target][server] = end_s, cell.order[part - 1]
+        self.servers[option.target][server] = end_s, cell.order[part - 1]
         self._leave(part, option, end_s)
         self.ready_s[part - 1] = end_s
         self.processed_s += process_s
@@ -255,10 +257,10 @@ class Run:
     def _server(self, part: int, option: Option) -> tuple[float, int]:
         """When a part may begin at a machine with servers, and with which of them: the one that lets it begin first."""
         product, setups = self.cell.order[part - 1], self.cell.setups[option.target]
-        ready_s, there = max(self.ready_s[part - 1], self._put_s[part - 1]), self.cell.positions[option.to]
+        ready_s, there = max(self.ready_s[part - 1], self.put_s[part - 1]), self.cell.positions[option.to]
         if option.target not in there.holds:
             ready_s = max(ready_s, self._kept_s[option.target] - (there.processing_s or 0.0))
-        free_s = [max(ready_s, free + setups.get((last, product), 0.0)) for free, last in self._servers[option.target]]
+        free_s = [max(ready_s, free + setups.get((last, product), 0.0)) for free, last in self.servers[option.target]]
         return min(free_s), free_s.index(min(free_s))
 
     def _leave(self, part: int, option: Option, left_s: float) -> None:
@@ -307,7 +309,7 @@ class Run:
 
     def free_s(self, station: int) -> float:
         """When the first of a station's servers is through with what it was given; 0 where there is none."""
-        return min((free_s for free_s, _ in self._servers.get(station, ())), default=0.0)
+        return min((free_s for free_s, _ in self.servers.get(station, ())), default=0.0)
 
     def reach_s(self, option: Option) -> float:
         """When the robot of a way is where it picks, if it goes there now."""
@@ -315,10 +317,27 @@ class Run:
 
     def _reached_s(self, option: Option) -> tuple[float, float]:
         """When the robot of a way sets out for where it picks, and when it is there."""
-        at, robot, cell = self.robots_at[option.robot], option.robot, self.cell
-        leave_s = self._clear_s(robot, at, option.origin, self.robots_s[robot])
-        empty_s = 0.0 if at == option.origin else float(cell.empty_s[at, option.origin]) / cell.robots[robot].speed
-        return leave_s, leave_s + empty_s
+        return self.drive_s(option.robot, option.origin, self.robots_s[option.robot])
+
+    def drive_s(self, robot: int, station: int, at_s: float) -> tuple[float, float]:
+        """When a robot, not before a time, sets out for a station without a part, and when it is there."""
+        at = self.robots_at[robot]
+        if at == station:
+            return at_s, at_s
+        leave_s = self._clear_s(robot, at, station, self.in_order_s(robot, at_s))
+        empty_s = float(self.cell.empty_s[at, station]) / self.cell.robots[robot].speed
+        return leave_s, self.times.until_s(robot, leave_s, empty_s)
+
+    def drive(self, robot: int, station: int) -> None:
+        """A robot drives to a station without a part, as soon as it is free."""
+        leave_s, reach_s = self.drive_s(robot, station, self.robots_s[robot])
+        self._hold(robot, self.robots_at[robot], station, leave_s)
+        self.waited_s += leave_s - self.robots_s[robot]
+        self.robots_at[robot], self.robots_s[robot] = station, reach_s
+
+    def in_order_s(self, robot: int, at_s: float) -> float:
+        """From when on, not before a time, a robot is in order [s]."""
+        return self.times.until_s(robot, at_s, 0.0)
 
     def _clear_s(self, robot: int, origin: int, target: int, at_s: float) -> float:
         """From when on, not before a time, a robot finds every stretch of its way free when it comes to it."""
@@ -338,6 +357,10 @@ class Run:
         """When a way takes a part up, if that were done now; where a server works on it: when it begins."""
         return self._server(part, option)[0] if option.robot == SERVER else self._times_s(part, option)[3]
 
+    def begin_s(self, part: int, option: Option) -> float:
+        """When the robot of a way begins its service, or picks where it has none, if that were done now [s]."""
+        return self._times_s(part, option)[2]
+
     def drop_s(self, part: int, option: Option) -> float:
         """When a way brings a part to its end, by the cell's own times, as soon as there is room."""
         if option.robot == SERVER:
@@ -355,7 +378,7 @@ class Run:
         ready_s = max(reach_s, self.ready_s[part - 1]) if option.waits else reach_s
         if not self.cell.serial:
             ready_s = max(ready_s, self._may_go_s(part, option) - option.service_s)
-        return leave_s, reach_s, ready_s, ready_s + option.service_s
+        return leave_s, reach_s, ready_s, self.times.until_s(option.robot, ready_s, option.service_s)
 
     def _may_go_s(self, part: int, option: Option) -> float:
         """Before when a way may not pick, whoever takes it: where the part or its pallet is still carried, the part before it
@@ -363,7 +386,7 @@ class Run:
         here, there = self.cell.positions[self.locations[part - 1]], self.cell.positions[option.to]
         inside = self.inside(option.if_full) if option.if_full is not None else ()
         kept_s = [self._kept_s[station] for station in here.holds if station not in there.holds]
-        return max([self._put_s[part - 1], *(self._fetched_s[other - 1] for other in inside), *kept_s])
+        return max([self.put_s[part - 1], *(self._fetched_s[other - 1] for other in inside), *kept_s])
 
     def _first_ready_s(self) -> list[float]:
         arrivals, came_s = self.cell.arrivals, 0.0
@@ -371,7 +394,7 @@ class Run:
         all_s = [s + (self.times.late_s(n) if at == start else 0.0) for n, (s, at, start) in enumerate(places, 1)]
         if arrivals is not None:
             for part in self.cell.coming[: 1 if arrivals.after == "pick" else None]:
-                came_s += self.times.interval_s(part)
+                came_s = self.times.comes_s(part, came_s)
                 all_s[part - 1] = came_s
         return all_s
 
@@ -382,9 +405,9 @@ class Run:
         if arrivals is None or self.fetched == len(coming):
             return
         following = coming[self.fetched]
-        self._put_s[following - 1] = pick_s
+        self.put_s[following - 1] = pick_s
         if arrivals.after == "pick":
-            self.ready_s[following - 1] = pick_s + self.times.interval_s(following)
+            self.ready_s[following - 1] = self.times.comes_s(following, pick_s)
 
     def in_turn(self, part: int) -> bool:
         """Whether it is there: parts that arrive are taken in their order."""
@@ -428,5 +451,5 @@ def take_over(run: Run, state: Run) -> None:
         state.held.copy(),
         state.rooms.copy(),
     )
-    run._servers = {station: servers.copy() for station, servers in state._servers.items()}
-    run._fetched_s, run._put_s, run._kept_s = state._fetched_s.copy(), state._put_s.copy(), state._kept_s.copy()
+    run.servers = {station: servers.copy() for station, servers in state.servers.items()}
+    run._fetched_s, run.put_s, run._kept_s = state._fetched_s.copy(), state.put_s.copy(), state._kept_s.copy()

@@ -1,6 +1,7 @@
 """Times drawn by chance: their laws, and what a draw depends on."""
 
 from collections.abc import Callable
+from itertools import islice, pairwise
 
 import numpy as np
 import pytest
@@ -10,7 +11,8 @@ from hypothesis import strategies as st
 from lab.errors import BadInput
 from lab.learning.splitmix import uniform
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.cell.chance import LAWS, NO_CHANCE, Chance, Episode, repairs
+from lab.sequencing.cell.chance import LAWS, NO_CHANCE, Chance, Episode, check_chance, repairs, through
+from lab.tasks.task_file import load_cell
 
 CellMaker = Callable[..., Cell]
 SEEDS = st.integers(0, 2**64 - 1)
@@ -143,8 +145,52 @@ def test_late_parts_come_so_much_later_on_average(oven_cell: CellMaker) -> None:
     assert Episode(cell, NO_CHANCE, 3).late_s(2) == 0.0
 
 
-@pytest.mark.parametrize("name", ["breaks_every_s", "repair_s", "late_s"])
+@pytest.mark.parametrize("name", ["breaks_every_s", "repair_s", "late_s", "robot_breaks_every_s", "robot_repair_s"])
 @pytest.mark.parametrize("value", [-1.0, float("nan"), float("inf")])
 def test_times_of_mishaps_that_cannot_be(name: str, value: float) -> None:
     with pytest.raises(BadInput, match=rf"^chance, {name} = {value}: allowed are finite times from 0$"):
         Chance(**{name: value})  # type: ignore[arg-type]
+
+
+# ---- robots that break down ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("start_s", "work_s", "until_s"),
+    [
+        (0.0, 10.0, 10.0),  # done as it breaks down
+        (0.0, 11.0, 31.0),  # 10 s before, 1 s after the repair
+        (12.0, 5.0, 35.0),  # begun when it is repaired
+        (10.0, 0.0, 30.0),  # nothing is begun then
+        (0.0, 45.0, 115.0),  # twice: 10 s, 10 s from 30 on, the rest from 90 on
+        (95.0, 1.0, 96.0),
+    ],
+)
+def test_through_outages_by_hand(start_s: float, work_s: float, until_s: float) -> None:
+    """Out of order from 10 to 30 s, and from 40 to 90 s."""
+    assert through([(10.0, 30.0), (40.0, 90.0)], start_s, work_s) == until_s
+
+
+def test_robots_are_out_of_order_by_their_share() -> None:
+    """In order for 80 s, repaired for 20 s, on average: 20 % of the time, each at times of its own, whatever is done."""
+    cell, chance = load_cell("two-carriers").cell(2), Chance("constant", robot_breaks_every_s=80.0, robot_repair_s=20.0)
+    episode = Episode(cell, chance, 3)
+    own = [[*islice(episode.outages(robot), 2000)] for robot in (0, 1)]
+    assert own[0] == [*islice(Episode(cell, chance, 3).outages(0), 2000)]
+    assert own[0][0] != own[1][0]
+    for stops in own:
+        assert sum(until_s - from_s for from_s, until_s in stops) / stops[-1][1] == pytest.approx(0.2, abs=0.02)
+        assert all(a[1] <= b[0] for a, b in pairwise(stops))
+
+
+def test_without_breakdowns_robots_are_always_in_order() -> None:
+    episode = Episode(load_cell("two-carriers").cell(2), Chance("constant", robot_repair_s=20.0), 3)
+    assert [*episode.outages(0)] == []
+    assert episode.until_s(1, 3.0, 4.0) == 7.0
+
+
+def test_robots_that_cannot_break_down() -> None:
+    with pytest.raises(BadInput, match=r"^chance, robot_breaks_every_s = 0.5: allowed are 0 and times from 1$"):
+        Chance(robot_breaks_every_s=0.5)
+    with pytest.raises(BadInput, match="robot_breaks_every_s = 50 and a track"):
+        check_chance(load_cell("two-on-a-track").cell(), Chance(robot_breaks_every_s=50.0))

@@ -11,6 +11,7 @@ from lab.sequencing.cell.chance import NO_CHANCE, Chance, Episode
 from lab.sequencing.methods.exact import optimum
 from lab.sequencing.methods.hindsight import in_hindsight, known_cell
 from lab.sequencing.simulate.follow import follow
+from lab.tasks.task_file import load_cell
 
 CellMaker = Callable[..., Cell]
 CHANCE = Chance("exponential", breaks_every_s=50.0, repair_s=20.0, late_s=30.0)
@@ -31,3 +32,12 @@ def test_the_known_cell_is_the_episode(toast_cell: CellMaker, fms_cell: CellMake
         kept = follow(cell, best, times)
         assert follow(known_cell(cell, times), best).end_s == pytest.approx(kept.end_s)
         assert in_hindsight(cell, times).cost <= kept.end_s + 1e-6
+
+
+def test_of_several_robots_it_is_a_bound() -> None:
+    """Two robots, one box: 10 s to a press, 30 s there, 10 s out, whoever breaks down."""
+    cell = load_cell("two-carriers").cell(1)
+    chance = Chance("constant", robot_breaks_every_s=20.0, robot_repair_s=20.0)
+    found = in_hindsight(cell, Episode(cell, chance, 4))
+    assert (found.cost, found.proven) == (pytest.approx(50.0), False)
+    assert in_hindsight(cell, Episode(cell)).proven

@@ -11,6 +11,7 @@ from lab.sequencing.cell.chance import NO_CHANCE, Chance, Episode
 from lab.sequencing.methods.exact import optimum
 from lab.sequencing.methods.rolling import rolling
 from lab.sequencing.simulate.execution import Execution, carry_out, replicate
+from lab.tasks.task_file import load_cell
 
 CellMaker = Callable[..., Cell]
 
@@ -63,3 +64,10 @@ def test_it_does_not_look_into_what_is_drawn(toast_cell: CellMaker) -> None:
 def test_what_is_refused(futures: int, says: str) -> None:
     with pytest.raises(BadInput, match=says):
         rolling((1,), NO_CHANCE, 0, futures=futures)
+
+
+def test_several_robots_are_refused() -> None:
+    with pytest.raises(
+        BadInput, match="cells in which one robot does all the work: several are planned anew by rollout"
+    ):
+        carry_out(load_cell("two-carriers").cell(), rolling((1,), NO_CHANCE, 0))

@@ -59,7 +59,10 @@ def walk_both(cell: Cell, chance: Chance, seed: int, pick: Callable[[int], int])
         kernels.move(arrays, there, i, np.uint64(seed))
 
 
-MISHAPS = st.tuples(st.sampled_from([0.0, 5.0]), st.floats(0, 10), st.sampled_from([0.0, 20.0]))
+MISHAPS = st.tuples(
+    *(st.sampled_from([0.0, 5.0]), st.floats(0, 10), st.sampled_from([0.0, 20.0])),
+    *(st.sampled_from([0.0, 15.0]), st.floats(0, 10)),
+)
 
 
 @settings(max_examples=80, deadline=None)
@@ -82,6 +85,8 @@ def test_robots_and_servers_too(shops: Callable[..., SearchStrategy[Cell]], data
     cell = with_due_times(data.draw(shops()), data.draw(st.floats(0, 100)))
     law = data.draw(st.sampled_from(sorted(LAWS)))
     chance = Chance(law, "constant", data.draw(st.floats(0, 1)), *data.draw(MISHAPS))
+    if not cell.robots or cell.track:
+        chance = replace(chance, robot_breaks_every_s=0.0)
     choices = data.draw(st.randoms(use_true_random=False))
     run, _, there = walk_both(cell, chance, data.draw(SEEDS), choices.randrange)
     for name in objectives.OBJECTIVES:

@@ -35,4 +35,14 @@ def test_the_whole(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(study, "TROUBLES", {"times 10 % off": study.TROUBLES["times 10 % off"]})
     found = reacting(Job(3), {})
     assert len(found.figures) == 1
-    assert {f"{name}: mean over hindsight [%]" for name in (LIST, RULE, ANEW, ROLLING)} < set(found.summary)
+    alike = "mean over hindsight, one robot that never breaks down [%]"
+    assert {f"{name}: {alike}" for name in (LIST, RULE, ANEW, ROLLING)} < set(found.summary)
+
+
+def test_several_robots_that_break_down() -> None:
+    """Nothing rolls there, hindsight is a bound, and what is planned anew saves over the list."""
+    found = reacted(Setting("two-carriers", "BBB", study.ROBOTS), 3, 0)
+    assert (set(found.costs), found.proven, found.decision_s) == ({LIST, RULE, ANEW, HINDSIGHT}, 0, None)
+    assert all((costs >= found.costs[HINDSIGHT] - 1e-6).all() for costs in found.costs.values())
+    assert found.costs[ANEW].mean() <= found.costs[LIST].mean()
+    assert {one["method"] for one in rows_of(Setting("two-carriers", "BBB", study.ROBOTS), found)} == set(found.costs)

@@ -132,8 +132,8 @@ def least_of_all(cell: Cell) -> float | None:
                 *ahead.robots_s,
                 ahead.end_s,
                 repr(vars(ahead.rooms)),
-                repr(ahead._servers),
-                *(*ahead.held, *ahead._fetched_s, *ahead._put_s, *ahead._kept_s),
+                repr(ahead.servers),
+                *(*ahead.held, *ahead._fetched_s, *ahead.put_s, *ahead._kept_s),
                 *ahead.track_s,
             )
             if ahead.end_s < best and key not in seen:
