@@ -72,7 +72,9 @@ class AroundPart(Skill):
         """Above the part, or ahead of it where it is taken from the side, and along the learned cells to the tool pose `goal`."""
         robot, mdp = bench.scene.robot, self.problem.mdp
         entry = entry_cell(goal, robot.tool(), self.surveys.into(self.station) is not None)[: len(mdp.shape)]
-        path = learned_path(policy, mdp, int(np.ravel_multi_index(entry, mdp.shape)))
+        path = learned_path(
+            policy, mdp, min(mdp.starts, key=lambda s: np.abs(np.subtract(mdp.state_cell(s), entry)).sum())
+        )
         poses = [self.pose(state, goal) for state in path]
         high = max(robot.tool().z, poses[0].z)
         yield from robot.follow([ToolPose(poses[0].x, poses[0].y, high, poses[0].yaw)], slow=SLOW)

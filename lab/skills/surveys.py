@@ -2,14 +2,15 @@
 
 from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import replace
-from functools import partial
+from functools import partial, reduce
 from math import hypot, pi
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lab.errors import BadInput, LabError
 from lab.sim.arms.kinematics import ToolPose
-from lab.sim.parts.kinds import Spot, beside
+from lab.sim.parts.kinds import Spot, beside, comes_as
 from lab.sim.scene.blocked_cells import OUT_OF_REACH, Survey, Surveyor
 from lab.sim.scene.places import Layout
 from lab.sim.scene.scene import Scene
@@ -18,7 +19,7 @@ from lab.sim.world import World
 from lab.skills.camera_grids import RELEASE_ABOVE, TOUCH_CLEARANCE, SurveyedGrid
 from lab.skills.once import Made, once
 from lab.tasks.task import Order, Task
-from lab.tasks.task_fields import CameraGrid
+from lab.tasks.task_fields import CameraGrid, Station
 from lab.workers import Workers
 
 Cell = tuple[int, ...]
@@ -73,7 +74,7 @@ class Surveys:
     """The surveys of one task in one layout."""
 
     def __init__(self, task: Task, order: Order, layout: Layout) -> None:
-        self.task, self.layout, self.parts = task, Layout(layout.obstacles, ()), len(order)
+        self.task, self.order, self.layout, self.parts = task, order, Layout(layout.obstacles, ()), len(order)
         self.places = places_of(task)
         self.kinds = self.places.kinds
         self.made: Made = {}
@@ -184,13 +185,22 @@ class Surveys:
 
     @once
     def around(self, station_name: str, kind: str, loaded: bool) -> Survey:
-        """Around the part that stands (or, loaded, is to stand) on a station's first spot, with neighbours on all sides."""
-        station, own = self.task.station(station_name), self.kinds[kind]
-        spot = self.places.spots(station, kind)[0]
+        """Around the part that stands (or, loaded, is to stand) at a station, with neighbours on all sides.
+
+        Free is what is free on each spot that the order uses. BadInput names what is in the way to one of them.
+        """
+        station = self.task.station(station_name)
+        surveyed = [self._around(station, kind, loaded, spot) for spot in self.spots_in_use(station, kind, loaded)]
+        return Survey(reduce(lambda one, other: np.where(one == "", other, one), surveyed))
+
+    def _around(self, station: Station, kind: str, loaded: bool, spot: Spot) -> NDArray[np.str_]:
+        """The causes around a part on one spot."""
+        own, into = self.kinds[kind], self.into(station.name)
         with World() as world:
-            scene = Scene(world, self.task, (), Layout(self.layout.obstacles, ()))
+            scene = Scene(world, self.task, (), self.layout)
             for name, (neighbour, other) in self.places.neighbours(station, spot).items():
-                self._stand(scene, name, neighbour, other)
+                if loaded or self._may_stand(station, neighbour, other, kind):
+                    self._stand(scene, name, neighbour, other)
             foot = self.places.raised(kind, station, spot)
             if foot != spot:
                 self._stand(scene, "the part", str(self.task.part(kind).pallet), spot)
@@ -202,8 +212,48 @@ class Surveys:
             beside_finger = (scene.robot.arm.gripper.opening_m - own.grip.width_m) / 2
             clearance = min(TOUCH_CLEARANCE[loaded], FINGER_SHARE * beside_finger)
             surveyor = Surveyor(scene, kind if loaded else None, clearance=clearance)
+            way = [] if into is not None else _between(self.approach(station.name), goal)
+            if cause := next(filter(None, map(surveyor.cause, way)), ""):
+                raise BadInput(
+                    f"station '{station.name}': the tool cannot go over its spot at ({spot.x:.2f}, {spot.y:.2f}) m: "
+                    f"{cause if cause == OUT_OF_REACH else f'in the way: {cause}'}"
+                )
             shape = NEAR_SHAPE if loaded else (*NEAR_SHAPE, NEAR_YAWS)
-            return surveyor.grid(shape, lambda cell: near_pose(goal, cell, self.into(station_name)))
+            return surveyor.grid(shape, lambda cell: near_pose(goal, cell, into)).causes
+
+    def _may_stand(self, station: Station, kind: str, spot: Spot, taken: str) -> bool:
+        """Whether one of a kind may be beside a part that is `taken` up: the widest anywhere, others where the order has them.
+
+        These stand where they begin, and at stations in the middle of a route; from where it ends a part is only taken after
+        a fault.
+        """
+        places, made = self.places, self.task.made_as(taken)
+        if kind == max(places.kinds_at(station.name), key=lambda own: own.footprint_m()).name:
+            return True
+        if self.task.starts(made.name) != station.name:
+            return all(route[-1].station != station.name for route in made.routes)
+        begins = zip(self.order, places.begins(self.order), strict=True)
+        stand = [at for name, at in begins if comes_as(self.task.part(name)) == kind]
+        return any(hypot(at.x - spot.x, at.y - spot.y) < NEAR_STEP_M[0] for at in stand)
+
+    def spots_in_use(self, station: Station, kind: str, loaded: bool) -> tuple[Spot, ...]:
+        """The spots on which parts of the order of a kind are taken up at a station or, loaded, set down; the first if none.
+
+        A station is filled from its first spot on, and a buffer where parts wait for a station only while another one is there.
+        """
+        task, made = self.task, self.task.made_as(kind).name
+        first, *others = self.places.spots(station, kind)
+        if not loaded and task.starts(made) == station.name:
+            begins = (
+                spot for name, spot in zip(self.order, self.places.begins(self.order), strict=True) if name == made
+            )
+            return tuple(begins) or (first,)
+        routes = {name: task.part(name).routes for name in self.order}
+        parts = sum(
+            station.name in task.part(n).places and task.share_places(station.name, n, made) for n in self.order
+        )
+        waits = all(stage.station != station.name for own in routes.values() for route in own for stage in route)
+        return first, *others[: max(0, parts - 1 - waits)]
 
     def check_free(self, what: str, poses: Sequence[ToolPose]) -> None:
         """BadInput when the empty tool cannot be at one of these poses, naming what is in the way."""
