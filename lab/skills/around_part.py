@@ -101,6 +101,11 @@ def from_above(mdp: TabularMDP) -> TabularMDP:
     return replace(mdp, starts=tuple(int(s) for s in starts))
 
 
+def nearest_start(mdp: TabularMDP, cell: tuple[int, ...]) -> int:
+    """The state nearest to a cell, in steps of the grid, of those that episodes begin in: others are blocked."""
+    return min(mdp.starts, key=lambda state: np.abs(np.subtract(mdp.state_cell(state), cell)).sum())
+
+
 def entry_cell(goal: ToolPose, tool: ToolPose, from_the_side: bool = False) -> tuple[int, int, int, int]:
     """The cell of the highest level that is nearest to where the tool is, seen from the part; from the side: straight ahead."""
     c, s = np.cos(goal.yaw), np.sin(goal.yaw)
