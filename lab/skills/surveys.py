@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from lab.errors import BadInput, LabError
 from lab.sim.arms.kinematics import ToolPose
-from lab.sim.parts.kinds import Spot, beside, comes_as
+from lab.sim.parts.kinds import Spot, beside
 from lab.sim.scene.blocked_cells import OUT_OF_REACH, Survey, Surveyor
 from lab.sim.scene.places import Layout
 from lab.sim.scene.scene import Scene
@@ -199,8 +199,7 @@ class Surveys:
         with World() as world:
             scene = Scene(world, self.task, (), self.layout)
             for name, (neighbour, other) in self.places.neighbours(station, spot).items():
-                if loaded or self._may_stand(station, neighbour, other, kind):
-                    self._stand(scene, name, neighbour, other)
+                self._stand(scene, name, neighbour, other)
             foot = self.places.raised(kind, station, spot)
             if foot != spot:
                 self._stand(scene, "the part", str(self.task.part(kind).pallet), spot)
@@ -220,21 +219,6 @@ class Surveys:
                 )
             shape = NEAR_SHAPE if loaded else (*NEAR_SHAPE, NEAR_YAWS)
             return surveyor.grid(shape, lambda cell: near_pose(goal, cell, into)).causes
-
-    def _may_stand(self, station: Station, kind: str, spot: Spot, taken: str) -> bool:
-        """Whether one of a kind may be beside a part that is `taken` up: the widest anywhere, others where the order has them.
-
-        These stand where they begin, and at stations in the middle of a route; from where it ends a part is only taken after
-        a fault.
-        """
-        places, made = self.places, self.task.made_as(taken)
-        if kind == max(places.kinds_at(station.name), key=lambda own: own.footprint_m()).name:
-            return True
-        if self.task.starts(made.name) != station.name:
-            return all(route[-1].station != station.name for route in made.routes)
-        begins = zip(self.order, places.begins(self.order), strict=True)
-        stand = [at for name, at in begins if comes_as(self.task.part(name)) == kind]
-        return any(hypot(at.x - spot.x, at.y - spot.y) < NEAR_STEP_M[0] for at in stand)
 
     def spots_in_use(self, station: Station, kind: str, loaded: bool) -> tuple[Spot, ...]:
         """The spots on which parts of the order of a kind are taken up at a station or, loaded, set down; the first if none.

@@ -275,8 +275,8 @@ class Places:
 
     def neighbours(self, station: Station, spot: Spot) -> dict[str, tuple[str, Spot]]:
         """Parts that may stand beside one spot, their kind and spots by name; where there is one place only there are none."""
-        kinds = outermost(self.kinds_at(station.name))
-        if not kinds or station.capacity == 1:
+        largest = max(self.kinds_at(station.name), key=lambda kind: kind.footprint_m(), default=None)
+        if largest is None or station.capacity == 1:
             return {}
         if station.own_places:
             seen = enumerate(self._seen_from(station, spot), 1)
@@ -286,21 +286,20 @@ class Places:
         if self._has_columns(station):
             steps |= {"to the left": (-column_m, 0.0), "to the right": (column_m, 0.0)}
         return {
-            f"{kind.name} {where}": (
-                kind.name,
+            f"{largest.name} {where}": (
+                largest.name,
                 Spot(*beside((spot.x, spot.y), spot.yaw, off), spot.z, spot.yaw),
             )
-            for kind in kinds
             for where, off in steps.items()
         }
 
     def _seen_from(self, station: Station, spot: Spot) -> list[tuple[str, Spot]]:
-        """The outermost kinds on each other spot of the station and where that lies as seen from any of them, from this one.
+        """The largest kind on each other spot of the station and where that lies as seen from any of them, seen from this one.
 
         Lower layers are left away: they are no higher than what this spot lies on; and so is what this one carries.
         """
-        found: dict[tuple[str | float, ...], tuple[str, Spot]] = {}
-        stand = {one: [kind for kind, _ in self.grounds(station, one)] for one in self.spots(station)}
+        found: dict[tuple[float, ...], tuple[str, Spot]] = {}
+        stand = {one: [kind.name for kind, _ in self.grounds(station, one)] for one in self.spots(station)}
         for one, own in stand.items():
             for other, kinds in stand.items():
                 # the places of a kind are filled from the lowest on: above it stands none of its own yet
@@ -310,24 +309,11 @@ class Places:
                 if up > 0.0 and one in [under for _, under in self.below(station, other)]:
                     continue
                 along, across = beside((0.0, 0.0), -one.yaw, (other.x - one.x, other.y - one.y))
+                largest = max(kinds, key=lambda kind: self.kinds[kind].footprint_m())
                 x, y = beside((spot.x, spot.y), spot.yaw, (along, across))
-                seen = Spot(x, y, spot.z + up, spot.yaw + other.yaw - one.yaw)
                 key = round(along, 4), round(across, 4), round(up, 4), round(other.yaw - one.yaw, 4)
-                found |= {(kind.name, *key): (kind.name, seen) for kind in outermost(kinds)}
+                found[key] = largest, Spot(x, y, spot.z + up, spot.yaw + other.yaw - one.yaw)
         return list(found.values())
-
-
-def outermost(kinds: Sequence[Kind]) -> list[Kind]:
-    """The kinds than which no other reaches as far to all sides and up: who keeps clear of them keeps clear of all."""
-    sizes = [(*kind.footprint_m(), kind.height_m) for kind in kinds]
-    return [
-        kind
-        for n, (kind, own) in enumerate(zip(kinds, sizes, strict=True))
-        if not any(
-            all(a >= b for a, b in zip(other, own, strict=True)) and (other != own or m < n)
-            for m, other in enumerate(sizes)
-        )
-    ]
 
 
 def _draw_place(

@@ -202,18 +202,6 @@ def test_in_rows_there_are_neighbours_on_all_sides_of_a_storage_and_on_two_of_a_
     assert places.neighbours(task.station("toaster"), here) == {}  # one place only
 
 
-def test_beside_a_spot_stands_the_widest_kind_and_a_higher_one(breakfast: Task) -> None:
-    """A thin cup, lower than a slice, reaches nowhere beyond one; a cup of 20 cm does above it."""
-    parts = {part.name: part for part in breakfast.parts}
-    for high, kinds in ((0.05, {"slice"}), (0.2, {"slice", "cup"})):
-        cup = parts["cup"].model_copy(update={"size_m": (0.012, high), "look": None, "grip": None})
-        task = breakfast.changed(parts=(parts["slice"], cup))
-        spots = task.station("tray").model_copy(update={"spots": None})
-        task = task.changed(stations=tuple(spots if s.name == "tray" else s for s in task.stations))
-        found = places_of(task).neighbours(task.station("tray"), Spot(0.0, 0.0, 0.0, 0.0)).values()
-        assert {kind for kind, _ in found} == kinds
-
-
 def test_by_given_spots_neighbours_are_wherever_one_lies_as_seen_from_another(fms: Task) -> None:
     """Of 2 x 3 places, 16 cm and 8.5 cm apart, others are -1, 0, 1 columns and -2, ..., 2 rows away: 3 * 5 - 1."""
     places, here = places_of(fms), Spot(0.0, 0.0, 0.012, 0.0)
