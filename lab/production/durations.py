@@ -175,20 +175,8 @@ def trials(prepared: Prepared) -> list[Trial]:
 
 
 def spots_in_use(prepared: Prepared, skill: Skill) -> tuple[Spot, ...]:
-    """The spots on which a skill takes parts of an order up, or sets them down.
-
-    A station is filled from its first spot on, and a buffer where parts wait for a station only while another one is there.
-    """
-    task, order, places = prepared.task, prepared.order, prepared.surveys.places
-    station, kind = task.station(skill.station), task.made_as(skill.kind).name
-    first, *others = places.spots(station, kind)
-    if not skill.carries and task.starts(kind) == station.name:
-        begins = (spot for name, spot in zip(order, places.begins(order), strict=True) if name == kind)
-        return tuple(begins) or (first,)
-    routes = {name: task.part(name).routes for name in order}
-    parts = sum(station.name in task.part(n).places and task.share_places(station.name, n, kind) for n in order)
-    waits = all(stage.station != station.name for own in routes.values() for route in own for stage in route)
-    return first, *others[: max(0, parts - 1 - waits)]
+    """The spots on which a skill takes parts of an order up, or sets them down."""
+    return prepared.surveys.spots_in_use(prepared.task.station(skill.station), skill.kind, skill.carries)
 
 
 def measure(

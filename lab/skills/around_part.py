@@ -74,7 +74,8 @@ class AroundPart(Skill):
         """
         robot, mdp = bench.scene.robot, self.problem.mdp
         entry = entry_cell(goal, robot.tool(), self.surveys.into(self.station) is not None)[: len(mdp.shape)]
-        path = learned_path(policy, mdp, int(np.ravel_multi_index(entry, mdp.shape)))
+        begin = min(mdp.starts, key=lambda state: np.abs(np.subtract(mdp.state_cell(state), entry)).sum())
+        path = learned_path(policy, mdp, begin)
         cells = tuple(mdp.state_cell(state) for state in path)
         kept = self.surveys.around_corners(self.station, self.kind, self.carries, cells)
         poses = [self.pose(path[n], goal) for n in kept]
@@ -101,6 +102,11 @@ def from_above(mdp: TabularMDP) -> TabularMDP:
     levels = np.indices(mdp.shape)[2].ravel()
     starts = np.flatnonzero((levels == NEAR_SHAPE[2] - 1) & ~mdp.terminal)
     return replace(mdp, starts=tuple(int(s) for s in starts))
+
+
+def nearest_start(mdp: TabularMDP, cell: tuple[int, ...]) -> int:
+    """The state nearest to a cell, in steps of the grid, of those that episodes begin in: others are blocked."""
+    return min(mdp.starts, key=lambda state: np.abs(np.subtract(mdp.state_cell(state), cell)).sum())
 
 
 def entry_cell(goal: ToolPose, tool: ToolPose, from_the_side: bool = False) -> tuple[int, int, int, int]:

@@ -1,11 +1,13 @@
 """What the sub-tasks survey of one scene, each survey made once: the workspace, the surroundings of a station, the grids."""
 
 from collections.abc import Hashable, Iterable, Sequence
+from contextlib import ExitStack
 from dataclasses import replace
-from functools import partial
+from functools import partial, reduce
 from math import hypot, pi
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lab.errors import BadInput, LabError
 from lab.sim.arms.kinematics import ToolPose
@@ -19,7 +21,7 @@ from lab.skills.camera_grids import RELEASE_ABOVE, TOUCH_CLEARANCE, SurveyedGrid
 from lab.skills.once import Made, once
 from lab.skills.shortcuts import corners
 from lab.tasks.task import Order, Task
-from lab.tasks.task_fields import CameraGrid
+from lab.tasks.task_fields import CameraGrid, Station
 from lab.workers import Workers
 
 Cell = tuple[int, ...]
@@ -75,7 +77,7 @@ class Surveys:
     """The surveys of one task in one layout."""
 
     def __init__(self, task: Task, order: Order, layout: Layout) -> None:
-        self.task, self.layout, self.parts = task, Layout(layout.obstacles, ()), len(order)
+        self.task, self.order, self.layout, self.parts = task, order, Layout(layout.obstacles, ()), len(order)
         self.places = places_of(task)
         self.kinds = self.places.kinds
         self.made: Made = {}
@@ -199,25 +201,67 @@ class Surveys:
 
     @once
     def around(self, station_name: str, kind: str, loaded: bool) -> Survey:
-        """Around the part that stands (or, loaded, is to stand) on a station's first spot, with neighbours on all sides."""
-        with World() as world:
-            surveyor, goal = self._around(world, station_name, kind, loaded)
-            shape = NEAR_SHAPE if loaded else (*NEAR_SHAPE, NEAR_YAWS)
-            return surveyor.grid(shape, lambda cell: near_pose(goal, cell, self.into(station_name)))
+        """Around the part that stands (or, loaded, is to stand) at a station, with neighbours on all sides.
+
+        Free is what is free on each spot that the order uses. BadInput names what is in the way to one of them.
+        """
+        station, into = self.task.station(station_name), self.into(station_name)
+        shape = NEAR_SHAPE if loaded else (*NEAR_SHAPE, NEAR_YAWS)
+        surveyed = list[NDArray[np.str_]]()
+        for spot in self.spots_in_use(station, kind, loaded):
+            with World() as world:
+                surveyor, goal = self._around(world, station, kind, loaded, spot)
+                way = [] if into is not None else _between(self.approach(station.name), goal)
+                if cause := next(filter(None, map(surveyor.cause, way)), ""):
+                    raise BadInput(
+                        f"station '{station.name}': the tool cannot go over its spot at ({spot.x:.2f}, {spot.y:.2f}) m: "
+                        f"{cause if cause == OUT_OF_REACH else f'in the way: {cause}'}"
+                    )
+                surveyed.append(surveyor.grid(shape, lambda cell, goal=goal: near_pose(goal, cell, into)).causes)
+        return Survey(reduce(lambda one, other: np.where(one == "", other, one), surveyed))
+
+    def spots_in_use(self, station: Station, kind: str, loaded: bool) -> tuple[Spot, ...]:
+        """The spots on which parts of the order of a kind are taken up at a station or, loaded, set down; the first if none.
+
+        A station is filled from its first spot on, and a buffer where parts wait for a station only while another one is there.
+        """
+        task, made = self.task, self.task.made_as(kind).name
+        first, *others = self.places.spots(station, kind)
+        if not loaded and task.starts(made) == station.name:
+            begins = (
+                spot for name, spot in zip(self.order, self.places.begins(self.order), strict=True) if name == made
+            )
+            return tuple(begins) or (first,)
+        routes = {name: task.part(name).routes for name in self.order}
+        parts = sum(
+            station.name in task.part(n).places and task.share_places(station.name, n, made) for n in self.order
+        )
+        waits = all(stage.station != station.name for own in routes.values() for route in own for stage in route)
+        return first, *others[: max(0, parts - 1 - waits)]
 
     @once
-    def around_corners(self, station: str, kind: str, loaded: bool, cells: tuple[Cell, ...]) -> tuple[int, ...]:
+    def around_corners(self, station_name: str, kind: str, loaded: bool, cells: tuple[Cell, ...]) -> tuple[int, ...]:
         """Which of the cells of a path around a part are left when the tool goes straight where that is as free as cells are."""
-        with World() as world:
-            surveyor, goal = self._around(world, station, kind, loaded)
-            path = [near_pose(goal, cell, self.into(station)) for cell in cells]
-            return corners(path, _NEAR_STEP_M, surveyor.free)
+        station, into = self.task.station(station_name), self.into(station_name)
+        with ExitStack() as worlds:
+            around = [
+                self._around(worlds.enter_context(World()), station, kind, loaded, spot)
+                for spot in self.spots_in_use(station, kind, loaded)
+            ]
+            first = around[0][1]
 
-    def _around(self, world: World, station_name: str, kind: str, loaded: bool) -> tuple[Surveyor, ToolPose]:
-        """What surveys around a part, and where the tool closes or opens."""
-        station, own = self.task.station(station_name), self.kinds[kind]
-        spot = self.places.spots(station, kind)[0]
-        scene = Scene(world, self.task, (), Layout(self.layout.obstacles, ()))
+            def free(line: Sequence[ToolPose]) -> bool:
+                turned = [0.0 if into is not None else goal.yaw - first.yaw for _, goal in around]
+                return all(
+                    surveyor.free([_as_at(pose, first, goal, turn) for pose in line])
+                    for (surveyor, goal), turn in zip(around, turned, strict=True)
+                )
+
+            return corners([near_pose(first, cell, into) for cell in cells], _NEAR_STEP_M, free)
+
+    def _around(self, world: World, station: Station, kind: str, loaded: bool, spot: Spot) -> tuple[Surveyor, ToolPose]:
+        """What surveys around a part on a spot, and where the tool closes or opens."""
+        own, scene = self.kinds[kind], Scene(world, self.task, (), self.layout)
         for name, (neighbour, other) in self.places.neighbours(station, spot).items():
             self._stand(scene, name, neighbour, other)
         foot = self.places.raised(kind, station, spot)
@@ -266,3 +310,9 @@ def _survey(surveys: Surveys, name: SurveyName) -> object:
 def _between(one: ToolPose, other: ToolPose) -> list[ToolPose]:
     parts = np.linspace(0.0, 1.0, 8)
     return [ToolPose(one.x + t * (other.x - one.x), one.y + t * (other.y - one.y), one.z, one.yaw) for t in parts]
+
+
+def _as_at(pose: ToolPose, one: ToolPose, other: ToolPose, turn: float) -> ToolPose:
+    """A pose beside one goal, as it is beside another one that is turned by so much [rad]."""
+    x, y = beside((other.x, other.y), turn, (pose.x - one.x, pose.y - one.y))
+    return ToolPose(x, y, pose.z - one.z + other.z, pose.yaw - one.yaw + other.yaw)

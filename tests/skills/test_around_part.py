@@ -8,7 +8,7 @@ from lab.mdp import grid
 from lab.sim.arms.kinematics import ToolPose
 from lab.sim.scene.places import Layout
 from lab.skills import Grasp, Place
-from lab.skills.around_part import SIDEWAYS, entry_cell, from_above
+from lab.skills.around_part import SIDEWAYS, entry_cell, from_above, nearest_start
 from lab.skills.grasp import ACTIONS
 from lab.skills.surveys import NEAR_SHAPE, Surveys, near_pose
 from lab.tasks.task import Task
@@ -32,6 +32,15 @@ def test_episodes_begin_anywhere_free_on_the_highest_level() -> None:
     top = NEAR_SHAPE[2] - 1
     mdp = from_above(grid(blocked.shape, blocked, (0, 0, top), (1, 0, 0)))
     assert [mdp.state_cell(s) for s in mdp.starts] == [(0, 0, top), (0, 1, top), (1, 0, top)]
+
+
+def test_the_tool_enters_by_the_nearest_free_cell_where_the_one_below_it_is_blocked() -> None:
+    top = NEAR_SHAPE[2] - 1
+    blocked = np.zeros((3, 1, NEAR_SHAPE[2]), dtype=bool)
+    blocked[0, 0, -1] = True
+    mdp = from_above(grid(blocked.shape, blocked, (1, 0, top), (2, 0, 0)))
+    for cell, entry in (((0, 0, top), (1, 0, top)), ((2, 0, top), (2, 0, top))):
+        assert mdp.state_cell(nearest_start(mdp, cell)) == entry
 
 
 @pytest.mark.parametrize("yaw", [0.0, 0.4, -1.2, 1.5])

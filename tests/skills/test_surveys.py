@@ -6,9 +6,10 @@ import pytest
 from lab.errors import BadInput
 from lab.sim.arms.arm_models import arm_of
 from lab.sim.arms.kinematics import ToolPose
-from lab.sim.parts.kinds import Spot
+from lab.sim.parts.kinds import Spot, beside
 from lab.sim.scene.blocked_cells import OUT_OF_REACH
 from lab.sim.scene.places import Layout
+from lab.sim.scene.scene_check import places_of
 from lab.skills.grasp import GOAL
 from lab.skills.prepared_scene import prepare
 from lab.skills.skillset import SkillSet
@@ -24,7 +25,7 @@ from lab.skills.surveys import (
     way_to,
 )
 from lab.tasks.task import Task
-from lab.tasks.task_fields import Workspace
+from lab.tasks.task_fields import Obstacle, Workspace
 from lab.tasks.task_file import load
 
 ORDER = ("slice", "slice")
@@ -127,6 +128,18 @@ def test_around_a_slice_the_goal_is_free_and_what_stands_beside_blocks(surveys: 
     assert loaded.causes.shape == NEAR_SHAPE
     assert not loaded.blocked[2, 2, 0]
     assert not loaded.blocked[:, :, -1].any()
+
+
+def test_around_a_part_is_free_what_is_free_on_each_spot_in_use(task: Task) -> None:
+    """A pillar beside the second spot of the plate is in nobody's way while there is one slice only."""
+    second = places_of(task).spots(task.station("plate"), "slice")[1]
+    x, y = beside((second.x, second.y), second.yaw, (0.0, -0.105))
+    pillar = Obstacle(name="pillar", position_m=(x, y), cubes=6)
+    near = task.changed(obstacles=(pillar,))
+    for slices in (1, 2):
+        around = Surveys(near, ("slice",) * slices, Layout(((x, y),), ())).around("plate", "slice", False)
+        assert ("pillar" in around.causes) is (slices == 2)
+        assert not around.blocked[2, 2, 0, NEAR_YAWS // 2]
 
 
 def test_a_scene_that_cannot_be_is_refused_at_once(task: Task, layout: Layout) -> None:

@@ -28,6 +28,7 @@ _ROOT_KG, _ROOT_KGM2 = 1.0, 0.01  # of a foot that says nothing: it is bolted do
 MOST_LINKS = 200
 MOST_SEEN_BYTES = 500_000  # of the meshes of one link
 _GREY = "0.8 0.8 0.8 1"
+_QUARTER_RAD = 1e-5  # so near to a quarter turn an angle is one that was written with few digits
 _PACKAGE = "package://"
 
 
@@ -103,6 +104,7 @@ def settled(path: Path, folder: Path) -> Urdf:
     for joint in root.findall("joint"):
         check_joint(path, joint, links)
         _check_limits(path, joint)
+        _straighten(joint)
     carrying, foot = _tree(path, root, links)
     for link in root.findall("link"):
         name = link.get("name", "")
@@ -124,6 +126,16 @@ def _check_limits(path: Path, joint: Xml.Element) -> None:
         raise BadInput(f"{path}: joint '{name}' has the velocity limit {limit.get('velocity')}, wanted above 0")
     if np.linalg.norm(floats(joint.find("axis"), "xyz", "0 0 0")) < 1e-6:
         raise BadInput(f"{path}: joint '{name}' has an axis of length 0")
+
+
+def _straighten(joint: Xml.Element) -> None:
+    """Write a joint's quarter turns out: with 1.5708 a wrist would have to whirl where its axes fall together."""
+    origin = joint.find("origin")
+    if origin is not None:
+        turns = np.array(floats(origin, "rpy", "0 0 0"))
+        quarters = np.round(turns / (np.pi / 2)) * (np.pi / 2)
+        turns = np.where(abs(turns - quarters) < _QUARTER_RAD, quarters, turns)
+        origin.set("rpy", " ".join(map(repr, turns.tolist())))
 
 
 def _tree(path: Path, root: Xml.Element, links: Sequence[str]) -> tuple[dict[str, Xml.Element], str]:

@@ -155,7 +155,9 @@ def _heights(shape: PartShape, gripper: Gripper) -> list[float]:
 
 def _grip(shape: PartShape, pads: "_Pads", yaw: float, up_m: float) -> Grip:
     x, y = -sin(yaw) * pads.middle_m + 0.0, cos(yaw) * pads.middle_m + 0.0  # no -0.0
-    return Grip(yaw, up_m, x, y, pads.width_m, _period(shape))
+    return Grip(
+        yaw if yaw <= pi / 2 else yaw - pi, up_m, x, y, pads.width_m, _period(shape)
+    )  # half a turn on is the same
 
 
 def _is_round(shape: PartShape) -> bool:

@@ -1,7 +1,9 @@
 """What is wrong with a task's cell before anything is surveyed in it: reach, heights, and stations in each other's way."""
 
 from itertools import combinations, product
-from math import ceil, cos, hypot, sin
+from math import ceil, cos, hypot, pi, sin
+
+import numpy as np
 
 from lab.errors import BadInput, counted
 from lab.sim import models
@@ -23,6 +25,7 @@ DETOUR = 1.5  # times the straight way along the axes, at most, around the arm a
 OVER_M = 0.01  # [m] between a carried part and what stands below its way
 ON_M = 1e-6  # by what a part may reach beyond what it stands on: sums of lengths differ by less
 RESTS = 0.25  # of the way from a part's middle to its sides: so far at least reaches what carries it
+TURNS = 17  # places of a turn that are looked at
 INTO_M = 0.005  # [m] the same above a machine that it is let down into
 
 
@@ -51,6 +54,7 @@ def check_scene(task: Task) -> None:
                 pose = kind.held_at(spot)
                 for at in (pose, ToolPose(pose.x, pose.y, low, pose.yaw)):
                     _check_reach(arm, station, at)
+                _check_turn(arm, station, at)
 
 
 def _check_level(task: Task) -> None:
@@ -239,6 +243,22 @@ def _check_reach(arm: Arm, station: Station, at: ToolPose) -> None:
             f"pose = {list(station.pose)}, is {hypot(at.x, at.y):.2f} m from the robot; "
             f"the arm '{arm.name}' {arm.reach_in_words(at.z)}"
         )
+
+
+def _check_turn(arm: Arm, station: Station, above: ToolPose) -> None:
+    """BadInput when the last joint ends before the tool has turned over a station to its yaw, or over a spot to the grip's."""
+    x, y, yaw = station.pose
+    came, over = ToolPose(x, y, above.z, 0.0), ToolPose(x, y, above.z, yaw)
+    for begun, ended in ((came, over), (over, above)):
+        turn = (ended.yaw - begun.yaw + pi) % (2 * pi) - pi
+        shares = np.linspace(0.0, 1.0, TURNS)[:, None]
+        poses = [begun.x, begun.y, begun.z, begun.yaw] + shares * [ended.x - begun.x, ended.y - begun.y, 0.0, turn]
+        if station.approach != "side" and np.isnan(arm.inverse_path(poses)).all():
+            raise BadInput(
+                f"station '{station.name}': pose = {list(station.pose)}: over its spot at ({above.x:.2f}, {above.y:.2f}) m the "
+                f"arm '{arm.name}' cannot turn its tool from yaw {begun.yaw:.2f} to {ended.yaw:.2f}: its last joint goes from "
+                f"{arm.lower[-1]:.2f} to {arm.upper[-1]:.2f} rad; wanted another yaw, of the station or of the grip"
+            )
 
 
 def check_apart(task: Task, parts: int) -> None:

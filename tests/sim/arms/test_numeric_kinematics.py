@@ -40,7 +40,14 @@ def test_a_redundant_arm_stays_in_its_plane(name: str) -> None:
     joints = arm.kinematics.bent(np.linspace(0.45, 0.6, 30), np.full(30, 0.3))
     assert np.isfinite(joints).all()
     aside = {"panda": [0, 2, 4], "iiwa": [0, 2, 4], "xarm6": [0, 3]}[name]
-    assert np.abs(joints[:, aside]).max() < 1e-4  # the xArm6 has 1.5708 for a right angle
+    assert np.abs(joints[:, aside]).max() < 1e-6
+
+
+def test_the_xarm6_goes_straight_on_where_its_wrist_is_straight() -> None:
+    """30 cm out its fifth joint passes 0, where the fourth and the last turn about one line: neither moves for that."""
+    joints = arm_named("xarm6").kinematics.bent(np.full(400, 0.2976), np.linspace(-0.2, 0.0, 400))
+    assert joints[:, 4].min() < 0.0 < joints[:, 4].max()
+    assert np.abs(joints[:, [3, 5]]).max() < 1e-6
 
 
 @pytest.mark.parametrize("name", sorted(set(ARMS) - {"up6"}))

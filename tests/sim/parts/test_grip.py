@@ -80,14 +80,15 @@ def test_a_ball_is_gripped_where_it_is_widest(tmp_path: Path) -> None:
     assert found.up_m < shape.foot_m < found.up_m + 0.024
 
 
-def test_a_part_that_stands_turned_in_its_file_is_gripped_turned(tmp_path: Path) -> None:
-    """A bar of 60 x 20 x 40 mm, its length 40 degrees off the file's x axis: so is the tool's."""
-    c, s = cos(radians(40)), sin(radians(40))
+@pytest.mark.parametrize(("turned", "gripped"), [(40, 40), (170, -10)])
+def test_a_part_that_stands_turned_in_its_file_is_gripped_turned(turned: int, gripped: int, tmp_path: Path) -> None:
+    """A bar of 60 x 20 x 40 mm, its length 40 degrees off the file's x axis: so is the tool's, by a quarter turn at most."""
+    c, s = cos(radians(turned)), sin(radians(turned))
     turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
     bar = trimesh.creation.box((0.06, 0.02, 0.04))
     bar.apply_transform(np.block([[turn, np.zeros((3, 1))], [0, 0, 0, 1]]))
     found = taken(meshed(bar, tmp_path))
-    assert (found.yaw, found.width_m) == pytest.approx((radians(40), 0.02), abs=1e-4)
+    assert (found.yaw, found.width_m) == pytest.approx((radians(gripped), 0.02), abs=1e-4)
 
 
 def test_the_tool_goes_to_the_middle_of_what_it_grips_not_to_the_centre_of_mass(tmp_path: Path) -> None:

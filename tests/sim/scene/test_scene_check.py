@@ -44,6 +44,17 @@ def test_what_check_scene_passes_the_arm_reaches(name: str) -> None:
             assert all(arm.inverse(kind.held_at(spot)) is not None for spot in places.spots(station))
 
 
+def test_a_yaw_to_which_the_last_joint_cannot_turn_the_tool_is_refused(moved: Moved) -> None:
+    """The Panda's last joint goes from -2.90 to 2.90 rad: not every turn of nearly half a turn fits into that."""
+    task = load("toast-panda")
+    x, y, _ = task.station("butter_buffer").pose
+    check_scene(moved(task, "butter_buffer", pose=(x, y, -2.6)))
+    with pytest.raises(
+        BadInput, match=r"'butter_buffer': .* cannot turn its tool from yaw 0\.00 to 3\.00: its last joint"
+    ):
+        check_scene(moved(task, "butter_buffer", pose=(x, y, 3.0)))
+
+
 def test_a_machine_for_two_is_a_machine_with_two_spots(task: Task, moved: Moved) -> None:
     double = moved(task, "toaster", capacity=2)
     check_scene(double)
