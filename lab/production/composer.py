@@ -13,12 +13,12 @@ from lab.production.conditions import Conditions
 from lab.production.faults.injector import Injector
 from lab.production.floor import Floor
 from lab.production.machine import NEVER
-from lab.production.outcome import Outcome
+from lab.production.outcome import Outcome, Replanned
 from lab.production.perception import Deviation, moved_off, scene_seen
 from lab.production.recorder import burnt_name, finish_name
 from lab.production.recovery import Recovery
 from lab.production.relearning import Relearner, adopt
-from lab.production.replanning import in_another, plan_again
+from lab.production.replanning import Planner, in_another, plan_again
 from lab.production.run_journal import Met, Moved, RunJournal
 from lab.production.standing import has_fallen, stands
 from lab.production.transfers import Transfers
@@ -41,14 +41,17 @@ NOBODY: Mapping[int, int] = MappingProxyType({})
 class Production:
     """One sequence being carried out on a floor.
 
-    relearner: learns what changed in the scene, None: nobody does. sequence: the decisions still to come (see `Run`).
+    relearner: learns what changed in the scene, None: nobody does. planner: who orders the rest where it must be. sequence:
+    the decisions still to come (see `Run`). replanned: each new order, in plain words.
     """
 
     floor: Floor
     cell: Cell
     tell: Tell = unheard
     relearner: Relearner | None = None
+    planner: Planner = field(default_factory=Planner)
     sequence: list[int] = field(default_factory=list)
+    replanned: list[Replanned] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.work = Transfers(self.floor, self.cell, self.tell)
@@ -116,7 +119,7 @@ class Production:
         ready_s |= dict.fromkeys(sorted(taken_up), 0.0)
         mishaps = Mishaps(frozenset(recovery.lost), tuple(recovery.out), ready_s, back)
         try:
-            found = plan_again(work.plan, mishaps, first)
+            found = plan_again(work.plan, mishaps, first, self.planner)
         except LabError as error:
             if first is None or not recovery.set_aside(why):
                 raise RunStopped(f"{why}: {error}") from None
@@ -125,10 +128,13 @@ class Production:
         recovery.lose(dict(found.stuck))
         self.sequence = [*found.sequence]
         work.go_by(found.run)
+        gap = None
         if found.schedule is not None and found.proven is not None:
-            gap = found.proven.gap(found.schedule.makespan_s)
-            plan = found.schedule.later(now_s)
-            self.tell(PlanMade(plan, len(self.sequence), gap, found.proven.proven, now_s, why, found.proven.of))
+            proven, plan = found.proven, found.schedule.later(now_s)
+            gap = proven.gap(found.schedule.makespan_s)
+            self.tell(PlanMade(plan, len(self.sequence), gap, proven.proven, now_s, why, proven.of, found.method))
+        if found.method:
+            self.replanned.append(Replanned(now_s, why, found.method, len(self.sequence), gap))
 
     def relearn(self, seen: Sequence[Deviation]) -> None:
         """Learn what changed in the scene, and go on with that. Raises LabError where nothing can be done in it."""
@@ -190,6 +196,7 @@ class Production:
             tuple(work.timed),
             floor.skipped_s,
             interrupted,
+            replanned=tuple(self.replanned),
         )
 
 
@@ -224,7 +231,8 @@ def carry_out(
         floor.stops.note = journal.note_stops
         floor.stops.again(journal.stops(), journal.last_step())
         conditions.on_floor(floor)
-        production = Production(floor, cell, noted, relearner)
+        planner = Planner(prepared.task.sequencing, prepared.seed)
+        production = Production(floor, cell, noted, relearner, planner)
         interrupted = False
         try:
             failure = production.carry_out(sequence)

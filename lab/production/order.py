@@ -1,7 +1,7 @@
 """The order of a job's transfers: as an operator gives it, as people advise it, and as a method finds it alone."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,6 +18,7 @@ from lab.learning.session_events import Event as SessionEvent
 from lab.learning.settings import GateSettings
 from lab.production.cyclic_order import cyclic_order, mix_of
 from lab.production.durations import untimed
+from lab.production.order_learning import OrderLearning, bound_shares
 from lab.sequencing import find_sequence
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import BUILT_IN, MAKESPAN, cost
@@ -30,7 +31,16 @@ from lab.sequencing.simulate.follow import follow, waits_in
 from lab.sequencing.simulate.run import NO_WAIT, Run, branch
 from lab.tasks.sequencing import Sequencing, search_for
 from lab.tasks.task import Order, Task
-from lab.teaching.events import ORDER, LessonEvent, OrderChosen, SequenceFound, SequencingBegan, Tell, unheard
+from lab.teaching.events import (
+    ORDER,
+    LessonEvent,
+    OrderChosen,
+    OrderLearned,
+    SequenceFound,
+    SequencingBegan,
+    Tell,
+    unheard,
+)
 from lab.teaching.lesson_sessions import TellingAdvisor
 
 if TYPE_CHECKING:
@@ -126,6 +136,7 @@ def person_of(names: Sequence[str]) -> AdvisorName:
 class Ordered:
     """The order that is used, and by whom it is; what each order that was found costs; what the advice was worth.
 
+    learning: how the order that is used was found, or, where that one was not looked for, the one beside it.
     receipt: None where nobody was asked and nothing was given; `guided_best` in it: the cheapest episode with advice. rhythm:
     what the order repeats, where that was asked for.
     """
@@ -134,6 +145,7 @@ class Ordered:
     proven: Optimum
     used: str
     costs: dict[str, float]
+    learning: OrderLearning
     receipt: dict[str, Any] | None = None
     rhythm: "Rhythm | None" = None
 
@@ -141,9 +153,10 @@ class Ordered:
 def ordered(cell: Cell, settings: Sequencing, advice: OrderAdvice, seed: int, tell: Tell = unheard) -> Ordered:
     """The order of a job, beside what cannot be beaten: the given one, or the best of those that were found.
 
-    A cyclic order is used as a given one is. With advice, SRL looks for one with it, and the settings' method for one alone; the
-    exact search gives one, too. Of orders that cost the same the advised one is used, then the method's; one of SRL that no
-    move was advised to is no advised one, and comes after them. Raises BadInput as `checked_order`, `advised_srl` and
+    A cyclic order is used as a given one is. With advice, SRL looks for one with it, and the settings' method for one alone; what
+    the exact search finds stands beside them, and is used where the method is `exact`. Of orders that cost the same the advised
+    one is used, then the method's; one of SRL that no move was advised to is no advised one, and comes after them.
+    Raises BadInput as `checked_order`, `advised_srl` and
     `cyclic_order` do, WorkFailed and KeyboardInterrupt.
     """
     search, proven = search_for(settings), optimum(cell)
@@ -165,21 +178,29 @@ def ordered(cell: Cell, settings: Sequencing, advice: OrderAdvice, seed: int, te
     asked: AdvisedResult | None = None
     if advice.advisor.row != "none" and not orders:
         asked, said = _with_advice(cell, search, advice, seed, known, tell)
-    if asked is not None and asked.helped_steps:
+    if asked is not None and asked.advised:
         orders[ADVISED] = asked
-    orders[settings.method] = find_sequence(cell, settings.method, search, seed)
-    if asked is not None and not asked.helped_steps:
+    alone = search
+    if asked is None:  # else the page goes on showing what people were asked about
+        tell(SequencingBegan(search.episodes, known, method=settings.method))
+        alone = replace(search, on_episode=tell)
+    orders[settings.method] = find_sequence(cell, settings.method, alone, seed)
+    if asked is not None and not asked.advised:
         orders[UNADVISED] = asked
-    if is_timed and len(orders) > 1 and proven.sequence:
-        orders[EXACT] = SequenceResult(proven.sequence, proven.cost, (proven.cost,))
     used = next((name for name in (GIVEN, CYCLIC) if name in orders), None) or _cheapest(orders)
     costs = {name: order.cost for name, order in orders.items()}
+    if is_timed and len(orders) > 1 and proven.sequence:
+        costs[EXACT] = proven.cost
+    learned = settings.method if used in (GIVEN, CYCLIC) else used
+    shares = bound_shares(cell, learned, search, seed)
+    learning = OrderLearning(learned, search.objective, orders[learned], known, shares)
     tell(SequenceFound(orders[used], known, cell.parts, used))
+    tell(OrderLearned(tuple(learning.lines())))
     if len(orders) == 1:
-        return Ordered(orders[used], proven, used, costs)
+        return Ordered(orders[used], proven, used, costs, learning)
     tell(OrderChosen(used, costs, search.objective))
     worth = {"used": used, "costs": costs, "objective": search.objective, "bound": known.bound}
-    return Ordered(orders[used], proven, used, costs, worth | said, rhythm)
+    return Ordered(orders[used], proven, used, costs, learning, worth | said, rhythm)
 
 
 def reference(cell: Cell, objective: str, time_limit_s: float = SECOND_OPINION_S, workers: int = 1) -> Reference:
@@ -214,7 +235,7 @@ def _with_advice(
     journal = advice.keep(cell, search.objective) if is_person else Journal()
     try:
         while True:
-            tell(SequencingBegan(search.episodes, known, GateSettings(advice.gate, spare_best=True)))
+            tell(SequencingBegan(search.episodes, known, GateSettings(advice.gate, spare_best=True), "srl"))
             try:
                 found = advised_session(cell, search, advice, (seed, 0), journal, tell)
                 break

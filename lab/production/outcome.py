@@ -13,6 +13,17 @@ from lab.teaching.events import Event
 
 
 @dataclass(frozen=True)
+class Replanned:
+    """A new order of the rest: when, why, by which method, of how many moves; gap: to what is proven, None: not known."""
+
+    at_s: float
+    why: str
+    method: str
+    moves: int
+    gap: float | None
+
+
+@dataclass(frozen=True)
 class Outcome:
     """A run in physics: the measured schedule, which parts were delivered, retries, and why not all were (None: all).
 
@@ -37,6 +48,7 @@ class Outcome:
     heard: tuple[Event, ...] = ()
     program: Program | None = None
     audit: Audit | None = None
+    replanned: tuple[Replanned, ...] = ()
 
     def verdict(self, names: Sequence[str]) -> Verdict:
         """Whether all parts, of these names, were delivered, or the run stopped and told the truth (see `truth.verdict`)."""

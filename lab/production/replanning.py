@@ -1,25 +1,67 @@
-"""The order of the work that remains, found anew from the state that was reached, with its proven gap."""
+"""The order of the work that remains, found anew by the run's method from the state that was reached, with its proven gap."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from lab.errors import WorkFailed
+from lab.errors import LabError, WorkFailed
+from lab.sequencing import find_sequence
 from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.objectives import MAKESPAN
 from lab.sequencing.cell.routes import part_of
 from lab.sequencing.cell.schedule import Schedule
 from lab.sequencing.methods.exact import Optimum, optimum
+from lab.sequencing.search import SAME, EpisodeSequenced
 from lab.sequencing.simulate.follow import simulate
 from lab.sequencing.simulate.rest import NOTHING, Mishaps, Rest, rest_of
 from lab.sequencing.simulate.run import Run, branch
+from lab.tasks.sequencing import Sequencing, search_for
+
+EXACT = "exact"
+
+
+@dataclass(frozen=True)
+class Planner:
+    """Who orders a run's work, and what is left of it where something went wrong: the method of these settings."""
+
+    settings: Sequencing = field(default_factory=Sequencing)
+    seed: int = 0
+
+    def order(self, cell: Cell, proven: Optimum) -> tuple[tuple[int, ...], str]:
+        """The order that the method finds, which ends as soon as nothing can be better, and its name.
+
+        The one of the exact search, and its name, where the method finds none, or is not made for what is left.
+        """
+        method, search = self.settings.method, search_for(self.settings)
+        is_timed = search.objective == MAKESPAN
+        if method == EXACT and is_timed:
+            return proven.sequence, EXACT
+
+        def until_best(tried: EpisodeSequenced) -> None:
+            if is_timed and tried.best and tried.best_cost <= proven.bound_s + SAME:
+                raise _NothingBetter(tried.best)
+
+        try:
+            return find_sequence(cell, method, replace(search, on_episode=until_best), self.seed).sequence, method
+        except _NothingBetter as ended:
+            return ended.sequence, method
+        except LabError:
+            return proven.sequence, EXACT
+
+
+class _NothingBetter(Exception):
+    """A search has found an order that costs no more than what no order is below."""
+
+    def __init__(self, sequence: tuple[int, ...]) -> None:
+        self.sequence = sequence
 
 
 @dataclass(frozen=True)
 class NewPlan:
     """The run to go on with, the decisions still to come, and what is proven of them; schedule: None where there are none.
 
-    stuck: the parts that cannot be finished, and why not.
+    stuck: the parts that cannot be finished, and why not. method: by what the order was found, "" where nothing was ordered.
     """
 
     run: Run
@@ -27,11 +69,13 @@ class NewPlan:
     proven: Optimum | None
     schedule: Schedule | None
     stuck: Mapping[int, str]
+    method: str = ""
 
 
-def plan_again(run: Run, mishaps: Mishaps, under_way: int | None = None) -> NewPlan:
-    """The best order from where a run is; under_way: the decision that must come first, its part is in the gripper.
+def plan_again(run: Run, mishaps: Mishaps, under_way: int | None = None, planner: Planner | None = None) -> NewPlan:
+    """The order of what is left from where a run is; under_way: the decision that must come first, its part is in the gripper.
 
+    planner: who finds it, by default as where a file says nothing.
     Raises WorkFailed where no order comes to its end, and where that part cannot be brought on.
     """
     fallback_s = float(np.nanmax(run.cell.empty_s, initial=0.0))
@@ -41,22 +85,23 @@ def plan_again(run: Run, mishaps: Mishaps, under_way: int | None = None) -> NewP
         raise WorkFailed(f"{name} is in the gripper and cannot be brought on: take it out")
     if rest.cell is None:
         return NewPlan(run, (), None, None, rest.stuck)
-    now = Run(rest.cell)
+    now, planner = Run(rest.cell), planner or Planner()
     if under_way is None:
-        return _ordered(rest, now, ())
+        return _ordered(rest, now, (), planner)
     ahead = branch(now)
     ahead.move(under_way)
     later = rest_of(ahead, NOTHING, fallback_s)
-    return _ordered(replace(later, stuck={**rest.stuck, **later.stuck}), now, (under_way,))
+    return _ordered(replace(later, stuck={**rest.stuck, **later.stuck}), now, (under_way,), planner)
 
 
-def _ordered(rest: Rest, now: Run, first: tuple[int, ...]) -> NewPlan:
+def _ordered(rest: Rest, now: Run, first: tuple[int, ...], planner: Planner) -> NewPlan:
     if rest.cell is None:
         return NewPlan(now, first, None, None, rest.stuck)
     found = optimum(rest.cell)
-    sequence = (*first, *found.sequence)
+    own, method = planner.order(rest.cell, found)
+    sequence = (*first, *own)
     schedule = None if first else simulate(now.cell, sequence)
-    return NewPlan(now, sequence, None if first else found, schedule, rest.stuck)
+    return NewPlan(now, sequence, None if first else found, schedule, rest.stuck, method)
 
 
 def in_another(run: Run, cell: Cell) -> Run:

@@ -17,6 +17,7 @@ from lab.export.program import PROGRAM, TRAJECTORY
 from lab.files import draft, read_limited, write_whole
 from lab.operating_system import replace
 from lab.production.cyclic_order import measured_period
+from lab.production.order_learning import OrderLearning
 from lab.production.outcome import Outcome
 from lab.production.run_story import story_of
 from lab.production.taught import Taught
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
 
 FILES = {
     "gantt": "gantt.png",
+    "order_learning": "order-learning.png",
     "learning_curves": "learning-curves.png",
     "value_map": "insert-value-map.png",
     "overhead": "overhead.png",
@@ -56,7 +58,7 @@ class Report:
     """What a whole run came to; `began_s` is the clock's reading (`time.perf_counter`) when it began.
 
     method: by what the sequence was found (see `lab.sequencing.method_in_words`). files: by name, those that are written;
-    missing: why another one could not be.
+    missing: why another one could not be. learning: how the order, or the one beside it, was found.
     """
 
     prepared: Prepared
@@ -72,6 +74,7 @@ class Report:
     missing: dict[str, str] = field(default_factory=dict)
     receipts: dict[str, Any] | None = None
     rhythm: "Rhythm | None" = None
+    learning: OrderLearning | None = None
 
     @property
     def success(self) -> bool:
@@ -81,7 +84,12 @@ class Report:
     @property
     def gap(self) -> float:
         """How much longer the used sequence takes than the proven optimum (or the bound), as a fraction of it."""
-        return self.proven.gap(self.sequenced.cost)
+        return self.proven.gap(self.predicted_s)
+
+    @property
+    def predicted_s(self) -> float:
+        """The makespan of the used sequence by the planned times [s], whatever it was judged by."""
+        return simulate(self.taught.cell, self.sequenced.sequence).makespan_s
 
     @property
     def lost(self) -> str:
@@ -105,7 +113,9 @@ class Report:
             "skills": list(self.taught.rows.values()),
             "sequence": list(self.sequenced.sequence),
             "method": self.method,
-            "predicted_makespan_s": self.sequenced.cost,
+            "order_learning": None if self.learning is None else self.learning.to_json(),
+            "replanned": [asdict(one) for one in outcome.replanned],
+            "predicted_makespan_s": self.predicted_s,
             "measured_makespan_s": outcome.schedule.makespan_s if self.success else None,
             "optimal_makespan_s": self.proven.optimal_s,
             "bound_s": self.proven.bound_s,
@@ -181,6 +191,8 @@ def write_files(
         from lab.view.gantt import gantt
 
         drawn = drawn | {"gantt": workers.begin(_png, partial(gantt, report.outcome.schedule, predicted=predicted))}
+    if report.learning is not None and len(report.learning.found.episode_costs) > 1:
+        drawn = drawn | {"order_learning": workers.begin(_png, report.learning.drawn(report.taught.cell))}
     try:
         out.mkdir(parents=True, exist_ok=True)
         with draft(out) as beside:
@@ -277,7 +289,7 @@ def _curves(prepared: Prepared, lessons: dict[str, Lesson]) -> dict[str, Policy]
 def _sequence_document(report: Report, predicted: Schedule) -> dict[str, Any]:
     return {
         "sequence": list(report.sequenced.sequence),
-        "makespan_s": report.sequenced.cost,
+        "makespan_s": report.predicted_s,
         "episode_makespans_s": list(report.sequenced.episode_costs),
         "optimal_s": report.proven.optimal_s,
         "optimal_sequence": list(report.proven.sequence),

@@ -134,12 +134,12 @@ def run(
     whose = OrderAdvice() if advice is None else advice.order(people, taught.durations.to_json())
     order = ordered(taught.cell, prepared.task.sequencing, whose, prepared.seed, teacher.tell)
     planned = simulate(taught.cell, order.found.sequence)
-    gap, proven = order.proven.gap(order.found.cost), order.proven.proven
+    gap, proven = order.proven.gap(planned.makespan_s), order.proven.proven
     teacher.tell(PhaseBegan("carry out", len(order.found.sequence)))
-    teacher.tell(PlanMade(planned, len(order.found.sequence), gap, proven, 0.0, of=order.proven.of))
+    teacher.tell(PlanMade(planned, len(order.found.sequence), gap, proven, 0.0, of=order.proven.of, method=order.used))
     faults = prepared.task.faults
     if conditions.fault_seed is not None:
-        faults += draw(prepared.task, prepared.order, conditions.fault_seed, order.found.cost)
+        faults += draw(prepared.task, prepared.order, conditions.fault_seed, planned.makespan_s)
     conditions, relearner = replace(conditions, faults=faults), Relearner(prepared, taught, teacher)
     scenes = list[Described]()
     on_floor = partial(_look_at, conditions.on_floor, workers, scenes)
@@ -150,6 +150,7 @@ def run(
         *(prepared, taught, order.found, order.used, order.proven, outcome, recording, began),
         receipts=receipts,
         rhythm=order.rhythm,
+        learning=order.learning,
     )
     teacher.tell(PhaseBegan("draw", 1))
     scene = next((scene for filmed, scene in scenes if filmed is recording), None)

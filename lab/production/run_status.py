@@ -72,6 +72,7 @@ class PlanStatus:
     why: str
     rows: list[Activity]
     of: str
+    method: str = ""
 
 
 @dataclass
@@ -138,7 +139,9 @@ class RunStatus:
                 self.phase, self.words = name, ""
             case PlanMade():
                 rows = [*event.schedule.robot, *event.schedule.machines, *event.schedule.parts]
-                self.plan = PlanStatus(event.schedule.makespan_s, event.gap, event.proven, event.why, rows, event.of)
+                self.plan = PlanStatus(
+                    *(event.schedule.makespan_s, event.gap, event.proven, event.why, rows, event.of, event.method)
+                )
                 self.moves = self._made + event.moves
             case MoveBegan() | SkillBegan() | MoveMade() | PartDone() | PartLost():
                 self._hear_move(event)

@@ -52,8 +52,8 @@ class _Story:
                 self._say(at_s, "The run goes on")
             case OperatorActed(words, _, at_s, refused):
                 self._mark(Mark(at_s, "operator", f"{words}{refused and f': refused, {refused}'}"))
-            case PlanMade(at_s=at_s, why=why) if why:
-                self._say(at_s, f"A new plan: {why}")
+            case PlanMade(at_s=at_s, why=why, method=by) if why:
+                self._say(at_s, f"A new plan{by and f' by {by}'}: {why}")
 
     def _say(self, at_s: float, words: str) -> None:
         self.captions.append((round(at_s, 3), words))

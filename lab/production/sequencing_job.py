@@ -205,7 +205,7 @@ def _sessions(
         return find_sequence(cell, method, search, wanted.seed, session)
 
     def began(known: Reference | None) -> SequencingBegan:
-        return SequencingBegan(search.episodes, known, gate)
+        return SequencingBegan(search.episodes, known, gate, method)
 
     def say(event: Event) -> None:
         if journal is None or not (journal.folding and isinstance(event, SequenceFound)):

@@ -126,11 +126,19 @@ class MoveTimed:
 
 @dataclass(frozen=True)
 class SequencingBegan:
-    """A sequencer begins to try orders; gate: when it asks which part to move, None: it asks nobody."""
+    """A sequencer, method, begins to try orders; gate: when it asks which part to move, None: it asks nobody."""
 
     episodes: int
     reference: Reference | None = None
     gate: GateSettings | None = None
+    method: str = ""
+
+
+@dataclass(frozen=True)
+class OrderLearned:
+    """How the order was learned, in words, a line each: by what, when it was found, what of it a method's bound is."""
+
+    lines: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -184,7 +192,7 @@ class PlanMade:
     """An order for the work that remains was found: its schedule, how many moves, and the proven gap (None: not known).
 
     at_s: when; the schedule's times are counted from the same beginning of the run [s], as all of a run's. why: what
-    made a new plan necessary, "" at first. of: of which plans it is proven.
+    made a new plan necessary, "" at first; method: by what the new one was found. of: of which plans it is proven.
     """
 
     schedule: Schedule
@@ -194,6 +202,7 @@ class PlanMade:
     at_s: float
     why: str = ""
     of: str = EVERY_PLAN
+    method: str = ""
 
 
 @dataclass(frozen=True)
@@ -319,6 +328,7 @@ Event = (
     | MoveTimed
     | SequencingBegan
     | EpisodeSequenced
+    | OrderLearned
     | SequencingStands
     | SequenceFound
     | OrderChosen

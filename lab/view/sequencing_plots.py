@@ -1,7 +1,9 @@
 """Pictures of how sequences were found: one session or many."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from itertools import cycle
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,12 +12,13 @@ from numpy.typing import NDArray
 from lab.errors import BadInput, counted
 from lab.sequencing.cell.cell import EVERY_PLAN
 from lab.sequencing.search import among
-from lab.view.canvas import BLUE, GREY, INK, RED, SKY, picture_file, seconds, tip
+from lab.view.canvas import BLUE, GREY, INK, ORANGE, RED, SKY, picture_file, seconds, tip
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 SIZE_INCH = 7.0, 4.0
+NOTHING: Mapping[str, float] = MappingProxyType({})
 
 FloatArray = NDArray[np.float64]
 
@@ -28,12 +31,16 @@ def sequence_plot(
     ylabel: str = "makespan [s]",
     deadlock: float | None = None,
     proven_of: str = EVERY_PLAN,
+    proven: bool = True,
+    title: str = "",
+    beside: Mapping[str, float] = NOTHING,
 ) -> None:
     """Cost of each sequencing episode, the best so far, and the proven optimum; PNG or SVG by the path's suffix.
 
     Several sessions (a list of lists): the best so far of each as a pale line, their mean, and the mean cost of an
     episode. deadlock: the cost of episodes that ended in one (`stuck_cost`), drawn as marks at the upper edge; they
-    count in no mean. proven_of: of which plans. Raises BadInput without episodes, and as all plots here do.
+    count in no mean. proven_of: of which plans; proven: `optimal` is the optimum, not only a bound. beside: other costs to
+    compare with, by what they are called. Raises BadInput without episodes, and as all plots here do.
     Source: thesis fig. 7.3.
     """
     from matplotlib.ticker import MaxNLocator
@@ -52,13 +59,16 @@ def sequence_plot(
         draw = _draw_session if len(sessions) == 1 else _draw_sessions
         draw(axes, kept, unit)
         if optimal is not None:
-            label = f"proven optimum: {_number(optimal, unit)}{among(proven_of)}"
+            label = f"proven {'optimum' if proven else 'bound'}: {_number(optimal, unit)}{among(proven_of)}"
             axes.axhline(optimal, color=RED, linestyle="--", linewidth=1.4, label=label)
+        for (label, value), look in zip(beside.items(), cycle((":", "-.")), strict=False):
+            axes.axhline(value, color=ORANGE, linestyle=look, linewidth=1.2, label=label)
         _draw_stuck(axes, stuck)
         axes.set(xlabel="episode", ylabel=ylabel, xlim=(0, 1.02 * max(2, costs.shape[1])))
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
         axes.grid()
-        axes.set_title("Sequences tried" if len(sessions) == 1 else f"Sequences tried in {len(sessions)} sessions")
+        several = f"Sequences tried in {len(sessions)} sessions"
+        axes.set_title(title or ("Sequences tried" if len(sessions) == 1 else several))
         figure.legend(loc="outside lower center", ncols=3)
 
 

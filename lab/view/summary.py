@@ -48,6 +48,11 @@ def run_summary(report: Mapping[str, Any]) -> RenderableType:
         table.add_row("saved", f"{counted(saved[0], 'episode')}, {counted(saved[1], 'helped step')}")
     table.add_row("sequence", " ".join(map(str, report["sequence"])))
     table.add_row("found by", Text(method_in_words(report["method"])))
+    if report["order_learning"] is not None:
+        table.add_row("order", Text("\n".join(report["order_learning"]["lines"])))
+    for plan in report["replanned"]:
+        gap = "" if plan["gap"] is None else f", gap {gap_of(plan['gap'], 2)}"
+        table.add_row("new plan", Text(f"{plan['at_s']:.1f} s: by {plan['method']}{gap}: {plan['why']}"))
     measured = report["measured_makespan_s"]
     predicted, bound = beside(report["predicted_makespan_s"], report["bound_s"], " s", 1)
     text = f"{predicted} predicted"
@@ -81,7 +86,7 @@ def _worth(receipts: Mapping[str, Any]) -> Iterator[tuple[str, list[str]]]:
         guided = order.get("guided_best")
         own = "" if guided is None else f"; best episode with advice {guided:.1f}{unit}"
         yield (
-            "advice on the order",
+            "advice on the order" if "lines" in order else "orders",
             [f"{costs}; used: {BESIDE_METHODS.get(order['used'], order['used'])}{own}", *order.get("lines", [])],
         )
 

@@ -105,14 +105,15 @@ def test_a_given_order_is_used_though_others_are_better() -> None:
 def test_the_cheapest_order_is_used_and_each_is_told(advisor: str, seed: int) -> None:
     heard = list[Event]()
     found = ordered(THREE, SRL, by(advisor), seed, heard.append)
-    assert list(found.costs) == ["advised", "srl", "exact"]
-    assert found.found.cost == min(found.costs.values()) == simulate(THREE, found.found.sequence).makespan_s
+    own = {name: cost for name, cost in found.costs.items() if name != "exact"}  # that one only stands beside them
+    assert set(own) in ({"advised", "srl"}, {"srl", "unadvised"})
+    assert found.found.cost == min(own.values()) == simulate(THREE, found.found.sequence).makespan_s
     assert found.costs[found.used] == pytest.approx(found.found.cost, abs=1e-6)
     (told,) = (event for event in heard if isinstance(event, OrderChosen))
     assert (told.used, told.costs) == (found.used, found.costs)
     assert found.receipt is not None
     assert found.receipt["requests"] > 0
-    assert found.receipt["guided_best"] >= found.costs["advised"]
+    assert found.receipt["guided_best"] >= own.get("advised", own.get("unadvised", 0.0))
     expert_is_better = ordered(THREE, SRL, by("expert"), seed).receipt["guided_best"]  # type: ignore[index]
     assert expert_is_better <= found.receipt["guided_best"]
 

@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 
 from lab.errors import WorkFailed
-from lab.production.replanning import in_another, plan_again
+from lab.production.replanning import Planner, in_another, plan_again
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.stations import Product, Stage, Station, one_robot
 from lab.sequencing.simulate.rest import Mishaps
 from lab.sequencing.simulate.run import Run
+from lab.tasks.sequencing import Sequencing
 
 
 def oven(seconds: float = 10.0) -> Cell:
@@ -64,3 +65,14 @@ def test_the_same_state_in_a_cell_with_other_times(run: Run) -> None:
     other = in_another(run, oven(30.0))
     assert (other.locations, other.now_s, other.robot) == (run.locations, run.now_s, run.robot)
     assert plan_again(other, Mishaps()).sequence == (1, 2, 2)
+
+
+@pytest.mark.parametrize("method", ["srl", "srl-time", "fifo", "exact"])
+def test_the_rest_is_ordered_by_the_runs_method(run: Run, method: str) -> None:
+    found = plan_again(run, Mishaps(), planner=Planner(Sequencing(method=method, episodes=20)))
+    assert (found.method, sorted(found.sequence)) == (method, [1, 2, 2])
+
+
+def test_a_method_that_is_not_made_for_the_rest_gives_way_to_the_exact_search(run: Run) -> None:
+    found = plan_again(run, Mishaps(), planner=Planner(Sequencing(method="earliest-due")))  # there are no due times
+    assert (found.method, found.sequence) == ("exact", (1, 2, 2))

@@ -56,6 +56,8 @@ RUN: dict[str, Any] = {
     "skills": [skill("learned", 30), skill("continued", 12), skill("reused")],
     "sequence": [1, 2, 1, 2],
     "method": "given",
+    "order_learning": None,
+    "replanned": [],
     "predicted_makespan_s": 100.0,
     "measured_makespan_s": 101.0,
     "optimal_makespan_s": 80.0,

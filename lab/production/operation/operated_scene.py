@@ -21,7 +21,9 @@ from lab.production.operation.commands import Spoken
 from lab.production.operation.lead import DROP, END, EVERY, Demonstration, Lead, led_in_words
 from lab.production.operation.typed_order import checked
 from lab.production.order import GIVEN, OrderAdvice, ordered
+from lab.production.order_learning import OrderLearning
 from lab.production.relearning import Relearner
+from lab.production.replanning import Planner
 from lab.production.run import teach_all
 from lab.production.run_journal import Led
 from lab.production.run_status import RunStatus
@@ -51,13 +53,14 @@ class Left(KeyboardInterrupt):
 
 @dataclass
 class Plan:
-    """What was taught, the order to carry out, and what is proven of it."""
+    """What was taught, the order to carry out, what is proven of it, and how it was learned."""
 
     taught: Taught
     found: SequenceResult
     method: str
     proven: Optimum
     production: Production
+    learning: OrderLearning
 
 
 class OperatedScene:
@@ -234,8 +237,9 @@ class OperatedScene:
                     )
                 )
             relearner = Relearner(self.prepared, taught, self.teacher)
-            production = Production(self.floor, taught.cell, self.floor.tell, relearner)
-            self.plan = Plan(taught, found, chosen.used, proven, production)
+            planner = Planner(self.task.sequencing, self.seed)
+            production = Production(self.floor, taught.cell, self.floor.tell, relearner, planner)
+            self.plan = Plan(taught, found, chosen.used, proven, production, chosen.learning)
             production.sequence = [*found.sequence]
             self._tell_plan("")
             return f"{len(found.sequence)} moves, {found.cost:.1f} s"

@@ -202,7 +202,9 @@ class Operation:
         )
         recorder.take()
         found = plan.found, plan.method, plan.proven
-        return Report(scene.prepared, plan.taught, *found, outcome, recorder.recording, self._began)
+        return Report(
+            scene.prepared, plan.taught, *found, outcome, recorder.recording, self._began, learning=plan.learning
+        )
 
 
 def _is_deed(entry: Entry) -> TypeGuard[Commanded]:

@@ -12,6 +12,7 @@ from lab.teaching.events import (
     Event,
     LessonContinued,
     MoveMade,
+    OrderLearned,
     PhaseBegan,
     SequencingBegan,
 )
@@ -30,8 +31,13 @@ def hear_run(known: Known, event: Event) -> None:
                 known.moves = []
         case SequencingBegan():
             known.work = None
-            optimal = None if event.reference is None else event.reference.bound
-            known.begin(ShownLesson(ORDER, "order", gate=event.gate, episodes=event.episodes, optimal=optimal))
+            shown = ShownLesson(ORDER, "order", gate=event.gate, episodes=event.episodes, method=event.method)
+            if event.reference is not None:
+                shown.optimal, shown.proven = event.reference.bound, event.reference.proven
+            known.begin(shown)
+        case OrderLearned(lines):
+            known.learning.learned = lines
+            known.changed("lesson")
         case EpisodeSequenced():
             if known.learning.gate is None:  # else the session itself tells of it, and whether it was guided
                 known.learning.curve.add(event.cost, False)

@@ -69,6 +69,9 @@ class ShownLesson:
     gate: GateSettings | None = None
     episodes: int = 0
     optimal: float | None = None
+    proven: bool = True  # else no cost is below it, and perhaps none is as low
+    method: str = ""  # of a sequencer
+    learned: tuple[str, ...] = ()  # how the order was learned, in words
     curve: Curve = field(default_factory=Curve)
     notices: deque[Notice] = field(default_factory=lambda: deque(maxlen=MOST_NOTICES))
     text: SessionText = field(default_factory=SessionText)
@@ -164,6 +167,9 @@ def _lesson(known: Known, now_s: float) -> Json:
         "unit": "s" if learning.kind == "order" else "steps",
         "episodes": learning.episodes,
         "optimal": learning.optimal,
+        "proven": learning.proven,
+        "method": learning.method,
+        "learned": list(learning.learned),
         "threshold": None if gate is None else gate.lambda_threshold,
     }
 

@@ -194,8 +194,8 @@ const seatDraw = (() => {
     return Math.max(count, episodes ? Math.min(round, episodes) : Math.round(round));
   }
 
-  // Means as a line, guided stretches as dots, the fewest possible as a dashed line
-  function curve(svg, { per, count, means, guided }, { optimal, unit, episodes }) {
+  // Means as a line, of orders the best so far as steps, guided stretches as dots, what cannot be beaten as a dashed line
+  function curve(svg, { per, count, means, guided, bests, best }, { optimal, proven, unit, episodes }) {
     const wide = svg.clientWidth || 400, tall = svg.clientHeight || 170, left = 46, right = 10, top = 10, bottom = 22;
     const last = reach(Math.max(count, per), episodes);
     const high = Math.max(...means, optimal || 0, 1) * 1.05, low = unit === "steps" ? 0 : Math.min(...means, optimal ?? Infinity, high) * 0.97;
@@ -209,13 +209,19 @@ const seatDraw = (() => {
     }
     parts.push(node("text", { x: left, y: tall - 6, fill: "#4f5a64" }, "1"), node("text", { x: wide - right, y: tall - 6, "text-anchor": "end", fill: "#4f5a64" }, `episode ${Math.round(last)}`));
     if (means.length) parts.push(node("polyline", { points: means.map((value, k) => `${middle(k).toFixed(1)},${y(value).toFixed(1)}`).join(" "), fill: "none", stroke: "#0072b2", "stroke-width": 1.4 }));
+    if (unit !== "steps" && best) {
+      const steps = bests.flatMap((value, k) => [[middle(k), k ? bests[k - 1] : value], [middle(k), value]]);
+      parts.push(node("polyline", { points: steps.map(([at, value]) => `${at.toFixed(1)},${y(value).toFixed(1)}`).join(" "), fill: "none", stroke: "#009e73", "stroke-width": 2 }));
+      parts.push(node("circle", { cx: x(best[1]), cy: y(best[0]), r: 4, fill: "#009e73", stroke: "#222222", "stroke-width": 0.6 }));
+    }
     guided.forEach((times, k) => times && parts.push(node("circle", { cx: middle(k), cy: y(means[k]), r: 3.2, fill: "#e69f00", stroke: "#222222", "stroke-width": 0.6 })));
     if (optimal !== null && optimal !== undefined) {
       parts.push(node("line", { x1: left, x2: wide - right, y1: y(optimal), y2: y(optimal), stroke: "#d55e00", "stroke-width": 1.4, "stroke-dasharray": "6 4" }));
-      parts.push(node("text", { x: wide - right, y: y(optimal) - 4, "text-anchor": "end", fill: "#b84f00" }, `${unit === "steps" ? "fewest" : "optimum"} ${nice(optimal)}`));
+      parts.push(node("text", { x: wide - right, y: y(optimal) - 4, "text-anchor": "end", fill: "#b84f00" }, `${unit === "steps" ? "fewest" : proven ? "optimum" : "bound"} ${nice(optimal)}`));
     }
     svg.replaceChildren(...parts);
-    const now = means.length ? `, lately ${nice(means[means.length - 1])} ${unit}` : "";
+    const found = unit !== "steps" && best ? `, best ${nice(best[0])} in episode ${best[1]}` : "";
+    const now = means.length ? `, lately ${nice(means[means.length - 1])} ${unit}${found}` : "";
     svg.setAttribute("aria-label", `${seatStatus.count(count, "episode")}${now}, ${guided.filter(Boolean).length} ${per > 1 ? "stretches" : "episodes"} guided`);
   }
 

@@ -30,7 +30,11 @@ const seatStatus = (() => {
 
   function showCurve({ curve, lesson }) {
     el("curve-figure").hidden = !curve.count && !lesson.title;
-    el("curve-title").textContent = lesson.unit === "steps" ? "Steps an episode; orange: guided" : "Makespan of each order tried; orange: guided";
+    el("curve-figure").classList.toggle("order", lesson.unit !== "steps");
+    const whose = lesson.method ? ` by ${lesson.method}` : "", guided = curve.guided.some(Boolean) ? "; orange: guided" : "";
+    el("curve-title").textContent = lesson.unit === "steps" ? "Steps an episode; orange: guided" : `Cost of each order tried${whose}; green: the best so far${guided}`;
+    el("learned").hidden = !lesson.learned.length;
+    el("learned").replaceChildren(...lesson.learned.map((line) => make("li", line)));
     if (!el("curve-figure").hidden) seatDraw.curve(el("curve"), curve, lesson);
   }
 

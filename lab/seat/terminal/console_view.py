@@ -122,7 +122,9 @@ def _chart(status: RunStatus, width: int) -> list[Text]:
             if gap is None
             else f", {100 * gap:.1f} % above the {'optimum' if plan.proven else 'bound'}{among(plan.of)}"
         )
-        until += f"; plan {plan.makespan_s:.1f} s{against}" + (f" ({plan.why})" if plan.why else "")
+        until += f"; plan{plan.method and f' by {plan.method}'} {plan.makespan_s:.1f} s{against}" + (
+            f" ({plan.why})" if plan.why else ""
+        )
     lines = [Text.assemble(("plan and measured ", "bold"), until)]
     for name in names:
         for kind, rows, style in (("plan", planned, "dim"), ("real", measured, "")):

@@ -24,12 +24,21 @@ FITTING = ("ccrl", "always", "never")  # gates that judge by episodes alone; tho
 
 @dataclass(frozen=True)
 class AdvisedResult(LearnedSequence):
-    """A sequencer's result, and the advice in it: episodes that asked, decisions taken from the advisor, misleads."""
+    """A sequencer's result, and the advice in it: episodes that asked, decisions taken from the advisor, misleads.
+
+    first_helped: the first episode in which a decision was the advisor's; None: there was none.
+    """
 
     requests: int
     helped_steps: int
     misleads: int
     rejected_at_episode: int | None
+    first_helped: int | None
+
+    @property
+    def advised(self) -> bool:
+        """Whether advice has a share in the sequence: a move was advised in its episode, or in one before, and learned from."""
+        return self.first_helped is not None and self.episode_costs.index(self.cost) + 1 >= self.first_helped
 
 
 def check_gate(gate: str) -> None:
@@ -65,6 +74,7 @@ def advised_srl(
         session.helped_steps,
         session.gate.misleads,
         session.rejected_at,
+        session.first_helped,
     )
 
 
@@ -77,6 +87,7 @@ class _Advised(Guide):
         self.gate, self._settings, self._advisor, self._tell = gate, settings, advisor, tell
         self.requests = self.helped_steps = 0
         self.rejected_at: int | None = None
+        self.first_helped: int | None = None
         self._costs: list[float] = []
         self._open = self._asked = False
         self._helped = 0
@@ -135,6 +146,7 @@ class _Advised(Guide):
         self._costs.append(cost)
         self.helped_steps += self._helped
         number, helped, window = len(self._costs), self._helped, self._settings.window
+        self.first_helped = number if helped and self.first_helped is None else self.first_helped
         self.gate.judges(self._costs, self._open and helped > 0)
         known, before = improvement(self._costs, window), self._costs[-1 - window : -1]
         rate = None if known is None else known.rate

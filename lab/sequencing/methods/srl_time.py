@@ -69,6 +69,12 @@ def srl_time(cell: Cell, search: Search, rng: np.random.Generator, bounded: bool
     return SrlTimeResult(*log.found(cell), final, learner.q)
 
 
+def bound_alone(cell: Cell, search: Search, rng: np.random.Generator) -> float | None:
+    """What an order costs that follows the first values of `srl_time` greedily, nothing learned; None: it gets stuck."""
+    _, cost, done = TimeLearner(cell, search.objective, rng).episode(learns=False)
+    return cost if done else None
+
+
 def _many_alike(cell: Cell) -> bool:
     alike = len(set(cell.order)) == 1 and cell.arrivals is None and cell.due_s is None
     return alike and cell.begins is None and not cell.precedences and cell.parts > max(SMALL_JOBS)

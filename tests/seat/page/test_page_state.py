@@ -148,6 +148,9 @@ def test_the_lesson_and_the_map_are_there_before_any_question(known: Known) -> N
         "unit": "steps",
         "episodes": 9,
         "optimal": None,
+        "proven": True,
+        "method": "",
+        "learned": [],
         "threshold": 0.05,
     }
     assert shown["slice"]["marks"] == "..G#"
@@ -180,7 +183,10 @@ def test_only_what_has_changed_is_new(known: Known) -> None:
 
 def test_the_curve_holds_every_episode_and_marks_the_guided_ones(known: Known) -> None:
     tell(known, [ended(1, 30), ended(2, 20, helped=4), ended(3, 10)])
-    assert document(known)["curve"] == {"per": 1, "count": 3, "means": [30.0, 20.0, 10.0], "guided": [0, 1, 0]}
+    assert document(known)["curve"] == {"per": 1, "count": 3, "means": [30.0, 20.0, 10.0], "guided": [0, 1, 0]} | {
+        "bests": [30.0, 20.0, 10.0],
+        "best": [10, 3],
+    }
 
 
 def test_the_averages_are_of_the_last_two_windows(known: Known) -> None:

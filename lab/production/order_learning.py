@@ -1,0 +1,126 @@
+"""How a method learned the order of a job: what its episodes cost, when it found its best, and what of that is its bound."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lab.errors import WorkFailed, counted
+from lab.sequencing import BESIDE_METHODS
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.objectives import MAKESPAN, stuck_cost
+from lab.sequencing.methods.srl_time import bound_alone, srl_time
+from lab.sequencing.search import Reference, Search, SequenceResult, among
+from lab.view.figures import beside, gap_of
+
+BOUND_ALONE, UNBOUNDED = "its bound alone", "without its bound"
+
+
+@dataclass(frozen=True)
+class Beside:
+    """What a part of a method comes to by itself: its best cost, None where it found no order, and in which episode."""
+
+    by: str
+    cost: float | None
+    episode: int | None
+
+
+@dataclass(frozen=True)
+class OrderLearning:
+    """What a method found, `by` its name, or by one of `BESIDE_METHODS`, episode by episode, beside what no order can beat.
+
+    beside: of srl-time, what the bound is that its values begin at: followed greedily without learning, and learned without.
+    """
+
+    by: str
+    objective: str
+    found: SequenceResult
+    known: Reference
+    beside: tuple[Beside, ...] = ()
+
+    @property
+    def episode(self) -> int:
+        """The first one, from 1, that came to the best cost."""
+        return self.found.episode_costs.index(self.found.cost) + 1
+
+    @property
+    def first_cost(self) -> float:
+        """What the first episode cost."""
+        return self.found.episode_costs[0]
+
+    def to_json(self) -> dict[str, Any]:
+        """In `lab run --json`; the costs of the episodes are in the run's folder."""
+        return {
+            "by": self.by,
+            "objective": self.objective,
+            "cost": self.found.cost,
+            "bound": self.known.bound,
+            "optimum_proven": self.known.proven,
+            "gap": self.known.gap(self.found.cost),
+            "episodes": len(self.found.episode_costs),
+            "found_at_episode": self.episode,
+            "first_cost": self.first_cost,
+            "beside": [vars(one) | {"gap": self._gap(one.cost)} for one in self.beside],
+            "lines": self.lines(),
+        }
+
+    def lines(self) -> list[str]:
+        """The same for people, one line first, and one for each that stands beside."""
+        known, episodes = self.known, len(self.found.episode_costs)
+        cost, bound = beside(self.found.cost, known.bound, known.unit, 1)
+        what = "proven optimum" if known.proven else "proven bound"
+        by = BESIDE_METHODS.get(self.by, self.by)
+        when = "at once" if episodes == 1 else f"in episode {self.episode} of {episodes}"
+        lines = [f"{by}: {cost} {when}; {what} {bound}{self._above(self.found.cost)}{among(known.of)}"]
+        if episodes > 1:
+            lines.append(f"its first episode: {self.first_cost:.1f}{known.unit}{self._above(self.first_cost)}")
+        for one in self.beside:
+            if one.cost is None:
+                lines.append(f"{one.by}: no order in {counted(episodes, 'episode')}")
+                continue
+            when = "nothing learned" if one.by == BOUND_ALONE else f"in episode {one.episode}"
+            lines.append(f"{one.by}: {one.cost:.1f}{known.unit}, {when}{self._above(one.cost)}")
+        return lines
+
+    def drawn(self, cell: Cell) -> Callable[[Path], None]:
+        """What draws it to a file: the cost by episode, the best so far, and what each part of the method comes to."""
+        from lab.view.sequencing_plots import sequence_plot
+
+        lines = {f"{one.by}: {one.cost:.1f}{self.known.unit}": one.cost for one in self.beside if one.cost is not None}
+        return partial(
+            sequence_plot,
+            self.found.episode_costs,
+            self.known.bound,
+            ylabel="makespan [s]" if self.objective == MAKESPAN else self.objective,
+            deadlock=stuck_cost(cell, self.objective),
+            proven_of=self.known.of,
+            proven=self.known.proven,
+            title=f"The order, as {BESIDE_METHODS.get(self.by, self.by)} learned it",
+            beside=lines,
+        )
+
+    def _gap(self, cost: float | None) -> float | None:
+        return None if cost is None else self.known.gap(cost)
+
+    def _above(self, cost: float) -> str:
+        gap = self.known.gap(cost)
+        return "" if gap is None else f", gap {gap_of(gap, 1)}"
+
+
+def bound_shares(cell: Cell, method: str, search: Search, seed: int) -> tuple[Beside, ...]:
+    """What the bound of srl-time comes to without learning, and the learning without the bound; of other methods nothing.
+
+    Both draw what the session 0 of this seed draws (see `find_sequence`).
+    """
+    if method != "srl-time":
+        return ()
+    cost = bound_alone(cell, search, np.random.default_rng([seed, 2, 0]))
+    try:
+        without = srl_time(cell, search, np.random.default_rng([seed, 2, 0]), bounded=False)
+    except WorkFailed:
+        return Beside(BOUND_ALONE, cost, None), Beside(UNBOUNDED, None, None)
+    episode = without.episode_costs.index(without.cost) + 1
+    return Beside(BOUND_ALONE, cost, None), Beside(UNBOUNDED, without.cost, episode)
