@@ -217,7 +217,7 @@ class Surveys:
                         f"station '{station.name}': the tool cannot go over its spot at ({spot.x:.2f}, {spot.y:.2f}) m: "
                         f"{cause if cause == OUT_OF_REACH else f'in the way: {cause}'}"
                     )
-                surveyed.append(surveyor.grid(shape, lambda cell, goal=goal: near_pose(goal, cell, into)).causes)
+                surveyed.append(surveyor.grid(shape, partial(near_pose, goal, into=into)).causes)
         return Survey(reduce(lambda one, other: np.where(one == "", other, one), surveyed))
 
     def spots_in_use(self, station: Station, kind: str, loaded: bool) -> tuple[Spot, ...]:

@@ -121,7 +121,7 @@ def test_what_a_person_said_before_the_break_still_counts(task: Task, tmp_path: 
     again = taught_by(task, tmp_path / "broken", second, lambda event: None)
     assert first.asked > 0
     assert first.asked + second.asked == whole.asked
-    nothing = Ordered(SequenceResult((), 0.0, ()), None, "", {})  # type: ignore[arg-type]
+    nothing = Ordered(SequenceResult((), 0.0, ()), None, "", {}, None)  # type: ignore[arg-type]
     worth = {name: one["receipt"] for name, one in known.receipts(nothing)["skills"].items()}
     assert len(worth) > 3
     assert {name: one["receipt"] for name, one in again.receipts(nothing)["skills"].items()} == worth

@@ -34,13 +34,13 @@ def test_the_one_that_ships_is_near_the_optimum(toast_cell: CellMaker, fms_cell:
 
 def test_it_reacts_as_it_plans(toast_cell: CellMaker) -> None:
     cell = toast_cell("II", 4)
-    reaction = SEQUENCERS["carried"].react(cell, "makespan", 0)
+    reaction = SEQUENCERS["carried"].react(cell, "makespan", 0, ())
     run = Run(cell)
     choose = reaction.policy(cell)
     while allowed := run.allowed():
         run.move(choose(Observed(run), allowed))
     assert run.end_s == find_sequence(cell, "carried", Search(1), 0).cost
-    assert (reaction.words, reaction.plans) == ("the carried-over policy, asked at every decision", False)
+    assert (reaction.words, reaction.replans) == ("the carried-over policy, asked at every decision", None)
 
 
 def test_a_rule_that_meets_another_cell(toast_cell: CellMaker, oven_cell: CellMaker) -> None:

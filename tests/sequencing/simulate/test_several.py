@@ -152,7 +152,9 @@ def test_nobody_moves_and_nothing_is_lost_while_all_are_broken() -> None:
 def test_servers_are_decided_when_they_are_free() -> None:
     """Two parts that need no robot, one server, 10 s on average: part 1 takes 25, so that part 2 begins at 25."""
     stations = (Station("in", "storage", 9), Station("m", "machine", 9, 10.0, servers=1))
-    cell = Cell(stations, (Product("p", ((Stage("in"), Stage("m")),)),), ("p", "p"), *[np.zeros((2, 2))] * 2, ())
+    cell = Cell(
+        stations, (Product("p", ((Stage("in"), Stage("m")),)),), ("p", "p"), np.zeros((2, 2)), np.zeros((2, 2)), ()
+    )
     found = dispatched(cell, replan(), Told(cell, works={(1, "m"): 25.0}))
     assert [(one.part, one.pick_s, one.end_s) for one in found.moves] == [(1, 0.0, 25.0), (2, 25.0, 35.0)]
 
@@ -193,7 +195,8 @@ def test_the_future_does_not_show(shops: Shops, data: st.DataObject, longer_s: f
     cell = data.draw(shops())
     assume(not cell.track)
     chance, now_s = Chance("exponential", robot_repair_s=9.0), float(data.draw(st.integers(0, 60)))
-    stops = {n: ((5.0 * n + 3.0, 5.0 * n + 30.0),) for n in range(len(cell.robots))}
+    stops = dict[int, tuple[tuple[float, float], ...]]()
+    stops |= {n: ((5.0 * n + 3.0, 5.0 * n + 30.0),) for n in range(len(cell.robots))}
     found = []
     for more_s in (0.0, longer_s):
         dispatch = Dispatch(cell, Later(cell, chance, seed, stops=stops, now_s=now_s, more_s=more_s))
