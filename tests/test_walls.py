@@ -44,7 +44,7 @@ ALONE: dict[str, set[str]] = (
         "ortools": {
             *(
                 f"lab.sequencing.methods.cp_sat{part}"
-                for part in ("", "_free", "_model", "_tasks", "_rooms", "_solver", "_track", "_transport")
+                for part in ("", "_free", "_model", "_tasks", "_rooms", "_shop", "_solver", "_track", "_transport")
             ),
             "lab.sequencing.cyclic.model",
         },

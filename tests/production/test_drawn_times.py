@@ -13,7 +13,7 @@ from lab.production.sequencing_job import (
 from lab.sequencing import SEQUENCERS
 from lab.sequencing.cell.chance import Chance
 from lab.sequencing.methods.carried_over_policy import CarriedPolicy
-from lab.sequencing.simulate.execution import replicate
+from lab.sequencing.simulate.replications import replicate
 from lab.tasks.carried_policy import write_policy
 from lab.tasks.task_file import load_cell
 

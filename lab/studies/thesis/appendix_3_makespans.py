@@ -15,7 +15,8 @@ from lab.sequencing.methods.many_sessions import evaluate, run_sessions
 from lab.sequencing.methods.rollout import replan
 from lab.sequencing.methods.srl_time_reacting import reacting
 from lab.sequencing.search import Search, SrlSettings
-from lab.sequencing.simulate.execution import Policy, replicate
+from lab.sequencing.simulate.execution import Policy
+from lab.sequencing.simulate.replications import replicate
 from lab.studies.thesis.appendix_3_fifo import STARTS, queued_fifo
 from lab.studies.thesis.chapter_7_cells import beta_of
 

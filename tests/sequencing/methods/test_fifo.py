@@ -10,8 +10,8 @@ from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.stations import Arrivals, Product, Stage, Station, one_robot
 from lab.sequencing.methods.fifo import fifo, first_in_first_out
 from lab.sequencing.search import Search
-from lab.sequencing.simulate.execution import carry_out
 from lab.sequencing.simulate.follow import simulate
+from lab.sequencing.simulate.replications import carry_out
 
 CellMaker = Callable[..., Cell]
 

@@ -12,8 +12,8 @@ from lab.sequencing.cell.chance import Chance
 from lab.sequencing.cell.objectives import cost
 from lab.sequencing.methods.rollout import by_rule, replan, rollout
 from lab.sequencing.methods.rules import RULES, dispatch, usable
-from lab.sequencing.simulate.execution import carry_out, replicate
 from lab.sequencing.simulate.follow import follow
+from lab.sequencing.simulate.replications import carry_out, replicate
 from lab.sequencing.simulate.run import Run
 
 CellMaker = Callable[..., Cell]

@@ -10,7 +10,7 @@ from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import NO_CHANCE, Chance
 from lab.sequencing.methods.exact import optimum
 from lab.sequencing.methods.srl_time_reacting import reacting
-from lab.sequencing.simulate.execution import replicate
+from lab.sequencing.simulate.replications import replicate
 
 CellMaker = Callable[..., Cell]
 Cells = Callable[..., st.SearchStrategy[Cell]]

@@ -14,8 +14,9 @@ from lab.sequencing.cell.chance import NO_CHANCE, Chance, Episode
 from lab.sequencing.cell.stations import Arrivals, Product, Stage, Station, one_robot
 from lab.sequencing.methods.rollout import by_rule, rollout
 from lab.sequencing.methods.rules import RULES
-from lab.sequencing.simulate.execution import WAIT, Execution, Observed, carry_out, replicate
+from lab.sequencing.simulate.execution import WAIT, Execution, Observed
 from lab.sequencing.simulate.follow import follow, simulate
+from lab.sequencing.simulate.replications import carry_out, replicate
 from lab.sequencing.simulate.run import Run, branch
 
 CellMaker = Callable[..., Cell]

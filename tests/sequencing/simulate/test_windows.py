@@ -26,9 +26,9 @@ from lab.sequencing.methods.srl_time import TimeLearner
 from lab.sequencing.search import Search
 from lab.sequencing.simulate import kernels
 from lab.sequencing.simulate.cell_arrays import cell_arrays, run_arrays
-from lab.sequencing.simulate.execution import replicate
 from lab.sequencing.simulate.follow import follow, simulate, steps
 from lab.sequencing.simulate.merged import MergedCell
+from lab.sequencing.simulate.replications import replicate
 from lab.sequencing.simulate.rest import Mishaps, rest_of
 from lab.sequencing.simulate.run import Run
 

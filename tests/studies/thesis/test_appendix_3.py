@@ -13,7 +13,7 @@ from scipy.stats import ttest_rel
 
 from lab.sequencing.cell.chance import Chance, Episode
 from lab.sequencing.methods.many_sessions import evaluate
-from lab.sequencing.simulate.execution import carry_out, replicate
+from lab.sequencing.simulate.replications import carry_out, replicate
 from lab.studies.findings import Findings
 from lab.studies.report import write_rows
 from lab.studies.runner import Job
