@@ -19,7 +19,8 @@ Tree = Callable[[Path], list[str]]
 
 
 SHIPPED = "breakfast, fms-arm, fms, "
-TASKS, METHODS = (f"known: {', '.join(sorted(names))}" for names in (shipped(), SEQUENCERS))
+TASKS = f"known: {', '.join(sorted(shipped())[:12])}"  # a message of more is cut
+METHODS = f"known: {', '.join(sorted(SEQUENCERS))}"
 ADVISORS, LEARNERS, GATES = (
     f"known: {', '.join(sorted(names))}" for names in (advisors.ADVISORS, UPDATES, gates.GATES)
 )
