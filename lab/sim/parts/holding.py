@@ -105,9 +105,11 @@ def grip_force_n(robot: RobotSettings, load: Load) -> float:
 
 def with_force(robot: RobotSettings, load: Load) -> str:
     """How a refusal begins: the field, its value, who gave it, and what it is to hold."""
-    force_n = grip_force_n(robot, load)
-    chosen = "" if force_n == robot.grip_force_n else ", chosen for it"
-    return f"robot.grip_force_n = {force_n:.3g}{chosen}: {load.name} of {load.mass_kg:g} kg, friction {load.friction:g}"
+    force_n, given_n = grip_force_n(robot, load), robot.grip_force_n
+    said = f"{force_n:.3g}, chosen for it" if given_n is None else f"{given_n:.3g}"
+    if given_n is not None and force_n < given_n:
+        said += f", for it {force_n:.3g}: pressed harder, it would creep"
+    return f"robot.grip_force_n = {said}: {load.name} of {load.mass_kg:g} kg, friction {load.friction:g}"
 
 
 def needs_fine(robot: RobotSettings, kinds: Iterable[Kind]) -> bool:

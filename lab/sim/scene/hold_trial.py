@@ -4,6 +4,7 @@ It is carried at least as far as the task carries it: what creeps between the fi
 """
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
 from math import ceil, hypot, pi
@@ -27,6 +28,7 @@ FOOT_M = 0.1  # [m] the part's foot above the table
 SLIPPED_M, TILTED = 0.008, 0.96  # of what the fingers hold: off where they took it; cosine of its turn towards its side
 NEAR_M = 0.012  # a part is set down so near to where it should stand
 SETTLE_STEPS, HELD_STEPS = 60, 240  # of physics, before and after; that it hangs in the air
+GENTLER = (0.5, 0.25, 0.12)  # of a force with which a part is lost: these are tried
 BLOCK, RGBA = "block", (0.8, 0.8, 0.8, 1.0)
 BESIDE_M = 0.03  # [m] of the block around the foot
 ABOVE_M = 0.0005  # [m] between what stands on one another, at first
@@ -35,8 +37,19 @@ ABOVE_M = 0.0005  # [m] between what stands on one another, at first
 def check_held(robot: RobotSettings, arm: Arm, kinds: Sequence[Kind], way_m: float = 0.0) -> None:
     """BadInput where friction cannot hold a part, or where a part is lost in a trial; only what is unusual is tried.
 
-    way_m: how far parts are carried at most [m].
+    way_m: how far parts are carried at most [m]. The refusal names a gentler force with which all are held, if one is found.
     """
+    for kind, went in _lost(robot, arm, kinds, way_m):
+        hint = "another mass_kg, friction or acceleration_m_s2 may do"
+        if robot.grip_force_n is not None:
+            hint = f"without grip_force_n a force is chosen, or {hint}"
+        if gentler_n := _gentler_n(robot, arm, kinds, way_m):
+            hint = f"pressed less it holds: grip_force_n = {gentler_n:g}"
+        raise BadInput(f"{with_force(robot, Load.of(kind))}, is not held: in a trial {went}; {hint}")
+
+
+def _lost(robot: RobotSettings, arm: Arm, kinds: Sequence[Kind], way_m: float) -> Iterator[tuple[Kind, str]]:
+    """The kinds that are lost in a trial, and how; BadInput for those that friction cannot hold."""
     fine, laps = needs_fine(robot, kinds), max(1, ceil(way_m / LAP_M))
     loads = [Load.of(kind) for kind in kinds]
     for load in loads:
@@ -46,14 +59,18 @@ def check_held(robot: RobotSettings, arm: Arm, kinds: Sequence[Kind], way_m: flo
         if load.is_usual(force_n, robot.acceleration_m_s2) and not robot.is_file:
             continue
         if went := tried(Trial(arm, kind, force_n, robot.speed_m_s, robot.acceleration_m_s2, fine, laps)):
-            raise BadInput(_refusal(robot, load, went))
+            yield kind, went
 
 
-def _refusal(robot: RobotSettings, load: Load, went: str) -> str:
-    hint = "another mass_kg, friction or acceleration_m_s2 may do"
-    if robot.grip_force_n is not None:
-        hint = f"without grip_force_n a force is chosen, or {hint}"
-    return f"{with_force(robot, load)}, is not held: in a trial {went}; {hint}"
+def _gentler_n(robot: RobotSettings, arm: Arm, kinds: Sequence[Kind], way_m: float) -> float | None:
+    """A gentler force than now [N] with which all kinds are held: what is pressed too hard creeps from between the fingers."""
+    now_n = max(grip_force_n(robot, Load.of(kind)) for kind in kinds)
+    for share in GENTLER:
+        gentler = robot.model_copy(update={"grip_force_n": float(f"{share * now_n:.2g}")})
+        with suppress(BadInput):
+            if not any(_lost(gentler, arm, kinds, way_m)):
+                return gentler.grip_force_n
+    return None
 
 
 class Trial(NamedTuple):
