@@ -301,6 +301,8 @@ def test_a_sequence_with_advice() -> None:
 def test_a_sequence_in_drawn_times() -> None:
     drawn = {
         "replications": 200,
+        "robot_breaks_every_s": None,
+        "robot_repair_s": None,
         "fixed": {"mean": 112.0, "ci95": [110.5, 113.5]},
         "reacting": {"mean": 109.0, "ci95": [108.0, 110.0], "policy": "planned anew at every decision"},
         "saved_by_reacting": {"mean": 3.0, "ci95": [2.25, 3.75]},

@@ -5,7 +5,7 @@ Not looked at: whether a buffer for when the machine ahead is full (buffers = "b
 """
 
 from collections.abc import Mapping, Sequence
-from itertools import combinations, pairwise
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -47,6 +47,10 @@ def faults(cell: Row, rows: Sequence[Row], makespan_s: float) -> list[str]:
     return found + ([] if abs(end_s - makespan_s) <= EPS else [f"the makespan is {end_s:g}, not {makespan_s:g}"])
 
 
+Spans = list[tuple[int, float, float]]  # a stretch of the track, from when until when a robot is on it [s]
+MOST_CHOICES = 256  # of when robots set out
+
+
 def _ways(cell: Row) -> dict[str, dict[str, list[tuple[int, float, float]]]]:
     """The shortest way on the track between any two stations: its stretches, from when until when one is on each [s]."""
     stretches = [
@@ -65,17 +69,33 @@ def _ways(cell: Row) -> dict[str, dict[str, list[tuple[int, float, float]]]]:
 
 
 def _collisions(cell: Row, robots: Row, rows: Sequence[Row]) -> list[str]:
-    """Two robots on one stretch at a time: all drive without stopping from when they set out."""
-    held, ways = list[tuple[int, float, float]](), _ways(cell)
-    for row in rows:
-        speed = float(robots[row["robot"]].get("speed") or 1.0)
-        held += [
-            (n, row["start_s"] + a / speed, row["start_s"] + b / speed)
-            for n, a, b in ways[row["station"]][row["target"]]
-        ]
-    held.sort()
-    met = [one for one, then in pairwise(held) if one[0] == then[0] and one[2] > then[1] + EPS]
-    return [f"two on stretch {n} of the track at {until_s:g}" for n, _, until_s in met]
+    """Two robots on one stretch at a time, whenever they set out: all drive without stopping from then on.
+
+    With a part a robot sets out as it has picked, or when a stretch that it needs is free, at the latest so that it comes there
+    just in time: rows do not say when.
+    """
+    ways, chosen = _ways(cell), [Spans()]
+    worst = list[str]()
+    for row in sorted(rows, key=lambda one: one["end_s"]):
+        way, speed = ways[row["station"]][row["target"]], float(robots[row["robot"]].get("speed") or 1.0)
+        way = [(n, since / speed, until / speed) for n, since, until in way]
+        first_s, late_s = row["start_s"], row["end_s"] - (way[-1][2] if way else 0.0)
+        tried = list[tuple[Spans, list[str]]]()
+        for held in chosen:
+            free = {until - since for n, since, _ in way for m, _, until in held if n == m}
+            at_s = sorted({late_s, first_s, *(s for s in free if first_s < s < late_s)} if row["part"] else {first_s})
+            own = [[(n, out_s + since, out_s + until) for n, since, until in way] for out_s in at_s]
+            tried += [([*held, *more], _met(held, more)) for more in own]
+        worst = worst or min((met for _, met in tried), key=len)
+        chosen = [held for held, met in tried if not met][:MOST_CHOICES] or [tried[0][0]]
+    return worst
+
+
+def _met(held: Spans, more: Spans) -> list[str]:
+    """Where spans of one robot are those of others."""
+    pairs = [(n, min(end, until)) for n, begin, end in more for m, since, until in held
+             if n == m and max(begin, since) < min(end, until) - EPS]  # fmt: skip
+    return [f"two on stretch {n} of the track at {until_s:g}" for n, until_s in pairs]
 
 
 def _travel_s(cell: Row, robot: Row, ends: Sequence[str], tables: Sequence[str] = ("travel",)) -> float:

@@ -56,7 +56,7 @@ def test_a_built_scene_holds_everything_and_stays_as_it_was_put(task: Task, worl
 
 
 def test_each_part_is_held_by_a_force_of_its_own(world: World) -> None:
-    """A slice of 5 g is taken with 150 N/kg, a cup of 1.5 kg in the same task with 6 x 1.5 kg x 11.01 m/s2 / (2 x 0.8) = 61.9 N."""
+    """A slice of 5 g is taken with 150 N/kg, a cup of 1.5 kg in the same task with 61.9 N: 6 x 1.5 kg x 11.01 m/s2 / 1.6."""
     task, masses = load("breakfast"), {"slice": 0.005, "cup": 1.5}
     parts = tuple(part.model_copy(update={"mass_kg": masses[part.name]}) for part in task.parts)
     task = task.changed(parts=parts, robot=task.robot.model_copy(update={"grip_force_n": None}))
