@@ -135,7 +135,7 @@ def _copied(*names: str) -> Callable[[Path, Path], object]:
 
 def _instances(folder: Path, sound: Path) -> None:
     _texts(INSTANCES)(folder, sound)
-    from lab.studies.ours.transport_instances import FOLDER
+    from lab_studies.comparisons.transport_instances import FOLDER
 
     for name in ("jobshoplab/ft06.yaml", "phillips-unger-tanks.csv", "phillips-unger-empty.csv"):
         shutil.copy(FOLDER / name, folder)

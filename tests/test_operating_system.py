@@ -94,7 +94,7 @@ importing = builtins.__import__
 
 
 def imported(name, globals=None, locals=None, fromlist=(), level=0):
-    if level == 0 and str((globals or {{}}).get("__name__", "")).partition(".")[0] == "lab":
+    if level == 0 and str((globals or {{}}).get("__name__", "")).partition(".")[0] in ("lab", "lab_studies"):
         if name.partition(".")[0] in POSIX_MODULES:
             raise ModuleNotFoundError(f"No module named '{{name}}'", name=name)
         if name in seen:
@@ -105,9 +105,10 @@ def imported(name, globals=None, locals=None, fromlist=(), level=0):
 builtins.__import__ = imported
 """
 IMPORTS = """
-import lab
+import lab, lab_studies
 failed = {}
-names = [module.name for module in pkgutil.walk_packages(lab.__path__, "lab.") if module.name not in %r]
+packages = (lab.__path__, "lab."), (lab_studies.__path__, "lab_studies.")
+names = [module.name for package in packages for module in pkgutil.walk_packages(*package) if module.name not in %r]
 for name in names:
     try:
         importlib.import_module(name)
@@ -115,7 +116,12 @@ for name in names:
         failed[name] = str(error)
 print(json.dumps({"imported": len(names) - len(failed), "failed": failed}))
 """
-OPTIONAL = ("lab.studies.ours.learning_speed_jax",)  # it is jax itself
+OPTIONAL = ("lab_studies.comparisons.learning_speed_jax",)  # it is jax itself
+
+
+def sources(root: Path) -> list[Path]:
+    """The Python files of both packages."""
+    return [path for package in ("lab", "lab_studies") for path in (root / package).rglob("*.py")]
 
 
 def on_windows(root: Path, code: str, *words: str) -> subprocess.CompletedProcess[str]:
@@ -132,7 +138,7 @@ def test_every_module_is_imported_without_posix(root: Path) -> None:
     assert ran.returncode == 0, ran.stderr
     said = json.loads(ran.stdout)
     assert said["failed"] == {}
-    assert said["imported"] == len([*(root / "lab").rglob("*.py")]) - 1 - len(OPTIONAL)  # all but lab/__init__.py
+    assert said["imported"] == len(sources(root)) - 2 - len(OPTIONAL)  # all but the __init__.py of both packages
 
 
 def test_what_windows_lacks_is_missed_where_it_is_imported(root: Path) -> None:
@@ -209,7 +215,7 @@ def posix_uses(source: str) -> list[str]:
 
 def test_no_module_but_the_door_uses_what_windows_lacks(root: Path) -> None:
     """The door asks first where it is; Ctrl-C's timer and the processors of this process are looked for before they are used."""
-    uses = {path: posix_uses(path.read_text(encoding="utf-8")) for path in (root / "lab").rglob("*.py")}
+    uses = {path: posix_uses(path.read_text(encoding="utf-8")) for path in sources(root)}
     found = {path.relative_to(root).as_posix() for path, lines in uses.items() if lines}
     assert found == {"lab/cli/interrupt.py", "lab/operating_system.py", "lab/workers.py"}
     assert posix_uses("import os\nos.fork()\nos.getpid()\nsignal.SIGINT") == ["2: os.fork"]

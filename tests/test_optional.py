@@ -19,6 +19,8 @@ from lab.errors import BadInput
 from lab.optional import EXTRAS, optional
 
 ROOT = Path(__file__).resolve().parent.parent
+PACKAGES = ("lab", "lab_studies")
+SOURCES = sorted(path for package in PACKAGES for path in (ROOT / package).rglob("*.py"))
 RIVALS = {"jax"}  # libraries that a study measures itself beside, where they are: never installed by an extra
 BROUGHT = {"pydantic_core": "pydantic", "pybullet_data": "pybullet"}  # a part of another library, and never without it
 HIDING = """
@@ -188,10 +190,7 @@ def test_without_all_that_is_not_plain_toast_is_made_and_its_times_are_kept(with
 
 
 def test_without_all_that_is_not_plain_every_module_can_be_imported(without: Without) -> None:
-    names = sorted(
-        ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
-        for path in (ROOT / "lab").rglob("*.py")
-    )
+    names = sorted(".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__") for path in SOURCES)
     ran = without(not_plain(), f"from importlib import import_module\nfor name in {names}: import_module(name)")
     assert (ran.returncode, ran.stderr) == (0, "")
 
@@ -216,7 +215,7 @@ def test_each_library_that_is_imported_is_a_dependency_or_is_asked_for_as_option
         canonicalize_name(Requirement(line).name) for line in requires("teaching-lab") or [] if "extra ==" not in line
     }
     owners = {module: {canonicalize_name(name) for name in names} for module, names in packages_distributions().items()}
-    for path in sorted((ROOT / "lab").rglob("*.py")):
+    for path in SOURCES:
         for library, asked in imported(ast.parse(path.read_text(encoding="utf-8"))):
             given = bool(own & owners.get(library, set())) or BROUGHT.get(library) in own
             assert given != asked or library in RIVALS, f"{path.relative_to(ROOT)}: {library}"
@@ -231,7 +230,7 @@ def imported(tree: ast.AST, asked: bool = False) -> Iterator[tuple[str, bool]]:
         names += [str(node.module)] if isinstance(node, ast.ImportFrom) and not node.level else []
         for name in names:
             library = name.partition(".")[0]
-            if library != "lab" and library not in sys.stdlib_module_names:
+            if library not in PACKAGES and library not in sys.stdlib_module_names:
                 yield library, asked
         inside = isinstance(node, ast.With) and any("optional(" in ast.unparse(item) for item in node.items)
         yield from imported(node, asked or inside)
@@ -239,6 +238,6 @@ def imported(tree: ast.AST, asked: bool = False) -> Iterator[tuple[str, bool]]:
 
 def test_no_message_and_no_page_installs_the_lab_from_an_index() -> None:
     """None has it yet: only a checkout, or the repository's address, can be installed."""
-    pages = [ROOT / "README.md", *(ROOT / "docs").rglob("*.md"), *(ROOT / "lab").rglob("*.py")]
+    pages = [ROOT / "README.md", *(ROOT / "docs").rglob("*.md"), *SOURCES]
     found = [path for path in pages if re.search(r"pip install [^`\n]*teaching-lab", path.read_text(encoding="utf-8"))]
     assert found == []

@@ -25,7 +25,7 @@ def test_wheel_and_sdist_take_both_folders(project: dict[str, Any], root: Path) 
     into = targets["wheel"]["force-include"]
     assert into == {name: f"lab/_data/{name}" for name in ("tasks", "assets")}
     assert {f"/{name}" for name in into} < set(targets["sdist"]["include"])
-    assert targets["wheel"]["packages"] == ["lab"]
+    assert targets["wheel"]["packages"] == ["lab", "lab_studies"]
     assert all((root / name.strip("/")).exists() for name in (*into, *targets["sdist"]["include"]))
 
 

@@ -28,7 +28,9 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("lab.studies", "lab.seat"),
     ("lab.api", "lab.testing"),
     ("lab.cli",),
+    ("lab_studies",),  # a package of its own, which the lab never imports
 )
+PACKAGES = ("lab", "lab_studies")
 ALONE: dict[str, set[str]] = (
     {  # library -> the only modules that may import it
         "pybullet": {"lab.sim.world"},
@@ -72,7 +74,7 @@ NEVER = {  # room -> rooms that it never imports, whatever the layers say
     "lab.sim": ("lab.learning", "lab.sequencing"),
     # it judges by frames and the task file, and shares no code with what carried the run out
     "lab.audit": ("lab.skills", "lab.sequencing", "lab.learning", "lab.sim.scene", "lab.sim.world", "lab.sim.arms"),
-    "lab.studies.ours.schedule_checker": ("lab",),  # it shares no code with what it checks
+    "lab_studies.comparisons.schedule_checker": ("lab",),  # it shares no code with what it checks
 }
 HEAVY = (
     *("numpy", "pydantic", "scipy", "trimesh", "matplotlib", "numba", "meshcat", "cv2", "pybullet", "safetensors"),
@@ -82,7 +84,7 @@ READS_ITS_OWN = (  # what ships with the lab, or what it has just written: nothi
     *("lab.view.meshcat", "lab.view.server_page", "lab.studies.report", "lab.cli.export", "lab.toolbox.remote_place"),
     *("lab.api.lessons", "lab.api.pictures", "lab.api.runs", "lab.api.scenes"),
 )
-BY_TABLE = ("lab", "lab.cli.app")  # what these load stands in a table of their own
+BY_TABLE = ("lab", "lab.cli.app", "lab_studies")  # what these load stands in a table of their own
 GENERATORS = {"Generator", "default_rng", "SeedSequence", "BitGenerator", "PCG64"}
 
 
@@ -145,7 +147,7 @@ def import_faults(module: str, found: list[Import]) -> Iterator[str]:
         top, place = item.target.partition(".")[0], f"{module}:{item.line} imports {item.target}"
         if module not in ALONE.get(top, {module}):
             yield f"{place}: allowed in {sorted(ALONE[top]) or 'no module'}"
-        if top != "lab" or item.target == "lab":
+        if top not in PACKAGES or item.target == "lab":
             continue
         for room, banned in NEVER.items():
             if within(module, room) and any(within(item.target, other) for other in banned):
@@ -211,7 +213,7 @@ def loads(module: str, item: Import) -> Iterator[str]:
 def house() -> dict[str, tuple[ast.Module, list[Import]]]:
     """Every module of the package: its tree and its imports."""
     paths = {}
-    for path in sorted((ROOT / "lab").rglob("*.py")):
+    for path in sorted(path for package in PACKAGES for path in (ROOT / package).rglob("*.py")):
         parts = path.relative_to(ROOT).with_suffix("").parts
         paths[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
     trees = {name: ast.parse(path.read_text(encoding="utf-8"), str(path)) for name, path in paths.items()}
@@ -241,9 +243,11 @@ def test_the_architecture_is_the_one_that_is_told() -> None:
     for indent, name in re.findall(r"^    ( *)(\w+)/ ", text, re.MULTILINE):
         parents[len(indent) // 2 :] = [name]
         told.add("/".join(parents))
-    assert told == {path.parent.relative_to(ROOT).as_posix() for path in (ROOT / "lab").rglob("__init__.py")}
+    folders = {path.parent for package in PACKAGES for path in (ROOT / package).rglob("__init__.py")}
+    assert told == {folder.relative_to(ROOT).as_posix() for folder in folders}
     floors = re.findall(r"^    \d+ +([a-z_, ]+)$", text, re.MULTILINE)
-    assert [tuple(f"lab.{room}" for room in floor.split(", ")) for floor in floors] == list(LAYERS)
+    rooms = [tuple(room.removeprefix("lab.") for room in floor) for floor in LAYERS]
+    assert [tuple(floor.split(", ")) for floor in floors] == rooms
 
 
 def test_the_package_itself_loads_nothing_until_it_is_touched() -> None:
@@ -301,15 +305,20 @@ def faults(module: str, source: str) -> list[str]:
         ("lab.sequencing.methods.srl", "from lab.seat.terminal.prompt import ReadLine", "lab.sequencing never does"),
         ("lab.sim.arms.robot", "from ...learning import session", "imports lab.learning.session: lab.sim never does"),
         ("lab.sim.world", "from lab.sequencing.cell.cell import Cell", "lab.sim never does"),
-        ("lab.studies.ours.schedule_checker", "from lab.sequencing.simulate.run import follow", "checker never does"),
+        (
+            "lab_studies.comparisons.schedule_checker",
+            "from lab.sequencing.simulate.run import follow",
+            "checker never does",
+        ),
         ("lab.production.composer", "from ..cli import main", "runs back up"),
+        ("lab.cli.study", "def f():\n    from lab_studies import STUDIES", "runs back up"),
         ("lab.vision.pictures", "from lab.sim.world import World", "runs back up"),
         ("lab.mdp", "print('x')", "prints"),
         ("lab.mdp", "import numpy as np\nx = np.random.rand()", "uses np.random.rand"),
         ("lab.mdp", "from numpy.random import shuffle, default_rng", "imports numpy.random.shuffle"),
         ("lab.mdp", "import numpy as np\nrng = np.random.default_rng()", "without a seed"),
         (
-            "lab.sequencing.methods.many_sessions",
+            "lab_studies.many_sessions",
             "from numpy.random import SeedSequence\nx = SeedSequence()",
             "without a seed",
         ),
@@ -332,7 +341,7 @@ def test_a_broken_wall_is_seen(module: str, source: str, fault: str) -> None:
         ("lab.sim.world", "from lab.sim.frames import Frame"),
         ("lab.mdp", "import numpy as np\ndef f(rng: np.random.Generator): return np.random.default_rng(1)"),
         ("lab.sequencing.methods.srl_advised", "from lab.learning.gates import GATES"),
-        ("lab.sequencing.methods.many_sessions", "from numpy.random import SeedSequence\nx = SeedSequence(1)"),
+        ("lab_studies.many_sessions", "from numpy.random import SeedSequence\nx = SeedSequence(1)"),
     ],
 )
 def test_what_is_allowed_passes(module: str, source: str) -> None:

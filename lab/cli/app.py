@@ -174,11 +174,6 @@ COMMANDS = {  # what is typed after `lab` -> the command
         "Write a random grid world as a task file; a way always leads from its start to its goal.",
         "lab task random 10x10x10 --density 0.06 --seed 7 --out my-world.toml",
     ),
-    "task reconstruct": Command(
-        "task",
-        "Look for a world like the thesis's world II, of which only a picture is printed; takes a few minutes.",
-        "lab task reconstruct --seed 0 --out world-2.toml",
-    ),
     "task check": Command(
         "task",
         "Check a task file: its text, its reach, and that a way exists for every sub-task, or through the world. Exit 2 if not.",

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from lab.cli.options import Json, Seed
-from lab.cli.output import console, end, show, write, write_json
+from lab.cli.output import end, show, write, write_json
 from lab.errors import BadInput, LabError, counted
 
 if TYPE_CHECKING:
@@ -125,18 +125,6 @@ def task_random(
         )
 
     show(write_random(shape, density, seed, out), as_json, told)
-
-
-def task_reconstruct(
-    out: Annotated[Path, typer.Option("--out", help="The .toml file to write.")], seed: Seed = 0, as_json: Json = False
-) -> None:
-    """Look for a world like the thesis's world II, of which only a picture is printed; takes a few minutes."""
-    from lab.studies.thesis.world_2 import write_reconstruction
-    from lab.view.progress import counting
-
-    with counting(console(), "layouts and views compared") as progress:
-        document = write_reconstruction(seed, out, progress)
-    show(document, as_json, lambda d: f"{d['file']}: {d['title']}")
 
 
 def task_check(

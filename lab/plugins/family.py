@@ -19,6 +19,8 @@ class PluginFault(Notice):
 class Family(MutableMapping[str, Row]):
     """Members by name: those that ship, then those of other packages, which are loaded where they are first asked for.
 
+    An entry point gives one member, called by its name, or a mapping of names to members.
+
     kind: "gates" and so on; adopt: makes a row of what somebody else's code gives, BadInput for what is none.
     A name that ships is found without looking at other packages. One that is faulty, or whose name is taken, is told in a
     `PluginFault` and left out.
@@ -80,12 +82,16 @@ class Family(MutableMapping[str, Row]):
 
         for point in entry_points(group=f"{GROUP}.{self.kind}"):
             package = point.dist.name if point.dist is not None else "?"
+            name = point.name
             try:
-                self.adopted(point.name, point.load(), f"package '{package}'")
+                thing = point.load()
+                members = thing if isinstance(thing, Mapping) else {name: thing}
+                for name, member in members.items():
+                    self.adopted(name, member, f"package '{package}'")
             except (Exception, SystemExit) as error:
                 why = str(error) if isinstance(error, BadInput) else f"{type(error).__name__}: {error}"
-                what = f"{self.kind}: '{point.name}' of package '{package}' ({point.value}) is left out: {why}"
-                warnings.warn(what, PluginFault, stacklevel=2)
+                what = f"{self.kind}: '{name}' of package '{package}' ({point.value}) is left out: {why}"
+                warnings.warn(what, PluginFault, stacklevel=3)
 
 
 def first_line(thing: Any) -> str:

@@ -1,13 +1,20 @@
 """Whose the code of a member is, and whose fault an error is."""
 
+from dataclasses import is_dataclass
 from traceback import walk_tb
 
+OWN = "package 'teaching-lab'"  # its faults keep their traceback
 _modules: dict[str, str] = {}  # of others, by name: where they come from
 
 
 def known_source(thing: object, source: str) -> None:
-    """Note whose a member is."""
-    _modules[getattr(thing, "__module__", type(thing).__module__)] = source
+    """Note whose a member is: of a record of the lab, such as a `Study`, whose the functions in it are."""
+    if source == OWN:
+        return
+    for one in (thing, *vars(thing).values()) if is_dataclass(thing) else (thing,):
+        module = getattr(one, "__module__", type(one).__module__)
+        if module.partition(".")[0] != "lab":
+            _modules[module] = source
 
 
 def blame(error: BaseException) -> str | None:

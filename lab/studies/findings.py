@@ -18,12 +18,13 @@ Row = dict[str, Any]
 
 @dataclass(frozen=True)
 class Findings:
-    """Rows as `lab study run --json` gives them, a summary, pictures (SVG) by caption, remarks."""
+    """Rows as `lab study run --json` gives them, a summary, pictures (SVG) by caption, remarks, texts by file name."""
 
     rows: list[Row]
     summary: Row
     figures: Mapping[str, bytes] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    files: Mapping[str, str] = field(default_factory=dict)
 
 
 def row(

@@ -23,7 +23,7 @@ from lab.advice.trust import (
 )
 from lab.learning.simulated_advice import advice_chances as chances_of
 from lab.mdp import grid, optimal_values
-from lab.studies.thesis.chapter_9_sessions import world
+from lab_studies.thesis.chapter_9_sessions import world
 
 LEFT, RIGHT = 0, 1
 TO_THE_GOAL = [(0, RIGHT, 1), (1, RIGHT, 2), (2, RIGHT, 3)]  # a corridor 0-1-2-3, the goal is 3

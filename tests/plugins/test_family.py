@@ -80,6 +80,17 @@ def test_what_a_package_adds_is_looked_for_once(monkeypatch: pytest.MonkeyPatch)
     assert asked == ["teaching_lab.tests"]
 
 
+def test_an_entry_point_may_give_many_members(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Those before a faulty one stay; the faulty one is named."""
+    points = [Point("package", {"first": int, "own": int})]
+    monkeypatch.setattr("importlib.metadata.entry_points", lambda group: points)
+    family = made()
+    with pytest.warns(
+        PluginFault, match=r"'own' of package '\?' \(somewhere:thing\) is left out: the name 'own' is taken"
+    ):
+        assert [*family] == ["own", "first"]
+
+
 def test_help_and_arguments() -> None:
     assert first_line(Point) == "An entry point"
     assert takes(Point, "name", "thing")

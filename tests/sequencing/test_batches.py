@@ -15,13 +15,13 @@ from lab.sequencing.cyclic.cycle import check_cyclic
 from lab.sequencing.methods.cp_sat import cp_sat
 from lab.sequencing.methods.exact import optimum
 from lab.sequencing.methods.one_robot import why_not
-from lab.sequencing.methods.rolling import rolling
 from lab.sequencing.search import Search
 from lab.sequencing.simulate import kernels
 from lab.sequencing.simulate.cell_arrays import cell_arrays, run_arrays
 from lab.sequencing.simulate.follow import follow, simulate, steps
 from lab.sequencing.simulate.rest import Mishaps, rest_of
 from lab.sequencing.simulate.run import Run, branch
+from lab_studies.comparisons.rolling import rolling
 
 DRAWN = 60
 

@@ -15,13 +15,13 @@ from lab.sequencing.cell.objectives import cost
 from lab.sequencing.cell.routes import part_of
 from lab.sequencing.cell.stations import UNLIMITED, Arrivals, Product, Robot, Stage, Station, one_robot
 from lab.sequencing.cell.ways import TICKS_PER_S
-from lab.sequencing.methods.branch_and_bound import branch_and_bound
 from lab.sequencing.methods.cp_sat import cp_sat
 from lab.sequencing.methods.exact import Optimum, exact, optimum
 from lab.sequencing.search import Reference, Search
 from lab.sequencing.simulate.follow import simulate
 from lab.sequencing.simulate.merged import MergedCell
 from lab.sequencing.simulate.run import Run
+from lab_studies.thesis.branch_and_bound import branch_and_bound
 
 Ends = Callable[[Run], Iterator[Run]]
 CellMaker = Callable[..., Cell]

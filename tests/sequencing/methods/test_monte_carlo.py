@@ -8,9 +8,9 @@ import pytest
 from lab.errors import BadInput
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.stations import Station
-from lab.sequencing.methods.many_sessions import run_sessions
 from lab.sequencing.methods.monte_carlo import monte_carlo
 from lab.sequencing.search import Search, SrlSettings
+from lab_studies.many_sessions import run_sessions
 
 CellMaker = Callable[..., Cell]
 

@@ -13,7 +13,6 @@ from lab.errors import WorkFailed
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import LAWS, Chance
 from lab.sequencing.cell.objectives import OBJECTIVES, stuck_cost
-from lab.sequencing.methods.many_sessions import METHODS, run_sessions, session_seeds
 from lab.sequencing.methods.session_readable import (
     BLOCK,
     ROWS,
@@ -26,6 +25,7 @@ from lab.sequencing.methods.session_readable import (
 from lab.sequencing.methods.srl import Srl
 from lab.sequencing.methods.state_keys import keys_of
 from lab.sequencing.search import FACTORS, STATES, VALUES, EpisodeSequenced, Search, SrlSettings
+from lab_studies.many_sessions import METHODS, run_sessions, session_seeds
 
 CellMaker = Callable[..., Cell]
 SEED = 2**64 - 59

@@ -14,7 +14,6 @@ from lab.sequencing import SEQUENCERS
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import OBJECTIVES, cost
 from lab.sequencing.cell.stations import Product, Stage, Station, one_robot
-from lab.sequencing.methods.branch_and_bound import branch_and_bound
 from lab.sequencing.methods.cp_sat import cp_sat
 from lab.sequencing.methods.exact import optimum
 from lab.sequencing.methods.session_readable import learn_compiled, learn_readably
@@ -25,6 +24,7 @@ from lab.sequencing.simulate.cell_arrays import cell_arrays, run_arrays
 from lab.sequencing.simulate.follow import follow, simulate
 from lab.sequencing.simulate.rest import Mishaps, Rest, rest_of
 from lab.sequencing.simulate.run import Run
+from lab_studies.thesis.branch_and_bound import branch_and_bound
 
 CellMaker = Callable[..., Cell]
 Cells = Callable[..., SearchStrategy[Cell]]

@@ -17,11 +17,9 @@ from lab.sequencing.cell.objectives import cost, stuck_cost
 from lab.sequencing.cell.routes import choice_of, part_of
 from lab.sequencing.cell.stations import Product, Stage, Station, one_robot
 from lab.sequencing.cell.ways import TICKS_PER_S
-from lab.sequencing.methods.branch_and_bound import branch_and_bound
 from lab.sequencing.methods.cp_sat import cp_sat
 from lab.sequencing.methods.exact import optimum
 from lab.sequencing.methods.lower_bound import LowerBound
-from lab.sequencing.methods.many_sessions import evaluate
 from lab.sequencing.methods.srl_time import TimeLearner
 from lab.sequencing.search import Search
 from lab.sequencing.simulate import kernels
@@ -31,6 +29,8 @@ from lab.sequencing.simulate.merged import MergedCell
 from lab.sequencing.simulate.replications import replicate
 from lab.sequencing.simulate.rest import Mishaps, rest_of
 from lab.sequencing.simulate.run import Run
+from lab_studies.many_sessions import evaluate
+from lab_studies.thesis.branch_and_bound import branch_and_bound
 
 CellMaker = Callable[..., Cell]
 Cells = Callable[..., SearchStrategy[Cell]]

@@ -1,0 +1,198 @@
+"""AdviceBench: every rule of when to ask and whom to believe, beside every advisor, at every budget, in every problem."""
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from lab.errors import unknown
+from lab.statistics import interval
+from lab.studies.findings import Findings, Row, row
+from lab.studies.runner import Job
+from lab_studies.comparisons.advice_bench.bad_advisors import ADVISORS, advice_of
+from lab_studies.comparisons.advice_bench.figures import answers_and_gain, distances, gains, worst_cells
+from lab_studies.comparisons.advice_bench.problems import HELD_OUT, PROBLEMS, problem
+from lab_studies.comparisons.advice_bench.ranks import Cell, Ranks, ranks
+from lab_studies.comparisons.advice_bench.sessions import (
+    BINS,
+    BUDGETS,
+    NOBODY,
+    OURS,
+    RULES,
+    Case,
+    Outcome,
+    Outcomes,
+    tried,
+)
+
+MOST_BELOW = -2.0  # points below nobody that an interval may reach: the project's own target
+LEVEL = 0.9  # of nobody's last points: where a learner has recovered
+MEASURES = (
+    "Points: the mean over all episodes (the area under the learning curve), 100 as the best policy walks on average, 0 an "
+    "episode that fails; in between by its steps. gain_points: less those of nobody's sessions with the same seeds, with the "
+    "95 % interval of the paired differences; below 0 is harm. last: points of the last tenth of the episodes. answers: what the "
+    "advisor said in a session. later: episodes until the mean curve reaches nine tenths of nobody's last points, less "
+    "nobody's own; empty: it never does. Budget: answers of a session. Where moves are left to chance (lake) there are four "
+    "times as many sessions."
+)
+RULES_NOTE = (
+    "always is early advising where there is a budget. importance (teacher's), correcting and predictive: the advisor speaks "
+    "only in the half of the states where most is at stake, there only against what the learner would do (which it "
+    "announces), or did when last there (Torrey and Taylor 2013; their prediction is a classifier). importance (learner's): "
+    "Clouse's and Amir's. uncertainty: RCMP with five tables. novelty: advice novelty. reliability: CLUE with one advisor. two "
+    "levels: ADMIRAL's successor, with one. shaping: policy shaping with a fixed consistency. fading: confidence decay. Those "
+    "that the literature gives for deep learners are their idea in a table."
+)
+CHOSEN = (
+    "Chosen on the problems that are not held out: the constants of 'earned-trust' (with seed 0, so that its figures there "
+    "flatter it), the rivals' settings (the best mean gain of three to six values each, with seed 7), and the learner's "
+    "settings, so that nobody learns best. Held out, nothing was chosen on them: " + ", ".join(HELD_OUT) + "."
+)
+RANKED = (
+    "Ranks: of the points in each cell (problem, advisor, budget), ties shared, averaged within each problem, then over "
+    "problems; the critical difference is Nemenyi's at 5 %, with problems as blocks. Points above others': Wilcoxon's signed "
+    "ranks of the problems' means, Holm's correction."
+)
+
+
+def advice_bench(job: Job, reading: Mapping[str, Any]) -> Findings:
+    """The bench; reading: "problem", "methods" (rules) and "advisors", lists of names, in place of all.
+
+    Raises BadInput for a problem that cannot be a table, an unknown rule or advisor.
+    """
+    rules = tuple(reading.get("methods", RULES))
+    for name in rules:
+        if name not in RULES:
+            raise unknown("rule", name, RULES, "--methods")
+    problems = list(reading.get("problem", (*PROBLEMS, *HELD_OUT)))
+    advisors = list(reading.get("advisors", ADVISORS))
+    for name in problems:
+        place = problem(name)
+        for advisor in advisors:
+            if advisor not in ADVISORS:
+                advice_of(advisor, place)
+    cases = [Case(name, advisor) for name in problems for advisor in (None, *advisors)]
+    found = measured(job, cases, rules)
+    rows = [one for name in problems for one in rows_of(name, found, advisors, rules)]
+    says, pictures = in_short(rows, problems, rules)
+    return Findings(rows, says, pictures, (MEASURES, RULES_NOTE, CHOSEN, RANKED))
+
+
+def measured(job: Job, cases: Sequence[Case], rules: tuple[str, ...]) -> dict[Case, Outcomes]:
+    """What each case came to; what the job's folder holds is not run again."""
+    mark = [job.sessions, job.seed, *rules]
+
+    def read(entry: Any) -> tuple[Case, Outcomes] | None:
+        case = Case(*entry["case"])
+        found = {(str(rule), str(budget)): Outcome.from_json(lists) for (rule, budget), lists in entry["found"]}
+        return (case, found) if entry["of"] == mark and case in cases else None
+
+    done: dict[Case, Outcomes] = job.kept_as(read)
+    left = [case for case in cases if case not in done]
+    job.progress(len(done), len(cases))
+    work = partial(tried, sessions=job.sessions, seed=job.seed, rules=rules)
+    for case, found in job.computed(work, left, 1):
+        done[case] = found
+        entry = {"case": [case.problem, case.advisor], "of": mark}
+        job.keep(entry | {"found": [[list(key), one.to_json()] for key, one in found.items()]})
+        job.progress(len(done), len(cases))
+    return done
+
+
+def rows_of(name: str, found: Mapping[Case, Outcomes], advisors: Sequence[str], rules: Sequence[str]) -> list[Row]:
+    """One row for nobody, and one for each advisor, budget and rule in a problem."""
+    nobody = found[Case(name, None)][NOBODY, "any"]
+    group = {"held_out": name in HELD_OUT}
+    alone = {
+        "problem": name,
+        "advisor": NOBODY,
+        "budget": None,
+        "rule": NOBODY,
+        **group,
+        **_shown(nobody, nobody, name),
+    }
+    rows = [row(alone, "gain_points", 0.0)]
+    for advisor in advisors:
+        for budget in BUDGETS:
+            for rule in rules:
+                one = found[Case(name, advisor)][rule, budget]
+                named = {"problem": name, "advisor": advisor, "budget": budget, "rule": rule, **group}
+                mean, *ends = interval(one.points - nobody.points)
+                rows.append(row(named | _shown(one, nobody, name), "gain_points", mean, ends))
+    return rows
+
+
+def _shown(one: Outcome, nobody: Outcome, name: str) -> Row:
+    """What stands beside the gain."""
+    later = _recovered(one, nobody, name), _recovered(nobody, nobody, name)
+    return {
+        "points": round(float(one.points.mean()), 2),
+        "last": round(float(one.last.mean()), 2),
+        "answers": round(float(one.answers.mean()), 1),
+        "later": None if None in later else round(later[0] - later[1]),  # type: ignore[operator]
+    }
+
+
+def _recovered(one: Outcome, nobody: Outcome, name: str) -> float | None:
+    """The episode from which on the mean curve stays at nine tenths of nobody's last points, None: it does not."""
+    enough = one.curve >= LEVEL * nobody.last.mean()
+    below = np.flatnonzero(~enough)
+    first = 0 if len(below) == 0 else int(below[-1]) + 1
+    return None if first == BINS else first * problem(name).learner.episodes / BINS
+
+
+def in_short(rows: Sequence[Row], problems: Sequence[str], rules: Sequence[str]) -> tuple[Row, dict[str, bytes]]:
+    """Ranks and harm in the problems that were chosen on, and in those that were held out; with pictures."""
+    advised = [one for one in rows if one["rule"] != NOBODY]
+    alone = {one["problem"]: one["points"] for one in rows if one["rule"] == NOBODY}
+    scores: dict[str, dict[Cell, float]] = {rule: {} for rule in rules}
+    scores[NOBODY] = {}
+    for one in advised:
+        cell = one["problem"], one["advisor"], one["budget"]
+        scores[one["rule"]][cell], scores[NOBODY][cell] = one["points"], alone[one["problem"]]
+    says: Row = {"rules": len(rules), "advisors": len({one["advisor"] for one in advised})}
+    pictures: dict[str, bytes] = {}
+    groups = {"": [name for name in problems if name not in HELD_OUT], "held out: ": [*filter(HELD_OUT.get, problems)]}
+    for words, those in groups.items():
+        if not those:
+            continue
+        here = [one for one in advised if one["problem"] in those]
+        ranked = ranks(scores, those, OURS)
+        says |= _ranked(words, ranked) | _harm(words, here, rules)
+        where = "held-out problems" if words else "problems"
+        pictures |= {
+            f"Mean ranks in {len(those)} {where}; rules joined by a bar are not told apart": distances(ranked),
+            f"Points gained over nobody, means over {len(those)} {where}": gains(here, list(ranked.mean)),
+            f"The worst cell of each rule in {len(those)} {where}": worst_cells(here, list(ranked.mean), MOST_BELOW),
+            f"Answers and points gained, means over {len(those)} {where}": answers_and_gain(here, rules),
+        }
+    return says, pictures
+
+
+def _ranked(words: str, ranked: Ranks) -> Row:
+    best = [*ranked.mean.items()][:3]
+    says: Row = {f"{words}best three mean ranks": ", ".join(f"{rule} {rank:.2f}" for rule, rank in best)}
+    if OURS in ranked.mean:
+        ahead = [rule for rule, rank in ranked.mean.items() if rank < ranked.mean[OURS]]
+        sure = sum(p < 0.05 for p in ranked.beaten.values())
+        says[f"{words}'{OURS}'"] = (
+            f"rank {len(ahead) + 1} of {len(ranked.mean)}; its points over problems are above those of {sure} others at 5 %"
+        )
+    return says | {f"{words}critical difference of ranks": round(ranked.critical, 2), f"{words}Friedman p": ranked.p}
+
+
+def _harm(words: str, rows: Sequence[Row], rules: Sequence[str]) -> Row:
+    """In how many cells each rule's interval reaches below the target, and the worst of them."""
+    says: Row = {}
+    for rule in rules:
+        own = [one for one in rows if one["rule"] == rule]
+        below = sum(one["ci95"][0] < MOST_BELOW for one in own)
+        surely = sum(one["ci95"][1] < MOST_BELOW for one in own)
+        worst = min(own, key=lambda one: one["ci95"][0])
+        place = f"{worst['problem']}, {worst['advisor']}, budget {worst['budget']}"
+        says[f"{words}harm by {rule}"] = (
+            f"{below} of {len(own)} intervals reach below {MOST_BELOW:g}, {surely} lie there whole; "
+            f"worst {worst['value']:+.1f} ({worst['ci95'][0]:.1f} to {worst['ci95'][1]:.1f}): {place}"
+        )
+    return says

@@ -1,0 +1,115 @@
+"""Who advises in AdviceBench: skill models from expert to novice, and experts with a defect."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from zlib import crc32
+
+import numpy as np
+
+from lab.advice.advisors import SKILL_TAUS, AdvisorName
+from lab.advice.table_level import TableLevel
+from lab.learning.requests import AdviceRequest
+from lab.learning.simulated_advice import Advice, TableAdvisor, advice_chances
+from lab.mdp import BoolArray, FloatArray
+from lab_studies.comparisons.advice_bench.problems import Benched
+
+EXPERT = SKILL_TAUS["expert"]
+WRONG_THERE, SILENT = 0.25, 0.75  # shares of the states
+DRIFTS = 50  # steps in which an expert becomes contrary
+Made = Callable[[Benched], Advice]
+
+
+def _skill(tau: float) -> Made:
+    return lambda of: Advice.of(advice_chances(of.values, tau))
+
+
+def contrary(of: Benched) -> Advice:
+    """Takes the worst action for the best."""
+    return Advice.of(advice_chances(-of.values, EXPERT))
+
+
+def wrong_there(of: Benched) -> Advice:
+    """An expert that is contrary in a quarter of the states, drawn once and for all."""
+    there = _drawn(of, WRONG_THERE)
+    return Advice.of(advice_chances(np.where(there[:, None], -of.values, of.values), EXPERT))
+
+
+def late(of: Benched) -> Advice:
+    """An expert that answers the question before."""
+    return replace(Advice.of(advice_chances(of.values, EXPERT)), late=True)
+
+
+def stuck(of: Benched) -> Advice:
+    """Says everywhere what is best at the start."""
+    always = int(of.values[of.mdp.start].argmax())
+    return Advice.of(np.tile(np.eye(of.mdp.n_actions)[always], (of.mdp.n_states, 1)))
+
+
+def drifting(of: Benched) -> Advice:
+    """An expert at first; the chance of a contrary answer grows to 1 over the session."""
+    good, bad = advice_chances(of.values, EXPERT), advice_chances(-of.values, EXPERT)
+    rows = np.minimum(np.arange(of.learner.episodes) * DRIFTS // of.learner.episodes, DRIFTS - 1)
+    shares = np.linspace(0.0, 1.0, DRIFTS)[rows]
+    return Advice.of((1.0 - shares)[:, None, None] * good + shares[:, None, None] * bad)
+
+
+def long_winded(of: Benched) -> Advice:
+    """Half of its answers are the best action, the others any that ends no episode in failure: it arrives, by detours."""
+    best = advice_chances(of.values, EXPERT)
+    mdp = of.mdp
+    safe = (~(mdp.terminal & ~mdp.goal)[mdp.successor]).astype(np.float64)
+    safe[safe.sum(axis=1) == 0.0] = 1.0
+    return Advice.of(0.5 * best + 0.5 * safe / safe.sum(axis=1, keepdims=True))
+
+
+def silent(of: Benched) -> Advice:
+    """An expert that says nothing in three quarters of the states, drawn once and for all."""
+    return Advice.of(advice_chances(of.values, EXPERT), ~_drawn(of, SILENT))
+
+
+def _drawn(of: Benched, share: float) -> BoolArray:
+    rng = np.random.default_rng(crc32(f"{of.name} {of.mdp.signature}".encode()))
+    return rng.random(of.mdp.n_states) < share
+
+
+ADVISORS: Mapping[str, Made] = {
+    **{name: _skill(tau) for name, tau in SKILL_TAUS.items()},
+    "contrary": contrary,
+    "wrong there": wrong_there,
+    "late": late,
+    "stuck": stuck,
+    "drifting": drifting,
+    "long-winded": long_winded,
+    "silent": silent,
+}
+
+
+def advice_of(name: str, of: Benched) -> Advice:
+    """Of an advisor of the bench, or of any other that answers a question always alike, such as one that was recorded.
+
+    BadInput for a name that no advisor has, and for a record that is about another problem.
+    """
+    if name in ADVISORS:
+        return ADVISORS[name](of)
+    level = TableLevel(of.mdp, of.learner.discount, np.random.default_rng(0), episodes=of.learner.episodes)
+    advisor = level.advisor(AdvisorName.of(name, "--advisors"))
+    if isinstance(advisor, TableAdvisor):
+        return advisor.advice
+    says = np.zeros(of.mdp.successor.shape)
+    q = [[0.0] * of.mdp.n_actions] * of.mdp.n_states
+    for state in np.flatnonzero(~of.mdp.terminal).tolist():
+        request = AdviceRequest(episode=1, step=1, state=state, own=0, allowed=range(of.mdp.n_actions), mdp=of.mdp, q=q)
+        action = None if advisor is None else advisor.advise(request)
+        if action is not None:
+            says[state, action] = 1.0
+    heard: BoolArray = says.sum(axis=1) > 0.0
+    says[~heard, 0] = 1.0
+    return Advice.of(says, heard)
+
+
+def importance(of: Benched, share: float = 0.5) -> BoolArray:
+    """Where a teacher sees most at stake: the half of the states with the widest values (S,) bool (Torrey and Taylor 2013)."""
+    live = ~of.mdp.terminal
+    width: FloatArray = of.values.max(axis=1) - of.values.min(axis=1)
+    wide: BoolArray = width >= np.quantile(width[live], 1.0 - share)
+    return wide & live

@@ -1,0 +1,106 @@
+"""The pictures of AdviceBench: mean ranks with their critical difference, gains by advisor, worst cells, answers against gain."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from lab.studies.findings import Row
+from lab.view.canvas import BLUE, GREY, INK, ORANGE, RED, picture_bytes
+from lab_studies.comparisons.advice_bench.ranks import Ranks
+from lab_studies.comparisons.advice_bench.sessions import BUDGETS, OURS
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+LARGEST = 40.0  # points, where the colours of the gains end
+
+
+def distances(ranked: Ranks) -> bytes:
+    """Mean ranks, best first, each with a bar of the critical difference: what it reaches is not told apart."""
+    rules = list(ranked.mean)
+
+    def draw(figure: "Figure") -> None:
+        axes = figure.add_subplot()
+        for line, rule in enumerate(rules):
+            rank, colour = ranked.mean[rule], ORANGE if rule == OURS else BLUE
+            axes.hlines(line, rank, rank + ranked.critical, color=GREY, linewidth=1.0)
+            axes.plot(rank, line, "o", color=colour, markersize=5)
+            axes.text(rank - 0.3, line, f"{rank:.1f}", ha="right", va="center", color=INK)
+        axes.set_yticks(range(len(rules)), rules)
+        axes.set(xlabel=f"mean rank (bar: critical difference {ranked.critical:.1f})", ylim=(len(rules) - 0.5, -0.5))
+        axes.set_xlim(0.0, len(rules) + ranked.critical)
+        axes.grid(axis="x")
+
+    return picture_bytes(draw, 7.5, 0.9 + 0.24 * len(rules))
+
+
+def gains(rows: Sequence[Row], rules: Sequence[str]) -> bytes:
+    """A map for each budget: rules by advisors, the mean gain over nobody as colour and number."""
+    advisors = list(dict.fromkeys(one["advisor"] for one in rows))
+    shown = [rule for rule in rules if any(one["rule"] == rule for one in rows)]
+
+    def draw(figure: "Figure") -> None:
+        both = figure.subplots(1, len(BUDGETS), sharey=True)
+        for axes, budget in zip(np.atleast_1d(both), BUDGETS, strict=True):
+            table = [[_mean(rows, budget, rule, advisor) for advisor in advisors] for rule in shown]
+            axes.imshow(table, cmap="RdBu", vmin=-LARGEST, vmax=LARGEST, aspect="auto")
+            for line, values in enumerate(table):
+                for column, value in enumerate(values):
+                    pale = "white" if abs(value) > 0.6 * LARGEST else INK
+                    axes.text(column, line, f"{value:+.0f}", ha="center", va="center", color=pale, fontsize=7)
+            axes.set_xticks(range(len(advisors)), advisors, rotation=45, ha="right")
+            axes.set_title(f"budget: {budget} answers" if budget != "any" else "any number of answers")
+        np.atleast_1d(both)[0].set_yticks(range(len(shown)), shown)
+
+    return picture_bytes(draw, 10.5, 1.6 + 0.24 * len(shown))
+
+
+def _mean(rows: Sequence[Row], budget: str, rule: str, advisor: str) -> float:
+    those = [one["value"] for one in rows if (one["budget"], one["rule"], one["advisor"]) == (budget, rule, advisor)]
+    return float(np.mean(those))
+
+
+def worst_cells(rows: Sequence[Row], rules: Sequence[str], target: float) -> bytes:
+    """Of each rule the cell whose interval reaches lowest, and the target."""
+    lowest = {}
+    for rule in rules:
+        own = [one for one in rows if one["rule"] == rule]
+        if own:
+            lowest[rule] = min(own, key=lambda one: one["ci95"][0])
+
+    def draw(figure: "Figure") -> None:
+        axes = figure.add_subplot()
+        for line, (rule, one) in enumerate(lowest.items()):
+            colour = ORANGE if rule == OURS else BLUE
+            axes.hlines(line, *one["ci95"], color=colour, linewidth=1.6)
+            axes.plot(one["value"], line, "o", color=colour, markersize=4)
+        axes.axvline(target, color=RED, linewidth=1.0, linestyle="--", label=f"target {target:g}")
+        axes.axvline(0.0, color=GREY, linewidth=0.8)
+        axes.set_yticks(range(len(lowest)), lowest)
+        axes.set(xlabel="points below nobody, with 95 % interval", ylim=(len(lowest) - 0.5, -0.5))
+        axes.grid(axis="x")
+        axes.legend(loc="lower left")
+
+    return picture_bytes(draw, 7.5, 0.9 + 0.24 * len(lowest))
+
+
+def answers_and_gain(rows: Sequence[Row], rules: Sequence[str]) -> bytes:
+    """What a rule asks for and what it gains, by budget, means over all cells."""
+
+    def draw(figure: "Figure") -> None:
+        axes = figure.add_subplot()
+        for budget, marker in zip(BUDGETS, "ox", strict=True):
+            for rule in rules:
+                own = [one for one in rows if (one["rule"], one["budget"]) == (rule, budget)]
+                at = max(1.0, float(np.mean([one["answers"] for one in own]))), np.mean([one["value"] for one in own])
+                axes.plot(*at, marker, color=ORANGE if rule == OURS else BLUE, markersize=5)
+                if budget == "any" or rule == OURS:
+                    axes.annotate(rule, at, xytext=(4, 2), textcoords="offset points", fontsize=6.5)
+            axes.plot([], [], marker, color=INK, label=f"budget: {budget}")
+        axes.axhline(0.0, color=GREY, linewidth=0.8)
+        axes.set(xscale="log", xlabel="answers of a session", ylabel="points gained over nobody")
+        axes.grid()
+        axes.legend(loc="lower left")
+
+    return picture_bytes(draw, 8.0, 4.6)

@@ -1,0 +1,240 @@
+"""What advice costs: success against helped steps, for every gate with and without memory, and every kind of advisor."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import fields, replace
+from functools import partial
+from math import hypot
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+
+from lab.advice.advisors import SKILL_TAUS
+from lab.learning.gates import GATES
+from lab.statistics import share
+from lab.studies.findings import Findings, Row, mean_row, row, share_row, those
+from lab.studies.runner import Job
+from lab_studies.comparisons.advice_budget_figures import of_ccrl, of_gates
+from lab_studies.thesis.chapter_9 import ADVISOR, EXACT, RECONSTRUCTED
+from lab_studies.thesis.chapter_9_sessions import AdviceOutcome, AdviceSetting, measured, sessions_of
+
+WORLDS = ("world-1", "world-2")
+RANDOM = "random"
+RANDOM_WORLDS = tuple(f"random:10x10x10:0.06:{seed}" for seed in range(100))
+PLACES = (*WORLDS, RANDOM)
+VIEWS: tuple[Literal["full", "limited"], ...] = ("full", "limited")
+WRONG, NOBODY = "wrong", "nobody"
+ADVISORS = (*SKILL_TAUS, WRONG)
+CCRL = ("ccrl",)
+ASKING = tuple(gate for gate, one in GATES.items() if gate != "never" and not (one.compiled and one.compiled.weighs))
+AGAINST = {False: "alone", True: "alone, with memory"}
+TARGETS = {"expert": (99.0, 24.0), "moderate": (98.0, 60.0), "limited": (85.0, 150.0), "novice": (63.0, 10.0)}
+MOST_BELOW = -2.0  # points of success that an advisor may cost against learning alone: the target
+
+MEASURES = (
+    "SP: sessions whose last episode took the shortest way. HS: helped steps, those that were asked for and followed; what is "
+    "done again from memory is none. AR: episodes in which advice was asked for. Each gate is at its defaults (those of "
+    "the world's file), not at the best of the thesis's grid. Wrong: takes the worst action for the best. World 'random': "
+    f"{len(RANDOM_WORLDS)} random worlds, {RANDOM_WORLDS[0]} and on, which share the sessions; there a limited view is the "
+    "middle half of each axis. Without memory only full view in worlds I and II is measured, and nobody everywhere."
+)
+LAST = (
+    "With memory nobody is asked in the last 15 % of the episodes, the last one's way is what counts, and there the learner "
+    "takes the moves that its table rates best. Without it chance still has a say in the last episode, in world II in every "
+    "fifth or so; CCRL and the combined method do not ask there either, but the other gates may: part of their success, or "
+    "failure, is the advisor's own walk."
+)
+OWN_MEMORY = (
+    "Mind the rows 'nobody, memory': a learner that nobody advises remembers all of its own moves, and practises the "
+    "shortest way through them before the end. Much of what weak and wrong advisors seem to give with memory is the "
+    "learner's own: they are to be held against these rows, and only what lies above them is the advisor's. Memory changes "
+    "the learner, not only the gate."
+)
+WORST = (
+    "worst_below_alone: the lowest success with memory over all advisors, with CCRL or with any gate, less that of learning "
+    "alone, without and with memory, with Newcombe's 95 % interval. The lowest of many is below its true value on average. "
+    "Targets: those of the project, not the thesis's."
+)
+
+
+def advice_budget(job: Job, reading: Mapping[str, Any]) -> Findings:
+    """Every gate, advisor and world, with and without memory; advisors know the exact values unless read otherwise."""
+    cells = {cell: tuple(replace(one, **reading) for one in ones) for cell, ones in settings().items()}
+    outcomes = _outcomes(job, cells)
+    table = next(iter(cells.values()))[0].advisor_table
+    rows = [one for cell, outcome in outcomes.items() for one in rows_of(cell, outcome, table)]
+    below = [
+        one
+        for gates in (CCRL, ASKING)
+        for place in PLACES
+        for view in VIEWS
+        for one in worst(outcomes, place, view, gates)
+    ]
+    shown = [one for one in rows if one["world"] in WORLDS and one["view"] == "full"]
+    pictures = {
+        "Success against helped steps, all gates": of_gates(shown),
+        "Success against helped steps, CCRL without and with memory": of_ccrl(shown, TARGETS),
+    }
+    notes = (
+        MEASURES,
+        LAST,
+        OWN_MEMORY,
+        WORST,
+        EXACT.split(";")[0] + "." if table == "exact" else ADVISOR,
+        RECONSTRUCTED,
+    )
+    return Findings(rows + below, in_short(rows, below), pictures, notes)
+
+
+class Asked(NamedTuple):
+    """A cell: where the advisor sees the robot, and so on; of nobody the view is full."""
+
+    world: str
+    view: Literal["full", "limited"]
+    gate: str
+    advisor: str
+    memory: bool
+
+
+def settings() -> dict[Asked, tuple[AdviceSetting, ...]]:
+    """What is measured, a setting for each world of a cell; nobody: the gate never asks."""
+    cells: dict[Asked, tuple[AdviceSetting, ...]] = {}
+    for place in PLACES:
+        worlds = RANDOM_WORLDS if place == RANDOM else (place,)
+        for memory in (False, True):
+            alone = [AdviceSetting(world, memory=memory, advisor_table="exact") for world in worlds]
+            cells[Asked(place, "full", "never", NOBODY, memory)] = tuple(alone)
+            for view in VIEWS if memory else ("full",) if place in WORLDS else ():
+                for gate in ASKING:
+                    for name in ADVISORS:
+                        tau = SKILL_TAUS["expert" if name == WRONG else name]
+                        cells[Asked(place, view, gate, name, memory)] = tuple(
+                            replace(one, view=view, gate=gate, tau=tau, wrong=name == WRONG) for one in alone
+                        )
+    return cells
+
+
+def _outcomes(job: Job, cells: Mapping[Asked, tuple[AdviceSetting, ...]]) -> dict[Asked, AdviceOutcome]:
+    """What each cell came to; those of one world are kept in the job's folder."""
+    single = {cell: ones[0] for cell, ones in cells.items() if cell.world != RANDOM}
+    found = measured(job, list(single.values()))
+    share = max(1, job.sessions // len(RANDOM_WORLDS))
+    joined = job.each(
+        partial(_joined, sessions=share, seed=job.seed), [cells[cell] for cell in cells if cell not in single]
+    )
+    return {cell: found[single[cell]] if cell in single else joined[ones] for cell, ones in cells.items()}
+
+
+def _joined(ones: tuple[AdviceSetting, ...], sessions: int, seed: int) -> AdviceOutcome:
+    """So many sessions of each setting, as one outcome."""
+    parts = [sessions_of(one, sessions, seed) for one in ones]
+    return AdviceOutcome(
+        *(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(AdviceOutcome))
+    )
+
+
+def rows_of(cell: Asked, outcome: AdviceOutcome, table: str) -> list[Row]:
+    """The measures of one cell; where the project has a target it stands beside them."""
+    named: Row = {
+        "world": cell.world,
+        "view": cell.view,
+        "gate": cell.gate,
+        "memory": cell.memory,
+        "advisor": cell.advisor,
+    }
+    if cell.advisor != NOBODY:
+        named |= {"tau": SKILL_TAUS.get(cell.advisor, SKILL_TAUS["expert"]), "advisor_table": table}
+    rows = [
+        share_row(named, "SP_percent", outcome.success),
+        mean_row(named, "HS_steps", outcome.helped_steps),
+        mean_row(named, "AR_requests", outcome.requests),
+    ]
+    if cell == Asked("world-1", "full", "ccrl", cell.advisor, True) and cell.advisor in TARGETS:
+        for one, target in zip(rows, TARGETS[cell.advisor], strict=False):
+            one["target"] = target
+    return rows
+
+
+def difference(one: AdviceOutcome, other: AdviceOutcome) -> tuple[float, float, float]:
+    """How much more often one setting's sessions succeed than another's, low and high end, in points.
+
+    Source: R. G. Newcombe, Statistics in Medicine 17 (1998), 873-890, method 10.
+    """
+    (percent, low, high), (than, than_low, than_high) = share(one.success), share(other.success)
+    gap = percent - than
+    return gap, gap - hypot(percent - low, than_high - than), gap + hypot(high - percent, than - than_low)
+
+
+def worst(
+    outcomes: Mapping[Asked, AdviceOutcome], place: str, view: Literal["full", "limited"], gates: Sequence[str] = CCRL
+) -> list[Row]:
+    """The advisor (and gate) with whom sessions with memory succeed least, against nobody, without and with memory."""
+    cells = [Asked(place, view, gate, name, True) for gate in gates for name in ADVISORS]
+    lowest = min(cells, key=lambda cell: float(outcomes[cell].success.mean()))
+    rows = []
+    for memory in (False, True):
+        gap, low, high = difference(outcomes[lowest], outcomes[Asked(place, "full", "never", NOBODY, memory)])
+        named: Row = {
+            **lowest._asdict(),
+            "over": "any gate" if len(gates) > 1 else lowest.gate,
+            "against": AGAINST[memory],
+        }
+        rows.append(row(named, "worst_below_alone_points", gap, (low, high)))
+    return rows
+
+
+def in_short(rows: Sequence[Row], below: Sequence[Row]) -> Row:
+    """The targets beside what was measured, nobody, the worst advisor against nobody, what memory saves."""
+    of = ("world", "view", "gate", "advisor", "memory", "measure")
+    value = {tuple(one[name] for name in of): one["value"] for one in rows}
+
+    def cell(place: str, gate: str, name: str, memory: bool) -> tuple[float, float]:
+        cell = (place, "full", gate, name, memory)
+        return value[*cell, "SP_percent"], value[*cell, "HS_steps"]
+
+    says: Row = {}
+    for name, (sp, hs) in TARGETS.items():
+        found, without = (cell("world-1", "ccrl", name, memory) for memory in (True, False))
+        missed = [what for what, kept in (("success", found[0] >= sp), ("steps", found[1] <= hs)) if not kept]
+        verdict = f"{' and '.join(missed)} missed" if missed else "met"
+        says[f"{name}, target {_both(sp, hs)}"] = f"{_both(*found)}: {verdict} (without memory {_both(*without)})"
+    for place in PLACES:
+        for memory, against in AGAINST.items():
+            says[f"{place}: {against}"] = f"{cell(place, 'never', NOBODY, memory)[0]:.1f} %"
+    saved = [
+        1.0 - cell(place, gate, name, True)[1] / cell(place, gate, name, False)[1]
+        for place in WORLDS
+        for gate in ASKING
+        for name in SKILL_TAUS
+        if cell(place, gate, name, False)[1] > 0
+    ]
+    says["helped steps that memory saves, median over gates and skills [%]"] = round(100 * float(np.median(saved)), 1)
+    return says | _worst_in_short(below)
+
+
+def _both(success: float, helped: float) -> str:
+    return f"{round(success, 1):g} % / {round(helped, 1):g} steps"
+
+
+def _worst_in_short(below: Sequence[Row]) -> Row:
+    says: Row = {}
+    for memory, against in AGAINST.items():
+        lowest = min(those(below, against=against), key=lambda one: float(one["value"]))
+        name = "worst_below_alone_with_memory" if memory else "worst_below_alone"
+        says[name] = round(float(lowest["value"]), 1)
+        says[f"{name} target"] = f"at least {MOST_BELOW:g} points: {verdict(lowest)}"
+    for one in below:
+        low, high = one["ci95"]
+        which = one["advisor"] if one["over"] == one["gate"] else f"{one['gate']}, {one['advisor']}"
+        place = f"{one['world']}, {one['view']} view"
+        says[f"{place}: worst with {one['over']} against {one['against']} [points]"] = (
+            f"{one['value']:+.1f} ({low:+.1f} to {high:+.1f}): {which}"
+        )
+    return says
+
+
+def verdict(lowest: Row) -> str:
+    """Whether the worst advisor keeps to the target, as far as the interval says."""
+    low, high = lowest["ci95"]
+    if low >= MOST_BELOW:
+        return "met, with its interval"
+    return "missed" if high < MOST_BELOW else "open: the interval holds it"

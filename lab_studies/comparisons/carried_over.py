@@ -1,0 +1,187 @@
+"""Learning that carries over: a policy learned on small cells of a family orders larger ones, beside every dispatching rule."""
+
+import time
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from lab.sequencing.cell.objectives import MAKESPAN, cost
+from lab.sequencing.methods.carried_over import Decider
+from lab.sequencing.methods.carried_over_policy import CarriedPolicy
+from lab.sequencing.methods.portfolio import best_known
+from lab.sequencing.methods.rules import dispatch, usable
+from lab.sequencing.search import gap
+from lab.sequencing.simulate.run import Run
+from lab.studies.charts import bars
+from lab.studies.findings import Findings, Row, row, those, varying_row
+from lab.studies.runner import Job, record_of
+from lab.tasks.carried_policy import write_policy
+from lab_studies.comparisons.carried_over_families import SMALL, Unseen, small_cells, unseen, unseen_cell
+from lab_studies.comparisons.carried_over_learning import CarriedLearning, learn_policy
+
+ALL = "all families"
+CARRIED = "carried over"
+SETTINGS = CarriedLearning()
+TIME_LIMIT_S = 20.0  # of CP-SAT, for each of the larger cells that A* does not take
+REPEATS = 20  # of each run whose time is measured
+ABOUT = (
+    "Policies are linear: {features} features of a decision, learned by CMA-ES from the costs of greedy runs alone, on {cells} "
+    "drawn small cells of a family ({generations} generations). They are tried on larger cells, none of which was "
+    "learned on. No search: one decision after the other, the one of highest value. The best rule is the one with the "
+    "lowest mean gap in the very cells of a row's group."
+)
+GAPS = (
+    "Gap: above the printed value (Bilge and Ulusoy), else above what is proven: the optimum by A*, or the bound of CP-SAT "
+    "after {limit:g} s. 'proven': how many of the references are optima, or printed as such. A run that gets stuck counts as "
+    "ten times the longest. Speeds: one core, CPU time, features and moves together, making the tables of a cell left out."
+)
+POLICIES = "The policies stand beside this report (policy-....json): lab sequence CELL --method carried --policy FILE uses one."
+
+
+@dataclass(frozen=True)
+class Surveyed:
+    """What is known of a larger cell: the best cost and the bound, and the cost, moves and CPU seconds of each rule's run."""
+
+    best: float
+    bound: float
+    rules: dict[str, float]
+    moves: int
+    rules_s: dict[str, float]
+
+    @property
+    def proven(self) -> bool:
+        """Whether the bound is reached."""
+        return gap(self.best, self.bound) == 0.0
+
+
+def carried_over(job: Job, reading: Mapping[str, Any]) -> Findings:
+    """Policies of each family and of all of them, on as many small cells as there are sessions; the reading changes nothing."""
+    families = [*SMALL, ALL]
+    learned = _kept(job, "learned", families, partial(_learned, sessions=job.sessions, seed=job.seed), _policy_of)
+    cells = unseen()
+    surveys = _kept(job, "surveyed", cells, surveyed, partial(record_of, Surveyed))
+    rows: list[Row] = []
+    for group in dict.fromkeys((one.family, one.group) for one in cells):
+        rows += rows_of(*group, {one: surveys[one] for one in cells if (one.family, one.group) == group}, learned)
+    if job.folder is not None:
+        for family, policy in learned.items():
+            write_policy(job.folder / f"policy-{family.replace(' ', '-')}.json", policy)
+    weights = len(next(iter(learned.values())).vector)
+    about = ABOUT.format(features=weights, cells=job.sessions, generations=SETTINGS.generations)
+    return Findings(
+        rows, in_short(rows), {"Mean gap by group": picture(rows)}, (about, GAPS.format(limit=TIME_LIMIT_S), POLICIES)
+    )
+
+
+def _kept(job: Job, kind: str, items: Sequence[Any], work: Any, read: Any) -> dict[Any, Any]:
+    """What `work`, a function of a module, makes of each item; what the folder holds of it is read, the rest is kept there."""
+    names = {_key(job, kind, one): one for one in items}
+    done = job.kept_as(lambda entry: (names[entry["key"]], read(entry["found"])) if entry["key"] in names else None)
+    left = [one for one in items if one not in done]
+    job.progress(len(done), len(items))
+    for one, found in job.computed(work, left):
+        done[one] = read(found)
+        job.keep({"key": _key(job, kind, one), "found": found})
+        job.progress(len(done), len(items))
+    return {one: done[one] for one in items}
+
+
+def _key(job: Job, kind: str, one: Any) -> str:
+    return f"{kind}: {one}, {job.sessions} cells, seed {job.seed}" if kind == "learned" else f"{kind}: {asdict(one)}"
+
+
+def _learned(family: str, sessions: int, seed: int) -> dict[str, Any]:
+    """The weights of a family's policy, as the folder keeps them."""
+    said = f"{sessions} small cells: {family}; lab study run carried-over --sessions {sessions} --seed {seed}"
+    policy = learn_policy(small_cells(family, sessions, seed), MAKESPAN, SETTINGS, seed, said)
+    return {"weights": dict(policy.weights), "learned_on": said}
+
+
+def _policy_of(held: dict[str, Any]) -> CarriedPolicy:
+    return CarriedPolicy(held["weights"], MAKESPAN, held["learned_on"])
+
+
+def surveyed(one: Unseen) -> dict[str, Any]:
+    """`Surveyed` of a larger cell, as the folder keeps it."""
+    cell, rules, rules_s, moves = unseen_cell(one), dict[str, float](), dict[str, float](), 0
+    for name, rule in usable(cell).items():
+        run, began = Run(cell), time.process_time()
+        moves = max(moves, len(dispatch(run, rule)))
+        rules_s[name] = time.process_time() - began
+        rules[name] = cost(run, MAKESPAN)
+    if one.printed is not None:
+        best, bound = one.printed, one.printed
+    else:
+        found = best_known(cell, MAKESPAN, TIME_LIMIT_S)
+        best, bound = found.cost, found.bound
+    return {"best": best, "bound": bound, "rules": rules, "moves": moves, "rules_s": rules_s}
+
+
+def rows_of(
+    family: str, group: str, found: Mapping[Unseen, Surveyed], learned: Mapping[str, CarriedPolicy]
+) -> list[Row]:
+    """The rows of a group: every rule, and every policy, that of the group's own family first."""
+    proven = sum(one.proven for one in found.values())
+    named: Row = {"table": f"{family}: {group}", "cells": len(found), "proven": proven}
+    gaps = {
+        rule: [100.0 * gap(one.rules[rule], one.bound) for one in found.values()]
+        for rule in next(iter(found.values())).rules
+    }
+    best = min(gaps, key=lambda rule: np.mean(gaps[rule]))
+    rows: list[Row] = []
+    for rule, own in gaps.items():
+        seconds = sum(one.rules_s[rule] for one in found.values())
+        said = named | {"method": rule, "best_rule": rule == best}
+        rows += _measured(said, own, sum(one.moves for one in found.values()) / max(seconds, 1e-9))
+    deciders = {one: Decider(unseen_cell(one)) for one in found}
+    for learned_on in sorted(learned, key=lambda name: name != family):
+        weights = learned[learned_on].vector
+        own = [100.0 * gap(float(deciders[o].costs(weights[None])[0]), s.bound) for o, s in found.items()]
+        said = named | {"method": CARRIED, "learned_on": learned_on}
+        rows += _measured(said, own, decisions_per_s(deciders.values(), learned[learned_on]))
+        rows.append(row(said, "of best rule's gap_percent", 100.0 * float(np.mean(own) / np.mean(gaps[best]))))
+    return rows
+
+
+def decisions_per_s(deciders: Iterable[Decider], policy: CarriedPolicy) -> float:
+    """How many decisions a policy takes in a second of one core, over runs of these cells."""
+    made, began = 0, time.process_time()
+    for decider in deciders:
+        for _ in range(REPEATS):
+            made += len(decider.sequence(policy.vector))
+    return made / max(time.process_time() - began, 1e-9)
+
+
+def _measured(named: Row, gaps: Sequence[float], rate: float) -> list[Row]:
+    return [
+        varying_row(named, "mean gap_percent", gaps),
+        row(named, "worst gap_percent", max(gaps)),
+        row(named, "decisions_per_s", rate),
+        row(named, "ms_per_decision", 1e3 / rate),
+    ]
+
+
+def in_short(rows: Sequence[Row]) -> Row:
+    """By group: the mean gap of the family's own policy, that of the best rule, and the slowest policy's speed."""
+    told: Row = {}
+    for table in dict.fromkeys(one["table"] for one in rows):
+        own = those(rows, table=table, method=CARRIED, measure="mean gap_percent")[0]["value"]
+        rule = those(rows, table=table, best_rule=True, measure="mean gap_percent")[0]
+        told[f"{table} [%]"] = f"{own:.2f} carried over, {rule['value']:.2f} by {rule['method']}"
+    rates = [one["value"] for one in those(rows, method=CARRIED, measure="decisions_per_s")]
+    return told | {"decisions a second, the slowest": round(min(rates))}
+
+
+def picture(rows: Sequence[Row]) -> bytes:
+    """Bars by group: the best rule, the family's own policy, and that of all families."""
+    tables = [*dict.fromkeys(one["table"] for one in rows)]
+    gaps = [those(rows, table=table, measure="mean gap_percent") for table in tables]
+    lines = {
+        "best rule": [those(own, best_rule=True)[0] for own in gaps],
+        "learned on small cells of the family": [those(own, method=CARRIED)[0] for own in gaps],
+        "learned on small cells of all families": [those(own, learned_on=ALL)[0] for own in gaps],
+    }
+    return bars([table.split(": ")[1].replace(", ", ",\n") for table in tables], lines, "mean gap [%]")

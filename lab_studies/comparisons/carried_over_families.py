@@ -1,0 +1,138 @@
+"""Families of cells: small ones that a policy is learned on, and larger ones that it has not seen."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import lru_cache, partial
+
+import numpy as np
+
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.stations import UNLIMITED, Product, Robot, Stage, Station
+from lab.tasks.task_file import load_cell
+from lab_studies.comparisons.transport_instances import board, cell_of
+from lab_studies.thesis.chapter_7_cells import robot_cell
+
+PRINTED = "Bilge and Ulusoy, two robots"  # of the board's families
+CASES = ("I", "II", "III")
+SHOP, TOAST, FMS = "job shops with two vehicles", "toast cells", "manufacturing cells"
+JOBS, TOASTS, PARTS = (3, 5), (3, 8), (3, 8)  # of the small ones, least and most
+
+
+@dataclass(frozen=True)
+class Unseen:
+    """A larger cell: its family, the group that it is reported with, its number there.
+
+    printed: the best value that others print; None: it has to be found.
+    """
+
+    family: str
+    group: str
+    number: int
+    printed: float | None = None
+
+
+def shop(rng: np.random.Generator, least: int, most: int) -> Cell:
+    """A drawn job shop in the manner of Bilge and Ulusoy: four machines, two vehicles, ways one way longer than the other."""
+    machines, jobs = 4, int(rng.integers(least, most + 1))
+    at = rng.uniform(0.0, 1.0, (machines + 1, 2))
+    ways = np.abs(at[:, None] - at[None]).sum(axis=-1) * rng.uniform(0.7, 1.3, (machines + 1, machines + 1))
+    times = np.maximum(2.0, np.round(12.0 * rng.uniform(0.3, 1.5) * ways))
+    np.fill_diagonal(times, 0.0)
+    names = [f"M{number}" for number in range(1, machines + 1)]
+    stations = Station("LU", "storage", UNLIMITED), *(Station(n, "machine", UNLIMITED, servers=1) for n in names)
+    products = []
+    for job in range(1, jobs + 1):
+        visited = rng.permutation(machines)[: rng.integers(2, machines + 1)]
+        stages = [Stage(names[one], processing_s=float(rng.integers(6, 21))) for one in visited]
+        products.append(Product(f"job {job}", ((Stage("LU"), *stages),)))
+    robots = tuple(Robot(f"vehicle {number}", "LU") for number in (1, 2))
+    return Cell(stations, tuple(products), tuple(one.name for one in products), times, times, robots)
+
+
+def toasts(rng: np.random.Generator, least: int, most: int) -> Cell:
+    """A case of the thesis's toast cell with other times: each machine up to twice as slow or fast, all moves a little."""
+    cell = robot_cell(CASES[rng.integers(len(CASES))], int(rng.integers(least, most + 1)))
+    factor = rng.uniform(0.7, 1.4)
+    return replace(
+        cell,
+        stations=tuple(
+            replace(s, processing_s=round(s.processing_s * rng.uniform(0.5, 2.0), 1)) for s in cell.stations
+        ),
+        empty_s=np.round(cell.empty_s * factor, 2),
+        loaded_s=np.round(cell.loaded_s * factor, 2),
+    )
+
+
+def manufactured(rng: np.random.Generator, least: int, most: int) -> Cell:
+    """The manufacturing cell of App. III with a drawn order, other processing times, and parts that come sooner or later."""
+    cell = _fms(rng, int(rng.integers(least, most + 1)))
+    factors = dict(zip(("rook", "sign"), rng.uniform(0.6, 1.5, 2), strict=True))
+    products = tuple(
+        replace(
+            one,
+            routes=tuple(
+                tuple(s.each(partial(_slower, factor=factors[one.name])) for s in route) for route in one.routes
+            ),
+        )
+        for one in cell.products
+    )
+    assert cell.arrivals is not None  # App. III has them
+    interval_s = (round(200.0 * rng.uniform(0.3, 1.5), 1),) * cell.parts
+    return replace(cell, products=products, arrivals=replace(cell.arrivals, interval_s=interval_s))
+
+
+def _fms(rng: np.random.Generator, parts: int) -> Cell:
+    order = tuple(str(name) for name in rng.choice(["rook", "sign"], parts))
+    return replace(load_cell("fms").cell(order), due_s=None)  # the makespan alone is asked for
+
+
+def _slower(stage: Stage, factor: float) -> Stage:
+    return stage if stage.processing_s is None else replace(stage, processing_s=round(stage.processing_s * factor, 1))
+
+
+SMALL: Mapping[str, Callable[[np.random.Generator], Cell]] = {
+    SHOP: lambda rng: shop(rng, *JOBS),
+    TOAST: lambda rng: toasts(rng, *TOASTS),
+    FMS: lambda rng: manufactured(rng, *PARTS),
+}
+BILGE_ULUSOY, MORE_JOBS = "Bilge and Ulusoy, two vehicles", "drawn, 10 to 20 jobs"
+THESIS_TOASTS, DRAWN_TOASTS, ORDERS = (
+    "cases I to III, 20 to 60 toasts",
+    "drawn, 20 to 60 toasts",
+    "orders of 12 to 30 parts",
+)
+
+
+def unseen() -> tuple[Unseen, ...]:
+    """The larger cells, the same ones whatever the study's seed."""
+    printed = [one.printed for one in board() if one.family == PRINTED]
+    return (
+        *(Unseen(SHOP, BILGE_ULUSOY, number, value) for number, value in enumerate(printed)),
+        *(Unseen(SHOP, MORE_JOBS, number) for number in range(12)),
+        *(Unseen(TOAST, THESIS_TOASTS, number) for number in range(15)),
+        *(Unseen(TOAST, DRAWN_TOASTS, number) for number in range(20)),
+        *(Unseen(FMS, ORDERS, number) for number in range(10)),
+    )
+
+
+@lru_cache(maxsize=256)
+def unseen_cell(one: Unseen) -> Cell:
+    """The cell."""
+    rng = np.random.default_rng([2026, [*GROUPS].index(one.group), one.number])
+    return GROUPS[one.group](one.number, rng)
+
+
+GROUPS: Mapping[str, Callable[[int, np.random.Generator], Cell]] = {
+    BILGE_ULUSOY: lambda number, rng: cell_of([one for one in board() if one.family == PRINTED][number]),
+    MORE_JOBS: lambda number, rng: shop(rng, 10, 20),
+    THESIS_TOASTS: lambda number, rng: robot_cell(CASES[number // 5], 20 + 10 * (number % 5)),
+    DRAWN_TOASTS: lambda number, rng: toasts(rng, 20, 60),
+    ORDERS: lambda number, rng: _fms(rng, 12 + 2 * number),
+}
+
+
+def small_cells(family: str, count: int, seed: int) -> list[Cell]:
+    """As many small cells of a family as are asked for, drawn; of an unknown one: of all families in turn."""
+    drawn = [SMALL[family]] if family in SMALL else [*SMALL.values()]
+    rng = np.random.default_rng([seed, 2, [*SMALL].index(family) if family in SMALL else len(SMALL)])
+    return [drawn[number % len(drawn)](rng) for number in range(count)]

@@ -1,0 +1,113 @@
+"""A carried-over policy is learned: weights of features, so that greedy runs of small cells cost less than the rules' do."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from lab.errors import BadInput
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.objectives import MAKESPAN, check_built_in, check_objective, cost
+from lab.sequencing.methods.carried_over import Decider
+from lab.sequencing.methods.carried_over_policy import FEATURES, CarriedPolicy
+from lab.sequencing.methods.rules import dispatch, usable
+from lab.sequencing.search import SAME
+from lab.sequencing.simulate.cell_arrays import Floats
+from lab.sequencing.simulate.run import Run
+from lab_studies.comparisons.evolution import Evolution
+
+WORST = 3.0  # times the best rule's cost: more than that, as a deadlock costs, is not worse
+
+
+@dataclass(frozen=True)
+class CarriedLearning:
+    """How long it learns: generations of so many candidates, each tried on so many of the cells, drawn; step: the first."""
+
+    generations: int = 200
+    population: int = 32
+    batch: int = 120
+    step: float = 0.3
+
+    def __post_init__(self) -> None:
+        for name, least in (("generations", 4), ("population", 4), ("batch", 1)):
+            if getattr(self, name) < least:
+                raise BadInput(f"{name} = {getattr(self, name)}: allowed are whole numbers from {least}")
+
+
+OnGeneration = Callable[[int, float], None]  # its number from 1, the mean cost of its candidates over the best rule's
+
+
+def learn_policy(
+    cells: Sequence[Cell],
+    objective: str = MAKESPAN,
+    settings: CarriedLearning | None = None,
+    seed: int = 0,
+    learned_on: str = "",
+    heard: OnGeneration = lambda number, mean: None,
+) -> CarriedPolicy:
+    """A policy for cells like these, which are small: costs of greedy runs, over the best rule's, are all that it learns from.
+
+    It begins with what `nearest_ready` does. The weights are the mean of those in the last quarter of the generations;
+    one without which no run of these cells costs more is 0. The same seed gives the same policy. Raises BadInput for an
+    objective that a cell has no data for. Source: CMA-ES, Hansen 2016; Moriarty et al. 1999, policies by evolution.
+    """
+    settings = settings or CarriedLearning()
+    if not cells:
+        raise BadInput("nothing to learn from: no cell")
+    check_built_in(objective, "the carried-over policy")
+    for cell in cells:
+        check_objective(objective, cell)
+    school = _School(cells, objective)
+    rng = np.random.default_rng([seed, 11])
+    start = np.zeros(len(FEATURES))
+    start[[*FEATURES].index("delay")] = -1.0
+    evolution, late = Evolution(start, settings.step, settings.population, rng), list[Floats]()
+    for number in range(1, settings.generations + 1):
+        chosen = rng.permutation(len(cells))[: settings.batch]
+        costs = school.costs(evolution.ask(), chosen)
+        evolution.tell(costs)
+        heard(number, float(costs.mean()))
+        if number > settings.generations * 3 // 4:
+            late.append(evolution.mean / np.linalg.norm(evolution.mean))
+    weights = school.without_idle(np.mean(late, axis=0))
+    kept = {name: round(float(weight), 4) for name, weight in zip(FEATURES, weights, strict=True) if weight}
+    return CarriedPolicy(kept, objective, learned_on)
+
+
+class _School:
+    """The cells that are learned from, and what the best rule makes of each."""
+
+    def __init__(self, cells: Sequence[Cell], objective: str) -> None:
+        self._deciders = [Decider(cell, objective) for cell in cells]
+        self._scales = [_best_rule(cell, objective) for cell in cells]
+
+    def costs(self, candidates: Floats, chosen: Sequence[int] | np.ndarray) -> Floats:
+        """The mean cost over the best rule's (N,) of candidates (N, F) in the chosen cells."""
+        total = np.zeros(len(candidates))
+        for number in chosen:
+            total += np.minimum(WORST, self._deciders[number].costs(candidates) / self._scales[number])
+        return total / len(chosen)
+
+    def without_idle(self, weights: Floats) -> Floats:
+        """The weights, one after the other 0 where that, with those that are 0 already, makes no difference in any cell."""
+        costs = self._each(weights)
+        for number in np.argsort(np.abs(weights)):
+            without = weights.copy()
+            without[number] = 0.0
+            if (np.abs(self._each(without) - costs) <= SAME).all():
+                weights = without
+        return weights
+
+    def _each(self, weights: Floats) -> Floats:
+        """What the weights' runs cost in each cell."""
+        return np.array([decider.costs(weights[None])[0] for decider in self._deciders])
+
+
+def _best_rule(cell: Cell, objective: str) -> float:
+    """The cost of the best rule; where that is 0, or none comes to its end, a move's work."""
+    costs = []
+    for rule in usable(cell).values():
+        run = Run(cell)
+        dispatch(run, rule)
+        costs.append(cost(run, objective))
+    return max(min(costs), 1.0)

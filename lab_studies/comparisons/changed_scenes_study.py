@@ -1,0 +1,252 @@
+"""What skills that were learned in one scene are worth in changed ones, beside learning everything anew there."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+from lab.learning.problem import Problem
+from lab.mdp import greedy_path
+from lab.skills.prepared_scene import Prepared, prepare
+from lab.studies.charts import bars
+from lab.studies.findings import Findings, Row, row, share_row, those, varying_row
+from lab.studies.runner import Job
+from lab.tasks.task_file import load
+from lab.teaching.lesson_plan import Lesson
+from lab.toolbox.policy import Policy
+from lab_studies.comparisons.changed_scenes import KINDS, Scene, surveyed
+from lab_studies.comparisons.skills_taught import Known, distinct, fails, key_of, spent, taught, works
+
+TASK, TOASTS = "toast", 3
+WAYS = ("the same", "used", "adapted", "refused", "learned")  # what becomes of a skill in a changed scene
+
+ABOUT = (
+    f"{{}} changed scenes of the task '{TASK}', as many of each kind; seed 0 is what the skills were learned in, all with the "
+    "advisor 'expert'. In each scene all skills are found, adapted or learned, and for comparison all are learned from nothing. "
+    "A problem that several skills share counts once. {} scenes could not be surveyed (something overlaps, or nothing leads "
+    "to it) and were drawn again."
+)
+COLUMNS = (
+    "The same: exactly the problem that it was learned in. Used: another problem, in which its ways are free and as short as "
+    "any. Adapted: learned on from it. Refused: learned from nothing, though there was a policy with its states and moves. "
+    "Learned: there was none. saved_percent: of the episodes that learning from nothing took for the same skills."
+)
+CHECKS = (
+    "Checks, none of which the verdict has seen: accepted_failing: policies used as they are that miss the goal from a start "
+    "step by step, or that fail when they are carried out in physics (all are, grasps before they are used, too); "
+    "refused_working: skills whose policies were refused although one of the toolbox leads from all starts to the goal; "
+    "longer: skills whose way is longer than the one learned from nothing; success: skills that reach their goals."
+)
+
+
+@dataclass(frozen=True)
+class Tally:
+    """What came of the skills of one scene that took the same way; wall_s: finding or learning them.
+
+    anew: episodes and helped steps from nothing.
+    """
+
+    skills: int
+    episodes: int
+    helped_steps: int
+    wall_s: float
+    anew: tuple[int, int]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of one changed scene, by `WAYS`; the counts of skills are those of the checks.
+
+    unsolved: skills without a way to the goal, found or learned here, and learned from nothing.
+    """
+
+    words: str
+    refused_draws: int
+    tallies: dict[str, Tally]
+    accepted_failing: int
+    adapted_failing: int
+    refused_working: int
+    longer: int
+    unsolved: tuple[int, int]
+
+
+def changed_scenes(job: Job, reading: Mapping[str, Any]) -> Findings:
+    """So many changed scenes, as many of each kind; the reading changes nothing here."""
+    kinds = [*KINDS]
+    scenes = [Scene(kinds[number % len(kinds)], number // len(kinds), job.seed) for number in range(job.sessions)]
+    found = job.each(tried, scenes)
+    rows = [
+        one for kind in (None, *KINDS) for one in rows_of(kind, [found[s] for s in scenes if kind in (None, s.kind)])
+    ]
+    rows += [one for order, scene in enumerate(scenes, 1) for one in rows_of_scene(order, scene, found[scene])]
+    drawn_again = sum(one.refused_draws for one in found.values())
+    notes = (ABOUT.format(len(scenes), drawn_again), COLUMNS, CHECKS)
+    return Findings(rows, in_short(rows), {"What becomes of a skill": _picture(rows)}, notes)
+
+
+@lru_cache(maxsize=1)
+def learned_here() -> tuple[Prepared, Known, Known]:
+    """The scene that is changed, what a run learns in it, and what each problem of it gives when it is learned from nothing.
+
+    Both by (sub-task, signature), and the same in each process.
+    """
+    task = load(TASK)
+    prepared = prepare(task, task.order(TOASTS), 0)
+    problems = distinct(prepared)
+    lessons = [one.lesson for one in taught(prepared, {}, problems)]
+    anew = {key_of(problem): _from_nothing(prepared, problem) for problem in problems}
+    return prepared, {(one.policy.subtask, one.policy.signature): one.policy for one in lessons}, anew
+
+
+def tried(scene: Scene) -> Outcome:
+    """One changed scene, with what was learned before and from nothing."""
+    base, known, learned = learned_here()
+    prepared, words, refused = surveyed(scene, base.task, base.layout, base.seed, base.order)
+    problems = distinct(prepared)
+    here = taught(prepared, known, problems)
+    anew = [learned.get(key_of(problem)) or _from_nothing(prepared, problem) for problem in problems]
+    ways = [_way(one.lesson) for one in here]
+    tallies = {}
+    for way in WAYS:
+        own = [n for n, one in enumerate(ways) if one == way]
+        costs = [spent(here[n].lesson) for n in own]
+        tallies[way] = Tally(
+            len(own),
+            sum(episodes for episodes, _ in costs),
+            sum(helped for _, helped in costs),
+            sum(here[n].wall_s for n in own),
+            (sum(len(anew[n].curve) for n in own), sum(anew[n].helped_steps for n in own)),
+        )
+    lessons = [one.lesson for one in here]
+    failing = [fails(prepared, problem, lesson.policy) for problem, lesson in zip(problems, lessons, strict=True)]
+    return Outcome(
+        words,
+        refused,
+        tallies,
+        accepted_failing=sum(fails for fails, way in zip(failing, ways, strict=True) if way == "used"),
+        adapted_failing=sum(fails for fails, way in zip(failing, ways, strict=True) if way == "adapted"),
+        refused_working=sum(
+            _any_works(known, problem) for problem, way in zip(problems, ways, strict=True) if way == "refused"
+        ),
+        longer=sum(
+            _moves(problem, lesson.policy) > _moves(problem, policy)
+            for problem, lesson, policy in zip(problems, lessons, anew, strict=True)
+        ),
+        unsolved=(
+            sum(not works(problem, one.policy) for problem, one in zip(problems, lessons, strict=True)),
+            sum(not works(problem, policy) for problem, policy in zip(problems, anew, strict=True)),
+        ),
+    )
+
+
+def _from_nothing(prepared: Prepared, problem: Problem) -> Policy:
+    """What a problem gives to who knows nothing else."""
+    return taught(prepared, {}, [problem])[0].lesson.policy
+
+
+def _way(lesson: Lesson) -> str:
+    if lesson.source == "reused":
+        return "the same" if lesson.fitness is None else "used"
+    if lesson.source == "adapted":
+        return "adapted"
+    return "learned" if lesson.fitness is None else "refused"
+
+
+def _any_works(known: Known, problem: Problem) -> bool:
+    return any(works(problem, policy) for (subtask, _), policy in known.items() if subtask == problem.subtask)
+
+
+def _moves(problem: Problem, policy: Policy) -> int:
+    """Moves of the greedy way from the problem's start."""
+    return len(greedy_path(policy.q, problem.mdp, problem.mdp.n_states)[1])
+
+
+def rows_of(kind: str | None, outcomes: Sequence[Outcome]) -> list[Row]:
+    """The measures of the scenes of one kind, None: of all."""
+    if not outcomes:
+        return []
+    named: Row = {"kind": kind or "all", "scenes": len(outcomes)}
+    skills = sum(_sum(outcomes, way) for way in WAYS)
+    rows = [_share(named | {"source": way}, "skills_percent", _sum(outcomes, way), skills) for way in WAYS]
+    for measure, ways in (("saved", WAYS), ("saved_in_changed_problems", WAYS[1:])):
+        for number, what in enumerate(("episodes", "helped_steps")):
+            spent = [sum(getattr(one.tallies[way], what) for way in ways) for one in outcomes]
+            anew = [sum(one.tallies[way].anew[number] for way in ways) for one in outcomes]
+            shares = [100.0 * (1 - now / then) for now, then in zip(spent, anew, strict=True) if then]
+            rows += _mean(named, f"{measure}_{what}_percent", shares)
+    rows += [
+        _share(
+            named, "accepted_failing_percent", sum(one.accepted_failing for one in outcomes), _sum(outcomes, "used")
+        ),
+        _share(
+            named, "adapted_failing_percent", sum(one.adapted_failing for one in outcomes), _sum(outcomes, "adapted")
+        ),
+        _share(
+            named, "refused_working_percent", sum(one.refused_working for one in outcomes), _sum(outcomes, "refused")
+        ),
+        _share(named, "longer_percent", sum(one.longer for one in outcomes), skills),
+        _share(named, "success_percent", skills - sum(one.unsolved[0] for one in outcomes), skills),
+        _share(
+            named | {"source": "all anew"}, "success_percent", skills - sum(o.unsolved[1] for o in outcomes), skills
+        ),
+    ]
+    return rows
+
+
+def rows_of_scene(order: int, scene: Scene, outcome: Outcome) -> list[Row]:
+    """What came of one scene, a row for each way that a skill took in it."""
+    return [
+        row(
+            {
+                "order": order,
+                "kind": scene.kind,
+                "task": f"{TASK}: {outcome.words}",
+                "source": way,
+                "episodes": tally.episodes,
+                "helped_steps": tally.helped_steps,
+                "wall_s": round(tally.wall_s, 3),
+                "saved_percent": 100.0 * (1 - tally.episodes / tally.anew[0]),
+                "episodes_anew": tally.anew[0],
+                "helped_steps_anew": tally.anew[1],
+            },
+            "skills",
+            tally.skills,
+        )
+        for way, tally in outcome.tallies.items()
+        if tally.skills
+    ]
+
+
+def _sum(outcomes: Sequence[Outcome], way: str) -> int:
+    return sum(one.tallies[way].skills for one in outcomes)
+
+
+def _share(named: Row, measure: str, count: int, of: int) -> Row:
+    """So many of all, in percent; of none, 0 without an interval."""
+    return (
+        share_row(named | {"of": of}, measure, [True] * count + [False] * (of - count))
+        if of
+        else row(named, measure, 0)
+    )
+
+
+def _mean(named: Row, measure: str, values: Sequence[float]) -> list[Row]:
+    if len(values) < 2:
+        return [row(named, measure, value) for value in values]
+    return [varying_row(named, measure, values)]
+
+
+def in_short(rows: Sequence[Row]) -> Row:
+    """The figures over all scenes."""
+    says = {}
+    for one in those(rows, kind="all"):
+        name = " ".join(filter(None, (one.get("source", ""), one["measure"])))
+        says[name] = round(one["value"], 2)
+    return says
+
+
+def _picture(rows: Sequence[Row]) -> bytes:
+    """Bars by kind, a bar for each way."""
+    kinds = [kind for kind in KINDS if those(rows, kind=kind, measure="skills_percent")]
+    lines = {way: [those(rows, kind=kind, source=way, measure="skills_percent")[0] for kind in kinds] for way in WAYS}
+    return bars(kinds, lines, "skills [%]")

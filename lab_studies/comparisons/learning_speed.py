@@ -1,0 +1,69 @@
+"""How fast sessions are: the compiled kernel, alone and with gates, beside rivals, all in one run on one core."""
+
+import time
+from collections.abc import Callable, Mapping
+from functools import partial
+from math import inf
+from typing import Any
+
+import numpy as np
+
+from lab.learning.batch import run_sessions
+from lab.learning.settings import GateSettings
+from lab.learning.simulated_advice import Advice, advice_chances
+from lab.studies.findings import Findings, Row, agreement, median_row, those
+from lab.studies.runner import Job
+from lab_studies.comparisons.learning_speed_rivals import C_LANES, RIVALS
+from lab_studies.comparisons.learning_speed_session import Measured, Missing
+from lab_studies.thesis.chapter_9_sessions import learned_table, world
+
+SESSIONS = 500
+ABOUT = (
+    "{} sessions of 200 episodes in world I, one process on one core, median of five runs; compile time is not counted. "
+    "The kernel walks many sessions side by side, so a few of them leave it half empty; 'c scalar' does one after the other, "
+    "'c lanes' one in each SIMD lane of the processor, in single precision. Rivals run at most 500 sessions, the tutorial "
+    "loop 5: their figure is a rate."
+)
+FEW = {"gymnasium tutorial loop": 5}  # sessions of a rival so slow that its rate shows with few
+REPEATS = 5
+GATES = (GateSettings("ccrl", omega=1), GateSettings("ia"), GateSettings("combined", omega=1))
+
+
+def speed(job: Job, reading: Mapping[str, Any]) -> Findings:
+    """Million environment steps a second in world I, median of five runs; the reading changes nothing here."""
+    place = world("world-1")
+    mdp, learner = place.mdp(), place.learner
+    advice = Advice.of(advice_chances(learned_table(place), 0.1))
+    seeds = np.arange(job.seed, job.seed + job.sessions, dtype=np.uint64)
+
+    def learned(*gates: GateSettings) -> Measured:
+        began, moves = time.perf_counter(), 0
+        for gate in gates:
+            moves += int(run_sessions(mdp, learner, gate, advice, seeds).moves.sum())
+        return Measured(moves, time.perf_counter() - began)
+
+    def against(name: str) -> Row | str:
+        """The row of a rival, or why there is none."""
+        sessions = min(FEW.get(name, SESSIONS), job.sessions)
+        try:
+            return _row(name, lambda: RIVALS[name](mdp, learner, sessions, job.seed))
+        except Missing as error:
+            return f"{name}: not measured: {error}"
+
+    rows = [_row("kernel", partial(learned, GateSettings("never"))), _row("kernel gated", partial(learned, *GATES))]
+    found = job.in_turn([partial(against, name) for name in RIVALS])
+    rivals = [one for one in found if not isinstance(one, str)]
+    fastest = max((one["value"] for one in rivals), default=inf)
+    lanes = those(rivals, name=C_LANES)
+    missing = [one for one in found if isinstance(one, str)]
+    summary = agreement(rows + rivals) | {
+        "kernel to the fastest rival": round(rows[0]["value"] / fastest, 2) if rivals else None,
+        "kernel to C lanes": round(rows[0]["value"] / lanes[0]["value"], 2) if lanes else None,
+    }
+    return Findings(rows + rivals, summary, {}, (ABOUT.format(job.sessions), *missing))
+
+
+def _row(name: str, run: Callable[[], Measured]) -> Row:
+    run()  # compiles
+    rates = [found.moves / found.seconds / 1e6 for found in (run() for _ in range(REPEATS))]
+    return median_row({"name": name, "world": "world-1"}, "speed_million steps per s", rates)

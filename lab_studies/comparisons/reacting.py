@@ -1,0 +1,149 @@
+"""Times that nobody knows: a list kept as it is, policies that react, and the best order in hindsight, in the same episodes."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.chance import Chance, Episode, drawn_seed
+from lab.sequencing.methods.cp_sat import cp_sat
+from lab.sequencing.methods.exact import optimum
+from lab.sequencing.methods.rollout import by_rule, replan
+from lab.sequencing.methods.rules import usable
+from lab.sequencing.simulate.cell_arrays import Floats
+from lab.sequencing.simulate.replications import replicate
+from lab.studies.charts import bars
+from lab.studies.findings import Findings, Row, mean_row, row, those
+from lab.studies.runner import Job
+from lab.tasks.cell_file import order_from_word
+from lab.tasks.task_file import load_cell
+from lab_studies.comparisons.hindsight import in_hindsight
+from lab_studies.comparisons.rolling import FUTURES, rolling
+
+ROBOTS = "robots break down"
+WORKS = (
+    *(("toast-case-1", "TTTT"), ("toast-case-2", "TTTT"), ("toast-case-3", "TTTT"), ("fms", "RSRSR")),
+    ("two-carriers", "BBBB"),
+)
+TROUBLES = {
+    "times 10 % off": Chance("normal"),
+    "exponential times": Chance("exponential"),
+    "breakdowns": Chance("normal", breaks_every_s=300.0, repair_s=60.0),
+    "late parts": Chance("normal", late_s=60.0),
+    ROBOTS: Chance("normal", robot_breaks_every_s=300.0, robot_repair_s=60.0),
+}
+LIST, RULE, ANEW, ROLLING, HINDSIGHT = "the list as it is", "best rule", "planned anew", "rolling", "best in hindsight"
+ABOUT = (
+    "Makespans in {episodes} drawn episodes, the same ones for all; intervals are of the mean, 95 %. The list is "
+    "the proven optimum by the mean times, kept whatever comes. Best rule: of all dispatching rules, asked at "
+    "every decision, the one with the least mean here. Planned anew: by mean times, by rollout, at every decision; "
+    "with several robots whenever something happens, beginning with the list. Rolling, of one robot: "
+    "each decision is tried in {futures} futures drawn from what can be known, by the list and by every rule "
+    "after it. Best in hindsight: the optimum with the drawn times known (where it was not proven, a bound), "
+    "which no policy can reach; where robots break down a bound, as if none did."
+)
+KINDS = (
+    "Times 10 % off: processing times are normal, their standard deviation a tenth of the mean (thesis 7.6). "
+    "Breakdowns: besides, a machine works 300 s between two of them on average, and is repaired for 60 s. Late "
+    "parts: besides, each comes 60 s late on average. Where the FMS's parts arrive after one another, lateness is "
+    "not drawn. Robots break down: besides, a robot is in order for 300 s on average, at work or not, and then stops "
+    "where it is, with what it holds, for 60 s."
+)
+LIMITS = (
+    "Rolling decisions are for one robot: their futures are compiled for decisions that follow one another in time, and "
+    "leave out that the robot breaks down, which delays all of them. Machines break down while they work only."
+)
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A cell with an order, and what troubles it."""
+
+    cell: str
+    order: str
+    trouble: str
+
+
+@dataclass(frozen=True)
+class Reacted:
+    """The costs in each episode [s], by policy; how long a rolling decision took [s], None: there is none, and how many
+    hindsights are proven."""
+
+    costs: Mapping[str, Floats]
+    rule: str
+    decision_s: float | None
+    proven: int
+
+
+def reacting(job: Job, reading: Mapping[str, Any]) -> Findings:
+    """Every cell with every trouble; the reading changes nothing here."""
+    settings = [Setting(cell, order, trouble) for cell, order in WORKS for trouble in TROUBLES]
+    found = job.each(partial(reacted, episodes=job.sessions, seed=job.seed), settings)
+    rows = [line for setting in settings for line in rows_of(setting, found[setting])]
+    figures = {f"{cell}, {order}": _picture(rows, cell) for cell, order in WORKS}
+    alike = [(one["table"], one["trouble"]) for one in those(rows, measure="makespan_s", method=ROLLING)]
+    alike = [one for one in alike if one[1] != ROBOTS]  # there hindsight is a bound
+    says: Row = {}
+    for name in (LIST, RULE, ANEW, ROLLING) if alike else ():
+        over = those(rows, measure="over hindsight_percent", method=name)
+        mean = np.mean([one["value"] for one in over if (one["table"], one["trouble"]) in alike])
+        says[f"{name}: mean over hindsight, one robot that never breaks down [%]"] = round(float(mean), 2)
+    took_s = [one.decision_s for one in found.values() if one.decision_s is not None]
+    says["milliseconds a rolling decision"] = round(1e3 * float(np.mean(took_s)), 1) if took_s else None
+    notes = (ABOUT.format(episodes=job.sessions, futures=FUTURES), KINDS, LIMITS)
+    return Findings(rows, says, figures, notes)
+
+
+def reacted(setting: Setting, episodes: int, seed: int) -> Reacted:
+    """One setting: all policies in the same episodes."""
+    file = load_cell(setting.cell)
+    cell, chance = file.cell(order_from_word(file, setting.order)), TROUBLES[setting.trouble]
+    planned = optimum(cell).sequence if cell.serial else cp_sat(cell).sequence
+    costs = {LIST: replicate(cell, planned, chance, episodes, seed)}
+    rules = {name: replicate(cell, by_rule(rule), chance, episodes, seed) for name, rule in usable(cell).items()}
+    rule = min(rules, key=lambda name: float(rules[name].mean()))
+    costs |= {RULE: rules[rule], ANEW: replicate(cell, replan(planned=planned), chance, episodes, seed)}
+    decision_s = None
+    if cell.serial:
+        policy = rolling(planned, chance, seed)
+        replicate(cell, policy, chance, 1, seed)  # compiles
+        began_s = perf_counter()
+        costs[ROLLING] = replicate(cell, policy, chance, episodes, seed)
+        decision_s = (perf_counter() - began_s) / episodes / len(planned)
+    costs[HINDSIGHT], proven = _hindsight(cell, chance, episodes, seed)
+    return Reacted(costs, rule, decision_s, proven)
+
+
+def _hindsight(cell: Cell, chance: Chance, episodes: int, seed: int) -> tuple[Floats, int]:
+    rng = np.random.default_rng(seed)  # the episodes of `replicate`
+    found = [in_hindsight(cell, Episode(cell, chance, drawn_seed(rng))) for _ in range(episodes)]
+    return np.array([one.cost for one in found]), sum(one.proven for one in found)
+
+
+def rows_of(setting: Setting, found: Reacted) -> list[Row]:
+    """The mean of each policy, what it saves over the list, and how far it is from hindsight."""
+    rows: list[Row] = []
+    least = float(found.costs[HINDSIGHT].mean())
+    for name, costs in found.costs.items():
+        named: Row = {"table": setting.cell, "order": setting.order, "trouble": setting.trouble, "method": name}
+        if name == RULE:
+            named["rule"] = found.rule
+        rows.append(mean_row(named, "makespan_s", costs))
+        if name not in (LIST, HINDSIGHT):
+            rows.append(mean_row(named, "saved over the list_s", found.costs[LIST] - costs))
+        rows.append(row(named, "over hindsight_percent", 100.0 * (float(costs.mean()) / least - 1.0)))
+    return rows
+
+
+def _picture(rows: list[Row], cell: str) -> bytes:
+    """Bars of the mean makespans, trouble by trouble."""
+    lines = {
+        name: [those(rows, table=cell, trouble=trouble, method=name, measure="makespan_s")[0] for trouble in TROUBLES]
+        for name in (LIST, RULE, ANEW, ROLLING, HINDSIGHT)
+        if those(rows, table=cell, method=name)
+    }
+    return bars([*TROUBLES], lines, "mean makespan [s]")

@@ -1,0 +1,331 @@
+"""The curriculum: tasks taught one after another into one toolbox, in several orders, beside each learned from nothing."""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from math import factorial
+from typing import Any
+
+import numpy as np
+
+from lab.errors import BadInput
+from lab.learning.problem import Problem
+from lab.skills.prepared_scene import Prepared, prepare
+from lab.studies.findings import Findings, Row, row, those, varying_row
+from lab.studies.runner import Job
+from lab.tasks.task_file import load
+from lab_studies.comparisons.reuse_figures import by_place, by_task
+from lab_studies.comparisons.skills_taught import Known, Taught, distinct, fails, spent, taught, works
+
+TASKS = ("toast", "two-toasters", "breakfast", "sorting", "fms-arm")
+OTHER_ARM = "toast-panda"  # taught after the first task alone
+SOURCES = ("reused", "adapted", "learned")
+FATES = ("taken", "adapted", "own", "learned")
+COSTS = ("episodes", "helped_steps", "moves", "wall_s", "cpu_s")
+LATER = "later"  # all places of an order but the first
+GROWTH = "more_saved_a_place_percent"
+CARRIED, NOT_CARRIED = 50.0, 10.0  # [%] of its skills: from which on a sub-task carries over, up to which it does not
+_LIVES = 12  # that a process remembers: their policies fill up to 100 MB each
+
+ABOUT = (
+    "{orders} of the tasks {tasks}: the order that they ship in, then drawn ones. Each task's skills are found, adapted or "
+    "learned as `lab run` does, with the advisor 'expert', into the toolbox that the tasks before it left; the first task of "
+    "an order finds an empty one. For comparison each task is learned from nothing, which shares skills within the task, too: "
+    "what is saved is saved by earlier tasks. A problem that several skills share counts once. A table fits only where there are "
+    "the same states and moves: ways between stations carry over where the workspaces have the same grid. "
+    "Intervals are over the orders: they say nothing of other tasks or scenes."
+)
+COLUMNS = (
+    "Taken: the policy of an earlier task is used as it is. Adapted: learned on from it. Own: taken or adapted within the "
+    "task. Learned: from nothing. from_earlier: how many skills are taken or adapted from earlier tasks. saved_percent: of "
+    "the episodes that the same skills take from nothing. Place 'later': all places but the first. after: the toolbox holds "
+    f"that task's skills alone. {GROWTH}: how much more a task saves for each place that it comes later, "
+    "from the second on; a task is only held against itself. wall_s is as the clock has it, cpu_s the processor's share of it."
+)
+CHECKS = (
+    "Checks, none of which the verdict has seen: taken_failing_percent: policies of earlier tasks that are used or adapted and "
+    "then miss a goal step by step, or fail in physics; unsolved_percent: skills without a way to the goal from each start."
+)
+
+
+@dataclass(frozen=True)
+class Life:
+    """Tasks that are taught one after another, in scenes that the seed lays out."""
+
+    order: tuple[str, ...]
+    seed: int
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of one skill; from_task: whose policy was taken or adapted, "" where it was learned from nothing.
+
+    failing: it came from an earlier task, and fails in physics; unsolved: it does not reach the goal from each start.
+    """
+
+    task: str
+    subtask: str
+    source: str
+    from_task: str
+    episodes: int
+    helped_steps: int
+    moves: int
+    wall_s: float
+    cpu_s: float
+    failing: bool = False
+    unsolved: bool = False
+
+    @property
+    def carried(self) -> bool:
+        """Whether an earlier task left what it was made of."""
+        return self.from_task not in ("", self.task)
+
+    @property
+    def fate(self) -> str:
+        """Its kind of FATES."""
+        if not self.from_task:
+            return "learned"
+        if not self.carried:
+            return "own"
+        return "taken" if self.source == "reused" else "adapted"
+
+
+Place = tuple[Outcome, ...]  # the skills of one task, in the order in which they are taught
+Beside = tuple[Sequence[Outcome], Sequence[Outcome]]  # skills, and the same skills from nothing
+
+
+def reuse(job: Job, reading: Mapping[str, Any]) -> Findings:
+    """As many orders of TASKS as there are sessions; the reading changes nothing here. BadInput for more than there are."""
+    orders = orders_of(TASKS, job.sessions, job.seed)
+    pairs = [(TASKS[0], other) for other in (*TASKS[1:], OTHER_ARM)]
+    alone = [(task,) for task in (*TASKS, OTHER_ARM)]
+    found = job.each(tried, [Life(order, job.seed) for order in (*orders, *pairs, *alone)])
+    anew = {task: found[Life((task,), job.seed)][0] for (task,) in alone}
+    lives = [found[Life(order, job.seed)] for order in orders]
+    after = {other: found[Life((first, other), job.seed)][1] for first, other in pairs}
+    rows = [*rows_of(lives, anew), *rows_after(after, anew), *rows_of_lives(lives, anew)]
+    figures = {"Saved, by place in the order": by_place(rows), "What becomes of the skills of a task": by_task(rows)}
+    words = f"{len(orders)} orders" if len(orders) > 1 else "1 order"
+    notes = (ABOUT.format(orders=words, tasks=", ".join(TASKS)), COLUMNS, CHECKS)
+    return Findings(rows, in_short(rows, len(orders)), figures, notes)
+
+
+def orders_of(tasks: Sequence[str], count: int, seed: int) -> list[tuple[str, ...]]:
+    """So many orders of the tasks, none twice: the one given, then drawn ones; BadInput when there are not so many."""
+    if not 1 <= count <= factorial(len(tasks)):
+        raise BadInput(f"{count} orders (--sessions) of {len(tasks)} tasks: allowed are 1 to {factorial(len(tasks))}")
+    rng, found = np.random.default_rng([seed, len(tasks)]), {tuple(tasks): None}
+    while len(found) < count:
+        found[tuple(tasks[at] for at in rng.permutation(len(tasks)))] = None
+    return [*found]
+
+
+def tried(life: Life) -> tuple[Place, ...]:
+    """What came of each task of a life, one after the other."""
+    return _lived(life)[0]
+
+
+@lru_cache(maxsize=_LIVES)
+def _lived(life: Life) -> tuple[tuple[Place, ...], Known]:
+    """What came of each task, and what the toolbox then holds; lives that begin alike share their beginning."""
+    if not life.order:
+        return (), {}
+    before, known = _lived(Life(life.order[:-1], life.seed))
+    prepared = _prepared(life.order[-1], life.seed)
+    problems = distinct(prepared)
+    lessons = taught(prepared, known, problems, life.seed)
+    place = tuple(outcome_of(prepared, problem, one) for problem, one in zip(problems, lessons, strict=True))
+    policies = [one.lesson.policy for one in lessons]
+    learned = {(policy.subtask, policy.signature): policy for policy in policies}
+    return (*before, place), {**known, **learned}
+
+
+@lru_cache(maxsize=len(TASKS) + 1)
+def _prepared(name: str, seed: int) -> Prepared:
+    task = load(name)
+    return prepare(task, task.order(), seed)
+
+
+def outcome_of(prepared: Prepared, problem: Problem, one: Taught) -> Outcome:
+    """What is counted of a lesson; a policy of an earlier task is tried in physics."""
+    lesson, (episodes, helped_steps) = one.lesson, spent(one.lesson)
+    found = Outcome(
+        prepared.task.name,
+        problem.subtask,
+        lesson.source if lesson.source in SOURCES else "learned",
+        lesson.from_task,
+        episodes,
+        helped_steps,
+        0 if lesson.result is None else int(lesson.result.visits.sum()),
+        one.wall_s,
+        one.cpu_s,
+        unsolved=not works(problem, lesson.policy),
+    )
+    return replace(found, failing=found.carried and fails(prepared, problem, lesson.policy))
+
+
+# ---- rows ----------------------------------------------------------------------------------------------------------
+
+
+def rows_of(lives: Sequence[Sequence[Place]], anew: Mapping[str, Place]) -> list[Row]:
+    """The measures of each place, of all later ones, and there of each sub-task and task; a value an order."""
+
+    def at(places: slice, **wanted: str) -> list[Beside]:
+        return [_beside(life[places], anew, wanted) for life in lives]
+
+    rows, later = [], slice(1, None)
+    for place in range(1, len(lives[0])):
+        rows += measures({"place": place + 1}, at(slice(place, place + 1)))
+    rows += measures({"place": LATER}, at(later)) + _growth(lives, anew)
+    for subtask in dict.fromkeys(one.subtask for place in anew.values() for one in place):
+        rows += measures({"place": LATER, "subtask": subtask}, at(later, subtask=subtask))
+    for task in anew:
+        rows += measures({"place": LATER, "task": task}, at(later, task=task))
+    return rows
+
+
+def _growth(lives: Sequence[Sequence[Place]], anew: Mapping[str, Place]) -> list[Row]:
+    """By least squares, how much more of its episodes a task saves the later it comes; nothing where none comes at two places."""
+    at: dict[str, list[tuple[float, float]]] = {}
+    for life in lives:
+        for place, skills in enumerate(life[1:], 2):
+            then = _sum(anew[skills[0].task], "episodes")
+            at.setdefault(skills[0].task, []).append((place, 100.0 * (1 - _sum(skills, "episodes") / then)))
+    off = np.concatenate([np.array(own) - np.mean(own, axis=0) for own in at.values()]) if at else np.zeros((0, 2))
+    spread = float((off[:, 0] ** 2).sum())
+    slope = float((off[:, 0] * off[:, 1]).sum()) / spread if spread else None
+    return [] if slope is None else [row({"place": LATER}, GROWTH, slope)]
+
+
+def rows_after(after: Mapping[str, Place], anew: Mapping[str, Place]) -> list[Row]:
+    """The measures of each task that finds the skills of the first one alone."""
+    first = TASKS[0]
+    return [
+        one for task, place in after.items() for one in measures({"after": first, "task": task}, [(place, anew[task])])
+    ]
+
+
+def rows_of_lives(lives: Sequence[Sequence[Place]], anew: Mapping[str, Place]) -> list[Row]:
+    """What came of each task in each order, a row for all its skills and for each source."""
+    rows = []
+    for order, life in enumerate(lives, 1):
+        for place, skills in enumerate(life, 1):
+            pairs = [*zip(skills, anew[skills[0].task], strict=True)]
+            for source in ("all", *SOURCES):
+                own = [pair for pair in pairs if source in ("all", pair[0].source)]
+                named: Row = {"order": order, "place": place, "task": skills[0].task, "source": source}
+                rows += [_row_of(named, [one for one, _ in own], [other for _, other in own])] if own else []
+    return rows
+
+
+def _row_of(named: Row, now: Sequence[Outcome], anew: Sequence[Outcome]) -> Row:
+    then = _sum(anew, "episodes")
+    spent_now = {what: round(_sum(now, what), 3) for what in COSTS}
+    spent_anew = {f"{what}_anew": round(_sum(anew, what), 3) for what in COSTS}
+    saved = None if not then else 100.0 * (1 - _sum(now, "episodes") / then)
+    carried = sum(one.carried for one in now)
+    return row(
+        {**named, "from_earlier": carried, **spent_now, "saved_percent": saved, **spent_anew}, "skills", len(now)
+    )
+
+
+def _beside(places: Iterable[Place], anew: Mapping[str, Place], wanted: Mapping[str, str]) -> Beside:
+    """The skills of some places that have what is wanted, and the same ones from nothing."""
+    pairs = [pair for place in places for pair in zip(place, anew[place[0].task], strict=True)]
+    pairs = [pair for pair in pairs if all(getattr(pair[0], name) == value for name, value in wanted.items())]
+    return [one for one, _ in pairs], [other for _, other in pairs]
+
+
+def measures(named: Row, orders: Sequence[Beside]) -> list[Row]:
+    """What became of skills and what that saved, in percent, with an interval over the orders where it varies."""
+    orders = [one for one in orders if one[0]]
+    rows = []
+    for fate in FATES:
+        rows += _mean(named, f"{fate}_percent", [_share([one.fate == fate for one in now]) for now, _ in orders])
+    for what in COSTS:
+        costs = [(_sum(now, what), _sum(anew, what)) for now, anew in orders]
+        rows += _mean(named, f"saved_{what}_percent", [100.0 * (1 - now / then) for now, then in costs if then])
+    failing = [[one.failing for one in now if one.carried] for now, _ in orders]
+    rows += _mean(named, "taken_failing_percent", [_share(found) for found in failing if found])
+    return rows + _mean(named, "unsolved_percent", [_share([one.unsolved for one in now]) for now, _ in orders])
+
+
+def _share(found: Sequence[bool]) -> float:
+    return 100.0 * sum(found) / len(found)
+
+
+def _sum(outcomes: Iterable[Outcome], what: str) -> float:
+    total: float = sum(getattr(one, what) for one in outcomes)
+    return total
+
+
+def _mean(named: Row, measure: str, values: Sequence[float]) -> list[Row]:
+    return [varying_row(named, measure, values)] if values else []
+
+
+# ---- in words ------------------------------------------------------------------------------------------------------
+
+
+def in_short(rows: Sequence[Row], orders: int) -> Row:
+    """Whether a lab that has lived longer learns less, and what carries over, in words and numbers."""
+    whole = [one for one in rows if one.get("place") is not None and not (one.get("subtask") or one.get("task"))]
+    later = {one["measure"]: one for one in those(whole, place=LATER)}
+    saved = [one for one in rows if one["measure"] == "saved_episodes_percent"]
+    places = [f"{ordinal(one['place'])} {percent(one)}" for one in saved if isinstance(one.get("place"), int)]
+    tasks = [f"{one['task']} {percent(one)}" for one in saved if one.get("place") == LATER and one.get("task")]
+    after = [f"{one['task']} {percent(one)}" for one in saved if one.get("after")]
+    shares = _carried(rows)
+    says: Row = {
+        "orders": orders,
+        "answer": _answer(later),
+        "episodes saved by place": ", ".join(places),
+        "episodes saved by task": ", ".join(tasks),
+        f"episodes saved after {TASKS[0]}": ", ".join(after),
+        "carry over": _named(shares, lambda share: share >= CARRIED),
+        "carry over in part": _named(shares, lambda share: NOT_CARRIED < share < CARRIED),
+        "do not carry over": _named(shares, lambda share: share <= NOT_CARRIED),
+    }
+    for measure in (*(f"saved_{what}_percent" for what in COSTS[1:]), "taken_failing_percent", "unsolved_percent"):
+        if measure in later:
+            says[measure] = round(later[measure]["value"], 2)
+    return says
+
+
+def _named(shares: Mapping[str, float], wanted: Callable[[float], bool]) -> str:
+    return ", ".join(f"{name} {share:.0f} %" for name, share in shares.items() if wanted(share)) or "none"
+
+
+def _answer(later: Mapping[str, Row]) -> str:
+    """The verdict over all tasks that are not the first of their order, from their measures."""
+    found = later.get("saved_episodes_percent")
+    if found is None:
+        return "one task alone has nothing to take over"
+    ends = found["ci95"] or [found["value"]] * 2
+    verdict = "yes" if ends[0] > 0 else "no" if ends[1] <= 0 else "not shown"
+    said = f"{verdict}: later tasks of an order save {percent(found)} of the episodes that they take from nothing"
+    growth = later.get(GROWTH)
+    if growth is None:
+        return said
+    points = f"{abs(growth['value']):.1f} points {'more' if growth['value'] >= 0 else 'less'}"
+    return f"{said}, and {points} for each place that a task comes later"
+
+
+def _carried(rows: Sequence[Row]) -> dict[str, float]:
+    """By sub-task, how many of its skills are taken or adapted from earlier tasks [%]; the most first."""
+    later = [one for one in rows if one.get("place") == LATER and one.get("subtask")]
+    shares: dict[str, float] = {}
+    for one in later:
+        if one["measure"] in ("taken_percent", "adapted_percent"):
+            shares[one["subtask"]] = shares.get(one["subtask"], 0.0) + one["value"]
+    return dict(sorted(shares.items(), key=lambda pair: -pair[1]))
+
+
+def percent(one: Row) -> str:
+    """A measure and its interval, such as "31 % (20 to 42)"."""
+    ends = "" if one["ci95"] is None else f" ({one['ci95'][0]:.0f} to {one['ci95'][1]:.0f})"
+    return f"{one['value']:.0f} %{ends}"
+
+
+def ordinal(number: int) -> str:
+    """Such as "2nd"; for numbers up to 20."""
+    return f"{number}{dict(enumerate(('st', 'nd', 'rd'), 1)).get(number, 'th')}"

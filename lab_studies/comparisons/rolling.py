@@ -1,0 +1,144 @@
+"""A policy that averages over drawn futures: at every decision each that may be taken is tried in all of them."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lab.errors import BadInput
+from lab.learning.splitmix import MASK, mixed
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.chance import Chance, Episode
+from lab.sequencing.cell.objectives import MAKESPAN, check_objective
+from lab.sequencing.cell.routes import choice_of, part_of
+from lab.sequencing.methods.priority_kernels import OrderArrays
+from lab.sequencing.methods.rules import dispatch, usable
+from lab.sequencing.simulate.cell_arrays import Floats, Ints, RunArrays, cell_arrays, moves_each, run_arrays
+from lab.sequencing.simulate.execution import Choose, Observed, Policy
+from lab.sequencing.simulate.run import branch
+from lab_studies.comparisons.rolling_kernels import mean_cost
+
+FUTURES = 100  # drawn at every decision
+TRIES = 30  # to draw a time that is not over yet
+
+
+def rolling(
+    planned: Sequence[int], chance: Chance, seed: int, objective: str = MAKESPAN, futures: int = FUTURES
+) -> Policy:
+    """A policy that begins with a planned list of decisions, and departs from it where another one is better on average.
+
+    So many futures are drawn anew at every decision, from what can be known: what goes on is not over yet. In each of them each
+    decision that may be taken is followed by the rest of the list, and by what each dispatching rule makes of the rest; the
+    least mean is taken, of equal ones what the list has. All decisions meet the same futures. Raises BadInput for fewer than 1
+    future, and when it is run in a cell with several robots or servers: its futures are compiled for one robot, whose decisions
+    follow one another in time. That one robot breaks down delays whatever it does, so futures leave it out.
+    Source: rollout with several heuristics, Bertsekas, Tsitsiklis and Wu 1997; Monte Carlo policy improvement, Tesauro and
+    Galperin 1997.
+    """
+    if futures < 1:
+        raise BadInput(f"futures = {futures}: allowed are whole numbers from 1")
+
+    def policy(cell: Cell) -> Choose:
+        check_objective(objective, cell)
+        if not cell.serial:
+            raise BadInput(
+                "rolling decisions are for cells in which one robot does all the work: several are planned anew by rollout"
+            )
+        if cell.batches:
+            raise BadInput(
+                "rolling decisions are for cells without batches: an order says what they are, before it begins"
+            )
+        return _Rolling(cell, planned, chance, (seed, futures), objective).choose
+
+    return policy
+
+
+class _Rolling:
+    """An episode of the policy: what is left of the list, and room for runs."""
+
+    def __init__(
+        self, cell: Cell, planned: Sequence[int], chance: Chance, drawn: tuple[int, int], objective: str
+    ) -> None:
+        self.cell, self.chance = cell, replace(chance, robot_breaks_every_s=0.0)
+        self.seed, self.futures = drawn
+        self._arrays = cell_arrays(cell, objective, self.chance)
+        self._run, self._now = run_arrays(cell), run_arrays(cell)
+        self._left, self._decisions = [*planned], 0
+
+    def choose(self, seen: Observed, allowed: tuple[int, ...]) -> int:
+        """The decision with the least mean cost."""
+        self._decisions += 1
+        first = next((one for one in self._left if one in allowed), allowed[0])
+        chosen = first
+        if len(allowed) > 1:
+            seeds = np.array([self._seed_of(future) for future in range(self.futures)], np.uint64)
+            ready_s = np.array([self._ready_s(seen, int(one)) for one in seeds])
+            _put(self._now, seen, self._arrays.rooms)
+            others = [one for one in allowed if one != first]
+            chosen = min([first, *others], key=lambda one: self._mean_cost(seen, one, ready_s, seeds))
+        self._left = self._without(chosen)
+        return chosen
+
+    def _mean_cost(self, seen: Observed, decision: int, ready_s: Floats, seeds: NDArray[np.uint64]) -> float:
+        """The least mean of all the ways to carry on after a decision."""
+        index, way = part_of(decision, self.cell.parts) - 1, seen.option(decision)
+        place = seen.locations[index]
+        option = int(self._arrays.first_option[place]) + self.cell.positions[place].options.index(way)
+        tails = [self._without(decision)]
+        for rule in usable(self.cell).values():
+            ahead = branch(seen)
+            ahead.move(decision)
+            tails.append([*dispatch(ahead, rule)])
+        return min(
+            mean_cost(self._arrays, self._run, self._now, self._order(tail), (index, option), ready_s, seeds)
+            for tail in tails
+        )
+
+    def _without(self, decision: int) -> list[int]:
+        """The rest of the list without a decision: its own entry, or the next one of its part."""
+        parts = self.cell.parts
+        own = [n for n, one in enumerate(self._left) if part_of(one, parts) == part_of(decision, parts)]
+        same = [n for n in own if self._left[n] == decision]
+        used = next(iter([*same, *own]), len(self._left))
+        return [one for n, one in enumerate(self._left) if n != used]
+
+    def _order(self, tail: Sequence[int]) -> OrderArrays:
+        """A list of priorities: the tail, and after it moves that its parts did not need."""
+        parts = self.cell.parts
+        spare = [part for _ in range(max(moves_each(self.cell))) for part in range(parts)]
+        own = np.array([part_of(one, parts) - 1 for one in tail] + spare, np.int64)
+        choices = np.array([choice_of(one, parts) for one in tail] + [0] * len(spare), np.int64)
+        size = len(own)
+        left_s = np.zeros(len(self.cell.positions))
+        return OrderArrays(own, choices, np.zeros(size, np.bool_), np.zeros(size, np.int64), left_s)
+
+    def _seed_of(self, future: int) -> int:
+        return int(mixed((self.seed * 1_000_003 + self._decisions * 10_007 + future) & MASK))
+
+    def _ready_s(self, seen: Observed, seed: int) -> list[float]:
+        """When each part may be picked in a future: what goes on now is drawn again, until it is not over yet."""
+        ready_s = list(seen.ready_s)
+        for index, ready in enumerate(seen.ready):
+            place = seen.locations[index]
+            at_start = place == self.cell.starts[index]
+            if ready or (at_start and not self.chance.late_s) or (at_start and self.cell.arrivals is not None):
+                continue
+            for again in range(TRIES):
+                times = Episode(self.cell, self.chance, int(mixed((seed + again) & MASK)))
+                took_s = times.late_s(index + 1) if at_start else times.processing_s(index + 1, place)
+                if seen.began_s[index] + took_s > seen.now_s:
+                    ready_s[index] = seen.began_s[index] + took_s
+                    break
+        return ready_s
+
+
+def _put(now: RunArrays, seen: Observed, rooms: Ints) -> None:
+    """A run into arrays."""
+    now.locations[:] = seen.locations
+    now.finished_s[:] = [end_s or 0.0 for end_s in seen.finished_s]
+    now.room[:] = rooms
+    now.room[: len(seen.occupied)] -= seen.occupied
+    now.clock[:] = seen.now_s, seen.waited_s, seen.processed_s, seen.end_s
+    now.whole[:] = seen.fetched, sum(end_s is None for end_s in seen.finished_s)
+    now.robots_at[:], now.robots_s[:] = seen.robots_at, seen.robots_s

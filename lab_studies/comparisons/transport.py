@@ -1,0 +1,234 @@
+"""Orders of work on the instances that the field measures itself with: every method beside the best known and the printed."""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from itertools import groupby
+from math import inf
+from typing import Any
+
+from lab.errors import WorkFailed, counted, unknown
+from lab.sequencing.search import SAME, gap
+from lab.studies.findings import Findings, Row, row
+from lab.studies.runner import Job
+from lab_studies.comparisons.schedule_checker import faults
+from lab_studies.comparisons.transport_entries import CYCLES_SHOWN, CYCLIC, KEPT, Entry, Found, carried_out, methods_for
+from lab_studies.comparisons.transport_figures import by_seconds, profile
+from lab_studies.comparisons.transport_instances import Instance, board, cell_file, own
+
+SECONDS = 10.0
+Board = Mapping[Entry, Found]
+MEASURES = (
+    "Costs are makespans (of a cyclic order: the period) in the instance's unit of time. Best: the least that anything on this "
+    "board found, or that is printed. Gap: above the best. Bound: the highest that anything on this board proved; an order "
+    "that reaches it is an optimum, proven; without a proof, a printed figure or a prover beside it, the best may be far from "
+    "that. Seconds: when a method found the last of its improvements. One seed each. JobShopLab's vehicles set out for a job "
+    "only when the operation before has begun; here they may set out earlier, so that its PPO's schedules are allowed here, "
+    "and those here not always there."
+)
+TIMES = (
+    "Each method has {seconds:g} s an instance, by the clock of this machine, other entries of the study beside it: with more "
+    "time, or alone, each finds more. Methods that try sequences begin again with ever longer sessions until the time is over; "
+    "compiling does not count, building CP-SAT's model does not either. Rules have one sequence. CP-SAT has six threads."
+)
+LEARNERS = (
+    "srl and mc learn from the costs of whole sequences alone; srl-time is given a lower bound of the whole cell besides, and "
+    "takes cells with one robot only. srl-improved learns from sequences that a short annealing has improved, so that much of "
+    "what it finds is that search's. anneal, ga and random search learn nothing; exact, cp-sat and portfolio know the "
+    "cell's model."
+)
+CHECKED = (
+    "--verify holds each kept schedule against its instance with a checker that shares no code with the simulators or the "
+    "methods (lab_studies/comparisons/schedule_checker.py): every operation in its turn, on its machine, long enough, no "
+    "machine, place or robot in two places at once, and the end as it is claimed. Of the cyclic order it is shown {shown} parts."
+)
+
+
+def transport(job: Job, reading: Mapping[str, Any]) -> Findings:
+    """Every method on every instance; reading: "seconds" a method, "methods", "instances" of one's own instead, "verify".
+
+    Raises BadInput for an unknown method and for instances that cannot be read, WorkFailed where a schedule is found wrong.
+    """
+    seconds = float(reading.get("seconds", SECONDS))
+    instances = own(reading["instances"]) if "instances" in reading else board()
+    entries = entries_of(instances, reading.get("methods", ()), seconds, job.seed)
+    found = measured(job, entries)
+    notes = [MEASURES, TIMES.format(seconds=seconds), LEARNERS, CHECKED.format(shown=CYCLES_SHOWN)]
+    says: Row = {}
+    if reading.get("verify"):
+        says["schedules that the checker found right"] = verified(found)
+    rows = [line for one, of in by_instance(found).items() for line in rows_of(one, of)]
+    rows = [*in_all(found), *rows]
+    orders = {entry: one for entry, one in found.items() if entry.method != CYCLIC}
+    figures = {
+        "How many instances a method solves within a gap": profile(gaps_of(orders)),
+        "The mean gap, second by second": by_seconds(
+            orders, {one: least(one, of) for one, of in by_instance(orders).items()}
+        ),
+    }
+    refused = {(e.method, f.refused) for e, f in found.items() if f.cost is None}
+    notes += [f"Left out: {method}: {why}." for method, why in sorted(refused)[:12]]
+    return Findings(rows, in_short(found) | says, figures, tuple(notes))
+
+
+def entries_of(instances: Sequence[Instance], methods: Sequence[str], seconds: float, seed: int) -> list[Entry]:
+    """Every method that is asked for (none: all) on every instance that it may be tried on."""
+    known = dict.fromkeys(method for one in instances for method in methods_for(one))
+    for name in methods:
+        if name not in known:
+            raise unknown("method", name, known, "--methods")
+    return [
+        Entry(one, method, seconds, seed)
+        for one in instances
+        for method in methods_for(one)
+        if not methods or method in methods
+    ]
+
+
+def measured(job: Job, entries: Sequence[Entry]) -> dict[Entry, Found]:
+    """What came of every entry; those that the job's folder holds are read, the others are measured and kept there."""
+    names = {_key(one): one for one in entries}
+    done: dict[Entry, Found] = job.kept_as(lambda line: (names[line["entry"]], Found.of_json(line["found"])))
+    left = [one for one in entries if one not in done]
+    job.progress(len(done), len(entries))
+    for entry, found in job.computed(carried_out, left, most=1):  # seconds each: a kill loses one a process
+        done[entry] = found
+        job.keep({"entry": _key(entry), "found": asdict(found)})
+        job.progress(len(done), len(entries))
+    return {one: done[one] for one in entries}
+
+
+def _key(entry: Entry) -> str:
+    return json.dumps(asdict(entry), sort_keys=True)
+
+
+def verified(found: Board) -> str:
+    """How many kept schedules the checker holds right, of how many; WorkFailed names the first that are not."""
+    wrong, right = list[str](), 0
+    for entry, one in found.items():
+        if one.cost is None:
+            continue
+        said = faults_of(entry, one)
+        right += not said
+        wrong += [f"{entry.instance.name}, {entry.method}: {said[0]}"] if said else []
+    if wrong:
+        more = f", and {counted(len(wrong) - 3, 'other')}" if len(wrong) > 3 else ""
+        raise WorkFailed(
+            f"{counted(len(wrong), 'schedule')} of {right + len(wrong)} found wrong: {'; '.join(wrong[:3])}{more}"
+        )
+    return f"{right} of {right}"
+
+
+def faults_of(entry: Entry, found: Found) -> list[str]:
+    """What the checker finds wrong with a kept schedule, and with the cost that is claimed for it."""
+    plain = cell_file(entry.instance).model_dump()
+    if entry.method == CYCLIC:
+        names = list(dict.fromkeys(plain["order"] or [one["name"] for one in plain["products"]]))
+        plain |= {"parts": None, "order": [names[n % len(names)] for n in range(found.parts)]}
+    elif abs(found.ends_s - (found.cost or 0.0)) > SAME:
+        return [f"it ends at {found.ends_s:g}, not at {found.cost:g}"]
+    try:
+        return faults(
+            plain,
+            [
+                dict.fromkeys(("product", "resource", "when")) | dict(zip(KEPT, one, strict=True))
+                for one in found.schedule
+            ],
+            found.ends_s,
+        )
+    except (KeyError, TypeError, ValueError, StopIteration) as error:
+        return [f"it cannot be read: {type(error).__name__}: {error}"]
+
+
+# ---- what is told of it ------------------------------------------------------------------------------------------------
+
+
+def by_instance(found: Board) -> dict[Instance, dict[str, Found]]:
+    """What each method found, instance by instance."""
+    return {
+        one: {entry.method: found[entry] for entry in of}
+        for one, of in groupby(found, key=lambda entry: entry.instance)
+    }
+
+
+def least(instance: Instance, of: Mapping[str, Found]) -> float:
+    """The least cost that is known of an instance; infinite where nothing is."""
+    return min([one.cost for one in of.values() if one.cost is not None] + [instance.printed or inf])
+
+
+def highest(of: Mapping[str, Found]) -> tuple[float, str]:
+    """The highest bound, and whose it is; 0 by nobody."""
+    return max(((one.bound, one.bound_by) for one in of.values()), key=lambda one: one[0], default=(0.0, ""))
+
+
+def rows_of(instance: Instance, of: Mapping[str, Found]) -> list[Row]:
+    """A line a method: what it found, how far that is from the best known, and what is proven."""
+    best, (bound, by) = least(instance, of), highest(of)
+    rows: list[Row] = []
+    for method, one in of.items():
+        if one.cost is None:
+            continue
+        named: Row = {
+            "table": instance.family,
+            "instance": instance.name,
+            "robots": len(cell_file(instance).cell().robots),
+            "printed": instance.printed,
+            "printed as": instance.printed_is or None,
+            "bound": bound,
+            "proven": one.cost <= bound + SAME,
+            "proven by": by if one.cost <= bound + SAME else None,
+            "method": method,
+            "found_by": one.found_by if one.found_by != method else None,
+            "seconds": round(one.trace[-1][0] if one.trace else one.wall_s, 3),
+        }
+        rows += [row(named, "cost", one.cost), row(named, "gap_percent", 100.0 * gap(one.cost, best))]
+    return rows
+
+
+def gaps_of(found: Board) -> dict[str, list[float]]:
+    """By method, the gaps [%] to the best known of the instances that it took."""
+    gaps = dict[str, list[float]]()
+    for instance, of in by_instance(found).items():
+        for method, one in of.items():
+            if one.cost is not None:
+                gaps.setdefault(method, []).append(100.0 * gap(one.cost, least(instance, of)))
+    return gaps
+
+
+def in_all(found: Board) -> list[Row]:
+    """A line a method and family: its mean and worst gap, how often it found the best known, and how often it proved one."""
+    rows: list[Row] = []
+    families = dict.fromkeys(one.instance.family for one in found)
+    for family in families:
+        part = {entry: one for entry, one in found.items() if entry.instance.family == family}
+        proofs = {
+            method: sum(
+                one.cost is not None and one.cost <= one.bound + SAME for e, one in part.items() if e.method == method
+            )
+            for method in dict.fromkeys(entry.method for entry in part)
+        }
+        for method, gaps in gaps_of(part).items():
+            named: Row = {
+                "table": f"All of {family}",
+                "method": method,
+                "best known found": f"{sum(one <= 100 * SAME for one in gaps)} of {len(gaps)}",
+                "proven alone": f"{proofs[method]} of {len(gaps)}",
+            }
+            rows.append(row(named, "mean gap_percent", sum(gaps) / len(gaps)))
+            rows.append(row(named, "worst gap_percent", max(gaps)))
+    return rows
+
+
+def in_short(found: Board) -> Row:
+    """How many instances there are, how many optima are proven, and how the best compare with what is printed."""
+    boards = by_instance(found)
+    told: Row = {"instances": len(boards), "entries": len(found)}
+    proven = [one for one, of in boards.items() if least(one, of) <= highest(of)[0] + SAME]
+    told["optima proven here"] = len(proven)
+    mine = {one: min((f.cost for f in of.values() if f.cost is not None), default=inf) for one, of in boards.items()}
+    printed = [one for one in boards if one.printed is not None]
+    if printed:
+        equal = sum(abs(mine[one] - (one.printed or 0.0)) <= SAME for one in printed)
+        better = [one.name for one in printed if mine[one] < (one.printed or 0.0) - SAME]
+        told |= {"with a printed figure": len(printed), "as printed": equal, "better than printed": len(better)}
+    return told

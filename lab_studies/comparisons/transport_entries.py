@@ -1,0 +1,194 @@
+"""One entry of the board: a method on an instance for so many seconds, what it finds when, and its schedule as plain rows."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from math import inf
+from time import perf_counter
+from typing import Any
+
+from lab.errors import BadInput, WorkFailed
+from lab.sequencing import SEQUENCERS, find_sequence
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.objectives import MAKESPAN
+from lab.sequencing.cell.schedule import Schedule
+from lab.sequencing.cell.schedule_rows import rows_of
+from lab.sequencing.search import EpisodeSequenced, Search
+from lab.sequencing.simulate.follow import follow, simulate
+from lab.studies.runner import record_of
+from lab_studies.comparisons.transport_instances import Instance, cell_of
+
+CYCLIC = "cyclic"
+FIRST, GROWS, SHARE = (
+    50,
+    10.0,
+    0.9,
+)  # episodes of a first session, how much longer the next may be, of the time that is left
+CP_SAT_WORKERS = 6  # threads that look in different ways, also on two cores
+CYCLES_SHOWN = 12  # parts of a cyclic order that the checker is shown
+KEPT = ("part", "operation", "station", "target", "robot", "start_s", "end_s")  # of a schedule's rows
+
+Proof = tuple[tuple[int, ...], str, float, str]  # a sequence, by whom; a bound, by whom
+
+
+@dataclass(frozen=True)
+class Entry:
+    """What is measured: a method on an instance, for so long [s], with a seed."""
+
+    instance: Instance
+    method: str
+    seconds: float
+    seed: int
+
+
+@dataclass(frozen=True)
+class Found:
+    """What came of it, in the instance's unit of time. trace: (seconds, cost), each better than the one before.
+
+    refused: why the method takes no such cell, or found nothing. schedule: rows by KEPT of an order that ends at `ends_s`; a
+    cyclic order's cost is its period, and its schedule that of CYCLES_SHOWN parts.
+    """
+
+    cost: float | None = None
+    found_by: str = ""
+    bound: float = 0.0
+    bound_by: str = ""
+    trace: tuple[tuple[float, float], ...] = ()
+    wall_s: float = 0.0
+    refused: str = ""
+    schedule: tuple[tuple[Any, ...], ...] = ()
+    ends_s: float = 0.0
+    parts: int = field(default=0)
+
+    @classmethod
+    def of_json(cls, found: Mapping[str, Any]) -> "Found":
+        """As it was kept. Raises ValueError for what is something else."""
+        return record_of(cls, found)
+
+
+def methods_for(instance: Instance) -> tuple[str, ...]:
+    """The methods that are tried on an instance: all but those that need due times."""
+    return (CYCLIC,) if instance.is_cyclic else tuple(name for name in SEQUENCERS if name != "earliest-due")
+
+
+def carried_out(entry: Entry) -> Found:
+    """One entry; what a method does not take is told in `refused`."""
+    try:
+        cell = cell_of(entry.instance)
+        if entry.method == CYCLIC:
+            return _cyclic(entry, cell)
+        if prove := PROVERS.get(entry.method):
+            return _proven(entry, cell, prove)
+        return _by_episodes(entry, cell)
+    except (BadInput, WorkFailed) as error:
+        return Found(refused=str(error))
+
+
+class _Over(Exception):
+    """The time is over."""
+
+
+@dataclass
+class _Watch:
+    """Hears every episode; raises _Over after so many seconds."""
+
+    seconds: float
+    began_s: float = field(default_factory=perf_counter)
+    best: tuple[int, ...] = ()
+    cost: float = inf
+    trace: list[tuple[float, float]] = field(default_factory=list)
+
+    @property
+    def past_s(self) -> float:
+        return perf_counter() - self.began_s
+
+    def hear(self, event: EpisodeSequenced) -> None:
+        now_s = self.past_s
+        if event.best and event.best_cost < self.cost:
+            self.best, self.cost = event.best, event.best_cost
+            self.trace.append((now_s, event.best_cost))
+        if now_s > self.seconds:
+            raise _Over
+
+
+def _by_episodes(entry: Entry, cell: Cell) -> Found:
+    """Sessions that grow until the time is over; compiling, in a first one of one episode, does not count."""
+    find_sequence(cell, entry.method, Search(1), entry.seed)
+    watch, episodes, session = _Watch(entry.seconds), FIRST, 1
+    try:
+        while True:
+            began_s = watch.past_s
+            search = Search(episodes, on_episode=watch.hear)
+            found = find_sequence(cell, entry.method, search, entry.seed, session)
+            if len(found.episode_costs) < episodes:
+                break  # a rule has one sequence
+            left, took_s = entry.seconds - watch.past_s, max(watch.past_s - began_s, 1e-6)
+            episodes, session = int(episodes * min(GROWS, SHARE * left / took_s)), session + 1
+            if episodes < 1:
+                break
+    except _Over:
+        pass
+    return _measured(cell, watch.best, Found(found_by=entry.method, trace=tuple(watch.trace), wall_s=watch.past_s))
+
+
+def _proven(entry: Entry, cell: Cell, prove: "Callable[[Entry, Cell], Proof]") -> Found:
+    began_s = perf_counter()
+    sequence, found_by, bound, bound_by = prove(entry, cell)
+    wall_s = perf_counter() - began_s
+    found = Found(found_by=found_by, bound=bound, bound_by=bound_by, wall_s=wall_s)
+    done = _measured(cell, sequence, found)
+    return replace(done, trace=() if done.cost is None else ((wall_s, done.cost),))
+
+
+def _measured(cell: Cell, sequence: tuple[int, ...], found: Found) -> Found:
+    """With the cost of the sequence, and its schedule as rows."""
+    if not sequence:
+        return replace(found, refused=found.refused or "no order was found in its time")
+    return replace(_with_schedule(cell, simulate(cell, sequence), found), cost=follow(cell, sequence).end_s)
+
+
+def _with_schedule(cell: Cell, schedule: Schedule, found: Found) -> Found:
+    rows = tuple(tuple(one[name] for name in KEPT) for one in rows_of(schedule, cell, "planned"))
+    return replace(found, schedule=rows, ends_s=schedule.makespan_s, parts=cell.parts)
+
+
+def _cyclic(entry: Entry, cell: Cell) -> Found:
+    from lab.sequencing.cyclic.cycle import best_cycle
+    from lab.sequencing.cyclic.unrolled import of_parts, unrolled
+
+    began_s = perf_counter()
+    mix = tuple(dict.fromkeys(cell.order))
+    cycle = best_cycle(cell, mix, entry.seconds, entry.seed)
+    wall_s = perf_counter() - began_s
+    shown = unrolled(cycle, of_parts(cell, mix, CYCLES_SHOWN))
+    found = Found(cycle.period_s, CYCLIC, cycle.bound_s, CYCLIC, ((wall_s, cycle.period_s),), wall_s)
+    return _with_schedule(shown.cell, shown.schedule, found)
+
+
+def _exact(entry: Entry, cell: Cell) -> Proof:
+    from lab.sequencing.methods.exact import optimum
+    from lab.sequencing.methods.one_robot import one_robot, why_not
+
+    if cell.serial:
+        state = optimum(cell)
+        return state.sequence, "A*", state.bound_s, "A*"
+    if why := why_not(cell):
+        raise BadInput(f"neither by states nor by tours: {why}")
+    tour = one_robot(cell, entry.seconds)
+    return tour.sequence, "tours", tour.bound, "tours"
+
+
+def _cp_sat(entry: Entry, cell: Cell) -> Proof:
+    from lab.sequencing.methods.cp_sat import cp_sat
+
+    found = cp_sat(cell, MAKESPAN, entry.seconds, entry.seed, None, CP_SAT_WORKERS)
+    return found.sequence, "CP-SAT", found.bound, "CP-SAT"
+
+
+def _portfolio(entry: Entry, cell: Cell) -> Proof:
+    from lab.sequencing.methods.portfolio import best_known
+
+    found = best_known(cell, MAKESPAN, entry.seconds, entry.seed, CP_SAT_WORKERS)
+    return found.sequence, found.found_by, found.bound, found.bound_by
+
+
+PROVERS: dict[str, Callable[[Entry, Cell], Proof]] = {"exact": _exact, "cp-sat": _cp_sat, "portfolio": _portfolio}

@@ -1,0 +1,113 @@
+"""Appendix III, order by order: what each method's makespans are in the flexible manufacturing system."""
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lab.sequencing import SEQUENCERS
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.chance import LAWS, Chance, drawn_seed
+from lab.sequencing.cell.stations import Arrivals
+from lab.sequencing.methods.exact import optimum
+from lab.sequencing.methods.rollout import replan
+from lab.sequencing.methods.srl_time_reacting import reacting
+from lab.sequencing.search import Search, SrlSettings
+from lab.sequencing.simulate.execution import Policy
+from lab.sequencing.simulate.replications import replicate
+from lab_studies.many_sessions import evaluate, run_sessions
+from lab_studies.thesis.appendix_3_fifo import STARTS, queued_fifo
+from lab_studies.thesis.chapter_7_cells import beta_of
+
+Floats = NDArray[np.float64]
+
+EPISODES, REPLICATIONS, SPREAD = 200, 50, 0.1  # App. III
+LEARNED_BY = 10  # of the sessions asked for, one in so many is learned for each order,
+SLOW_BY = 250  # and one in so many by what is not compiled
+REACTIONS = {3: 6, 5: 2, 8: 1}  # replications of a policy that reacts, for 500 sessions: it takes its time
+ASKED = 500
+UNKNOWN = "exponential"  # the law of arrivals by which there is something to react to
+REACTING: dict[str, Policy | None] = {"reacting": None, "rollout": replan()}  # None: made for each cell
+FIFO = {start: f"fifo {start}" for start in STARTS}
+
+
+@dataclass(frozen=True)
+class Mix:
+    """An order, such as "RSR" (R a rook, S a sign), and the mean interval of its parts' arrivals [s]."""
+
+    order: str
+    mean_s: float
+
+
+@dataclass(frozen=True, eq=False)
+class Made:
+    """What the methods make of an order. makespans_s: by method and law of arrivals, of each replication (n,) [s].
+
+    Replications are the same ones for all methods; of policies that react there are fewer, and by exponential arrivals only.
+    By constant arrivals there is one. Methods that learn: the mean over their sessions. gaps: by method, constant arrivals,
+    how much longer than the proven optimum (where not `proven`, than the bound), as a fraction.
+    """
+
+    makespans_s: dict[tuple[str, str], Floats]
+    gaps: dict[str, float]
+    proven: bool
+
+
+@lru_cache(maxsize=64)
+def fms(order: str, mean_s: float) -> Cell:
+    """The system with an order to make, parts arriving one at a time, after the pick of the one before."""
+    from lab.tasks.cell_file import order_from_word
+    from lab.tasks.task_file import load_cell
+
+    file = load_cell("fms")
+    cell = file.cell(order_from_word(file, order))
+    return replace(cell, arrivals=Arrivals((mean_s,) * cell.parts, "pick"), due_s=None)
+
+
+def made(mix: Mix, *, sessions: int, seed: int) -> Made:
+    """All methods with one order; `sessions` are those that the study was asked for."""
+    cell = fms(mix.order, mix.mean_s)
+    rng = np.random.default_rng([seed, int(mix.mean_s), *map(ord, mix.order)])
+    times_seed = drawn_seed(rng)
+    best = optimum(cell)
+    lists, greedy_s = _lists(cell, sessions, rng)
+    lists["exact"] = [best.sequence]
+    found: dict[tuple[str, str], Floats] = {("srl greedy", "constant"): greedy_s}
+    for law in LAWS:
+        chance, count = Chance("constant", law, SPREAD), 1 if law == "constant" else REPLICATIONS
+        for method, sequences in lists.items():
+            found[method, law] = evaluate(cell, sequences, times_seeds(times_seed, count), chance).mean(axis=0)
+        for start, method in FIFO.items():
+            found[method, law] = replicate(cell, queued_fifo(start), chance, count, times_seed)
+        few = min(count, max(1, REACTIONS.get(cell.parts, 1) * sessions // ASKED))
+        for method, policy in REACTING.items() if law == UNKNOWN else ():
+            found[method, law] = replicate(cell, policy or reacting(cell), chance, few, times_seed)
+    gaps = {method: best.gap(float(costs.mean())) for (method, law), costs in found.items() if law == "constant"}
+    return Made(found, gaps, best.proven)
+
+
+def times_seeds(seed: int, episodes: int) -> list[int]:
+    """The seeds of the times that `execution.replicate` meets, so that lists can be evaluated in the same."""
+    rng = np.random.default_rng(seed)
+    return [drawn_seed(rng) for _ in range(episodes)]
+
+
+def settings(parts: int) -> SrlSettings:
+    """Those of App. III and its listing: values per next state of the stations, type B."""
+    return SrlSettings(beta=beta_of(parts), factor="B", values="states", state="stations")
+
+
+def _lists(cell: Cell, sessions: int, rng: np.random.Generator) -> tuple[dict[str, list[tuple[int, ...]]], Floats]:
+    """By method the best sequence of each session, learned with constant arrivals; SRL's greedy makespan at the end (1,)."""
+    listed, seed = Search(EPISODES, settings=settings(cell.parts)), drawn_seed(rng)
+    pairs = replace(listed, settings=replace(listed.settings, values="pairs"))
+    lists, greedy_s = {}, np.zeros(1)
+    for name, method, search in (("srl", "srl", listed), ("srl pairs", "srl", pairs), ("random", "random", listed)):
+        learned = run_sessions(cell, method, search, max(1, sessions // LEARNED_BY), seed)
+        lists[name] = [tuple(row[row > 0].tolist()) for row in learned.sequences]
+        if name == "srl":
+            greedy_s[0] = learned.final_cost.mean()
+    slow = range(max(1, sessions // SLOW_BY))
+    lists["srl-time"] = [SEQUENCERS["srl-time"](cell, listed, rng).sequence for _ in slow]
+    return lists, greedy_s

@@ -1,0 +1,130 @@
+"""AdviceBench: its problems and advisors by hand, its ranks, and a small run of it that goes on where it stopped."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lab.errors import BadInput
+from lab.mdp import greedy_path, optimal_values, shortest_steps
+from lab.studies.runner import Job
+from lab_studies.comparisons.advice_bench import layouts
+from lab_studies.comparisons.advice_bench.advice_bench import advice_bench
+from lab_studies.comparisons.advice_bench.bad_advisors import ADVISORS, advice_of, importance
+from lab_studies.comparisons.advice_bench.problems import problem
+from lab_studies.comparisons.advice_bench.ranks import holm, ranks
+from lab_studies.comparisons.advice_bench.sessions import RULES, Case, tried
+
+
+def test_layouts_take_as_many_moves_as_by_hand() -> None:
+    assert shortest_steps(layouts.minigrid(("S.G",))) == 2
+    assert shortest_steps(layouts.minigrid(("S.", ".G"))) == 3  # ahead, turn, ahead
+    assert shortest_steps(layouts.minigrid(("SkDG",))) == 5  # pick up, ahead, toggle, ahead, ahead
+    lava = layouts.minigrid(("S~G", "..."))
+    assert shortest_steps(lava) == 7  # turn, ahead, turn, two ahead, turn, ahead
+    assert (lava.terminal & ~lava.goal).sum() == 1
+
+
+def test_a_door_stays_shut_without_its_key() -> None:
+    assert (
+        shortest_steps(layouts.minigrid(("S.DG", "...."))) == 8
+    )  # round it: ahead, turn, ahead, turn, two ahead, turn, ahead
+    assert shortest_steps(layouts.minigrid(("S.DG", "k..."))) == 7  # turn, pick up, turn, ahead, toggle, two ahead
+    locked = layouts.minigrid(("S.DG", "k###"))
+    actions = greedy_path(optimal_values(locked, 0.99), locked, 30)[1]
+    assert actions.index(layouts.PICK_UP) < actions.index(layouts.TOGGLE)
+
+
+def test_three_toasts_take_as_long_as_by_hand() -> None:
+    # two slots, 4 steps each: in 1, in 2, wait till 5, out 6 (under the applier till 8), the third goes in at 7, ...
+    mdp = layouts.toast_order()
+    assert shortest_steps(mdp) == 17
+    q = optimal_values(mdp, 0.99)
+    assert greedy_path(q, mdp, 40)[2]
+
+
+def test_bad_advisors_are_bad_in_their_way() -> None:
+    place = problem("empty")
+    best = place.values.argmax(axis=1)
+    live = np.flatnonzero(~place.mdp.terminal)
+
+    def share(name: str) -> float:
+        advice = ADVISORS[name](place)
+        heard = [state for state in live if advice.region[state]]
+        right = place.values[heard] >= place.values[heard].max(axis=1, keepdims=True) - 1e-9
+        chances = np.diff(advice.thresholds[0, heard], axis=1, prepend=0.0)
+        return float((chances * right).sum(axis=1).mean())
+
+    assert share("expert") > 0.99 > share("moderate") > share("limited") > share("novice")
+    assert share("contrary") < 0.01
+    assert 0.65 < share("wrong there") < 0.85
+    assert share("silent") > 0.99  # what it says
+    assert 0.1 < ADVISORS["silent"](place).region.mean() < 0.4
+    stuck = ADVISORS["stuck"](place).thresholds[0]
+    assert (np.diff(stuck, axis=1, prepend=0.0).argmax(axis=1) == best[place.mdp.start]).all()
+    drifting = np.diff(ADVISORS["drifting"](place).thresholds, axis=2, prepend=0.0)
+    assert drifting[0, live, best[live]].min() > 0.3 > drifting[-1, live].max(axis=1).min() - 1.0
+    assert ADVISORS["late"](place).late
+    assert 0.3 < importance(place)[live].mean() < 0.9
+
+
+def test_ranks_by_hand() -> None:
+    cells = [("maze", "expert", "any"), ("maze", "novice", "any"), ("lake", "expert", "any")]
+    scores = {
+        "ours": dict(zip(cells, (9.0, 9.0, 9.0), strict=True)),
+        "first": dict(zip(cells, (5.0, 9.0, 5.0), strict=True)),
+        "last": dict(zip(cells, (1.0, 1.0, 7.0), strict=True)),
+    }
+    found = ranks(scores, ["maze", "lake"], "ours")
+    # maze: 1, 2, 3 and 1.5, 1.5, 3; lake: 1, 3, 2
+    assert found.mean == {"ours": 1.125, "first": 2.375, "last": 2.5}
+    assert found.critical == pytest.approx(2.343 * np.sqrt(3 * 4 / 12), abs=0.01)  # Demsar's q for three
+    assert {*found.beaten} == {"first", "last"}
+    assert holm({"a": 0.01, "b": 0.04, "c": 0.03}) == pytest.approx({"a": 0.03, "c": 0.06, "b": 0.06})
+
+
+def test_every_rule_runs_and_nobody_is_the_same_whatever_the_advisor() -> None:
+    found = tried(Case("empty", "expert"), 3, 0)
+    assert {rule for rule, _ in found} == {*RULES}
+    assert all(one.points.shape == (3,) and one.answers.max() <= 100 for key, one in found.items() if key[1] == "100")
+    nobody = tried(Case("empty", None), 3, 0)["nobody", "any"]
+    assert found["always", "any"].points == pytest.approx([100.0] * 3, abs=0.5)
+    assert found["earned-trust", "any"].points.mean() > nobody.points.mean()
+
+
+def test_a_small_bench_goes_on_where_it_stopped_and_says_the_same(tmp_path: Path) -> None:
+    reading = {"problem": ["empty"], "methods": ["always", "earned-trust"], "advisors": ["expert", "contrary"]}
+    job = Job(sessions=3, folder=tmp_path)
+    found = advice_bench(job, reading)
+    assert len(found.rows) == 1 + 2 * 2 * 2
+    harm = [one for one in found.rows if (one["rule"], one["advisor"], one["budget"]) == ("always", "contrary", "any")]
+    assert harm[0]["value"] < -80.0
+    assert "rank 1" in found.summary["'earned-trust'"]
+    lines = (tmp_path / "sessions.jsonl").read_text().splitlines()
+    assert [json.loads(line)["case"][1] for line in lines] == [None, "expert", "contrary"]
+    (tmp_path / "sessions.jsonl").write_text("\n".join([*lines[:2], "cut"]))
+    again = advice_bench(job, reading)
+    assert again.rows == found.rows
+    assert again.summary == found.summary
+
+
+def test_what_cannot_be_benched_is_refused() -> None:
+    job = Job(sessions=2)
+    with pytest.raises(BadInput, match=r"unknown rule 'trost'.*trust"):
+        advice_bench(job, {"methods": ["trost"]})
+    with pytest.raises(BadInput, match="unknown advisor 'expart'"):
+        advice_bench(job, {"problem": ["empty"], "advisors": ["expart"]})
+    with pytest.raises(BadInput):
+        advice_bench(job, {"problem": ["no-such-maze"]})
+
+
+def test_a_file_of_ones_own_and_any_advisor_that_always_answers_alike(tmp_path: Path) -> None:
+    maze = tmp_path / "maze.txt"
+    maze.write_text("S..\n.#.\n..G\n")
+    found = advice_bench(
+        Job(sessions=3), {"problem": [str(maze)], "methods": ["earned-trust"], "advisors": ["tau=0.05"]}
+    )
+    assert found.rows[-1]["value"] > 0.0
+    place = problem(str(maze))
+    assert advice_of("tau=0.05", place).thresholds.shape == (1, *place.mdp.successor.shape)
