@@ -13,7 +13,7 @@ from lab.errors import BadInput
 from lab.production.sequencing_job import Wanted, sequence_cell, sequenced_named
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import NO_CHANCE
-from lab.sequencing.search import SequenceResult, among
+from lab.sequencing.search import SequenceResult
 from lab.sequencing.simulate.follow import simulate
 from lab.tasks.sequencing import Sequencing
 from lab.teaching.teacher import Teacher
@@ -63,7 +63,7 @@ class OrderResult:
 
     @property
     def proven(self) -> bool:
-        """Whether no order costs less than the best one, of those in `proven_of`."""
+        """Whether no order costs less than the best one."""
         return bool(self.document["proven"])
 
     @property
@@ -99,7 +99,6 @@ class OrderResult:
 
     def __str__(self) -> str:
         what = "proven: there is none better" if self.proven else f"nothing below {self.bound:g} is possible"
-        what += among(self.proven_of)
         return f"{self.document['objective']} {self.cost:g} (by {self.document['best_by']}; {what})"
 
     def _repr_html_(self) -> str:

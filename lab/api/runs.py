@@ -19,7 +19,6 @@ from lab.production.run_advice import RunAdvice
 from lab.production.run_journal import RunJournal
 from lab.production.run_options import RunOptions, begun
 from lab.sequencing.cell.schedule_rows import rows_of
-from lab.sequencing.search import among
 from lab.skills.prepared_scene import prepare
 from lab.tasks.task_file import load
 from lab.teaching.teacher import Teacher
@@ -91,7 +90,6 @@ class RunResult:
         delivered = f"{len(self.report.outcome.delivered)} of {len(self.report.prepared.order)} parts"
         why = f"; {self.failure}" if self.failure else ""
         gap = f"planned {self.report.sequenced.cost:.1f} s, {100 * self.report.gap:.1f} % above what is proven"
-        gap += among(self.report.proven.of)
         return f"{self.report.prepared.task.name}: {delivered} in {self.makespan_s:.1f} s ({gap}){why}"
 
     def _repr_html_(self) -> str:

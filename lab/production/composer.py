@@ -132,7 +132,7 @@ class Production:
         if found.schedule is not None and found.proven is not None:
             proven, plan = found.proven, found.schedule.later(now_s)
             gap = proven.gap(found.schedule.makespan_s)
-            self.tell(PlanMade(plan, len(self.sequence), gap, proven.proven, now_s, why, proven.of, found.method))
+            self.tell(PlanMade(plan, len(self.sequence), gap, proven.proven, now_s, why, found.method))
         if found.method:
             self.replanned.append(Replanned(now_s, why, found.method, len(self.sequence), gap))
 

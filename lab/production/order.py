@@ -161,9 +161,7 @@ def ordered(cell: Cell, settings: Sequencing, advice: OrderAdvice, seed: int, te
     """
     search, proven = search_for(settings), optimum(cell)
     is_timed = search.objective == MAKESPAN
-    known = (
-        Reference(proven.bound_s, proven.proven, "A*", of=proven.of) if is_timed else reference(cell, search.objective)
-    )
+    known = Reference(proven.bound_s, proven.proven, "A*") if is_timed else reference(cell, search.objective)
     orders = dict[str, SequenceResult]()
     if advice.given:
         taken = checked_order(cell, advice.given)

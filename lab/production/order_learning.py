@@ -13,7 +13,7 @@ from lab.sequencing import BESIDE_METHODS
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import MAKESPAN, stuck_cost
 from lab.sequencing.methods.srl_time import bound_alone, srl_time
-from lab.sequencing.search import Reference, Search, SequenceResult, among
+from lab.sequencing.search import Reference, Search, SequenceResult
 from lab.view.figures import beside, gap_of
 
 BOUND_ALONE, UNBOUNDED = "its bound alone", "without its bound"
@@ -74,7 +74,7 @@ class OrderLearning:
         what = "proven optimum" if known.proven else "proven bound"
         by = BESIDE_METHODS.get(self.by, self.by)
         when = "at once" if episodes == 1 else f"in episode {self.episode} of {episodes}"
-        lines = [f"{by}: {cost} {when}; {what} {bound}{self._above(self.found.cost)}{among(known.of)}"]
+        lines = [f"{by}: {cost} {when}; {what} {bound}{self._above(self.found.cost)}"]
         if episodes > 1:
             lines.append(f"its first episode: {self.first_cost:.1f}{known.unit}{self._above(self.first_cost)}")
         for one in self.beside:
@@ -96,7 +96,6 @@ class OrderLearning:
             self.known.bound,
             ylabel="makespan [s]" if self.objective == MAKESPAN else self.objective,
             deadlock=stuck_cost(cell, self.objective),
-            proven_of=self.known.of,
             proven=self.known.proven,
             title=f"The order, as {BESIDE_METHODS.get(self.by, self.by)} learned it",
             beside=lines,

@@ -21,6 +21,7 @@ from lab.production.order_learning import OrderLearning
 from lab.production.outcome import Outcome
 from lab.production.run_story import story_of
 from lab.production.taught import Taught
+from lab.sequencing.cell.cell import EVERY_PLAN
 from lab.sequencing.cell.schedule import Schedule
 from lab.sequencing.cell.schedule_rows import csv_of, rows_of
 from lab.sequencing.methods.exact import Optimum
@@ -121,7 +122,7 @@ class Report:
             "bound_s": self.proven.bound_s,
             "optimality_gap": self.gap,
             "optimum_proven": self.proven.proven,
-            "proven_of": self.proven.of,
+            "proven_of": EVERY_PLAN,
             "camera_deviation_m": max(outcome.camera_deviations_m, default=None),
             "sim_s": outcome.sim_s - outcome.skipped_s + self.taught.durations.sim_s,
             "skipped_s": outcome.skipped_s,

@@ -136,7 +136,7 @@ def run(
     planned = simulate(taught.cell, order.found.sequence)
     gap, proven = order.proven.gap(planned.makespan_s), order.proven.proven
     teacher.tell(PhaseBegan("carry out", len(order.found.sequence)))
-    teacher.tell(PlanMade(planned, len(order.found.sequence), gap, proven, 0.0, of=order.proven.of, method=order.used))
+    teacher.tell(PlanMade(planned, len(order.found.sequence), gap, proven, 0.0, method=order.used))
     faults = prepared.task.faults
     if conditions.fault_seed is not None:
         faults += draw(prepared.task, prepared.order, conditions.fault_seed, planned.makespan_s)

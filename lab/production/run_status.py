@@ -71,7 +71,6 @@ class PlanStatus:
     proven: bool
     why: str
     rows: list[Activity]
-    of: str
     method: str = ""
 
 
@@ -140,7 +139,7 @@ class RunStatus:
             case PlanMade():
                 rows = [*event.schedule.robot, *event.schedule.machines, *event.schedule.parts]
                 self.plan = PlanStatus(
-                    *(event.schedule.makespan_s, event.gap, event.proven, event.why, rows, event.of, event.method)
+                    *(event.schedule.makespan_s, event.gap, event.proven, event.why, rows, event.method)
                 )
                 self.moves = self._made + event.moves
             case MoveBegan() | SkillBegan() | MoveMade() | PartDone() | PartLost():

@@ -17,7 +17,7 @@ from lab.production.any_time import CTRL_C, looked_for
 from lab.production.drawn_times import stochastic
 from lab.production.order import NOBODY, KeepOrder, OrderAdvice, advised_session
 from lab.sequencing import SEQUENCERS, check_method, find_sequence
-from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.cell import EVERY_PLAN, Cell
 from lab.sequencing.cell.chance import NO_CHANCE, Chance
 from lab.sequencing.cell.objectives import (
     MAKESPAN,
@@ -255,7 +255,7 @@ def _document(
         "optimal_s": optimal if timed else None,
         "optimal_cost": optimal,
         "optimum_proven": known.proven,
-        "proven_of": known.of,
+        "proven_of": EVERY_PLAN,
         "bound_s": known.bound if timed else None,
         "bound_cost": known.bound,
         "bound_by": known.method,
@@ -336,7 +336,6 @@ def draw(cell: Cell, document: dict[str, Any], found: Sequence[SequenceResult], 
             files["plot"],
             ylabel=label,
             deadlock=stuck,
-            proven_of=document["proven_of"],
         )
     if "gantt" in files:
         gantt(simulate(cell, document["best_sequence"]), files["gantt"], due_s=cell.due_s)

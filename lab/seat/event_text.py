@@ -21,7 +21,6 @@ from lab.seat.request_text import percent, verdict
 from lab.sequencing import BESIDE_METHODS
 from lab.sequencing.cell.objectives import MAKESPAN
 from lab.sequencing.cell.routes import part_of
-from lab.sequencing.search import among
 from lab.teaching.events import (
     Event,
     KeptBeside,
@@ -174,7 +173,7 @@ def sequence_parts(event: SequenceFound) -> tuple[str, str]:
         gap = known.gap(best.cost)
         shown, bound = beside(best.cost, known.bound, known.unit, 1)
         what = "proven optimum" if known.proven else "proven bound"
-        reference = f"{what} {bound}" + ("" if gap is None else f", gap {gap_of(gap, 1)}") + among(known.of)
+        reference = f"{what} {bound}" + ("" if gap is None else f", gap {gap_of(gap, 1)}")
     by = f" by {event.method}" if event.method else ""
     episode, episodes = best.episode_costs.index(best.cost) + 1, len(best.episode_costs)
     found = f"{shown} found{by} in episode {episode} of {episodes}"

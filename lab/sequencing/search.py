@@ -6,7 +6,7 @@ from math import inf
 from typing import TYPE_CHECKING, Literal, Protocol
 
 from lab.errors import BadInput, WorkFailed, counted, unknown
-from lab.sequencing.cell.cell import EVERY_PLAN, Cell
+from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import NO_CHANCE, Chance
 from lab.sequencing.cell.objectives import MAKESPAN, check_objective
 
@@ -126,17 +126,11 @@ def gap(cost: float, bound: float) -> float:
     return share if share >= SAME else 0.0
 
 
-def among(of: str) -> str:
-    """Of which plans something is proven, where these are not all: ", among ...", else ""."""
-    return "" if of == EVERY_PLAN else f", among {of}"
-
-
 @dataclass(frozen=True)
 class Reference:
     """What no sequence can beat: `bound`, in the objective's unit; `proven`: some sequence reaches it.
 
-    sequence: the best one that was found, without pointless hops, and by which method; empty: none. of: of which plans that is
-    said.
+    sequence: the best one that was found, without pointless hops, and by which method; empty: none.
     """
 
     bound: float
@@ -145,7 +139,6 @@ class Reference:
     unit: str = " s"
     sequence: tuple[int, ...] = ()
     found_by: str = ""
-    of: str = EVERY_PLAN
 
     def gap(self, cost: float) -> float | None:
         """`gap` to the bound; None where the bound is 0 and the cost is not."""

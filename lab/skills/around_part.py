@@ -10,7 +10,7 @@ from lab.errors import BadInput
 from lab.learning.problem import Problem
 from lab.mdp import NoPath, TabularMDP, grid
 from lab.sim.arms.kinematics import ToolPose
-from lab.sim.scene.blocked_cells import Survey
+from lab.sim.scene.blocked_cells import OUT_OF_REACH, Survey, in_the_way
 from lab.skills.skill import Bench, Skill, learned_path, no_way
 from lab.skills.surveys import NEAR_SHAPE, NEAR_STEP_M, NEAR_YAW_STEP, NEAR_YAWS, SurveyName, Surveys, near_pose
 from lab.tasks.task import Task
@@ -46,7 +46,7 @@ class AroundPart(Skill):
         survey = surveys.around(self.station, self.kind, self.carries)
         rewards = surveys.task.subtask(self.subtask).rewards
         try:
-            start = free_above(self.name, survey, self.goal)
+            start = free_above(self.name, survey, self.goal, self.station)
             actions = (
                 self.actions if surveys.into(self.station) is None else tuple(SIDEWAYS.get(a, a) for a in self.actions)
             )
@@ -84,16 +84,17 @@ class AroundPart(Skill):
         yield from robot.follow(poses, blend=_BLEND_M, slow=SLOW)
 
 
-def free_above(what: str, survey: Survey, goal: tuple[int, ...]) -> tuple[int, ...]:
-    """The first free cell of the highest level; BadInput names what blocks them all, or the goal."""
+def free_above(what: str, survey: Survey, goal: tuple[int, ...], station: str) -> tuple[int, ...]:
+    """The first free cell of the highest level at a station; BadInput names what blocks them all, or the goal."""
     top = [cell for cell in np.ndindex(*survey.causes.shape) if cell[2] == NEAR_SHAPE[2] - 1]
     free = [cell for cell in top if not survey.blocked[cell]]
     if survey.blocked[goal] or not free:
         names = survey.names([goal] if survey.blocked[goal] else top)
-        raise BadInput(
-            f"{what}: no room for gripper and part; in the way: {', '.join(names)}: move that, or say spots that are farther "
-            "apart, or let the fingers open less (opening_m)"
-        )
+        why = in_the_way(names, station)
+        if names not in ([station], [OUT_OF_REACH]):
+            why += ": move that, or say spots that are farther apart"
+        less = "" if names == [OUT_OF_REACH] else ", or let the fingers open less (opening_m)"
+        raise BadInput(f"{what}: no room for gripper and part; {why}{less}")
     return free[0]
 
 

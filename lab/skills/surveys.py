@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from lab.errors import BadInput, LabError
 from lab.sim.arms.kinematics import ToolPose
 from lab.sim.parts.kinds import Spot, beside
-from lab.sim.scene.blocked_cells import OUT_OF_REACH, Survey, Surveyor
+from lab.sim.scene.blocked_cells import OUT_OF_REACH, Survey, Surveyor, in_the_way
 from lab.sim.scene.places import Layout
 from lab.sim.scene.scene import Scene
 from lab.sim.scene.scene_check import places_of
@@ -135,10 +135,8 @@ class Surveys:
                 way = _between(self.cell_pose(cell), approach)
                 if not survey.blocked[cell] and not any(surveyor.cause(pose) for pose in way):
                     return cell
-        cause = cause or ", ".join(survey.names(near))
-        raise BadInput(
-            f"station '{place}' cannot be approached{f' with {carried}' if carried else ''}: in the way: {cause}"
-        )
+        why = in_the_way([cause] if cause else survey.names(near), place)
+        raise BadInput(f"station '{place}' cannot be approached{f' with {carried}' if carried else ''}: {why}")
 
     def _cell(self, world: World) -> Scene:
         """The cell without parts; for a level tool, whose wrist is low, with the highest that comes there on each spot in use."""
@@ -215,7 +213,7 @@ class Surveys:
                 if cause := next(filter(None, map(surveyor.cause, way)), ""):
                     raise BadInput(
                         f"station '{station.name}': the tool cannot go over its spot at ({spot.x:.2f}, {spot.y:.2f}) m: "
-                        f"{cause if cause == OUT_OF_REACH else f'in the way: {cause}'}"
+                        f"{in_the_way([cause], station.name)}"
                     )
                 surveyed.append(surveyor.grid(shape, partial(near_pose, goal, into=into)).causes)
         return Survey(reduce(lambda one, other: np.where(one == "", other, one), surveyed))

@@ -11,7 +11,7 @@ from lab.learning.problem import Problem
 from lab.learning.requests import Advisor, Request
 from lab.learning.session import Session
 from lab.learning.settings import GateSettings
-from lab.sequencing.cell.cell import EVERY_PLAN, MAX_PARTS
+from lab.sequencing.cell.cell import MAX_PARTS
 from lab.sequencing.cell.schedule import Move, Schedule
 from lab.sequencing.search import EpisodeSequenced, Reference, SequenceResult
 from lab.teaching.lesson_plan import Lesson, LessonPlan
@@ -192,7 +192,7 @@ class PlanMade:
     """An order for the work that remains was found: its schedule, how many moves, and the proven gap (None: not known).
 
     at_s: when; the schedule's times are counted from the same beginning of the run [s], as all of a run's. why: what
-    made a new plan necessary, "" at first; method: by what the new one was found. of: of which plans it is proven.
+    made a new plan necessary, "" at first; method: by what the new one was found.
     """
 
     schedule: Schedule
@@ -201,7 +201,6 @@ class PlanMade:
     proven: bool
     at_s: float
     why: str = ""
-    of: str = EVERY_PLAN
     method: str = ""
 
 

@@ -10,8 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.errors import BadInput, counted
-from lab.sequencing.cell.cell import EVERY_PLAN
-from lab.sequencing.search import among
 from lab.view.canvas import BLUE, GREY, INK, ORANGE, RED, SKY, picture_file, seconds, tip
 
 if TYPE_CHECKING:
@@ -30,7 +28,6 @@ def sequence_plot(
     *,
     ylabel: str = "makespan [s]",
     deadlock: float | None = None,
-    proven_of: str = EVERY_PLAN,
     proven: bool = True,
     title: str = "",
     beside: Mapping[str, float] = NOTHING,
@@ -39,7 +36,7 @@ def sequence_plot(
 
     Several sessions (a list of lists): the best so far of each as a pale line, their mean, and the mean cost of an
     episode. deadlock: the cost of episodes that ended in one (`stuck_cost`), drawn as marks at the upper edge; they
-    count in no mean. proven_of: of which plans; proven: `optimal` is the optimum, not only a bound. beside: other costs to
+    count in no mean. proven: `optimal` is the optimum, not only a bound. beside: other costs to
     compare with, by what they are called. Raises BadInput without episodes, and as all plots here do.
     Source: thesis fig. 7.3.
     """
@@ -59,7 +56,7 @@ def sequence_plot(
         draw = _draw_session if len(sessions) == 1 else _draw_sessions
         draw(axes, kept, unit)
         if optimal is not None:
-            label = f"proven {'optimum' if proven else 'bound'}: {_number(optimal, unit)}{among(proven_of)}"
+            label = f"proven {'optimum' if proven else 'bound'}: {_number(optimal, unit)}"
             axes.axhline(optimal, color=RED, linestyle="--", linewidth=1.4, label=label)
         for (label, value), look in zip(beside.items(), cycle((":", "-.")), strict=False):
             axes.axhline(value, color=ORANGE, linestyle=look, linewidth=1.2, label=label)

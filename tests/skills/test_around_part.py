@@ -78,6 +78,20 @@ def test_no_room_beside_the_slice_is_bad_input_that_names_what_is_in_the_way(tas
             skill.setup(surveys)
 
 
+def test_a_station_in_its_own_way_is_not_told_to_be_moved(task: Task, layout: Layout) -> None:
+    """A box with its floor below its rim: the part would stand inside, and moves with the station."""
+    own = {"body": "box", "size_m": (0.3, 0.3, 0.12), "floor_m": 0.02}
+    stations = tuple(s.model_copy(update=own) if s.name == "toaster_buffer" else s for s in task.stations)
+    surveys = Surveys(task.changed(stations=stations), ORDER, layout)
+    for skill in (Grasp(surveys.task, "slice", "toaster_buffer"), Place(surveys.task, "slice", "toaster_buffer")):
+        with pytest.raises(BadInput) as told:
+            skill.setup(surveys)
+        assert str(told.value) == (
+            f"{skill.name}: no room for gripper and part; in the way: toaster_buffer itself: "
+            "change its body, size_m, floor_m, spots or approach, or let the fingers open less (opening_m)"
+        )
+
+
 def test_a_pillar_at_one_side_leaves_the_other_side_to_begin_from(task: Task) -> None:
     x, y, _ = task.station("toaster_buffer").pose
     near = Obstacle(name="pillar", position_m=(x, y - 0.105), cubes=6)

@@ -251,7 +251,7 @@ class OperatedScene:
         plan, now_s = self._planned(), self.floor.now_s
         schedule = simulate(plan.taught.cell, plan.found.sequence).later(now_s)
         gap = plan.proven.gap(plan.found.cost)
-        self.tell(PlanMade(schedule, len(plan.found.sequence), gap, plan.proven.proven, now_s, why, plan.proven.of))
+        self.tell(PlanMade(schedule, len(plan.found.sequence), gap, plan.proven.proven, now_s, why))
 
     def _planned(self) -> Plan:
         if self.plan is None:
@@ -274,7 +274,7 @@ class OperatedScene:
             else:
                 schedule = order.schedule.later(self.floor.now_s - production.work.plan.now_s)
                 now_s, why = self.floor.now_s, f"the operator's order: {order.words}"
-                self.tell(PlanMade(schedule, len(order.sequence), order.gap, order.proven, now_s, why, order.of))
+                self.tell(PlanMade(schedule, len(order.sequence), order.gap, order.proven, now_s, why))
             return order.words
 
         return deed

@@ -9,7 +9,6 @@ from lab.errors import counted
 from lab.production.order import moves_from
 from lab.sequencing.cell.schedule import Schedule
 from lab.sequencing.methods.exact import optimum
-from lab.sequencing.search import among
 from lab.sequencing.simulate.rest import rest_of
 from lab.sequencing.simulate.run import Run
 
@@ -18,14 +17,13 @@ from lab.sequencing.simulate.run import Run
 class TypedOrder:
     """A sequence that may be carried out: when it ends [s] and how much longer that is than the proven optimum or bound.
 
-    gap: a fraction; proven: against an optimum, not only a bound. of: of which plans.
+    gap: a fraction; proven: against an optimum, not only a bound.
     """
 
     sequence: tuple[int, ...]
     schedule: Schedule
     gap: float
     proven: bool
-    of: str
 
     @property
     def words(self) -> str:
@@ -34,7 +32,7 @@ class TypedOrder:
         longer = (
             f"{100 * self.gap:.1f} % longer than the {against}" if self.gap > 1e-9 else f"as short as the {against}"
         )
-        return f"{counted(len(self.sequence), 'move')}, {self.schedule.makespan_s:.1f} s: {longer}{among(self.of)}"
+        return f"{counted(len(self.sequence), 'move')}, {self.schedule.makespan_s:.1f} s: {longer}"
 
 
 def checked(state: Run, sequence: Sequence[int]) -> TypedOrder:
@@ -44,4 +42,4 @@ def checked(state: Run, sequence: Sequence[int]) -> TypedOrder:
     rest = rest_of(state, fallback_s=float(np.nanmax(state.cell.empty_s, initial=0.0))).cell
     proven = optimum(state.cell if rest is None else rest)
     gap = proven.gap(schedule.makespan_s - state.now_s)
-    return TypedOrder(tuple(sequence), schedule, gap, proven.proven, proven.of)
+    return TypedOrder(tuple(sequence), schedule, gap, proven.proven)

@@ -262,9 +262,9 @@ const seatConsole = (() => {
     chart.grow(now);
   }
 
-  function planInWords({ makespan_s, gap, proven, among, why, by }) {
+  function planInWords({ makespan_s, gap, proven, why, by }) {
     const worth = gap === null ? "" : proven && gap < 5e-4 ? ", proven: no order is faster" : `, ${(100 * gap).toFixed(1)} % above the ${proven ? "optimum" : "proven bound"}`;
-    return `The plan${by ? ` by ${by}` : ""} ends at ${makespan_s.toFixed(1)} s${worth}${gap === null ? "" : among}${why ? ` (new: ${why})` : ""}.`;
+    return `The plan${by ? ` by ${by}` : ""} ends at ${makespan_s.toFixed(1)} s${worth}${why ? ` (new: ${why})` : ""}.`;
   }
 
   function tick() {

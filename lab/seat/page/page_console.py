@@ -11,7 +11,6 @@ from lab.seat.event_text import PHASES
 from lab.seat.page.page_order import chart_row
 from lab.sequencing import BESIDE_METHODS
 from lab.sequencing.cell.stations import ROBOT
-from lab.sequencing.search import among
 from lab.teaching.events import Event, MoveMade, PartLost, PlanMade, SkillBegan
 
 Json = dict[str, Any]
@@ -97,7 +96,6 @@ def plan_of(console: Console | None) -> Json | None:
         "makespan_s": plan.makespan_s,
         "gap": plan.gap,
         "proven": plan.proven,
-        "among": among(plan.of),
         "why": plan.why,
         "by": BESIDE_METHODS.get(plan.method, plan.method),
         "rows": [chart_row(one) for one in plan.rows if one.resource in rows],

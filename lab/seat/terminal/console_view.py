@@ -8,7 +8,6 @@ from lab.production.run_status import MachineStatus, PartStatus, RunStatus
 from lab.seat.terminal.screen import folded
 from lab.sequencing.cell.schedule import Activity
 from lab.sequencing.cell.stations import ROBOT
-from lab.sequencing.search import among
 
 LIGHTS = {"idle": ("( )", "dim"), "busy": ("(>)", "yellow"), "done": ("(v)", "green"), "failed": ("(!)", "bold red")}
 HELDS = {
@@ -117,11 +116,7 @@ def _chart(status: RunStatus, width: int) -> list[Text]:
     until = f"0 s to {end_s:.0f} s"
     if status.plan is not None:
         gap, plan = status.plan.gap, status.plan
-        against = (
-            ""
-            if gap is None
-            else f", {100 * gap:.1f} % above the {'optimum' if plan.proven else 'bound'}{among(plan.of)}"
-        )
+        against = "" if gap is None else f", {100 * gap:.1f} % above the {'optimum' if plan.proven else 'bound'}"
         until += f"; plan{plan.method and f' by {plan.method}'} {plan.makespan_s:.1f} s{against}" + (
             f" ({plan.why})" if plan.why else ""
         )

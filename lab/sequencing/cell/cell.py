@@ -41,7 +41,7 @@ TRACK_SLACK_S = 1e-9  # by what sums of times may differ
 BUFFER_USES = ("busy", "free")
 ARRIVALS_AFTER = ("clock", "pick")
 
-EVERY_PLAN = "every plan"  # of which something is proven
+EVERY_PLAN = "every plan"  # of which orders are proven; cycles name theirs, see `Rhythm.proven_of`
 
 
 @dataclass(frozen=True, eq=False)

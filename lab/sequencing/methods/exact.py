@@ -9,7 +9,7 @@ from operator import le
 import numpy as np
 
 from lab.errors import WorkFailed, counted
-from lab.sequencing.cell.cell import EVERY_PLAN, Cell
+from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import MAKESPAN
 from lab.sequencing.cell.ways import FAR, TICKS_PER_S
 from lab.sequencing.methods.lower_bound import LowerBound
@@ -33,7 +33,7 @@ class Optimum:
     """The best sequence known, and what is proven: no sequence is shorter than `bound_s`.
 
     cost: its makespan [s]. `proven`: the sequence is optimal (to a nanosecond a move) and `bound_s` is its makespan.
-    `expanded`: states opened. `of`: of which plans that is said.
+    `expanded`: states opened.
     """
 
     cost: float
@@ -41,7 +41,6 @@ class Optimum:
     proven: bool
     bound_s: float
     expanded: int
-    of: str = EVERY_PLAN
 
     @property
     def optimal_s(self) -> float | None:

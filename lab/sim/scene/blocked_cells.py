@@ -35,6 +35,15 @@ class Survey:
         return sorted({str(self.causes[cell]) for cell in cells} - {""})
 
 
+def in_the_way(causes: Sequence[str], station: str) -> str:
+    """What keeps the tool from a station, for an error; where that is its own body, what to change: it moves along with it."""
+    if [*causes] == [OUT_OF_REACH]:
+        return OUT_OF_REACH
+    named = ", ".join(f"{cause} itself" if cause == station else cause for cause in causes)
+    own = ": change its body, size_m, floor_m, spots or approach" if [*causes] == [station] else ""
+    return f"in the way: {named}{own}"
+
+
 class Surveyor:
     """Puts the arm at one pose after the other in a scene and measures what is near; with or without a part in the fingers."""
 

@@ -6,7 +6,6 @@ from hypothesis import strategies as st
 
 from lab.production.run_status import HeldStatus, PlanStatus, RunStatus
 from lab.seat.terminal.console_view import LIGHTS, NOTICE, plain_lines, row_of, view
-from lab.sequencing.cell.cell import EVERY_PLAN
 from lab.sequencing.cell.schedule import Activity, Move
 from lab.tasks.task_file import load
 from lab.teaching.events import MachineBegan, MachineFailed, MoveBegan, MoveMade, SkillBegan, TroubleMet
@@ -30,7 +29,7 @@ def status() -> RunStatus:
         Activity("robot", "carry", 1, "plate", "toaster", 0.0, 10.0),
         Activity("toaster", "process", 1, "toaster", "toaster", 10.0, 50.0),
     ]
-    made.plan = PlanStatus(50.0, 0.02, True, "slice 2 was moved", rows, EVERY_PLAN)
+    made.plan = PlanStatus(50.0, 0.02, True, "slice 2 was moved", rows)
     made.now_s = 20.0
     return made
 

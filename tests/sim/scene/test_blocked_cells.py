@@ -5,7 +5,7 @@ import pytest
 
 from lab.sim.arms.kinematics import ToolPose
 from lab.sim.arms.robot import NAME
-from lab.sim.scene.blocked_cells import CARRIED, OUT_OF_REACH, Survey, Surveyor
+from lab.sim.scene.blocked_cells import CARRIED, OUT_OF_REACH, Survey, Surveyor, in_the_way
 from lab.sim.scene.places import Layout
 from lab.sim.scene.scene import Scene
 from lab.sim.world import World
@@ -142,3 +142,13 @@ def test_a_grid_says_of_each_cell_what_a_pose_alone_does(task: Task, world: Worl
     causes = surveyor.grid((8, 2), far_out).causes
     assert {str(cause) for cause in causes.ravel()} == {"", OUT_OF_REACH, "cube"}
     assert all(causes[cell] == surveyor.cause(far_out(cell)) for cell in np.ndindex(8, 2))
+
+
+def test_only_the_stations_own_body_is_to_be_changed() -> None:
+    """What stands there is named alone; a station moves along with its own body, so that is to be changed."""
+    assert in_the_way([OUT_OF_REACH], "oven") == "out of reach"
+    assert in_the_way(["pillar"], "oven") == "in the way: pillar"
+    assert in_the_way(["oven", "pillar"], "oven") == "in the way: oven itself, pillar"
+    assert (
+        in_the_way(["oven"], "oven") == "in the way: oven itself: change its body, size_m, floor_m, spots or approach"
+    )
