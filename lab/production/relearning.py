@@ -59,8 +59,7 @@ def relearned(prepared: Prepared, taught: Taught, scene: tuple[Task, Layout], te
     Raises BadInput for a scene in which nothing can be done.
     """
     task, layout = scene
-    check_scene(task)
-    fresh = _surveyed(prepared, task, layout)
+    fresh = _surveyed(prepared, check_scene(task), layout)
     teacher = replace(teacher, trial=trial_of(fresh))
     known = KnownPolicies.of(lesson.policy for lesson in taught.lessons.values())
     lessons: dict[str, Lesson] = {}

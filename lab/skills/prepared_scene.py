@@ -49,7 +49,7 @@ def prepare(task: Task, order: Order, seed: int, only: str | None = None, worker
     """
     began = time.perf_counter()
     with task.in_its_file():
-        check_scene(task)
+        task = check_scene(task)
         check_apart(task, len(order))
         precedences(task, order)
         skillset = SkillSet.of(task, order)

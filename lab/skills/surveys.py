@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from lab.errors import BadInput, LabError
 from lab.sim.arms.kinematics import ToolPose
-from lab.sim.parts.kinds import Spot, beside
+from lab.sim.parts.kinds import Spot, beside, comes_as
 from lab.sim.scene.blocked_cells import OUT_OF_REACH, Survey, Surveyor, in_the_way
 from lab.sim.scene.places import Layout
 from lab.sim.scene.scene import Scene
@@ -218,6 +218,21 @@ class Surveys:
                 surveyed.append(surveyor.grid(shape, partial(near_pose, goal, into=into)).causes)
         return Survey(reduce(lambda one, other: np.where(one == "", other, one), surveyed))
 
+    def _may_stand(self, station: Station, kind: str, spot: Spot, own: str, loaded: bool) -> bool:
+        """Whether one of a kind may stand on a spot beside a part of another kind while this is taken up or, `loaded`, set down.
+
+        The widest may anywhere. Others may where they begin, while parts that begin there are taken, and wherever parts come on
+        their ways; where its route ends a part is only taken up again after a fault.
+        """
+        made = self.task.made_as(own)
+        if kind == max(self.places.kinds_at(station.name), key=lambda one: one.footprint_m()).name:
+            return True
+        if loaded or self.task.starts(made.name) != station.name:
+            return loaded or all(route[-1].station != station.name for route in made.routes)
+        begins = zip(self.order, self.places.begins(self.order), strict=True)
+        stand = [at for name, at in begins if comes_as(self.task.part(name)) == kind]
+        return any(hypot(at.x - spot.x, at.y - spot.y) < NEAR_STEP_M[0] for at in stand)
+
     def spots_in_use(self, station: Station, kind: str, loaded: bool) -> tuple[Spot, ...]:
         """The spots on which parts of the order of a kind are taken up at a station or, loaded, set down; the first if none.
 
@@ -261,7 +276,8 @@ class Surveys:
         """What surveys around a part on a spot, and where the tool closes or opens."""
         own, scene = self.kinds[kind], Scene(world, self.task, (), self.layout)
         for name, (neighbour, other) in self.places.neighbours(station, spot).items():
-            self._stand(scene, name, neighbour, other)
+            if self._may_stand(station, neighbour, other, kind, loaded):
+                self._stand(scene, name, neighbour, other)
         foot = self.places.raised(kind, station, spot)
         if foot != spot:
             self._stand(scene, "the part", str(self.task.part(kind).pallet), spot)

@@ -82,7 +82,7 @@ def test_a_policy_that_learned_nothing_goes_round(task: Task, known: Known) -> N
 
 def test_what_slips_in_physics_fails_there(task: Task, known: Known, monkeypatch: pytest.MonkeyPatch) -> None:
     """So smooth a slice would be refused before it is tried."""
-    monkeypatch.setattr("lab.sim.scene.scene_check.check_held", lambda *_: None)
+    monkeypatch.setattr("lab.sim.scene.scene_check.held", lambda robot, *_: robot)
     smooth = task.changed(parts=(task.parts[0].model_copy(update={"friction": 0.001}),))
     scene = in_scene(known(GRASP), smooth, GRASP, 0)
     assert (scene.failed_in, scene.reason) == ("physics", "slice 1 is not in the gripper after grasping at 'plate'")

@@ -149,7 +149,7 @@ def test_a_journal_says_solved_only_after_the_trial_in_physics(
     task: Task, teacher: Teacher, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The grasp of a slice as slippery as wet ice, which nobody refuses, lifts nothing: journal and toolbox say the same."""
-    monkeypatch.setattr("lab.sim.scene.scene_check.check_held", lambda *_: None)
+    monkeypatch.setattr("lab.sim.scene.scene_check.held", lambda robot, *_: robot)
     ice = task.changed(parts=(task.parts[0].model_copy(update={"friction": 0.001}),))
     options = LessonOptions("grasp", advisors=("expert",))
     document = teach(SkillSubject.of(options, ice), options, teacher, tmp_path / "lesson")

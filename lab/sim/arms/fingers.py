@@ -172,7 +172,15 @@ class _Ends:
         palm = [float(points[:, 0].max()) for points in (self.points(link, 0.0) for link in self.palm) if len(points)]
         tip = finger[finger[:, 0] > finger[:, 0].max() - _TIP_M]
         depth = -max(palm) if palm else float(np.ptp(finger[:, 0]))
-        return Gripper(opening_m, depth, float(np.ptp(tip[:, 2])), float(np.ptp(tip[:, 1])))
+        solid = np.concatenate([self.points(link, 1.0) for link in self.solids])
+        hand = np.abs(solid[solid[:, 0] <= -depth + 1e-9]).max(axis=0, initial=0.0)
+        return Gripper(
+            opening_m,
+            depth,
+            float(np.ptp(tip[:, 2])),
+            float(np.ptp(tip[:, 1])),
+            hand_m=(float(hand[2]), float(hand[1])),
+        )
 
     def _side(self, name: str) -> bool:
         """Whether a joint is left of the middle when all are half open."""

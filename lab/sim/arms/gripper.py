@@ -10,7 +10,8 @@ class Gripper:
     """Two parallel fingers, which close along the tool's y axis [m].
 
     opening_m: between the open fingers' pads. depth_m: from the finger tips up to the palm. width_m, thick_m: of a
-    finger, across the way it closes and along it. level: the tool is held level, not hanging.
+    finger, across the way it closes and along it. level: the tool is held level, not hanging. hand_m: how far what is above
+    the palm reaches from the tool's axis, across the way the fingers close and along it.
     """
 
     opening_m: float
@@ -18,3 +19,4 @@ class Gripper:
     width_m: float
     thick_m: float
     level: bool = False
+    hand_m: tuple[float, float] = (0.0, 0.0)

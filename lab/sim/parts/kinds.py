@@ -36,22 +36,29 @@ class Spot:
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of part, or a pallet with its part on it: then the gripper holds the pallet, and `rider` stands on that.
-
-    finger_m: how far an open finger reaches beyond the part's side [m].
-    """
+    """A kind of part, or a pallet with its part on it: then the gripper holds the pallet, and `rider` stands on that."""
 
     name: str
     part: Part
     shape: PartShape
     grip: Grip
-    finger_m: float
+    gripper: Gripper
     rider: "Kind | None" = None
 
     @property
     def height_m(self) -> float:
         """From the foot to the top."""
         return sum(kind.shape.height_m for kind in self.stack())
+
+    @property
+    def finger_m(self) -> float:
+        """How far an open finger reaches beyond the part's side [m]."""
+        return (self.gripper.opening_m - self.grip.width_m) / 2 + self.gripper.thick_m
+
+    @property
+    def palm_up_m(self) -> float:
+        """How high above the part's foot the palm of a hanging tool is that holds it [m]."""
+        return self.grip.up_m + self.gripper.depth_m
 
     @property
     def gyration_m(self) -> float:
@@ -95,6 +102,11 @@ class Kind:
         reach = [np.maximum(-kind.shape.low[:2], kind.shape.high[:2]) for kind in self.stack()]
         x, y = np.max(reach, axis=0)
         return float(x), float(y)
+
+    def hand_half_m(self) -> tuple[float, float]:
+        """How far the hand that holds a standing part reaches from the part's spot at most, along the part's axes [m]."""
+        (wide, thick), c, s = self.gripper.hand_m, abs(cos(self.grip.yaw)), abs(sin(self.grip.yaw))
+        return abs(self.grip.x) + c * wide + s * thick, abs(self.grip.y) + s * wide + c * thick
 
     def margins_m(self, beside: float, closing: float) -> tuple[float, float]:
         """`beside` [m] along both of the part's axes, and so much more, `closing` [m], along the way the fingers close."""
@@ -141,7 +153,7 @@ def kinds_of(task: Task, gripper: Gripper) -> dict[str, Kind]:
 def _kind(part: Part, folder: Path, gripper: Gripper) -> Kind:
     shape = shape_of(part, folder)
     grip = grip_of(shape, gripper, part.friction, part.grip)
-    return Kind(part.name, part, shape, grip, (gripper.opening_m - grip.width_m) / 2 + gripper.thick_m)
+    return Kind(part.name, part, shape, grip, gripper)
 
 
 def _check_rider(loaded: Kind, gripper: Gripper) -> None:

@@ -34,21 +34,30 @@ BESIDE_M = 0.03  # [m] of the block around the foot
 ABOVE_M = 0.0005  # [m] between what stands on one another, at first
 
 
-def check_held(robot: RobotSettings, arm: Arm, kinds: Sequence[Kind], way_m: float = 0.0) -> None:
-    """BadInput where friction cannot hold a part, or where a part is lost in a trial; only what is unusual is tried.
+def held(
+    robot: RobotSettings, arm: Arm, kinds: Sequence[Kind], way_m: float = 0.0, turn_rad: float = TURN_RAD
+) -> RobotSettings:
+    """The robot as it holds all kinds: with a gentler force where they creep from the one that is chosen; one given is kept.
 
-    way_m: how far parts are carried at most [m]. The refusal names a gentler force with which all are held, if one is found.
+    Only what is unusual is tried. way_m: how far parts are carried at most [m]; turn_rad: how far the tool turns with them.
+    BadInput where friction cannot hold a part, and where one is lost in a trial; it names a gentler force that holds, if any.
     """
-    for kind, went in _lost(robot, arm, kinds, way_m):
+    for kind, went in _lost(robot, arm, kinds, way_m, turn_rad):
+        gentler = _gentler(robot, arm, kinds, way_m, turn_rad)
+        if gentler is not None and robot.grip_force_n is None:
+            return gentler
         hint = "another mass_kg, friction or acceleration_m_s2 may do"
         if robot.grip_force_n is not None:
             hint = f"without grip_force_n a force is chosen, or {hint}"
-        if gentler_n := _gentler_n(robot, arm, kinds, way_m):
-            hint = f"pressed less it holds: grip_force_n = {gentler_n:g}"
+        if gentler is not None:
+            hint = f"pressed less it holds: grip_force_n = {gentler.grip_force_n:g}"
         raise BadInput(f"{with_force(robot, Load.of(kind))}, is not held: in a trial {went}; {hint}")
+    return robot
 
 
-def _lost(robot: RobotSettings, arm: Arm, kinds: Sequence[Kind], way_m: float) -> Iterator[tuple[Kind, str]]:
+def _lost(
+    robot: RobotSettings, arm: Arm, kinds: Sequence[Kind], way_m: float, turn_rad: float
+) -> Iterator[tuple[Kind, str]]:
     """The kinds that are lost in a trial, and how; BadInput for those that friction cannot hold."""
     fine, laps = needs_fine(robot, kinds), max(1, ceil(way_m / LAP_M))
     loads = [Load.of(kind) for kind in kinds]
@@ -58,25 +67,27 @@ def _lost(robot: RobotSettings, arm: Arm, kinds: Sequence[Kind], way_m: float) -
         force_n = grip_force_n(robot, load)
         if load.is_usual(force_n, robot.acceleration_m_s2) and not robot.is_file:
             continue
-        if went := tried(Trial(arm, kind, force_n, robot.speed_m_s, robot.acceleration_m_s2, fine, laps)):
+        if went := tried(Trial(arm, kind, force_n, robot.speed_m_s, robot.acceleration_m_s2, fine, laps, turn_rad)):
             yield kind, went
 
 
-def _gentler_n(robot: RobotSettings, arm: Arm, kinds: Sequence[Kind], way_m: float) -> float | None:
-    """A gentler force than now [N] with which all kinds are held: what is pressed too hard creeps from between the fingers."""
+def _gentler(
+    robot: RobotSettings, arm: Arm, kinds: Sequence[Kind], way_m: float, turn_rad: float
+) -> RobotSettings | None:
+    """The robot with a gentler force with which all kinds are held: what is pressed too hard creeps from between the fingers."""
     now_n = max(grip_force_n(robot, Load.of(kind)) for kind in kinds)
     for share in GENTLER:
         gentler = robot.model_copy(update={"grip_force_n": float(f"{share * now_n:.2g}")})
         with suppress(BadInput):
-            if not any(_lost(gentler, arm, kinds, way_m)):
-                return gentler.grip_force_n
+            if not any(_lost(gentler, arm, kinds, way_m, turn_rad)):
+                return gentler
     return None
 
 
 class Trial(NamedTuple):
     """A kind that an arm takes up with a force [N], moving as fast [m/s] and speeding up as much [m/s2] as in its task.
 
-    laps: how often it is carried from side to side, round a corner, and turned.
+    laps: how often it is carried from side to side, round a corner, and turned, by turn_rad.
     """
 
     arm: Arm
@@ -86,6 +97,7 @@ class Trial(NamedTuple):
     acceleration_m_s2: float
     fine: bool = False
     laps: int = 1
+    turn_rad: float = TURN_RAD
 
 
 @lru_cache(maxsize=64)
@@ -123,7 +135,7 @@ def _way(trial: Trial, spot: Spot) -> list[ToolPose]:
     at = trial.kind.held_at(spot)
     up = at.shifted(dz=LIFT_M)
     side = up.shifted(dy=-SWING_M)
-    return [at, up, up.shifted(dy=SWING_M), side, side.shifted(dx=CORNER_M), up.shifted(dyaw=TURN_RAD), up]
+    return [at, up, up.shifted(dy=SWING_M), side, side.shifted(dx=CORNER_M), up.shifted(dyaw=trial.turn_rad), up]
 
 
 def _built(world: World, kind: Kind, spot: Spot) -> list[str]:

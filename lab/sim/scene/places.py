@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import product
+from itertools import permutations, product
 from math import ceil, cos, hypot, pi, sin
 
 import numpy as np
@@ -24,6 +24,7 @@ SLAB_M, CLOSING_M = (
 )  # [m] that a slab is larger than what stands on it, and as much more where fingers close
 APART_M = 0.002  # [m] between parts where they begin, at least
 FREE_M = 0.0125  # [m] beyond an open finger to what stands beside, at least
+UNDER_M = 0.005  # [m] of the palm over what stands beside a part, at least
 MAX_DRAWS = 100  # of an obstacle's place
 ON_TOP_M = 0.002  # between the top of a part and the foot of the one that stands on it, at most [m]
 SPARE_SPOTS = 4  # so many spots of a station are reckoned with, however few parts there are
@@ -127,8 +128,15 @@ class Places:
         return sorted(found, key=lambda at: (round(hypot(*at), 6), at))
 
     def pitch(self, station: Station) -> tuple[float, float]:
-        """From one spot to the next, along and across [m]."""
-        return self._largest(station, BETWEEN_M, lambda kind: max(FINGERS_M, kind.finger_m - BETWEEN_M + FREE_M), 2.0)
+        """From one spot to the next, along and across [m]: fingers come between parts, and the hand past those above its palm."""
+        pitch_m = self._largest(
+            station, BETWEEN_M, lambda kind: max(FINGERS_M, kind.finger_m - BETWEEN_M + FREE_M), 2.0
+        )
+        for kind, other in permutations(self.kinds_at(station.name), 2):
+            if not kind.gripper.level and other.height_m > kind.palm_up_m - UNDER_M:
+                past_m = np.add(kind.hand_half_m(), other.footprint_m()) + FREE_M
+                pitch_m = max(pitch_m[0], float(past_m[0])), max(pitch_m[1], float(past_m[1]))
+        return pitch_m
 
     def room(self, station: Station) -> tuple[float, float]:
         """How far a part and the gripper around it reach from a spot, along and across [m]."""
@@ -275,8 +283,8 @@ class Places:
 
     def neighbours(self, station: Station, spot: Spot) -> dict[str, tuple[str, Spot]]:
         """Parts that may stand beside one spot, their kind and spots by name; where there is one place only there are none."""
-        largest = max(self.kinds_at(station.name), key=lambda kind: kind.footprint_m(), default=None)
-        if largest is None or station.capacity == 1:
+        kinds = outermost(self.kinds_at(station.name))
+        if not kinds or station.capacity == 1:
             return {}
         if station.own_places:
             seen = enumerate(self._seen_from(station, spot), 1)
@@ -286,20 +294,18 @@ class Places:
         if self._has_columns(station):
             steps |= {"to the left": (-column_m, 0.0), "to the right": (column_m, 0.0)}
         return {
-            f"{largest.name} {where}": (
-                largest.name,
-                Spot(*beside((spot.x, spot.y), spot.yaw, off), spot.z, spot.yaw),
-            )
+            f"{kind.name} {where}": (kind.name, Spot(*beside((spot.x, spot.y), spot.yaw, off), spot.z, spot.yaw))
+            for kind in kinds
             for where, off in steps.items()
         }
 
     def _seen_from(self, station: Station, spot: Spot) -> list[tuple[str, Spot]]:
-        """The largest kind on each other spot of the station and where that lies as seen from any of them, seen from this one.
+        """The outermost kinds on each other spot of the station and where that lies as seen from any of them, from this one.
 
         Lower layers are left away: they are no higher than what this spot lies on; and so is what this one carries.
         """
-        found: dict[tuple[float, ...], tuple[str, Spot]] = {}
-        stand = {one: [kind.name for kind, _ in self.grounds(station, one)] for one in self.spots(station)}
+        found: dict[tuple[str | float, ...], tuple[str, Spot]] = {}
+        stand = {one: [kind for kind, _ in self.grounds(station, one)] for one in self.spots(station)}
         for one, own in stand.items():
             for other, kinds in stand.items():
                 # the places of a kind are filled from the lowest on: above it stands none of its own yet
@@ -309,11 +315,24 @@ class Places:
                 if up > 0.0 and one in [under for _, under in self.below(station, other)]:
                     continue
                 along, across = beside((0.0, 0.0), -one.yaw, (other.x - one.x, other.y - one.y))
-                largest = max(kinds, key=lambda kind: self.kinds[kind].footprint_m())
                 x, y = beside((spot.x, spot.y), spot.yaw, (along, across))
+                seen = Spot(x, y, spot.z + up, spot.yaw + other.yaw - one.yaw)
                 key = round(along, 4), round(across, 4), round(up, 4), round(other.yaw - one.yaw, 4)
-                found[key] = largest, Spot(x, y, spot.z + up, spot.yaw + other.yaw - one.yaw)
+                found |= {(kind.name, *key): (kind.name, seen) for kind in outermost(kinds)}
         return list(found.values())
+
+
+def outermost(kinds: Sequence[Kind]) -> list[Kind]:
+    """The kinds than which no other reaches as far to all sides and up: who keeps clear of them keeps clear of all."""
+    sizes = [(*kind.footprint_m(), kind.height_m) for kind in kinds]
+    return [
+        kind
+        for n, (kind, own) in enumerate(zip(kinds, sizes, strict=True))
+        if not any(
+            all(a >= b for a, b in zip(other, own, strict=True)) and (other != own or m < n)
+            for m, other in enumerate(sizes)
+        )
+    ]
 
 
 def _draw_place(

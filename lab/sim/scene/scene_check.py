@@ -14,7 +14,7 @@ from lab.sim.camera import Camera
 from lab.sim.frames import Vector
 from lab.sim.parts.kinds import Kind, Spot, beside, comes_as, kinds_of
 from lab.sim.scene import station_bodies
-from lab.sim.scene.hold_trial import check_held
+from lab.sim.scene.hold_trial import TURN_RAD, held
 from lab.sim.scene.places import ON_TOP_M, Places, Rectangle
 from lab.sim.scene.scene import in_grid, marker_of
 from lab.tasks.task import Task
@@ -34,13 +34,16 @@ def places_of(task: Task) -> Places:
     return Places(task, kinds_of(task, arm_of(task.robot, task.folder).gripper))
 
 
-def check_scene(task: Task) -> None:
-    """BadInput when a part cannot be gripped, spots are out of the arm's reach, or transfers would sweep parts."""
+def check_scene(task: Task) -> Task:
+    """The task, gripping more gently where its parts would creep; the force that its file gives is kept.
+
+    BadInput when a part cannot be gripped or held, spots are out of the arm's reach, or transfers would sweep parts.
+    """
     arm, places = arm_of(task.robot, task.folder), places_of(task)
     low = task.workspace.lower_m[2] + task.workspace.cell_m[2] / 2
     _check_level(task)
     _check_lowest(places, low)
-    check_held(task.robot, arm, list(places.kinds.values()), longest_way_m(places))
+    robot = held(task.robot, arm, list(places.kinds.values()), longest_way_m(places), _turn_rad(task))
     for station in task.stations:
         station_bodies.check(station, task.folder)
         if station.grid is not None:
@@ -55,6 +58,17 @@ def check_scene(task: Task) -> None:
                 for at in (pose, ToolPose(pose.x, pose.y, low, pose.yaw)):
                     _check_reach(arm, station, at)
                 _check_turn(arm, station, at)
+    return task if robot is task.robot else task.changed(robot=robot)
+
+
+def _turn_rad(task: Task) -> float:
+    """How far the tool turns with a part in the trial of its grip: one that hangs about as far as any does, as easily.
+
+    A level tool turns the whole arm, which few postures do gently: as far as the stations are turned.
+    """
+    if task.robot.tool != "level":
+        return TURN_RAD
+    return min(TURN_RAD, max(abs((station.pose[2] + pi) % (2 * pi) - pi) for station in task.stations))
 
 
 def _check_level(task: Task) -> None:

@@ -87,6 +87,7 @@ def test_a_small_box_is_held_gently_and_finely(gyration_m: float, friction: floa
         (0.04, 0.8, 60.0, False),  # held with 40 N
         (0.04, 0.8, 1.6, True),  # barely: 6 x 0.28 N are 1.65
         (0.04, 0.4, 25.0, True),  # slippery
+        (0.04, 0.58, 25.0, True),  # one crept by 18 mm in usual steps
         (0.019, 0.8, 19.0, True),  # light
         (0.36, 0.8, 25.0, True),  # heavy
         (0.3, 0.8, 51.0, True),

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from lab.errors import BadInput
 from lab.sim import models
 from lab.sim.parts.kinds import Spot, beside
-from lab.sim.scene.places import SLAB, Layout, Rectangle
+from lab.sim.scene.places import FREE_M, SLAB, Layout, Rectangle
 from lab.sim.scene.scene_check import places_of
 from lab.tasks.task import Order, Task
 from lab.tasks.task_fields import Obstacle, Place
@@ -200,6 +200,30 @@ def test_in_rows_there_are_neighbours_on_all_sides_of_a_storage_and_on_two_of_a_
     }
     assert set(places.neighbours(task.station("toaster_buffer"), here)) == {"slice in front", "slice behind"}
     assert places.neighbours(task.station("toaster"), here) == {}  # one place only
+
+
+def test_beside_a_spot_stands_the_widest_kind_and_a_higher_one(breakfast: Task, moved: Moved) -> None:
+    """A thin cup, lower than a slice, reaches nowhere beyond one; a cup of 20 cm does above it."""
+    slices, cups = breakfast.parts
+    for high, kinds in ((0.05, {"slice"}), (0.2, {"slice", "cup"})):
+        cup = cups.model_copy(update={"size_m": (0.012, high), "look": None, "grip": None})
+        task = moved(breakfast.changed(parts=(slices, cup)), "tray", spots=None)
+        found = places_of(task).neighbours(task.station("tray"), Spot(0.0, 0.0, 0.0, 0.0)).values()
+        assert {kind for kind, _ in found} == kinds
+
+
+def test_rows_are_so_far_apart_that_the_hand_goes_down_beside_a_part_above_its_palm() -> None:
+    """The Panda's hand is 20 cm wide along the way its fingers close, its palm 48 mm above their tips."""
+    panda = load("toast-panda")
+    (slices,) = panda.parts
+    low = slices.model_copy(update={"name": "low", "size_m": (0.06, 0.02, 0.02), "look": None, "grip": None})
+    for high, apart in ((0.03, 0.0), (0.09, 0.102 + 0.005 + FREE_M)):
+        post = low.model_copy(update={"name": "post", "size_m": (0.01, 0.01, high)})
+        task = panda.changed(parts=(low, post))
+        station = next(one for one in task.stations if one.name == task.starts("low"))
+        pitch = places_of(task).pitch(station)[1]
+        assert pitch >= apart - 1e-3
+        assert (pitch > 0.1) is (apart > 0.0)
 
 
 def test_by_given_spots_neighbours_are_wherever_one_lies_as_seen_from_another(fms: Task) -> None:
