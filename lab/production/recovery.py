@@ -81,14 +81,40 @@ class Recovery:
 
         Unattended, these are parts that could not be taken up. Attended, a person has put things right: then also those that
         stand where they were left, as in a machine that was out of order. What a machine had not finished, it begins anew.
+        Where no order brings them on, they are given up as before.
         """
         found = {part: one for part, one in self._given_up.items() if attended or one.astray}
-        found = {part: one for part, one in found.items() if self._is_back(part, one)}
+        found = self._with_room({part: one for part, one in found.items() if self._is_back(part, one)})
+        why = {part: self.lost[part] for part in found}
         for part, one in found.items():
             self._take_back(part, one)
-        if found:
-            self.replan("a part can be taken up again", {part: one.position for part, one in found.items()})
+        try:
+            if found:
+                self.replan("a part can be taken up again", {part: one.position for part, one in found.items()})
+        except RunStopped as stopped:
+            self._note(str(stopped))
+            for part, one in found.items():
+                self._lose(part, why[part], one)
+            return False
         return bool(found)
+
+    def _with_room(self, found: dict[int, GivenUp]) -> dict[int, GivenUp]:
+        """Those for which there is room at the stations of their positions, those that stand there first; others come later."""
+        cell, chosen = self.work.cell, dict[int, GivenUp]()
+        places = [place for part, place in enumerate(self.work.plan.locations, 1) if part not in self.lost]
+        taken = Counter(station for place in places for station in self.work.plan.cell.positions[place].holds)
+
+        def is_elsewhere(part: int) -> bool:
+            return (spot := found[part].spot) is None or not self._stands(part, spot)
+
+        for part in sorted(found, key=lambda part: (is_elsewhere(part), part)):
+            holds = cell.laid_out[found[part].position].holds
+            if all(taken[station] < cell.capacities[station] for station in holds):
+                taken.update(holds)
+                chosen[part] = found[part]
+            else:
+                self._given_up[part] = replace(found[part], astray=True)
+        return chosen
 
     def _take_back(self, part: int, left: GivenUp) -> None:
         """Count on a part again that had been given up."""

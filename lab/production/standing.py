@@ -9,15 +9,17 @@ from lab.production.trouble import Trouble
 from lab.sim.arms.kinematics import ToolPose
 from lab.sim.arms.robot import NAME
 from lab.sim.parts.kinds import Spot, comes_as
-from lab.sim.scene.places import Rectangle
+from lab.sim.scene.blocked_cells import OUT_OF_REACH, Surveyor
+from lab.sim.scene.places import Layout, Rectangle
 from lab.sim.scene.scene import TABLE, Scene, in_grid, pallet_of
+from lab.sim.world import World
 from lab.skills.around_part import SLOW
 from lab.skills.free_way import by_free_cells
 from lab.skills.place import let_go, release_pose
 from lab.skills.sight import SkillFailed
 from lab.skills.skill import UPRIGHT, Bench
 from lab.skills.skillset import Carried, SkillSet
-from lab.skills.surveys import Surveys
+from lab.skills.surveys import NEAR_SHAPE, NEAR_STEP_M, Surveys
 
 ASTRAY_M = 0.15  # a part this near to a spot of a station is taken up by the station's own way
 DELIVERED_M = 0.02  # a part this near to its spot has been delivered
@@ -103,11 +105,23 @@ def set_down(bench: Bench, surveys: Surveys, spot: Spot, carried: str) -> Iterat
 
 
 def too_near(bench: Bench, body: str) -> str:
-    """What stands so near to a part that the open fingers would touch it; "" for nothing."""
-    scene = bench.scene
-    own = {body, pallet_of(body), body.removesuffix("'s pallet")}
-    fixed = [obstacle.name for obstacle in scene.task.obstacles] + [station.name for station in scene.task.stations]
-    return in_fingers_way(scene, bench.part_pose(body), [one for one in (*scene.kind_of, *fixed) if one not in own])
+    """What the arm with open fingers would touch as it comes down to a part where that stands; "" for nothing.
+
+    It is tried in a copy of the scene, with all bodies where they are now.
+    """
+    scene, goal = bench.scene, bench.part_pose(body)
+    own = {body, pallet_of(body), body.removesuffix(pallet_of(""))}
+    with World() as world:
+        copy = Scene(world, scene.task, (), Layout(scene.layout.obstacles, ()))
+        for name, kind in ((name, kind) for name, kind in scene.kind_of.items() if name not in own):
+            world.part(name, kind.shape, kind.part.mass_kg, kind.part.friction, (0.0, 0.0, 0.0))
+            copy.solid.append(name)
+        for name in copy.solid:
+            world.put(name, *scene.world.pose(name))
+        surveyor = Surveyor(copy, None, clearance=BESIDE_M)
+        levels = 1 if scene.robot.arm.gripper.level else NEAR_SHAPE[2]
+        way = (goal.shifted(dz=level * NEAR_STEP_M[2]) for level in range(levels))
+        return next((cause for pose in way if (cause := surveyor.cause(pose)) not in ("", OUT_OF_REACH)), "")
 
 
 def in_fingers_way(scene: Scene, tool: ToolPose, bodies: Collection[str]) -> str:

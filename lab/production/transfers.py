@@ -95,7 +95,7 @@ class Transfers:
         self.place = self.cell.robot_start
         self.look: Callable[[], None] = _unseen
         self._under_way: _UnderWay | None = None
-        self._last: dict[str, tuple[Carried, Spot, float]] = {}
+        self._last: dict[str, tuple[Carried, float]] = {}  # how each part was brought where it is, and for what time there
         self._left_s: dict[str, float] = {}  # when parts that were set aside left their stations
         self._served: set[str] = set()  # parts for which the robot's service is done
         scene = self.floor.scene
@@ -151,15 +151,19 @@ class Transfers:
         return self._under_way is not None
 
     def put_back(self) -> None:
-        """Bring parts again to where they were moved from; their machines begin anew. Raises Trouble."""
+        """Bring parts again to where they were moved from, on a spot that is free by now; their machines begin anew. Raises
+        Trouble."""
         while self.to_put_back and self.floor.bench.held in (None, self.name(self.to_put_back[0])):
-            name = self.name(self.to_put_back[0])
-            way, spot, process_s = self._last[name]
+            part = self.to_put_back[0]
+            name = self.name(part)
+            way, process_s = self._last[name]
+            spot = self._spot_for(part, way)
             move = self._under_way = _UnderWay((name, way), self.place, self.floor.now_s, smooth=False)
             if self.floor.bench.held is None:
                 self._take_up(name, way, spot)
             self._bring(way, spot, move)
             self._under_way = None
+            self.spot_of |= dict.fromkeys(self.floor.scene.bodies_of(name, way.kind), spot)
             self._left_s.pop(name, None)
             self.to_put_back.pop(0)
             if self.cell.index(way.target) not in self.cell.batches:
@@ -202,12 +206,11 @@ class Transfers:
     def begin_again(self, part: int, stands: bool) -> None:
         """Let the machine begin a part anew that it had not finished; stands: where it was brought, else it is put back first."""
         name = self.name(part)
-        way, spot, process_s = self._last[name]
+        way, process_s = self._last[name]
         self.floor.take_out(name)
         if stands:
             self._start_machine(name, way.target, process_s)
         else:
-            self.spot_of[name] = spot
             self.to_put_back.append(part)
 
     def _start_machine(self, name: str, station: str, process_s: float) -> None:
@@ -229,7 +232,7 @@ class Transfers:
         inside = [part for part in self.plan.inside(self.cell.index(station)) if part not in self.to_put_back]
         working = {name for name, work in self.floor.machines[station].works.items() if not work.done(self.floor.now_s)}
         names = [name for name in map(self.name, inside) if name in self.waiting | working]
-        longest_s = max((self._last[name][2] for name in names), default=0.0)
+        longest_s = max((self._last[name][1] for name in names), default=0.0)
         for name in names:
             self._start_machine(name, station, longest_s)
         self.waiting -= {*names}
@@ -262,7 +265,7 @@ class Transfers:
         times_s = leave_s, reach_s, pick_s, floor.now_s, planned.process_s, pick_s - served_s
         self.moves.append(Move(part, move.start, way.origin, way.target, *times_s, planned.carries))
         if planned.carries == "part":
-            self._last[name] = way, spot, planned.process_s
+            self._last[name] = way, planned.process_s
             batch = self.cell.index(way.target) in self.cell.batches
             if not batch:
                 self._start_machine(name, way.target, planned.process_s)
@@ -295,7 +298,7 @@ class Transfers:
         others = {body: spot for body, spot in self.spot_of.items() if body not in own}
         in_the_way = self.left_lying | {self.name(one) for one in self.to_put_back}
         in_the_way |= {body for body, spot in others.items() if spot not in spots}  # they stand astray
-        return free_spot(self.floor.bench, name, way, others, self.taken, in_the_way)
+        return free_spot(self.floor.bench, name, way, others, self.taken, in_the_way - {*own})
 
     # ---- what a move is made of ------------------------------------------------------------------------------------
 

@@ -23,7 +23,7 @@ MOVED_M = 0.005  # what is fixed was moved if it is farther than this from where
 RING_M, RINGS = 0.06, 8  # where a part is put that cannot stand where it began
 IN_THE_WAY = re.compile(r"something new|no path|approached|no room|enclosed|in the way|presses on|strange box")
 
-PRESSES = re.compile(r"presses on")  # then the part that is named stands where the arm cannot come to it
+NO_ROOM = re.compile(r"presses on|too near to")  # then the part that is named stands where the arm cannot come to it
 
 
 @dataclass
@@ -80,7 +80,7 @@ class Attendant(Controls):
                 yield f"repaired '{station}'"
         for number, name in enumerate(parts_of(floor)):
             named = re.search(rf"{re.escape(name)}(?!\d)", why)
-            off = _is_astray(floor, name) or (PRESSES.search(why) and not _on_spot(floor, name))
+            off = _is_astray(floor, name) or (NO_ROOM.search(why) and not _on_spot(floor, name))
             if named and off and _stand_up(floor, number):
                 yield f"stood {name} up"
 

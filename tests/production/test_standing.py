@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import pytest
 
 from lab.production.floor import Floor
-from lab.production.standing import free_spot
+from lab.production.standing import free_spot, too_near
 from lab.production.trouble import Trouble
 from lab.sim.parts.kinds import Spot
 from lab.sim.world import World
@@ -52,3 +52,20 @@ def test_nothing_is_put_where_nothing_stands_below(floor: Floor) -> None:
     assert free_spot(floor.bench, "box 5", WAY, standing, (), ("box 2",)) == spots[6]
     with pytest.raises(Trouble, match="no spot of 'pallet' is free: what would carry it does not stand there"):
         free_spot(floor.bench, "box 5", WAY, standing, (), tuple(standing))
+
+
+def test_the_arm_itself_tells_whether_a_part_can_be_taken_up() -> None:
+    """Cans stand between turned walls, with room for the arm; one beside a wall has room for the fingers, not for the hand."""
+    task = load("sorting")
+    order = task.ordered()
+    with World() as world:
+        floor = Floor(world, SkillSet.of(task, order), lay_out(task, order, 0), order)
+        assert {too_near(floor.bench, name) for name in floor.scene.kind_of} == {""}
+        (_, _, z), turn = world.pose("can-2 2")
+        world.put("can-2 2", (0.74, -0.16, z), turn)
+        assert too_near(floor.bench, "can-2 2") == "container right"
+        world.put("can-2 2", (0.55, 0.30, z), turn)
+        for off, other in (((0.0, 0.05), "can-1 1"), ((0.05, 0.0), "")):  # where a finger comes down, or before the hand
+            at = floor.bench.part_pose("can-2 2").local(*off)
+            world.put("can-1 1", (at.x, at.y, z), turn)
+            assert too_near(floor.bench, "can-2 2") == other

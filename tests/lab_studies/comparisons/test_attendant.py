@@ -13,7 +13,7 @@ from lab.sequencing.methods.exact import optimum
 from lab.skills.prepared_scene import prepare
 from lab.tasks.fault_fields import FaultFields
 from lab.tasks.task_file import load
-from lab.teaching.events import MachineBegan
+from lab.teaching.events import MachineBegan, PartDone
 from lab.teaching.teacher import Teacher
 from lab.toolbox.registry import Toolbox
 from lab_studies.comparisons.attendant import COMES_AFTER_S, MOST_CALLS, Attendant
@@ -78,6 +78,26 @@ def test_what_a_machine_had_not_finished_it_begins_anew(run_with: Any) -> None:
     ]
     assert len(began) == 2
     assert began[1] > outcome.happened[0].at_s
+
+
+def test_a_part_that_is_brought_back_does_not_come_where_another_one_stands_by_then(run_with: Any) -> None:
+    """Slice 1 is taken from the plate at the end; slice 2 comes to its spot, and slice 1 to the next one."""
+    person = Attendant()
+    outcome = run_with(person, {"what": "part gone", "part": "slice 1", "when": "standing", "at_s": 150})
+    delivered = [e for e in outcome.heard if isinstance(e, PartDone) and e.at_s < outcome.happened[0].at_s]
+    assert [event.part for event in delivered] == ["slice 1"]
+    assert len(person.asked) == 1
+    assert (outcome.failure, outcome.delivered, outcome.audit.findings) == (None, (1, 2), ())
+
+
+def test_of_two_parts_that_go_into_one_machine_again_the_second_waits(run_with: Any) -> None:
+    """Slice 1 is taken out of the toaster, which then fails with slice 2 in it; both are to be toasted after that."""
+    person = Attendant()
+    gone = {"what": "part gone", "part": "slice 1", "when": "in machine", "at_s": 40}
+    outcome = run_with(person, gone, {"what": "machine fails", "station": "toaster", "at_s": 60})
+    assert person.did == ["repaired 'toaster'", "stood slice 1 up"]
+    assert len(person.asked) == 1
+    assert (outcome.failure, outcome.delivered, outcome.audit.findings) == (None, (1, 2), ())
 
 
 def test_a_person_who_helps_in_vain_is_not_called_for_ever(run_with: Any, monkeypatch: pytest.MonkeyPatch) -> None:
