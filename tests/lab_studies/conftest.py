@@ -3,8 +3,8 @@
 from pathlib import Path
 
 import pytest
+from sequencing_cells import cells, fms_cell, oven_cell, toast_cell
 
-from tests.sequencing.conftest import cells, fms_cell, oven_cell, toast_cell
 from tests.studies.conftest import cluster
 
 __all__ = ["cells", "cluster", "fms_cell", "oven_cell", "toast_cell"]

@@ -65,7 +65,10 @@ def test_the_arm_itself_tells_whether_a_part_can_be_taken_up() -> None:
         world.put("can-2 2", (0.74, -0.16, z), turn)
         assert too_near(floor.bench, "can-2 2") == "container right"
         world.put("can-2 2", (0.55, 0.30, z), turn)
-        for off, other in (((0.0, 0.05), "can-1 1"), ((0.05, 0.0), "")):  # where a finger comes down, or before the hand
+        for off, other in (
+            ((0.0, 0.05), "can-1 1"),
+            ((0.05, 0.0), ""),
+        ):  # where a finger comes down, or before the hand
             at = floor.bench.part_pose("can-2 2").local(*off)
             world.put("can-1 1", (at.x, at.y, z), turn)
             assert too_near(floor.bench, "can-2 2") == other
