@@ -137,8 +137,9 @@ def in_one_another(evidence: Evidence) -> Iterator[Finding]:
     """No two parts are in one place: the circles within their feet, and their heights, do not overlap."""
     tracks = evidence.tracks
     own = [(seen, tracks.number(seen.name)) for seen in evidence.parts if tracks.number(seen.name) >= 0]
+    middles = {body: tracks.middle(body) for _, body in own}  # a mesh's frame is where its mass is, and that may be low
     for (one, a), (other, b) in combinations(own, 2):
-        off = np.abs(tracks.poses[:, a, :3] - tracks.poses[:, b, :3])
+        off = np.abs(middles[a] - middles[b])
         sizes = [tracks.high[body] - tracks.low[body] for body in (a, b)]
         within = sum(min(size[:2]) / 2 for size in sizes) - BETWEEN_M
         level = off[:, 2] < sum(size[2] / 2 for size in sizes) - BETWEEN_M
