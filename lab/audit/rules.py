@@ -62,6 +62,8 @@ def _along(evidence: Evidence, seen: PartSeen, route: Sequence[Stage]) -> Iterat
             continue
         long = [n for n in there if work_s is None or stays[n].seconds >= work_s - SLACK_S]
         chosen = long[0] if long else max(there, key=lambda n: stays[n].seconds)
+        if not evidence.undisturbed(seen.name):  # it may have been taken out of a machine, and been worked on again
+            chosen = min(long or [chosen], key=lambda n: len([*_covered_in(evidence, seen, stage, stays[n])]))
         between = [one for one in stays[place:chosen] if one.station != stage.buffer]
         if between and evidence.undisturbed(seen.name) and not _repeated(between, before, stage):
             words = f"came to '{between[0].station}', which is not on its route from '{before}' to '{stage.station}'"
@@ -69,8 +71,7 @@ def _along(evidence: Evidence, seen: PartSeen, route: Sequence[Stage]) -> Iterat
         stay, place, before = stays[chosen], chosen + 1, stage.station
         if work_s is not None:
             yield from _times(evidence, seen, stage, stay, work_s)
-            yield from _covered(evidence, seen, stage.station, stay)
-        yield from _served(evidence, seen, stage, stay)
+        yield from _covered_in(evidence, seen, stage, stay)
     if stays[place:] and evidence.undisturbed(seen.name) and not _repeated(stays[place:], before, route[-1]):
         words = f"went on to '{stays[place].station}' after the end of its route, '{before}'"
         yield Finding("route", seen.name, stays[place].station, stays[place].start_s, words)
@@ -79,6 +80,13 @@ def _along(evidence: Evidence, seen: PartSeen, route: Sequence[Stage]) -> Iterat
 def _repeated(between: Sequence[Stay], before: str, stage: Stage) -> bool:
     """Whether a part only stood again where it was, or was set down more than once where it goes."""
     return all(one.station in (before, stage.station) for one in between)
+
+
+def _covered_in(evidence: Evidence, seen: PartSeen, stage: Stage, stay: Stay) -> Iterator[Finding]:
+    """In a stay, the machine's head and the robot's hand covered what its stage asks for."""
+    if evidence.work_s(seen.kind, stage) is not None:
+        yield from _covered(evidence, seen, stage.station, stay)
+    yield from _served(evidence, seen, stage, stay)
 
 
 def _times(evidence: Evidence, seen: PartSeen, stage: Stage, stay: Stay, work_s: float) -> Iterator[Finding]:

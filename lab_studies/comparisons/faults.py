@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from lab.production.composer import PUT_RIGHT
 from lab.production.faults import FAULTS
-from lab.production.faults.truth import explained, pieces
+from lab.production.faults.truth import pieces, untrue
 from lab.statistics import share
 from lab.studies.findings import Findings, Row, row
 from lab.studies.runner import Job, record_of
@@ -205,7 +205,7 @@ def _carried_out(setting: Setting, person: Attendant | None) -> Ran:
         wrong.append(str(outcome.audit.failure))
     called = [why.removesuffix(PUT_RIGHT) for why in (person.asked if person else ()) if why.endswith(PUT_RIGHT)]
     asked = [piece for why in called for piece in pieces(why)]
-    wrong += [f"no fault explains what it asked: {one}" for one in asked if not explained(one, outcome.happened)]
+    wrong += [f"no fault explains what it asked: {one}" for one in untrue(asked, outcome.happened)]
     return replace(
         ran,
         came="wrong" if wrong else found.came,

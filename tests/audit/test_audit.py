@@ -358,32 +358,48 @@ def test_the_rows_of_a_schedule() -> None:
         schedule_rows(header + "cube 1,cube,carry,in,oven,robot,robot,soon,4,measured\n")
 
 
-def test_a_head_that_leaves_cells_out() -> None:
-    """A head rests for 3 s before each of two cells, one over the other, of the side of a cube in the oven; then before one."""
-    case = evidence((ONE,))
+def headed(case: Evidence, *low: tuple[float, float]) -> list[tuple[str, str, str]]:
+    """What is found where the oven has a head that is 3 cm over it, and 1 cm from one time to the other [s].
+
+    The head has to rest for 3 s before each of two cells, one over the other, of the side of a cube.
+    """
     tracks, times_s = case.tracks, case.tracks.times_s
-    low = np.where((times_s >= 10) & (times_s < 13.5), 0.01, 0.03)  # [m] above the oven
-    for middle, found_ in ((low, []), (np.full(len(times_s), 0.03), [("process", "cube 1", "oven")])):
-        head = np.zeros((len(times_s), 1, 7))
-        head[:, 0, :3] = np.stack(
-            [np.full(len(times_s), 0.58), np.full(len(times_s), -0.1), TOPS["oven"] + middle], axis=1
-        )
-        head[:, 0, 6] = 1.0
-        half = np.full((1, 3), 0.01)
-        own = BodyTracks(
-            (*tracks.names, "oven head"),
-            times_s,
-            np.concatenate([tracks.poses, head], axis=1),
-            np.concatenate([tracks.low, -half]),
-            np.concatenate([tracks.high, half]),
-        )
-        stations = [
-            station.model_copy(update={"process": "glue", "processing_s": None}) if station.name == "oven" else station
-            for station in case.task.stations
-        ]
-        process = Process(grid=(2, 1), dwell_s=3.0)
-        task = case.task.model_copy(update={"stations": tuple(stations), "processes": {"glue": process}})
-        assert found(Evidence(task, case.order, own, case.rows, case.claimed)) == found_
+    near = np.logical_or.reduce([(times_s >= from_s) & (times_s < to_s) for from_s, to_s in low or [(0.0, 0.0)]])
+    head = np.zeros((len(times_s), 1, 7))
+    above = TOPS["oven"] + np.where(near, 0.01, 0.03)
+    head[:, 0, :3] = np.stack([np.full(len(times_s), 0.58), np.full(len(times_s), -0.1), above], axis=1)
+    head[:, 0, 6] = 1.0
+    half = np.full((1, 3), 0.01)
+    own = BodyTracks(
+        (*tracks.names, "oven head"),
+        times_s,
+        np.concatenate([tracks.poses, head], axis=1),
+        np.concatenate([tracks.low, -half]),
+        np.concatenate([tracks.high, half]),
+    )
+    stations = [
+        station.model_copy(update={"process": "glue", "processing_s": None}) if station.name == "oven" else station
+        for station in case.task.stations
+    ]
+    process = Process(grid=(2, 1), dwell_s=3.0)
+    task = case.task.model_copy(update={"stations": tuple(stations), "processes": {"glue": process}})
+    return found(Evidence(task, case.order, own, case.rows, case.claimed, case.struck))
+
+
+def test_a_head_that_leaves_cells_out() -> None:
+    case = evidence((ONE,))
+    assert headed(case, (10, 13.5)) == []
+    assert headed(case) == [("process", "cube 1", "oven")]
+
+
+def test_a_part_that_was_taken_out_is_judged_by_the_stay_in_which_the_head_covered_it() -> None:
+    """It stands in the oven from 4 to 14 s, and again from 20 to 40 s; nobody but a fault takes it out."""
+    twice: Way = ((0, "in"), (2, ""), (4, "oven"), (14, ""), (20, "oven"), (40, ""), (42, "out"))
+    touched = evidence((twice,), [Struck("part moved", "cube 1", "oven")])
+    assert headed(touched, (25, 28.5)) == []
+    assert headed(touched, (5, 8.5)) == []
+    assert headed(touched) == [("process", "cube 1", "oven")]
+    assert ("process", "cube 1", "oven") in headed(evidence((twice,)), (25, 28.5))
 
 
 def test_two_parts_in_one_place() -> None:

@@ -68,13 +68,16 @@ def _wrong(
             yield f"{one.part} was delivered, and '{one.station}' had not finished it"
     if failure is None and lacking:
         yield f"nothing was said of {', '.join(lacking)}"
-    told = [*pieces(failure or "")] if happened else []
+    for piece in untrue([*pieces(failure or "")], happened) if happened else ():
+        yield f"no fault explains: {piece}"
+
+
+def untrue(told: Sequence[str], happened: Sequence[Happened]) -> list[str]:
+    """The reasons that no fault explains, and that do not follow from one that a fault explains."""
     true = [piece for piece in told if explained(piece, happened)]
     while following := [piece for piece in told if piece not in true and _follows(piece, true)]:
         true += following
-    for piece in told:
-        if piece not in true:
-            yield f"no fault explains: {piece}"
+    return [piece for piece in told if piece not in true]
 
 
 def _follows(piece: str, true: Sequence[str]) -> bool:

@@ -4,7 +4,7 @@ import pytest
 
 from lab.production.faults import FAULTS
 from lab.production.faults.fault import Happened
-from lab.production.faults.truth import CLAIMS, explained, verdict
+from lab.production.faults.truth import CLAIMS, explained, pieces, untrue, verdict
 from lab.teaching.events import MachineBegan, TroubleMet
 
 MOVED = Happened("part moved", "slice 1 was moved by 0.06 m from 'plate'", 10.0, part="slice 1", station="plate")
@@ -59,7 +59,10 @@ def test_a_part_that_another_keeps_out_is_explained_by_why_that_one_is_there() -
     full = "slice {} at '{}': no spot of '{}' is free: slice {} is there"
     why = f"slice 1 lies on its side; {full.format(3, 'hot', 'hot', 2)}; {full.format(2, 'out', 'out', 1)}"
     assert verdict([fallen], [], why, ["slice 1"]).came == "stopped"
-    assert verdict([fallen], [], full.format(3, "hot", "hot", 2), ["slice 3"]).came == "wrong"  # why is slice 2 there?
+    assert untrue([*pieces(why)], [fallen]) == []
+    lone = full.format(3, "hot", "hot", 2)  # why is slice 2 there?
+    assert verdict([fallen], [], lone, ["slice 3"]).came == "wrong"
+    assert untrue([lone], [fallen]) == [lone]
 
 
 def test_a_run_in_which_nothing_struck_may_stop() -> None:
