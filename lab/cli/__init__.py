@@ -3,9 +3,12 @@
 
 def main() -> None:
     """The `lab` command. Nothing is loaded before Ctrl-C is heard: the libraries of the commands take a while."""
+    import atexit
+    import gc
     import os
     import sys
 
+    atexit.register(gc.freeze)  # the interpreter ends without a last look for cycles in all that was loaded: 0.3 s of CPU
     for number, name in enumerate(("stdin", "stdout", "stderr")):
         if getattr(sys, name) is None:  # it was closed: no file of ours may take its place and be printed into
             os.open(os.devnull, os.O_RDWR)

@@ -1,6 +1,5 @@
 """A group of commands: its help is read from their rows, and only the command that was typed is loaded."""
 
-import gc
 from collections.abc import Callable
 from typing import Any
 
@@ -44,4 +43,3 @@ class CommandGroup(TyperGroup):
             for name, meaning in rows:
                 table.add_row(name, Text(meaning))
             console.print(Panel(table, title=title, title_align="left", border_style="dim"))
-        gc.freeze()  # nothing follows: the interpreter ends without a last look for cycles in all that was loaded
