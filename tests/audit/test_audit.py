@@ -249,7 +249,9 @@ def test_a_part_on_a_part_is_delivered_where_the_file_has_a_place_there() -> Non
 
 
 def test_a_cap_whose_frame_is_low_is_not_in_what_it_stands_on() -> None:
-    found_ = stacked(FLOOR, LAYER, low_m=HALF_M / 2)  # other rules miss it, for the file's cube has its frame in the middle
+    found_ = stacked(
+        FLOOR, LAYER, low_m=HALF_M / 2
+    )  # other rules miss it, for the file's cube has its frame in the middle
     assert [words for _, words in found_ if "in one place" in words] == []
 
 
