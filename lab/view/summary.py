@@ -57,6 +57,8 @@ def run_summary(report: Mapping[str, Any]) -> RenderableType:
     text = f"{predicted} predicted"
     if measured is not None:
         text += f", {measured:.1f} s measured ({measured / report['predicted_makespan_s'] - 1:+.2%})"
+    else:
+        text += f", ended after {report['sim_s'] + report['skipped_s'] - report['timed_s']:.1f} s"
     table.add_row("makespan", text)
     proven = "proven optimum" if report["optimum_proven"] else "proven bound"
     table.add_row(proven, f"{bound} by the planned times, gap {gap_of(report['optimality_gap'], 2)}")

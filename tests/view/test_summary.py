@@ -66,6 +66,8 @@ RUN: dict[str, Any] = {
     "optimum_proven": True,
     "proven_of": "every plan",
     "sim_s": 300.0,
+    "skipped_s": 10.0,
+    "timed_s": 30.0,
     "wall_s": 10.0,
     "files": {"gantt": "out/gantt.png", "learning_curves": "[out]/learning-curves.png"},
 }
@@ -116,7 +118,7 @@ def test_a_run_that_failed_says_which_part_where_and_why() -> None:
         "        retries  try 1: a",
         "                 try 2: b",
     ]
-    assert "       makespan  100.0 s predicted" in lines
+    assert "       makespan  100.0 s predicted, ended after 280.0 s" in lines
     assert "   proven bound  75.0 s by the planned times, gap 25.00%" in lines
 
 
