@@ -127,7 +127,8 @@ def written(shop: dict[str, Any], kind: Kind, folder: Path) -> tuple[list[str], 
 def timed(command: list[str]) -> tuple[float, float, dict[str, Any]]:
     """Wall and processor seconds of a new process, and the last line that it prints, as JSON."""
     before, began = os.times(), time.perf_counter()
-    keeps = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}  # as users start it
+    without = ("PYTHONDONTWRITEBYTECODE",)  # users keep what Python compiled
+    keeps = {name: value for name, value in os.environ.items() if name not in without}
     done = subprocess.run(command, capture_output=True, text=True, check=True, env=keeps)
     wall, after = time.perf_counter() - began, os.times()
     spent = after.children_user + after.children_system - before.children_user - before.children_system
