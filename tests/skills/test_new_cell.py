@@ -28,10 +28,12 @@ def test_parts_may_be_brought_from_one_place_to_another_only(tmp_path: Path) -> 
 
 
 def test_parts_that_the_fingers_open_wide_for_have_more_room(tmp_path: Path) -> None:
-    parts = ("box:0.06x0.03x0.06:2", "cup=cylinder:0.06x0.08:1")
-    _, task = new_cell(new_task("t", "panda", parts, (), False), tmp_path / "t.toml")
+    _, task = new_cell(new_task("t", "panda", ("cup=cylinder:0.06x0.08:3",), (), False), tmp_path / "t.toml")
     assert task.robot.opening_m == 0.076  # of the panda's 0.08 m
-    assert task.station("input").spots is not None
+    parts = ("box:0.06x0.02x0.1:2", "pin=cylinder:0.03x0.1:2")
+    _, task = new_cell(new_task("t", "xarm6", parts, (), False), tmp_path / "t.toml")
+    assert task.robot.opening_m == 0.046
+    assert task.station("input").spots is not None  # the rows of a station are too close
 
 
 @pytest.mark.parametrize(
