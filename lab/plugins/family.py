@@ -91,7 +91,7 @@ class Family(MutableMapping[str, Row]):
             except (Exception, SystemExit) as error:
                 why = str(error) if isinstance(error, BadInput) else f"{type(error).__name__}: {error}"
                 what = f"{self.kind}: '{name}' of package '{package}' ({point.value}) is left out: {why}"
-                warnings.warn(what, PluginFault, stacklevel=3)
+                warnings.warn(what, PluginFault, stacklevel=2)
 
 
 def first_line(thing: Any) -> str:

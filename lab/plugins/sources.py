@@ -8,7 +8,7 @@ _modules: dict[str, str] = {}  # of others, by name: where they come from
 
 
 def known_source(thing: object, source: str) -> None:
-    """Note whose a member is: of a record of the lab, such as a `Study`, whose the functions in it are."""
+    """Note whose the code of a member is. In a record of the lab, such as a `Study`, that is the code of its functions."""
     if source == OWN:
         return
     for one in (thing, *vars(thing).values()) if is_dataclass(thing) else (thing,):
