@@ -95,9 +95,8 @@ class Transfers:
         self.place = self.cell.robot_start
         self.look: Callable[[], None] = _unseen
         self._under_way: _UnderWay | None = None
-        self._last: dict[
-            str, tuple[Carried, float]
-        ] = {}  # how each part was brought where it is, and for what time there
+        # how each part was brought to where it stands, and how long it is worked on there [s]
+        self._last: dict[str, tuple[Carried, float]] = {}
         self._left_s: dict[str, float] = {}  # when parts that were set aside left their stations
         self._served: set[str] = set()  # parts for which the robot's service is done
         scene = self.floor.scene
