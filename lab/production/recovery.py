@@ -323,7 +323,8 @@ class Recovery:
         self._tell_seen(seen, "leaves it")
 
     def _follow(self, part: int, seen: Deviation) -> None:
-        """A part that was moved is taken up where it stands; out of its machine before that was done, it is put back there.
+        """A part that was moved is taken up where it stands; out of its machine before that was done, or before the robot served
+        it there, it is put back there.
 
         Where the machine is done by now, and the part was not seen in it since, it is noted that nobody knows.
         """
@@ -332,8 +333,8 @@ class Recovery:
             self._leave(part, replace(seen, words=f"{seen.words}, too near to {other} to be taken up"))
             return
         work, begun, answer = self.work, self.work.work_on(part), "takes it up there"
-        unfinished = (begun is not None and not begun.done(work.floor.now_s)) or seen.name in work.waiting
-        if unfinished or part in work.finished:
+        unfinished = begun is not None and (not begun.done(work.floor.now_s) or work.to_be_served(part, begun.station))
+        if unfinished or seen.name in work.waiting or part in work.finished:
             answer = "puts it back"
             work.to_put_back.append(part)
         else:

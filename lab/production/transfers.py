@@ -239,10 +239,13 @@ class Transfers:
         self.waiting -= {*names}
 
     def _begin(self, name: str, way: Carried, ahead: int) -> _UnderWay:
-        """The times of the move, which begins now or was interrupted."""
-        now_s = self.floor.now_s
-        if self._under_way is None or self._under_way.what != (name, way):
+        """The times of the move, which begins now or was interrupted. A part that was on its way to another station then, and is
+        still in the gripper, left its origin when it was taken up."""
+        now_s, former = self.floor.now_s, self._under_way
+        if former is None or former.what != (name, way):
             self._under_way = _UnderWay((name, way), self.place or way.origin, now_s, now_s, now_s, now_s)
+            if former is not None and self.floor.bench.held == self.floor.scene.body_of(name, way.kind):
+                self._under_way = replace(former, what=(name, way), leg=0)
             number = len(self.moves) + 1
             self.tell(MoveBegan(number, number - 1 + ahead, name, self.place, way.origin, way.target, now_s))
         else:
@@ -429,9 +432,17 @@ class Transfers:
         """What the robot does at a station before it takes a part out, once."""
         name = self.name(part)
         if name not in self._served:
-            for skill in self.floor.skillset.services.get((self.cell.order[part - 1], station), ()):
+            for skill in self._service(part, station):
                 self._do(skill, name, station)
+            self.look()  # the part may have been taken away meanwhile
             self._served.add(name)
+
+    def _service(self, part: int, station: str) -> Sequence[Skill]:
+        return self.floor.skillset.services.get((self.cell.order[part - 1], station), ())
+
+    def to_be_served(self, part: int, station: str) -> bool:
+        """Whether the robot has yet to do something at a station for a part that is there."""
+        return bool(self._service(part, station)) and self.name(part) not in self._served
 
     def _take_up(self, name: str, way: Carried, spot: Spot) -> None:
         """Take a part up: by the way of the station that it stands near to, or of its own where it stands astray."""

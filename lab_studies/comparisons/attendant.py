@@ -103,7 +103,8 @@ class Attendant(Controls):
         world = floor.world
         for body, (at, _) in self._stood.items():
             off = np.asarray(at) - np.asarray(world.pose(body)[0])
-            if body.endswith(MARKER) or f"'{body}'" not in why or float(np.abs(off).max()) < MOVED_M:
+            named = re.search(rf"(?<!\w){re.escape(body)}(?!\w)", why)
+            if body.endswith(MARKER) or not named or float(np.abs(off).max()) < MOVED_M:
                 continue
             near = [name for name in parts_of(floor) if floor.world.nearest(name, body, NEAR_M) < NEAR_M]
             for one in (part for name in near for part in stack_of(floor, name) if body in floor.machines):
