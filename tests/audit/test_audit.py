@@ -515,6 +515,19 @@ def test_a_part_that_is_carried_beside_the_hand() -> None:
     assert set(found(case)) == {("gripper", "cube 1", "")}
 
 
+@pytest.mark.parametrize(("sinks_m", "right"), [(0.0024, True), (0.012, False)])
+def test_a_part_that_sinks_as_the_fingers_open(sinks_m: float, right: bool) -> None:
+    """From one frame to the next the hand is 28 mm away, and the cube comes down by 2.4 mm; by 12 mm it is dropped."""
+    case = evidence()
+    tracks = case.tracks
+    cube, hand, lands = tracks.number("cube 1"), tracks.number("robot hand"), int(np.searchsorted(tracks.times_s, 3.99))
+    tracks.poses[lands - 1, cube, :3] = tracks.poses[lands, cube, :3] + (0.0, 0.0, sinks_m)
+    tracks.poses[lands - 1, hand, :3] = tracks.poses[lands - 1, cube, :3]
+    tracks.poses[lands:, hand, 0] = np.maximum(tracks.poses[lands:, hand, 0], AT["oven"][0] + 0.1)
+    said = [one.at_s for one in audit(case).findings if one.words.endswith("not by the robot's hand") and one.at_s < 5]
+    assert said == ([] if right else [pytest.approx(3.9)])
+
+
 def test_two_parts_that_change_places_with_nobody_there() -> None:
     case = evidence()
     one, other = (frames(case, f"cube {n}", 59.0, 61.0) for n in (1, 2))

@@ -21,6 +21,7 @@ _TURNED_RAD = pi / 2  # [rad] from here on the tool begins a path by turning on 
 _SETTLE_STEPS = 12  # after a path ends
 _HELD_RAD = 0.005  # farther off its targets than this something has moved the arm
 GRIP_STEPS = 72  # 0.3 s to close or open
+FINGER_M_S, _OPENS_N = 0.2, 60.0  # each finger, at most
 _TOUCH_RAD, _TOUCH_STEPS = 0.1, 8  # so far the tool turns before contacts are found anew; looked at every so many steps
 _PEDESTAL_M, _PEDESTAL_RGBA = 0.09, (0.22, 0.23, 0.26, 1.0)  # radius
 _POINT_M = 0.002  # the same as PAD_M where a finger touches in a point
@@ -232,24 +233,32 @@ class Robot:
 
     def grip(self, force_n: float | None = None) -> Iterator[None]:
         """Close the fingers and keep pressing, each with a force [N], by default the grip force."""
-        self._press(self.arm.fingers.strokes[0], self.grip_force if force_n is None else force_n)
         self.closed, self._touched_at = True, self.tool().yaw
-        yield from self._pressed()
+        yield from self._fingers_to(0.0, self.grip_force if force_n is None else force_n)
 
     def release(self) -> Iterator[None]:
         """Open the fingers."""
-        self._press(self.arm.fingers.at(self.arm.fingers.open_m), 60.0)
         self.closed = False
-        yield from self._pressed()
+        yield from self._fingers_to(self.arm.fingers.open_m, _OPENS_N)
+
+    def _fingers_to(self, opening: float, force: float) -> Iterator[None]:
+        """Move the fingers until each pad is `opening` [m] from the middle, or presses with a force [N] on what is there.
+
+        Faster than FINGER_M_S they would be deep in a light part before physics stops them, and throw it out.
+        """
+        if self.listener is not None:
+            self.listener.pressed(self.closed)
+        fingers = self.arm.fingers
+        now = fingers.opening(self.world.joints(NAME, fingers.joints))
+        most = max(FINGER_M_S * TIME_STEP, 1.5 * abs(opening - now) / GRIP_STEPS)  # wide ones arrive in time, too
+        for _ in range(GRIP_STEPS):
+            now += min(max(opening - now, -most), most)
+            self._press(fingers.at(now), force)
+            yield
 
     def lose(self) -> None:
         """The fingers open by themselves, as when their air fails: who moves the arm still holds them to be closed."""
-        self._press(self.arm.fingers.at(self.arm.fingers.open_m), 60.0)
-
-    def _pressed(self) -> Iterator[None]:
-        if self.listener is not None:
-            self.listener.pressed(self.closed)
-        yield from _stay(GRIP_STEPS)
+        self._press(self.arm.fingers.at(self.arm.fingers.open_m), _OPENS_N)
 
 
 def _stay(steps: int) -> Iterator[None]:
