@@ -24,7 +24,8 @@ PAD_M = 0.024  # [m] of the pads, upwards from the tips, that touch
 OVER_FLOOR_M = 0.005  # [m] of the finger tips above the foot, at least
 HOLD_M = 0.006  # [m] of the pads on the part, at least
 BESIDE_M = 0.004  # [m] between an open finger and the part, at least, on its way down
-PALM_M = 0.002  # [m] between the palm and the part's top
+PALM_M = 0.002  # [m] between the palm and the part's top, at least
+UNDER_PALM_M = 0.006  # the same where a grip is chosen: what surveys want beside a part, and the margin of its hull
 FLAT_M = 0.0004  # [m] what is so little narrower than the widest place touches the pad, too
 FLAT_WIDE_M = 0.006  # [m] of the pad along which a flat side touches
 SHARE = 0.8  # of what friction would hold is relied on
@@ -93,7 +94,7 @@ def _level(shape: PartShape, gripper: Gripper, friction: float, given: GripField
             "or an approach = 'side': leave grip away"
         )
     laid = replace(shape, hull=shape.hull[:, [2, 1, 0]] * [1.0, 1.0, -1.0])  # x up, and its front, +x, below
-    deep_m = max(laid.foot_m - PAD_M / 2, laid.height_m - gripper.depth_m + PALM_M)  # the tips, behind the front
+    deep_m = max(laid.foot_m - PAD_M / 2, laid.height_m - gripper.depth_m + UNDER_PALM_M)  # the tips, behind the front
     low, high = gripper.width_m / 2 + OVER_FLOOR_M, max(shape.height_m - HOLD_M, shape.foot_m)
     if high < low:
         raise BadInput(
@@ -120,7 +121,7 @@ def _level_refusal(
         return f"{what}, and its sides slope by {least:.0f} degrees: friction {friction:g} holds {holds:.0f}"
     return (
         f"{what}; the gripper takes up to {gripper.opening_m - 2 * BESIDE_M:.3f} m, and "
-        f"{gripper.depth_m - PALM_M:.3f} m from its tips to its palm"
+        f"{gripper.depth_m - UNDER_PALM_M:.3f} m from its tips to its palm"
     )
 
 
@@ -143,7 +144,7 @@ def _as_given(shape: PartShape, gripper: Gripper, given: GripFields) -> Grip:
 
 def _heights(shape: PartShape, gripper: Gripper) -> list[float]:
     """Where the finger tips may be above the foot [m]: near the top, for flat sides; near the middle; anywhere else."""
-    low = max(OVER_FLOOR_M, shape.height_m - gripper.depth_m + PALM_M)
+    low = max(OVER_FLOOR_M, shape.height_m - gripper.depth_m + UNDER_PALM_M)
     high = shape.height_m - HOLD_M
     if high < low - 1e-9:
         return []
@@ -182,7 +183,7 @@ def _refusal(sections: "_Sections", gripper: Gripper, friction: float, slopes: l
         least, holds = degrees(min(slopes)), degrees(atan(SHARE * friction))
         return f"{what}, and where it is no wider its sides slope by {least:.0f} degrees: friction {friction:g} holds {holds:.0f}"
     if widths[narrow] <= most:
-        room = gripper.depth_m - PALM_M
+        room = gripper.depth_m - UNDER_PALM_M
         return f"{what}; it is {shape.height_m:.3f} m high, too wide below {room:.3f} m under its top, where palm and fingers end"
     return what
 

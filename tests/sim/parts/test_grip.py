@@ -17,7 +17,7 @@ from lab.errors import BadInput
 from lab.files import assets_folder
 from lab.sim.arms.arm_models import arm_named
 from lab.sim.arms.gripper import Gripper
-from lab.sim.parts.grip import BESIDE_M, HOLD_M, OVER_FLOOR_M, PALM_M, Grip, grip_of
+from lab.sim.parts.grip import BESIDE_M, HOLD_M, OVER_FLOOR_M, UNDER_PALM_M, Grip, grip_of
 from lab.sim.parts.part_shape import PartShape, shape_of
 from lab.tasks.part_fields import GripFields, PartFields
 
@@ -116,7 +116,7 @@ def test_a_box_of_any_size_is_gripped_within_the_opening_or_refused_with_its_wid
     found = taken(shape)
     assert min(x, y) - 1e-6 <= found.width_m <= MOST
     assert OVER_FLOOR_M <= found.up_m <= z - HOLD_M + 1e-9
-    assert z - found.up_m <= GRIPPER.depth_m - PALM_M
+    assert z - found.up_m <= GRIPPER.depth_m - UNDER_PALM_M + 1e-9
     assert abs(sin(2 * found.yaw)) < 1e-9 or found.width_m > min(x, y), "flat on its sides"
 
 
