@@ -12,7 +12,7 @@ from lab.api.pictures import Picture
 from lab.api.settings import Settings
 from lab.errors import BadInput
 from lab.learning.problem import Problem
-from lab.learning.session import SessionResult
+from lab.learning.session_result import SessionResult
 from lab.mdp import FloatArray
 from lab.teaching.events import unheard
 from lab.teaching.lesson import Subject, document_of, taught

@@ -11,7 +11,7 @@ from lab.gym.numbered_environment import Moved, NumberedEnvironment
 from lab.gym.transition_model import SAME_REWARD, Actions, Worth
 from lab.learning.environment import Judged, Step
 from lab.learning.selection import Draw
-from lab.learning.session import run_session
+from lab.learning.session import Session
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import FloatArray, TabularMDP
 
@@ -113,7 +113,7 @@ class GymEnvironment:
         learner = replace(ON_TILES if self.mdp.cells and not self.mdp.shape else ALONE, discount=discount)
         learner = replace(learner, max_steps=self.max_steps)
         alone, rng = _Unjudged(self.live.again()), np.random.default_rng(0)
-        result = run_session(alone, learner, GateSettings(gate="never"), None, rng)
+        result = Session(alone, learner, GateSettings(gate="never"), None, rng).run()
         if result.interrupted:
             raise KeyboardInterrupt
         if not (np.ptp(result.q, axis=1) > 0.0).any():

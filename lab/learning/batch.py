@@ -21,7 +21,8 @@ from lab.learning.kernels.records import LANES
 from lab.learning.kernels.session_loop import run
 from lab.learning.physics.cells import CellTable
 from lab.learning.selection import SELECTIONS
-from lab.learning.session import check_members, run_session
+from lab.learning.session import Session
+from lab.learning.session_result import check_members
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.learning.simulated_advice import SPEAKS_ALWAYS, SPEAKS_AS_EXPECTED, Advice, TableAdvisor
 from lab.learning.tiles import TileCoding
@@ -65,7 +66,7 @@ def run_sessions(
     problem: a table, or the environment whose steps are made; compiled are a table's own, those of a
     `ChanceTable` and those of `physics`.
 
-    The same tables, step counts, requests, helped steps and misleads as `run_session` with draws `splitmix.stream(seed)` and
+    The same tables, step counts, requests, helped steps and misleads as `Session.run` with draws `splitmix.stream(seed)` and
     a `TableAdvisor` on the same draws. Raises BadInput for an unknown learner, selection or gate, or advice of another
     shape.
     """
@@ -170,7 +171,7 @@ def _one_by_one(
     for n, seed in enumerate(seeds):
         draw = splitmix.stream(int(seed))
         advisor = None if advice is None else TableAdvisor(advice, draw)
-        one = run_session(place, learner, gate, advisor, draw)
+        one = Session(place, learner, gate, advisor, draw).run()
         if one.interrupted:
             raise KeyboardInterrupt
         found.steps[n], found.guided[n], found.moves[n] = one.steps, one.guided, one.visits.sum()

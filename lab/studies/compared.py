@@ -22,7 +22,7 @@ from lab.learning.gates import GATES
 from lab.learning.physics.environment import PhysicsEnvironment
 from lab.learning.problem import Problem
 from lab.learning.requests import Advisor, Ask
-from lab.learning.session import run_session
+from lab.learning.session import Session
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.learning.simulated_advice import TableAdvisor
 from lab.learning.updates import UPDATES
@@ -153,7 +153,7 @@ def _alone(
     """One session in the readable loop: rejected, steps (E,), q (S, A), helped steps, requests, misleads."""
     rng = np.random.default_rng(seed)
     advisor = advising.gather(environment, learner, rng)
-    one = run_session(environment, learner, gate, advisor, rng)
+    one = Session(environment, learner, gate, advisor, rng).run()
     if one.interrupted:
         raise KeyboardInterrupt
     return one.rejected_at_episode is not None, one.steps, one.q, one.helped_steps, one.requests, one.misleads

@@ -116,7 +116,7 @@ class Learned(Record):
 
     def check_members(self, where: str = "") -> None:
         """Raises BadInput for an unknown learner, selection or gate; `where` comes before the names of the tables."""
-        from lab.learning.session import check_members
+        from lab.learning.session_result import check_members
 
         check_members(self.learner, self.gate, (f"{where}learner", f"{where}gate"))
 

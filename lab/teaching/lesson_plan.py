@@ -6,7 +6,7 @@ from typing import Literal
 
 from lab.advice.journal import Journal
 from lab.learning.problem import Problem
-from lab.learning.session import SessionResult
+from lab.learning.session_result import SessionResult
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.toolbox.fitness import Fitness
 from lab.toolbox.policy import Policy

@@ -13,8 +13,9 @@ from lab.learning import session_events as session
 from lab.learning.environment import TableEnvironment
 from lab.learning.problem import Problem
 from lab.learning.requests import Advisor, Request, Walked
-from lab.learning.session import Session, SessionResult
+from lab.learning.session import Session
 from lab.learning.session_events import AdviceEnded, AdviceRejected
+from lab.learning.session_result import SessionResult
 from lab.learning.settings import LearnerSettings
 from lab.learning.values import fewest_moves, greedy_moves, known_values
 from lab.mdp import BoolArray, FloatArray, TabularMDP, greedy_path

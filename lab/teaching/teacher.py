@@ -9,7 +9,7 @@ from lab.advice.entries import Closed
 from lab.advice.journal import Journal
 from lab.errors import BadInput, LabError, WorkFailed, counted
 from lab.learning.problem import Problem
-from lab.learning.session import SessionResult
+from lab.learning.session_result import SessionResult
 from lab.mdp import TabularMDP
 from lab.teaching.events import KeptBeside, LessonContinued, PolicyAdvises, RecordSkipped, Tell, unheard
 from lab.teaching.lesson_plan import Interrupted, Keep, Lesson, LessonPlan, Source, Trial

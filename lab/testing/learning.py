@@ -10,8 +10,9 @@ from lab.advice.advisors import ADVISORS, AdvisorName
 from lab.advice.table_level import TableLevel
 from lab.learning.gates import GATES, Gate
 from lab.learning.requests import Advisor, Ask
-from lab.learning.session import SessionResult, run_session
+from lab.learning.session import Session
 from lab.learning.session_events import AdviceRequested, EpisodeEnded, Event
+from lab.learning.session_result import SessionResult
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.learning.updates import UPDATES, Update
 from lab.mdp import TabularMDP, greedy_path, grid
@@ -38,7 +39,7 @@ def session(
     events: list[Event] = []
     name = AdvisorName.of(advisor) if isinstance(advisor, str) else AdvisorName.made(advisor)
     adviser = TableLevel(mdp, learner.discount, np.random.default_rng([seed, 1])).advisor(name)
-    result = run_session(mdp, learner, gate, adviser, np.random.default_rng(seed), on_event=events.append)
+    result = Session(mdp, learner, gate, adviser, np.random.default_rng(seed)).run(events.append)
     return result, events
 
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from lab.learning.session import run_session
+from lab.learning.session import Session
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import greedy_path, optimal_values, shortest_steps
 from lab.skills import SKILLS, Skill
@@ -36,7 +36,7 @@ def check_skill(skill: str | type[Skill], task: str = "toast") -> None:
     for start in (mdp.start, *mdp.starts):
         require(greedy_path(q, mdp, mdp.n_states, start)[2], f"{what}: no way leads from {mdp.state_label(start)}")
     learner, gate = LearnerSettings(episodes=1, max_steps=1), GateSettings("never")
-    result = run_session(problem.environment or mdp, learner, gate, None, np.random.default_rng(0))
+    result = Session(problem.environment or mdp, learner, gate, None, np.random.default_rng(0)).run()
     made = Policy.of(result, mdp, learner, gate, Origin("best", subtask, task, "none", 0))
     failure = subject.tried(problem, replace(made, q=q, solved=True))
     require(failure is None, f"{what}: in physics: {failure}")

@@ -16,7 +16,7 @@ from lab.errors import BadInput
 from lab.mdp import FloatArray, TabularMDP
 
 if TYPE_CHECKING:
-    from lab.learning.session import CountArray, SessionResult
+    from lab.learning.session_result import CountArray, SessionResult
     from lab.learning.settings import GateSettings, LearnerSettings
 
 MAX_NAME_LENGTH = 100

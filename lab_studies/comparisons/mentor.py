@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from lab.learning.environment import TableEnvironment
-from lab.learning.session import run_session
+from lab.learning.session import Session
 from lab.learning.settings import GateSettings
 from lab.mdp import FloatArray, TabularMDP
 from lab.studies.charts import legend_below
@@ -68,7 +68,7 @@ def learned(mdp: TabularMDP, place: Any, rng: np.random.Generator) -> Taught:
     tables, seen = [], list[int]()
     learner = place.learner.__class__(**(vars(place.learner) | {"episodes": LEARNED}))
     for number, own in enumerate(rng.spawn(TABLES)):
-        one = run_session(mdp, learner, GateSettings("never"), None, own)
+        one = Session(mdp, learner, GateSettings("never"), None, own).run()
         tables.append(one.q)
         if number == 0:
             seen = np.repeat(np.arange(mdp.n_states), one.visits.sum(axis=1)).tolist()

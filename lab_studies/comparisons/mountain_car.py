@@ -15,7 +15,7 @@ from lab.learning.batch import run_sessions
 from lab.learning.physics import PHYSICS
 from lab.learning.physics.environment import SOBER, PhysicsEnvironment, fitting
 from lab.learning.requests import AdviceRequest
-from lab.learning.session import run_session
+from lab.learning.session import Session
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.learning.simulated_advice import Advice, advice_chances
 from lab.learning.splitmix import stream
@@ -187,7 +187,7 @@ def _told(setting: Setting, learner: LearnerSettings, seeds: NDArray[np.uint64])
     steps, helped, tables = [], [], []
     for seed in seeds.tolist():
         teacher = Teacher(known, TEACHERS[setting.rule], span_of())
-        one = run_session(world(), learner, GATE, teacher, stream(seed))
+        one = Session(world(), learner, GATE, teacher, stream(seed)).run()
         if one.interrupted:
             raise KeyboardInterrupt
         steps.append(one.steps)

@@ -12,7 +12,7 @@ from lab.advice.advisors import SKILL_TAUS
 from lab.advice.panel import DECISIONS, Panel, PanelSettings, members_of
 from lab.learning.requests import Advisor
 from lab.learning.selection import uniforms
-from lab.learning.session import run_session
+from lab.learning.session import Session
 from lab.learning.session_events import AdvisorDropped, AdvisorReadmitted, AdvisorsDisagreed, Event
 from lab.learning.simulated_advice import Advice, TableAdvisor, advice_chances
 from lab.studies.charts import bars
@@ -151,7 +151,7 @@ def one_session(setting: PanelSetting, seed: int) -> tuple[bool, int, list[Event
             tell=told.append,
         )
     gate = gate_of(lesson, world(lesson.world).gate)
-    result = run_session(mdp, learner_of(lesson), gate, advisor, streams[-1])
+    result = Session(mdp, learner_of(lesson), gate, advisor, streams[-1]).run()
     (success,) = succeeded(lesson, np.array([result.steps]))
     return bool(success), result.helped_steps, told
 

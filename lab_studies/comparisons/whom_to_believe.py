@@ -11,7 +11,7 @@ from lab.advice.advisors import SKILL_TAUS
 from lab.advice.panel import DECISIONS, Panel, PanelSettings, members_of
 from lab.learning.requests import Advisor
 from lab.learning.selection import uniforms
-from lab.learning.session import run_session
+from lab.learning.session import Session
 from lab.learning.settings import GateSettings
 from lab.learning.simulated_advice import Advice, TableAdvisor, advice_chances
 from lab.mdp import FloatArray
@@ -101,7 +101,7 @@ def _one(setting: Setting, seed: int) -> tuple[float, float, list[float]]:
             tell=lambda event: None,
         )
     gate = GateSettings(setting.gate, first_episode=10, spare_best=True)
-    one = run_session(place.mdp, place.learner, gate, advisor, streams[-1])
+    one = Session(place.mdp, place.learner, gate, advisor, streams[-1]).run()
     most = place.learner.max_steps + 1
     points = float((100.0 * (most - one.steps) / (most - place.par)).mean())
     return points, one.helped_steps, [] if panel is None else [member.trust for member in panel.standing()]

@@ -12,7 +12,7 @@ from lab.advice.advisors import AdvisorName
 from lab.advice.answers_file import answers_of
 from lab.advice.table_level import TableLevel
 from lab.errors import BadInput
-from lab.learning.session import run_session
+from lab.learning.session import Session
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import grid
 
@@ -35,7 +35,7 @@ def test_they_advise_a_session_and_are_silent_elsewhere(tmp_path: Path) -> None:
     name = AdvisorName.of(f"answers:{kept(tmp_path, way)}")
     advisor = TableLevel(MDP, 0.99, np.random.default_rng(0)).advisor(name)
     learner = LearnerSettings("q", episodes=1, max_steps=9)
-    one = run_session(MDP, learner, GateSettings("always"), advisor, np.random.default_rng(0))
+    one = Session(MDP, learner, GateSettings("always"), advisor, np.random.default_rng(0)).run()
     assert (one.steps.tolist(), one.helped_steps) == ([3], 3)
 
 

@@ -31,10 +31,11 @@ from lab.advice.journal import Again, Journal, Undo
 from lab.advice.json_lines import differing
 from lab.advice.table_level import TableLevel
 from lab.errors import BadInput, WorkFailed
+from lab.learning import session as learning
 from lab.learning.environment import TableEnvironment
 from lab.learning.requests import AdviceRequest, AdvisorLeft, Ask
-from lab.learning.session import SessionResult, run_session
 from lab.learning.session_events import AdviceGiven, Ending, EpisodeEnded, Event, Verdict
+from lab.learning.session_result import SessionResult
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import TabularMDP, grid
 
@@ -62,7 +63,7 @@ def lesson(journal: Journal, ask: Ask, told: list[Event] | None = None) -> Sessi
         rng = np.random.default_rng(5)
         advisor = Advising.of(("terminal",), {"terminal": ask}).gather(place, LEARNER, rng, journal=journal, tell=tell)
         try:
-            result = run_session(place.mdp, LEARNER, GATE, advisor, rng, on_event=tell)
+            result = learning.Session(place.mdp, LEARNER, GATE, advisor, rng).run(tell)
         except Again:
             journal.rewind()
             continue

@@ -12,8 +12,9 @@ from lab.advice.table_level import TableLevel
 from lab.errors import BadInput
 from lab.learning.requests import AdviceRequest, Advisor, AdvisorLeft, Walked
 from lab.learning.selection import uniforms
-from lab.learning.session import SessionResult, run_session
+from lab.learning.session import Session
 from lab.learning.session_events import AdviceGiven, AdvisorDropped, AdvisorReadmitted, AdvisorsDisagreed, Event
+from lab.learning.session_result import SessionResult
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import TabularMDP, grid
 
@@ -255,7 +256,7 @@ def session(names: Sequence[str], decide: str, asked: str, seed: int) -> tuple[S
     settings = PanelSettings(asked, decide)
     of = Panel(members_of(names, members), mdp.n_states, settings, draw=uniforms(own), tell=told.append)
     learner = LearnerSettings(episodes=40, max_steps=40)
-    result = run_session(mdp, learner, GateSettings("always"), of, last, on_event=told.append)
+    result = Session(mdp, learner, GateSettings("always"), of, last).run(told.append)
     return result, told, of
 
 

@@ -16,7 +16,7 @@ from lab.advice.panel import Panel, PanelSettings, members_of
 from lab.advice.receipt import OVERRULED, SILENT, UNHEARD, WIDTH, Receipt, receipt
 from lab.advice.table_level import TableLevel
 from lab.learning.requests import AdviceRequest, AdvisorLeft
-from lab.learning.session import run_session
+from lab.learning.session import Session
 from lab.learning.session_events import (
     AdviceEnded,
     AdviceGiven,
@@ -288,7 +288,7 @@ def lesson(*, several: bool = False, answers: int = 60) -> tuple[Receipt, Any, l
         members = members_of(("terminal", "wrong"), (advisor, wrong))
         advisor = Panel(members, mdp.n_states, PanelSettings(), draw=rng.random, tell=tell)
     learner = LearnerSettings(episodes=30, max_steps=40)
-    result = run_session(mdp, learner, GateSettings("always"), advisor, rng, on_event=tell)
+    result = Session(mdp, learner, GateSettings("always"), advisor, rng).run(tell)
     return receipt(journal.entries, mdp, values), result, journal.entries
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lab.learning.session import run_session
+from lab.learning.session import Session
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import grid
 from lab.toolbox.policy import Origin, Policy
@@ -42,5 +42,5 @@ def policy() -> Callable[..., Policy]:
 def made(name: str = "insert at toaster 12345678") -> Policy:
     mdp = grid((2, 3), np.zeros((2, 3), bool), (0, 0), (1, 2))
     learner, gate = LearnerSettings(episodes=8, max_steps=20), GateSettings()
-    result = run_session(mdp, learner, gate, None, np.random.default_rng(0))
+    result = Session(mdp, learner, gate, None, np.random.default_rng(0)).run()
     return Policy.of(result, mdp, learner, gate, Origin(name, "insert", "toast", "none", 0))

@@ -10,7 +10,7 @@ from lab.learning.batch import run_sessions
 from lab.learning.chance_table import ChanceTable, Outcome
 from lab.learning.gates import GATES
 from lab.learning.requests import AdviceRequest
-from lab.learning.session import run_session
+from lab.learning.session import Session
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.learning.simulated_advice import (
     SPEAKS_ALWAYS,
@@ -53,7 +53,7 @@ def test_compiled_sessions_are_the_same(gate: str, speaks: int) -> None:
     batch = run_sessions(table, LEARNER, how, who, seeds, keep_tables=True)
     for n in (0, 5, 29):
         draw = stream(int(seeds[n]))
-        one = run_session(table, LEARNER, how, TableAdvisor(who, draw), draw)
+        one = Session(table, LEARNER, how, TableAdvisor(who, draw), draw).run()
         np.testing.assert_array_equal(batch.steps[n], one.steps)
         np.testing.assert_array_equal(batch.q[n], one.q)
         assert (batch.requests[n], batch.helped_steps[n]) == (one.requests, one.helped_steps)

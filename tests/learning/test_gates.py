@@ -12,7 +12,8 @@ from lab.errors import BadInput
 from lab.learning.gates import GATES, Gate, Surroundings, deviation, improvement
 from lab.learning.members import Member
 from lab.learning.reasons import TooSlow
-from lab.learning.session import SessionResult, run_session
+from lab.learning.session import Session
+from lab.learning.session_result import SessionResult
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.learning.updates import UPDATES, Update
 from lab.mdp import grid
@@ -164,7 +165,7 @@ def taught(name: str, advisor: str, seed: int) -> SessionResult:
     mdp = grid((6, 6), blocked, (2, 0), (3, 5))
     settings = GateSettings(name, first_episode=10, window=3, omega=2, rate=0.3)
     adviser = TableLevel(mdp, 0.99, np.random.default_rng([seed, 1])).advisor(AdvisorName.of(advisor))
-    return run_session(mdp, LearnerSettings("q", episodes=80), settings, adviser, np.random.default_rng(seed))
+    return Session(mdp, LearnerSettings("q", episodes=80), settings, adviser, np.random.default_rng(seed)).run()
 
 
 @pytest.mark.parametrize("name", GATES)
@@ -245,7 +246,7 @@ def test_the_ensemble_learns_as_the_learner_does(learner: str, monkeypatch: pyte
     monkeypatch.setitem(GATES, "certain", Member(ensemble, "certain"))
     adviser = TableLevel(mdp, 0.99, np.random.default_rng(1)).advisor(AdvisorName.of("novice"))
     asks = GateSettings("certain", first_episode=3, spread=0.0, ensemble=2)
-    result = run_session(mdp, settings, asks, adviser, np.random.default_rng(0))
+    result = Session(mdp, settings, asks, adviser, np.random.default_rng(0)).run()
     assert result.helped_steps > 0
     for table in made:
         np.testing.assert_array_equal(list(table.q), result.q)

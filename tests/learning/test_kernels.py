@@ -11,7 +11,8 @@ from lab.learning.batch import Batch, run_sessions
 from lab.learning.gates import GATES, Gate, Steps
 from lab.learning.kernels.records import LANES
 from lab.learning.members import Member
-from lab.learning.session import SessionResult, run_session
+from lab.learning.session import Session
+from lab.learning.session_result import SessionResult
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.learning.simulated_advice import Advice, TableAdvisor, advice_chances
 from lab.learning.splitmix import stream
@@ -39,7 +40,7 @@ def alone(
     """The interactive session with the numbers that the kernel draws for this seed."""
     draw = stream(seed)
     advisor = None if who is None else TableAdvisor(who, draw)
-    return run_session(mdp, learner, gate, advisor, draw)
+    return Session(mdp, learner, gate, advisor, draw).run()
 
 
 def assert_same(batch: Batch, n: int, one: SessionResult) -> None:

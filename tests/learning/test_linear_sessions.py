@@ -10,7 +10,8 @@ from lab.learning.batch import Batch, is_compiled, run_sessions
 from lab.learning.environment import Environment, TableEnvironment
 from lab.learning.physics import PHYSICS
 from lab.learning.physics.environment import PhysicsEnvironment, fitting
-from lab.learning.session import SessionResult, run_session
+from lab.learning.session import Session
+from lab.learning.session_result import SessionResult
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.learning.simulated_advice import Advice, TableAdvisor, advice_chances
 from lab.learning.splitmix import stream
@@ -56,7 +57,9 @@ def both(place: Environment, learner: LearnerSettings, gate: GateSettings, who: 
     batch = run_sessions(place, learner, gate, who, seeds, keep_tables=True)
     for n, seed in enumerate(seeds.tolist()):
         draw = stream(seed)
-        assert_same(batch, n, run_session(place, learner, gate, None if who is None else TableAdvisor(who, draw), draw))
+        assert_same(
+            batch, n, Session(place, learner, gate, None if who is None else TableAdvisor(who, draw), draw).run()
+        )
     return batch
 
 
@@ -93,7 +96,7 @@ def test_what_has_no_compiled_form_runs_one_by_one() -> None:
     assert not is_compiled(CAR.mdp, SHORT, gate)
     short, who = replace(SHORT, episodes=3), advice(CAR)
     draw = stream(7)
-    one = run_session(CAR, short, gate, TableAdvisor(who, draw), draw)
+    one = Session(CAR, short, gate, TableAdvisor(who, draw), draw).run()
     assert_same(run_sessions(CAR, short, gate, who, np.array([7], np.uint64), keep_tables=True), 0, one)
 
 
@@ -107,14 +110,14 @@ def test_the_car_is_learned_alone_and_its_master_is_a_good_one() -> None:
 
 def test_learners_that_keep_a_value_per_state_have_no_tiles() -> None:
     with pytest.raises(BadInput, match=r"'dyna-q'.*tilings = 8: allowed are q, sarsa, q-lambda, sarsa-lambda"):
-        run_session(CAR, replace(SHORT, learner="dyna-q"), EAGER, None, stream(0))
+        Session(CAR, replace(SHORT, learner="dyna-q"), EAGER, None, stream(0)).run()
 
 
 def test_start_values_hold_wherever_nothing_was_learned() -> None:
     settings = LearnerSettings("q", alpha=0.5, start_value=-3.0, episodes=1, max_steps=1)
     mdp = board()
     for tilings in (1, 2):
-        q = run_session(mdp, replace(settings, tilings=tilings), EAGER, None, stream(0)).q
+        q = Session(mdp, replace(settings, tilings=tilings), EAGER, None, stream(0)).run().q
         assert q[-2].tolist() == [-3.0] * 4
         assert q[0].min() < -3.0  # a step costs
     both(CAR, replace(SHORT, start_value=-50.0, episodes=4), GateSettings("never"), None)
@@ -126,5 +129,5 @@ def test_what_comes_after_a_broken_off_episode_is_thought_to_be_worth_the_start_
     mdp = grid((1, 9), np.zeros((1, 9), bool), (0, 4), (0, 8))
     for start, worth in ((0.0, -0.2), (-5.0, -5.2)):
         learner = LearnerSettings("monte-carlo", alpha=1.0, discount=1.0, start_value=start, episodes=1, max_steps=2)
-        q = run_session(mdp, learner, GateSettings("never"), None, stream(1)).q
+        q = Session(mdp, learner, GateSettings("never"), None, stream(1)).run().q
         assert worth in np.round(q[4], 9)

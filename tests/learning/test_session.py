@@ -13,7 +13,7 @@ from lab.learning.environment import Judged, Step, TableEnvironment
 from lab.learning.gates import GATES
 from lab.learning.requests import AdviceRequest, AdvisorLeft
 from lab.learning.selection import SELECTIONS, Draw
-from lab.learning.session import Session, run_session
+from lab.learning.session import Session
 from lab.learning.session_events import (
     AdviceEnded,
     AdviceRejected,
@@ -83,7 +83,7 @@ def test_a_failed_episode_counts_one_more_than_the_limit() -> None:
     always = GateSettings(gate="always")
     few = LearnerSettings(episodes=2, max_steps=4)
     for advisor, expected in ((into_the_wall, [5, 5]), (to_the_goal, [1, 1]), (still, [5, 5])):
-        result = run_session(walls, few, always, advisor, np.random.default_rng(0))
+        result = Session(walls, few, always, advisor, np.random.default_rng(0)).run()
         assert result.steps.tolist() == expected
     assert result.helped_steps == len(still.requests) == 8  # nobody is asked for a move that is never made
 
@@ -93,12 +93,12 @@ def test_advice_is_learned_as_if_it_were_the_learners_own(learner: str) -> None:
     # alpha 1, gamma 1: cell 1 learns 1.5; cell 0 learns -.1 + 1.5 an episode later, with traces of lambda 1 at once
     settings = LearnerSettings(learner, alpha=1.0, discount=1.0, trace=1.0, episodes=2)
     right = Scripted(lambda request: 1)
-    result = run_session(corridor(3), settings, GateSettings("always"), right, np.random.default_rng(0))
+    result = Session(corridor(3), settings, GateSettings("always"), right, np.random.default_rng(0)).run()
     np.testing.assert_allclose(result.q, [[0.0, 1.4], [0.0, 1.5], [0.0, 0.0]], atol=1e-12)
     assert result.visits.tolist() == [[0, 2], [0, 2], [0, 0]]
-    once = run_session(
+    once = Session(
         corridor(3), replace(settings, episodes=1), GateSettings("always"), right, np.random.default_rng(0)
-    )
+    ).run()
     np.testing.assert_allclose(once.q[0, 1], 1.4 if learner in WHOLE_WAYS else -0.1, atol=1e-12)
 
 
@@ -106,23 +106,23 @@ def test_afterstates_learn_advice_by_hand() -> None:
     # alpha 1, gamma 1; episode 1: V(0) = V(1) = -.1, then the goal shows its 1.5; episode 2: V(0) = -.2, V(1) = 1.4
     settings = LearnerSettings("afterstate", alpha=1.0, discount=1.0, episodes=2)
     right = Scripted(lambda request: 1)
-    result = run_session(corridor(3), settings, GateSettings("always"), right, np.random.default_rng(0))
+    result = Session(corridor(3), settings, GateSettings("always"), right, np.random.default_rng(0)).run()
     np.testing.assert_allclose(result.q, [[-0.3, 1.3], [-0.3, 1.4], [0.0, 0.0]], atol=1e-12)
 
 
 def test_the_start_may_count_as_a_step() -> None:
     right, still = (Scripted(lambda request, a=action: a) for action in (1, 0))
     always, settings = GateSettings("always"), LearnerSettings(episodes=1, max_steps=4, count_start=True)
-    moved = run_session(corridor(4), settings, always, right, np.random.default_rng(0))
+    moved = Session(corridor(4), settings, always, right, np.random.default_rng(0)).run()
     assert (moved.steps.tolist(), moved.visits.sum()) == ([4], 3)  # three moves are four steps
-    stayed = run_session(corridor(4), settings, always, still, np.random.default_rng(0))
+    stayed = Session(corridor(4), settings, always, still, np.random.default_rng(0)).run()
     assert (stayed.steps.tolist(), stayed.visits.sum()) == ([5], 3)
 
 
 def test_the_gate_says_why_and_keeps_to_its_budget() -> None:
     right = Scripted(lambda request: 1)
     gate = GateSettings("always", budget=4)
-    result = run_session(corridor(4), LearnerSettings(episodes=5), gate, right, np.random.default_rng(0))
+    result = Session(corridor(4), LearnerSettings(episodes=5), gate, right, np.random.default_rng(0)).run()
     assert result.helped_steps == len(right.requests) == 4
     assert {str(request.reason) for request in right.requests} == {"it asks about every step"}
 
@@ -133,7 +133,7 @@ def test_an_expert_on_the_shortest_way_misleads_as_printed_but_not_where_the_bes
         # Lambda 1: it asks until 2K + 1 results were the same; nobody can be better than 3 steps
         gate = GateSettings(first_episode=4, window=2, omega=3, lambda_threshold=1.0, spare_best=spare_best)
         right = Scripted(lambda request: 1)
-        result = run_session(corridor(4), settings, gate, right, np.random.default_rng(0), on_event=events.append)
+        result = Session(corridor(4), settings, gate, right, np.random.default_rng(0)).run(events.append)
         assert (result.misleads > 0) == (not spare_best)
         verdicts = {one.verdict for one in events if isinstance(one, EpisodeEnded) and one.guided}
         assert ("misled" in verdicts, "best" in verdicts) == (not spare_best, spare_best)
@@ -150,21 +150,21 @@ def test_who_is_rejected_does_not_hang_on_where_episodes_begin(advisor: str, rej
         adviser = TableLevel(anywhere, settings.discount, np.random.default_rng([seed, 1])).advisor(
             AdvisorName.of(advisor)
         )
-        results.append(run_session(anywhere, settings, gate, adviser, np.random.default_rng(seed)))
+        results.append(Session(anywhere, settings, gate, adviser, np.random.default_rng(seed)).run())
     assert all((result.rejected_at_episode is not None) == rejected for result in results)
 
 
 @pytest.mark.parametrize("selection", SELECTIONS)
 def test_every_selection_learns_a_corridor(selection: str) -> None:
     settings = LearnerSettings("q", selection=selection, exploration=0.5, episodes=60)
-    assert run_session(corridor(4), settings, GateSettings("never"), None, np.random.default_rng(0)).solved
+    assert Session(corridor(4), settings, GateSettings("never"), None, np.random.default_rng(0)).run().solved
 
 
 def test_the_request_shows_where_the_learner_is() -> None:
     right = Scripted(lambda request: 1)
     settings = LearnerSettings(episodes=3)
     gate = GateSettings("always", window=1)
-    run_session(corridor(4), settings, gate, right, np.random.default_rng(0))
+    Session(corridor(4), settings, gate, right, np.random.default_rng(0)).run()
     first, last = right.requests[0], right.requests[-1]
     assert [(r.episode, r.step, r.state) for r in right.requests[:4]] == [(1, 1, 0), (1, 2, 1), (1, 3, 2), (2, 1, 0)]
     assert (first.improvement, last.improvement) == (None, Improvement(0.0, 3.0, 3.0))
@@ -175,9 +175,9 @@ def test_the_request_shows_where_the_learner_is() -> None:
 def test_no_answer_leaves_the_step_to_the_learner() -> None:
     shy = Scripted(lambda request: None)
     alone, _ = session(board(3), "none", gate="always", learner="q")
-    result = run_session(
+    result = Session(
         board(3), replace(SHORT, learner="q"), replace(EARLY, gate="always"), shy, np.random.default_rng(0)
-    )
+    ).run()
     np.testing.assert_array_equal(result.q, alone.q)
     assert (result.helped_steps, bool(result.guided.any()), result.requests, alone.requests) == (0, False, 60, 0)
 
@@ -190,9 +190,7 @@ def test_an_advisor_that_leaves_is_not_asked_again() -> None:
 
     events: list[Event] = []
     advisor = Scripted(leave)
-    result = run_session(
-        corridor(4), SHORT, GateSettings("always"), advisor, np.random.default_rng(0), on_event=events.append
-    )
+    result = Session(corridor(4), SHORT, GateSettings("always"), advisor, np.random.default_rng(0)).run(events.append)
     assert (result.helped_steps, len(advisor.requests), len(result.steps)) == (4, 5, 60)
     assert [event for event in events if isinstance(event, AdviceEnded)] == [AdviceEnded(2, "advisor left")]
     assert result.guided[:3].tolist() == [True, True, False]
@@ -205,13 +203,9 @@ def test_an_interruption_loses_nothing(learner: str) -> None:
             raise KeyboardInterrupt
         return 1
 
-    result = run_session(
-        corridor(4),
-        replace(SHORT, learner=learner),
-        GateSettings("always"),
-        Scripted(interrupt),
-        np.random.default_rng(0),
-    )
+    settings = replace(SHORT, learner=learner)
+    advisor = Scripted(interrupt)
+    result = Session(corridor(4), settings, GateSettings("always"), advisor, np.random.default_rng(0)).run()
     assert (result.interrupted, result.steps.tolist(), result.guided.tolist()) == (True, [3, 3], [True, True])
     assert result.visits[:, 1].tolist() == [3, 2, 2, 0]  # the step under way counts too
     assert result.q[2, 1] > 1.0
@@ -223,7 +217,7 @@ def test_an_interruption_while_reporting_keeps_the_episode() -> None:
         if event.episode == 4:
             raise KeyboardInterrupt
 
-    result = run_session(corridor(4), SHORT, GateSettings("never"), None, np.random.default_rng(0), on_event=interrupt)
+    result = Session(corridor(4), SHORT, GateSettings("never"), None, np.random.default_rng(0)).run(interrupt)
     assert (result.interrupted, len(result.steps), len(result.guided)) == (True, 4, 4)
 
 
@@ -231,7 +225,7 @@ def test_a_misleading_advisor_is_rejected_with_the_numbers() -> None:
     events: list[Event] = []
     back = Scripted(lambda request: 0)
     gate = GateSettings(first_episode=5, window=2, omega=1, lambda_threshold=1.0)
-    result = run_session(corridor(4), SHORT, gate, back, np.random.default_rng(0), on_event=events.append)
+    result = Session(corridor(4), SHORT, gate, back, np.random.default_rng(0)).run(events.append)
     rejections = [event for event in events if isinstance(event, AdviceRejected)]
     mean = (result.steps[3] + result.steps[4]) / 2
     assert rejections == [AdviceRejected(6, 2, 1, 31, mean)]
@@ -263,7 +257,7 @@ def test_with_memory_one_showing_is_enough(learner: str) -> None:
     right = Scripted(lambda request: 1)
     gate, events = GateSettings("always", memory=True), list[Event]()
     settings = LearnerSettings(learner, episodes=40, max_steps=30)
-    result = run_session(corridor(6), settings, gate, right, np.random.default_rng(0), on_event=events.append)
+    result = Session(corridor(6), settings, gate, right, np.random.default_rng(0)).run(events.append)
     assert (result.helped_steps, result.requests, len(right.requests)) == (5, 1, 5)
     assert [request.state for request in right.requests] == [0, 1, 2, 3, 4]
     assert result.solved
@@ -274,7 +268,7 @@ def test_with_memory_one_showing_is_enough(learner: str) -> None:
 def test_a_showing_that_missed_the_goal_is_asked_for_again_three_in_all() -> None:
     shy = Scripted(lambda request: 1 if request.state < 2 else None)  # speaks in the first two cells only
     settings, gate = LearnerSettings(episodes=12, max_steps=4), GateSettings("always", window=3, memory=True)
-    result = run_session(corridor(9), settings, gate, shy, np.random.default_rng(3))
+    result = Session(corridor(9), settings, gate, shy, np.random.default_rng(3)).run()
     assert set(result.steps.tolist()) == {5}  # nine cells are too far for four steps
     assert np.flatnonzero(result.guided).tolist() == [0, 3, 6]
     assert result.requests == 3
@@ -285,7 +279,7 @@ def test_with_memory_nothing_is_tried_out_in_the_last_episodes(learner: str) -> 
     settings = LearnerSettings(learner, episodes=40, max_steps=60, beta=0.0)  # as warm as ever to the end
     for seed in range(5):
         draw = np.random.default_rng(seed)
-        result = run_session(corridor(5), settings, GateSettings("never", memory=True), None, draw)
+        result = Session(corridor(5), settings, GateSettings("never", memory=True), None, draw).run()
         assert result.steps[-1] == 4
         assert result.solved
 
@@ -293,7 +287,7 @@ def test_with_memory_nothing_is_tried_out_in_the_last_episodes(learner: str) -> 
 def test_with_memory_a_wrong_advisor_loses_its_trust_at_once() -> None:
     back = Scripted(lambda request: 0)  # into the wall, in the first cell
     gate, events = GateSettings("always", memory=True), list[Event]()
-    result = run_session(corridor(4), SHORT, gate, back, np.random.default_rng(0), on_event=events.append)
+    result = Session(corridor(4), SHORT, gate, back, np.random.default_rng(0)).run(events.append)
     assert result.helped_steps == 2  # a point of trust for each, and it began with one
     ended = [event for event in events if isinstance(event, AdviceEnded)]
     assert ended == [AdviceEnded(1, "misled by what was remembered")]
@@ -304,8 +298,8 @@ def test_with_memory_only_episodes_with_help_are_judged() -> None:
     gate = GateSettings(first_episode=5, window=2, omega=1, lambda_threshold=1.0)
     silent = Scripted(lambda request: None)
     settings = replace(SHORT, max_steps=4)  # too few for the way: no episode is better than those before
-    plain = run_session(corridor(9), settings, gate, silent, np.random.default_rng(0))
-    kept = run_session(corridor(9), settings, replace(gate, memory=True), silent, np.random.default_rng(0))
+    plain = Session(corridor(9), settings, gate, silent, np.random.default_rng(0)).run()
+    kept = Session(corridor(9), settings, replace(gate, memory=True), silent, np.random.default_rng(0)).run()
     assert (plain.misleads, plain.rejected_at_episode) == (2, 6)
     assert (kept.misleads, kept.rejected_at_episode) == (0, None)
 
@@ -313,7 +307,7 @@ def test_with_memory_only_episodes_with_help_are_judged() -> None:
 def test_memory_keeps_to_the_budget() -> None:
     right = Scripted(lambda request: 1)
     gate = GateSettings("always", budget=3, memory=True)
-    result = run_session(corridor(6), LearnerSettings(episodes=9), gate, right, np.random.default_rng(0))
+    result = Session(corridor(6), LearnerSettings(episodes=9), gate, right, np.random.default_rng(0)).run()
     assert result.helped_steps == len(right.requests) == 3
 
 
@@ -342,7 +336,7 @@ class Slides:
 
 def test_memory_works_where_steps_are_left_to_chance() -> None:
     right, gate = Scripted(lambda request: 1), GateSettings("always", memory=True)
-    result = run_session(Slides(), SHORT, gate, right, np.random.default_rng(0))
+    result = Session(Slides(), SHORT, gate, right, np.random.default_rng(0)).run()
     assert result.solved
     assert 3 <= result.helped_steps == len(right.requests) < 60
 
@@ -350,11 +344,11 @@ def test_memory_works_where_steps_are_left_to_chance() -> None:
 def test_unknown_names_and_actions() -> None:
     rng = np.random.default_rng(0)
     with pytest.raises(BadInput, match=r"unknown learner 'q-lamda'.*did you mean 'q-lambda'"):
-        run_session(corridor(3), LearnerSettings("q-lamda"), GateSettings(), None, rng)
+        Session(corridor(3), LearnerSettings("q-lamda"), GateSettings(), None, rng).run()
     with pytest.raises(BadInput, match=r"unknown gate 'crl'.*did you mean 'ccrl'"):
-        run_session(corridor(3), LearnerSettings(), GateSettings("crl"), None, rng)
+        Session(corridor(3), LearnerSettings(), GateSettings("crl"), None, rng).run()
     with pytest.raises(BadInput, match="advisor named action 2: allowed 0"):
-        run_session(corridor(3), LearnerSettings(), GateSettings("always"), Scripted(lambda request: 2), rng)
+        Session(corridor(3), LearnerSettings(), GateSettings("always"), Scripted(lambda request: 2), rng).run()
 
 
 def test_episodes_begin_at_each_of_several_starts() -> None:
@@ -365,7 +359,7 @@ def test_episodes_begin_at_each_of_several_starts() -> None:
         if request.step == 1:
             starts.add(request.state)
 
-    result = run_session(mdp, SHORT, GateSettings("always"), Scripted(note), np.random.default_rng(0))
+    result = Session(mdp, SHORT, GateSettings("always"), Scripted(note), np.random.default_rng(0)).run()
     assert starts == {0, 3, 12}
     assert result.solved == all(greedy_path(result.q, mdp, 99, start)[2] for start in mdp.starts)
 
@@ -373,5 +367,5 @@ def test_episodes_begin_at_each_of_several_starts() -> None:
 def test_the_butter_board_is_covered_in_the_fewest_moves() -> None:
     mdp = coverage((3, 3), Rewards())
     advisor = TableLevel(mdp, 0.99, np.random.default_rng(1)).advisor(AdvisorName.of("expert"))
-    result = run_session(mdp, LearnerSettings(), GateSettings(), advisor, np.random.default_rng(0))
+    result = Session(mdp, LearnerSettings(), GateSettings(), advisor, np.random.default_rng(0)).run()
     assert (result.solved, result.final_steps) == (True, 8)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from lab.errors import BadInput
-from lab.learning.session import run_session
+from lab.learning.session import Session
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import TabularMDP, coverage, grid
 from lab.production.publication import publish, write_card
@@ -25,7 +25,7 @@ def make() -> Make:
 
     def learned(mdp: TabularMDP) -> Policy:
         learner, gate = LearnerSettings(episodes=8, max_steps=20), GateSettings()
-        result = run_session(mdp, learner, gate, None, np.random.default_rng(0))
+        result = Session(mdp, learner, gate, None, np.random.default_rng(0)).run()
         return Policy.of(result, mdp, learner, gate, Origin("butter it", "cover", "toast", "none", 0))
 
     return learned

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from lab.learning.session import SessionResult, run_session
+from lab.learning.session import Session
 from lab.learning.session_events import AdviceRejected, AdviceRequested
+from lab.learning.session_result import SessionResult
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import TabularMDP, grid
 from lab.seat.event_text import run_text
@@ -63,7 +64,7 @@ def board() -> TabularMDP:
 
 def lesson(board: TabularMDP, source: str = "learned", requests: int = 0, helped_steps: int = 0) -> Lesson:
     learner, gate = LearnerSettings(episodes=30, max_steps=30), GateSettings()
-    result: SessionResult = run_session(board, learner, gate, None, np.random.default_rng(1))
+    result: SessionResult = Session(board, learner, gate, None, np.random.default_rng(1)).run()
     object.__setattr__(result, "requests", requests)
     object.__setattr__(result, "helped_steps", helped_steps)
     policy = Policy.of(result, board, learner, gate, Origin("p", "transfer", "toast", "none", 0))

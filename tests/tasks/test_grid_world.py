@@ -13,7 +13,7 @@ from lab.errors import BadInput
 from lab.learning.environment import TableEnvironment
 from lab.learning.requests import AdviceRequest
 from lab.learning.selection import uniforms
-from lab.learning.session import run_session
+from lab.learning.session import Session
 from lab.learning.settings import LearnerSettings
 from lab.learning.simulated_advice import Advice, TableAdvisor, advice_chances
 from lab.mdp import NoPath, Rewards, greedy_path, optimal_values, shortest_steps
@@ -280,7 +280,7 @@ def test_a_goal_that_nobody_finds_by_chance_is_learned_from_being_shown() -> Non
     assert learner.start_value == pytest.approx(walking(world.rewards.step, learner), abs=1e-6)
     place, draw = TableEnvironment(mdp), uniforms(np.random.default_rng(0))
     expert = TableAdvisor(Advice.of(advice_chances(place.values(learner.discount), 0.01)), draw)
-    result = run_session(mdp, replace(learner, episodes=30), world.gate, expert, draw)
+    result = Session(mdp, replace(learner, episodes=30), world.gate, expert, draw).run()
     assert result.solved
     assert 0 < result.helped_steps <= 12 * shortest_steps(mdp)
     assert random_world((30, 30), 0.1, 3).learner.learner == "afterstate"  # a near one is found alone

@@ -30,7 +30,8 @@ from lab.learning.environment import Judged
 from lab.learning.physics.environment import PhysicsEnvironment
 from lab.learning.physics.mountain_car import energy_rule
 from lab.learning.selection import Draw, uniforms
-from lab.learning.session import SessionResult, run_session
+from lab.learning.session import Session
+from lab.learning.session_result import SessionResult
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.learning.simulated_advice import advice_chances
 from lab.tasks.task_file import load_world
@@ -132,7 +133,7 @@ def learned(world: GymWorld, seed: int, advisor: str = "none", draw: Draw | None
         AdvisorName.of(advisor)
     )
     place = problem.environment
-    return run_session(place, world.learner, world.gate, asked, rng if draw is None else draw)
+    return Session(place, world.learner, world.gate, asked, rng if draw is None else draw).run()
 
 
 # ---- names ----------------------------------------------------------------------------------------------------------
@@ -322,9 +323,9 @@ def test_a_world_of_ours_is_learned_to_the_same_table(name: str) -> None:
     world = load_world(name)
     place = gym_world(f"gym:TeachingLab/World{name[-1]}-v0").problem().environment
     assert place is not None
-    ours = run_session(world.mdp(), world.learner, GateSettings(gate="never"), None, np.random.default_rng(7))
+    ours = Session(world.mdp(), world.learner, GateSettings(gate="never"), None, np.random.default_rng(7)).run()
     draw = itertools.chain([0.5], iter(uniforms(np.random.default_rng(7)), None)).__next__
-    theirs = run_session(place, world.learner, GateSettings(gate="never"), None, draw)
+    theirs = Session(place, world.learner, GateSettings(gate="never"), None, draw).run()
     assert np.array_equal(ours.q, theirs.q)
     assert ours.steps.tolist() == theirs.steps.tolist()
     assert (ours.final_steps, ours.optimal_steps, ours.solved) == (
@@ -626,7 +627,7 @@ def test_gymnasiums_car_is_learned_in_the_same_cells_as_the_labs_own() -> None:
         state, terminated, steps = other.state, other.terminated, steps + 1
     assert steps < 150
     short = replace(theirs.learner, episodes=2)
-    found = run_session(others, short, GateSettings("never"), None, np.random.default_rng(0))
+    found = Session(others, short, GateSettings("never"), None, np.random.default_rng(0)).run()
     assert found.steps.tolist() == [201, 201]
 
 

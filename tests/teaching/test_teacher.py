@@ -12,8 +12,9 @@ from lab.advice.advising import Advising
 from lab.errors import BadInput, WorkFailed
 from lab.learning.problem import Problem
 from lab.learning.requests import AdviceRequest, AdvisorLeft
-from lab.learning.session import Session, SessionResult
+from lab.learning.session import Session
 from lab.learning.session_events import AdviceRejected, EpisodeEnded, Event
+from lab.learning.session_result import SessionResult
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import TabularMDP, greedy_path, grid
 from lab.teaching.events import AdvisorGathered, LessonEvent, RecordSkipped

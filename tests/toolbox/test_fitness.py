@@ -9,7 +9,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from lab.learning.session import run_session
+from lab.learning.session import Session
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import FloatArray, NoPath, TabularMDP, greedy_path, grid, optimal_values, shortest_steps
 from lab.toolbox.fitness import MOST_JUDGED, best_fit, comparable, followed, judged, reference, warm_start
@@ -37,7 +37,7 @@ def board(*blocked: Cell, start: Cell = START, goal: Cell = GOAL, starts: Sequen
 def learned(mdp: TabularMDP, q: FloatArray | None = None, name: str = "way") -> Policy:
     """A policy that has made every move of a problem, and takes a shortest way unless a table says otherwise."""
     learner, gate = LearnerSettings(episodes=1, max_steps=1), GateSettings("never")
-    result = run_session(mdp, learner, gate, None, np.random.default_rng(0))
+    result = Session(mdp, learner, gate, None, np.random.default_rng(0)).run()
     made = Policy.of(result, mdp, learner, gate, Origin(name, "insert", "toast", "none", 0))
     visits = np.where(mdp.terminal[:, None], 0, np.ones_like(made.visits))
     return replace(made, q=optimal_values(mdp, 0.99) if q is None else q, visits=visits)

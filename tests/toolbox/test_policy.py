@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from lab.errors import BadInput
-from lab.learning.session import run_session
+from lab.learning.session import Session
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import TabularMDP, grid
 from lab.toolbox.policy import Origin, Policy
@@ -23,13 +23,13 @@ def problem() -> TabularMDP:
 @pytest.fixture
 def policy() -> Policy:
     mdp = problem()
-    result = run_session(mdp, LEARNER, GATE, None, np.random.default_rng(4))
+    result = Session(mdp, LEARNER, GATE, None, np.random.default_rng(4)).run()
     return Policy.of(result, mdp, LEARNER, GATE, Origin("insert", "insert", "toast", "none", 4))
 
 
 def test_it_keeps_what_was_learned_and_where(policy: Policy) -> None:
     mdp = problem()
-    result = run_session(mdp, LEARNER, GATE, None, np.random.default_rng(4))
+    result = Session(mdp, LEARNER, GATE, None, np.random.default_rng(4)).run()
     np.testing.assert_array_equal(policy.q, result.q)
     np.testing.assert_array_equal(policy.visits, result.visits)
     assert (policy.signature, policy.shape, policy.start) == (mdp.signature, (2, 3), 0)

@@ -1,6 +1,6 @@
 """The compiled sessions whose values are sums of weights of tiles: on a table's steps, or on a world's physics.
 
-One session after the other, for its weights stay in the cache; each equals that of `session.run_session` with the same
+One session after the other, for its weights stay in the cache; each equals that of `session.Session` with the same
 uniform numbers. The gates and the advisor are those of `asking`, of which this is lane 0.
 """
 

@@ -1,7 +1,7 @@
 """The loop of the compiled sessions, many side by side.
 
 One session alone waits for its memory and its exponentials, 24 keep the processor busy. Each has uniform numbers of its
-own (`splitmix`), so its result depends on its seed and on nothing else, and equals that of `session.run_session` with the
+own (`splitmix`), so its result depends on its seed and on nothing else, and equals that of `session.Session` with the
 same numbers.
 """
 

@@ -3,7 +3,10 @@
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+
 from lab.learning.members import Member
+from lab.learning.selection import Draw
 from lab.learning.settings import LearnerSettings
 from lab.learning.updates.afterstate import Afterstate
 from lab.learning.updates.episode_returns import MonteCarlo
@@ -15,7 +18,7 @@ from lab.learning.updates.update import ACTION_VALUES, STATE_VALUES, Row, Table,
 from lab.mdp import FloatArray, TabularMDP
 from lab.plugins.family import Family, first_line, takes, wanted
 
-__all__ = ["LINEAR", "UPDATES", "Row", "Table", "Update", "update_of"]
+__all__ = ["LINEAR", "UPDATES", "Row", "Table", "Update", "scattered", "update_of"]
 
 Learner = Callable[[list[Row], LearnerSettings, TabularMDP], Update]
 
@@ -49,3 +52,11 @@ def update_of(settings: LearnerSettings, mdp: TabularMDP, q: FloatArray) -> Upda
     if settings.tilings > 1:
         return LINEAR[settings.learner](q, settings, mdp)
     return UPDATES[settings.learner].make(q.tolist(), settings, mdp)
+
+
+def scattered(settings: LearnerSettings, mdp: TabularMDP, draw: Draw, tables: int) -> list[Update]:
+    """So many learners as the settings name, whose start values are drawn within +-0.5."""
+    made = [update_of(settings, mdp, np.zeros(mdp.successor.shape)) for _ in range(tables)]
+    for one in made:
+        one.scatter(draw)
+    return made

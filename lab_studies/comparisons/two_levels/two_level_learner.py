@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from lab.learning.session import run_session
+from lab.learning.session import Session
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import greedy_path
 from lab.sequencing.cell.cell import Cell
@@ -49,7 +49,7 @@ def practised(kitchen: Kitchen, way: Way, seed: Sequence[int]) -> tuple[LearnedT
     mdp, skills = kitchen.way(way), []
     for episodes in EPISODES:
         learner = replace(LEARNER, episodes=episodes)
-        learned = run_session(mdp, learner, GateSettings("never"), None, np.random.default_rng(seed))
+        learned = Session(mdp, learner, GateSettings("never"), None, np.random.default_rng(seed)).run()
         _, moves, reached = greedy_path(learned.q, mdp, learner.max_steps)
         skills.append(LearnedTransfer(int(learned.visits.sum()), tuple(moves) if reached else None))
     return tuple(skills)

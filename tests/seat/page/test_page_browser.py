@@ -15,8 +15,9 @@ from lab.advice.advisors import Person
 from lab.advice.journal import Undo
 from lab.learning.problem import Problem
 from lab.learning.requests import AdviceRequest
-from lab.learning.session import SessionResult, run_session
+from lab.learning.session import Session
 from lab.learning.session_events import AdviceEnded, Event
+from lab.learning.session_result import SessionResult
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import TabularMDP, grid
 from lab.seat.page.teaching_page import SeatPage
@@ -63,7 +64,7 @@ class Teaching:
             self.page.hear(LessonEvent("board", event))
 
         rng = np.random.default_rng(0)
-        result = run_session(self.mdp, self.learner, self.gate, Person(self._ask), rng, on_event=hear)
+        result = Session(self.mdp, self.learner, self.gate, Person(self._ask), rng).run(hear)
         self.page.finished("The lesson is over.")
         return result
 

@@ -17,8 +17,9 @@ from lab.errors import BadInput, WorkFailed
 from lab.learning.problem import Problem
 from lab.learning.reasons import Reason, TooSlow
 from lab.learning.requests import AdviceRequest, AdvisorLeft
-from lab.learning.session import SessionResult, run_session
+from lab.learning.session import Session
 from lab.learning.session_events import EpisodeEnded, Event, Improvement
+from lab.learning.session_result import SessionResult
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import TabularMDP, grid
 from lab.seat.page.teaching_page import SeatPage
@@ -106,7 +107,7 @@ def test_a_whole_session_is_advised_from_the_page(page: SeatPage, mdp: TabularMD
 
     def session() -> SessionResult:
         rng = np.random.default_rng(0)
-        return run_session(mdp, LEARNER, ALWAYS, Person(page.ask), rng, on_event=hear)
+        return Session(mdp, LEARNER, ALWAYS, Person(page.ask), rng).run(hear)
 
     with opens(page) as browser:
         result = meanwhile(session)

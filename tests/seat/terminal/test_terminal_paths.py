@@ -14,8 +14,9 @@ from lab.advice.advisors import AdvisorName
 from lab.advice.journal import Again, Journal, Undo
 from lab.advice.table_level import TableLevel
 from lab.learning.requests import AdviceRequest
-from lab.learning.session import SessionResult, run_session
+from lab.learning.session import Session
 from lab.learning.session_events import EpisodeEnded, Event, Improvement
+from lab.learning.session_result import SessionResult
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import TabularMDP, grid
 from lab.seat.terminal.line_reader import PlainReader, TerminalReader
@@ -180,7 +181,7 @@ def teach(ask: Callable[[AdviceRequest], int | None], on_event: Callable[..., No
     advisor = TableLevel(BOARD, 0.99, rng, {"terminal": ask}).advisor(AdvisorName.of("terminal"))
     gate = GateSettings(first_episode=4, window=1, omega=0, lambda_threshold=1.0)
     settings = LearnerSettings(episodes=12, max_steps=20)
-    return run_session(BOARD, settings, gate, advisor, rng, on_event=on_event)
+    return Session(BOARD, settings, gate, advisor, rng).run(on_event)
 
 
 def taught(lines: str) -> tuple[SessionResult, str]:
