@@ -106,11 +106,13 @@ class Robot:
     ) -> None:
         """Load the arm at the world's origin; `speed` [m/s], `acceleration` [m/s2], `grip_force` [N] unless `grip` is told.
 
-        fine: its pads hold as areas do, not as points, and without creep; physics is solved in many iterations.
+        fine: its pads hold as areas do, not as points, and without creep; physics is solved in many iterations. Fingers that a
+        linkage moves always are: else light parts creep from between them.
         """
         self.world, self.arm, self.grip_force = world, arm, grip_force
         self.speed, self.acceleration = speed, acceleration
         fingers = arm.fingers
+        fine = fine or len(fingers.joints) > 2
         holding = [link for side in fingers.links for link in side]
         world.load(NAME, arm.urdf, (0.0, 0.0, arm.base_up_m), checked=True)
         if arm.base_up_m > 0.0:
@@ -118,7 +120,7 @@ class Robot:
         world.friction(NAME, 1.0, links=holding, spinning=PAD_M if fine else _POINT_M, sticks=fine)
         for follower, leader in fingers.leaders.items():
             world.gear(NAME, leader, follower, fingers.ratio(follower))
-        if fine or len(fingers.joints) > 2:
+        if fine:
             world.at_least(_FINE_ITERATIONS)
         self._free = [joint for joint in fingers.joints if joint not in fingers.driven]
         self.closed = False
