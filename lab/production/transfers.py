@@ -37,6 +37,7 @@ from lab.teaching.events import (
 )
 
 BEGINS_M = 0.05  # a tool this near to where a skill begins need not be brought there
+ON_TIME_S = 0.05  # a window is kept that is not overrun by more: physics goes in steps
 LATE_S = 1.0  # a machine that takes so much longer than it should is late
 MOST_ASIDE = 3  # places at which it is tried to set a part aside
 
@@ -414,7 +415,7 @@ class Transfers:
         if work is None or part in self.spoilt or work.moves:
             return
         at_most_s, late_s = self.at_most_s(name, work.station), self.floor.now_s - work.until_s
-        if at_most_s is None or late_s <= at_most_s:
+        if at_most_s is None or late_s <= at_most_s + ON_TIME_S:
             return
         what = f"it is burnt: fetched {late_s:.1f} s after it was done, allowed are {at_most_s:g}"
         self.spoilt[part] = f"{name} at '{work.station}': {what}"

@@ -1,18 +1,20 @@
 """Cover: a surface is covered cell by cell, by the shortest learned path: with butter, glue or paint, or by vacuuming."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
+from lab.errors import BadInput
 from lab.learning.problem import Problem
 from lab.mdp import coverage
 from lab.sim import models
 from lab.sim.arms.kinematics import ToolPose
 from lab.sim.frames import Body, Shape
 from lab.sim.parts.kinds import Kind
+from lab.sim.scene.scene import Scene
 from lab.sim.scene.station_bodies import HEAD_JOINTS, HEAD_LINK
-from lab.sim.world import TIME_STEP, Array
+from lab.sim.world import TIME_STEP, Array, World
 from lab.skills.sight import SkillFailed
 from lab.skills.skill import Bench, Skill, learned_path
 from lab.skills.state_words import plain
@@ -91,6 +93,35 @@ class CoverPart(Cover):
     moves_arm: ClassVar[bool] = False
     looks_from: ClassVar[tuple[float, float]] = (-42.0, 28.0)  # the head stands before the part
 
+    def setup(self, surveys: Surveys) -> Problem:
+        """The shortest complete coverage. BadInput for cells of a part that the head does not meet, with what it meets."""
+        problem = super().setup(surveys)
+        for part in surveys.task.kinds_at(self.station):
+            missed = self._missed(surveys.kinds[part.name])
+            if missed:
+                (row, column), before = min(missed.items())
+                raise BadInput(
+                    f"{self.name}: the head misses {len(missed)} of {self.shape[0] * self.shape[1]} cells of {part.name}, as row "
+                    f"{row + 1} from the top, column {column + 1}: before it is {before}; another grid of the process, another "
+                    "floor_m or body may do"
+                )
+        return problem
+
+    def _missed(self, kind: Kind) -> dict[tuple[int, ...], str]:
+        """The cells of a part on its spot that the head does not meet, and what it meets there."""
+        task, places, missed = self.surveys.task, self.surveys.places, dict[tuple[int, ...], str]()
+        with World() as world:
+            scene = Scene(world, task, (), self.surveys.layout)
+            scene.add(kind.name, kind.name, places.spots(task.station(self.station), kind.name)[0])
+            for cell in np.ndindex(*self.shape):
+                world.set_joints(self.station, HEAD_JOINTS, self.head_at(cell, kind))
+                hit = self._ray(world)
+                if hit is None or hit[0] != kind.name:
+                    missed[cell] = "nothing" if hit is None else f"'{hit[0]}'"
+                elif self._cell_of(world, kind.name, kind, hit[1]) != cell:
+                    missed[cell] = "another cell"
+        return missed
+
     def cell_m(self, kind: Kind | None = None) -> tuple[float, float]:
         """Height and width of a cell on the part's side [m]."""
         low, high = (kind or self.own_kind).shape.low, (kind or self.own_kind).shape.high
@@ -98,8 +129,11 @@ class CoverPart(Cover):
 
     def head(self, state: int, kind: Kind | None = None) -> tuple[float, float]:
         """The head's joints in a state [m]: across from the part's middle, and up from the machine's floor."""
-        row, column = self.problem.mdp.state_cell(state)
-        high, wide = self.cell_m(kind)
+        return self.head_at(self.problem.mdp.state_cell(state), kind)
+
+    def head_at(self, cell: Sequence[int], kind: Kind | None = None) -> tuple[float, float]:
+        """The head's joints [m] before a cell: its row from the top, and its column."""
+        (row, column), (high, wide) = cell, self.cell_m(kind)
         return ((column - (self.shape[1] - 1) / 2) * wide, (self.shape[0] - 1 - row + 0.5) * high)
 
     def pose(self, state: int) -> ToolPose:
@@ -166,16 +200,25 @@ class CoverPart(Cover):
         world.drive(self.station, HEAD_JOINTS, target, force=300.0)
 
     def _met(self, bench: Bench, kind: Kind) -> tuple[int, int] | None:
-        """The cell of the part that the nozzle's ray meets, in the part's own frame."""
-        world = bench.scene.world
+        """The cell of the part that the nozzle's ray meets."""
+        hit = self._ray(bench.scene.world)
+        return (
+            self._cell_of(bench.scene.world, self.part, kind, hit[1])
+            if hit is not None and hit[0] == self.part
+            else None
+        )
+
+    def _ray(self, world: World) -> tuple[str, Array] | None:
+        """The body that the nozzle's ray meets, and where."""
         nozzle, _ = world.pose(self.station, HEAD_LINK)
         yaw = self.surveys.task.station(self.station).pose[2]
         ahead = np.array([-np.sin(yaw), np.cos(yaw), 0.0])
-        hit = world.ray(nozzle + 0.035 * ahead, nozzle + _RAY_M * ahead)
-        if hit is None or hit[0] != self.part:
-            return None
-        centre, turn = world.pose(self.part)
-        local, (high, wide) = _unrotated(hit[1] - centre, turn), self.cell_m(kind)
+        return world.ray(nozzle + 0.035 * ahead, nozzle + _RAY_M * ahead)
+
+    def _cell_of(self, world: World, part: str, kind: Kind, at: Array) -> tuple[int, int] | None:
+        """The cell of a part in which a point lies, in the part's own frame."""
+        centre, turn = world.pose(part)
+        local, (high, wide) = _unrotated(at - centre, turn), self.cell_m(kind)
         row = int((kind.shape.high[2] - local[2]) // high)
         column = int((local[0] - kind.shape.low[0]) // wide)
         return (row, column) if 0 <= row < self.shape[0] and 0 <= column < self.shape[1] else None

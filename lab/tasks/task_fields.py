@@ -177,7 +177,7 @@ class Station(Record):
     """The process that the machine carries out, which is learned; in place of processing_s, such as `"butter"`."""
     at_most_s: Time | None = None
     """How long a part may stay in the machine after that before it is spoilt [s], such as `4.0`; left out: as long as
-    you like.
+    you like. In physics it ends when the gripper goes to the part to take it up, which takes up to 4 s more.
     """
     body: Annotated[str, Field(min_length=1, max_length=200)] | None = None
     """What stands there: "slab", "box", or a URDF, OBJ or STL file beside the task file, such as `"toaster.urdf"`.

@@ -90,3 +90,12 @@ def test_a_part_that_gets_another_target_on_the_way_left_when_it_was_taken_up(la
     carried = [r for r in rows if (r["when"], r["operation"], r["part"]) == ("measured", "carry", "plate 2")]
     assert [(r["station"], r["target"]) for r in carried] == [("input", "mill"), ("mill", "output")]
     assert carried[0]["start_s"] < 15.0
+
+
+def test_a_window_of_no_time_is_kept_where_the_robot_waits_at_the_machine(lab: Lab, folder: Path) -> None:
+    """The robot notices that the oven is done in the physics step after that."""
+    assert lab("new", "cell", "--part", "plate=box:0.05x0.03x0.04:1", "--machine", "oven:10").code == 0
+    file = folder / "cell.toml"
+    file.write_text(file.read_text().replace("processing_s = 10.0", "processing_s = 10.0\nat_most_s = 0"))
+    ran = lab("run", str(file), "--json")
+    assert (ran.code, json.loads(ran.out)["delivered"]) == (0, 1)

@@ -54,6 +54,19 @@ def test_nine_cells_are_met_by_the_ray_one_beside_the_other(
     assert bench.upright(SLICE) > 0.999
 
 
+def test_a_row_of_cells_behind_the_lip_of_the_machine_is_refused(task: Task, surveyed: Surveyed) -> None:
+    """In 12 rows of 1 cm the lowest one's middle is 5 mm up, and the applier's lip is before it."""
+    wanted = task.model_copy(
+        update={"processes": {"butter": task.processes["butter"].model_copy(update={"grid": (12, 1)})}}
+    )
+    butter = CoverPart(wanted, "butter", "butter_applier", "slice")
+    with pytest.raises(
+        BadInput, match=r"misses \d of 12 cells of slice, as row 12 .* before it is 'butter_applier'"
+    ) as error:
+        butter.setup(surveyed(wanted))
+    assert "grid" in str(error.value)
+
+
 def test_the_time_is_the_way_and_the_rests(surveys: Surveys, task: Task, stage: Stage, optimal: PolicyOf) -> None:
     """Nine rests and, at the head's speed, eight steps of 4 cm, the way there and the way back."""
     butter, bench, policy = prepared(surveys, stage, optimal)
