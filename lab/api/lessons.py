@@ -15,7 +15,7 @@ from lab.learning.problem import Problem
 from lab.learning.session_result import SessionResult
 from lab.mdp import FloatArray
 from lab.teaching.events import unheard
-from lab.teaching.lesson import Subject, document_of, taught
+from lab.teaching.lesson import Subject, document_of, planned
 from lab.teaching.lesson_plan import Lesson
 from lab.teaching.step_record import StepRecord
 from lab.teaching.subjects import Teachable, subject_from
@@ -139,5 +139,7 @@ def teach(
         steps = StepRecord() if record else None
         tell = unheard if steps is None else steps.hear
         teacher = Teacher(toolbox_of(toolbox, nowhere), advising_of(advisor, toolbox), seed, tell)
-        learned, lesson = taught(subject, teacher)
-    return LessonResult(learned, lesson, document_of(learned, lesson, teacher) | subject.facts(), subject, steps)
+        teacher, plan = planned(subject, teacher)
+        lesson = teacher.one_session(plan)
+    document = document_of(plan.problem, lesson, teacher) | subject.facts()
+    return LessonResult(plan.problem, lesson, document, subject, steps)

@@ -90,7 +90,8 @@ def one_lesson(
     sessions: those of the run that the lesson belongs to.
     BadInput when the policy called `name` is of another problem.
     """
-    problem, lesson = taught(subject, teacher, name, sessions)
+    teacher, plan = planned(subject, teacher, name, sessions)
+    problem, lesson = plan.problem, teacher.one_session(plan)
     document = document_of(problem, lesson, teacher) | subject.facts()
     if out is None:
         return document
@@ -103,15 +104,16 @@ def one_lesson(
     return document | ({"missing": missing} if missing else {})
 
 
-def taught(subject: Subject, teacher: Teacher, name: str | None = None, sessions: int = 1) -> tuple[Problem, Lesson]:
-    """What `one_lesson` surveyed and learned, before anything is written beside the policy."""
+def planned(
+    subject: Subject, teacher: Teacher, name: str | None = None, sessions: int = 1
+) -> tuple[Teacher, LessonPlan]:
+    """What is surveyed now and is to be learned, and the teacher of this subject, whose `one_session` learns it."""
     check_name(name)
     problem = subject.prepare(teacher.seed)
     teacher.tell(ScenePrepared(subject.scene, problem))
     teacher = replace(teacher, advising=replace(teacher.advising, region=subject.region), trial=subject.tried)
     how = subject.settings
-    plan = LessonPlan(problem, how.learner, how.gate, subject.name, name=name, sessions=sessions)
-    return problem, teacher.one_session(plan)
+    return teacher, LessonPlan(problem, how.learner, how.gate, subject.name, name=name, sessions=sessions)
 
 
 def replay(kept: KeptSession, subject: Subject, tell: Tell) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from zlib import crc32
 import numpy as np
 
 from lab.advice.advising import Advising
-from lab.advice.journal import Again, Journal
+from lab.advice.journal import Journal
 from lab.learning import session_events as session
 from lab.learning.environment import TableEnvironment
 from lab.learning.problem import Problem
@@ -19,7 +19,7 @@ from lab.learning.session_result import SessionResult
 from lab.learning.settings import LearnerSettings
 from lab.learning.values import fewest_moves, greedy_moves, known_values
 from lab.mdp import BoolArray, FloatArray, TabularMDP, greedy_path
-from lab.teaching.events import AdvisorGathered, LessonBegan, LessonEvent, QuestionAnswered, SessionBegan, Tell
+from lab.teaching.events import AdvisorGathered, LessonEvent, QuestionAnswered, SessionBegan, Tell
 from lab.teaching.lesson_plan import LessonPlan
 from lab.toolbox.fitness import warm_start
 from lab.toolbox.policy import Policy
@@ -29,41 +29,32 @@ WARM_EPISODES = 29  # of a session that begins from what was learned elsewhere
 WARM_EXPLORATION = 0.1  # of what a beginner explores: what was learned elsewhere is to be tried, not forgotten
 
 
-def learn(plan: LessonPlan, advising: Advising, seed: int, journal: Journal, tell: Tell) -> SessionResult:
-    """All sessions of a lesson as one, run from the beginning each time an answer is taken back.
+class Sessions:
+    """The sessions of a lesson, and who advises in them.
 
     Up to `plan.sessions` are run until the greedy paths are as short as can be; once they lead to the goal, at most
     MORE_SESSIONS further ones look for shorter ones. A table that leads to the goal is never given up for a worse one.
 
     In a lesson of several sessions nobody is asked in these further ones, and a session alone, there or because nobody is
-    left to ask, does not go on from the best table but with hope (see `hopeful`): then every move that might lead to a
-    shorter way is tried. A session whose advisor has left, or was rejected, ends at once, and one alone follows.
+    left to ask, does not go on from the best table but from optimistic initial values (see `optimistic`): then every move
+    that might lead to a shorter path is tried. A session whose advisor has left, or was rejected, ends at once, and one
+    alone follows.
 
     With a policy to begin from, a short session alone comes before them.
     """
-    while True:
-        tell(LessonBegan(plan, journal))
-        try:
-            return _Sessions(plan, advising, seed, journal, tell).run()
-        except Again:
-            journal.rewind()
-
-
-class _Sessions:
-    """The sessions of a lesson under way, and who advises in them."""
 
     def __init__(self, plan: LessonPlan, advising: Advising, seed: int, journal: Journal, tell: Tell):
         self.plan, self.advising, self.journal, self.tell = plan, advising, journal, tell
         self.place = plan.problem.environment or TableEnvironment(plan.problem.mdp)
         self.gate = replace(plan.gate, judge_unhelped=False) if advising.records else plan.gate
-        lived = 0 if plan.unfinished is None else len(plan.unfinished.curve)  # what did not help is not drawn again
-        self.rng = np.random.default_rng([seed, crc32(plan.problem.name.encode()), lived])
+        before = 0 if plan.unfinished is None else len(plan.unfinished.curve)  # what did not help is not drawn again
+        self.rng = np.random.default_rng([seed, crc32(plan.problem.name.encode()), before])
         self.alone = False  # the advisor left or was rejected: nobody is asked about this skill again
         mdp = plan.problem.mdp  # one session is not followed by another
         self.fewest = float(fewest_moves(mdp)[list(mdp.starts)].sum()) if mdp.starts and plan.sessions > 1 else inf
 
     def run(self) -> SessionResult:
-        """The curves of all sessions, with the best table of these and of the unfinished policy."""
+        """The curves of all sessions, with the best table of these and of the unfinished policy. Raises Again."""
         plan, several, unfinished = self.plan, self.plan.sessions > 1, self.plan.unfinished
         whole = None if plan.warm is None else self._alone(plan.warm)
         kept: SessionResult | Policy | None = unfinished or whole
@@ -73,8 +64,14 @@ class _Sessions:
         left = plan.sessions if moves == inf else min(plan.sessions, MORE_SESSIONS)
         while left:
             left -= 1
-            lived = unfinished if whole is None else joined(unfinished, whole)
-            result = self._session(None if kept is None else kept.q, moves < inf, lived)
+            advisor = None if self.alone or (several and moves < inf) else self._advisor()
+            q0 = None if kept is None else kept.q
+            if several and advisor is None and plan.problem.environment is None:
+                past, mdp = unfinished if whole is None else joined(unfinished, whole), plan.problem.mdp
+                tried = np.zeros(mdp.successor.shape, bool) if past is None else past.visits > 0
+                q0 = optimistic(mdp, tried, plan.learner.discount)
+            session, asks = self._begun(plan.learner, advisor, q0), several and advisor is not None
+            result = session.run(self._hear, lambda: self.alone) if asks else session.run(self._hear)
             whole, now = joined(whole, result), moves_to_goal(result.q, plan.problem, plan.learner)
             if now <= moves:
                 if now < moves == inf:
@@ -85,29 +82,14 @@ class _Sessions:
         assert whole is not None
         assert kept is not None
         if several and not (whole.interrupted or kept.solved) and before == moves < inf and unfinished is not None:
-            kept = unfinished  # no shorter way: with the same table, what was measured with it still holds
+            kept = unfinished  # no shorter path: with the same table, what was measured with it still holds
         return replace(whole, q=kept.q, final_steps=kept.final_steps, solved=kept.solved)
 
-    def _session(self, q0: FloatArray | None, reached: bool, lived: SessionResult | Policy | None) -> SessionResult:
-        """A session that begins from a table; lived: all that was tried before it, None: nothing."""
-        plan, several = self.plan, self.plan.sessions > 1
-        advisor = None if self.alone or (several and reached) else self._advisor()
-        if several and advisor is None and plan.problem.environment is None:
-            mdp = plan.problem.mdp
-            tried = np.zeros(mdp.successor.shape, bool) if lived is None else lived.visits > 0
-            q0 = hopeful(mdp, tried, plan.learner.discount)
-        return self._run(plan.learner, advisor, q0, enough=lambda: several and advisor is not None and self.alone)
-
-    def _run(
-        self,
-        learner: LearnerSettings,
-        advisor: Advisor | None,
-        q0: FloatArray | None,
-        enough: Callable[[], bool] = lambda: False,
-    ) -> SessionResult:
+    def _begun(self, learner: LearnerSettings, advisor: Advisor | None, q0: FloatArray | None) -> Session:
+        """A session that begins from a table (S, A), told of."""
         session = Session(self.place, learner, self.gate, advisor, self.rng, q0)
         self.tell(SessionBegan(session))
-        return session.run(self._hear, enough)
+        return session
 
     def _alone(self, warm: Policy) -> SessionResult:
         """A short session without advice that begins from a policy of another problem; the better of both tables."""
@@ -116,7 +98,7 @@ class _Sessions:
         episodes = min(plan.learner.episodes, WARM_EPISODES)
         short = replace(plan.learner, episodes=episodes, exploration=WARM_EXPLORATION * plan.learner.exploration)
         self.tell(AdvisorGathered(None))
-        result = self._run(short, None, q0)
+        result = self._begun(short, None, q0).run(self._hear)
         if moves_to_goal(q0, plan.problem, plan.learner) >= moves_to_goal(result.q, plan.problem, plan.learner):
             return result
         final, _, solved = self.place.judge(q0, plan.learner)
@@ -133,8 +115,8 @@ class _Sessions:
         self.tell(LessonEvent(self.plan.problem.name, event, self.journal.tell(event)))
 
 
-def hopeful(mdp: TabularMDP, tried: BoolArray, discount: float) -> FloatArray:
-    """Start values (S, A) for one who goes on alone: a move that was not tried yet is as good as the best reward."""
+def optimistic(mdp: TabularMDP, tried: BoolArray, discount: float) -> FloatArray:
+    """Optimistic initial values (S, A) for a session alone: a move that was not tried yet is as good as the best reward."""
     return known_values(mdp, tried, np.full(mdp.successor.shape, mdp.reward.max()), discount)
 
 

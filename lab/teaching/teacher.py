@@ -6,14 +6,14 @@ from dataclasses import asdict, dataclass, field, replace
 
 from lab.advice.advising import Advising
 from lab.advice.entries import Closed
-from lab.advice.journal import Journal
+from lab.advice.journal import Again, Journal
 from lab.errors import BadInput, LabError, WorkFailed, counted
 from lab.learning.problem import Problem
 from lab.learning.session_result import SessionResult
 from lab.mdp import TabularMDP
-from lab.teaching.events import KeptBeside, LessonContinued, PolicyAdvises, RecordSkipped, Tell, unheard
+from lab.teaching.events import KeptBeside, LessonBegan, LessonContinued, PolicyAdvises, RecordSkipped, Tell, unheard
 from lab.teaching.lesson_plan import Interrupted, Keep, Lesson, LessonPlan, Source, Trial
-from lab.teaching.lesson_sessions import fits, joined, learn
+from lab.teaching.lesson_sessions import Sessions, fits, joined
 from lab.toolbox.fitness import Fitness, best_fit, reference
 from lab.toolbox.index import KnownPolicies
 from lab.toolbox.policy import MAX_NAME_LENGTH, Origin, Policy, is_name
@@ -166,7 +166,13 @@ class Teacher:
             self.tell(PolicyAdvises(known))
         journal = self.keep(plan)
         try:
-            result = learn(plan, self.advising, self.seed, journal, self.tell)
+            result = None
+            while result is None:
+                self.tell(LessonBegan(plan, journal))
+                try:
+                    result = Sessions(plan, self.advising, self.seed, journal, self.tell).run()
+                except Again:  # an answer was taken back
+                    journal.rewind()
             name = plan.name or self._free_name(problem, result.solved)
             origin = Origin(name, problem.subtask, plan.task, str(self.advising), self.seed)
             policy = Policy.of(joined(unfinished, result), problem.mdp, plan.learner, plan.gate, origin)

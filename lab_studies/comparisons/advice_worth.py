@@ -21,7 +21,7 @@ from lab.studies.runner import Job, seeds_of
 from lab.tasks.task_file import load
 from lab.teaching.events import Event, LessonEvent, SessionBegan
 from lab.teaching.lesson_plan import LessonPlan
-from lab.teaching.lesson_sessions import learn
+from lab.teaching.lesson_sessions import Sessions
 from lab.view.canvas import BLUE, GREEN, INK, ORANGE, RED, SKY, picture_bytes
 
 if TYPE_CHECKING:
@@ -132,7 +132,7 @@ def taught(pupil: Pupil, *, lessons: int, seed: int) -> Cost:
     watches = []
     for own in seeds_of(replace(pupil, advisor=""), lessons, seed):  # every advisor has the same lessons
         watch = Watch.over(problem.mdp)
-        learn(plan, advising, int(own), Journal(), watch.hear)
+        Sessions(plan, advising, int(own), Journal(), watch.hear).run()
         watches.append(watch)
     columns = zip(*((one.solved, one.episodes, one.moves, one.helped) for one in watches), strict=True)
     solved, episodes, moves, helped = (np.array(column) for column in columns)

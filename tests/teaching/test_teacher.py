@@ -20,7 +20,7 @@ from lab.mdp import TabularMDP, greedy_path, grid
 from lab.teaching.events import AdvisorGathered, LessonEvent, RecordSkipped
 from lab.teaching.events import Event as LessonsEvent
 from lab.teaching.lesson_plan import MAX_SESSIONS, Interrupted, LessonPlan
-from lab.teaching.lesson_sessions import MORE_SESSIONS, WARM_EPISODES, fits, hopeful
+from lab.teaching.lesson_sessions import MORE_SESSIONS, WARM_EPISODES, fits, optimistic
 from lab.teaching.teacher import Teacher, candidates
 from lab.toolbox.fitness import reference
 from lab.toolbox.index import KnownPolicies
@@ -324,7 +324,7 @@ def test_a_worse_table_never_replaces_a_better_one(teacher: Teacher, monkeypatch
     assert (policy.final_steps, policy.q is longer.q) == (7, True)
 
 
-def test_once_it_fits_shorter_ways_are_looked_for_alone_and_with_hope(
+def test_once_it_fits_shorter_ways_are_looked_for_alone_from_optimistic_values(
     teacher: Teacher, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The one move that each scripted session makes is known by then; any other may be as good as the goal."""
@@ -340,20 +340,20 @@ def test_once_it_fits_shorter_ways_are_looked_for_alone_and_with_hope(
     assert (began[-1][tried] < 1.5).all()
 
 
-def test_hope_by_hand() -> None:
+def test_optimistic_values_by_hand() -> None:
     """In a corridor of 4 cells the first move was made: it is worth a step and then, discounted, the best that can be."""
     corridor = grid((1, 4), np.zeros((1, 4), bool), (0, 0), (0, 3))  # -0, +0, left, right
     nothing = np.zeros((4, 4), bool)
-    assert (hopeful(corridor, nothing, 0.5) == 1.5).all()
+    assert (optimistic(corridor, nothing, 0.5) == 1.5).all()
     tried = nothing.copy()
     tried[0, 3] = tried[2, 3] = True
-    hope = hopeful(corridor, tried, 0.5)
-    assert hope[0].tolist() == [1.5, 1.5, 1.5, -0.1 + 0.5 * 1.5]
-    assert hope[2].tolist() == [1.5, 1.5, 1.5, 1.5]  # it entered the goal
+    values = optimistic(corridor, tried, 0.5)
+    assert values[0].tolist() == [1.5, 1.5, 1.5, -0.1 + 0.5 * 1.5]
+    assert values[2].tolist() == [1.5, 1.5, 1.5, 1.5]  # it entered the goal
     tried[0] = tried[1] = True  # all around the start is known: the first three moves stay there or in cell 1
-    hope = hopeful(corridor, tried, 0.5)
-    assert hope[1, 3] == pytest.approx(-0.1 + 0.5 * 1.5)
-    assert hope[0, 3] == pytest.approx(-0.1 + 0.5 * 0.65)
+    values = optimistic(corridor, tried, 0.5)
+    assert values[1, 3] == pytest.approx(-0.1 + 0.5 * 1.5)
+    assert values[0, 3] == pytest.approx(-0.1 + 0.5 * 0.65)
 
 
 def test_going_on_keeps_the_history(teacher: Teacher) -> None:

@@ -9,7 +9,7 @@ from lab.learning.problem import Problem
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import grid
 from lab.teaching.lesson_plan import LessonPlan
-from lab.teaching.lesson_sessions import learn
+from lab.teaching.lesson_sessions import Sessions
 from lab_studies.comparisons.advice_worth import (
     NOBODY,
     Cost,
@@ -34,7 +34,7 @@ def test_a_lesson_is_counted_until_it_is_solved() -> None:
     learner = LearnerSettings("dyna-q", episodes=5)
     plan = LessonPlan(Problem("corridor", "walk", CORRIDOR), learner, GateSettings("always"), "corridor")
     watch = Watch.over(CORRIDOR)
-    learn(plan, Advising.of(["expert"]), 0, Journal(), watch.hear)
+    Sessions(plan, Advising.of(["expert"]), 0, Journal(), watch.hear).run()
     assert (watch.solved, watch.episodes, watch.moves, watch.helped) == (True, 1, 3, 3)
 
 
