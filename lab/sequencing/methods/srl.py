@@ -1,4 +1,8 @@
-"""SRL, the sequencing algorithm of thesis ch. 5, as printed in fig. 5.1."""
+"""SRL, the sequencing algorithm of thesis ch. 5, as printed in fig. 5.1: its updates.
+
+The episodes, explored and greedy decisions, one after the other, are in `session_readable.learn`, which calls `step` after each
+decision and `end` after each episode; the logarithms are in `session_updates`. With these three files SRL is read whole.
+"""
 
 from dataclasses import dataclass
 from math import exp
