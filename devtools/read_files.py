@@ -8,7 +8,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from commands import environment, lab
+from devtools.commands import environment, lab
 
 INSTANCES = {
     "la": "3 3\n0 3 1 2 2 5\n1 4 0 1 2 2\n2 6 1 3 0 2\n",

@@ -17,12 +17,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from threading import Timer
 
-from commands import LAB, Ended, lab
-from forked import forked
-from kills import ALONE, known_as
-from parts import Outcome, Part
-from shim import KINDS, Strike, built, shimmed
-from works import (
+from devtools.commands import LAB, Ended, lab
+from devtools.forked import forked
+from devtools.kills import ALONE, known_as
+from devtools.parts import Outcome, Part
+from devtools.shim import KINDS, Strike, built, shimmed
+from devtools.works import (
     LONGEST_S,
     WORKS,
     CarriedOut,
@@ -41,7 +41,6 @@ from works import (
     state,
     unsound,
 )
-
 from lab.toolbox.registry import Toolbox
 
 COUNT = 400

@@ -1,4 +1,4 @@
-"""What breaks the lab: `python lab-dev PART... [--count N] [--seed N] [--workers N] [--out DIR]`, and a scoreboard.
+"""What breaks the lab: `python -m devtools PART... [--count N] [--seed N] [--workers N] [--out DIR]`, and a scoreboard.
 
 Needs an environment in which the lab can be imported. The same folder goes on where it was stopped; exit 1 if anything broke.
 """
@@ -8,19 +8,20 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from audit_violations import PART as AUDITS
-from drawn_physics import PART as PHYSICS
-from kills import PART as KILLS
-from mutated_commands import PART as MUTATED_COMMANDS
-from mutations import PART as MUTATIONS
-from page_attacks import PART as REQUESTS
-from parts import Part
-from proofs import PART as PROOFS
-from resources import PART as RESOURCES
 from rich.console import Console
 from rich.progress import Progress
-from scoreboard import line, show, written
-from sizes import PART as SIZES
+
+from devtools.audit_violations import PART as AUDITS
+from devtools.drawn_physics import PART as PHYSICS
+from devtools.kills import PART as KILLS
+from devtools.mutated_commands import PART as MUTATED_COMMANDS
+from devtools.mutations import PART as MUTATIONS
+from devtools.page_attacks import PART as REQUESTS
+from devtools.parts import Part
+from devtools.proofs import PART as PROOFS
+from devtools.resources import PART as RESOURCES
+from devtools.scoreboard import line, show, written
+from devtools.sizes import PART as SIZES
 
 PARTS: dict[str, Part] = {
     "kills": KILLS,
@@ -45,7 +46,7 @@ def main(
     seed: Annotated[int, typer.Option(min=0)] = 0,
     workers: Annotated[int, typer.Option(min=1)] = 2,
     out: Annotated[Path, typer.Option(help="what was tried, a file a part; gone on with if it is there")] = Path(
-        "lab-dev-out"
+        "devtools-out"
     ),
 ) -> None:
     """Tries to break the lab and prints what held."""

@@ -8,7 +8,6 @@ import os
 import re
 import resource
 import subprocess
-import sys
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -17,10 +16,11 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from attackers import ATTACKS
-from commands import LAB, environment, kill_session
-from parts import Outcome, Part
 from safetensors.numpy import load_file
+
+from devtools.attackers import ATTACKS
+from devtools.commands import LAB, environment, kill_session, module, search_path
+from devtools.parts import Outcome, Part
 
 ANOTHER_USER = "65534"
 LESSON = ("teach", "world-1", "--advisor", "web", "--gate", "always", "--episodes", "6", "--json")
@@ -145,10 +145,11 @@ def attempt(number: int, seed: int, room: Path) -> Outcome:
 
     def attacked(port: int, token: str, process: int) -> None:
         nonlocal told
-        script, uid = Path(__file__).with_name("attackers.py"), [ANOTHER_USER] if os.getuid() == 0 else []
+        env = {**os.environ, "PYTHONPATH": search_path(), "SPIED": str(folder / "toolbox")}
+        uid = [ANOTHER_USER] if os.getuid() == 0 else []
         attacker = subprocess.run(
-            [sys.executable, script, kind, str(port), str(ATTACK_S), str(seed), str(process), *uid],
-            input=token, capture_output=True, text=True, timeout=300, env={**os.environ, "SPIED": str(folder / "toolbox")},
+            [*module("attackers"), kind, str(port), str(ATTACK_S), str(seed), str(process), *uid],
+            input=token, capture_output=True, text=True, timeout=300, env=env,
         )  # fmt: skip
         told = Told(**json.loads(attacker.stdout)) if attacker.returncode == 0 else Told(0, [attacker.stderr[-300:]])
 

@@ -10,9 +10,8 @@ from random import Random
 from typing import NamedTuple
 from zipfile import ZIP_DEFLATED, ZipFile
 
-from commands import environment, lab
-from parts import Outcome, Part
-
+from devtools.commands import environment, lab
+from devtools.parts import Outcome, Part
 from lab.files import tasks_folder
 
 REFUSED_S, REFUSED_MB = 5.0, 1000.0

@@ -1,6 +1,6 @@
 """Whole commands of the lab against a plain CP-SAT program, in pairs: seconds from the start of the process to the proof.
 
-    python lab-dev/plain_pairs.py [--seed 1] [--each 5] [--rounds 3] [--seconds 60] [--out FOLDER]
+    python -m devtools.plain_pairs [--seed 1] [--each 5] [--rounds 3] [--seconds 60] [--out FOLDER]
 
 Shops are drawn: job shops, with due dates, flexible, and with vehicles. The plain program (`plain_model.py`) is one that
 somebody writes in an hour. Both are new processes on the same machine in turn; what each pays before it searches is counted.

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-from commands import Ended
-from drawn_cells import drawn_cell
-from drawn_features import FEATURES
-from drawn_parts import MESHES, SOLIDS
-from drawn_physics import FORCE_N, MASS_KG, MOVED_M, SHIPPED, SPEED_M_S, TASKS, attempt, drawn, judged
 
+from devtools.commands import Ended
+from devtools.drawn_cells import drawn_cell
+from devtools.drawn_features import FEATURES
+from devtools.drawn_parts import MESHES, SOLIDS
+from devtools.drawn_physics import FORCE_N, MASS_KG, MOVED_M, SHIPPED, SPEED_M_S, TASKS, attempt, drawn, judged
 from lab.tasks.robot_fields import MODELS
 from lab.tasks.task_file import find, task_of_text
 

@@ -8,7 +8,7 @@ part's folder, and what it has is the row that counts it.
 import sys
 from pathlib import Path
 
-from parts import Outcome, Part
+from devtools.parts import Outcome, Part
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests" / "sequencing"))
 

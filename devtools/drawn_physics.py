@@ -11,10 +11,10 @@ from pathlib import Path
 from shutil import copytree, rmtree
 
 import numpy as np
-from commands import Ended, environment, lab
-from drawn_cells import drawn_cell
-from parts import Outcome, Part
 
+from devtools.commands import Ended, environment, lab
+from devtools.drawn_cells import drawn_cell
+from devtools.parts import Outcome, Part
 from lab.files import write_whole
 from lab.tasks.task_file import find
 

@@ -1,6 +1,6 @@
 """How much longer a run takes than its physics: wall time over the seconds inside `stepSimulation`, of all its processes.
 
-    python lab-dev/step_share.py [--rounds 5] [TASK] [OPTIONS OF lab run]
+    python -m devtools.step_share [--rounds 5] [TASK] [OPTIONS OF lab run]
 
 A machine that is twice as slow takes twice as long for both, so the ratio compares where seconds do not. Each round runs
 `lab run` twice in new interpreters: cold, with an empty toolbox, and warm, with what the first one kept.

@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from commands import environment, lab
-from parts import Outcome, Part
 
+from devtools.commands import environment, lab
+from devtools.parts import Outcome, Part
 from lab.audit.audit import audit, kept_evidence
 from lab.audit.evidence import SLACK_S, Evidence
 from lab.audit.stays import PartSeen, Stay

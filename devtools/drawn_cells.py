@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from drawn_features import FEATURES, DrawnCell, evenly
-from drawn_parts import DrawnPart, Rng, Table, drawn_part
 
+from devtools.drawn_features import FEATURES, DrawnCell, evenly
+from devtools.drawn_parts import DrawnPart, Rng, Table, drawn_part
 from lab.errors import BadInput
 from lab.sim.arms.arm import Arm
 from lab.sim.arms.arm_models import arm_of

@@ -15,9 +15,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from commands import Ended, environment, lab
-from shim import Strike, built, counted, shimmed
 
+from devtools.commands import Ended, environment, lab
+from devtools.shim import Strike, built, counted, shimmed
 from lab.advice.entries import read_journal
 from lab.errors import BadInput
 from lab.production.run_journal import RunEnded, read_run

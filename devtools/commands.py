@@ -15,6 +15,7 @@ from pathlib import Path
 from threading import Timer
 from typing import IO
 
+ROOT = Path(__file__).resolve().parent.parent
 LAB = (sys.executable, "-c", "import sys; from lab.cli import main; sys.argv[0] = 'lab'; main()")
 ERROR, LINE_CHARACTERS = "lab: ", 300
 CODES = (0, 1, 2, 130)
@@ -48,11 +49,22 @@ class Ended:
         return f"an error of {longest} characters" if longest > LINE_CHARACTERS else ""
 
 
+def module(name: str) -> tuple[str, ...]:
+    """The command that runs a module of this package as a process of its own, in an `environment` that finds it."""
+    return (sys.executable, "-m", f"devtools.{name}")
+
+
+def search_path() -> str:
+    """The PYTHONPATH with which a process in any folder imports this checkout."""
+    return os.pathsep.join([str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])])
+
+
 def environment(home: Path, **more: str) -> dict[str, str]:
-    """This process's environment with a home and a toolbox of their own under `home`."""
+    """This process's environment with a home and a toolbox of their own under `home`, in which this checkout is imported."""
     kept = {name: value for name, value in os.environ.items() if not name.startswith(("LAB_", "XDG_"))}
     return {
         **kept,
+        "PYTHONPATH": search_path(),
         "HOME": str(home),
         "LAB_TOOLBOX": str(home / "toolbox"),
         "PYTHONUNBUFFERED": "1",

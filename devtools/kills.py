@@ -9,11 +9,11 @@ import shutil
 from functools import cache
 from pathlib import Path
 
-from commands import Ended
-from forked import forked
-from parts import Outcome, Part
-from shim import Strike, built
-from works import (
+from devtools.commands import Ended
+from devtools.forked import forked
+from devtools.parts import Outcome, Part
+from devtools.shim import Strike, built
+from devtools.works import (
     LONGEST_S,
     WORKS,
     CarriedOut,

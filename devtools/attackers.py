@@ -1,4 +1,4 @@
-"""Attacks on the live page's server, as a process of its own: `python attackers.py KIND PORT SECONDS SEED SERVER [UID]`.
+"""Attacks on the live page's server, as a process of its own: `python -m devtools.attackers KIND PORT SECONDS SEED SERVER [UID]`.
 
 It reads the token from stdin, becomes the user UID before it begins, and prints as one JSON document how often it tried, and
 `inside`: what should not have been let in. SERVER is the lesson's process.

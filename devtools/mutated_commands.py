@@ -5,12 +5,12 @@ from pathlib import Path
 from random import Random
 from typing import NamedTuple
 
-from commands import environment, lab
-from mutate import mutated
-from mutations import prepare
-from parts import Outcome, Part
-from read_damaged import sound_files
-from read_files import KINDS
+from devtools.commands import environment, lab
+from devtools.mutate import mutated
+from devtools.mutations import prepare
+from devtools.parts import Outcome, Part
+from devtools.read_damaged import sound_files
+from devtools.read_files import KINDS
 
 COMMANDS = 1000
 LATE_S = 300.0

@@ -6,9 +6,10 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from parts import Outcome, Part
 from rich.console import Console
 from rich.table import Table
+
+from devtools.parts import Outcome, Part
 
 SHOWN = 12  # of what broke, told under the table; all of it is in the files
 

@@ -6,11 +6,11 @@ from random import Random
 from zipfile import ZipFile
 
 import pytest
-from mutate import FITTING, MUTATIONS, mutated
-from mutations import told_of
-from read_damaged import batch, verdict
-from read_files import KINDS, Kind
 
+from devtools.mutate import FITTING, MUTATIONS, mutated
+from devtools.mutations import told_of
+from devtools.read_damaged import batch, verdict
+from devtools.read_files import KINDS, Kind
 from lab.errors import BadInput
 
 QUICK = (
@@ -93,7 +93,7 @@ def test_faults_of_a_sort_are_told_once() -> None:
 
 
 def test_there_is_a_kind_for_every_sort_of_file_that_a_command_is_given() -> None:
-    from mutated_commands import READ_BY
+    from devtools.mutated_commands import READ_BY
 
     assert {command.kind for command in READ_BY} <= KINDS.keys()
     assert all(kind.content in FITTING for kind in KINDS.values())

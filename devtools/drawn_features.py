@@ -7,7 +7,8 @@ from math import ceil
 from typing import Any
 
 import numpy as np
-from drawn_parts import DrawnPart, Rng, Table
+
+from devtools.drawn_parts import DrawnPart, Rng, Table
 
 SPARE_WINDOW_S, FORCE_N = (15.0, 90.0), (8.0, 80.0)  # the forces evenly over their logarithms
 LAYER_M = 0.08  # between the stacks of a layer, beyond the part

@@ -8,7 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from page_attacks import Taught, judged
+
+from devtools.page_attacks import Taught, judged
 
 QUIET = Taught(0, "as the quiet one", "page: http://", 0.01, 1.0, 100.0)
 
@@ -16,7 +17,8 @@ QUIET = Taught(0, "as the quiet one", "page: http://", 0.01, 1.0, 100.0)
 def test_a_lesson_does_not_notice_requests_without_a_right(tmp_path: Path, root: Path) -> None:
     command = [
         sys.executable,
-        str(root / "lab-dev"),
+        "-m",
+        "devtools",
         "requests",
         "--count",
         "1",

@@ -3,11 +3,12 @@
 from dataclasses import replace
 from pathlib import Path
 
-import proofs
 import pytest
 from against_oracle.compared import Compared, compared
 from against_oracle.drawn import Raw, drawn
-from parts import Outcome
+
+from devtools import proofs
+from devtools.parts import Outcome
 
 
 def test_a_cell_of_which_all_holds(tmp_path: Path) -> None:

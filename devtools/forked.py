@@ -1,6 +1,7 @@
-"""Commands forked from a process that has the lab loaded already, which is ten times as fast: `python forked.py`, and its client.
+"""Commands forked from a process that has the lab loaded already, which is ten times as fast.
 
-The process reads requests from stdin, a line of JSON each, and answers each with two lines: the child's number, how it ended.
+The process, `python -m devtools.forked`, reads requests from stdin, a line of JSON each, and answers each with two lines: the
+child's number, how it ended.
 """
 
 import ctypes
@@ -16,8 +17,8 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from commands import Ended, kill_session
-from works import environment_in
+from devtools.commands import Ended, kill_session, module
+from devtools.works import environment_in
 
 _WARM = (
     ("teach", "world-1", "--advisor", "expert", "--episodes", "30", "--out", "lesson", "--json"),
@@ -45,7 +46,7 @@ def forked(library: Path, room: Path) -> Callable[[tuple[str, ...], Path, Mappin
             warm.mkdir(exist_ok=True)
             said = environment_in(warm, room) | {"LD_PRELOAD": str(library)}
             _HERE.server = subprocess.Popen(
-                [sys.executable, __file__],
+                module("forked"),
                 cwd=warm,
                 env=said,
                 stdin=subprocess.PIPE,

@@ -5,22 +5,19 @@ line, within 5 s of CPU time and 1 GB.
 """
 
 import json
-import os
-import sys
 from collections import Counter
 from itertools import count as numbers_from
 from pathlib import Path
 from typing import Any
 
-from commands import environment, lab
-from parts import Outcome, Part
-from read_files import KINDS, make_sound
+from devtools.commands import environment, lab, module
+from devtools.parts import Outcome, Part
+from devtools.read_files import KINDS, make_sound
 
 FILES = 100_000
 BATCH_S = 3600.0
 MOST_DEATHS = 20  # of a batch's processes, each of which a file has killed
 MOST_TOLD = 4  # sorts of faults of a batch
-READER = Path(__file__).with_name("read_damaged.py")
 
 
 def prepare(room: Path, seed: int) -> None:
@@ -48,8 +45,8 @@ def read_batch(room: Path, name: str, seed: int, first: int, tries: int, folder:
     for death in numbers_from():
         told = home / f"told-{death}"
         words = (str(room), name, str(seed), str(at), str(end - at), str(told))
-        env = environment(home, PYTHONPATH=os.environ.get("PYTHONPATH", ""), OPENBLAS_NUM_THREADS="1")
-        ended = lab(*words, cwd=home, env=env, timeout_s=BATCH_S, command=(sys.executable, str(READER)))
+        env = environment(home, OPENBLAS_NUM_THREADS="1")
+        ended = lab(*words, cwd=home, env=env, timeout_s=BATCH_S, command=module("read_damaged"))
         lines = told.read_text().splitlines() if told.exists() else []
         if lines and lines[-1].startswith("{"):
             last: dict[str, Any] = json.loads(lines[-1])

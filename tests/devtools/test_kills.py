@@ -9,13 +9,13 @@ import sys
 from pathlib import Path
 
 import pytest
-from commands import Ended
-from kills import drawn, judged
-from resources import Case
-from resources import judged as judged_without
-from shim import KINDS, Strike, built, counted, shimmed
-from works import WORKS, Undisturbed, age, kept_before, leftovers, lost, policy, reached, state, unsound
 
+from devtools.commands import Ended
+from devtools.kills import drawn, judged
+from devtools.resources import Case
+from devtools.resources import judged as judged_without
+from devtools.shim import KINDS, Strike, built, counted, shimmed
+from devtools.works import WORKS, Undisturbed, age, kept_before, leftovers, lost, policy, reached, state, unsound
 from lab.toolbox.registry import Toolbox
 
 WRITER = """

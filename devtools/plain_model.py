@@ -1,6 +1,6 @@
 """A plain model of a shop for OR-Tools' CP-SAT, as somebody writes it in an hour; it imports nothing of the lab.
 
-    python lab-dev/plain_model.py SHOP.json [SECONDS [WORKERS]]
+    python -m devtools.plain_model SHOP.json [SECONDS [WORKERS]]
 
 It reads `jobs`, for each operation a table from machine to time; `due`, a time for each job, or none; `travel`, a matrix of
 times whose first place is where jobs and vehicles begin and whose others are the machines, or none; `vehicles`.

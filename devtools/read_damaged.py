@@ -1,4 +1,4 @@
-"""Damaged files of one kind, read in a process of its own: `python read_damaged.py ROOM KIND SEED FIRST COUNT TOLD`.
+"""Damaged files of one kind, read in a process of its own: `python -m devtools.read_damaged ROOM KIND SEED FIRST COUNT TOLD`.
 
 A line of JSON about each file that breaks the lab, and at the end one about all of them, is added to the file TOLD; a line with
 the number alone says which file is being read, so that who waits knows it when this process dies.
@@ -18,8 +18,8 @@ from pathlib import Path
 from random import Random
 from typing import Any
 
-from mutate import mutated
-from read_files import KINDS, Kind
+from devtools.mutate import mutated
+from devtools.read_files import KINDS, Kind
 
 LINE_CHARACTERS = 300
 MOST_S = 5.0  # CPU time of a file
