@@ -29,6 +29,7 @@ from devtools.works import (
     lost,
     names,
     next_words,
+    own_folder,
     reached,
     undisturbed,
     unsound,
@@ -54,10 +55,10 @@ def attempt(number: int, seed: int, room: Path) -> Outcome:
     random.Random(seed).shuffle(shuffled)
     name = shuffled[number % len(shuffled)]
     expected = known_as(name, room)
-    home = fresh(room, f"kill-{number}", WORKS[name])
+    home = fresh(room / f"kill-{number}", room, WORKS[name])
     carried_out = by_itself if number % ALONE == 0 or "workers" in name else forked(built(room), room)
     share = chance.random() if chance.random() < AT_RANDOM else None
-    longest_s = expected.seconds if carried_out is by_itself else _forked_s(name, room)
+    longest_s = expected.seconds if carried_out is by_itself else forked_s(name, room)
     at_s = None if share is None else share * longest_s
     strike = None if at_s is not None else drawn(expected.calls, chance)
     caches = home if number % COLD == 0 else room
@@ -76,9 +77,9 @@ def known_as(name: str, room: Path) -> Undisturbed:
 
 
 @cache
-def _forked_s(name: str, room: Path) -> float:
+def forked_s(name: str, room: Path) -> float:
     """How long a command takes when it is forked, looked at once."""
-    home = fresh(room, "forked", WORKS[name])
+    home = fresh(own_folder(room, "forked"), room, WORKS[name])
     took_s = disturbed(home, WORKS[name].words, built(room), None, room, LONGEST_S, forked(built(room), room)).seconds
     shutil.rmtree(home.parent)
     return took_s

@@ -237,7 +237,7 @@ def attempt(number: int, seed: int, room: Path) -> Outcome:
     make, _, works = FAULTS[kind]
     name = chance.choice(works or [*names()])
     case = Case(name, room / f"resource-{number}" / "home", known_as(name, room), chance)
-    fresh(room, case.home.parent.name, WORKS[name])
+    fresh(case.home.parent, room, WORKS[name])
     make(case)
     told = f"{number}, seed {seed}: {name}: {case.said}"
     if case.room_kb and not BARE:

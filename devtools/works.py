@@ -12,6 +12,7 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from hashlib import sha256
 from pathlib import Path
+from tempfile import mkdtemp
 from typing import Any
 
 import numpy as np
@@ -127,10 +128,15 @@ def policy(name: str, value: float) -> Policy:
     )  # fmt: skip
 
 
-def fresh(room: Path, folder: str, work: Work) -> Path:
-    """What a command begins from, in a folder of its own."""
-    home = room / folder / "home"
-    shutil.rmtree(home.parent, ignore_errors=True)
+def own_folder(room: Path, name: str) -> Path:
+    """A new empty folder that no other worker has: several may measure the same command at the same time."""
+    return Path(mkdtemp(prefix=f"{name}-", dir=room))
+
+
+def fresh(folder: Path, room: Path, work: Work) -> Path:
+    """The home in a folder, made anew, that a command begins from."""
+    home = folder / "home"
+    shutil.rmtree(folder, ignore_errors=True)
     shutil.copytree(base(room), home, symlinks=True)
     for left in work.left:
         (home / left).write_bytes(b"half")
@@ -181,7 +187,7 @@ def undisturbed(name: str, room: Path) -> Undisturbed:
     if not file.exists():
         states, code, calls, took_s = list[dict[str, str]](), 0, dict[str, int](), 0.0
         for turn in ("to compile what it needs", "first", "second"):
-            home = fresh(room, f"{file.stem}-{turn.split()[0]}", WORKS[name])
+            home = fresh(own_folder(room, f"{file.stem}-{turn.split()[0]}"), room, WORKS[name])
             ended = disturbed(home, WORKS[name].words, built(room), None, room)
             assert not ended.fault((0, 1)), f"{name}: {ended.fault((0, 1))}"
             code, calls, took_s = ended.code, counted(home.parent / "home-counts"), ended.seconds
@@ -189,7 +195,10 @@ def undisturbed(name: str, room: Path) -> Undisturbed:
             shutil.rmtree(home.parent)
         _, *states = states
         common = {what: value for what, value in states[0].items() if states[1].get(what) == value}
-        file.write_text(json.dumps(asdict(Undisturbed(code, common, calls, took_s)), indent=1))
+        half = own_folder(room, file.stem) / file.name
+        half.write_text(json.dumps(asdict(Undisturbed(code, common, calls, took_s)), indent=1))
+        half.replace(file)  # another worker that has measured the same command may read it
+        half.parent.rmdir()
     return Undisturbed(**json.loads(file.read_text()))
 
 

@@ -6,16 +6,31 @@ import shutil
 import signal
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from threading import Barrier
 
 import pytest
 
+from devtools import kills, works
 from devtools.commands import Ended
 from devtools.kills import drawn, judged
 from devtools.resources import Case
 from devtools.resources import judged as judged_without
 from devtools.shim import KINDS, Strike, built, counted, shimmed
-from devtools.works import WORKS, Undisturbed, age, kept_before, leftovers, lost, policy, reached, state, unsound
+from devtools.works import (
+    WORKS,
+    Undisturbed,
+    age,
+    kept_before,
+    leftovers,
+    lost,
+    policy,
+    reached,
+    state,
+    undisturbed,
+    unsound,
+)
 from lab.toolbox.registry import Toolbox
 
 WRITER = """
@@ -141,6 +156,28 @@ def test_a_killed_command_is_done_again(room: Path) -> None:
     assert "then lab toolbox remove doubled --json: not as undisturbed" in judged(
         "toolbox remove", expected, home, killed, room, carried_out
     )
+
+
+def test_two_workers_measure_a_command_in_homes_of_their_own(room: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Both are at the same command at the same time: each finds there what it began from, until it is over."""
+    together = Barrier(2, timeout=20)
+
+    def disturbed(home: Path, *_: object) -> Ended:
+        together.wait()
+        (home / "measured").mkdir()
+        together.wait()
+        shimmed(room / "write_shim.so", home, home.parent / f"{home.name}-counts")  # nothing is counted
+        return Ended(0, "", "", 1.5, 0)
+
+    for module in (kills, works):
+        monkeypatch.setattr(module, "disturbed", disturbed)
+        monkeypatch.setattr(module, "built", lambda _: room / "write_shim.so")
+    with ThreadPoolExecutor(2) as pool:
+        forked = [pool.submit(kills.forked_s, "toolbox remove", room) for _ in range(2)]
+        assert [one.result() for one in forked] == [1.5, 1.5]
+        alone = [pool.submit(undisturbed, "toolbox remove", room) for _ in range(2)]
+        assert [one.result().seconds for one in alone] == [1.5, 1.5]
+    assert sorted(path.name for path in room.iterdir()) == ["base", "home", "toolbox-remove.json"]
 
 
 @pytest.mark.parametrize(
