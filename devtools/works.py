@@ -125,6 +125,7 @@ def policy(name: str, value: float) -> Policy:
     return Policy(
         name, "world", "drawn", q, np.ones((4, 2), np.int64), ("left", "right"), (4,), 0, "0123456789abcdef", {"learner": "q"},
         {"gate": "ccrl"}, "expert", 0, [3, 3], [False, False], 0, 0, 3, 3, True, f"2026-01-01T00:00:{int(value):02}+00:00", {},
+        np.array([0, 0, 0, 1], np.uint8),
     )  # fmt: skip
 
 

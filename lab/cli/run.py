@@ -40,7 +40,6 @@ def run(
         str | None,
         typer.Option("--speed", help="Simulated seconds per second, or max; default: 4 with a page, else max."),
     ] = None,
-    view: Annotated[bool, typer.Option("--view/--no-view", hidden=True)] = False,  # the old word for --page
     port: Port = 0,
     wait: Wait = None,
     override: Annotated[
@@ -111,14 +110,14 @@ def run(
             options, loaded = gone_on(given, resume, out)
         wanted, folder = options.by_method(loaded), resume or out or Path(f"{loaded.name}-run")
         check_out(folder)
-        watched = page or view or "web" in options.advisors
+        watched = page or "web" in options.advisors
         controls = Controls(pace(speed or ("4" if watched else "max")))
         lessons = options.lessons()
         lessons.advising()
         prepared = prepare(wanted, options.ordered(loaded), options.seed, workers=beside)
         journal = begun(options, loaded, folder) if resume is None else RunJournal.resume(folder)
         try:
-            with lesson_seat(options.advisors, page=page or view, port=port, wait_s=wait) as seat:
+            with lesson_seat(options.advisors, page=page, port=port, wait_s=wait) as seat:
                 teacher = teacher_of(toolbox, lessons, seat)
                 advice = RunAdvice(teacher.toolbox, lessons, journal, options.order or "", cyclic=options.cyclic)
                 advice.parts_per_cycle = options.parts_per_cycle

@@ -61,7 +61,6 @@ def teach(
             help="Where in a world the advisor sees the robot: full, or limited to the region in its file; default: full.",
         ),
     ] = None,
-    view: Annotated[str | None, typer.Option("--view", hidden=True)] = None,  # the old word for --sight
     resume: Annotated[
         Path | None, typer.Option("--resume", help="Go on with the session in this folder, as it was begun.")
     ] = None,
@@ -90,7 +89,7 @@ def teach(
     from lab.view.summary import lesson_summary
 
     who = (tuple(advisor or ()), asked, decide)
-    given = LessonOptions(subtask or "", task, sight or view, learner, gate, memory, *who, episodes, seed, save)
+    given = LessonOptions(subtask or "", task, sight, learner, gate, memory, *who, episodes, seed, save)
     kept = None if resume is None else KeptSession(resume, "--resume", trusted=trust_module or ())
     if kept is not None and out is not None:
         raise BadInput(f"--out {out} beside --resume {resume}: a session goes on in its own folder: leave it away")
