@@ -233,9 +233,8 @@ def state(home: Path) -> dict[str, str]:
 def _fingerprint(held: Policy) -> str:
     """A policy without the time at which it was made."""
     facts = asdict(replace(held, created="", parent=held.parent.rpartition("@")[0]))
-    tables = b"".join(np.ascontiguousarray(facts.pop(name)).tobytes() for name in ("q", "visits"))
-    ends = facts.pop("ends")
-    return _digest(tables + (b"" if ends is None else ends.tobytes()) + json.dumps(facts, sort_keys=True).encode())
+    tables = b"".join(np.ascontiguousarray(facts.pop(name)).tobytes() for name in ("q", "visits", "ends"))
+    return _digest(tables + json.dumps(facts, sort_keys=True).encode())
 
 
 def _timeless(content: bytes) -> bytes:

@@ -15,7 +15,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 LAYERS: tuple[tuple[str, ...], ...] = (
-    ("lab.errors", "lab.operating_system"),
+    ("lab.errors", "lab.lazy", "lab.operating_system"),
     ("lab.files", "lab.mdp", "lab.optional", "lab.plugins", "lab.statistics", "lab.workers"),
     ("lab.learning", "lab.vision"),
     ("lab.sequencing", "lab.toolbox"),
@@ -84,7 +84,7 @@ READS_ITS_OWN = (  # what ships with the lab, or what it has just written: nothi
     *("lab.view.meshcat", "lab.view.server_page", "lab.studies.report", "lab.cli.export", "lab.toolbox.remote_place"),
     *("lab.api.lessons", "lab.api.pictures", "lab.api.runs", "lab.api.scenes"),
 )
-BY_TABLE = ("lab", "lab.cli.app", "lab_studies")  # what these load stands in a table of their own
+BY_TABLE = ("lab", "lab.lazy", "lab.cli.app", "lab_studies")  # what these load stands in a table
 GENERATORS = {"Generator", "default_rng", "SeedSequence", "BitGenerator", "PCG64"}
 
 
@@ -252,6 +252,26 @@ def test_the_architecture_is_the_one_that_is_told() -> None:
 
 def test_the_package_itself_loads_nothing_until_it_is_touched() -> None:
     assert not [item.target for item in house()["lab"][1] if item.at_load]
+
+
+@pytest.mark.parametrize(
+    "module", sorted(name for name, (tree, _) in house().items() if "loader(__name__" in ast.unparse(tree))
+)
+def test_a_table_of_what_is_loaded_later_holds_what_is_imported_for_types(module: str) -> None:
+    """The walls see the imports of the table's module; what is loaded when it runs is the table's."""
+    tree, _ = house()[module]
+    block = next(node for node in tree.body if isinstance(node, ast.If) and _is_type_checking(node))
+    for_types = {
+        (node.module, alias.name, alias.asname or alias.name)
+        for node in ast.walk(block)
+        if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+    }
+    (table,) = (
+        node.value for node in tree.body if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "TABLE"
+    )
+    rows = [(where, row) for where, names in ast.literal_eval(table).items() for row in names]
+    assert {(where, row.partition(" ")[0], row.rpartition(" ")[2]) for where, row in rows} == for_types
 
 
 def test_ctrl_c_is_heard_before_anything_is_loaded() -> None:
