@@ -37,10 +37,7 @@ ALONE: dict[str, set[str]] = (
         "pybullet_data": {"lab.sim.world"},
         "pybullet_utils": {"lab.sim.world"},
         "meshcat": {"lab.view.meshcat"},
-        "cv2": {
-            *(f"lab.vision.{name}" for name in ("markers", "hidden_discs", "part_outline", "picture_files")),
-            *(f"lab.vision.{name}" for name in ("lens", "calibration", "photo_effects")),
-        },
+        "cv2": {"lab.vision.opencv"},
         "PIL": {"lab.view.movie"},
         "numba": {"lab.learning.compiled"},  # what is kept of it is kept in one place
         "ortools": {
@@ -305,7 +302,7 @@ def faults(module: str, source: str) -> list[str]:
         ("lab.sim.arms.robot", "import pybullet", "allowed in ['lab.sim.world']"),
         ("lab.sim.arms.robot", "def f():\n    import pybullet as p", "lab.sim.arms.robot:2 imports pybullet"),
         ("lab.view.plots", "from meshcat.geometry import Box", "allowed in ['lab.view.meshcat']"),
-        ("lab.skills.insert", "import cv2.gapi", "allowed in ['lab.vision.calibration', 'lab.vision.hidden_discs', "),
+        ("lab.skills.insert", "import cv2.gapi", "allowed in ['lab.vision.opencv']"),
         ("lab.view.plots", "import websockets", "allowed in no module"),
         (
             "lab.sequencing.methods.exact",
@@ -354,7 +351,7 @@ def test_a_broken_wall_is_seen(module: str, source: str, fault: str) -> None:
     ("module", "source"),
     [
         ("lab.sim.world", "import pybullet"),
-        ("lab.vision.lens", "import cv2"),
+        ("lab.vision.opencv", "import cv2"),
         ("lab.cli.output", "print('x')\nfrom lab.view import meshcat"),
         ("lab.seat.terminal.prompt", "console.print('x')"),
         ("lab.learning.session", "from lab.learning.gates import GATES\nfrom .settings import GateSettings"),

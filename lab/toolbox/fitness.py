@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from lab.errors import counted
 from lab.learning.values import fewest_moves, known_values
 from lab.mdp import BoolArray, FloatArray, IntArray, TabularMDP
+from lab.toolbox import deferred
 from lab.toolbox.names import hash_of
 from lab.toolbox.policy import GOAL, ON, OUT, Policy
 
@@ -220,6 +221,4 @@ def best_fit(policies: Iterable[Policy], mdp: TabularMDP, discount: float = DISC
 
 def reference(policy: Policy) -> str:
     """What another policy's `parent` calls this one: name@hash."""
-    from lab.toolbox.policy_file import encode
-
-    return f"{policy.name}@{hash_of(encode(policy))}"
+    return f"{policy.name}@{hash_of(deferred.encode(policy))}"
