@@ -2,20 +2,17 @@
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from lab.cli import deferred
 from lab.cli.lessons import lesson_seat, teacher_of
 from lab.errors import BadInput
 
-if TYPE_CHECKING:
-    from lab.teaching.kept_order import OrderOptions
-
 OF_A_CYCLE = ("task", "case", "toasts", "parts", "seed", "layout", "robots")
 
 
 def cyclic_found(
-    given: "OrderOptions", toolbox: str | None, files: dict[str, Path], parts_per_cycle: int | None
+    given: "deferred.OrderOptions", toolbox: str | None, files: dict[str, Path], parts_per_cycle: int | None
 ) -> dict[str, Any]:
     """The document of the shortest cycle; BadInput for options that say how an order is looked for, which a cycle is not."""
     none = asdict(deferred.OrderOptions())

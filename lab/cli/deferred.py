@@ -6,7 +6,7 @@ from lab.lazy import loader
 
 if TYPE_CHECKING:
     from lab.advice.advisors import ADVISORS, PEOPLE, AdvisorName
-    from lab.advice.entries import read_journal
+    from lab.advice.entries import Read, read_journal
     from lab.advice.panel import ASKED, DECISIONS
     from lab.api.scenes import Asked as SceneAsked
     from lab.api.scenes import seen
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from lab.files import check_out, tasks_folder, write_whole
     from lab.gym import parse_name
     from lab.learning.gates import GATES
+    from lab.learning.requests import Ask, Request
     from lab.learning.selection import SELECTIONS
     from lab.learning.tuned_ranges import USUAL
     from lab.learning.updates import UPDATES
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from lab.production.controls import Controls
     from lab.production.cyclic_job import CyclicWanted, cyclic_named
     from lab.production.evaluation import evaluate, skill_of, task_of
+    from lab.production.operation.at_once import Done
     from lab.production.operation.commands import pace
     from lab.production.operation.desk import Desk
     from lab.production.operation.operation import Operation
@@ -91,7 +93,9 @@ if TYPE_CHECKING:
     from lab.toolbox.archive import pack, take_in, unpack
     from lab.toolbox.history import EVALUATED
     from lab.toolbox.hub_folder import read_folder
+    from lab.toolbox.policy import Policy
     from lab.toolbox.registry import Toolbox
+    from lab.toolbox.versions import Version
     from lab.view.canvas import check_picture
     from lab.view.cell_plan import draw_cell
     from lab.view.cyclic_summary import cyclic_summary
@@ -114,13 +118,22 @@ if TYPE_CHECKING:
         table_of,
     )
     from lab.view.toolbox_summary import log_summary, policy_summary, toolbox_summary, verify_summary
-    from lab.vision import draw, read_picture, see, write_picture
-    from lab.vision.calibration import Mat, calibrate, drawn, from_corners, pinhole, read_calibration, write_calibration
+    from lab.vision import Image, View, draw, read_picture, see, write_picture
+    from lab.vision.calibration import (
+        Calibration,
+        Mat,
+        calibrate,
+        drawn,
+        from_corners,
+        pinhole,
+        read_calibration,
+        write_calibration,
+    )
     from lab.workers import Workers
 
 TABLE = {
     "lab.advice.advisors": ("AdvisorName", "ADVISORS", "PEOPLE"),
-    "lab.advice.entries": ("read_journal",),
+    "lab.advice.entries": ("Read", "read_journal"),
     "lab.advice.panel": ("ASKED", "DECISIONS"),
     "lab.api.scenes": ("Asked as SceneAsked", "seen"),
     "lab.audit.audit": ("audit", "kept_evidence"),
@@ -132,6 +145,7 @@ TABLE = {
     "lab.files": ("check_out", "tasks_folder", "write_whole"),
     "lab.gym": ("parse_name",),
     "lab.learning.gates": ("GATES",),
+    "lab.learning.requests": ("Ask", "Request"),
     "lab.learning.selection": ("SELECTIONS",),
     "lab.learning.tuned_ranges": ("USUAL",),
     "lab.learning.updates": ("UPDATES",),
@@ -141,6 +155,7 @@ TABLE = {
     "lab.production.controls": ("Controls",),
     "lab.production.cyclic_job": ("cyclic_named", "CyclicWanted"),
     "lab.production.evaluation": ("evaluate", "skill_of", "task_of"),
+    "lab.production.operation.at_once": ("Done",),
     "lab.production.operation.commands": ("pace",),
     "lab.production.operation.desk": ("Desk",),
     "lab.production.operation.operation": ("Operation",),
@@ -198,7 +213,9 @@ TABLE = {
     "lab.toolbox.archive": ("pack", "take_in", "unpack"),
     "lab.toolbox.history": ("EVALUATED",),
     "lab.toolbox.hub_folder": ("read_folder",),
+    "lab.toolbox.policy": ("Policy",),
     "lab.toolbox.registry": ("Toolbox",),
+    "lab.toolbox.versions": ("Version",),
     "lab.view.canvas": ("check_picture",),
     "lab.view.cell_plan": ("draw_cell",),
     "lab.view.cyclic_summary": ("cyclic_summary",),
@@ -221,9 +238,10 @@ TABLE = {
         "table_of",
     ),
     "lab.view.toolbox_summary": ("log_summary", "policy_summary", "toolbox_summary", "verify_summary"),
-    "lab.vision": ("draw", "read_picture", "see", "write_picture"),
+    "lab.vision": ("draw", "Image", "read_picture", "see", "View", "write_picture"),
     "lab.vision.calibration": (
         "calibrate",
+        "Calibration",
         "drawn",
         "from_corners",
         "Mat",

@@ -4,27 +4,18 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from lab.cli import deferred
 from lab.cli.output import complain, console
 from lab.errors import LabError
 from lab.files import is_file
 
-if TYPE_CHECKING:
-    from lab.advice.entries import Read
-    from lab.learning.requests import Ask
-    from lab.seat.lesson_seat import LessonSeat
-    from lab.teaching.kept_order import OrderSession
-    from lab.teaching.kept_session import KeptSession
-    from lab.teaching.lesson_options import LessonOptions
-    from lab.teaching.teacher import Teacher
-
 
 @contextmanager
 def lesson_seat(
     names: Sequence[str], *, page: bool = False, port: int = 0, wait_s: float | None = None, plain: bool = False
-) -> Iterator["LessonSeat"]:
+) -> Iterator["deferred.LessonSeat"]:
     """Who hears of a command's lessons: the progress lines, and, when they are wanted, the prompt and the page."""
     progress = deferred.RunProgress(console())
     with ExitStack() as stack:
@@ -45,7 +36,9 @@ def lesson_seat(
             raise
 
 
-def teacher_of(toolbox: str | None, options: "LessonOptions", seat: "LessonSeat") -> "Teacher":
+def teacher_of(
+    toolbox: str | None, options: "deferred.LessonOptions", seat: "deferred.LessonSeat"
+) -> "deferred.Teacher":
     """The teacher that the options describe; raises BadInput for options that cannot be.
 
     Whether policies can be kept is looked at before one is learned: whoever learns nothing needs not write.
@@ -59,7 +52,11 @@ def teacher_of(toolbox: str | None, options: "LessonOptions", seat: "LessonSeat"
 
 
 def sequenced(
-    kept: "OrderSession", people: "Mapping[str, Ask]", seat: "LessonSeat", toolbox: str | None, files: dict[str, Path]
+    kept: "deferred.OrderSession",
+    people: "Mapping[str, deferred.Ask]",
+    seat: "deferred.LessonSeat",
+    toolbox: str | None,
+    files: dict[str, Path],
 ) -> dict[str, Any]:
     """The document of a session of `lab sequence`, whom it may ask behind such names as "terminal", its pictures in files."""
     options = kept.options
@@ -86,11 +83,11 @@ def sequenced(
     return deferred.sequence_named(options.task, options.case, options.toasts, wanted, teacher=teacher, files=files)
 
 
-def _say_cut(read: "Read") -> None:
+def _say_cut(read: "deferred.Read") -> None:
     complain(f"journal '{read.path}': its last line was cut off and is left out: {read.cut[:60]!r}")
 
 
-def say_read(kept: "KeptSession | OrderSession", where: str) -> None:
+def say_read(kept: "deferred.KeptSession | deferred.OrderSession", where: str) -> None:
     """Says of a session that goes on or is shown again what was cut off, and which files are read that are not its own."""
     assert kept.read is not None
     if kept.read.cut:

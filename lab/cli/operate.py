@@ -3,7 +3,7 @@
 import sys
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
@@ -12,11 +12,6 @@ from lab.cli.lessons import lesson_seat, teacher_of
 from lab.cli.options import Json, Parts, Port, Seed, ShowPage, Toasts, ToolboxPlace
 from lab.cli.output import complain, end, show, write
 from lab.errors import counted
-
-if TYPE_CHECKING:
-    from lab.production.operation.at_once import Done
-    from lab.production.operation.desk import Desk
-    from lab.production.operation.operation import Operation
 
 
 def operate(
@@ -87,7 +82,7 @@ def operate(
         end(bad.refused or bad.failed, 2 if bad.refused else 1)
 
 
-def _at_console(desk: "Desk", live: bool, as_json: bool, stay: bool) -> "Done | None":
+def _at_console(desk: "deferred.Desk", live: bool, as_json: bool, stay: bool) -> "deferred.Done | None":
     """The command that ended a pipe, None for none; stay: beside a page, which goes on when the pipe has ended."""
     if live:
         deferred.OperatorConsole(desk).run()
@@ -96,7 +91,7 @@ def _at_console(desk: "Desk", live: bool, as_json: bool, stay: bool) -> "Done | 
     return console.run(sys.stdin, stay=stay)
 
 
-def _kept(operation: "Operation", folder: Path) -> dict[str, Any]:
+def _kept(operation: "deferred.Operation", folder: Path) -> dict[str, Any]:
     """Write the files of the run, where one was carried out, and the document of what was done."""
     scene, report = operation.scene, operation.report()
     document = {

@@ -2,7 +2,7 @@
 
 from contextlib import nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
@@ -12,11 +12,6 @@ from lab.cli.lessons import lesson_seat, say_read, sequenced
 from lab.cli.options import Json, Plain, Port, ToolboxPlace, TrustModule
 from lab.cli.output import complain, console, end, show
 from lab.errors import BadInput
-
-if TYPE_CHECKING:
-    from lab.learning.requests import Request
-    from lab.seat.lesson_seat import LessonSeat
-    from lab.teaching.kept_order import OrderSession
 
 
 def replay(
@@ -144,10 +139,10 @@ def _replay_run(
             end("stopped by Ctrl-C", 130)
 
 
-def _replayed(kept: "OrderSession", seat: "LessonSeat", toolbox: str | None) -> dict[str, Any]:
+def _replayed(kept: "deferred.OrderSession", seat: "deferred.LessonSeat", toolbox: str | None) -> dict[str, Any]:
     """Advice on an order again: the session is run once more, and the journal answers for the people."""
 
-    def nobody(request: "Request") -> int | None:
+    def nobody(request: "deferred.Request") -> int | None:
         raise KeyboardInterrupt
 
     try:

@@ -3,7 +3,7 @@
 import re
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
@@ -11,10 +11,6 @@ from lab.cli import deferred
 from lab.cli.options import Json, Seed
 from lab.cli.output import complain, show
 from lab.errors import BadInput
-
-if TYPE_CHECKING:
-    from lab.vision import Image, View
-    from lab.vision.calibration import Calibration
 
 TASK = "toast"  # whose camera takes pictures that are made, unless another is named
 
@@ -135,7 +131,9 @@ def calibrate_camera(
     return found.to_json() | {"files": files}
 
 
-def _from_corners(corners: str, task: str | None, image: "Image", known: "Calibration | None") -> "Calibration":
+def _from_corners(
+    corners: str, task: str | None, image: "deferred.Image", known: "deferred.Calibration | None"
+) -> "deferred.Calibration":
     number = r"-?\d+(?:\.\d+)?"
     if not re.fullmatch(rf"\s*{number},{number}(?:\s+{number},{number}){{3}}\s*", corners):
         raise BadInput(
@@ -152,7 +150,7 @@ def _from_corners(corners: str, task: str | None, image: "Image", known: "Calibr
     return deferred.from_corners(lens, pixels, [(x, y), (x + a, y), (x + a, y + b), (x, y + b)])
 
 
-def _calibration(path: Path | None) -> "Calibration | None":
+def _calibration(path: Path | None) -> "deferred.Calibration | None":
     return None if path is None else deferred.read_calibration(path)
 
 
@@ -196,7 +194,7 @@ def _shape(grid: str | None) -> tuple[int, int]:
     return int(match[1]), int(match[2])
 
 
-def _camera(task: str, pixels: int, wanted: tuple[int, int] | None) -> "tuple[View, float]":
+def _camera(task: str, pixels: int, wanted: tuple[int, int] | None) -> "tuple[deferred.View, float]":
     """How a task's camera with so many pixels a side sees its grid, and its field of view [rad]; BadInput when a grid of
     another shape is wanted.
     """

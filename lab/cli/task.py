@@ -2,7 +2,7 @@
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
@@ -10,9 +10,6 @@ from lab.cli import deferred
 from lab.cli.options import Json, Seed
 from lab.cli.output import end, show, write, write_json
 from lab.errors import BadInput, LabError, counted
-
-if TYPE_CHECKING:
-    from lab.tasks.task import Task
 
 
 def task_list(as_json: Json = False) -> None:
@@ -153,7 +150,7 @@ def task_check(
         end(errors[0], 2)
 
 
-def _to_draw(file: str, plot: Path) -> "Task | None":
+def _to_draw(file: str, plot: Path) -> "deferred.Task | None":
     """The task to be drawn, None when it cannot be read; BadInput for what has no picture, and for a bad path of one."""
     deferred.check_picture(plot)
     try:

@@ -1,7 +1,7 @@
 """`lab toolbox`: the policies that were learned."""
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
@@ -10,10 +10,6 @@ from lab.cli.families import offers
 from lab.cli.options import Json, ToolboxPlace
 from lab.cli.output import end, show
 from lab.errors import BadInput, counted, unknown
-
-if TYPE_CHECKING:
-    from lab.toolbox.registry import Toolbox
-    from lab.toolbox.versions import Version
 
 Name = Annotated[str, typer.Argument(help="A policy's name; lab toolbox list shows them.")]
 
@@ -40,7 +36,9 @@ def toolbox_list(
     show({"folder": box.address, "policies": rows}, as_json, deferred.toolbox_summary)
 
 
-def _check_filter(box: "Toolbox", what: str, field: str, value: str | None, known: Callable[[str], bool]) -> None:
+def _check_filter(
+    box: "deferred.Toolbox", what: str, field: str, value: str | None, known: Callable[[str], bool]
+) -> None:
     """BadInput for a word that neither the toolbox nor the lab knows; an empty toolbox knows none, and says so."""
     held = {row[field] for row in box.list()}
     if value is not None and held and value not in held and not known(value):
@@ -92,7 +90,7 @@ def toolbox_rollback(name: Name, toolbox: ToolboxPlace = None, as_json: Json = F
     _show_in_use(box, name, box.rollback(name), as_json)
 
 
-def _show_in_use(box: "Toolbox", name: str, version: "Version", as_json: bool) -> None:
+def _show_in_use(box: "deferred.Toolbox", name: str, version: "deferred.Version", as_json: bool) -> None:
     file = box.place.where(box.versions(name).in_use_file)
     document = {"name": name, "version": version.number, "hash": version.hash, "file": file}
     show(document, as_json, lambda d: f"'{name}': version {d['version']} ({d['hash']}) is in use")

@@ -1,7 +1,7 @@
 """`lab toolbox card, export, import, publish`: policies shown and given to others, and taken from them."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
@@ -9,10 +9,6 @@ from lab.cli import deferred
 from lab.cli.options import Json, ToolboxPlace
 from lab.cli.output import complain, show
 from lab.errors import BadInput, counted
-
-if TYPE_CHECKING:
-    from lab.toolbox.policy import Policy
-    from lab.toolbox.registry import Toolbox
 
 OutFolder = Annotated[Path, typer.Option("--out", help="The folder for its files.")]
 
@@ -91,7 +87,7 @@ def toolbox_import(
     show(document, as_json, told)
 
 
-def _told(box: "Toolbox", name: str) -> "tuple[Policy, list[dict[str, Any]]]":
+def _told(box: "deferred.Toolbox", name: str) -> "tuple[deferred.Policy, list[dict[str, Any]]]":
     """A policy and its log."""
     shown = box.show(name)
     return box.load(shown["file"]), shown["events"]

@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -11,9 +11,6 @@ from lab.cli import deferred
 from lab.cli.options import Json, Parts, Seed, Toasts
 from lab.cli.output import end, show, write, write_json
 from lab.errors import BadInput
-
-if TYPE_CHECKING:
-    from lab.api.scenes import Asked
 
 Tell = Callable[[str, str], None]
 
@@ -54,7 +51,7 @@ def view(
         end("stopped by Ctrl-C", 130)
 
 
-def serve(what: str, asked: "Asked | None", port: int, tell: Tell) -> None:
+def serve(what: str, asked: "deferred.SceneAsked | None", port: int, tell: Tell) -> None:
     """Serve a run's replay, a task's scene or a world on 127.0.0.1 until interrupted; `tell(url, hint)` once it is there."""
     if Path(what).is_dir():
         with deferred.LiveView(port, replay=replay_page(Path(what))) as page:
@@ -80,7 +77,7 @@ def replay_page(folder: Path) -> Path:
     return page
 
 
-def write_page(what: str, asked: "Asked", out: Path) -> dict[str, str]:
+def write_page(what: str, asked: "deferred.SceneAsked", out: Path) -> dict[str, str]:
     """Write a task's scene or a world as one HTML file; the document of `lab view --out --json`."""
     if Path(what).is_dir():
         raise BadInput(f"'{what}' is the folder of a run: its replay.html is such a page already (--out)")
