@@ -140,7 +140,7 @@ def families(place: Place) -> None:
 
 def lessons(place: Place) -> None:
     """The pages whose commands are run, the five lessons among them: their commands and their Python, each in its own folder."""
-    script = ROOT / "lab-dev" / "page_examples.py"
+    script = ROOT / "devtools" / "page_examples.py"
     for folder in run_path(str(script))["COMMANDS_RUN"]:
         for page in sorted((ROOT / "docs" / folder).glob("*.md")):
             own = place.work / f"page-{page.stem}"

@@ -188,8 +188,11 @@ def make_policy() -> "Callable[..., Policy]":
             solved=True,
             created="2026-05-01T12:00:00+00:00",
             versions={"numpy": "2.0"},
+            ends=np.array([0, 0, 0, 1], np.uint8),
         )
-        return replace(base, **changed)
+        ends = np.zeros(len(changed.get("q", base.q)), np.uint8)
+        ends[-1] = 1
+        return replace(base, **{"ends": ends} | changed)
 
     return made
 

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from page_examples import COMMANDS_RUN, run
 
 import lab
+from devtools.page_examples import COMMANDS_RUN, run
 from lab.cli.app import made
 from lab.learning.settings import SETTINGS
 from lab.studies import STUDIES

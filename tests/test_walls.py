@@ -15,7 +15,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 LAYERS: tuple[tuple[str, ...], ...] = (
-    ("lab.errors", "lab.operating_system"),
+    ("lab.errors", "lab.lazy", "lab.operating_system"),
     ("lab.files", "lab.mdp", "lab.optional", "lab.plugins", "lab.statistics", "lab.workers"),
     ("lab.learning", "lab.vision"),
     ("lab.sequencing", "lab.toolbox"),
@@ -37,10 +37,7 @@ ALONE: dict[str, set[str]] = (
         "pybullet_data": {"lab.sim.world"},
         "pybullet_utils": {"lab.sim.world"},
         "meshcat": {"lab.view.meshcat"},
-        "cv2": {
-            *(f"lab.vision.{name}" for name in ("markers", "hidden_discs", "part_outline", "picture_files")),
-            *(f"lab.vision.{name}" for name in ("lens", "calibration", "photo_effects")),
-        },
+        "cv2": {"lab.vision.opencv"},
         "PIL": {"lab.view.movie"},
         "numba": {"lab.learning.compiled"},  # what is kept of it is kept in one place
         "ortools": {
@@ -84,7 +81,7 @@ READS_ITS_OWN = (  # what ships with the lab, or what it has just written: nothi
     *("lab.view.meshcat", "lab.view.server_page", "lab.studies.report", "lab.cli.export", "lab.toolbox.remote_place"),
     *("lab.api.lessons", "lab.api.pictures", "lab.api.runs", "lab.api.scenes"),
 )
-BY_TABLE = ("lab", "lab.cli.app", "lab_studies")  # what these load stands in a table of their own
+BY_TABLE = ("lab", "lab.lazy", "lab.cli.app", "lab_studies")  # what these load stands in a table
 GENERATORS = {"Generator", "default_rng", "SeedSequence", "BitGenerator", "PCG64"}
 
 
@@ -254,6 +251,26 @@ def test_the_package_itself_loads_nothing_until_it_is_touched() -> None:
     assert not [item.target for item in house()["lab"][1] if item.at_load]
 
 
+@pytest.mark.parametrize(
+    "module", sorted(name for name, (tree, _) in house().items() if "loader(__name__" in ast.unparse(tree))
+)
+def test_a_table_of_what_is_loaded_later_holds_what_is_imported_for_types(module: str) -> None:
+    """The walls see the imports of the table's module; what is loaded when it runs is the table's."""
+    tree, _ = house()[module]
+    block = next(node for node in tree.body if isinstance(node, ast.If) and _is_type_checking(node))
+    for_types = {
+        (node.module, alias.name, alias.asname or alias.name)
+        for node in ast.walk(block)
+        if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+    }
+    (table,) = (
+        node.value for node in tree.body if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "TABLE"
+    )
+    rows = [(where, row) for where, names in ast.literal_eval(table).items() for row in names]
+    assert {(where, row.partition(" ")[0], row.rpartition(" ")[2]) for where, row in rows} == for_types
+
+
 def test_ctrl_c_is_heard_before_anything_is_loaded() -> None:
     assert not [item.target for item in house()["lab.cli"][1] if item.at_load]
 
@@ -285,7 +302,7 @@ def faults(module: str, source: str) -> list[str]:
         ("lab.sim.arms.robot", "import pybullet", "allowed in ['lab.sim.world']"),
         ("lab.sim.arms.robot", "def f():\n    import pybullet as p", "lab.sim.arms.robot:2 imports pybullet"),
         ("lab.view.plots", "from meshcat.geometry import Box", "allowed in ['lab.view.meshcat']"),
-        ("lab.skills.insert", "import cv2.gapi", "allowed in ['lab.vision.calibration', 'lab.vision.hidden_discs', "),
+        ("lab.skills.insert", "import cv2.gapi", "allowed in ['lab.vision.opencv']"),
         ("lab.view.plots", "import websockets", "allowed in no module"),
         (
             "lab.sequencing.methods.exact",
@@ -334,7 +351,7 @@ def test_a_broken_wall_is_seen(module: str, source: str, fault: str) -> None:
     ("module", "source"),
     [
         ("lab.sim.world", "import pybullet"),
-        ("lab.vision.lens", "import cv2"),
+        ("lab.vision.opencv", "import cv2"),
         ("lab.cli.output", "print('x')\nfrom lab.view import meshcat"),
         ("lab.seat.terminal.prompt", "console.print('x')"),
         ("lab.learning.session", "from lab.learning.gates import GATES\nfrom .settings import GateSettings"),

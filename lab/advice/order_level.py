@@ -30,11 +30,11 @@ def signature_of(cell: Cell, objective: str) -> str:
         cell.buffers,
         cell.due_s,
         objective,
-        *((cell.begins, cell.closed) if cell.begins or cell.closed else ()),
-        *cell.precedences,
+        cell.begins,
+        cell.closed,
+        cell.precedences,
     )
-    said = repr(parts).replace(", at_most_s=None", "")  # as before there were windows: advice that was kept still fits
-    return sha256(said.encode() + cell.empty_s.tobytes() + cell.loaded_s.tobytes()).hexdigest()[:16]
+    return sha256(repr(parts).encode() + cell.empty_s.tobytes() + cell.loaded_s.tobytes()).hexdigest()[:16]
 
 
 @dataclass(frozen=True)

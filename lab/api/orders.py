@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from html import escape
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, TypedDict, Unpack
@@ -102,8 +103,6 @@ class OrderResult:
         return f"{self.document['objective']} {self.cost:g} (by {self.document['best_by']}; {what})"
 
     def _repr_html_(self) -> str:
-        from html import escape
-
         return f"<p>{escape(str(self))}</p>{self.gantt._repr_svg_()}"
 
 

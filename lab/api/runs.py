@@ -3,6 +3,7 @@
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import cached_property
+from html import escape
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, TypedDict, Unpack
@@ -93,8 +94,6 @@ class RunResult:
         return f"{self.report.prepared.task.name}: {delivered} in {self.makespan_s:.1f} s ({gap}){why}"
 
     def _repr_html_(self) -> str:
-        from html import escape
-
         return f"<p>{escape(str(self))}</p>{self.replay._repr_html_()}"
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -57,8 +58,6 @@ class StudyResult:
         return f"{self.title}: " + "; ".join(f"{name}: {value}" for name, value in self.summary.items())
 
     def _repr_html_(self) -> str:
-        from html import escape
-
         shown = "".join(f"<p>{escape(caption)}</p>{data.decode()}" for caption, data in self.findings.figures.items())
         return f"<p>{escape(str(self))}</p>{shown}"
 

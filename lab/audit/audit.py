@@ -1,6 +1,8 @@
 """The audit of a run: what is delivered by the frames and the task file, and what is wrong, part by part."""
 
+from csv import DictReader
 from dataclasses import asdict, dataclass
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -85,9 +87,6 @@ def schedule_rows(text: str) -> dict[str, list[dict[str, Any]]]:
     """The rows of a `schedule.csv`, "planned" and "measured", their times as numbers [s]. Raises ValueError and KeyError for
     another file.
     """
-    from csv import DictReader
-    from io import StringIO
-
     rows: dict[str, list[dict[str, Any]]] = {"planned": [], "measured": []}
     for row in DictReader(StringIO(text)):
         if not {"part", "operation", "station", "target", "robot"} <= row.keys():

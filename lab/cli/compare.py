@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
+from lab.cli import deferred
 from lab.cli.families import from_files, offers
 from lab.cli.options import Json, ProblemName, Seed, SightInWorld, TaskOfSkill
 from lab.cli.output import console, show
@@ -64,18 +65,14 @@ def study_compare(
 
     Same seed, same rows. What the folder already holds is not run again.
     """
-    from lab.studies import Study, carried_out
-    from lab.studies.compared import Compared, compared
-    from lab.studies.runner import Job
-    from lab.view.progress import counting
-    from lab.view.summary import study_summary
-
     given = {name: parsed(name, text) for name, text in values.items() if text is not None}
-    what = Compared(problem, listed("advisor", advisor), given, task, sight)
-    study = Study(f"Compared: {problem}", lambda job, reading: compared(what, job), least=2)
-    with counting(console(), f"settings in {problem}") as progress:
-        document = carried_out(study, "compare", Job(sessions, seed, workers, dask, progress=progress), out)
-    show(document, as_json, study_summary)
+    what = deferred.Compared(problem, listed("advisor", advisor), given, task, sight)
+    study = deferred.Study(f"Compared: {problem}", lambda job, reading: deferred.compared(what, job), least=2)
+    with deferred.counting(console(), f"settings in {problem}") as progress:
+        document = deferred.carried_out(
+            study, "compare", deferred.Job(sessions, seed, workers, dask, progress=progress), out
+        )
+    show(document, as_json, deferred.study_summary)
 
 
 def listed(name: str, text: str) -> list[str]:

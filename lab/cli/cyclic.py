@@ -1,28 +1,21 @@
 """What `lab sequence --cyclic` runs."""
 
+from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from lab.cli import deferred
 from lab.cli.lessons import lesson_seat, teacher_of
 from lab.errors import BadInput
-
-if TYPE_CHECKING:
-    from lab.teaching.kept_order import OrderOptions
 
 OF_A_CYCLE = ("task", "case", "toasts", "parts", "seed", "layout", "robots")
 
 
 def cyclic_found(
-    given: "OrderOptions", toolbox: str | None, files: dict[str, Path], parts_per_cycle: int | None
+    given: "deferred.OrderOptions", toolbox: str | None, files: dict[str, Path], parts_per_cycle: int | None
 ) -> dict[str, Any]:
     """The document of the shortest cycle; BadInput for options that say how an order is looked for, which a cycle is not."""
-    from dataclasses import asdict
-
-    from lab.production.cyclic_job import CyclicWanted, cyclic_named
-    from lab.teaching.kept_order import OrderOptions
-    from lab.teaching.lesson_options import DEFAULT_ADVISORS, LessonOptions
-
-    none = asdict(OrderOptions())
+    none = asdict(deferred.OrderOptions())
     for name, value in asdict(given).items():
         if name not in OF_A_CYCLE and value != none[name]:
             said = "" if value is True else f" {value}"
@@ -33,11 +26,11 @@ def cyclic_found(
         raise BadInput(f"--cyclic beside --plot {files['plot']}: a cycle has no episodes; --gantt draws it")
     if "schedule" in files:
         raise BadInput(f"--cyclic beside --schedule {files['schedule']}: a cycle has no end: --gantt draws it")
-    options = LessonOptions(advisors=DEFAULT_ADVISORS, seed=given.seed)
+    options = deferred.LessonOptions(advisors=deferred.DEFAULT_ADVISORS, seed=given.seed)
     with lesson_seat(()) as seat, seat.progress:
         teacher = teacher_of(toolbox, options, seat)
         beside = given.beside
-        wanted = CyclicWanted(
+        wanted = deferred.CyclicWanted(
             given.case, given.toasts, given.parts, given.seed, beside.layout, beside.robots, parts_per_cycle
         )
-        return cyclic_named(given.task, wanted, teacher, files)
+        return deferred.cyclic_named(given.task, wanted, teacher, files)

@@ -1,13 +1,17 @@
 """`lab export`: a run for the real robot, checked before it is trusted."""
 
+from datetime import datetime
+from math import degrees
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from lab.cli import deferred
 from lab.cli.families import offers
 from lab.cli.options import Json
 from lab.cli.output import complain, end, show
+from lab.errors import WorkFailed, counted, unknown
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -26,29 +30,21 @@ def export(
     as_json: Json = False,
 ) -> None:
     """Write what the robot did in a run as job files or trajectories, read them back and play them in physics."""
-    from datetime import datetime
-
-    from lab.errors import unknown
-    from lab.export import FORMATS
-    from lab.export.commands import Path as Lines
-    from lab.export.options import POSITIONS, Options
-    from lab.export.play import deviation
-    from lab.export.program import Program
-    from lab.files import check_out
-
-    if to not in FORMATS:
-        raise unknown("format", to, FORMATS, "--format")
-    if positions not in POSITIONS:
-        raise unknown("sort of positions", positions, POSITIONS, "--positions")
+    if to not in deferred.FORMATS:
+        raise unknown("format", to, deferred.FORMATS, "--format")
+    if positions not in deferred.POSITIONS:
+        raise unknown("sort of positions", positions, deferred.POSITIONS, "--positions")
     folder = out or run / to
-    check_out(folder)
-    program, form = Program.load(run), FORMATS[to]
-    options = Options("pulse" if positions == "pulse" else "rectan", datetime.now().strftime("%Y/%m/%d %H:%M"), any_arm)
+    deferred.check_out(folder)
+    program, form = deferred.Program.load(run), deferred.FORMATS[to]
+    options = deferred.Options(
+        "pulse" if positions == "pulse" else "rectan", datetime.now().strftime("%Y/%m/%d %H:%M"), any_arm
+    )
     written = form.write(program, options)
     files = _written(written, folder)
     read = {path.name: path.read_bytes().decode("utf-8") for path in files}
     read_back = form.read(read, program.arm)
-    off = deviation(program, read_back)
+    off = deferred.deviation(program, read_back)
     for warning in form.warnings(program):
         complain(warning)
     document = {
@@ -58,7 +54,7 @@ def export(
         "files": [str(path) for path in files],
         "transfers": len(program.carried.transfers),
         "motions": off.motions,
-        "moves": sum(len(one.points) for one in read_back if isinstance(one, Lines))
+        "moves": sum(len(one.points) for one in read_back if isinstance(one, deferred.Lines))
         if isinstance(read_back, list)
         else 0,
         "poses": off.poses,
@@ -78,24 +74,17 @@ def export(
 
 def _written(texts: dict[str, str], folder: Path) -> list[Path]:
     """The files, each written whole."""
-    from lab.errors import WorkFailed
-    from lab.files import write_whole
-
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for name, text in texts.items():
-            write_whole(folder / name, text.encode("utf-8"))
+            deferred.write_whole(folder / name, text.encode("utf-8"))
     except OSError as error:
         raise WorkFailed(f"output folder '{folder}' (--out) cannot be written: {error.strerror or error}") from error
     return [folder / name for name in texts]
 
 
 def _summary(document: dict[str, Any]) -> "RenderableType":
-    from math import degrees
-
     from rich.text import Text
-
-    from lab.errors import counted
 
     files = document["files"]
     worst = f"{1000 * document['max_deviation_m']:.2f} mm, {degrees(document['max_deviation_rad']):.2f} degrees"

@@ -11,6 +11,7 @@ from typing import Any, cast
 import typer
 from typer.core import TyperCommand
 
+from lab.cli import deferred
 from lab.cli.glossary import TERMS, TEXTS
 from lab.cli.output import complain
 
@@ -18,50 +19,32 @@ Tables = dict[str, Mapping[str, Any] | Sequence[str]]
 
 
 def _of_teaching() -> Tables:
-    from lab.advice.advisors import ADVISORS
-    from lab.advice.panel import ASKED, DECISIONS
-    from lab.learning.gates import GATES
-    from lab.learning.selection import SELECTIONS
-    from lab.learning.updates import UPDATES
-    from lab.skills import SKILLS
-
     return {
         "terms": TERMS,
-        "skills": SKILLS,
-        "learners": UPDATES,
-        "gates": GATES,
-        "selections": SELECTIONS,
-        "advisors": ADVISORS,
-        "asked": ASKED,
-        "decisions": DECISIONS,
+        "skills": deferred.SKILLS,
+        "learners": deferred.UPDATES,
+        "gates": deferred.GATES,
+        "selections": deferred.SELECTIONS,
+        "advisors": deferred.ADVISORS,
+        "asked": deferred.ASKED,
+        "decisions": deferred.DECISIONS,
     }
 
 
 def _of_sequencing() -> Tables:
-    from lab.sequencing import SEQUENCERS
-    from lab.sequencing.cell.objectives import OBJECTIVES
-    from lab.sequencing.methods.srl_advised import FITTING
-
-    return {"methods": SEQUENCERS, "objectives": OBJECTIVES, "order gates": FITTING}
+    return {"methods": deferred.SEQUENCERS, "objectives": deferred.OBJECTIVES, "order gates": deferred.FITTING}
 
 
 def _of_studies() -> Tables:
-    from lab.studies import STUDIES
-
-    return {"studies": STUDIES}
+    return {"studies": deferred.STUDIES}
 
 
 def _of_tasks() -> Tables:
-    from lab.tasks.instances import INSTANCES
-    from lab.tasks.robot_fields import MODELS
-
-    return {"arms": MODELS, "instances": INSTANCES}
+    return {"arms": deferred.MODELS, "instances": deferred.INSTANCES}
 
 
 def _of_export() -> Tables:
-    from lab.export import FORMATS
-
-    return {"export formats": FORMATS}
+    return {"export formats": deferred.FORMATS}
 
 
 def members(family: str) -> Mapping[str, Any] | Sequence[str]:
@@ -90,12 +73,11 @@ def from_files(*families: str) -> Callable[[Any, Any], Any]:
     def taken(context: typer.Context, value: Any) -> Any:
         if context.resilient_parsing or not value:
             return value
-        from lab.plugins.code_file import is_file_word, take
 
         def member(word: str) -> str:
-            if not is_file_word(word.strip()):
+            if not deferred.is_file_word(word.strip()):
                 return word
-            return take([cast(Any, members(family)) for family in families], word.strip(), complain)
+            return deferred.take([cast(Any, members(family)) for family in families], word.strip(), complain)
 
         if isinstance(value, str):
             return ",".join(map(member, value.split(",")))

@@ -1,47 +1,32 @@
 """What the commands that teach share: who hears of it, the teacher of the options, what a kept session reads."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from lab.cli import deferred
 from lab.cli.output import complain, console
 from lab.errors import LabError
 from lab.files import is_file
-
-if TYPE_CHECKING:
-    from lab.advice.entries import Read
-    from lab.learning.requests import Ask
-    from lab.seat.lesson_seat import LessonSeat
-    from lab.teaching.kept_order import OrderSession
-    from lab.teaching.kept_session import KeptSession
-    from lab.teaching.lesson_options import LessonOptions
-    from lab.teaching.teacher import Teacher
 
 
 @contextmanager
 def lesson_seat(
     names: Sequence[str], *, page: bool = False, port: int = 0, wait_s: float | None = None, plain: bool = False
-) -> Iterator["LessonSeat"]:
+) -> Iterator["deferred.LessonSeat"]:
     """Who hears of a command's lessons: the progress lines, and, when they are wanted, the prompt and the page."""
-    from contextlib import ExitStack
-
-    from lab.seat.lesson_seat import LessonSeat
-    from lab.seat.run_progress import RunProgress
-    from lab.seat.terminal.prompt import TeachingPrompt
-
-    progress = RunProgress(console())
+    progress = deferred.RunProgress(console())
     with ExitStack() as stack:
         shown = None
         if page or "web" in names:
-            from lab.seat.page.teaching_page import SeatPage
-
-            shown = stack.enter_context(SeatPage(port, wait_s=wait_s))
+            shown = stack.enter_context(deferred.SeatPage(port, wait_s=wait_s))
             progress.console.print(f"page: {shown.url}\nfrom another machine: {shown.hint}", soft_wrap=True)
             if not {"web", "terminal"} & {*names}:
                 shown.asks_nobody()
-        prompt = TeachingPrompt(progress.console, plain=plain) if "terminal" in names else None
-        seat = LessonSeat(progress, prompt, shown)
+        prompt = deferred.TeachingPrompt(progress.console, plain=plain) if "terminal" in names else None
+        seat = deferred.LessonSeat(progress, prompt, shown)
         stack.callback(seat.clear_scene)
         try:
             yield seat
@@ -51,33 +36,31 @@ def lesson_seat(
             raise
 
 
-def teacher_of(toolbox: str | None, options: "LessonOptions", seat: "LessonSeat") -> "Teacher":
+def teacher_of(
+    toolbox: str | None, options: "deferred.LessonOptions", seat: "deferred.LessonSeat"
+) -> "deferred.Teacher":
     """The teacher that the options describe; raises BadInput for options that cannot be.
 
     Whether policies can be kept is looked at before one is learned: whoever learns nothing needs not write.
     """
-    from dataclasses import replace
-
-    from lab.teaching.teacher import Teacher
-    from lab.toolbox.registry import Toolbox
-
-    box = Toolbox(toolbox)
+    box = deferred.Toolbox(toolbox)
     box.check(to_write=False)
     advising = replace(options.advising(seat.people()), toolbox=box)
     for journal in advising.cut_records():
         _say_cut(journal)
-    return Teacher(box, advising, options.seed, seat.hear)
+    return deferred.Teacher(box, advising, options.seed, seat.hear)
 
 
 def sequenced(
-    kept: "OrderSession", people: "Mapping[str, Ask]", seat: "LessonSeat", toolbox: str | None, files: dict[str, Path]
+    kept: "deferred.OrderSession",
+    people: "Mapping[str, deferred.Ask]",
+    seat: "deferred.LessonSeat",
+    toolbox: str | None,
+    files: dict[str, Path],
 ) -> dict[str, Any]:
     """The document of a session of `lab sequence`, whom it may ask behind such names as "terminal", its pictures in files."""
-    from lab.production.sequencing_job import Wanted, sequence_named
-    from lab.teaching.lesson_options import DEFAULT_ADVISORS, LessonOptions
-
     options = kept.options
-    wanted = Wanted(
+    wanted = deferred.Wanted(
         options.method,
         options.episodes,
         options.objective,
@@ -96,30 +79,25 @@ def sequenced(
         options.seconds,
         options.gap,
     )
-    teacher = teacher_of(toolbox, LessonOptions(advisors=DEFAULT_ADVISORS, seed=options.seed), seat)
-    return sequence_named(options.task, options.case, options.toasts, wanted, teacher=teacher, files=files)
+    teacher = teacher_of(toolbox, deferred.LessonOptions(advisors=deferred.DEFAULT_ADVISORS, seed=options.seed), seat)
+    return deferred.sequence_named(options.task, options.case, options.toasts, wanted, teacher=teacher, files=files)
 
 
-def _say_cut(read: "Read") -> None:
+def _say_cut(read: "deferred.Read") -> None:
     complain(f"journal '{read.path}': its last line was cut off and is left out: {read.cut[:60]!r}")
 
 
-def say_read(kept: "KeptSession | OrderSession", where: str) -> None:
+def say_read(kept: "deferred.KeptSession | deferred.OrderSession", where: str) -> None:
     """Says of a session that goes on or is shown again what was cut off, and which files are read that are not its own."""
-    from lab.advice.advisors import AdvisorName
-    from lab.tasks.task_file import is_path
-
     assert kept.read is not None
     if kept.read.cut:
         _say_cut(kept.read)
     options = kept.options
     named: list[object] = [getattr(options, "subtask", None), options.task]
     if str(named[0]).startswith("gym:"):
-        from lab.gym import parse_name
-
-        named = list(parse_name(str(named[0]), where).options.values())
-    files = [word for word in named if isinstance(word, str) and is_path(word) and is_file(word)]
-    advisors = [AdvisorName.of(name) for name in options.advisors]
+        named = list(deferred.parse_name(str(named[0]), where).options.values())
+    files = [word for word in named if isinstance(word, str) and deferred.is_path(word) and is_file(word)]
+    advisors = [deferred.AdvisorName.of(name) for name in options.advisors]
     files += [str(one) for name in advisors for one in (name.folder, name.answers) if one is not None]
     here = kept.read.path.parent.resolve()
     if outside := [name for name in files if not Path(name).resolve().is_relative_to(here)]:

@@ -4,6 +4,7 @@ from typing import Annotated, Any
 
 import typer
 
+from lab.cli import deferred
 from lab.cli.families import offers
 from lab.cli.options import Json
 from lab.cli.output import console, show
@@ -58,23 +59,16 @@ def new(
 
     Without options it asks; with any it does not.
     """
-    from lab.skills.new_cell import new_cell
-    from lab.tasks.new_task import MACHINE, file_of, new_task
-    from lab.tasks.record import write_whole
-
-    path, task_name = file_of(name)
+    path, task_name = deferred.file_of(name)
     numbers = (mass or (), friction or (), capacity or (), batch or ())
     if part or machine or arm or buffer or any(numbers):
-        wanted = new_task(task_name, arm or "up6", part or (), machine or (), buffer, *numbers)
+        wanted = deferred.new_task(task_name, arm or "up6", part or (), machine or (), buffer, *numbers)
     elif yes:
-        wanted = new_task(task_name, "up6", (), (MACHINE,), False)
+        wanted = deferred.new_task(task_name, "up6", (), (deferred.MACHINE,), False)
     else:
-        from lab.seat.terminal.line_reader import default_reader
-        from lab.seat.terminal.new_task_questions import ask
-
-        wanted = ask(task_name, default_reader(console(), moves=False), console())
-    text, task = new_cell(wanted, path)
-    write_whole(path, text)
+        wanted = deferred.ask(task_name, deferred.default_reader(console(), moves=False), console())
+    text, task = deferred.new_cell(wanted, path)
+    deferred.write_task_text(path, text)
 
     def told(d: dict[str, Any]) -> str:
         there = f"{counted(d['parts'], 'part')} and {counted(d['stations'], 'station')} around the arm {wanted.arm}"

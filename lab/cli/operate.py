@@ -1,18 +1,17 @@
 """`lab operate`: the operator's console."""
 
+import sys
+from dataclasses import asdict, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
+from lab.cli import deferred
 from lab.cli.lessons import lesson_seat, teacher_of
 from lab.cli.options import Json, Parts, Port, Seed, ShowPage, Toasts, ToolboxPlace
 from lab.cli.output import complain, end, show, write
-
-if TYPE_CHECKING:
-    from lab.production.operation.at_once import Done
-    from lab.production.operation.desk import Desk
-    from lab.production.operation.operation import Operation
+from lab.errors import counted
 
 
 def operate(
@@ -43,41 +42,30 @@ def operate(
     as_json: Json = False,
 ) -> None:
     """Run a task by hand: order, pause, stop, jog, lead, grasp, learn, in a live console, on a page, or from a pipe."""
-    import sys
-    from dataclasses import replace
-
-    from lab.files import check_out
-    from lab.production.conditions import Conditions
-    from lab.production.controls import Controls
-    from lab.production.operation.commands import pace
-    from lab.production.operation.desk import Desk
-    from lab.production.operation.operation import Operation
-    from lab.production.run_journal import RunJournal
-    from lab.production.run_options import RunOptions, begun, gone_on
-    from lab.tasks.task_file import load
-    from lab.teaching.events import unheard
-    from lab.teaching.lesson_options import DEFAULT_ADVISORS
-
     live = sys.stdin.isatty() and sys.stderr.isatty()
     watched = live or page
-    speed_now = pace(speed or ("4" if watched else "max"))
-    options = RunOptions(task or "", toasts, parts, seed=seed, faults=faults)
+    speed_now = deferred.pace(speed or ("4" if watched else "max"))
+    options = deferred.RunOptions(task or "", toasts, parts, seed=seed, faults=faults)
     if resume is None:
-        options = replace(options, task=task or "toast", advisors=DEFAULT_ADVISORS)
-        loaded = load(options.task)
+        options = replace(options, task=task or "toast", advisors=deferred.DEFAULT_ADVISORS)
+        loaded = deferred.load(options.task)
     else:
-        options, loaded = gone_on(options, resume, out, "operate")
+        options, loaded = deferred.run_gone_on(options, resume, out, "operate")
     order, folder = loaded.ordered(options.toasts, options.parts), resume or out or Path(f"{loaded.name}-run")
-    check_out(folder)
-    journal = begun(options, loaded, folder, "operate") if resume is None else RunJournal.resume(folder)
+    deferred.check_out(folder)
+    journal = (
+        deferred.begun(options, loaded, folder, "operate") if resume is None else deferred.RunJournal.resume(folder)
+    )
     try:
         with lesson_seat(options.advisors, page=page, port=port) as seat:
             if live:
-                seat.progress.hear = unheard  # type: ignore[method-assign]  # the panel tells
+                seat.progress.hear = deferred.unheard  # type: ignore[method-assign]  # the panel tells
             teacher = teacher_of(toolbox, options.lessons(), seat)
-            conditions = Conditions(1.0, seat.page, Controls(speed_now), journal, fault_seed=options.faults)
-            operation = Operation(loaded, order, options.seed, teacher, conditions)
-            desk = Desk(operation, attended=watched, known=journal.known)
+            conditions = deferred.Conditions(
+                1.0, seat.page, deferred.Controls(speed_now), journal, fault_seed=options.faults
+            )
+            operation = deferred.Operation(loaded, order, options.seed, teacher, conditions)
+            desk = deferred.Desk(operation, attended=watched, known=journal.known)
             if seat.page is not None:
                 shown = seat.page
                 operation.on_done.append(lambda done: shown.ran())
@@ -94,29 +82,17 @@ def operate(
         end(bad.refused or bad.failed, 2 if bad.refused else 1)
 
 
-def _at_console(desk: "Desk", live: bool, as_json: bool, stay: bool) -> "Done | None":
+def _at_console(desk: "deferred.Desk", live: bool, as_json: bool, stay: bool) -> "deferred.Done | None":
     """The command that ended a pipe, None for none; stay: beside a page, which goes on when the pipe has ended."""
-    import sys
-
     if live:
-        from lab.seat.terminal.console_app import OperatorConsole
-
-        OperatorConsole(desk).run()
+        deferred.OperatorConsole(desk).run()
         return None
-    from lab.seat.terminal.console_plain import PlainConsole
-
-    console = PlainConsole(desk, complain if as_json else lambda line: write(f"{line}\n"))
+    console = deferred.PlainConsole(desk, complain if as_json else lambda line: write(f"{line}\n"))
     return console.run(sys.stdin, stay=stay)
 
 
-def _kept(operation: "Operation", folder: Path) -> dict[str, Any]:
+def _kept(operation: "deferred.Operation", folder: Path) -> dict[str, Any]:
     """Write the files of the run, where one was carried out, and the document of what was done."""
-    from dataclasses import asdict
-
-    from lab.production.report import write_files
-    from lab.production.run import remember
-    from lab.production.run_journal import RunEnded
-
     scene, report = operation.scene, operation.report()
     document = {
         "task": scene.task.name,
@@ -128,10 +104,10 @@ def _kept(operation: "Operation", folder: Path) -> dict[str, Any]:
         "files": {},
     }
     if report is not None and report.outcome.schedule.robot:
-        write_files(report, folder)
+        deferred.write_files(report, folder)
         if not report.outcome.interrupted:
-            remember(report, scene.teacher)
-            scene.journal.tell(RunEnded(len(report.outcome.delivered), report.outcome.failure or ""))
+            deferred.remember(report, scene.teacher)
+            scene.journal.tell(deferred.RunEnded(len(report.outcome.delivered), report.outcome.failure or ""))
     if report is not None:
         document |= report.to_json()
     said = {"commands": [asdict(done) for done in operation.done], "demonstrations": scene.demonstrations}
@@ -140,9 +116,6 @@ def _kept(operation: "Operation", folder: Path) -> dict[str, Any]:
 
 def _summary(document: dict[str, Any]) -> Any:
     """The end of a console's session."""
-    from lab.errors import counted
-    from lab.view.summary import delivered_in_words
-
-    made = delivered_in_words(document["delivered"], document["parts"])
+    made = deferred.delivered_in_words(document["delivered"], document["parts"])
     said = counted(len(document["commands"]), "command")
     return f"{made}; {said} (seed {document['seed']})"

@@ -7,6 +7,7 @@ import warnings
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NoReturn, TextIO
 
+from lab.cli import deferred
 from lab.errors import LabError, Notice, WorkFailed, escaped
 
 if TYPE_CHECKING:
@@ -92,9 +93,7 @@ def silence(stream: TextIO | None = None) -> None:
 
 def console() -> "Console":
     """The terminal that stderr goes to."""
-    from lab.view.escaping_console import EscapingConsole
-
-    return EscapingConsole(stderr=True, highlight=False)
+    return deferred.EscapingConsole(stderr=True, highlight=False)
 
 
 def show(document: dict[str, Any], as_json: bool, render: Callable[[dict[str, Any]], "RenderableType"]) -> None:
@@ -102,9 +101,7 @@ def show(document: dict[str, Any], as_json: bool, render: Callable[[dict[str, An
     if as_json:
         write_json(document)
         return
-    from lab.view.escaping_console import EscapingConsole
-
-    console = EscapingConsole(highlight=False, width=None if sys.stdout.isatty() else _FILE_WIDTH)
+    console = deferred.EscapingConsole(highlight=False, width=None if sys.stdout.isatty() else _FILE_WIDTH)
     with console.capture() as shown:
         console.print(render(document), soft_wrap=not sys.stdout.isatty())
     text = "".join(f"{line.rstrip()}\n" for line in shown.get().splitlines())

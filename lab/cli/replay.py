@@ -1,20 +1,17 @@
 """`lab replay`: a kept session again."""
 
+from contextlib import nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
+from lab.cli import deferred
 from lab.cli.families import from_files
 from lab.cli.lessons import lesson_seat, say_read, sequenced
 from lab.cli.options import Json, Plain, Port, ToolboxPlace, TrustModule
 from lab.cli.output import complain, console, end, show
 from lab.errors import BadInput
-
-if TYPE_CHECKING:
-    from lab.learning.requests import Request
-    from lab.seat.lesson_seat import LessonSeat
-    from lab.teaching.kept_order import OrderSession
 
 
 def replay(
@@ -63,61 +60,48 @@ def replay(
     as_json: Json = False,
 ) -> None:
     """Show a kept teaching session, or a run, again: what was asked, answered or done, and what came of it."""
-    from contextlib import nullcontext
-
-    from lab.advice.entries import read_journal
-    from lab.production.run_journal import is_run
-    from lab.seat.terminal.replay_keys import HELP as KEYS_HELP
-    from lab.seat.terminal.replay_keys import replay_keys
-    from lab.teaching.events import told_to
-    from lab.teaching.kept_order import OrderSession, kept_order
-    from lab.teaching.kept_session import KeptSession
-    from lab.teaching.lesson import replay as replay_session
-    from lab.teaching.session_list import session_rows
-    from lab.teaching.step_record import StepRecord, check_libraries
-    from lab.toolbox.registry import Toolbox
-    from lab.view.summary import replay_summary, table_of
-
     for option, given in (("--movie", movie is not None), ("--audit", audit)):
-        if given and (folder is None or not is_run(folder)):
+        if given and (folder is None or not deferred.is_run(folder)):
             where = "" if folder is None else f"'{folder}': "
             raise BadInput(f"{where}{option} goes with the folder of a run (lab run --out)")
     if folder is None:
-        rows = session_rows(Toolbox(toolbox))
-        show({"sessions": rows}, as_json, lambda d: table_of(d["sessions"], ("session", "problem", "advisor", "state")))
+        rows = deferred.session_rows(deferred.Toolbox(toolbox))
+        show(
+            {"sessions": rows},
+            as_json,
+            lambda d: deferred.table_of(d["sessions"], ("session", "problem", "advisor", "state")),
+        )
         return
     if audit:
         _audit_run(folder, as_json)
         return
-    if is_run(folder):
+    if deferred.is_run(folder):
         _replay_run(folder, page, port, as_json, movie, seconds)
         return
-    from lab.teaching.subjects import subject_of
-
-    check_libraries(minari, tensorboard)
-    box = Toolbox(toolbox)
-    kept: KeptSession | OrderSession
-    if read_journal(folder, "DIR").session.command == "sequence":
-        kept = kept_order(folder, "DIR", box, read_only=True)
+    deferred.check_libraries(minari, tensorboard)
+    box = deferred.Toolbox(toolbox)
+    kept: deferred.KeptSession | deferred.OrderSession
+    if deferred.read_journal(folder, "DIR").session.command == "sequence":
+        kept = deferred.kept_order(folder, "DIR", box, read_only=True)
     else:
-        kept = KeptSession(folder, "DIR", read_only=True, trusted=trust_module or ())
+        kept = deferred.KeptSession(folder, "DIR", read_only=True, trusted=trust_module or ())
     say_read(kept, "DIR")
     try:
         with lesson_seat([] if as_json else ["terminal"], page=page, port=port, plain=plain) as seat:
             pace = seat.replaying(0.0 if as_json else pause)
-            with nullcontext() if as_json else replay_keys(pace) as has_keys:
+            with nullcontext() if as_json else deferred.replay_keys(pace) as has_keys:
                 if has_keys:
-                    seat.progress.console.print(KEYS_HELP)
-                if isinstance(kept, OrderSession):
+                    seat.progress.console.print(deferred.KEYS_HELP)
+                if isinstance(kept, deferred.OrderSession):
                     document = _replayed(kept, seat, toolbox)
                 else:
-                    record = StepRecord()
-                    hear = told_to(seat.hear, record.hear) if minari or tensorboard else seat.hear
-                    document = replay_session(kept, subject_of(kept.options, kept), hear)
+                    record = deferred.StepRecord()
+                    hear = deferred.told_to(seat.hear, record.hear) if minari or tensorboard else seat.hear
+                    document = deferred.replay_session(kept, deferred.subject_of(kept.options, kept), hear)
                     if minari or tensorboard:
                         document["files"] = record.written(minari, tensorboard)
             seat.lesson_over(document)
-            show(document, as_json, replay_summary)
+            show(document, as_json, deferred.replay_summary)
             seat.stay()
     except KeyboardInterrupt:
         end("stopped by Ctrl-C", 130)
@@ -125,13 +109,9 @@ def replay(
 
 def _audit_run(folder: Path, as_json: bool) -> None:
     """Hold what a run's folder keeps against its task; exit 1 when something is wrong."""
-    from lab.audit.audit import audit, kept_evidence
-    from lab.production.run_options import kept_task
-    from lab.view.summary import audit_summary
-
-    options, task = kept_task(folder, "DIR")
-    found = audit(kept_evidence(folder, task, task.ordered(options.toasts, options.parts)))
-    show({"run": str(folder), "task": task.name} | found.to_json(), as_json, audit_summary)
+    options, task = deferred.kept_task(folder, "DIR")
+    found = deferred.audit(deferred.kept_evidence(folder, task, task.ordered(options.toasts, options.parts)))
+    show({"run": str(folder), "task": task.name} | found.to_json(), as_json, deferred.audit_summary)
     if found.failure:
         end(found.failure, 1)
 
@@ -141,17 +121,12 @@ def _replay_run(
 ) -> None:
     """What was done in a run and what came of it, from its journal; its film as a moving picture, or on a page."""
     from lab.cli.view import replay_page, serve
-    from lab.production.run_journal import replayed_run
-    from lab.view.summary import run_replay_summary
 
-    document = replayed_run(folder, "DIR")
+    document = deferred.replayed_run(folder, "DIR")
     if movie is not None:
-        from lab.view.movie import write_movie
-        from lab.view.progress import counting
-
-        with counting(console(), "pictures drawn") as progress:
-            document["movie"] = write_movie(replay_page(folder), movie, seconds, progress)
-    show(document, as_json, run_replay_summary)
+        with deferred.counting(console(), "pictures drawn") as progress:
+            document["movie"] = deferred.write_movie(replay_page(folder), movie, seconds, progress)
+    show(document, as_json, deferred.run_replay_summary)
     if page:
         try:
             serve(
@@ -164,15 +139,14 @@ def _replay_run(
             end("stopped by Ctrl-C", 130)
 
 
-def _replayed(kept: "OrderSession", seat: "LessonSeat", toolbox: str | None) -> dict[str, Any]:
+def _replayed(kept: "deferred.OrderSession", seat: "deferred.LessonSeat", toolbox: str | None) -> dict[str, Any]:
     """Advice on an order again: the session is run once more, and the journal answers for the people."""
-    from lab.advice.advisors import PEOPLE
 
-    def nobody(request: "Request") -> int | None:
+    def nobody(request: "deferred.Request") -> int | None:
         raise KeyboardInterrupt
 
     try:
-        stopped = sequenced(kept, dict.fromkeys(PEOPLE, nobody), seat, toolbox, files={})["interrupted"]
+        stopped = sequenced(kept, dict.fromkeys(deferred.PEOPLE, nobody), seat, toolbox, files={})["interrupted"]
     except KeyboardInterrupt:  # before an order was found
         stopped = True
     if stopped and (kept.journal is None or kept.journal.folding):  # by Ctrl-C, not by the journal's end

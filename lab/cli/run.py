@@ -1,11 +1,13 @@
 """`lab run`: the main job."""
 
+from dataclasses import replace
 from pathlib import Path
 from shlex import quote
 from typing import Annotated
 
 import typer
 
+from lab.cli import deferred
 from lab.cli.lessons import lesson_seat, teacher_of
 from lab.cli.options import (
     AdvisorNames,
@@ -40,7 +42,6 @@ def run(
         str | None,
         typer.Option("--speed", help="Simulated seconds per second, or max; default: 4 with a page, else max."),
     ] = None,
-    view: Annotated[bool, typer.Option("--view/--no-view", hidden=True)] = False,  # the old word for --page
     port: Port = 0,
     wait: Wait = None,
     override: Annotated[
@@ -79,58 +80,43 @@ def run(
     as_json: Json = False,
 ) -> None:
     """Find or learn the skills, time them, find an order for them, and carry them out in physics."""
-    from lab.production import load_run
-    from lab.workers import Workers
-
-    with Workers(workers, first=load_run) as beside:
-        from dataclasses import replace
-
-        from lab.files import check_out
-        from lab.production.conditions import Conditions
-        from lab.production.controls import Controls
-        from lab.production.operation.commands import pace
-        from lab.production.operation.run_desk import RunDesk
-        from lab.production.run import run as run_task
-        from lab.production.run_advice import RunAdvice
-        from lab.production.run_journal import RunJournal
-        from lab.production.run_options import RunOptions, begun, gone_on
-        from lab.skills.prepared_scene import prepare
-        from lab.tasks.task_file import load
-        from lab.teaching.lesson_options import DEFAULT_ADVISORS
-        from lab.view.summary import delivered_in_words, run_summary
-
-        given = RunOptions(
+    with deferred.Workers(workers, first=deferred.load_run) as beside:
+        given = deferred.RunOptions(
             *(task or "", toasts, parts, tuple(advisor or ()), asked, decide, override, seed, faults, order, cyclic),
             method=method,
             parts_per_cycle=parts_per_cycle,
         )
         if resume is None:
-            options = replace(given, task=task or "toast", advisors=given.advisors or DEFAULT_ADVISORS)
-            loaded = load(options.task)
+            options = replace(given, task=task or "toast", advisors=given.advisors or deferred.DEFAULT_ADVISORS)
+            loaded = deferred.load(options.task)
         else:
-            options, loaded = gone_on(given, resume, out)
+            options, loaded = deferred.run_gone_on(given, resume, out)
         wanted, folder = options.by_method(loaded), resume or out or Path(f"{loaded.name}-run")
-        check_out(folder)
-        watched = page or view or "web" in options.advisors
-        controls = Controls(pace(speed or ("4" if watched else "max")))
+        deferred.check_out(folder)
+        watched = page or "web" in options.advisors
+        controls = deferred.Controls(deferred.pace(speed or ("4" if watched else "max")))
         lessons = options.lessons()
         lessons.advising()
-        prepared = prepare(wanted, options.ordered(loaded), options.seed, workers=beside)
-        journal = begun(options, loaded, folder) if resume is None else RunJournal.resume(folder)
+        prepared = deferred.prepare(wanted, options.ordered(loaded), options.seed, workers=beside)
+        journal = deferred.begun(options, loaded, folder) if resume is None else deferred.RunJournal.resume(folder)
         try:
-            with lesson_seat(options.advisors, page=page or view, port=port, wait_s=wait) as seat:
+            with lesson_seat(options.advisors, page=page, port=port, wait_s=wait) as seat:
                 teacher = teacher_of(toolbox, lessons, seat)
-                advice = RunAdvice(teacher.toolbox, lessons, journal, options.order or "", cyclic=options.cyclic)
+                advice = deferred.RunAdvice(
+                    teacher.toolbox, lessons, journal, options.order or "", cyclic=options.cyclic
+                )
                 advice.parts_per_cycle = options.parts_per_cycle
                 teacher = replace(teacher, keep=advice.keep)
                 share = options.override / 100
-                conditions = Conditions(share, seat.page, controls, journal, fault_seed=options.faults, advice=advice)
+                conditions = deferred.Conditions(
+                    share, seat.page, controls, journal, fault_seed=options.faults, advice=advice
+                )
                 if seat.page is not None:
-                    desk = RunDesk(loaded, prepared.order, controls, journal, seat.hear)
+                    desk = deferred.RunDesk(loaded, prepared.order, controls, journal, seat.hear)
                     conditions = replace(conditions, on_floor=desk.on_floor)
                     seat.page.steer(desk)
                 with seat.progress:
-                    report = run_task(prepared, teacher, folder, conditions, beside)
+                    report = deferred.run_task(prepared, teacher, folder, conditions, beside)
         except BadInput:
             if resume is None:
                 journal.forget()
@@ -141,10 +127,10 @@ def run(
         finally:
             journal.close()
     document = report.to_json()
-    show(document, as_json, run_summary)
+    show(document, as_json, deferred.run_summary)
     if report.outcome.interrupted:
         raise KeyboardInterrupt(f"stopped by Ctrl-C; go on with: lab run --resume {quote(str(folder))}")
     if not report.success:
-        end(report.outcome.failure or delivered_in_words(document["delivered"], document["parts"]), 1)
+        end(report.outcome.failure or deferred.delivered_in_words(document["delivered"], document["parts"]), 1)
     if report.lost:
         end(report.lost, 1)

@@ -3,17 +3,14 @@
 import re
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
+from lab.cli import deferred
 from lab.cli.options import Json, Seed
 from lab.cli.output import complain, show
 from lab.errors import BadInput
-
-if TYPE_CHECKING:
-    from lab.vision import Image, View
-    from lab.vision.calibration import Calibration
 
 TASK = "toast"  # whose camera takes pictures that are made, unless another is named
 
@@ -68,8 +65,6 @@ def see(
     as_json: Json = False,
 ) -> None:
     """Picture to grid: find the gripper (magenta), the machine's marker (cyan) and the obstacles (green)."""
-    from lab.view.summary import grid_summary, pictures_summary
-
     if sum((make is not None, score, calibrated)) > 1:
         raise BadInput("--make, --score and --calibrate: wanted one of them")
     if corners is not None and not calibrated:
@@ -78,35 +73,31 @@ def see(
     if make is not None:
         if paths or out is None:
             raise BadInput("--make: wanted no picture, and --out FOLDER")
-        show(made(task or TASK, make, out, seed), as_json, pictures_summary)
+        show(made(task or TASK, make, out, seed), as_json, deferred.pictures_summary)
         return
     if not paths or (len(paths) > 1 and not calibrated):
         raise BadInput(f"{len(paths)} pictures: wanted one, such as lab see overhead.png --task toast")
     if score:
-        show(scored(paths[0], calibration), as_json, pictures_summary)
+        show(scored(paths[0], calibration), as_json, deferred.pictures_summary)
     elif calibrated:
-        show(calibrate_camera(paths, task, calibration, corners, out, overlay), as_json, pictures_summary)
+        show(calibrate_camera(paths, task, calibration, corners, out, overlay), as_json, deferred.pictures_summary)
     else:
         seen = see_picture(paths[0], grid, task, overlay or out, calibration)
         if task is None:
             shape = f"{len(seen['grid'])}x{len(seen['grid'][0])}"
             wrong = "of a picture from a task's camera that is wrong: give --task, such as --task toast"
             complain(f"no --task: the whole picture is taken for a grid of {shape}; {wrong}")
-        show(seen, as_json, grid_summary)
+        show(seen, as_json, deferred.grid_summary)
 
 
 def made(task: str, count: int, out: Path, seed: int) -> dict[str, Any]:
     """Pictures made, the document of `lab see --make --json`."""
-    from lab.skills.made_pictures import make_pictures
-
-    return make_pictures(task, count, out, seed) | {"files": {"folder": str(out)}}
+    return deferred.make_pictures(task, count, out, seed) | {"files": {"folder": str(out)}}
 
 
 def scored(folder: Path, calibration: Path | None) -> dict[str, Any]:
     """Pictures read back, the document of `lab see --score --json`."""
-    from lab.skills.scored_pictures import score_pictures
-
-    return score_pictures(folder, _calibration(calibration))
+    return deferred.score_pictures(folder, _calibration(calibration))
 
 
 def calibrate_camera(
@@ -121,31 +112,28 @@ def calibrate_camera(
 
     From pictures of the mat; or from the pixels of four corners, with the lens that is `known` or that the task states.
     """
-    from lab.skills.made_pictures import mat_of
-    from lab.tasks.task_file import load
-    from lab.vision import read_picture, write_picture
-    from lab.vision.calibration import Mat, calibrate, drawn, write_calibration
-
-    loaded = None if task is None else load(task)
-    pictures = [(str(path), read_picture(path)) for path in images]
+    loaded = None if task is None else deferred.load(task)
+    pictures = [(str(path), deferred.read_picture(path)) for path in images]
     angle = None if loaded is None or loaded.camera is None else loaded.camera.field_of_view_rad
     if corners is None:
-        found = calibrate(pictures, Mat() if loaded is None else mat_of(loaded), angle)
+        found = deferred.calibrate(pictures, deferred.Mat() if loaded is None else deferred.mat_of(loaded), angle)
     else:
         found = _from_corners(corners, task, pictures[0][1], _calibration(known))
     files = {}
     if out is not None:
-        write_calibration(out, found)
+        deferred.write_calibration(out, found)
         files["calibration"] = str(out)
     if overlay is not None:
-        write_picture(overlay, drawn(pictures[0][1], found, None if loaded is None else mat_of(loaded)))
+        deferred.write_picture(
+            overlay, deferred.drawn(pictures[0][1], found, None if loaded is None else deferred.mat_of(loaded))
+        )
         files["overlay"] = str(overlay)
     return found.to_json() | {"files": files}
 
 
-def _from_corners(corners: str, task: str | None, image: "Image", known: "Calibration | None") -> "Calibration":
-    from lab.vision.calibration import from_corners, pinhole
-
+def _from_corners(
+    corners: str, task: str | None, image: "deferred.Image", known: "deferred.Calibration | None"
+) -> "deferred.Calibration":
     number = r"-?\d+(?:\.\d+)?"
     if not re.fullmatch(rf"\s*{number},{number}(?:\s+{number},{number}){{3}}\s*", corners):
         raise BadInput(
@@ -158,14 +146,12 @@ def _from_corners(corners: str, task: str | None, image: "Image", known: "Calibr
     view, angle = _camera(task, height, None)
     (x, y), (i, j) = view.origin_m, view.shape
     a, b = i * view.cell_m, j * view.cell_m
-    lens = pinhole((width, height), angle) if known is None else known.lens
-    return from_corners(lens, pixels, [(x, y), (x + a, y), (x + a, y + b), (x, y + b)])
+    lens = deferred.pinhole((width, height), angle) if known is None else known.lens
+    return deferred.from_corners(lens, pixels, [(x, y), (x + a, y), (x + a, y + b), (x, y + b)])
 
 
-def _calibration(path: Path | None) -> "Calibration | None":
-    from lab.vision.calibration import read_calibration
-
-    return None if path is None else read_calibration(path)
+def _calibration(path: Path | None) -> "deferred.Calibration | None":
+    return None if path is None else deferred.read_calibration(path)
 
 
 def see_picture(
@@ -176,12 +162,8 @@ def see_picture(
     With a task the grid is the one of its overhead camera, which a calibration straightens and places; without, the frame is
     the grid, 12 x 12 unless `grid` says so. Where the picture is drawn, parts are looked for, too.
     """
-    from lab.skills.scored_pictures import parts_seen
-    from lab.tasks.task_file import load
-    from lab.vision import draw, read_picture, see, write_picture
-
     shape = _shape(grid)
-    picture = read_picture(image)
+    picture = deferred.read_picture(image)
     camera, known = None, _calibration(calibration)
     if known is not None:
         if task is None:
@@ -194,12 +176,14 @@ def see_picture(
         camera, _ = _camera(task, height, None if grid is None else shape)
         if known is not None:
             camera = replace(camera, pixel_from_world=known.pixel_from_world)
-    seen = see(picture, camera, shape=shape, where=str(image))
+    seen = deferred.see(picture, camera, shape=shape, where=str(image))
     parts = (
-        parts_seen(load(task), picture, camera) if out is not None and task is not None and camera is not None else []
+        deferred.parts_seen(deferred.load(task), picture, camera)
+        if out is not None and task is not None and camera is not None
+        else []
     )
     if out is not None:
-        write_picture(out, draw(picture, seen, [part["outline_px"] for part in parts]))
+        deferred.write_picture(out, deferred.draw(picture, seen, [part["outline_px"] for part in parts]))
     return seen.to_json() | {"parts": parts, "files": {} if out is None else {"picture": str(out)}}
 
 
@@ -210,18 +194,15 @@ def _shape(grid: str | None) -> tuple[int, int]:
     return int(match[1]), int(match[2])
 
 
-def _camera(task: str, pixels: int, wanted: tuple[int, int] | None) -> "tuple[View, float]":
+def _camera(task: str, pixels: int, wanted: tuple[int, int] | None) -> "tuple[deferred.View, float]":
     """How a task's camera with so many pixels a side sees its grid, and its field of view [rad]; BadInput when a grid of
     another shape is wanted.
     """
-    from lab.skills.camera_grids import camera_view
-    from lab.tasks.task_file import load
-
-    loaded = load(task)
+    loaded = deferred.load(task)
     station = next((station.name for station in loaded.stations if station.grid is not None), None)
     if station is None or loaded.camera is None:
         raise BadInput(f"task '{task}' (--task): no station of it is approached through the camera's grid")
-    camera = camera_view(loaded, station, pixels)
+    camera = deferred.camera_view(loaded, station, pixels)
     if wanted is not None and wanted != camera.shape:
         own, other = (f"{shape[0]}x{shape[1]}" for shape in (camera.shape, wanted))
         raise BadInput(f"grid '{other}' (--grid): the grid of the task's camera is {own}; leave --grid away")

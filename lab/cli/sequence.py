@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from lab.cli import deferred
 from lab.cli.cyclic import cyclic_found
 from lab.cli.families import offers
 from lab.cli.lessons import lesson_seat, say_read, sequenced
@@ -124,12 +125,7 @@ def sequence(
 
     What a person advises is kept: --resume goes on with it, lab replay shows it again.
     """
-    from lab.teaching.kept_order import OrderOptions, OrderSession, gone_on
-    from lab.toolbox.registry import Toolbox
-    from lab.view.cyclic_summary import cyclic_summary
-    from lab.view.summary import sequence_summary
-
-    given = OrderOptions(
+    given = deferred.OrderOptions(
         *(task or "", case, toasts, method, objective, episodes, sessions, stochastic, advisor, gate, seed, parts),
         layout=None if layout is None else str(layout),
         robots=robots,
@@ -142,12 +138,14 @@ def sequence(
     if cyclic:
         if resume is not None:
             raise BadInput(f"--cyclic beside --resume {resume}: nobody is asked about a cycle: leave one of them away")
-        show(cyclic_found(given.complete(), toolbox, files, parts_per_cycle), as_json, cyclic_summary)
+        show(cyclic_found(given.complete(), toolbox, files, parts_per_cycle), as_json, deferred.cyclic_summary)
         return
     if parts_per_cycle is not None:
         raise BadInput(f"--parts-per-cycle {parts_per_cycle}: only a cycle has as many: add --cyclic")
-    box = Toolbox(toolbox)
-    kept = OrderSession(given.complete(), box) if resume is None else gone_on(given, resume, box)
+    box = deferred.Toolbox(toolbox)
+    kept = (
+        deferred.OrderSession(given.complete(), box) if resume is None else deferred.order_gone_on(given, resume, box)
+    )
     if resume is not None:
         say_read(kept, "--resume")
     try:
@@ -157,6 +155,6 @@ def sequence(
         if kept.journal is None:
             raise
         raise KeyboardInterrupt(f"{str(stopped) or 'stopped by Ctrl-C'}{kept.resume_command(box)}") from None
-    show(document | kept.worth(), as_json, sequence_summary)
+    show(document | kept.worth(), as_json, deferred.sequence_summary)
     if document["interrupted"]:
         end(f"stopped by Ctrl-C; the best order until then is above{kept.resume_command(box)}", 130)

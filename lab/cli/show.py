@@ -5,7 +5,7 @@ from typing import Annotated, Any
 
 import typer
 
-from lab.cli import output
+from lab.cli import deferred, output
 from lab.cli.options import Json
 from lab.errors import BadInput
 
@@ -30,13 +30,9 @@ def write_page(schedule: list[Path], out: Path | None) -> dict[str, Any]:
     page = Path(f"{schedule[0].stem}.html") if out is None else out
     if page.suffix != ".html":
         raise BadInput(f"page '{page}' (--out): its name must end in .html")
-    from lab.tasks.schedule_table import read_schedule
-    from lab.view.meshcat import replay_html
-    from lab.view.schedule_scene import scene_of
-
-    table = read_schedule([one / "schedule.csv" if one.is_dir() else one for one in schedule])
-    shown = scene_of(table, schedule[0].stem)
-    replay_html(shown.recording, page, shown.speed, shown.title, shown.story, tracks=shown.tracks)
+    table = deferred.read_schedule([one / "schedule.csv" if one.is_dir() else one for one in schedule])
+    shown = deferred.scene_of(table, schedule[0].stem)
+    deferred.replay_html(shown.recording, page, shown.speed, shown.title, shown.story, tracks=shown.tracks)
     rows, measured = table.rows, shown.story.measured
     return {
         "file": str(page),

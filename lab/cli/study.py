@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from lab.cli import deferred
 from lab.cli.families import from_files, offers
 from lab.cli.options import Json, Seed
 from lab.cli.output import console, show
@@ -12,11 +13,8 @@ from lab.cli.output import console, show
 
 def study_list(as_json: Json = False) -> None:
     """The studies that can be run."""
-    from lab.studies import STUDIES
-    from lab.view.summary import table_of
-
-    rows = [{"name": name, "title": study.title} for name, study in STUDIES.items()]
-    show({"studies": rows}, as_json, lambda d: table_of(d["studies"], ("name", "title")))
+    rows = [{"name": name, "title": study.title} for name, study in deferred.STUDIES.items()]
+    show({"studies": rows}, as_json, lambda d: deferred.table_of(d["studies"], ("name", "title")))
 
 
 def study_run(
@@ -71,11 +69,6 @@ def study_run(
     as_json: Json = False,
 ) -> None:
     """Run a study and write its report; what its folder already holds (chapter 9, faults, transport) is not run again."""
-    from lab.studies import run_study, study_of
-    from lab.studies.runner import Job
-    from lab.view.progress import counting
-    from lab.view.summary import study_summary
-
     asked = {
         "advisor_table": advisor_table,
         "seconds": seconds,
@@ -86,10 +79,10 @@ def study_run(
         "verify": verify or None,
     }
     reading = {name: value for name, value in asked.items() if value is not None}
-    with counting(console(), f"cells of {name}") as progress:
-        job = Job(sessions or study_of(name).sessions, seed, workers, dask, progress=progress)
-        document = run_study(name, job, out or Path(f"{name}-study"), reading)
-    show(document, as_json, study_summary)
+    with deferred.counting(console(), f"cells of {name}") as progress:
+        job = deferred.Job(sessions or deferred.study_of(name).sessions, seed, workers, dask, progress=progress)
+        document = deferred.run_study(name, job, out or Path(f"{name}-study"), reading)
+    show(document, as_json, deferred.study_summary)
 
 
 def _listed(names: str | None) -> list[str] | None:

@@ -1,33 +1,27 @@
 """`lab task`: task files."""
 
+import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
+from lab.cli import deferred
 from lab.cli.options import Json, Seed
 from lab.cli.output import end, show, write, write_json
 from lab.errors import BadInput, LabError, counted
 
-if TYPE_CHECKING:
-    from lab.tasks.task import Task
-
 
 def task_list(as_json: Json = False) -> None:
     """The tasks, the cells for lab sequence and the grid worlds that ship."""
-    from lab.tasks import task_file as taskfile
-    from lab.view.summary import table_of
-
-    kinds = taskfile.shipped()
+    kinds = deferred.shipped()
     rows = [{"name": name, "kind": kind} for name, kind in kinds.items()]
-    show({"tasks": list(kinds), "kinds": kinds}, as_json, lambda _: table_of(rows, ("name", "kind")))
+    show({"tasks": list(kinds), "kinds": kinds}, as_json, lambda _: deferred.table_of(rows, ("name", "kind")))
 
 
 def task_show(task: str, as_json: Json = False) -> None:
     """The text of a task file, of a task, a cell or a world: copy it, change it, use it."""
-    from lab.tasks.task_file import describe
-
-    text, document = describe(task)
+    text, document = deferred.describe(task)
     if as_json:
         write_json(document)
     else:
@@ -54,18 +48,15 @@ def task_schema(
     An editor with a TOML extension (Even Better TOML, taplo) reads the schema where the first line of a file says
     #:schema FILE.
     """
-    import json
-
-    from lab.tasks.record import write_whole
-    from lab.tasks.schema import page_of, schema_of
-
-    schema = schema_of(kind)
+    schema = deferred.schema_of(kind)
     if out is None:
         write_json(schema)
         return
     if out.suffix not in (".json", ".md"):
         raise BadInput(f"file '{out}' (--out): wanted one that ends with .json or .md")
-    write_whole(out, page_of(kind) if out.suffix == ".md" else json.dumps(schema, indent=2, ensure_ascii=False) + "\n")
+    deferred.write_task_text(
+        out, deferred.page_of(kind) if out.suffix == ".md" else json.dumps(schema, indent=2, ensure_ascii=False) + "\n"
+    )
     hint = "" if out.suffix == ".md" else f"; as the first line of a {kind} file: #:schema {out}"
     show({"file": str(out), "kind": kind}, as_json, lambda d: f"{d['file']}: the keys of a {kind} file{hint}")
 
@@ -88,17 +79,12 @@ def task_convert(
     as_json: Json = False,
 ) -> None:
     """Read an instance as the field writes it, and write it as the lab's own cell file (TOML), or as PyJobShop's JSON."""
-    from lab.tasks.cell_toml import toml_of
-    from lab.tasks.instances import Asked, pyjobshop
-    from lab.tasks.record import write_whole
-    from lab.tasks.task_file import load_cell_beside
-
-    found = load_cell_beside(file, Asked(layout, robots, case))
+    found = deferred.load_cell_beside(file, deferred.InstanceAsked(layout, robots, case))
     if out is not None and out.suffix not in (".toml", ".json"):
         raise BadInput(f"file '{out}' (--out): wanted one that ends with .toml or .json")
-    text = pyjobshop.write(found) if out is not None and out.suffix == ".json" else toml_of(found)
+    text = deferred.pyjobshop.write(found) if out is not None and out.suffix == ".json" else deferred.toml_of(found)
     if out is not None:
-        write_whole(out, text)
+        deferred.write_task_text(out, text)
     parts, robots_there = len(found.ordered()), len(found.built_robots)
     document = {"file": None if out is None else str(out), "name": found.name, "parts": parts, "robots": robots_there}
     if as_json or out is not None:
@@ -116,7 +102,6 @@ def task_random(
     as_json: Json = False,
 ) -> None:
     """Write a random grid world as a task file; a way always leads from its start to its goal."""
-    from lab.tasks.grid_world import write_random
 
     def told(d: dict[str, Any]) -> str:
         return (
@@ -124,7 +109,7 @@ def task_random(
             f"{counted(d['optimal_steps'], 'move')} (seed {seed})"
         )
 
-    show(write_random(shape, density, seed, out), as_json, told)
+    show(deferred.write_random(shape, density, seed, out), as_json, told)
 
 
 def task_check(
@@ -152,16 +137,11 @@ def task_check(
     Of a cell: that its order can be made, with the line of what is wrong. With --json the document comes in both cases, and
     so does the picture of a task that can be read: what is wrong is marked in it.
     """
-    from lab.skills.prepared_scene import check_task
-
     task = None if plot is None else _to_draw(file, plot)
-    errors, warnings = check_task(file, toasts, seed)
+    errors, warnings = deferred.check_task(file, toasts, seed)
     files = {}
     if task is not None and plot is not None:
-        from lab.skills.cell_outline import outline
-        from lab.view.cell_plan import draw_cell
-
-        draw_cell(outline(task, toasts, seed, errors[0] if errors else ""), plot)
+        deferred.draw_cell(deferred.outline(task, toasts, seed, errors[0] if errors else ""), plot)
         files["plot"] = str(plot)
     if as_json or not errors:
         document = {"valid": not errors, "errors": errors, "warnings": warnings, "files": files}
@@ -170,19 +150,14 @@ def task_check(
         end(errors[0], 2)
 
 
-def _to_draw(file: str, plot: Path) -> "Task | None":
+def _to_draw(file: str, plot: Path) -> "deferred.Task | None":
     """The task to be drawn, None when it cannot be read; BadInput for what has no picture, and for a bad path of one."""
-    from lab.tasks.cell_file import CellFile
-    from lab.tasks.task import Task
-    from lab.tasks.task_file import load_any
-    from lab.view.canvas import check_picture
-
-    check_picture(plot)
+    deferred.check_picture(plot)
     try:
-        found = load_any(file)
+        found = deferred.load_any(file)
     except LabError:  # which the check tells
         return None
-    if not isinstance(found, Task):
-        instead = f"lab sequence {file} --gantt {plot}" if isinstance(found, CellFile) else f"lab view {file}"
+    if not isinstance(found, deferred.Task):
+        instead = f"lab sequence {file} --gantt {plot}" if isinstance(found, deferred.CellFile) else f"lab view {file}"
         raise BadInput(f"--plot draws the cell of a task from above, and {file} is none: see {instead}")
     return found

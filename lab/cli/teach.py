@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from lab.cli import deferred
 from lab.cli.families import offers
 from lab.cli.lessons import lesson_seat, say_read, teacher_of
 from lab.cli.options import (
@@ -61,7 +62,6 @@ def teach(
             help="Where in a world the advisor sees the robot: full, or limited to the region in its file; default: full.",
         ),
     ] = None,
-    view: Annotated[str | None, typer.Option("--view", hidden=True)] = None,  # the old word for --sight
     resume: Annotated[
         Path | None, typer.Option("--resume", help="Go on with the session in this folder, as it was begun.")
     ] = None,
@@ -82,16 +82,9 @@ def teach(
 
     Each session keeps a journal: --resume goes on with one that was broken off, lab replay shows it again.
     """
-    from lab.files import check_out
-    from lab.teaching.kept_session import KeptSession, check_new
-    from lab.teaching.lesson import teach as teach_session
-    from lab.teaching.lesson_options import LessonOptions
-    from lab.teaching.subjects import subject_of
-    from lab.view.summary import lesson_summary
-
     who = (tuple(advisor or ()), asked, decide)
-    given = LessonOptions(subtask or "", task, sight or view, learner, gate, memory, *who, episodes, seed, save)
-    kept = None if resume is None else KeptSession(resume, "--resume", trusted=trust_module or ())
+    given = deferred.LessonOptions(subtask or "", task, sight, learner, gate, memory, *who, episodes, seed, save)
+    kept = None if resume is None else deferred.KeptSession(resume, "--resume", trusted=trust_module or ())
     if kept is not None and out is not None:
         raise BadInput(f"--out {out} beside --resume {resume}: a session goes on in its own folder: leave it away")
     options = given.complete() if kept is None else kept.same(given)
@@ -99,17 +92,17 @@ def teach(
         say_read(kept, "--resume")
     options.advising()
     if out is not None:
-        check_new(out)
-    subject = subject_of(options, kept)
+        deferred.check_new(out)
+    subject = deferred.subject_of(options, kept)
     folder = out if kept is None else kept.folder
     if folder is not None:
-        check_out(folder)
+        deferred.check_out(folder)
     with lesson_seat(options.advisors, page=page, port=port, wait_s=wait, plain=plain) as seat:
         teacher = teacher_of(toolbox, options, seat)
         teacher.toolbox.check()
-        document = teach_session(subject, options, teacher, folder, kept)
+        document = deferred.teach_session(subject, options, teacher, folder, kept)
         seat.lesson_over(document)
-    show(document, as_json, lesson_summary)
+    show(document, as_json, deferred.lesson_summary)
     if document["failure"] is not None:
         end(document["failure"], 1)
     if document["final_steps"] is None:

@@ -1,30 +1,26 @@
 """`lab toolbox card, export, import, publish`: policies shown and given to others, and taken from them."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
+from lab.cli import deferred
 from lab.cli.options import Json, ToolboxPlace
 from lab.cli.output import complain, show
 from lab.errors import BadInput, counted
-
-if TYPE_CHECKING:
-    from lab.toolbox.policy import Policy
-    from lab.toolbox.registry import Toolbox
 
 OutFolder = Annotated[Path, typer.Option("--out", help="The folder for its files.")]
 
 
 def toolbox_card(name: str, out: OutFolder, toolbox: ToolboxPlace = None, as_json: Json = False) -> None:
     """A policy's card: what it does, where and with whose advice it was learned, its curve and its values as pictures."""
-    from lab.production.publication import CARD, write_card
-    from lab.toolbox.registry import Toolbox
-
-    policy, events = _told(Toolbox(toolbox), name)
-    files = write_card(policy, events, out)
+    policy, events = _told(deferred.Toolbox(toolbox), name)
+    files = deferred.write_card(policy, events, out)
     show(
-        {"policy": policy.name, "folder": str(out), "files": files}, as_json, lambda d: f"the card: {d['files'][CARD]}"
+        {"policy": policy.name, "folder": str(out), "files": files},
+        as_json,
+        lambda d: f"the card: {d['files'][deferred.CARD]}",
     )
 
 
@@ -38,11 +34,8 @@ def toolbox_publish(
     as_json: Json = False,
 ) -> None:
     """A folder as the Hugging Face Hub has it: model card, safetensors, metadata, pictures. Nothing is sent anywhere."""
-    from lab.production.publication import publish
-    from lab.toolbox.registry import Toolbox
-
-    policy, events = _told(Toolbox(toolbox), name)
-    files = publish(policy, events, license_name, out)
+    policy, events = _told(deferred.Toolbox(toolbox), name)
+    files = deferred.publish(policy, events, license_name, out)
     document = {"policy": policy.name, "folder": str(out), "license": license_name, "files": files}
     push = f"hf upload YOUR-NAME/REPOSITORY {out} pushes it to the Hub"
     show(document, as_json, lambda d: f"{counted(len(files), 'file')} in {d['folder']}; {push}")
@@ -55,18 +48,14 @@ def toolbox_export(
     as_json: Json = False,
 ) -> None:
     """Policies as one archive; the same policies give the same bytes."""
-    from lab.files import write_whole
-    from lab.toolbox.archive import pack
-    from lab.toolbox.registry import Toolbox
-
-    box = Toolbox(toolbox)
+    box = deferred.Toolbox(toolbox)
     wanted = list(dict.fromkeys(names or [row["name"] for row in box.list()]))
     if not wanted:
         raise BadInput(f"toolbox {box.address}: there is nothing to export")
-    content, manifest = pack(_told(box, name)[0] for name in wanted)
+    content, manifest = deferred.pack(_told(box, name)[0] for name in wanted)
     damaged = [] if names else box.index()[1]
     try:
-        write_whole(out, content)
+        deferred.write_whole(out, content)
     except OSError as error:
         raise BadInput(f"archive '{out}' (--out) cannot be written: {error.strerror or error}") from error
     for reason in damaged:
@@ -86,13 +75,9 @@ def toolbox_import(
     as_json: Json = False,
 ) -> None:
     """Bring in policies that somebody gave you: every one is checked before the first is kept, and all are kept or none."""
-    from lab.toolbox.archive import take_in, unpack
-    from lab.toolbox.hub_folder import read_folder
-    from lab.toolbox.registry import Toolbox
-
-    box = Toolbox(toolbox)
-    policies = [read_folder(file)] if file.is_dir() else unpack(file)
-    taken = take_in(box, policies, replace)
+    box = deferred.Toolbox(toolbox)
+    policies = [deferred.read_folder(file)] if file.is_dir() else deferred.unpack(file)
+    taken = deferred.take_in(box, policies, replace)
     document = {"file": str(file), "toolbox": box.address, **taken._asdict()}
 
     def told(d: dict[str, Any]) -> str:
@@ -102,7 +87,7 @@ def toolbox_import(
     show(document, as_json, told)
 
 
-def _told(box: "Toolbox", name: str) -> "tuple[Policy, list[dict[str, Any]]]":
+def _told(box: "deferred.Toolbox", name: str) -> "tuple[deferred.Policy, list[dict[str, Any]]]":
     """A policy and its log."""
     shown = box.show(name)
     return box.load(shown["file"]), shown["events"]

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from lab.cli import deferred
 from lab.cli.options import Json, Seed, ToolboxPlace
 from lab.cli.output import console, end, show
 from lab.errors import counted
@@ -29,20 +30,15 @@ def toolbox_evaluate(
     as_json: Json = False,
 ) -> None:
     """Carry a policy out in physics, in scenes drawn from the seed on: how often it does what it is for, for its log."""
-    from lab.production.evaluation import evaluate, skill_of, task_of
-    from lab.toolbox.history import EVALUATED
-    from lab.toolbox.registry import Toolbox
-    from lab.view.progress import counting
-
-    box = Toolbox(toolbox)
+    box = deferred.Toolbox(toolbox)
     policy = box.load(box.show(name)["file"])
-    found = task_of(policy, task)
-    wanted = skill_of(policy, found, skill)
-    with counting(console(), "scenes") as told:
-        evaluation = evaluate(policy, found, wanted, scenes, seed, told)
+    found = deferred.task_of(policy, task)
+    wanted = deferred.skill_of(policy, found, skill)
+    with deferred.counting(console(), "scenes") as told:
+        evaluation = deferred.evaluate(policy, found, wanted, scenes, seed, told)
     document = evaluation.to_json()
     if document["scenes"]:
-        box.note(policy.name, EVALUATED, **evaluation.facts())
+        box.note(policy.name, deferred.EVALUATED, **evaluation.facts())
     show(document, as_json, evaluation_summary)
     if evaluation.interrupted:
         end(f"stopped by Ctrl-C after {counted(len(evaluation.scenes), 'scene')} of {scenes}", 130)

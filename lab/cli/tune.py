@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from lab.cli import deferred
 from lab.cli.compare import listed
 from lab.cli.families import from_files, offers
 from lab.cli.options import GateName, Json, LearnerName, ProblemName, Seed, SightInWorld, TaskOfSkill
@@ -52,18 +53,11 @@ def tune(
     settings.toml, to be pasted into the problem's file. What the folder already holds is not run again: the same command goes on
     where it was broken off, or with more --trials.
     """
-    from lab.learning.tuned_ranges import USUAL
-    from lab.studies import Study, carried_out
-    from lab.studies.runner import Job
-    from lab.studies.tuning import FILE, Tuning, tuned
-    from lab.view.progress import counting
-    from lab.view.summary import study_summary
-
     held = {name: value for name, value in (("learner", learner), ("gate", gate)) if value is not None}
-    names = USUAL if over is None else [name.replace("-", "_") for name in listed("over", over)]
-    what = Tuning(problem, advisor, held, tuple(names), trials, task, sight)
-    study = Study(f"Tuned: {problem}", lambda job, reading: tuned(what, job), least=2)
-    with counting(console(), f"trials in {problem}") as progress:
-        document = carried_out(study, "tune", Job(sessions, seed, workers, progress=progress), out)
-    document["files"]["settings"] = str(out / FILE)
-    show(document, as_json, study_summary)
+    names = deferred.USUAL if over is None else [name.replace("-", "_") for name in listed("over", over)]
+    what = deferred.Tuning(problem, advisor, held, tuple(names), trials, task, sight)
+    study = deferred.Study(f"Tuned: {problem}", lambda job, reading: deferred.tuned(what, job), least=2)
+    with deferred.counting(console(), f"trials in {problem}") as progress:
+        document = deferred.carried_out(study, "tune", deferred.Job(sessions, seed, workers, progress=progress), out)
+    document["files"]["settings"] = str(out / deferred.FILE)
+    show(document, as_json, deferred.study_summary)

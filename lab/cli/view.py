@@ -3,16 +3,14 @@
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
+from lab.cli import deferred
 from lab.cli.options import Json, Parts, Seed, Toasts
 from lab.cli.output import end, show, write, write_json
 from lab.errors import BadInput
-
-if TYPE_CHECKING:
-    from lab.api.scenes import Asked
 
 Tell = Callable[[str, str], None]
 
@@ -35,10 +33,10 @@ def view(
     as_json: Json = False,
 ) -> None:
     """Look at a task's scene, at a grid world in 3D or at a run's replay, on a page on 127.0.0.1, until Ctrl-C."""
-    from lab.api.scenes import Asked
-
     if out is not None:
-        show(write_page(what, Asked(toasts, parts, seed), out), as_json, lambda document: document["file"])
+        show(
+            write_page(what, deferred.SceneAsked(toasts, parts, seed), out), as_json, lambda document: document["file"]
+        )
         return
 
     def tell(url: str, hint: str) -> None:
@@ -48,21 +46,21 @@ def view(
             write(f"{url}\nfrom another machine: {hint}\nCtrl-C ends it\n")
 
     try:
-        serve(what, Asked(toasts, parts, seed), port, tell)
+        serve(what, deferred.SceneAsked(toasts, parts, seed), port, tell)
     except KeyboardInterrupt:
         end("stopped by Ctrl-C", 130)
 
 
-def serve(what: str, asked: "Asked | None", port: int, tell: Tell) -> None:
+def serve(what: str, asked: "deferred.SceneAsked | None", port: int, tell: Tell) -> None:
     """Serve a run's replay, a task's scene or a world on 127.0.0.1 until interrupted; `tell(url, hint)` once it is there."""
-    from lab.api.scenes import Asked, seen
-    from lab.view.meshcat import LiveView
-
     if Path(what).is_dir():
-        with LiveView(port, replay=replay_page(Path(what))) as page:
+        with deferred.LiveView(port, replay=replay_page(Path(what))) as page:
             tell(page.url, page.hint)
             _wait()
-    with seen(what, asked or Asked()) as (title, recording), LiveView(port, title=title) as live:
+    with (
+        deferred.seen(what, asked or deferred.SceneAsked()) as (title, recording),
+        deferred.LiveView(port, title=title) as live,
+    ):
         live.show(recording.bodies, recording.camera)
         live.update(recording.frames[-1])
         tell(live.url, live.hint)
@@ -79,17 +77,14 @@ def replay_page(folder: Path) -> Path:
     return page
 
 
-def write_page(what: str, asked: "Asked", out: Path) -> dict[str, str]:
+def write_page(what: str, asked: "deferred.SceneAsked", out: Path) -> dict[str, str]:
     """Write a task's scene or a world as one HTML file; the document of `lab view --out --json`."""
-    from lab.api.scenes import seen
-    from lab.view.meshcat import replay_html
-
     if Path(what).is_dir():
         raise BadInput(f"'{what}' is the folder of a run: its replay.html is such a page already (--out)")
     if out.suffix != ".html":
         raise BadInput(f"page '{out}' (--out): its name must end in .html")
-    with seen(what, asked) as (title, recording):
-        return {"file": str(replay_html(recording, out, title=title))}
+    with deferred.seen(what, asked) as (title, recording):
+        return {"file": str(deferred.replay_html(recording, out, title=title))}
 
 
 def _wait() -> None:

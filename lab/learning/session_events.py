@@ -1,6 +1,6 @@
 """What happens in a session, as records: what the learner tells whoever teaches, watches or keeps a journal."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Literal
 
 Verdict = Literal["", "better", "best", "misled"]  # of a gate on an episode that was open for advice; "": none
@@ -21,7 +21,7 @@ class Improvement:
 class EpisodeEnded:
     """An episode is over: `steps` is max_steps + 1 when it failed, of an order its cost; the rate is None before 2K episodes.
 
-    verdict: "better" than those before it, no better but the "best" so far, or "misled"; older journals do not know it.
+    verdict: "better" than those before it, no better but the "best" so far, or "misled"; "" for a gate that gives none.
     """
 
     episode: int
@@ -30,7 +30,7 @@ class EpisodeEnded:
     helped_steps: int
     improvement_rate: float | None
     reached: bool
-    verdict: Verdict = field(default="", compare=False)
+    verdict: Verdict = ""
 
 
 @dataclass(frozen=True)

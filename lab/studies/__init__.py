@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lab.errors import BadInput, counted, unknown
+from lab.files import check_out
 from lab.plugins.family import Family, first_line, takes, wanted
 
 if TYPE_CHECKING:
@@ -84,7 +85,6 @@ def carried_out(
     study: Study, name: str, job: "Job", out: Path, reading: Mapping[str, Any] | None = None
 ) -> dict[str, Any]:
     """As `run_study`, of a study that need not be in the table, and with a reading that fits it."""
-    from lab.files import check_out
     from lab.studies.runner import STORE
 
     check_out(out)

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
+from warnings import simplefilter
 
 from lab.learning.tuned_ranges import Range, Span
 from lab.optional import optional
@@ -69,8 +70,6 @@ def search(
 def _optuna() -> Any:
     with optional("tuning"):
         import optuna
-    from warnings import simplefilter
-
     simplefilter("ignore", optuna.exceptions.ExperimentalWarning)
     optuna.logging.set_verbosity(optuna.logging.ERROR)
     return optuna

@@ -14,7 +14,19 @@ from typing import Any, NamedTuple, get_type_hints
 from annotated_types import DocInfo
 
 from lab.errors import unknown
+from lab.learning.gates import GATES
+from lab.learning.selection import SELECTIONS
+from lab.learning.settings import GateSettings, LearnerSettings
+from lab.learning.updates import UPDATES
+from lab.mdp import Rewards
+from lab.sequencing import SEQUENCERS
+from lab.sequencing.cell.chance import LAWS
+from lab.sequencing.cell.objectives import OBJECTIVES
+from lab.tasks.cell_file import CellFile
+from lab.tasks.grid_world import GridWorld
 from lab.tasks.record import NAME_PATTERN, Record
+from lab.tasks.robot_fields import MODELS
+from lab.tasks.task import Task
 
 DRAFT = "http://json-schema.org/draft-07/schema#"  # which the editors' extensions for TOML know
 TABLES = "definitions"
@@ -27,10 +39,6 @@ Schema = dict[str, Any]
 
 
 def _records() -> dict[str, type[Record]]:
-    from lab.tasks.cell_file import CellFile
-    from lab.tasks.grid_world import GridWorld
-    from lab.tasks.task import Task
-
     return {"task": Task, "cell": CellFile, "world": GridWorld}
 
 
@@ -101,9 +109,6 @@ def field_texts(record: type[Record]) -> dict[str, str]:
 
 def _from_dataclasses() -> dict[str, dict[str, str]]:
     """The descriptions of records that are no pydantic models, and of their fields: by record, and by field, "" its own."""
-    from lab.learning.settings import GateSettings, LearnerSettings
-    from lab.mdp import Rewards
-
     found: dict[str, dict[str, str]] = {}
     for kind in (LearnerSettings, GateSettings, Rewards):
         hints = get_type_hints(kind, include_extras=True)
@@ -116,14 +121,6 @@ def _from_dataclasses() -> dict[str, dict[str, str]]:
 
 def _names() -> dict[tuple[str, str], tuple[list[str], Schema | None]]:
     """The names that a key may hold, by record and key; and what else it may hold: a plug-in's name, or a file's."""
-    from lab.learning.gates import GATES
-    from lab.learning.selection import SELECTIONS
-    from lab.learning.updates import UPDATES
-    from lab.sequencing import SEQUENCERS
-    from lab.sequencing.cell.chance import LAWS
-    from lab.sequencing.cell.objectives import OBJECTIVES
-    from lab.tasks.robot_fields import MODELS
-
     plugged: Schema = {"type": "string"}
     urdf: Schema = {"type": "string", "pattern": r"\.[uU][rR][dD][fF]$"}
     return {

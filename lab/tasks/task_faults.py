@@ -8,7 +8,6 @@ from typing import Any, get_args
 from pydantic import BaseModel
 
 from lab.errors import BadInput
-from lab.tasks.first_form import own_loc, renewed
 from lab.tasks.toml_text import Loc, TomlText
 
 # the table of the file, by the word in a message
@@ -24,7 +23,7 @@ _WORD = re.compile(r"[a-z_]+")
 
 def refusal(toml: TomlText, message: str) -> BadInput:
     """The error that says in which file, and on which line of it, the thing stands that a message is about."""
-    return toml.refusal(own_loc(toml.raw, loc_of(renewed(toml.raw), message)), message)
+    return toml.refusal(loc_of(toml.raw, message), message)
 
 
 def loc_of(raw: dict[str, Any], message: str) -> Loc:

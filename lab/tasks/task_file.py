@@ -12,7 +12,6 @@ from pydantic import ValidationError
 from lab.errors import BadInput, shortened, unknown
 from lab.files import tasks_folder
 from lab.tasks.cell_file import CellFile
-from lab.tasks.first_form import own_loc, renewed
 from lab.tasks.grid_world import RANDOM, GridWorld, from_text, from_words
 from lab.tasks.instances import SUFFIXES, Asked, is_instance, read_instance, takes_case
 from lab.tasks.record import MAX_SHORT_BYTES, Record, read_text
@@ -108,7 +107,7 @@ def load_any(word: str, wanted: FileKind | None = None) -> Task | CellFile | Gri
     _check_wanted(word, kind, wanted)
     if kind == "cell":
         return CellFile.checked(toml)
-    return _task(toml) if kind == "task" else _checked(GridWorld, toml, toml.raw)
+    return _task(toml) if kind == "task" else _checked(GridWorld, toml)
 
 
 def load_beside(word: str, asked: Asked) -> tuple[Task | CellFile | GridWorld, str | None]:
@@ -176,20 +175,20 @@ def _toml(path: Path) -> TomlText:
 
 
 def _task(toml: TomlText) -> Task:
-    task = _checked(Task, toml, renewed(toml.raw))
+    task = _checked(Task, toml)
     task._folder, task._toml = toml.path.resolve().parent, toml
     return task
 
 
-def _checked(model: type[Checked], toml: TomlText, raw: dict[str, Any]) -> Checked:
+def _checked(model: type[Checked], toml: TomlText) -> Checked:
     try:
-        return model.model_validate(raw)
+        return model.model_validate(toml.raw)
     except ValidationError as error:
         first = finding(error)
-        said = explain(error, partial(fields_at, model), partial(own_loc, toml.raw), toml.raw)
+        said = explain(error, partial(fields_at, model), toml.raw)
         at = first["loc"]
         if first["type"] in _OF_WHOLE:
-            at = at + within(raw, at, first["msg"]) if at else loc_of(raw, first["msg"])
-        raise toml.refusal(own_loc(toml.raw, at), said) from None
+            at = at + within(toml.raw, at, first["msg"]) if at else loc_of(toml.raw, first["msg"])
+        raise toml.refusal(at, said) from None
     except BadInput as error:
         raise refusal(toml, str(error)) from None

@@ -220,13 +220,11 @@ def finding(error: ValidationError) -> "ErrorDetails":
     return next((one for one in findings if one["type"] in _NO_SUCH_KEY), findings[0])
 
 
-def explain(
-    error: ValidationError, fields: Fields | None = None, own: Callable[[Loc], Loc] = tuple, raw: Any = None
-) -> str:
+def explain(error: ValidationError, fields: Fields | None = None, raw: Any = None) -> str:
     """The first finding of a validation as one line: the field, the bad value, what is allowed; and how many more there are.
 
-    fields: those of the record to which a way leads, to say which one may have been meant; own: the way as the file has it;
-    raw: the file's values, to say the name of what the field is of.
+    fields: those of the record to which a way leads, to say which one may have been meant; raw: the file's values, to
+    say the name of what the field is of.
     """
     findings, first = error.errors(), finding(error)
     loc, message = first["loc"], _WORDS.get(first["type"], first["msg"].removeprefix("Value error, "))
@@ -236,7 +234,7 @@ def explain(
         message = f"wanted a list of {1 + max(int(one['loc'][-1]) for one in short)}"
     elif first["type"] == "too_long" and isinstance(first["input"], tuple):
         message = f"wanted a list of {first['ctx']['max_length']}"
-    where = ".".join(map(str, own(loc))) + _whose(raw, own(loc))
+    where = ".".join(map(str, loc)) + _whose(raw, loc)
     if first["type"] in _NO_SUCH_KEY:
         message = "there is no such key"
         known = fields(first["loc"][:-1]) if fields else []

@@ -192,11 +192,10 @@ class KeptSession(SessionInFolder):
             ("learner", head.learner, asdict(plan.learner)),
             ("gate", head.gate, asdict(plan.gate)),
         ):
-            then = now | then  # an older journal does not know all settings of today
-            if changed := [name for name in now if then[name] != now[name]]:
+            if changed := [name for name in now if name not in then or then[name] != now[name]]:
                 name = changed[0]
                 raise BadInput(
-                    f"session '{self.folder}' ({self.where}): its {what} had {name} = {then[name]!r}, and the task now "
+                    f"session '{self.folder}' ({self.where}): its {what} had {name} = {then.get(name)!r}, and the task now "
                     f"gives {now[name]!r}: its file has changed"
                 )
         self.journal = kept_journal(self.read, self._read_only)

@@ -21,7 +21,6 @@ from lab.toolbox.registry import Toolbox
 
 _UNFINISHED = " unfinished"
 _REUSED = "reused"  # the toolbox's records of which policy was used for a problem that it was not learned in
-_FIRST_ARM = "up6"  # what every arm was before there were others
 _LONGEST_PROBLEM = MAX_NAME_LENGTH - 20  # characters of a policy's name; the rest is for its signature and state
 
 
@@ -150,10 +149,8 @@ class Teacher:
         """Whether a policy was learned in this way, or broken off before anything can be said of its gate and advisor."""
         length = {"episodes": 0}
         broken_off = len(policy.curve) < policy.learner.get("episodes", 0)
-        gate, advisor = asdict(plan.gate), str(self.advising)
-        learner = asdict(plan.learner) | length  # an older policy does not know all settings
-        alike = gate | policy.gate == gate and policy.advisor == advisor
-        return learner | policy.learner | length == learner and (alike or broken_off)
+        alike = policy.gate == asdict(plan.gate) and policy.advisor == str(self.advising)
+        return policy.learner | length == asdict(plan.learner) | length and (alike or broken_off)
 
     def teach(self, plan: LessonPlan) -> Lesson:
         """Teach what is planned, and save the policy, solved or not. WorkFailed when several sessions find no way.
@@ -240,10 +237,9 @@ def _record_key(problem: Problem) -> str:
 
 def _told(lesson: Lesson, reason: str, found: Policy, problem: Problem) -> Lesson:
     """The lesson with its reason, which says the arm that the found policy was learned with when it is another."""
-    arm = found.arm or _FIRST_ARM
-    if problem.arm in ("", arm):
+    if problem.arm == found.arm or not found.arm:
         return replace(lesson, reason=reason)
-    return replace(lesson, reason=f"learned with the arm {arm}; {reason}", other_arm=arm)
+    return replace(lesson, reason=f"learned with the arm {found.arm}; {reason}", other_arm=found.arm)
 
 
 def _reused(plan: LessonPlan, policy: Policy, reason: str, fitness: Fitness | None = None) -> Lesson:

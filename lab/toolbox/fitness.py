@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from lab.errors import counted
 from lab.learning.values import fewest_moves, known_values
 from lab.mdp import BoolArray, FloatArray, IntArray, TabularMDP
+from lab.toolbox import deferred
 from lab.toolbox.names import hash_of
 from lab.toolbox.policy import GOAL, ON, OUT, Policy
 
@@ -26,7 +27,6 @@ TOLERATED = 0.25  # moves above the shortest, mean over several starts: what is 
 MOST_JUDGED = 64  # policies that are looked at for one problem
 MOST_WARMED = 8  # of these whose warm start is looked at
 DISCOUNT = 0.99
-_UNKNOWN = 255  # of a state: an older file does not say how episodes end there
 _ORDER = ("use", "adapt", "refuse")
 
 
@@ -37,7 +37,7 @@ class Fitness:
     coverage: of the states that go on and can be reached there, the share in which it has made a move; reached: the share of
     the starts from which its greedy steps reach the goal; worst, mean: how many moves above the shortest these ways take,
     None where none reaches it; value: its highest action value in the start, the feasibility score; changed: how many states
-    go on or end otherwise than where it was learned, None where its file does not say; warm: `reached` of its warm start,
+    go on or end otherwise than where it was learned, None for another table's size; warm: `reached` of its warm start,
     None where that was not looked at; moves: of its way from the problem's start, None where it misses the goal, fewest: of the
     shortest way.
     """
@@ -125,8 +125,7 @@ def judged(policy: Policy, mdp: TabularMDP, discount: float = DISCOUNT) -> Fitne
     known = measure_of(mdp)
     ahead, _ = followed(warm_start(policy, mdp, discount), mdp)
     warm = float((known.kinds[ahead[known.starts]] == GOAL).mean())
-    then = _kinds_then(policy)
-    same_goal = bool(((then == GOAL) == mdp.goal)[then != _UNKNOWN].all())
+    same_goal = bool(((policy.ends == GOAL) == mdp.goal).all())
     if max(warm, fitness.reached) > 0.0 or (same_goal and _has_moved(policy)[known.starts].any()):
         return replace(fitness, warm=warm)
     other = "start" if same_goal else "goal"
@@ -140,7 +139,7 @@ def behaviour(policy: Policy, mdp: TabularMDP) -> Fitness:
     end, moves = followed(policy.q, mdp)
     arrived = known.kinds[end[known.starts]] == GOAL
     above = (moves - known.moves)[known.starts][arrived]
-    changed = None if policy.ends is None else int((policy.ends != known.kinds).sum())
+    changed = int((policy.ends != known.kinds).sum())
     is_free = bool(arrived.all())
     fits = is_free and float(above.mean()) <= (TOLERATED if len(above) > 1 else 0.0)
     if fits:
@@ -149,7 +148,7 @@ def behaviour(policy: Policy, mdp: TabularMDP) -> Fitness:
         reason = f"its way is free, but {counted(int(above.max()), 'move')} longer than the shortest"
     else:
         reason = _fault(int(end[known.starts][~arrived][0]), known, mdp, len(known.starts) - int(arrived.sum()))
-    if not fits and changed is not None:
+    if not fits:
         reason += f"; {changed} of {counted(mdp.n_states, 'state')} changed"
     return Fitness(
         "use" if fits else "adapt",
@@ -186,21 +185,12 @@ def warm_start(policy: Policy, mdp: TabularMDP, discount: float = DISCOUNT) -> F
 
     A move that it made between two states that are as they were leads where it led; all values along such moves are found
     anew, by value iteration over them. A move into a state that now ends an episode is worth what the problem says of it: the
-    survey has seen it. Any other move counts as never made: 0, as at the beginning. Where an older file does not say how
-    episodes ended, only moves between states in which it has made moves are kept.
+    survey has seen it. Any other move counts as never made: 0, as at the beginning.
     """
-    now, then = measure_of(mdp).kinds, _kinds_then(policy)
-    as_it_was = now == then
+    as_it_was = measure_of(mdp).kinds == policy.ends
     kept = (policy.visits > 0) & as_it_was[:, None] & as_it_was[mdp.successor] & ~mdp.terminal[:, None]
     seen = ~as_it_was[mdp.successor] & mdp.terminal[mdp.successor] & ~mdp.terminal[:, None]
     return known_values(mdp, kept, np.where(seen, mdp.reward, 0.0), discount)
-
-
-def _kinds_then(policy: Policy) -> KindArray:
-    """How episodes went on or ended where the policy was learned, as far as its file says."""
-    if policy.ends is not None:
-        return policy.ends
-    return np.where(_has_moved(policy), ON, _UNKNOWN).astype(np.uint8)
 
 
 def _has_moved(policy: Policy) -> BoolArray:
@@ -231,6 +221,4 @@ def best_fit(policies: Iterable[Policy], mdp: TabularMDP, discount: float = DISC
 
 def reference(policy: Policy) -> str:
     """What another policy's `parent` calls this one: name@hash."""
-    from lab.toolbox.policy_file import encode
-
-    return f"{policy.name}@{hash_of(encode(policy))}"
+    return f"{policy.name}@{hash_of(deferred.encode(policy))}"

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from lab.errors import BadInput
 from lab.files import read_limited, write_whole
+from lab.toolbox import deferred
 from lab.toolbox.names import SUFFIX, VERSIONS, hash_of
 from lab.toolbox.place import FileState, Place
 
@@ -57,16 +58,14 @@ class Index:
 
     def _read(self, states: Mapping[str, FileState]) -> dict[str, Row]:
         """The rows of these files."""
-        from lab.toolbox.policy_file import decode, described, unreadable
-
         rows: dict[str, Row] = {}
         numbers = self._numbers(states)
         for name, content in self._place.read_many(states):
             where = self._place.where(name)
             try:
                 if isinstance(content, BadInput):
-                    raise unreadable(where, content)
-                facts = described(decode(content, where))
+                    raise deferred.unreadable(where, content)
+                facts = deferred.described(deferred.decode(content, where))
             except BadInput as error:
                 rows[name] = {"damaged": str(error)}
                 continue
@@ -77,8 +76,6 @@ class Index:
 
     def _numbers(self, states: Mapping[str, FileState]) -> dict[str, dict[str, int]]:
         """The numbers of the versions of these files, by stem and hash."""
-        from lab.toolbox.versions import version_of
-
         found: dict[str, dict[str, int]] = {}
         folders = [f"{VERSIONS}/{name.removesuffix(SUFFIX)}" for name in states]
         if len(folders) < max(_MANY, len(self._rows or ()) // _MANY):
@@ -86,7 +83,7 @@ class Index:
         else:
             files = self._place.tree(VERSIONS)
         for file in files:
-            if (version := version_of(file)) is not None:
+            if (version := deferred.version_of(file)) is not None:
                 found.setdefault(file.split("/")[1], {})[version.hash] = version.number
         return found
 

@@ -45,9 +45,9 @@ class Policy:
     solved: see `SessionResult`; created: ISO 8601 in UTC; versions by package. Raises BadInput when these do not
     fit together.
 
-    Since lineage is kept, "" or None in older files: parent: the policy that it was warm-started from, as "name@hash";
-    scene: where it was learned, in words; ends (S,) uint8: which states of that problem go on (0), are the goal (1), or
-    end without it (2); arm: which one it was learned with, since there is more than one.
+    ends (S,) uint8: which states of the problem go on (0), are the goal (1), or end without it (2). parent: the policy that
+    it was warm-started from, as "name@hash"; scene: where it was learned, in words; arm: which one it was learned with; each
+    of these is "" where there is none.
     """
 
     name: str
@@ -72,10 +72,10 @@ class Policy:
     solved: bool
     created: str
     versions: dict[str, str]
+    ends: NDArray[np.uint8]
     parent: str = ""
     scene: str = ""
     arm: str = ""
-    ends: NDArray[np.uint8] | None = None
 
     def __post_init__(self) -> None:
         reason = self._what_does_not_fit()
@@ -94,7 +94,7 @@ class Policy:
             return f"visits have shape {self.visits.shape}, q has {self.q.shape}"
         if not np.isfinite(self.q).all():
             return f"{int((~np.isfinite(self.q)).sum())} values of q are not finite"
-        if self.ends is not None and (self.ends.shape != (states,) or self.ends.max() > OUT):
+        if self.ends.shape != (states,) or self.ends.max() > OUT:
             return f"ends have shape {self.ends.shape} up to {self.ends.max()}, allowed ({states},) up to {OUT}"
         if self.visits.min() < 0:
             return "a visit count is negative"

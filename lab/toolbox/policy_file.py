@@ -16,8 +16,6 @@ from lab.toolbox.names import FORMAT
 from lab.toolbox.policy import Policy
 
 _TENSORS = {"q": "F64", "visits": "I64", "ends": "U8"}
-_SINCE_LINEAGE = {"ends", "parent", "scene", "arm"}  # older files have none of them
-_SINCE_ARMS = {"arm"}  # left out where there is none, so that an older policy keeps its hash
 _METADATA = tuple(field.name for field in fields(Policy) if field.name not in _TENSORS)
 
 
@@ -25,12 +23,8 @@ def encode(policy: Policy) -> bytes:
     """The file's bytes: the same policy always gives the same ones."""
     from safetensors.numpy import save
 
-    said = {name: getattr(policy, name) for name in _METADATA}
-    metadata = {
-        name: json.dumps(value, allow_nan=False) for name, value in said.items() if value or name not in _SINCE_ARMS
-    }
-    found = {name: getattr(policy, name) for name in _TENSORS}
-    tensors = {name: np.ascontiguousarray(table) for name, table in found.items() if table is not None}
+    metadata = {name: json.dumps(getattr(policy, name), allow_nan=False) for name in _METADATA}
+    tensors = {name: np.ascontiguousarray(getattr(policy, name)) for name in _TENSORS}
     return _ordered(save(tensors, {"format": FORMAT, **metadata}))
 
 
@@ -85,7 +79,7 @@ def _read(content: bytes) -> tuple[dict[str, np.ndarray[Any, Any]], dict[str, st
     metadata = header.get("__metadata__") or {}
     if metadata.get("format") != FORMAT:
         raise ValueError(f"format {metadata.get('format')!r}, allowed '{FORMAT}'")
-    if not set(_TENSORS) - _SINCE_LINEAGE <= set(tensors) <= set(_TENSORS):
+    if set(tensors) != set(_TENSORS):
         raise ValueError(f"it holds the tensors {sorted(tensors)}, allowed {sorted(_TENSORS)}")
     for name in sorted(tensors):
         if header[name]["dtype"] != _TENSORS[name]:
@@ -101,11 +95,7 @@ def _date(text: str) -> str:
 @cache
 def _metadata() -> type[BaseModel]:
     """What a policy's file holds beside its tables: the fields of `Policy`."""
-    held: dict[str, Any] = {
-        field.name: (field.type, field.default if field.name in _SINCE_LINEAGE else ...)
-        for field in fields(Policy)
-        if field.name in _METADATA
-    }
+    held: dict[str, Any] = {field.name: (field.type, ...) for field in fields(Policy) if field.name in _METADATA}
     held["created"] = (Annotated[str, AfterValidator(_date)], ...)
     held["learner"] = held["gate"] = (dict[str, str | bool | int | float], ...)
     return create_model("Metadata", __config__=ConfigDict(strict=True, allow_inf_nan=False), **held)

@@ -58,9 +58,13 @@ def _read(place: Place, file: str) -> dict[str, Any]:
         whole = json_of(place.read(file))
     except (BadInput, ValueError, RecursionError) as error:
         raise BadInput(f"record file {place.where(file)}: {error}") from error
-    if not isinstance(whole, dict) or not isinstance(whole.get("record"), dict) or not {"kind", "key"} <= whole.keys():
-        raise BadInput(f"record file {place.where(file)}: it must hold kind, key and record")
-    if whole.get("hash", known := _hash(whole["record"])) != known:  # an older version of the lab wrote none
+    if (
+        not isinstance(whole, dict)
+        or not isinstance(whole.get("record"), dict)
+        or not {"kind", "key", "hash"} <= whole.keys()
+    ):
+        raise BadInput(f"record file {place.where(file)}: it must hold kind, key, hash and record")
+    if whole["hash"] != _hash(whole["record"]):
         raise BadInput(f"record file {place.where(file)}: it does not hold what was written: it was changed")
     return whole
 

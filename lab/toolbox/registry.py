@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lab.errors import BadInput, WorkFailed, unknown
-from lab.toolbox import records
+from lab.toolbox import deferred, records
 from lab.toolbox.folder_place import FolderPlace
 from lab.toolbox.index import Index, Key, KnownPolicies, Row
 from lab.toolbox.names import SUFFIX, TRASH, VERSIONS, default_address, hash_of, is_address, slug
@@ -68,14 +68,12 @@ class Toolbox:
 
     def load(self, path: Path | str) -> "Policy":
         """Reads one file, of the toolbox or a local one. Raises BadInput, naming it, unless it is a sound policy."""
-        from lab.toolbox.policy_file import decode, unreadable
-
         inside = self._inside(path)
         try:
             content = read_file(Path(path)) if inside is None else self.place.read(inside)
         except BadInput as error:
-            raise unreadable(str(path), error) from error
-        return decode(content, str(path))
+            raise deferred.unreadable(str(path), error) from error
+        return deferred.decode(content, str(path))
 
     def find(self, subtask: str, signature: str, name: str | None = None) -> "Policy | None":
         """The policy of a sub-task for exactly this problem, None if there is none.
@@ -120,18 +118,16 @@ class Toolbox:
 
     def show(self, name: str) -> dict[str, Any]:
         """All that is known of one policy, and of its versions. Raises BadInput for an unknown name or a damaged file."""
-        from lab.toolbox.policy_file import decode, described
-
         stem = self._stem(name)
         versions = self._of(stem)
         file = self.place.where(versions.in_use_file)
         content = self._content(versions.in_use_file)
-        policy, made = decode(content, file), hash_of(content)
+        policy, made = deferred.decode(content, file), hash_of(content)
         events, _ = versions.events()
         kept, sizes = versions.kept(), self.place.files(f"{VERSIONS}/{stem}")
         saved = {str(event.get("hash")): event["time"] for event in reversed(events)}
         return {
-            **described(policy),
+            **deferred.described(policy),
             "file": file,
             "version": kept[made].number if made in kept else None if kept else 1,
             "hash": made,
@@ -212,8 +208,6 @@ class Toolbox:
 
         A row for each policy in use and each record; of versions and logs only those that are not sound.
         """
-        from lab.toolbox.policy_file import decode, unreadable
-
         report: Report = []
         stems = {file.removesuffix(SUFFIX) for file in self._files()}
         for stem in sorted(stems | set(self.place.folders(VERSIONS))):
@@ -223,10 +217,12 @@ class Toolbox:
                 reason = ""
                 try:
                     content = self._content(versions.in_use_file)
-                    decode(content, where)
+                    deferred.decode(content, where)
                     kept = versions.kept()  # looked up last: a version is kept before it is in use
                     if kept and hash_of(content) not in kept:
-                        reason = str(unreadable(where, ValueError("it is none of the kept versions: it was changed")))
+                        reason = str(
+                            deferred.unreadable(where, ValueError("it is none of the kept versions: it was changed"))
+                        )
                 except BadInput as error:
                     reason = str(error)
                 report.append((self.folder / versions.in_use_file, not reason, reason))
@@ -248,12 +244,10 @@ class Toolbox:
         return records.load(self.place, kind, key)
 
     def _content(self, file: str) -> bytes:
-        from lab.toolbox.policy_file import unreadable
-
         try:
             return self.place.read(file)
         except BadInput as error:
-            raise unreadable(self.place.where(file), error) from error
+            raise deferred.unreadable(self.place.where(file), error) from error
 
     def where(self, path: Path) -> str:
         """The whole address of a path in the toolbox."""
@@ -268,9 +262,7 @@ class Toolbox:
         return None
 
     def _of(self, stem: str) -> "Versions":
-        from lab.toolbox.versions import Versions
-
-        return Versions(self.place, stem)
+        return deferred.Versions(self.place, stem)
 
     def _rows(self) -> Rows:
         """The index's sound rows, each with its file; they are copies."""
@@ -305,9 +297,7 @@ def _place_of(where: Path | str | None) -> Place:
     if text.startswith("file://"):
         text = text.removeprefix("file://")
     if is_address(text):
-        from lab.toolbox.remote_place import RemotePlace
-
-        return RemotePlace(text)
+        return deferred.RemotePlace(text)
     return FolderPlace(Path(text))
 
 

@@ -56,7 +56,7 @@ class Versions:
     """All that a place holds of one name, which is given as its file stem.
 
     "STEM.safetensors" is the version in use, "versions/STEM/NUMBER-HASH.safetensors" are all, "log/STEM.jsonl" tells what
-    happened, "trash/STEM.safetensors" is what was removed. A policy from before there were versions is kept as one as
+    happened, "trash/STEM.safetensors" is what was removed. A policy whose file somebody put there is kept as a version as
     soon as anything takes its place.
     """
 

@@ -5,9 +5,12 @@ from itertools import cycle
 from math import degrees
 from pathlib import Path
 from textwrap import fill
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from matplotlib.patches import Circle, Patch, Polygon, Wedge
 
 from lab.sim.scene.ground_plan import (
     Block,
@@ -19,10 +22,6 @@ from lab.sim.scene.ground_plan import (
     Ring,
 )
 from lab.view.canvas import BLUE, GREEN, GREY, INK, ORANGE, PALE_GREY, PURPLE, RED, SKY, YELLOW, picture_file, tip
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.patches import Patch
 
 Look = dict[str, Any]
 
@@ -42,8 +41,6 @@ def draw_cell(plan: GroundPlan, path: Path) -> None:
     What is at fault has a thick red edge and a red name, and what is wrong stands below. Raises BadInput for a path that
     cannot be written.
     """
-    from matplotlib.patches import Circle
-
     (low_x, low_y), (high_x, high_y) = _extent(plan)
     tall = (high_y - low_y) / (high_x - low_x)
     with picture_file(path, LEGEND_INCH + 7.0 / max(tall, 1.0), 0.8 + 7.0 * min(tall, 1.0)) as figure:
@@ -84,17 +81,13 @@ def _extent(plan: GroundPlan) -> tuple[list[float], list[float]]:
     return (points.min(axis=0) - _AROUND_M).tolist(), (points.max(axis=0) + _AROUND_M).tolist()
 
 
-def _add(axes: "Axes", block: Block, **look: object) -> "Patch":
-    from matplotlib.patches import Polygon
-
+def _add(axes: Axes, block: Block, **look: object) -> Patch:
     patch: Patch = axes.add_patch(Polygon(block.corners(), **look))  # type: ignore[arg-type]
     return patch
 
 
-def _draw_blocked(axes: "Axes", blocked: BlockedCells) -> "Iterator[Patch]":
+def _draw_blocked(axes: Axes, blocked: BlockedCells) -> "Iterator[Patch]":
     """The workspace's lines and its blocked cells; the legend's rows, by how many cells a cause blocks."""
-    from matplotlib.patches import Patch
-
     (x, y), (wide, high), (columns, rows) = blocked.origin, blocked.cell, blocked.causes.shape
     lines: Look = {"color": "#D5D8DC", "linewidth": 0.5, "zorder": 0.5}
     axes.vlines(x + wide * np.arange(columns + 1), y, y + high * rows, **lines)
@@ -111,9 +104,7 @@ def _draw_blocked(axes: "Axes", blocked: BlockedCells) -> "Iterator[Patch]":
         yield Patch(label=cause if cause == OUT_OF_REACH else f"blocked by {cause}", **look)
 
 
-def _draw_reach(axes: "Axes", ring: Ring, height_m: float) -> "Patch":
-    from matplotlib.patches import Wedge
-
+def _draw_reach(axes: Axes, ring: Ring, height_m: float) -> Patch:
     look: Look = {"facecolor": "none", "edgecolor": BLUE, "linewidth": 1.3, "linestyle": (0, (5, 3)), "zorder": 2}
     edges = (-degrees(ring.right_rad), degrees(ring.left_rad))
     wedge: Patch = Wedge((0.0, 0.0), ring.farthest_m, *edges, width=ring.farthest_m - ring.nearest_m, **look)
@@ -121,7 +112,7 @@ def _draw_reach(axes: "Axes", ring: Ring, height_m: float) -> "Patch":
     return axes.add_patch(wedge)
 
 
-def _draw_camera(axes: "Axes", camera: CameraCells) -> None:
+def _draw_camera(axes: Axes, camera: CameraCells) -> None:
     (x, y), (columns, rows) = camera.origin, camera.shape
     wide, high = columns * camera.cell, rows * camera.cell
     lines: Look = {"color": GREEN, "linewidth": 0.35, "alpha": 0.7, "zorder": 1.5}
@@ -135,7 +126,7 @@ def _draw_camera(axes: "Axes", camera: CameraCells) -> None:
     )
 
 
-def _draw_obstacle(axes: "Axes", obstacle: PlannedObstacle, at_fault: bool) -> None:
+def _draw_obstacle(axes: Axes, obstacle: PlannedObstacle, at_fault: bool) -> None:
     edge = FAULT if at_fault else WOOD
     if obstacle.moves:
         _add(axes, obstacle.stays_in, facecolor="none", edgecolor=edge, linewidth=0.9, linestyle=(0, (2, 2)), zorder=4)
@@ -145,7 +136,7 @@ def _draw_obstacle(axes: "Axes", obstacle: PlannedObstacle, at_fault: bool) -> N
     _name(axes, obstacle.name, obstacle.stays_in.x, low, at_fault, 6.5)
 
 
-def _draw_station(axes: "Axes", station: PlannedStation, at_fault: bool) -> None:
+def _draw_station(axes: Axes, station: PlannedStation, at_fault: bool) -> None:
     look: Look = {"edgecolor": FAULT if at_fault else INK, "linewidth": 2.5 if at_fault else 1.0}
     body = _add(axes, station.body, facecolor=BODIES[station.kind], alpha=0.85, zorder=3, **look)
     tip(body, f"{station.name} ({station.kind})")
@@ -157,14 +148,14 @@ def _draw_station(axes: "Axes", station: PlannedStation, at_fault: bool) -> None
     _name(axes, station.name, station.body.x, lowest, at_fault, 8)
 
 
-def _name(axes: "Axes", name: str, x: float, y: float, at_fault: bool, size: float) -> None:
+def _name(axes: Axes, name: str, x: float, y: float, at_fault: bool, size: float) -> None:
     look: Look = {"color": FAULT if at_fault else INK, "fontweight": "bold" if at_fault else "normal", "fontsize": size}
     behind = {"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 0.6}
     at: Look = {"xytext": (0, -4), "textcoords": "offset points", "ha": "center", "va": "top", "zorder": 9}
     axes.annotate(name, (x, y), bbox=behind, **at, **look)
 
 
-def _draw_approaches(axes: "Axes", plan: GroundPlan) -> None:
+def _draw_approaches(axes: Axes, plan: GroundPlan) -> None:
     """Arrows from the cell that a transfer comes from to where it ends; a cross where there is no such cell."""
     for approach in plan.approaches:
         if approach.dock is None:
@@ -184,9 +175,6 @@ def _draw_approaches(axes: "Axes", plan: GroundPlan) -> None:
 
 def _kinds(plan: GroundPlan) -> "Iterator[object]":
     """The legend's rows of what has a shape of its own."""
-    from matplotlib.lines import Line2D
-    from matplotlib.patches import Patch
-
     for kind in dict.fromkeys(station.kind for station in plan.stations):
         yield Patch(facecolor=BODIES[kind], edgecolor=INK, label=kind)
     spots = [spot for station in plan.stations for spot in station.spots]

@@ -13,6 +13,7 @@ from lab.errors import counted
 from lab.sequencing import BESIDE_METHODS, method_in_words
 from lab.view.cyclic_summary import period_in_words
 from lab.view.figures import SAME, beside, gap_of
+from lab.view.progress import sparkline
 
 _STUDY_ROWS = 30
 SHOWN_MOVES = 60
@@ -101,8 +102,6 @@ def delivered_in_words(delivered: int, parts: Mapping[str, int]) -> str:
 
 def lesson_summary(lesson: Mapping[str, Any]) -> RenderableType:
     """The end of `lab teach`, from its JSON document."""
-    from lab.view.progress import sparkline
-
     lines = [
         f"{lesson['skill']}: {counted(lesson['episodes'], 'episode')}   {sparkline(lesson['steps_per_episode'], 40)}",
         f"learned way: {_way(lesson)}: {_verdict(lesson)}",

@@ -7,6 +7,7 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from lab.errors import counted, printable
+from lab.view.progress import sparkline
 from lab.view.summary import table_of
 
 _SHOWN_VERSIONS = 10
@@ -32,8 +33,6 @@ def toolbox_summary(box: Mapping[str, Any]) -> RenderableType:
 
 def policy_summary(policy: Mapping[str, Any]) -> RenderableType:
     """What `lab toolbox show` shows, from its JSON document."""
-    from lab.view.progress import sparkline
-
     curve = policy["curve"] or [0]
     guided = [str(n) for n, was_guided in enumerate(policy["guided"], start=1) if was_guided]
     apart = ("lineage", "kept_versions", "kept_bytes", "events")

@@ -52,7 +52,7 @@ def value_levels(policy: Policy, path: Path) -> None:
     if not can_be_drawn(policy):
         raise BadInput(f"value map of '{policy.name}': a grid with up to {MAX_CELLS} cells a level is needed")
     planes = Planes(policy.shape, is_map(policy))
-    ends = np.full(len(policy.q), ON, np.uint8) if policy.ends is None else policy.ends
+    ends = policy.ends
     learned = Learned(policy.q.max(axis=1), policy.q.argmax(axis=1), policy.visits.sum(axis=1) > 0, ends)
     start = tuple(int(i) for i in np.unravel_index(policy.start, policy.shape))
     levels = _chosen(planes, learned, planes.layer(start))

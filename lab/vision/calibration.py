@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from lab.errors import BadInput, WorkFailed, counted
 from lab.files import json_of, read_limited, write_whole
 from lab.vision.lens import TERMS, Lens
+from lab.vision.opencv import cv2
 from lab.vision.picture_files import Image, check_picture
 
 Array = NDArray[np.float64]
@@ -43,8 +44,6 @@ class Mat:
     @property
     def board(self) -> Any:
         """The mat as OpenCV has it: from the upper left corner, y downwards."""
-        import cv2
-
         dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, DICTIONARY))
         return cv2.aruco.GridBoard((self.columns, self.rows), self.marker_m, self.gap_m, dictionary)
 
@@ -56,8 +55,6 @@ class Mat:
 
     def printed(self, pixels_per_m: float) -> Image:
         """The mat as a picture to be printed, without a border."""
-        import cv2
-
         width, height = (max(1, round(side * pixels_per_m)) for side in self.size_m)
         grey = self.board.generateImage((width, height))
         return np.asarray(cv2.cvtColor(grey, cv2.COLOR_GRAY2RGB), dtype=np.uint8)
@@ -70,8 +67,6 @@ class Mat:
 
     def photographed(self, lens: Lens, turn: Array, shift: Array) -> Image:
         """What a lens shows of the mat, which lies where it should; `turn` (3, 3), `shift` (3,) [m]: world to camera."""
-        import cv2
-
         side, ahead = round(1.4 * max(lens.size)), lens.focal
         pinhole = np.array([[ahead[0], 0, side / 2], [0, ahead[1], side / 2], [0, 0, 1.0]])
         (length, width), step = self.size_m, 1 / PRINTED
@@ -85,8 +80,6 @@ class Mat:
 
     def found(self, image: Image, where: str = "picture") -> tuple[Array, Array]:
         """World points (n, 3) [m] and pixels (n, 2) of the markers' corners; BadInput names how many markers were seen."""
-        import cv2
-
         check_picture(image, where)
         settings = cv2.aruco.DetectorParameters()
         settings.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
@@ -144,8 +137,6 @@ def calibrate(pictures: Sequence[tuple[str, Image]], mat: Mat, angle_rad: float 
     looked for, only k1 and k2. k3 is left 0: k2 covers for it within a field of view of about 1 rad.
     Raises BadInput for too few pictures, without the mat, or of unlike sizes, WorkFailed where the focal length cannot be told.
     """
-    import cv2
-
     found = [mat.found(image, name) for name, image in pictures]
     sizes = {(image.shape[1], image.shape[0]) for _, image in pictures}
     if len(sizes) > 1:
@@ -185,8 +176,6 @@ def from_corners(
 
     BadInput for other numbers of corners, and for corners on one line.
     """
-    import cv2
-
     seen = np.asarray(pixels, dtype=np.float64)
     if len(seen) != 4 or len(corners_m) != 4:
         raise BadInput(f"{len(seen)} corners: wanted 4, around the rectangle in its order")
@@ -211,8 +200,6 @@ def pinhole(size: tuple[int, int], angle_rad: float) -> Lens:
 
 
 def _placed(lens: Lens, turn: Array, shift: Array, residual: float, points: int, method: str) -> Calibration:
-    import cv2
-
     rows = np.asarray(cv2.Rodrigues(turn)[0], dtype=float)
     return Calibration(
         lens,
@@ -226,8 +213,6 @@ def _placed(lens: Lens, turn: Array, shift: Array, residual: float, points: int,
 
 def drawn(image: Image, calibration: Calibration, mat: Mat | None = None) -> Image:
     """A copy of a picture with where the calibration has the mat's corners (green), the lens's middle."""
-    import cv2
-
     canvas = np.array(image)
     lens = calibration.lens
     if mat is not None:

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.vision.grid_view import View
+from lab.vision.opencv import cv2
 from lab.vision.picture_files import Image
 
 Array = NDArray[np.float64]
@@ -25,8 +26,6 @@ RIM_IN_PX = 0.1  # the outline runs that much within the rim
 
 def calmed(image: Image) -> Image:
     """The picture (H, W, 3), smoothed where it is noisy; a renderer's clean one as it is."""
-    import cv2
-
     second = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], dtype=np.float64)
     grey = cv2.cvtColor(image, cv2.COLOR_RGB2GRAY)
     rough: Any = np.abs(cv2.filter2D(grey, cv2.CV_64F, second))  # Immerkaer 1996; the median leaves edges out

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lab.errors import BadInput
+from lab.vision.opencv import cv2
 from lab.vision.picture_files import Image, check_picture
 
 Array = NDArray[np.float64]
@@ -49,8 +50,6 @@ class Lens:
 
     def projected(self, points: ArrayLike, turn: ArrayLike, shift: ArrayLike) -> Array:
         """The pixels (n, 2) of world points (n, 3) [m]; `turn` (3, 3) and `shift` (3,) take them to the camera's axes."""
-        import cv2
-
         rotation = cv2.Rodrigues(np.asarray(turn, dtype=np.float64))[0]
         world, to = np.asarray(points, dtype=np.float64), np.asarray(shift, dtype=np.float64)
         seen, _ = cv2.projectPoints(world, rotation, to, self.matrix, np.array(self.distortion))
@@ -62,8 +61,6 @@ class Lens:
 
     def straightened(self, image: Image) -> Image:
         """The picture (H, W, 3) as a pinhole with the same matrix would have taken it."""
-        import cv2
-
         self._check(image)
         if not any(self.distortion):
             return image
@@ -74,8 +71,6 @@ class Lens:
 
         `wide` (H, W, 3) should reach farther on all sides than this lens sees; beyond it the edge's pixels are taken again.
         """
-        import cv2
-
         check_picture(wide)
         width, height = self.size
         pixels = np.stack(np.meshgrid(np.arange(width), np.arange(height)), axis=-1).reshape(-1, 2)
@@ -84,8 +79,6 @@ class Lens:
         return np.asarray(bent, dtype=np.uint8)
 
     def _onto(self, pixels: Array, matrix: Array) -> Array:
-        import cv2
-
         there = cv2.undistortPoints(pixels[:, None], self.matrix, np.array(self.distortion), None, None, matrix)
         return np.asarray(there, dtype=np.float64).reshape(-1, 2)
 

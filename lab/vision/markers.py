@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from lab.errors import BadInput
 from lab.vision.grid_view import Cell, GridView, Marker, View, plain_view
 from lab.vision.hidden_discs import behind_cover, calmed, hidden_part
+from lab.vision.opencv import cv2
 from lab.vision.picture_files import Image, check_picture
 
 SATURATION = 100  # of 255; wood, bread, steel and skin stay below it or have another hue
@@ -47,8 +48,6 @@ def find_markers(image: Image, view: View) -> tuple[tuple[Marker, ...], int]:
 
     Cells may lie outside the grid. Raises BadInput for a picture of another shape or dtype, or of too many markers.
     """
-    import cv2
-
     check_picture(image)
     image = calmed(image)
     hsv = cv2.cvtColor(image, cv2.COLOR_RGB2HSV)
@@ -163,8 +162,6 @@ def draw(image: Image, grid: GridView, outlines: Sequence[Sequence[Sequence[floa
 
     outlines: of parts, each (n, 2) pixels, drawn in orange.
     """
-    import cv2
-
     check_picture(image)
     view = grid.view
     thin = max(1, round(min(image.shape[:2]) / 400))

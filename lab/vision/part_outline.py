@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lab.vision.hidden_discs import calmed
+from lab.vision.opencv import cv2
 from lab.vision.picture_files import Image, check_picture
 
 Array = NDArray[np.float64]
@@ -51,8 +52,6 @@ class Outlined:
 
     def outlines(self, poses: Array) -> Array:
         """The outlines (k, OUTLINE_POINTS, 4) of the part at `poses` (k, 3) x, y [m], yaw: pixels, and the way across it."""
-        import cv2
-
         c, s = np.cos(poses[:, 2])[:, None], np.sin(poses[:, 2])[:, None]
         x = poses[:, :1] + c * self.corners[:, 0] - s * self.corners[:, 1]
         y = poses[:, 1:2] + s * self.corners[:, 0] + c * self.corners[:, 1]
@@ -84,8 +83,6 @@ def find_part(image: Image, part: Outlined, near: ArrayLike, reach_m: float, rea
 
 def _coloured(image: Image, outline: Array, colours: Array) -> bool:
     """Whether most of what lies within an outline has one of the colours, brighter or darker."""
-    import cv2
-
     within = np.zeros(image.shape[:2], np.uint8)
     cv2.fillPoly(within, [np.rint(outline).astype(np.int32)], 1)
     pixels = calmed(image)[within > 0].astype(np.float64) + 1.0
@@ -116,8 +113,6 @@ def _finer(edges: Array, part: Outlined, pose: Array, last: int) -> Array:
 
 def _edges(image: Image, smooth_px: float) -> Array:
     """(H, W, 2): the gradient of the channel with the strongest one, its length from 0 (none) to 1 (strong)."""
-    import cv2
-
     soft = cv2.GaussianBlur(calmed(image), (0, 0), smooth_px).astype(np.float64)
     dy, dx = np.gradient(soft, axis=(0, 1))
     strong = np.hypot(dx, dy) * smooth_px
@@ -129,8 +124,6 @@ def _edges(image: Image, smooth_px: float) -> Array:
 
 def _shares(edges: Array, outlines: Array) -> Array:
     """How much of each outline (k, n, 4) runs along an edge, (k,): 0 none, 1 all; beyond the picture is none."""
-    import cv2
-
     x, y = outlines[..., 0].astype(np.float32), outlines[..., 1].astype(np.float32)
     there: Any = cv2.remap(edges.astype(np.float32), x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT)
     across = np.abs((there * outlines[..., 2:]).sum(axis=-1))

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.vision.lens import Lens
+from lab.vision.opencv import cv2
 from lab.vision.picture_files import Image, check_picture
 
 Array = NDArray[np.float64]
@@ -40,8 +41,6 @@ def spoiled(image: Image, rng: np.random.Generator, strength: float = 1.0) -> Im
 
     strength: 0 leaves it as it is, 1 draws from all that the constants above allow.
     """
-    import cv2
-
     check_picture(image)
     if strength <= 0.0:
         return image
@@ -71,8 +70,6 @@ def hide(
     image: Image, discs: Sequence[tuple[float, float, float]], rng: np.random.Generator
 ) -> tuple[Image, list[float]]:
     """A copy with each disc (x, y, radius) [pixels] partly covered by something's straight edge, and how much of each."""
-    import cv2
-
     canvas, shares = np.array(image), []
     for x, y, radius in discs:
         share, way = rng.uniform(0, HIDDEN), rng.uniform(0, 2 * pi)

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from lab.errors import BadInput
 from lab.files import read_limited
+from lab.vision.opencv import cv2
 
 Image = NDArray[np.uint8]  # (H, W, 3), RGB
 
@@ -29,8 +30,6 @@ def read_picture(path: Path) -> Image:
     Raises BadInput, with the reason, when it cannot be read, is cut off, is neither, or is larger than 64 MB or 40
     million pixels; the size is read from the header, before any memory is spent on the picture.
     """
-    import cv2
-
     try:
         data = read_limited(path, MAX_BYTES)
     except OSError as error:
@@ -79,8 +78,6 @@ def _check_chunks(data: bytes, path: Path) -> None:
 
 def write_picture(path: Path, image: Image) -> None:
     """Write an RGB array (H, W, 3) as the PNG or JPEG file that the name says; raises BadInput when that cannot be."""
-    import cv2
-
     check_picture(image, str(path))
     if path.suffix.lower() not in (".png", ".jpg", ".jpeg"):
         raise BadInput(f"{path}: pictures are written as .png, .jpg or .jpeg")

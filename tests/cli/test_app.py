@@ -116,17 +116,6 @@ def test_a_page_is_answered_only_where_somebody_asks(lab: Lab) -> None:
         assert ("can be answered" in text) == answered
 
 
-def test_old_words_go_on_working_unseen(lab: Lab) -> None:
-    """--view was the page of a run and the sight of an advisor."""
-    for command, new in (("run", "--page"), ("teach", "--sight")):
-        text = lab(command, "--help").out
-        assert new in text
-        assert "--view" not in text
-    assert lab("run", "toas", "--view").err == lab("run", "toas", "--page").err
-    assert lab("run", "toas", "--no-view").err == lab("run", "toas").err
-    assert lab("teach", "world-1", "--view", "half").err.startswith("lab: unknown sight 'half' (--sight)")
-
-
 @pytest.mark.parametrize("command", ["run", "view", "sequence", "task check"])
 def test_toasts_have_one_short_name(lab: Lab, command: str) -> None:
     assert lab(*command.split(), "toast", "-n", "0").err == "lab: 0 toasts (--toasts): allowed are 1 to 50\n"

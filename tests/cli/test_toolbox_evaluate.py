@@ -13,7 +13,7 @@ from lab.mdp import optimal_values
 from lab.production.evaluation import Evaluation, SceneResult
 from lab.skills.prepared_scene import prepare
 from lab.tasks.task_file import load
-from lab.toolbox.policy import Policy
+from lab.toolbox.policy import GOAL, ON, OUT, Policy
 from lab.toolbox.registry import Toolbox
 
 Lab = Callable[..., Any]  # the fixture of tests/conftest.py; it returns a Ran
@@ -25,7 +25,8 @@ def place(folder: Path, policy: Callable[..., Policy]) -> Policy:
     """A policy in the toolbox that sets a slice down by a shortest way."""
     mdp = prepare(load("toast"), ("slice",) * 3, 0, PLACE).problems[PLACE].mdp
     q = optimal_values(mdp, 0.99)
-    grid: dict[str, Any] = {"shape": mdp.shape, "start": mdp.start, "action_labels": mdp.action_labels, "ends": None}
+    ends = np.where(mdp.goal, GOAL, np.where(mdp.terminal, OUT, ON)).astype(np.uint8)
+    grid: dict[str, Any] = {"shape": mdp.shape, "start": mdp.start, "action_labels": mdp.action_labels, "ends": ends}
     made = replace(policy(f"{PLACE} 12345678"), subtask="place", q=q, visits=np.zeros(q.shape, np.int64), **grid)
     Toolbox(folder / "toolbox").save(made)
     return made

@@ -1,4 +1,4 @@
-"""The lab against the oracle: drawn cells of every kind (`python lab-dev proofs` draws more, and larger ones)."""
+"""The lab against the oracle: drawn cells of every kind (`python -m devtools proofs` draws more, and larger ones)."""
 
 from itertools import count, islice
 

@@ -18,7 +18,7 @@ from lab.skills.skillset import SkillSet
 from lab.skills.surveys import Surveys
 from lab.tasks.task import Order, Task
 from lab.tasks.task_file import load
-from lab.toolbox.policy import Policy
+from lab.toolbox.policy import GOAL, ON, OUT, Policy
 
 SLICE = "slice 1"
 ORDER: Order = ("slice", "slice")
@@ -158,6 +158,7 @@ def _policy(problem: Problem, q: np.ndarray[tuple[int, ...], np.dtype[np.float64
         solved=True,
         created="2024-05-01T12:00:00+00:00",
         versions={},
+        ends=np.where(mdp.goal, GOAL, np.where(mdp.terminal, OUT, ON)).astype(np.uint8),
     )
 
 

@@ -19,7 +19,7 @@ from lab.errors import BadInput
 from lab.learning.requests import AdviceRequest, Ask
 from lab.learning.session_events import AdviceGiven
 from lab.tasks.task_file import load_world
-from lab.teaching.events import Event, LessonEvent, QuestionAnswered, unheard
+from lab.teaching.events import Event, LessonEvent, QuestionAnswered
 from lab.teaching.kept_session import KeptSession, NewSession, check_new
 from lab.teaching.lesson import replay, teach
 from lab.teaching.lesson_options import LessonOptions
@@ -241,18 +241,6 @@ def test_another_world_in_the_file_is_noticed(tmp_path: Path, maze: Path) -> Non
     maze.write_text(MAZE.strip().replace("...##.", "..###."))  # on its way
     with pytest.raises(BadInput, match=r"is about 'maze' .* its file or the lab has changed"):
         gone_on(tmp_path, maze)
-
-
-def test_a_journal_of_an_older_version_knows_fewer_settings_and_verdicts(tmp_path: Path, maze: Path) -> None:
-    held(tmp_path, maze)
-    journal = tmp_path / "lesson" / FILE
-    lines = [json.loads(line) for line in journal.read_text().splitlines()]
-    assert lines[0]["gate"].pop("spare_best")
-    for line in lines:
-        line.pop("verdict", None)
-    journal.write_text("".join(json.dumps(line) + "\n" for line in lines))
-    kept = KeptSession(tmp_path / "lesson", "DIR", read_only=True)
-    assert replay(kept, WorldSubject.of(kept.options), unheard)["closed"]
 
 
 def test_options_are_the_same_in_another_folder(tmp_path: Path, maze: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -100,9 +100,6 @@ def test_what_another_arm_learned_is_used_but_not_in_silence(teacher: Teacher) -
     assert (same.other_arm, same.reason) == ("", "it was learned in exactly this problem")
     assert other.other_arm == "panda"
     assert other.reason == "learned with the arm panda; it was learned in exactly this problem"
-    older = replace(first.policy, arm="")  # from before arms had names: there was one
-    told = teacher.find_or_teach(plan(HOPELESS, about=replace(problem(), arm="xarm6")), known(older))
-    assert told.other_arm == "up6"
 
 
 def test_another_scene_is_learned_anew(teacher: Teacher) -> None:
@@ -128,7 +125,7 @@ def test_a_policy_of_another_size_or_with_other_actions_is_not_taken(teacher: Te
     sound = teacher.find_or_teach(plan(), known()).policy
     q, visits = np.zeros((7, 4)), np.zeros((7, 4), np.int64)
     for wrong in (
-        replace(sound, q=q, visits=visits, ends=None, shape=(7,), start=0),
+        replace(sound, q=q, visits=visits, ends=np.zeros(7, np.uint8), shape=(7,), start=0),
         replace(sound, action_labels=("n", "s", "w", "e")),
     ):
         assert teacher.find_or_teach(plan(), known(wrong)).source == "learned"

@@ -125,15 +125,6 @@ def test_a_warm_start_keeps_what_did_not_change() -> None:
     assert part[state((0, 2)), RIGHT] == 1.5  # in the rewards of this problem
 
 
-def test_an_older_file_does_not_say_where_episodes_ended() -> None:
-    old = replace(learned(board()), ends=None)
-    assert judged(old, board((2, 2))).verdict == "use"
-    fitness = judged(old, board((0, 1)))
-    assert (fitness.verdict, fitness.changed) == ("adapt", None)
-    assert fitness.reason == "its way meets what is in the way at (0, 1)"
-    np.testing.assert_allclose(warm_start(old, board((0, 1))), optimal_values(board((0, 1)), 0.99))
-
-
 # ---- refused -------------------------------------------------------------------------------------------------------
 
 

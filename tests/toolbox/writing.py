@@ -49,6 +49,7 @@ def made(name: str, rng: np.random.Generator) -> Policy:
         solved=bool(rng.random() < 0.5),
         created="2026-05-01T12:00:00+00:00",
         versions={"numpy": "2"},
+        ends=np.array([0, 0, 0, 1], np.uint8),
     )
 
 

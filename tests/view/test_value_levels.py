@@ -73,11 +73,8 @@ def test_another_best_move_and_another_end_are_another_picture(policy: MakePolic
     assert len(set(drawn)) == 5
 
 
-def test_one_that_nothing_was_learned_of_and_an_older_one_are_drawn(policy: MakePolicy, tmp_path: Path) -> None:
+def test_one_that_nothing_was_learned_of_is_drawn(policy: MakePolicy, tmp_path: Path) -> None:
     value_levels(policy((3, 4), visits=np.zeros((12, 6), np.int64)), tmp_path / "new.png")
-    older = policy((3, 4))
-    object.__setattr__(older, "ends", None)
-    value_levels(older, tmp_path / "old.png")
     assert ORANGE in colours(tmp_path / "new.png")
 
 

@@ -6,6 +6,15 @@ from io import StringIO
 from threading import Thread
 from typing import TYPE_CHECKING
 
+from prompt_toolkit.application import Application
+from prompt_toolkit.buffer import Buffer
+from prompt_toolkit.completion import WordCompleter
+from prompt_toolkit.filters import Condition
+from prompt_toolkit.formatted_text import ANSI
+from prompt_toolkit.key_binding import KeyBindings, KeyPressEvent
+from prompt_toolkit.layout import BufferControl, FormattedTextControl, HSplit, Layout, Window
+from prompt_toolkit.layout.processors import BeforeInput
+from prompt_toolkit.output import create_output
 from rich.text import Text
 
 from lab.errors import printable
@@ -125,14 +134,6 @@ class OperatorConsole:
     # ---- the screen --------------------------------------------------------------------------------------------------
 
     def _made(self, keys: "Input | None", screen: "Output | None") -> "Application[None]":
-        from prompt_toolkit.application import Application
-        from prompt_toolkit.buffer import Buffer
-        from prompt_toolkit.completion import WordCompleter
-        from prompt_toolkit.formatted_text import ANSI
-        from prompt_toolkit.layout import BufferControl, FormattedTextControl, HSplit, Layout, Window
-        from prompt_toolkit.layout.processors import BeforeInput
-        from prompt_toolkit.output import create_output
-
         def entered(buffer: "Buffer") -> bool:
             self.say(buffer.text.removeprefix(":"))
             return False
@@ -152,9 +153,6 @@ class OperatorConsole:
         return app
 
     def _bindings(self, line: "Buffer") -> "KeyBindings":
-        from prompt_toolkit.filters import Condition
-        from prompt_toolkit.key_binding import KeyBindings, KeyPressEvent
-
         bindings, is_empty = KeyBindings(), Condition(lambda: not line.text)
 
         def bind(key: str, words: str) -> None:

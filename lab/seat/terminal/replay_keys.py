@@ -6,6 +6,8 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from prompt_toolkit.input import create_input
+
 from lab.seat.replay_pace import KEYS, ReplayPace
 
 HELP = "space: pause and go on, n: one step, + and -: faster and slower, q: end"
@@ -19,8 +21,6 @@ def replay_keys(pace: ReplayPace) -> Iterator[bool]:
     if not sys.stdin.isatty():
         yield False
         return
-    from prompt_toolkit.input import create_input
-
     keys, over = create_input(sys.stdin), threading.Event()
 
     def read() -> None:

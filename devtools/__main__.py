@@ -1,0 +1,92 @@
+"""What breaks the lab: `python -m devtools PART... [--count N] [--seed N] [--workers N] [--out DIR]`, and a scoreboard.
+
+Needs an environment in which the lab can be imported. The same folder goes on where it was stopped; exit 1 if anything broke.
+"""
+
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.progress import Progress
+
+from devtools.audit_violations import PART as AUDITS
+from devtools.drawn_physics import PART as PHYSICS
+from devtools.kills import PART as KILLS
+from devtools.mutated_commands import PART as MUTATED_COMMANDS
+from devtools.mutations import PART as MUTATIONS
+from devtools.page_attacks import PART as REQUESTS
+from devtools.parts import Part
+from devtools.proofs import PART as PROOFS
+from devtools.resources import PART as RESOURCES
+from devtools.scoreboard import line, show, written
+from devtools.sizes import PART as SIZES
+
+PARTS: dict[str, Part] = {
+    "kills": KILLS,
+    "mutations": MUTATIONS,
+    "mutated-commands": MUTATED_COMMANDS,
+    "sizes": SIZES,
+    "requests": REQUESTS,
+    "resources": RESOURCES,
+    "physics": PHYSICS,
+    "audits": AUDITS,
+    "proofs": PROOFS,
+}
+
+
+def main(
+    parts: Annotated[
+        list[str] | None, typer.Argument(help=f"which: {', '.join(PARTS)}; all of them if none is named")
+    ] = None,
+    count: Annotated[
+        int | None, typer.Option(min=1, help="attempts of each part; else as many as a long run makes")
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0)] = 0,
+    workers: Annotated[int, typer.Option(min=1)] = 2,
+    out: Annotated[Path, typer.Option(help="what was tried, a file a part; gone on with if it is there")] = Path(
+        "devtools-out"
+    ),
+) -> None:
+    """Tries to break the lab and prints what held."""
+    console = Console(width=160)
+    unknown = [name for name in parts or () if name not in PARTS]
+    if unknown:
+        raise typer.BadParameter(f"{unknown[0]!r}: allowed are {', '.join(PARTS)}")
+    chosen = {name: PARTS[name] for name in parts or PARTS}
+    for name, part in chosen.items():
+        attempts(name, part, count, seed, workers, out.resolve(), console)
+    if not show(chosen, out, console):
+        raise typer.Exit(1)
+
+
+def attempts(name: str, part: Part, count: int | None, seed: int, workers: int, out: Path, console: Console) -> None:
+    """Makes the attempts of a part that its file does not hold yet."""
+    room = out / f"{name}-{seed}"
+    room.mkdir(parents=True, exist_ok=True)
+    there_are = part.prepare(room, seed)
+    most = part.count if part.count is not None else there_are
+    assert most is not None, f"{name} says neither a count nor how many attempts there are"
+    wanted = range(min(count or most, there_are or count or most))
+    file = out / f"{name}.jsonl"
+    todo = [number for number in wanted if number not in written(file)]
+    with (
+        Progress(console=console) as progress,
+        ThreadPoolExecutor(workers) as pool,
+        file.open("a", encoding="utf-8") as lines,
+    ):
+        bar = progress.add_task(name, total=len(wanted), completed=len(wanted) - len(todo))
+        running = {pool.submit(part.attempt, number, seed, room): number for number in todo}
+        try:
+            for ended in as_completed(running):
+                lines.write(line(running[ended], ended.result()))
+                lines.flush()
+                progress.advance(bar)
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+
+
+if __name__ == "__main__":
+    typer.run(main)

@@ -1,0 +1,462 @@
+"""Part `audits`: recorded runs into which something wrong is put, in their frames or in their schedule; the audit must name it.
+
+The runs are those of the tasks that ship, made by the real command. A number draws a run, a kind of violation, a part, a place
+and a time; what is put in is a matter of numpy alone. The runs themselves must pass.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from math import hypot
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from devtools.commands import environment, lab
+from devtools.parts import Outcome, Part
+from lab.audit.audit import audit, kept_evidence
+from lab.audit.evidence import SLACK_S, Evidence
+from lab.audit.stays import PartSeen, Stay
+from lab.production.run_options import kept_task
+
+TASKS = (
+    *("toast", "toast-window", "two-toasters", "toast-panda", "toast-iiwa", "toast-xarm6"),
+    *("breakfast", "sorting", "fms-arm", "palletise", "furnace", "kit"),
+)
+SEEDS = 3  # runs of each task
+RUN_S = 900.0
+LEAST_CUT, MOST_CUT = 0.05, 0.95  # of the time in a machine
+HANDLING_S = 10.0  # in a machine before and after its work, at most
+TILTS_RAD = (0.25, 1.5)
+SHIFTS_S = (2.0, 30.0)
+
+
+class Impossible(Exception):
+    """A run has nothing that can be violated so."""
+
+
+@dataclass(frozen=True)
+class Violated:
+    """Evidence with something wrong in it: about which part, "" for none alone, by which rules it may be found, and in words."""
+
+    evidence: Evidence
+    part: str
+    rules: tuple[str, ...]
+    words: str
+
+
+def copied(evidence: Evidence) -> Evidence:
+    """A copy whose frames and rows can be written to."""
+    tracks = replace(evidence.tracks, poses=evidence.tracks.poses.copy(), times_s=evidence.tracks.times_s.copy())
+    return replace(evidence, tracks=tracks, rows=[dict(row) for row in evidence.rows])
+
+
+def worked(evidence: Evidence) -> list[tuple[PartSeen, Stay, float]]:
+    """The stays of claimed parts in machines that work for a time, and for how long they do [s]."""
+    found = []
+    for seen in evidence.parts:
+        for stage in (stage for route in evidence.task.part(seen.kind).routes[:1] for stage in route):
+            work_s = evidence.work_s(seen.kind, stage)
+            own = [stay for stay in seen.stays if stay.station == stage.station]
+            if (
+                work_s
+                and own
+                and seen.name in evidence.claimed
+                and evidence.task.station(stage.station).process is None
+            ):
+                found.append((seen, max(own, key=lambda stay: stay.seconds), work_s))
+    return found
+
+
+def drawn(rng: np.random.Generator, found: list[Any]) -> Any:
+    """One of them."""
+    if not found:
+        raise Impossible
+    return found[int(rng.integers(len(found)))]
+
+
+def without(evidence: Evidence, from_s: float, to_s: float, rows: bool) -> Evidence:
+    """Evidence from which a span of time was cut; rows: from its schedule, too."""
+    by_s = to_s - from_s
+
+    def moved(at_s: float) -> float:
+        return at_s if at_s <= from_s else max(from_s, at_s - by_s)
+
+    times_s = evidence.tracks.times_s
+    kept = (times_s <= from_s) | (times_s >= to_s)
+    tracks = replace(
+        evidence.tracks,
+        poses=evidence.tracks.poses[kept],
+        times_s=np.array([moved(at_s) for at_s in times_s[kept].tolist()]),
+    )
+    own = [
+        dict(row) | ({"start_s": moved(row["start_s"]), "end_s": moved(row["end_s"])} if rows else {})
+        for row in evidence.rows
+    ]
+    return replace(evidence, tracks=tracks, rows=own)
+
+
+def time_cut(evidence: Evidence, rng: np.random.Generator) -> Violated:
+    """A machine lets a part go before its time, and the schedule says so."""
+    seen, stay, work_s = drawn(rng, worked(evidence))
+    cut_s = work_s * float(rng.uniform(LEAST_CUT, MOST_CUT))
+    begin_s = float(rng.uniform(stay.end_s - work_s, stay.end_s - cut_s)) - HANDLING_S / 4
+    begin_s = max(begin_s, stay.start_s + SLACK_S)
+    cut = without(evidence, begin_s, begin_s + cut_s, rows=True)
+    return Violated(
+        cut, seen.name, ("processing",), f"{seen.name} has {cut_s:.1f} of {work_s:g} s less in {stay.station}"
+    )
+
+
+def time_hidden(evidence: Evidence, rng: np.random.Generator) -> Violated:
+    """A machine lets a part go before its time, and the schedule says that it did not."""
+    seen, stay, work_s = drawn(rng, worked(evidence))
+    cut_s = work_s * float(rng.uniform(0.1, MOST_CUT))
+    begin_s = max(float(rng.uniform(stay.end_s - work_s, stay.end_s - cut_s)) - HANDLING_S / 4, stay.start_s + SLACK_S)
+    cut = without(evidence, begin_s, begin_s + cut_s, rows=False)
+    words = f"{seen.name} has {cut_s:.1f} s less in {stay.station}, which the schedule hides"
+    who = seen.name if cut_s > HANDLING_S else ""  # less may only be time in which the gripper was there
+    return Violated(cut, who, ("processing", "schedule"), words)
+
+
+def station_swapped(evidence: Evidence, rng: np.random.Generator) -> Violated:
+    """A part comes to two stations of its route in the wrong order."""
+    pairs = [
+        (seen, one, other)
+        for seen in evidence.parts
+        for n, one in enumerate(seen.stays)
+        for other in seen.stays[n + 1 :]
+        if one.station != other.station and _stages(evidence, seen, one) and _stages(evidence, seen, other)
+    ]
+    seen, one, other = drawn(rng, pairs)
+    return _swapped(copied(evidence), seen, one, other)
+
+
+def _stages(evidence: Evidence, seen: PartSeen, stay: Stay) -> bool:
+    """Whether a stay is at a stage of the part's only route, and the only one there."""
+    routes = evidence.task.part(seen.kind).routes
+    own = sum(one.station == stay.station for one in seen.stays)
+    return len(routes) == 1 and own == 1 and stay.station in [stage.station for stage in routes[0]]
+
+
+def _swapped(evidence: Evidence, seen: PartSeen, one: Stay, other: Stay) -> Violated:
+    tracks, body = evidence.tracks, evidence.tracks.number(seen.name)
+    here, there = (stay.frames(evidence.tracks) for stay in (one, other))
+    at, elsewhere = tracks.poses[here, body][-1].copy(), tracks.poses[there, body][0].copy()
+    tracks.poses[here, body], tracks.poses[there, body] = elsewhere, at
+    names = {one.station: other.station, other.station: one.station}
+    for row in evidence.rows:
+        if row["part"] == seen.name:
+            row["station"], row["target"] = (names.get(row[field], row[field]) for field in ("station", "target"))
+    words = f"{seen.name} comes to {one.station} and {other.station} in the wrong order"
+    return Violated(replace(evidence), seen.name, ("route", "end", "processing"), words)
+
+
+def station_left_out(evidence: Evidence, rng: np.random.Generator) -> Violated:
+    """A part never stands at a station of its route."""
+    stays = [(seen, stay) for seen in evidence.parts for stay in seen.stays[1:-1] if _stages(evidence, seen, stay)]
+    seen, stay = drawn(rng, stays)
+    own = copied(evidence)
+    own.tracks.poses[stay.frames(evidence.tracks), own.tracks.number(seen.name), 2] += 0.2
+    return Violated(replace(own), seen.name, ("route", "schedule"), f"{seen.name} hangs over {stay.station}")
+
+
+def overfull(evidence: Evidence, rng: np.random.Generator) -> Violated:
+    """A part stands where others fill a station."""
+    found = []
+    for number, station in enumerate(evidence.task.stations):
+        there = np.array([seen.occupies == number for seen in evidence.parts])
+        full = np.flatnonzero(there.sum(axis=0) == station.capacity)
+        runs = [run for run in np.split(full, np.flatnonzero(np.diff(full) > 1) + 1) if len(run) > 20]
+        for run in runs:
+            found += [
+                (station.name, run, seen) for seen, at in zip(evidence.parts, there, strict=True) if not at[run].any()
+            ]
+    station, run, seen = drawn(rng, found)
+    own = copied(evidence)
+    tracks, place = own.tracks, next(n for n, s in enumerate(own.task.stations) if s.name == station)
+    inside = [one for one in evidence.parts if (one.occupies[run] == place).all()]
+    host = drawn(rng, inside)
+    body = own.tracks.number(host.name if (host.at[run] == place).all() else f"{host.name}'s pallet")
+    guest, first = tracks.number(seen.name), int(rng.integers(len(run) - 12))
+    span = run[first : first + 12]
+    tracks.poses[span, guest] = tracks.poses[span, body]
+    tracks.poses[span, guest, 2] += tracks.low[body, 2] - tracks.low[guest, 2]  # foot on foot
+    return Violated(replace(own), seen.name, ("capacity",), f"{seen.name} stands in {station}, which is full")
+
+
+def window_overrun(evidence: Evidence, rng: np.random.Generator) -> Violated:
+    """A part stays in its machine for longer than the task allows."""
+    seen, stay, work_s = drawn(rng, worked(evidence))
+    over_s, allowed_s = float(rng.uniform(*SHIFTS_S)), stay.seconds - work_s + 1.0
+    stations = [
+        station.model_copy(update={"at_most_s": allowed_s}) if station.name == stay.station else station
+        for station in evidence.task.stations
+    ]
+    task = evidence.task.model_copy(update={"stations": tuple(stations)})
+    middle_s = stay.start_s + stay.seconds / 2
+    over_s += allowed_s
+
+    def moved(at_s: float) -> float:
+        return at_s + over_s if at_s > middle_s else at_s
+
+    times_s = np.array([moved(at_s) for at_s in evidence.tracks.times_s.tolist()])
+    rows = [dict(row) | {"start_s": moved(row["start_s"]), "end_s": moved(row["end_s"])} for row in evidence.rows]
+    for row in rows:
+        if row["operation"] == "process" and row["part"] == seen.name and row["station"] == stay.station:
+            row["end_s"] = row["start_s"] + work_s
+    own = replace(evidence, task=task, tracks=replace(evidence.tracks, times_s=times_s), rows=rows)
+    return Violated(own, seen.name, ("window",), f"{seen.name} stays in {stay.station} for {over_s:.1f} s too long")
+
+
+def head_idle(evidence: Evidence, rng: np.random.Generator) -> Violated:
+    """A machine's head leaves out what it should cover from a time on."""
+    stays = [
+        (seen, stay)
+        for seen in evidence.parts
+        for stay in seen.stays
+        if seen.name in evidence.claimed and evidence.task.station(stay.station).process is not None
+    ]
+    seen, stay = drawn(rng, stays)
+    own = copied(evidence)
+    head, during = own.tracks.number(f"{stay.station} head"), stay.frames(evidence.tracks)
+    first = int(rng.integers(len(during) // 10, len(during) * 2 // 3))
+    own.tracks.poses[during[first:], head] = own.tracks.poses[during[0], head]
+    return Violated(own, seen.name, ("process",), f"the head of {stay.station} stops over {seen.name}")
+
+
+def tilted(evidence: Evidence, rng: np.random.Generator) -> Violated:
+    """A part leans at the end."""
+    seen = drawn(rng, [seen for seen in evidence.parts if seen.name in evidence.claimed])
+    own, angle, about = copied(evidence), float(rng.uniform(*TILTS_RAD)), float(rng.uniform(0, 2 * np.pi))
+    half = np.sin(angle / 2)
+    body = own.tracks.number(seen.name)
+    own.tracks.poses[-1:, body, 3:] = (half * np.cos(about), half * np.sin(about), 0.0, np.cos(angle / 2))
+    return Violated(replace(own), seen.name, ("end",), f"{seen.name} leans by {angle:.2f} rad at the end")
+
+
+def elsewhere(evidence: Evidence, rng: np.random.Generator) -> Violated:
+    """A part is left beside its last station."""
+    seen = drawn(rng, [seen for seen in evidence.parts if seen.name in evidence.claimed])
+    own = copied(evidence)
+    body, about = own.tracks.number(seen.name), float(rng.uniform(0, 2 * np.pi))
+    last = own.tracks.number(seen.stays[-1].station)
+    off_m = float(hypot(*(own.tracks.high[last] - own.tracks.low[last])[:2])) + float(rng.uniform(0.02, 0.3))
+    own.tracks.poses[-4:, body, :2] += (off_m * np.cos(about), off_m * np.sin(about))
+    return Violated(replace(own), seen.name, ("end",), f"{seen.name} is left {off_m:.2f} m beside")
+
+
+def two_in_hand(evidence: Evidence, rng: np.random.Generator) -> Violated:
+    """The gripper carries two parts."""
+    pairs = [(one, other) for one in evidence.parts for other in evidence.parts if one is not other]
+    one, other = drawn(rng, pairs)
+    way = np.flatnonzero(one.carried)
+    if len(way) < 20:
+        raise Impossible
+    first = int(rng.integers(len(way) - 10))
+    span, own = way[first : first + 10], copied(evidence)
+    own.tracks.poses[span, own.tracks.number(other.name), :3] = own.tracks.poses[
+        span, own.tracks.number(one.name), :3
+    ] + (0.0, 0.0, 0.1)
+    return Violated(
+        replace(own), other.name, ("gripper", "schedule"), f"{one.name} and {other.name} are carried at once"
+    )
+
+
+def row_moved(evidence: Evidence, rng: np.random.Generator) -> Violated:
+    """The schedule has a carry at another time."""
+    own = copied(evidence)
+    row = drawn(rng, [row for row in own.rows if row["operation"] == "carry"])
+    by_s = float(rng.uniform(*SHIFTS_S)) + row["end_s"] - row["start_s"]
+    row["start_s"], row["end_s"] = row["start_s"] + by_s, row["end_s"] + by_s
+    return Violated(
+        own, str(row["part"]), ("schedule",), f"the carry of {row['part']} is said to be {by_s:.1f} s later"
+    )
+
+
+def row_lost(evidence: Evidence, rng: np.random.Generator) -> Violated:
+    """The schedule lacks a carry."""
+    own = copied(evidence)
+    row = drawn(rng, [row for row in own.rows if row["operation"] == "carry"])
+    own.rows.remove(row)  # type: ignore[attr-defined]
+    return Violated(own, str(row["part"]), ("schedule",), f"a carry of {row['part']} is not in the schedule")
+
+
+def drifting(evidence: Evidence, rng: np.random.Generator) -> Violated:
+    """A part creeps while it stands, by no step that anybody would see."""
+    stays = [(seen, stay) for seen in evidence.parts for stay in seen.stays if stay.seconds > 3 * HANDLING_S]
+    seen, stay = drawn(rng, stays)
+    own = copied(evidence)
+    during, by_m, about = stay.frames(evidence.tracks), float(rng.uniform(0.01, 0.04)), float(rng.uniform(0, 2 * np.pi))
+    times_s = own.tracks.times_s[during]
+    share = np.clip((times_s - times_s[0] - HANDLING_S) / (stay.seconds - 2 * HANDLING_S), 0.0, 1.0)[:, None]
+    own.tracks.poses[during, own.tracks.number(seen.name), :2] += (
+        share * by_m * np.array([np.cos(about), np.sin(about)])
+    )
+    return Violated(own, seen.name, ("stood", "gripper"), f"{seen.name} creeps by {by_m:.3f} m in {stay.station}")
+
+
+def beside(evidence: Evidence, rng: np.random.Generator) -> Violated:
+    """A part stands beside where the robot set it down."""
+    seen, stay = drawn(rng, [(seen, stay) for seen in evidence.parts for stay in seen.stays[1:]])
+    own = copied(evidence)
+    by_m, about = float(rng.uniform(0.03, 0.06)), float(rng.uniform(0, 2 * np.pi))
+    own.tracks.poses[stay.frames(evidence.tracks), own.tracks.number(seen.name), :2] += (
+        by_m * np.cos(about),
+        by_m * np.sin(about),
+    )
+    rules = ("stood", "gripper", "end", "route", "schedule", "overlap")
+    return Violated(replace(own), seen.name, rules, f"{seen.name} stands {by_m:.3f} m beside in {stay.station}")
+
+
+def off_its_foot(evidence: Evidence, rng: np.random.Generator) -> Violated:
+    """A part hangs over what it ends on, or has sunk into it."""
+    seen = drawn(rng, [seen for seen in evidence.parts if seen.name in evidence.claimed])
+    own, by_m = copied(evidence), float(rng.choice([rng.uniform(0.004, 0.009), -rng.uniform(0.003, 0.0045)]))
+    own.tracks.poses[seen.stays[-1].frames(evidence.tracks), own.tracks.number(seen.name), 2] += by_m
+    return Violated(replace(own), seen.name, ("stood",), f"{seen.name} ends {1000 * by_m:.1f} mm off its foot")
+
+
+def changed_places(evidence: Evidence, rng: np.random.Generator) -> Violated:
+    """Two parts of one kind stand on each other's spots, for as long as both are at a station."""
+    found = []
+    for one, other in ((a, b) for a in evidence.parts for b in evidence.parts if a.name < b.name and a.kind == b.kind):
+        both = np.flatnonzero((one.at >= 0) & (one.at == other.at))
+        runs = [run for run in np.split(both, np.flatnonzero(np.diff(both) > 1) + 1) if len(run) > 10]
+        found += [(one, other, run) for run in runs if run[0] > 0 or run[-1] < len(one.at) - 1]
+    one, other, run = drawn(rng, found)
+    own = copied(evidence)
+    a, b = own.tracks.number(one.name), own.tracks.number(other.name)
+    own.tracks.poses[np.ix_(run, np.array([a, b]))] = own.tracks.poses[np.ix_(run, np.array([b, a]))]
+    return Violated(replace(own), one.name, ("gripper", "stood"), f"{one.name} and {other.name} stand for one another")
+
+
+def beside_the_hand(evidence: Evidence, rng: np.random.Generator) -> Violated:
+    """A part flies beside the hand that carries it."""
+    seen = drawn(rng, [seen for seen in evidence.parts if seen.carried.any()])
+    way = drawn(
+        rng,
+        [
+            run
+            for run in np.split(
+                np.flatnonzero(seen.carried), np.flatnonzero(np.diff(np.flatnonzero(seen.carried)) > 1) + 1
+            )
+            if len(run) > 20
+        ],
+    )
+    own, by_m = copied(evidence), float(rng.uniform(0.12, 0.2))
+    own.tracks.poses[way, own.tracks.number(seen.name), 1] += by_m * np.sin(np.linspace(0.0, np.pi, len(way)))
+    return Violated(own, seen.name, ("gripper",), f"{seen.name} flies {by_m:.2f} m beside the hand")
+
+
+def everything_moved(evidence: Evidence, rng: np.random.Generator) -> Violated:
+    """The whole world stands elsewhere than the task has it."""
+    own, about, by_m = copied(evidence), float(rng.uniform(0, 2 * np.pi)), float(rng.uniform(0.004, 0.05))
+    own.tracks.poses[:, :, :2] += (by_m * np.cos(about), by_m * np.sin(about))
+    return Violated(own, "", ("station",), f"all stands {by_m:.3f} m elsewhere")
+
+
+def service_left_out(evidence: Evidence, rng: np.random.Generator) -> Violated:
+    """The robot's hand stays away from what it should work on before it takes a part out."""
+    stays = [
+        (seen, stay)
+        for seen in evidence.parts
+        for route in evidence.task.part(seen.kind).routes[:1]
+        for stage in route
+        for stay in seen.stays
+        if stage.service is not None and stay.station == stage.station and seen.name in evidence.claimed
+    ]
+    seen, stay = drawn(rng, stays)
+    own, by_m = copied(evidence), float(rng.uniform(0.1, 0.3))
+    during = stay.frames(evidence.tracks)
+    span = during[int(len(during) * rng.uniform(0.3, 0.6)) :]
+    own.tracks.poses[np.ix_(span, np.array(own.tracks.robot[1:]))] += (0.0, by_m, 0.0, 0.0, 0.0, 0.0, 0.0)
+    return Violated(own, seen.name, ("service",), f"the robot does not serve {seen.name} in {stay.station}")
+
+
+def plan_changed(evidence: Evidence, rng: np.random.Generator) -> Violated:
+    """The plan has two transfers in another order."""
+    moves = [row for row in evidence.planned if row["operation"] == "carry"]
+    pairs = [(a, b) for a, b in pairwise(moves) if (a["part"], a["station"]) != (b["part"], b["station"])]
+    one, other = drawn(rng, pairs)
+    own = copied(evidence)
+    rows = [dict(row) for row in own.planned]
+    for row in rows:
+        for this, that in ((one, other), (other, one)):
+            if all(row[key] == this[key] for key in ("operation", "part", "start_s")):
+                row |= {"start_s": that["start_s"], "end_s": that["end_s"]}
+    return Violated(
+        replace(own, planned=rows), "", ("schedule",), f"{one['part']} and {other['part']} in another order"
+    )
+
+
+def wait_changed(evidence: Evidence, rng: np.random.Generator) -> Violated:
+    """A wait of the robot has another time, as planned or as measured."""
+    as_planned = bool(rng.integers(2))
+    rows = [dict(row) for row in (evidence.planned if as_planned else evidence.rows)]
+    row = drawn(rng, [row for row in rows if row["robot"] and row["operation"] in ("wait", "empty")])
+    row["end_s"] += float(rng.choice([-1, 1])) * float(rng.uniform(0.5, 20.0))
+    own = replace(evidence, planned=rows) if as_planned else replace(evidence, rows=rows)
+    words = f"a {row['operation']} of the robot is {row['when']} to {row['end_s']:.1f} s"
+    return Violated(own, "", ("schedule",), words)
+
+
+VIOLATIONS: tuple[Callable[[Evidence, np.random.Generator], Violated], ...] = (
+    *(time_cut, time_hidden, station_swapped, station_left_out, overfull, window_overrun, head_idle, tilted, elsewhere),
+    *(two_in_hand, row_moved, row_lost, drifting, beside, off_its_foot, changed_places, beside_the_hand),
+    *(everything_moved, service_left_out, plan_changed, wait_changed),
+)
+
+
+def evidence_of(folder: Path) -> Evidence:
+    """The evidence in a run's folder."""
+    options, task = kept_task(folder, "audits")
+    return kept_evidence(folder, task, task.ordered(options.toasts, options.parts))
+
+
+def missed(violated: Violated) -> str:
+    """Why a violation was not found; "" when it was."""
+    found = audit(violated.evidence)
+    said = [one for one in found.findings if violated.part in ("", one.part) and one.rule in violated.rules]
+    if said and violated.part not in found.delivered:
+        return ""
+    return f"{violated.words}: the audit says {[(one.rule, one.words) for one in found.findings][:3]}"
+
+
+def _prepare(room: Path, seed: int) -> int | None:
+    for task in TASKS:
+        for number in range(SEEDS):
+            folder = room / f"{task}-{number}"
+            if not (folder / "run.json").is_file():
+                words = ("run", task, "--seed", str(seed + number), "--out", folder)
+                ended = lab(*words, cwd=room, env=environment(room), timeout_s=RUN_S)
+                assert ended.code == 0, f"{task} with seed {seed + number}: {ended.stderr[-300:]}"
+    return None
+
+
+def _attempt(number: int, seed: int, room: Path) -> Outcome:
+    runs = sorted(path.parent for path in room.glob("*/run.json"))
+    if number < len(runs):
+        folder = runs[number]
+        found = audit(evidence_of(folder)).findings
+        return Outcome("sound", folder.name, "; ".join(one.words for one in found))
+    rng = np.random.default_rng([seed, number])
+    kind = VIOLATIONS[number % len(VIOLATIONS)]
+    for _ in range(100):
+        folder = runs[int(rng.integers(len(runs)))]
+        try:
+            violated = kind(evidence_of(folder), rng)
+        except Impossible:
+            continue
+        return Outcome(kind.__name__, f"{folder.name}: {violated.words}", missed(violated))
+    return Outcome(kind.__name__, "no run has anything of the sort", "nothing could be tried")
+
+
+PART = Part(
+    "recorded runs with something wrong in them, given to the audit",
+    "all named, and none in runs that are right",
+    500 + len(TASKS) * SEEDS,
+    _prepare,
+    _attempt,
+)

@@ -1,0 +1,88 @@
+"""Part `mutations`: damaged files of every kind that the lab reads, given to the lab's own readers.
+
+An attempt is a batch of one kind in a process of its own. Each file must be read, or refused by the lab's own error in one
+line, within 5 s of CPU time and 1 GB.
+"""
+
+import json
+from collections import Counter
+from itertools import count as numbers_from
+from pathlib import Path
+from typing import Any
+
+from devtools.commands import environment, lab, module
+from devtools.parts import Outcome, Part
+from devtools.read_files import KINDS, make_sound
+
+FILES = 100_000
+BATCH_S = 3600.0
+MOST_DEATHS = 20  # of a batch's processes, each of which a file has killed
+MOST_TOLD = 4  # sorts of faults of a batch
+
+
+def prepare(room: Path, seed: int) -> None:
+    """The sound files that only runs of the lab leave."""
+    if not (room / "sound").exists():
+        make_sound(room)
+        (room / "sound").touch()
+
+
+def attempt(number: int, seed: int, room: Path) -> Outcome:
+    """One batch: of the kinds in turn, each with other files every time."""
+    name = [*KINDS][number % len(KINDS)]
+    tries = KINDS[name].tries
+    return read_batch(room, name, seed, number // len(KINDS) * tries, tries, str(number))
+
+
+def read_batch(room: Path, name: str, seed: int, first: int, tries: int, folder: str) -> Outcome:
+    """What came of so many damaged files of a kind; a process that a file has killed is followed by another."""
+    home = room / folder
+    home.mkdir(exist_ok=True)
+    found: Counter[str] = Counter()
+    broke: list[dict[str, str]] = []
+    figures = {"s": 0.0, "MB": 0.0}
+    at, end = first, first + tries
+    for death in numbers_from():
+        told = home / f"told-{death}"
+        words = (str(room), name, str(seed), str(at), str(end - at), str(told))
+        env = environment(home, OPENBLAS_NUM_THREADS="1")
+        ended = lab(*words, cwd=home, env=env, timeout_s=BATCH_S, command=module("read_damaged"))
+        lines = told.read_text().splitlines() if told.exists() else []
+        if lines and lines[-1].startswith("{"):
+            last: dict[str, Any] = json.loads(lines[-1])
+            broke += last.pop("broke")
+            figures = {"s": max(figures["s"], last.pop("slowest_s")), "MB": max(figures["MB"], last.pop("most_mb"))}
+            found.update(last)
+            break
+        if not lines or death == MOST_DEATHS:
+            raise RuntimeError(f"{name}: no batch: exit {ended.code}: {ended.stderr[-600:]}")
+        killer = int(lines[-1])
+        broke.append(
+            {"case": f"{name} {killer}", "why": f"the process ended with {ended.code}: {ended.stderr[-200:]!r}"}
+        )
+        found.update(tries=killer + 1 - at)
+        at = killer + 1
+        if at == end:
+            break
+    case = f"{name}, {tries} files from {first}, seed {seed}"
+    shares = {f"{what} %": round(100 * found[what] / tries) for what in ("read", "refused")}
+    return Outcome(name, case, told_of(broke, tries), found["tries"], {**figures, **shares})
+
+
+def told_of(broke: list[dict[str, str]], tries: int) -> str:
+    """What broke, each sort of fault with how often it came and its first case; empty if nothing did."""
+    sorts: dict[str, list[dict[str, str]]] = {}
+    for one in broke:
+        sorts.setdefault(one["why"].partition(" (")[2] or one["why"][:60], []).append(one)
+    told = [f"{len(same)} x {same[0]['case']}: {same[0]['why']}" for same in sorts.values()]
+    return f"{len(broke)} of {tries}: {'; '.join(told[:MOST_TOLD])}" if broke else ""
+
+
+ROUNDS = -(-FILES // sum(kind.tries for kind in KINDS.values()))
+PART = Part(
+    "damaged files of every kind",
+    "read or refused in a line, under 5 s, under 1 GB",
+    ROUNDS * len(KINDS),
+    prepare,
+    attempt,
+)

@@ -1,0 +1,70 @@
+"""Drawn cells of every kind that a cell file can say: what the lab proves of them against an oracle that shares no code with it.
+
+The oracle and the draw are in `tests/sequencing`. One attempt is one cell: all methods that prove something, and plans of others.
+What a plan breaks, or a plan of the oracle beats, is made smaller as long as it stays so. The smallest cell is written into the
+part's folder, and what it has is the row that counts it.
+"""
+
+import sys
+from pathlib import Path
+
+from devtools.parts import Outcome, Part
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests" / "sequencing"))
+
+from against_oracle.compared import METHODS, Compared, compared, freedom, label, least
+from against_oracle.cycles import fits, judged, periods
+from against_oracle.drawn import as_toml, drawn
+
+from lab.errors import BadInput
+
+COUNT = 1000
+
+
+def prepare(room: Path, seed: int) -> None:
+    """Nothing: each cell is drawn by itself."""
+
+
+def attempt(number: int, seed: int, room: Path) -> Outcome:
+    """One cell."""
+    raw = drawn(seed, number)
+    try:
+        found = compared(raw)
+    except BadInput as error:
+        return Outcome("refused by the lab", f"cell {seed} {number}: {error}")
+    figures = {"oracle_s": round(found.seconds["oracle"], 2), "lab_s": round(found.seconds["lab"], 2)}
+    figures |= {"proven": float(any(claim.proven for claim in found.claims))}
+    cycles = judged(periods(raw)) if fits(raw) else []
+    if not found.wrong and cycles:
+        file = room / f"{number}.toml"
+        file.write_text(as_toml(raw), encoding="utf-8")
+        said = "; ".join(words for *_, words in cycles)
+        return Outcome(f"{cycles[0][0]}: {label(raw)}", f"cell {seed} {number}: {file.name}", said, figures=figures)
+    if not found.wrong:
+        sure = "agrees" if found.oracle.status in ("optimal", "impossible") else "not proven by the oracle"
+        return Outcome(sure, f"cell {seed} {number}: {label(raw)}", figures=figures)
+    kind = found.kinds[0]
+    by = dict.fromkeys(method for one, method, _ in found.wrong if one == kind)
+    small = least(raw, kind, [name for name in by if name in METHODS])
+    small = small if kind in small.kinds else found
+    file = room / f"{number}.toml"
+    file.write_text(as_toml(small.raw), encoding="utf-8")
+    return Outcome(
+        f"{kind}: {label(small.raw)}", f"cell {seed} {number}: {file.name}", _said(small, kind), figures=figures
+    )
+
+
+def _said(found: Compared, kind: str) -> str:
+    """What is wrong with a cell, method by method."""
+    words = [f"{method}: {said}" for one, method, said in found.wrong if one == kind]
+    more = f" ({freedom(found)})" if kind == "proven is beaten" else ""
+    return "; ".join(dict.fromkeys(words)) + more
+
+
+PART = Part(
+    what="drawn cells: proofs, bounds and plans against an oracle",
+    target="no proof is beaten, no rule broken",
+    count=COUNT,
+    prepare=prepare,
+    attempt=attempt,
+)

@@ -1,0 +1,78 @@
+"""Outcomes on disk, a line each, and the table they come to."""
+
+import json
+from collections.abc import Iterable, Iterator
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from devtools.parts import Outcome, Part
+
+SHOWN = 12  # of what broke, told under the table; all of it is in the files
+
+
+def written(file: Path) -> dict[int, Outcome]:
+    """The outcomes in a file, by number; a line that was cut short is not counted."""
+    found = {}
+    for line in file.read_text(encoding="utf-8").splitlines() if file.exists() else ():
+        try:
+            row = json.loads(line)
+        except json.JSONDecodeError:
+            continue
+        number = row.pop("number")
+        found[number] = Outcome(**row)
+    return found
+
+
+def line(number: int, outcome: Outcome) -> str:
+    """An outcome as its line in the file."""
+    return json.dumps({"number": number, **asdict(outcome)}) + "\n"
+
+
+def rows(outcomes: Iterable[Outcome]) -> Iterator[dict[str, Any]]:
+    """A row for each group: tries, how many held, what broke, the most of each figure."""
+    groups: dict[str, list[Outcome]] = {}
+    for outcome in outcomes:
+        groups.setdefault(outcome.group, []).append(outcome)
+    for group, members in sorted(groups.items()):
+        broken = [one for one in members if one.broke]
+        figures: dict[str, float] = {}
+        for one in members:
+            for name, value in (one.figures or {}).items():
+                figures[name] = max(value, figures.get(name, value))
+        tries = sum(one.tries for one in members)
+        yield {"group": group, "tries": tries, "broke": len(broken), "most": figures,
+               "broken": [{"case": one.case, "broke": one.broke} for one in broken]}  # fmt: skip
+
+
+def show(parts: dict[str, Part], folder: Path, console: Console) -> bool:
+    """Prints and writes (`scoreboard.json`) what the folder's outcomes come to; whether all held."""
+    table = Table("part", "what", "tries", "broke", "most")
+    document, broken = {}, []
+    for name, part in parts.items():
+        counted = list(rows(written(folder / f"{name}.jsonl").values()))
+        document[name] = {"target": part.target, "rows": counted}
+        for n, row in enumerate(counted):
+            most = ", ".join(f"{figure} {value:.4g}" for figure, value in row["most"].items())
+            table.add_row("" if n else name, row["group"], str(row["tries"]), str(row["broke"]), most)
+            broken += [f"{name}: {one['case']}: {one['broke']}" for one in row["broken"]]
+        if counted:
+            total, lost = (sum(row[key] for row in counted) for key in ("tries", "broke"))
+            table.add_row(
+                "",
+                f"[bold]all[/] (target: {part.target})",
+                f"[bold]{total}[/]",
+                f"[bold]{lost}[/]",
+                "",
+                end_section=True,
+            )
+    console.print(table)
+    for text in broken[:SHOWN]:
+        console.print(text, markup=False, highlight=False)
+    if len(broken) > SHOWN:
+        console.print(f"... and {len(broken) - SHOWN} more in {folder}")
+    (folder / "scoreboard.json").write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
+    return not broken

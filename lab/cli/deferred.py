@@ -1,0 +1,256 @@
+"""What the commands call: each name is loaded when it is touched, so that `lab run --help` loads nothing heavy."""
+
+from typing import TYPE_CHECKING
+
+from lab.lazy import loader
+
+if TYPE_CHECKING:
+    from lab.advice.advisors import ADVISORS, PEOPLE, AdvisorName
+    from lab.advice.entries import Read, read_journal
+    from lab.advice.panel import ASKED, DECISIONS
+    from lab.api.scenes import Asked as SceneAsked
+    from lab.api.scenes import seen
+    from lab.audit.audit import audit, kept_evidence
+    from lab.export import FORMATS
+    from lab.export.commands import Path as Lines
+    from lab.export.options import POSITIONS, Options
+    from lab.export.play import deviation
+    from lab.export.program import Program
+    from lab.files import check_out, tasks_folder, write_whole
+    from lab.gym import parse_name
+    from lab.learning.gates import GATES
+    from lab.learning.requests import Ask, Request
+    from lab.learning.selection import SELECTIONS
+    from lab.learning.tuned_ranges import USUAL
+    from lab.learning.updates import UPDATES
+    from lab.plugins.code_file import is_file_word, take
+    from lab.production import load_run
+    from lab.production.conditions import Conditions
+    from lab.production.controls import Controls
+    from lab.production.cyclic_job import CyclicWanted, cyclic_named
+    from lab.production.evaluation import evaluate, skill_of, task_of
+    from lab.production.operation.at_once import Done
+    from lab.production.operation.commands import pace
+    from lab.production.operation.desk import Desk
+    from lab.production.operation.operation import Operation
+    from lab.production.operation.run_desk import RunDesk
+    from lab.production.publication import CARD, publish, write_card
+    from lab.production.report import write_files
+    from lab.production.run import remember
+    from lab.production.run import run as run_task
+    from lab.production.run_advice import RunAdvice
+    from lab.production.run_journal import RunEnded, RunJournal, is_run, replayed_run
+    from lab.production.run_options import RunOptions, begun, kept_task
+    from lab.production.run_options import gone_on as run_gone_on
+    from lab.production.sequencing_job import Wanted, sequence_named
+    from lab.seat.lesson_seat import LessonSeat
+    from lab.seat.page.teaching_page import SeatPage
+    from lab.seat.run_progress import RunProgress
+    from lab.seat.terminal.console_app import OperatorConsole
+    from lab.seat.terminal.console_plain import PlainConsole
+    from lab.seat.terminal.line_reader import default_reader
+    from lab.seat.terminal.new_task_questions import ask
+    from lab.seat.terminal.prompt import TeachingPrompt
+    from lab.seat.terminal.replay_keys import HELP as KEYS_HELP
+    from lab.seat.terminal.replay_keys import replay_keys
+    from lab.sequencing import SEQUENCERS
+    from lab.sequencing.cell.objectives import OBJECTIVES
+    from lab.sequencing.methods.srl_advised import FITTING
+    from lab.skills import SKILLS
+    from lab.skills.camera_grids import camera_view
+    from lab.skills.cell_outline import outline
+    from lab.skills.made_pictures import make_pictures, mat_of
+    from lab.skills.new_cell import new_cell
+    from lab.skills.prepared_scene import check_task, prepare
+    from lab.skills.scored_pictures import parts_seen, score_pictures
+    from lab.studies import STUDIES, Study, carried_out, run_study, study_of
+    from lab.studies.compared import Compared, compared
+    from lab.studies.runner import Job
+    from lab.studies.tuning import FILE, Tuning, tuned
+    from lab.tasks.cell_file import CellFile
+    from lab.tasks.cell_toml import toml_of
+    from lab.tasks.grid_world import write_random
+    from lab.tasks.instances import INSTANCES, pyjobshop
+    from lab.tasks.instances import Asked as InstanceAsked
+    from lab.tasks.new_task import MACHINE, file_of, new_task
+    from lab.tasks.record import write_whole as write_task_text
+    from lab.tasks.robot_fields import MODELS
+    from lab.tasks.schedule_table import read_schedule
+    from lab.tasks.schema import page_of, schema_of
+    from lab.tasks.task import Task
+    from lab.tasks.task_file import describe, is_path, load, load_any, load_cell_beside, shipped
+    from lab.teaching.events import told_to, unheard
+    from lab.teaching.kept_order import OrderOptions, OrderSession, kept_order
+    from lab.teaching.kept_order import gone_on as order_gone_on
+    from lab.teaching.kept_session import KeptSession, check_new
+    from lab.teaching.lesson import replay as replay_session
+    from lab.teaching.lesson import teach as teach_session
+    from lab.teaching.lesson_options import DEFAULT_ADVISORS, LessonOptions
+    from lab.teaching.session_list import session_rows
+    from lab.teaching.step_record import StepRecord, check_libraries
+    from lab.teaching.subjects import subject_of
+    from lab.teaching.teacher import Teacher
+    from lab.toolbox.archive import pack, take_in, unpack
+    from lab.toolbox.history import EVALUATED
+    from lab.toolbox.hub_folder import read_folder
+    from lab.toolbox.policy import Policy
+    from lab.toolbox.registry import Toolbox
+    from lab.toolbox.versions import Version
+    from lab.view.canvas import check_picture
+    from lab.view.cell_plan import draw_cell
+    from lab.view.cyclic_summary import cyclic_summary
+    from lab.view.escaping_console import EscapingConsole
+    from lab.view.meshcat import LiveView, replay_html
+    from lab.view.movie import write_movie
+    from lab.view.progress import counting
+    from lab.view.schedule_scene import scene_of
+    from lab.view.summary import (
+        audit_summary,
+        delivered_in_words,
+        grid_summary,
+        lesson_summary,
+        pictures_summary,
+        replay_summary,
+        run_replay_summary,
+        run_summary,
+        sequence_summary,
+        study_summary,
+        table_of,
+    )
+    from lab.view.toolbox_summary import log_summary, policy_summary, toolbox_summary, verify_summary
+    from lab.vision import Image, View, draw, read_picture, see, write_picture
+    from lab.vision.calibration import (
+        Calibration,
+        Mat,
+        calibrate,
+        drawn,
+        from_corners,
+        pinhole,
+        read_calibration,
+        write_calibration,
+    )
+    from lab.workers import Workers
+
+TABLE = {
+    "lab.advice.advisors": ("AdvisorName", "ADVISORS", "PEOPLE"),
+    "lab.advice.entries": ("Read", "read_journal"),
+    "lab.advice.panel": ("ASKED", "DECISIONS"),
+    "lab.api.scenes": ("Asked as SceneAsked", "seen"),
+    "lab.audit.audit": ("audit", "kept_evidence"),
+    "lab.export": ("FORMATS",),
+    "lab.export.commands": ("Path as Lines",),
+    "lab.export.options": ("Options", "POSITIONS"),
+    "lab.export.play": ("deviation",),
+    "lab.export.program": ("Program",),
+    "lab.files": ("check_out", "tasks_folder", "write_whole"),
+    "lab.gym": ("parse_name",),
+    "lab.learning.gates": ("GATES",),
+    "lab.learning.requests": ("Ask", "Request"),
+    "lab.learning.selection": ("SELECTIONS",),
+    "lab.learning.tuned_ranges": ("USUAL",),
+    "lab.learning.updates": ("UPDATES",),
+    "lab.plugins.code_file": ("is_file_word", "take"),
+    "lab.production": ("load_run",),
+    "lab.production.conditions": ("Conditions",),
+    "lab.production.controls": ("Controls",),
+    "lab.production.cyclic_job": ("cyclic_named", "CyclicWanted"),
+    "lab.production.evaluation": ("evaluate", "skill_of", "task_of"),
+    "lab.production.operation.at_once": ("Done",),
+    "lab.production.operation.commands": ("pace",),
+    "lab.production.operation.desk": ("Desk",),
+    "lab.production.operation.operation": ("Operation",),
+    "lab.production.operation.run_desk": ("RunDesk",),
+    "lab.production.publication": ("CARD", "publish", "write_card"),
+    "lab.production.report": ("write_files",),
+    "lab.production.run": ("remember", "run as run_task"),
+    "lab.production.run_advice": ("RunAdvice",),
+    "lab.production.run_journal": ("is_run", "replayed_run", "RunEnded", "RunJournal"),
+    "lab.production.run_options": ("begun", "kept_task", "gone_on as run_gone_on", "RunOptions"),
+    "lab.production.sequencing_job": ("sequence_named", "Wanted"),
+    "lab.seat.lesson_seat": ("LessonSeat",),
+    "lab.seat.page.teaching_page": ("SeatPage",),
+    "lab.seat.run_progress": ("RunProgress",),
+    "lab.seat.terminal.console_app": ("OperatorConsole",),
+    "lab.seat.terminal.console_plain": ("PlainConsole",),
+    "lab.seat.terminal.line_reader": ("default_reader",),
+    "lab.seat.terminal.new_task_questions": ("ask",),
+    "lab.seat.terminal.prompt": ("TeachingPrompt",),
+    "lab.seat.terminal.replay_keys": ("HELP as KEYS_HELP", "replay_keys"),
+    "lab.sequencing": ("SEQUENCERS",),
+    "lab.sequencing.cell.objectives": ("OBJECTIVES",),
+    "lab.sequencing.methods.srl_advised": ("FITTING",),
+    "lab.skills": ("SKILLS",),
+    "lab.skills.camera_grids": ("camera_view",),
+    "lab.skills.cell_outline": ("outline",),
+    "lab.skills.made_pictures": ("make_pictures", "mat_of"),
+    "lab.skills.new_cell": ("new_cell",),
+    "lab.skills.prepared_scene": ("check_task", "prepare"),
+    "lab.skills.scored_pictures": ("parts_seen", "score_pictures"),
+    "lab.studies": ("carried_out", "run_study", "STUDIES", "Study", "study_of"),
+    "lab.studies.compared": ("Compared", "compared"),
+    "lab.studies.runner": ("Job",),
+    "lab.studies.tuning": ("FILE", "tuned", "Tuning"),
+    "lab.tasks.cell_file": ("CellFile",),
+    "lab.tasks.cell_toml": ("toml_of",),
+    "lab.tasks.grid_world": ("write_random",),
+    "lab.tasks.instances": ("Asked as InstanceAsked", "INSTANCES", "pyjobshop"),
+    "lab.tasks.new_task": ("file_of", "MACHINE", "new_task"),
+    "lab.tasks.record": ("write_whole as write_task_text",),
+    "lab.tasks.robot_fields": ("MODELS",),
+    "lab.tasks.schedule_table": ("read_schedule",),
+    "lab.tasks.schema": ("page_of", "schema_of"),
+    "lab.tasks.task": ("Task",),
+    "lab.tasks.task_file": ("describe", "is_path", "load", "load_any", "load_cell_beside", "shipped"),
+    "lab.teaching.events": ("told_to", "unheard"),
+    "lab.teaching.kept_order": ("kept_order", "gone_on as order_gone_on", "OrderOptions", "OrderSession"),
+    "lab.teaching.kept_session": ("check_new", "KeptSession"),
+    "lab.teaching.lesson": ("replay as replay_session", "teach as teach_session"),
+    "lab.teaching.lesson_options": ("DEFAULT_ADVISORS", "LessonOptions"),
+    "lab.teaching.session_list": ("session_rows",),
+    "lab.teaching.step_record": ("check_libraries", "StepRecord"),
+    "lab.teaching.subjects": ("subject_of",),
+    "lab.teaching.teacher": ("Teacher",),
+    "lab.toolbox.archive": ("pack", "take_in", "unpack"),
+    "lab.toolbox.history": ("EVALUATED",),
+    "lab.toolbox.hub_folder": ("read_folder",),
+    "lab.toolbox.policy": ("Policy",),
+    "lab.toolbox.registry": ("Toolbox",),
+    "lab.toolbox.versions": ("Version",),
+    "lab.view.canvas": ("check_picture",),
+    "lab.view.cell_plan": ("draw_cell",),
+    "lab.view.cyclic_summary": ("cyclic_summary",),
+    "lab.view.escaping_console": ("EscapingConsole",),
+    "lab.view.meshcat": ("LiveView", "replay_html"),
+    "lab.view.movie": ("write_movie",),
+    "lab.view.progress": ("counting",),
+    "lab.view.schedule_scene": ("scene_of",),
+    "lab.view.summary": (
+        "audit_summary",
+        "delivered_in_words",
+        "grid_summary",
+        "lesson_summary",
+        "pictures_summary",
+        "replay_summary",
+        "run_replay_summary",
+        "run_summary",
+        "sequence_summary",
+        "study_summary",
+        "table_of",
+    ),
+    "lab.view.toolbox_summary": ("log_summary", "policy_summary", "toolbox_summary", "verify_summary"),
+    "lab.vision": ("draw", "Image", "read_picture", "see", "View", "write_picture"),
+    "lab.vision.calibration": (
+        "calibrate",
+        "Calibration",
+        "drawn",
+        "from_corners",
+        "Mat",
+        "pinhole",
+        "read_calibration",
+        "write_calibration",
+    ),
+    "lab.workers": ("Workers",),
+}
+
+if not TYPE_CHECKING:  # so that mypy knows the names of the table alone
+    __getattr__ = loader(__name__, TABLE)
