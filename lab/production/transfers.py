@@ -242,16 +242,18 @@ class Transfers:
     def _begin(self, name: str, way: Carried, ahead: int) -> _UnderWay:
         """The times of the move, which begins now or was interrupted. A part that was on its way to another station then, and is
         still in the gripper, left its origin when it was taken up."""
-        now_s, former = self.floor.now_s, self._under_way
-        if former is None or former.what != (name, way):
-            self._under_way = _UnderWay((name, way), self.place or way.origin, now_s, now_s, now_s, now_s)
-            if former is not None and self.floor.bench.held == self.floor.scene.body_of(name, way.kind):
-                self._under_way = replace(former, what=(name, way), leg=0)
-            number = len(self.moves) + 1
-            self.tell(MoveBegan(number, number - 1 + ahead, name, self.place, way.origin, way.target, now_s))
+        now_s, move = self.floor.now_s, self._under_way
+        if move is not None and move.what == (name, way):
+            move.smooth = False
+            return move
+        if move is not None and self.floor.bench.held == self.floor.scene.body_of(name, way.kind):
+            move = replace(move, what=(name, way), leg=0)
         else:
-            self._under_way.smooth = False
-        return self._under_way
+            move = _UnderWay((name, way), self.place or way.origin, now_s, now_s, now_s, now_s)
+        self._under_way = move
+        number = len(self.moves) + 1
+        self.tell(MoveBegan(number, number - 1 + ahead, name, self.place, way.origin, way.target, now_s))
+        return move
 
     def _finish(self, sequence: Sequence[int], way: Carried, spot: Spot, move: _UnderWay) -> None:
         """The part stands where it was to be brought: all that knows of it is told."""
