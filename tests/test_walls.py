@@ -43,13 +43,7 @@ ALONE: dict[str, set[str]] = (
         },
         "PIL": {"lab.view.movie"},
         "numba": {"lab.learning.compiled"},  # what is kept of it is kept in one place
-        "ortools": {
-            *(
-                f"lab.sequencing.methods.cp_sat{part}"
-                for part in ("", "_free", "_model", "_tasks", "_rooms", "_shop", "_solver", "_track", "_transport")
-            ),
-            "lab.sequencing.cyclic.model",
-        },
+        "ortools": {"lab.sequencing.methods.ortools_cp_sat"},  # without pandas
         "starlette": {"lab.view.server", "lab.view.server_page"},
         "uvicorn": {"lab.view.server", "lab.view.server_limits"},
         "websockets": set(),  # uvicorn's
@@ -290,7 +284,7 @@ def faults(module: str, source: str) -> list[str]:
         (
             "lab.sequencing.methods.exact",
             "from ortools.sat.python import cp_model",
-            "allowed in ['lab.sequencing.cyclic.model', ",
+            "allowed in ['lab.sequencing.methods.ortools_cp_sat']",
         ),
         ("lab.sequencing.methods.fifo", "def f():\n    import jinja2", "allowed in ['lab.studies.report']"),
         ("lab.mdp", "import random", "allowed in no module"),

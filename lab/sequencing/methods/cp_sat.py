@@ -7,7 +7,6 @@ from time import perf_counter
 from types import MappingProxyType
 
 import numpy as np
-from ortools.sat.python import cp_model
 
 from lab.errors import BadInput
 from lab.sequencing.cell.cell import Cell
@@ -18,6 +17,7 @@ from lab.sequencing.methods.cp_sat_shop import ShopModel, shop_of
 from lab.sequencing.methods.cp_sat_solver import NAME, Solution, Status, solved
 from lab.sequencing.methods.cp_sat_tasks import possible_tasks
 from lab.sequencing.methods.cp_sat_transport import TransportModel
+from lab.sequencing.methods.ortools_cp_sat import cp_model
 from lab.sequencing.methods.rules import first_come
 from lab.sequencing.methods.shared import Shared, shared_of
 from lab.sequencing.search import SAME, Search, SequenceResult, not_in_time, only_one

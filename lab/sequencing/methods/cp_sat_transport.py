@@ -12,8 +12,6 @@ from itertools import pairwise
 from math import inf
 from typing import NamedTuple
 
-from ortools.sat.python import cp_model
-
 from lab.errors import BadInput, counted
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import MAKESPAN, WITH_DUE_TIMES, cost, machine_places
@@ -23,6 +21,7 @@ from lab.sequencing.methods.cp_sat_solver import Solution
 from lab.sequencing.methods.cp_sat_tasks import Follows, Task, Tasks, Team
 from lab.sequencing.methods.cp_sat_times import Times
 from lab.sequencing.methods.cp_sat_track import Track
+from lab.sequencing.methods.ortools_cp_sat import cp_model
 from lab.sequencing.simulate.follow import follow, spoils, steps
 from lab.sequencing.simulate.run import Run, Windowless
 
