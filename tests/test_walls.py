@@ -78,7 +78,12 @@ READS_ITS_OWN = (  # what ships with the lab, or what it has just written: nothi
     *("lab.view.meshcat", "lab.view.server_page", "lab.studies.report", "lab.cli.export", "lab.toolbox.remote_place"),
     *("lab.api.lessons", "lab.api.pictures", "lab.api.runs", "lab.api.scenes"),
 )
-BY_TABLE = ("lab", "lab.cli.app", "lab_studies")  # what these load stands in a table of their own
+BY_TABLE = (
+    "lab",
+    "lab.cli.app",
+    "lab.tasks.instances",
+    "lab_studies",
+)  # what these load stands in a table of their own
 GENERATORS = {"Generator", "default_rng", "SeedSequence", "BitGenerator", "PCG64"}
 
 
