@@ -84,7 +84,8 @@ def sequence_named(
     for kind, path in files.items():
         check_table(path) if kind == "schedule" else check_picture(path)
     cell, document, found = sequenced_named(name, case, toasts, wanted, teacher)
-    draw(cell, document, found, files)
+    if files:
+        draw(cell, document, found, files)
     return document
 
 
