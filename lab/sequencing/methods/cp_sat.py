@@ -27,6 +27,7 @@ TIME_LIMIT_S = 60.0
 MOST_MOVES = 800  # that parts may make, in a model; what it takes in memory grows with the square, to a gigabyte
 
 FIRST_LOOK = 3.0  # about so many seconds of a thread, counted in what the solver does
+SHOP_LOOK = 5.0  # as such, of the model of a shop before the general one
 GROWS = 2.0
 
 
@@ -123,9 +124,14 @@ class _Asked:
 
 
 def _searched(asked: _Asked, known: tuple[int, ...]) -> CpSatResult:
-    """What the solver makes of a cell, beginning with an order; empty: with nothing."""
+    """What the solver makes of a cell, beginning with an order; empty: with nothing.
+
+    Of a shop with robots where no part has a choice of machines the model of a shop is looked at first, then the general one.
+    Measured, on Bilge and Ulusoy's instances with two robots: it proves what is easy in a tenth to a third of the time, of set 7
+    its bounds stay far below the general model's.
+    """
     cell, objective, shared = asked.shared.cell, asked.shared.objective, asked.shared
-    shop = None if cell.serial else shop_of(cell, objective)
+    shop, bound = None if cell.serial else shop_of(cell, objective), 0.0
     while True:
         if shop is not None:
             model: Model | ShopModel | TransportModel = ShopModel(cell, shop, objective, known)
@@ -133,18 +139,23 @@ def _searched(asked: _Asked, known: tuple[int, ...]) -> CpSatResult:
             model = Model(cell, objective, known) if cell.serial else TransportModel(cell, objective, known)
         asked.until_s = min(asked.until_s, perf_counter() + asked.time_limit_s)
         worth = cost(follow(cell, known), objective) if known else inf
+        in_turn = shop is not None and bool(cell.robots) and not shop.flexible
         if isinstance(model, ShopModel):
-            found = _result(asked, model, worth, model.parameters)
+            most = {"max_deterministic_time": SHOP_LOOK} if in_turn else {}
+            found = _result(asked, model, worth, {**model.parameters, **most})
         elif isinstance(model, TransportModel) and objective == MAKESPAN and not model.times.rounded_s:
             found = _narrowed(asked, model, worth)
         else:
             found = _result(asked, model, worth)
         if found.status == "unknown" and known:
             found = replace(found, status="feasible", cost=worth, sequence=known)
+        found = replace(found, bound=min(found.cost, max(found.bound, bound)))
         _tell(shared, found)
-        if found.status in ("optimal", "impossible") or not asked.goes_on or shared.cost >= found.cost - SAME:
+        proven = found.status in ("optimal", "impossible")
+        if proven or not asked.goes_on or (shared.cost >= found.cost - SAME and not in_turn):
             return found
-        known = shared.sequence
+        known, bound = shared.sequence, found.bound
+        shop = None if in_turn else shop
 
 
 def _tell(shared: Shared, found: CpSatResult) -> None:
