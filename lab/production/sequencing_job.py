@@ -270,6 +270,7 @@ def _document(
         "robots": len(cell.robots),
         "advisor": str(wanted.advisor),
         "advice": _advice(found) if wanted.advisor.row != "none" else None,
+        "advised": getattr(best, "advised", None),  # None: nobody was to be asked, or the best session was stopped
         "stochastic": None,
         "files": {},
     }
