@@ -21,7 +21,7 @@ from lab.sequencing.methods.ortools_cp_sat import cp_model
 from lab.sequencing.methods.rules import first_come
 from lab.sequencing.methods.shared import Shared, shared_of
 from lab.sequencing.search import SAME, Search, SequenceResult, not_in_time, only_one
-from lab.sequencing.simulate.follow import follow, spoils
+from lab.sequencing.simulate.follow import follow, simulate, spoils
 
 TIME_LIMIT_S = 60.0
 MOST_MOVES = 800  # that parts may make, in a model; what it takes in memory grows with the square, to a gigabyte
@@ -77,8 +77,18 @@ def cp_sat(
     if workers < 1:
         raise BadInput(f"workers = {workers}: allowed are whole numbers from 1")
     check_no_batches(cell)
-    known = first_come(cell) if hint is None else hint
+    known = first_come(cell) if hint is None else _checked(cell, hint)
     return _searched(_Asked(shared or Shared(cell, objective), seed, workers, time_limit_s), tuple(known))
+
+
+def _checked(cell: Cell, hint: Sequence[int]) -> Sequence[int]:
+    """The hint; BadInput for one that cannot be."""
+    try:
+        if hint:
+            simulate(cell, hint)
+    except BadInput as error:
+        raise BadInput(f"hint: {error}") from None
+    return hint
 
 
 def check_no_batches(cell: Cell) -> None:
