@@ -123,6 +123,20 @@ def test_what_is_told_while_it_runs() -> None:
     assert (costs[-1], bounds[-1]) == pytest.approx((document["best_cost"], document["bound_cost"]))
 
 
+def test_stopped_before_anything_is_proven_there_is_a_bound_that_takes_no_search(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Two toasts of 10 s in an oven for one: 20 s at least."""
+
+    def pressed(best: Shared) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("lab.production.any_time.look_first", pressed)
+    document = found("oven.toml", Wanted("srl"))
+    assert (document["stopped_by"], document["best_by"]) == ("Ctrl-C", "first come, first served")
+    assert (document["bound_cost"], document["bound_by"]) == (20.0, "each machine alone")
+
+
 def test_an_objective_without_a_rule_has_no_bound(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(OBJECTIVES, "squared", lambda run: run.now_s**2)
     cell = load_cell("fms").cell()
