@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 from audit_violations import PART as AUDITS
+from ctrl_c import PART as CTRL_C
 from drawn_physics import PART as PHYSICS
 from kills import PART as KILLS
 from mutated_commands import PART as MUTATED_COMMANDS
@@ -32,6 +33,7 @@ PARTS: dict[str, Part] = {
     "physics": PHYSICS,
     "audits": AUDITS,
     "proofs": PROOFS,
+    "ctrl-c": CTRL_C,
 }
 
 
