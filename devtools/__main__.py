@@ -12,6 +12,7 @@ from rich.console import Console
 from rich.progress import Progress
 
 from devtools.audit_violations import PART as AUDITS
+from devtools.ctrl_c import PART as CTRL_C
 from devtools.drawn_physics import PART as PHYSICS
 from devtools.kills import PART as KILLS
 from devtools.mutated_commands import PART as MUTATED_COMMANDS
@@ -33,6 +34,7 @@ PARTS: dict[str, Part] = {
     "physics": PHYSICS,
     "audits": AUDITS,
     "proofs": PROOFS,
+    "ctrl-c": CTRL_C,
 }
 
 

@@ -35,11 +35,11 @@ class Ended:
 
     def fault(self, codes: Sequence[int] = CODES) -> str:
         """What is wrong with how it ended: a traceback, an unknown code, lines too long; empty if nothing is."""
-        printed = self.stderr + self.stdout
         if self.late:
             return f"no end within {self.seconds:.0f} s"
-        if "Traceback (most recent call last)" in printed:
-            return f"traceback: {printed.strip().splitlines()[-1][:200]}"
+        for printed in (self.stderr, self.stdout):
+            if "Traceback (most recent call last)" in printed:
+                return f"traceback: {printed.strip().splitlines()[-1][:200]}"
         if self.code not in codes:
             return f"exit {self.code}, allowed {', '.join(map(str, codes))}: {self.stderr.strip()[-200:]}"
         if self.code in (1, 2) and not self.stderr.strip():

@@ -40,13 +40,7 @@ ALONE: dict[str, set[str]] = (
         "cv2": {"lab.vision.opencv"},
         "PIL": {"lab.view.movie"},
         "numba": {"lab.learning.compiled"},  # what is kept of it is kept in one place
-        "ortools": {
-            *(
-                f"lab.sequencing.methods.cp_sat{part}"
-                for part in ("", "_free", "_model", "_tasks", "_rooms", "_shop", "_solver", "_track", "_transport")
-            ),
-            "lab.sequencing.cyclic.model",
-        },
+        "ortools": {"lab.sequencing.methods.ortools_cp_sat"},  # without pandas
         "starlette": {"lab.view.server", "lab.view.server_page"},
         "uvicorn": {"lab.view.server", "lab.view.server_limits"},
         "websockets": set(),  # uvicorn's
@@ -81,7 +75,7 @@ READS_ITS_OWN = (  # what ships with the lab, or what it has just written: nothi
     *("lab.view.meshcat", "lab.view.server_page", "lab.studies.report", "lab.cli.export", "lab.toolbox.remote_place"),
     *("lab.api.lessons", "lab.api.pictures", "lab.api.runs", "lab.api.scenes"),
 )
-BY_TABLE = ("lab", "lab.lazy", "lab.cli.app", "lab_studies")  # what these load stands in a table
+BY_TABLE = ("lab", "lab.lazy", "lab.cli.app", "lab.tasks.instances", "lab_studies")  # what these load stands in a table
 GENERATORS = {"Generator", "default_rng", "SeedSequence", "BitGenerator", "PCG64"}
 
 
@@ -307,7 +301,7 @@ def faults(module: str, source: str) -> list[str]:
         (
             "lab.sequencing.methods.exact",
             "from ortools.sat.python import cp_model",
-            "allowed in ['lab.sequencing.cyclic.model', ",
+            "allowed in ['lab.sequencing.methods.ortools_cp_sat']",
         ),
         ("lab.sequencing.methods.fifo", "def f():\n    import jinja2", "allowed in ['lab.studies.report']"),
         ("lab.mdp", "import random", "allowed in no module"),

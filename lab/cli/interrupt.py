@@ -20,8 +20,9 @@ def ctrl_c_is_heard() -> Iterator[None]:
     """Raises KeyboardInterrupt on Ctrl-C, but not where a library may drop it unseen, or is in the midst of taking a lock.
 
     It is raised where the lab's own code runs, or where nothing has moved since the last look, as in a wait; in a library
-    that is busy for a second, or when it is pressed once more, there. Never while something is being imported. It is raised
-    again when Python has ignored it (in a callback). Windows has no interval timer: there it is raised where Python hears it.
+    that is busy for a second, or when it is pressed once more, there. Never while something is being imported, or in LLVM.
+    It is raised again when Python has ignored it (in a callback). Windows has no interval timer: there it is raised where
+    Python hears it.
     """
     has_timer = hasattr(signal, "setitimer")
     if (
@@ -39,7 +40,7 @@ def ctrl_c_is_heard() -> Iterator[None]:
             raise KeyboardInterrupt
         is_stuck = frame is looked_at[0] and frame.f_lasti == looked_at[1]
         impatient = looks > LOOKS or (number == signal.SIGINT and looks > 0)
-        if not _imports(frame, main_frame) and (frame.f_code.co_filename.startswith(OWN) or is_stuck or impatient):
+        if not _must_end(frame, main_frame) and (frame.f_code.co_filename.startswith(OWN) or is_stuck or impatient):
             looks, looked_at = 0, (None, 0)
             raise KeyboardInterrupt
         looks, looked_at = looks + 1, (frame, frame.f_lasti)
@@ -65,10 +66,14 @@ def ctrl_c_is_heard() -> Iterator[None]:
             signal.signal(number, handler)
 
 
-def _imports(frame: "FrameType | None", last: "FrameType") -> bool:
-    """Whether something is being imported between a frame and one of those that called it."""
+def _must_end(frame: "FrameType | None", last: "FrameType") -> bool:
+    """Whether something is being imported, or LLVM is at work, between a frame and one of those that called it.
+
+    What LLVM owns is handed over in two steps: between them Ctrl-C made a module be freed twice, a segmentation fault.
+    """
     while frame is not None and frame is not last:
-        if frame.f_code.co_filename.startswith("<frozen importlib"):
+        file = frame.f_code.co_filename
+        if file.startswith("<frozen importlib") or "llvmlite" in file:
             return True
         frame = frame.f_back
     return False

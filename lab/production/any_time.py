@@ -8,7 +8,7 @@ from lab.sequencing import SEQUENCERS
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import NO_CHANCE
 from lab.sequencing.cell.objectives import BUILT_IN
-from lab.sequencing.methods.portfolio import known_of, look_first, look_on
+from lab.sequencing.methods.portfolio import known_of, look_first, look_on, tell_alone
 from lab.sequencing.methods.rules import any_order
 from lab.sequencing.methods.shared import NO_LIMITS, Limits, SearchOver, Shared
 from lab.sequencing.search import SAME, EpisodeSequenced, Reference, Search, SequenceResult, not_in_time
@@ -100,6 +100,8 @@ def looked_for(
             if result := one.result():
                 shown = None if shown is None else _known(best)
                 tell(SequenceFound(result, shown, cell.parts, method))
+                if shown is not None and not best.cost < result.cost - SAME:
+                    best.told()
         asked = limits != NO_LIMITS or not SEQUENCERS[method].alone
         if asked and search.objective in BUILT_IN and not best.over.is_set():
             look_on(best, best.left_s(SECOND_OPINION_S))
@@ -110,6 +112,9 @@ def looked_for(
     found = [result for one in heard if (result := one.result())]
     if not best.sequence:
         best.tell(FIRST_COME, any_order(cell))
+    if not best.bound and search.objective in BUILT_IN:  # it was stopped before anything was proven
+        tell_alone(best)
+    best.report()
     if not (found or best.sequence):
         if stopped_by == CTRL_C:
             raise KeyboardInterrupt("stopped by Ctrl-C before an order was found") from None

@@ -129,10 +129,11 @@ class Production:
         self.sequence = [*found.sequence]
         work.go_by(found.run)
         gap = None
-        if found.schedule is not None and found.proven is not None:
-            proven, plan = found.proven, found.schedule.later(now_s)
-            gap = proven.gap(found.schedule.makespan_s)
-            self.tell(PlanMade(plan, len(self.sequence), gap, proven.proven, now_s, why, found.method))
+        if found.schedule is not None:
+            is_proven = found.proven is not None and found.proven.proven
+            gap = None if found.proven is None else found.proven.gap(found.schedule.makespan_s)
+            plan = found.schedule.later(now_s)
+            self.tell(PlanMade(plan, len(self.sequence), gap, is_proven, now_s, why, found.method))
         if found.method:
             self.replanned.append(Replanned(now_s, why, found.method, len(self.sequence), gap))
 

@@ -9,6 +9,7 @@ from typing import Any
 
 from lab.errors import BadInput, LabError
 from lab.production.cyclic_order import check_parts, cycle_document, mix_of
+from lab.production.durations import untimed
 from lab.production.order import check_order
 from lab.production.run import teach_all
 from lab.sequencing.cell.cell import MAX_PARTS, Cell
@@ -68,7 +69,7 @@ def cyclic_named(name: str, wanted: CyclicWanted, teacher: Teacher, files: dict[
     if parts is not None:
         check_parts(parts, mix, cyclic=True)
     if isinstance(loaded, Task):
-        check_order(loaded, mix, None, cyclic=True)
+        check_order(untimed(loaded, mix), None, mix_of(mix))
     most = max(FEWEST_CYCLES, ceil(own / len(mix))) * len(mix)
     cell = _largest(lambda parts: _cell(loaded, mix, parts, teacher), most, len(mix))
     teacher.tell(PhaseBegan("sequence", 1))

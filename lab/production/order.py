@@ -16,8 +16,7 @@ from lab.learning.requests import Ask
 from lab.learning.session_events import EpisodeEnded
 from lab.learning.session_events import Event as SessionEvent
 from lab.learning.settings import GateSettings
-from lab.production.cyclic_order import cyclic_order, mix_of
-from lab.production.durations import untimed
+from lab.production.cyclic_order import cyclic_order
 from lab.production.order_learning import OrderLearning, bound_shares
 from lab.sequencing import find_sequence
 from lab.sequencing.cell.cell import Cell
@@ -30,7 +29,6 @@ from lab.sequencing.search import SAME, Reference, Search, SequenceResult
 from lab.sequencing.simulate.follow import follow, waits_in
 from lab.sequencing.simulate.run import NO_WAIT, Run, branch
 from lab.tasks.sequencing import Sequencing, search_for
-from lab.tasks.task import Order, Task
 from lab.teaching.events import (
     ORDER,
     LessonEvent,
@@ -71,17 +69,19 @@ def checked_order(cell: Cell, words: str, where: str = "--order") -> tuple[int, 
     return sequence
 
 
-def check_order(task: Task, order: Order, words: str | None, cyclic: bool) -> None:
-    """BadInput for an order in words, or for a cycle, that cannot be however long moves take."""
-    cell = untimed(task, order)
+def check_order(cell: Cell, words: str | None, mix: Sequence[str]) -> None:
+    """BadInput for an order in words, or for a cycle of a mix of products, that cannot be however long moves take.
+
+    cell: not timed yet (see `durations.untimed`). mix: empty, there is no cycle.
+    """
     if words is not None:
         checked_order(cell, words)
-    if cyclic:
+    if mix:
         from lab.sequencing.cyclic.cycle import check_cyclic  # it loads OR-Tools
         from lab.sequencing.cyclic.line import lines
 
-        check_cyclic(cell, mix_of(order))
-        next(lines(cell, mix_of(order)))
+        check_cyclic(cell, mix)
+        next(lines(cell, mix))
 
 
 def moves_from(start: Run, sequence: Sequence[int], what: str) -> list[Move]:

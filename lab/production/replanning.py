@@ -59,9 +59,10 @@ class _NothingBetter(Exception):
 
 @dataclass(frozen=True)
 class NewPlan:
-    """The run to go on with, the decisions still to come, and what is proven of them; schedule: None where there are none.
+    """The run to go on with, the decisions still to come, and what is proven of them; schedule: None where nothing was ordered.
 
-    stuck: the parts that cannot be finished, and why not. method: by what the order was found, "" where nothing was ordered.
+    proven: of all orders that begin with what is in the gripper; None where that is not known. stuck: the parts that cannot be
+    finished, and why not. method: by what the order was found, "" where nothing was ordered.
     """
 
     run: Run
@@ -95,13 +96,19 @@ def plan_again(run: Run, mishaps: Mishaps, under_way: int | None = None, planner
 
 
 def _ordered(rest: Rest, now: Run, first: tuple[int, ...], planner: Planner) -> NewPlan:
+    """The order of the rest, which begins when the first decisions are carried out; what is proven is proven of both."""
     if rest.cell is None:
         return NewPlan(now, first, None, None, rest.stuck)
-    found = optimum(rest.cell)
+    found, ahead = optimum(rest.cell), branch(now)
+    for decision in first:
+        ahead.move(decision)
     own, method = planner.order(rest.cell, found)
-    sequence = (*first, *own)
-    schedule = None if first else simulate(now.cell, sequence)
-    return NewPlan(now, sequence, None if first else found, schedule, rest.stuck, method)
+    cost, bound_s = (ahead.now_s + seconds for seconds in (found.cost, found.bound_s))
+    whole = replace(found, cost=cost, sequence=(*first, *found.sequence), bound_s=bound_s)
+    # With windows it may be better to hold what is in the gripper for a while, which the rest does not know.
+    proven = None if first and now.cell.has_windows else whole
+    schedule = simulate(now.cell, (*first, *own))
+    return NewPlan(now, (*first, *own), proven, schedule, rest.stuck, method)
 
 
 def in_another(run: Run, cell: Cell) -> Run:

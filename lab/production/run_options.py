@@ -67,9 +67,10 @@ class RunOptions(SessionOptions):
         if self.parts_per_cycle is not None:
             check_parts(self.parts_per_cycle, mix_of(order), self.cyclic)
         if self.order is not None or self.cyclic:
+            from lab.production.durations import untimed  # and with it all of the scene
             from lab.production.order import check_order  # and with it all that finds one
 
-            check_order(task, order, self.order, self.cyclic)
+            check_order(untimed(task, order), self.order, mix_of(order) if self.cyclic else ())
         return order
 
     def lessons(self) -> LessonOptions:

@@ -84,7 +84,8 @@ def sequence_named(
     for kind, path in files.items():
         check_table(path) if kind == "schedule" else check_picture(path)
     cell, document, found = sequenced_named(name, case, toasts, wanted, teacher)
-    draw(cell, document, found, files)
+    if files:
+        draw(cell, document, found, files)
     return document
 
 
@@ -269,6 +270,7 @@ def _document(
         "robots": len(cell.robots),
         "advisor": str(wanted.advisor),
         "advice": _advice(found) if wanted.advisor.row != "none" else None,
+        "advised": getattr(best, "advised", None),  # None: nobody was to be asked, or the best session was stopped
         "stochastic": None,
         "files": {},
     }

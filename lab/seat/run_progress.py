@@ -39,7 +39,8 @@ ALL_FREE = "their ways are free here, and none is longer than one learned anew"
 class RunProgress:
     """Writes lines to `console`, which is not stdout, and on a terminal a progress bar below them.
 
-    Use it as a context manager for the bar; the lines come without it, too.
+    Use it as a context manager for the bar; the lines come without it, too. What a search stands at is shown before the bar, one
+    after the other in the same place; the last becomes a line, unless the order that was found is told.
     """
 
     def __init__(self, console: Console) -> None:
@@ -47,6 +48,7 @@ class RunProgress:
         self._progress, self._bars = progress_bar(console), bars_for(console)
         self._running = False
         self._task: TaskID | None = None
+        self._stands = ""  # what is shown before the bar instead of the phase
         self._first_asked: dict[str, int] = {}  # skill -> episode
         self._rejected: dict[str, AdviceRejected] = {}
         self._reused: list[tuple[str, Lesson]] = []  # by skill
@@ -59,6 +61,7 @@ class RunProgress:
     def __exit__(self, *_: object) -> None:
         self._running = False
         self._tell_reused()
+        self._tell_stands()
         self._progress.stop()
 
     @contextmanager
@@ -91,9 +94,15 @@ class RunProgress:
             case MoveTimed():
                 self._say(f"  {event.name:{_NAME}} {event.seconds:6.2f} s")
             case SequenceFound():
+                self._stands = ""  # which this tells, too
                 order, found = sequence_parts(event)
                 self._pack([Text(f"  {order}"), Text(found)], gap=" ")
-            case OrderChosen() | SequencingStands():
+            case OrderChosen():
+                self._say(f"  {run_text(event)}")
+            case SequencingStands() if self._running and self._task is not None and self.console.is_terminal:
+                self._stands = run_text(event)
+                self._progress.update(self._task, description=self._stands)
+            case SequencingStands():
                 self._say(f"  {run_text(event)}")
             case MoveMade():
                 self._say(f"  {event.move.drop_s:7.1f} s  {move_text(event)}")
@@ -102,10 +111,17 @@ class RunProgress:
 
     def _begin(self, title: str, parts: int) -> None:
         self._tell_reused()
+        self._tell_stands()
         if self._task is not None:
             self._progress.remove_task(self._task)
         self._say((title, "bold"))
         self._task = self._progress.add_task(title, total=parts)
+
+    def _tell_stands(self) -> None:
+        """The last of what a search stood at, if no order has been told of since."""
+        if self._stands:
+            self._say(f"  {self._stands}")
+        self._stands = ""
 
     def _lesson(self, name: str, lesson: Lesson) -> None:
         if lesson.result is None:

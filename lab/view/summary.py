@@ -236,12 +236,11 @@ def sequence_summary(found: Mapping[str, Any]) -> RenderableType:
     proven = "proven optimum" if found["optimum_proven"] else "proven bound"
     best, bound = beside(found["best_cost"], found["bound_cost"], unit, 2)
     alone = beside(found["cost"], found["bound_cost"], unit, 2)[0]
-    advised = any(advice["helped_steps"] for advice in found["advice"] or [])
-    whose = "with advice" if advised else "alone"
+    whose = " alone" if found["advice"] is None else {True: " with advice", False: " alone", None: ""}[found["advised"]]
     lines = [
         f"best order known: {what}{best} for {_ordered(found['order'])} (by {found['best_by']}; seed {found['seed']})",
         f"{proven} {bound}{_gap(found['best_cost'], found)} ({found['bound_by']})",
-        f"{found['method']} {whose}: {what}{alone}{_gap(found['cost'], found)}, "
+        f"{found['method']}{whose}: {what}{alone}{_gap(found['cost'], found)}, "
         f"in episode {found['found_at_episode']} of {found['episodes']}",
         *_order_of_transfers(found),
     ]

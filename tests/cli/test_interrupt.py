@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from lab.cli.interrupt import ctrl_c_is_heard
+from lab.cli.interrupt import LOOKS, ctrl_c_is_heard
 
 Lab = Callable[..., Any]  # the fixture of tests/conftest.py; it returns a Ran
 
@@ -131,6 +131,28 @@ def test_another_frame_in_the_place_of_one_that_is_gone_is_no_standstill() -> No
             hear(signal.SIGALRM, frame)
             with pytest.raises(KeyboardInterrupt):
                 hear(signal.SIGALRM, frame)
+            signal.setitimer(signal.ITIMER_REAL, 0.0)
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def test_llvm_is_left_before_it_is_raised() -> None:
+    """However long it takes, and however often it is pressed: a module was freed twice, and the order was lost."""
+    scope: dict[str, Any] = {"sys": sys}
+    exec(compile("def short(): return sys._getframe()", "site-packages/llvmlite/binding/ffi.py", "exec"), scope)
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with ctrl_c_is_heard():
+            hear: Any = signal.getsignal(signal.SIGINT)
+            frame = scope["short"]()
+            try:
+                for number in (*[signal.SIGALRM] * 2 * LOOKS, signal.SIGINT):
+                    hear(number, frame)
+                    signal.setitimer(signal.ITIMER_REAL, 0.0)
+            except KeyboardInterrupt:  # which would end all tests
+                pytest.fail("it was raised in LLVM")
+            with pytest.raises(KeyboardInterrupt):
+                hear(signal.SIGALRM, sys._getframe())
             signal.setitimer(signal.ITIMER_REAL, 0.0)
     finally:
         signal.signal(signal.SIGINT, before)

@@ -113,14 +113,28 @@ def test_a_rule_waits_for_no_proof_unless_it_is_asked_for(monkeypatch: pytest.Mo
 
 
 def test_what_is_told_while_it_runs() -> None:
-    """The best order never becomes worse, and the bound never lower."""
+    """The best order never becomes worse, and the bound never lower; the last that is told is what is known in the end."""
     heard = list[Event]()
     document = found("fms", Wanted("random", 200), heard.append)
     stands = [event for event in heard if isinstance(event, SequencingStands)]
     costs, bounds = [one.cost for one in stands], [one.reference.bound for one in stands]
     assert costs == sorted(costs, reverse=True)
     assert bounds == sorted(bounds)
-    assert costs[-1] >= document["best_cost"] - SAME
+    assert (costs[-1], bounds[-1]) == pytest.approx((document["best_cost"], document["bound_cost"]))
+
+
+def test_stopped_before_anything_is_proven_there_is_a_bound_that_takes_no_search(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Two toasts of 10 s in an oven for one: 20 s at least."""
+
+    def pressed(best: Shared) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("lab.production.any_time.look_first", pressed)
+    document = found("oven.toml", Wanted("srl"))
+    assert (document["stopped_by"], document["best_by"]) == ("Ctrl-C", "first come, first served")
+    assert (document["bound_cost"], document["bound_by"]) == (20.0, "each machine alone")
 
 
 def test_an_objective_without_a_rule_has_no_bound(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,5 +1,7 @@
 """The rest of the work ordered anew, by hand: two toasts through one oven, in the middle, with one lost or in the gripper."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -45,8 +47,39 @@ def test_a_lost_part_is_left_out(run: Run) -> None:
 
 
 def test_what_is_in_the_gripper_comes_first() -> None:
+    """All of it takes 29 s, whichever toast is first."""
     found = plan_again(Run(oven()), Mishaps(), under_way=2)
-    assert (found.sequence, found.proven) == ((2, 2, 1, 1), None)
+    assert (found.sequence, found.method) == ((2, 2, 1, 1), "srl-time")
+    assert found.schedule is not None
+    assert found.proven is not None
+    assert (found.schedule.makespan_s, found.proven.cost, found.proven.bound_s) == pytest.approx((29.0, 29.0, 29.0))
+    assert (found.proven.sequence, found.proven.proven) == ((2, 2, 1, 1), True)
+
+
+def test_beside_what_is_in_the_gripper_a_part_may_be_stuck() -> None:
+    """Toast 1 is in the oven, which is closed; toast 2, which goes through the other one, takes 2 + 10 + 2 s after 2 s of way."""
+    stations = (
+        *(Station("in", "storage", 9), Station("hot", "machine", 1, 10.0)),
+        *(Station("warm", "machine", 1, 10.0), Station("out", "storage", 9)),
+    )
+    products = tuple(Product(name, ((Stage("in"), Stage(name), Stage("out")),)) for name in ("hot", "warm"))
+    step = np.ones((4, 4)) - np.eye(4)
+    run = Run(Cell(stations, products, ("hot", "warm"), step, 2 * step, one_robot("in")))
+    run.move(1)
+    found = plan_again(run, Mishaps(closed=("hot",)), under_way=2)
+    assert found.schedule is not None
+    assert found.proven is not None
+    assert (found.sequence, found.schedule.makespan_s, list(found.stuck)) == ((2, 2), 15.0, [1])
+    assert (found.proven.bound_s, found.proven.proven) == (15.0, True)
+
+
+def test_with_windows_nothing_is_proven_of_what_is_in_the_gripper() -> None:
+    """It may have to be held for a while."""
+    cell = oven()
+    route = (Stage("in"), Stage("hot", at_most_s=20.0), Stage("out"))
+    found = plan_again(Run(replace(cell, products=(Product("toast", (route,)),))), Mishaps(), under_way=2)
+    assert found.schedule is not None
+    assert (found.sequence, found.schedule.makespan_s, found.proven) == ((2, 2, 1, 1), 29.0, None)
 
 
 def test_what_is_in_the_gripper_and_has_nowhere_to_go_stops_the_work(run: Run) -> None:

@@ -50,7 +50,7 @@ FIELDS = (
     ),
     *("bound_s", "bound_cost", "bound_by", "gap", "success_percent", "final_success_percent", "mean_best_s"),
     *("mean_best_cost", "best_s", "best_cost", "best_by", "best_sequence", "best_moves", "schedule", "srl_s", "proven"),
-    *("robots", "advisor", "advice", "stochastic", "files", "stopped_by", "interrupted"),
+    *("robots", "advisor", "advice", "advised", "stochastic", "files", "stopped_by", "interrupted"),
 )
 LEARNERS = ("srl", "srl-time", "srl-improved", "mc")
 AT_ONCE = {"fifo", "exact", "cp-sat", "portfolio", "carried", *RULES}
@@ -127,6 +127,7 @@ def test_a_cell_by_hand(lab: Lab) -> None:
         "robots": 1,
         "advisor": "none",
         "advice": None,
+        "advised": None,
         "stochastic": None,
         "files": {},
         "stopped_by": None,
@@ -317,6 +318,7 @@ def test_advice(lab: Lab, gate: str) -> None:
     document = asked(lab, words)
     assert tuple(document) == FIELDS
     assert (document["advisor"], len(document["advice"])) == ("expert", 2)
+    assert document["advised"] == (gate != "never")
     names = {"requests", "helped_steps", "misleads", "rejected_at_episode"}
     assert all(session.keys() == names for session in document["advice"])
     requests = [session["requests"] for session in document["advice"]]
@@ -334,6 +336,7 @@ def test_nobody_is_asked_unless_it_is_wanted(lab: Lab) -> None:
     assert alone.pop("advice") is None
     assert never.pop("advice") == [{"requests": 0, "helped_steps": 0, "misleads": 0, "rejected_at_episode": None}]
     assert (alone.pop("advisor"), never.pop("advisor")) == ("none", "wrong")
+    assert (alone.pop("advised"), never.pop("advised")) == (None, False)
     assert alone == never
 
 

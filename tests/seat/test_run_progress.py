@@ -18,6 +18,7 @@ from lab.seat.run_progress import ALL_FREE, RunProgress
 from lab.sequencing.cell.schedule import Move
 from lab.sequencing.search import Reference, SequenceResult
 from lab.teaching.events import (
+    Event,
     KeptBeside,
     LessonEvent,
     MoveMade,
@@ -26,6 +27,7 @@ from lab.teaching.events import (
     PhaseBegan,
     RecordSkipped,
     SequenceFound,
+    SequencingStands,
     SkillReady,
 )
 from lab.teaching.lesson_plan import Lesson
@@ -249,3 +251,35 @@ def test_a_plain_console_gets_a_plain_curve(board: TabularMDP) -> None:
     (line,) = lines(shown)
     assert line.isascii()
     assert "#" in line
+
+
+# ---- what a search stands at ---------------------------------------------------------------------------------------
+
+
+STANDS = [SequencingStands(cost, "annealing", Reference(80.0, False, "CP-SAT")) for cost in (100.0, 90.0)]
+SAYS = [
+    "best so far 100.0 s (annealing), bound 80.0 s, gap 25.0%",
+    "best so far 90.0 s (annealing), bound 80.0 s, gap 12.5%",
+]
+
+
+def told_of(shown: Console, *more: Event) -> list[str]:
+    with RunProgress(shown) as progress:
+        for event in (PhaseBegan("sequence", 1), *STANDS, *more):
+            progress.hear(event)
+    return lines(shown)
+
+
+def test_on_a_terminal_only_the_last_stays() -> None:
+    kept = told_of(shown := console(100))
+    assert [line for line in kept if line.startswith("  best")] == [f"  {SAYS[1]}"]
+    assert not has_bar(shown)
+
+
+def test_an_order_that_is_told_takes_its_place() -> None:
+    order = SequenceFound(SequenceResult((1,), 90.0, (90.0,)), STANDS[1].reference, 1, "anneal")
+    assert not [line for line in told_of(console(100), order) if line.startswith("  best")]
+
+
+def test_in_a_log_each_is_a_line() -> None:
+    assert told_of(console(terminal=False))[1:] == [f"  {text}" for text in SAYS]

@@ -238,6 +238,7 @@ FOUND: dict[str, Any] = {
     "success_percent": 0.0,
     "mean_best_cost": 110.0,
     "advice": None,
+    "advised": None,
     "stochastic": None,
     "files": {},
 }
@@ -290,14 +291,19 @@ def test_sequences_that_went_otherwise(change: dict[str, Any], line: str) -> Non
 
 def test_a_sequence_with_advice() -> None:
     advice = {"requests": 12, "helped_steps": 40, "misleads": 1, "rejected_at_episode": None}
-    lines = shown(sequence_summary(FOUND | {"advice": [advice, advice | {"rejected_at_episode": 95}]}))
+    two = {"advice": [advice, advice | {"rejected_at_episode": 95}]}
+    lines = shown(sequence_summary(FOUND | two | {"advised": True}))
     assert lines[2].startswith("srl with advice: 110.00 s")
     assert lines[4:] == [
         "session 1: asked in 12 episodes, 40 moves advised",
         "session 2: asked in 12 episodes, 40 moves advised; rejected its advisor in episode 95",
     ]
-    unheard = shown(sequence_summary(FOUND | {"advice": [advice | {"helped_steps": 0}]}))
+    unheard = shown(
+        sequence_summary(FOUND | two | {"advised": False})
+    )  # the best one was found before any move was advised
     assert unheard[2].startswith("srl alone: 110.00 s")
+    stopped = shown(sequence_summary(FOUND | {"advice": [dict.fromkeys(advice)], "advised": None}))
+    assert stopped[2].startswith("srl: 110.00 s")
 
 
 def test_a_sequence_in_drawn_times() -> None:

@@ -7,7 +7,6 @@ from time import perf_counter
 from types import MappingProxyType
 
 import numpy as np
-from ortools.sat.python import cp_model
 
 from lab.errors import BadInput
 from lab.sequencing.cell.cell import Cell
@@ -18,15 +17,17 @@ from lab.sequencing.methods.cp_sat_shop import ShopModel, shop_of
 from lab.sequencing.methods.cp_sat_solver import NAME, Solution, Status, solved
 from lab.sequencing.methods.cp_sat_tasks import possible_tasks
 from lab.sequencing.methods.cp_sat_transport import TransportModel
+from lab.sequencing.methods.ortools_cp_sat import cp_model
 from lab.sequencing.methods.rules import first_come
 from lab.sequencing.methods.shared import Shared, shared_of
 from lab.sequencing.search import SAME, Search, SequenceResult, not_in_time, only_one
-from lab.sequencing.simulate.follow import follow, spoils
+from lab.sequencing.simulate.follow import follow, simulate, spoils
 
 TIME_LIMIT_S = 60.0
 MOST_MOVES = 800  # that parts may make, in a model; what it takes in memory grows with the square, to a gigabyte
 
 FIRST_LOOK = 3.0  # about so many seconds of a thread, counted in what the solver does
+SHOP_LOOK = 5.0  # as such, of the model of a shop before the general one
 GROWS = 2.0
 
 
@@ -76,8 +77,18 @@ def cp_sat(
     if workers < 1:
         raise BadInput(f"workers = {workers}: allowed are whole numbers from 1")
     check_no_batches(cell)
-    known = first_come(cell) if hint is None else hint
+    known = first_come(cell) if hint is None else _checked(cell, hint)
     return _searched(_Asked(shared or Shared(cell, objective), seed, workers, time_limit_s), tuple(known))
+
+
+def _checked(cell: Cell, hint: Sequence[int]) -> Sequence[int]:
+    """The hint; BadInput for one that cannot be."""
+    try:
+        if hint:
+            simulate(cell, hint)
+    except BadInput as error:
+        raise BadInput(f"hint: {error}") from None
+    return hint
 
 
 def check_no_batches(cell: Cell) -> None:
@@ -123,9 +134,14 @@ class _Asked:
 
 
 def _searched(asked: _Asked, known: tuple[int, ...]) -> CpSatResult:
-    """What the solver makes of a cell, beginning with an order; empty: with nothing."""
+    """What the solver makes of a cell, beginning with an order; empty: with nothing.
+
+    Of a shop with robots where no part has a choice of machines the model of a shop is looked at first, then the general one.
+    Measured, on Bilge and Ulusoy's instances with two robots: it proves what is easy in a tenth to a third of the time, of set 7
+    its bounds stay far below the general model's.
+    """
     cell, objective, shared = asked.shared.cell, asked.shared.objective, asked.shared
-    shop = None if cell.serial else shop_of(cell, objective)
+    shop, bound = None if cell.serial else shop_of(cell, objective), 0.0
     while True:
         if shop is not None:
             model: Model | ShopModel | TransportModel = ShopModel(cell, shop, objective, known)
@@ -133,18 +149,23 @@ def _searched(asked: _Asked, known: tuple[int, ...]) -> CpSatResult:
             model = Model(cell, objective, known) if cell.serial else TransportModel(cell, objective, known)
         asked.until_s = min(asked.until_s, perf_counter() + asked.time_limit_s)
         worth = cost(follow(cell, known), objective) if known else inf
+        in_turn = shop is not None and bool(cell.robots) and not shop.flexible
         if isinstance(model, ShopModel):
-            found = _result(asked, model, worth, model.parameters)
+            most = {"max_deterministic_time": SHOP_LOOK} if in_turn else {}
+            found = _result(asked, model, worth, {**model.parameters, **most})
         elif isinstance(model, TransportModel) and objective == MAKESPAN and not model.times.rounded_s:
             found = _narrowed(asked, model, worth)
         else:
             found = _result(asked, model, worth)
         if found.status == "unknown" and known:
             found = replace(found, status="feasible", cost=worth, sequence=known)
+        found = replace(found, bound=min(found.cost, max(found.bound, bound)))
         _tell(shared, found)
-        if found.status in ("optimal", "impossible") or not asked.goes_on or shared.cost >= found.cost - SAME:
+        proven = found.status in ("optimal", "impossible")
+        if proven or not asked.goes_on or (shared.cost >= found.cost - SAME and not in_turn):
             return found
-        known = shared.sequence
+        known, bound = shared.sequence, found.bound
+        shop = None if in_turn else shop
 
 
 def _tell(shared: Shared, found: CpSatResult) -> None:

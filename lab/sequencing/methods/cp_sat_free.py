@@ -6,12 +6,11 @@ With many robots the bound is near the best order; with few it is far from it.
 from collections.abc import Sequence
 from time import perf_counter
 
-from ortools.sat.python import cp_model
-
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.routes import SERVER, entry
 from lab.sequencing.methods.cp_sat_solver import solved
 from lab.sequencing.methods.cp_sat_transport import TransportModel
+from lab.sequencing.methods.ortools_cp_sat import cp_model
 from lab.sequencing.methods.shared import Shared
 from lab.sequencing.simulate.run import Run
 

@@ -3,9 +3,8 @@
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from ortools.sat.python import cp_model
-
 from lab.sequencing.methods.cp_sat_tasks import Task, Tasks
+from lab.sequencing.methods.ortools_cp_sat import cp_model
 
 Nodes = Sequence[tuple[int, int, cp_model.LiteralT]]
 

@@ -11,8 +11,6 @@ from itertools import product
 from types import MappingProxyType
 from typing import NamedTuple
 
-from ortools.sat.python import cp_model
-
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import MAKESPAN, WITH_DUE_TIMES, cost
 from lab.sequencing.cell.routes import SERVER, Option, entry
@@ -20,6 +18,7 @@ from lab.sequencing.methods.cp_sat_rooms import add_chains
 from lab.sequencing.methods.cp_sat_solver import Solution
 from lab.sequencing.methods.cp_sat_tasks import teams_of
 from lab.sequencing.methods.cp_sat_times import Times
+from lab.sequencing.methods.ortools_cp_sat import cp_model
 from lab.sequencing.simulate.follow import follow
 
 
@@ -41,12 +40,14 @@ class Shop(NamedTuple):
     steps: Mapping[int, tuple[Step, ...]]
     layers: tuple[tuple[tuple[int, ...], ...], ...]
 
+    @property
+    def flexible(self) -> bool:
+        """Whether a part may take one of several machines."""
+        return any(len(layer) > 1 for of_part in self.layers for layer in of_part)
+
 
 def shop_of(cell: Cell, objective: str) -> Shop | None:
-    """The cell as a shop; None: it is more than one, or is judged by what a shop does not know.
-
-    None, too, of robots where no part has a choice: of Bilge and Ulusoy's instances the other model proves more.
-    """
+    """The cell as a shop; None: it is more than one, or is judged by what a shop does not know."""
     alike = len(teams_of(cell)) <= 1 and len({robot.start for robot in cell.robots}) <= 1
     begun = cell.begin_at != cell.starts
     more = cell.rules or cell.has_windows or cell.track or cell.arrivals or begun or any(cell.setups)
@@ -69,8 +70,7 @@ def shop_of(cell: Cell, objective: str) -> Shop | None:
         if len(set(stops)) < len(stops) or sum(ends) > len(found[-1]):
             return None  # some routes are longer than others
         layers.append(tuple(found))
-    flexible = any(len(layer) > 1 for of_part in layers for layer in of_part)
-    return Shop(steps, tuple(layers)) if flexible or not cell.robots else None
+    return Shop(steps, tuple(layers))
 
 
 def _rooms(cell: Cell) -> list[int]:

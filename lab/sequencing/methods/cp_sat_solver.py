@@ -5,8 +5,7 @@ from concurrent.futures import ThreadPoolExecutor, wait
 from time import perf_counter
 from typing import Literal
 
-from ortools.sat.python import cp_model
-
+from lab.sequencing.methods.ortools_cp_sat import cp_model
 from lab.sequencing.methods.shared import Shared
 
 PATIENCE_S = 5.0  # so long it looks at least before it begins again with another method's better order

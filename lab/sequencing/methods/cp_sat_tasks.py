@@ -5,11 +5,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from ortools.sat.python import cp_model
-
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.routes import SERVER, Option, from_the_ends, reached_from
 from lab.sequencing.methods.cp_sat_times import Times
+from lab.sequencing.methods.ortools_cp_sat import cp_model
 
 
 class Team(NamedTuple):

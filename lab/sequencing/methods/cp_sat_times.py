@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lab.errors import BadInput, counted
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.routes import SERVER, Option, from_the_ends, part_of
 from lab.sequencing.cell.ways import Way
@@ -88,7 +87,7 @@ class Timed(NamedTuple):
 
 
 def timed(cell: Cell, times: Times, ways: Sequence[Way], sequence: Sequence[int]) -> list[Timed]:
-    """A sequence with the model's times; BadInput for a decision that may not be taken, and when parts are left."""
+    """A sequence with the model's times."""
     run, moves, now = Run(cell), list[Timed](), 0
     ready, coming = [times.whole(seconds) for seconds in cell.begin_s], [part - 1 for part in cell.coming]
     intervals = [times.whole(seconds) for seconds in cell.arrivals.interval_s] if cell.arrivals else [0] * cell.parts
@@ -99,8 +98,7 @@ def timed(cell: Cell, times: Times, ways: Sequence[Way], sequence: Sequence[int]
     for run, decision, wait in steps(cell, sequence):
         part, option = part_of(decision, cell.parts) - 1, run.option(decision)
         place = run.locations[part]
-        if option is None:
-            raise BadInput(f"hint: {run.refusal(decision)}")
+        assert option is not None
         way = next(way for way in ways if way.place == place and way.option == option)
         begin = now + times.travel(run.robot, option.origin)
         begin = (max(begin, ready[part]) if option.waits else begin) + times.whole(wait.pick_s)
@@ -111,8 +109,6 @@ def timed(cell: Cell, times: Times, ways: Sequence[Way], sequence: Sequence[int]
             ready[part] = now + times.processing(option.to)
         run.move(decision, wait)
         moves.append(Timed(part, way, begin, now))
-    if not run.done:
-        raise BadInput(f"hint: the sequence ends after {counted(len(moves), 'move')}, but not all parts are finished")
     return moves
 
 

@@ -12,9 +12,6 @@ from itertools import pairwise
 from math import inf
 from typing import NamedTuple
 
-from ortools.sat.python import cp_model
-
-from lab.errors import BadInput, counted
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import MAKESPAN, WITH_DUE_TIMES, cost, machine_places
 from lab.sequencing.cell.routes import SERVER, choice_of, entry, part_of
@@ -23,6 +20,7 @@ from lab.sequencing.methods.cp_sat_solver import Solution
 from lab.sequencing.methods.cp_sat_tasks import Follows, Task, Tasks, Team
 from lab.sequencing.methods.cp_sat_times import Times
 from lab.sequencing.methods.cp_sat_track import Track
+from lab.sequencing.methods.ortools_cp_sat import cp_model
 from lab.sequencing.simulate.follow import follow, spoils, steps
 from lab.sequencing.simulate.run import Run, Windowless
 
@@ -377,17 +375,13 @@ def _routes(solver: Solution, arcs: Arcs) -> list[list[int]]:
 
 
 def _known(cell: Cell, times: Times, sequence: Sequence[int]) -> dict[tuple[int, int, int], tuple[int, int]]:
-    """When each task of a sequence begins and ends, by part, place and choice, in units; BadInput where it cannot be."""
+    """When each task of a sequence begins and ends, by part, place and choice, in units."""
     run, done = Run(cell), list[tuple[int, int, int]]()
     for run, decision, wait in steps(cell, sequence):
-        part, option = part_of(decision, cell.parts) - 1, run.option(decision)
+        part = part_of(decision, cell.parts) - 1
         place = run.locations[part]
-        if option is None:
-            raise BadInput(f"hint: {run.refusal(decision)}")
         run.move(decision, wait)
         done.append((part, place, choice_of(decision, cell.parts)))
-    if not run.done:
-        raise BadInput(f"hint: the sequence ends after {counted(len(done), 'move')}, but not all parts are finished")
     return {
         key: (times.whole(move.pick_s - (0.0 if move.served else move.service_s)), times.whole(move.end_s))
         for key, move in zip(done, run.moves, strict=True)

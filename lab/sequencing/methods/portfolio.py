@@ -72,7 +72,7 @@ def look_on(
         found = optimum(cell, most, shared)
         shared.tell("A*", found.sequence, found.bound_s)
         return known_of(shared)
-    _tell_alone(shared)
+    tell_alone(shared)
     from lab.sequencing.methods.one_robot import one_robot, why_not  # here and below: numba takes its time
 
     if objective == MAKESPAN and not why_not(cell):
@@ -88,7 +88,14 @@ def look_first(shared: Shared) -> None:
         with suppress(WorkFailed):  # whoever looks longer says so
             look_on(shared, most=FIRST_LOOK)
     else:
-        _tell_alone(shared)
+        tell_alone(shared)
+
+
+def tell_alone(shared: Shared) -> None:
+    """Tells the bounds that are known without any search."""
+    shared.tell("each part alone", bound=_alone(shared.cell, shared.objective))
+    if shared.objective == MAKESPAN:
+        shared.tell("each machine alone", bound=_machines_alone(shared.cell))
 
 
 def known_of(shared: Shared) -> BestKnown:
@@ -119,13 +126,6 @@ def _look(shared: Shared, time_limit_s: float, seed: int, workers: int) -> None:
         _side_by_side(shared, until_s, seed, workers)
     elif not shared.cell.serial:
         _prove(shared, time_limit_s, seed, workers)
-
-
-def _tell_alone(shared: Shared) -> None:
-    """Tells what is known without any search."""
-    shared.tell("each part alone", bound=_alone(shared.cell, shared.objective))
-    if shared.objective == MAKESPAN:
-        shared.tell("each machine alone", bound=_machines_alone(shared.cell))
 
 
 def _machines_alone(cell: Cell) -> float:

@@ -146,14 +146,19 @@ class Shared:
         """
         if get_ident() != self._owner:
             return
-        (self if self._parent is None else self._parent)._report()
+        (self if self._parent is None else self._parent).report(REPORT_S)
         if self.near or perf_counter() >= self.limits.until_s:
             self.over.set()
             raise SearchOver("gap" if self.near else "seconds")
 
-    def _report(self) -> None:
+    def told(self) -> None:
+        """What is known now has been told in another way: it is no news for the listener."""
+        self._heard = self._best, self._bound
+
+    def report(self, least_s: float = 0.0) -> None:
+        """Tell the listener what is new, unless it was told of something within the last seconds."""
         now_s, news = perf_counter(), (self._best, self._bound)
-        if self._hear is not None and now_s > self._heard_s + REPORT_S and self._heard != news:
+        if self._hear is not None and now_s >= self._heard_s + least_s and self._heard != news:
             self._heard, self._heard_s = news, now_s
             self._hear(self)
 

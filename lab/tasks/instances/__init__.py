@@ -1,14 +1,14 @@
 """Instances as the field writes them, read as the lab's cell files: a file a format, and how a format is told by its content."""
 
 import re
-from collections.abc import Callable
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 
 from lab.errors import BadInput
 from lab.tasks.cell_file import CellFile
-from lab.tasks.instances import bilge_ulusoy, dzn, fjsplib, jobshoplab, jsplib, phillips_unger, pyjobshop, taillard
 from lab.tasks.instances.source import Asked, Source
+from lab.tasks.instances.taillard import BLOCKS
 from lab.tasks.record import MAX_SHORT_BYTES, read_text
 
 __all__ = ["INSTANCES", "SUFFIXES", "Asked", "Format", "format_of", "is_instance", "read_instance", "takes_case"]
@@ -18,22 +18,27 @@ SUFFIXES = (".csv", ".dzn", ".yaml", ".yml", ".json", ".jsp", ".jssp", ".fjs")  
 
 @dataclass(frozen=True)
 class Format:
-    """A format: what it is, how it is read, the endings that mean it where the content says nothing."""
+    """A format: what it is, the module of this package that reads it, the endings that mean it where the content says nothing."""
 
     help: str
-    read: Callable[[Source, Asked], CellFile]
+    module: str
     suffixes: tuple[str, ...] = ()
+
+    def read(self, source: Source, asked: Asked) -> CellFile:
+        """The cell of a file of this format, whose module is loaded now; BadInput, with file and line, for a damaged one."""
+        cell: CellFile = import_module(f"{__name__}.{self.module}").read(source, asked)
+        return cell
 
 
 INSTANCES = {
-    "jsplib": Format("job shops of JSPLIB and the OR-Library, text", jsplib.read, (".jsp", ".jssp")),
-    "taillard": Format("Taillard's job shops, text: times, then machines", taillard.read),
-    "fjsplib": Format("flexible job shops of FJSPLIB, text", fjsplib.read, (".fjs",)),
-    "bilge-ulusoy": Format("job sets of Bilge and Ulusoy, CSV; --case SET:LAYOUT, such as 7:1", bilge_ulusoy.read),
-    "phillips-unger": Format("tanks of a hoist line, CSV; --layout: its empty moves", phillips_unger.read),
-    "hoist": Format("hoist lines as MiniZinc data", dzn.read, (".dzn",)),
-    "jobshoplab": Format("JobShopLab's job shops with vehicles, YAML", jobshoplab.read, (".yaml", ".yml")),
-    "pyjobshop": Format("PyJobShop's JSON, without breaks and deadlines", pyjobshop.read, (".json",)),
+    "jsplib": Format("job shops of JSPLIB and the OR-Library, text", "jsplib", (".jsp", ".jssp")),
+    "taillard": Format("Taillard's job shops, text: times, then machines", "taillard"),
+    "fjsplib": Format("flexible job shops of FJSPLIB, text", "fjsplib", (".fjs",)),
+    "bilge-ulusoy": Format("job sets of Bilge and Ulusoy, CSV; --case SET:LAYOUT, such as 7:1", "bilge_ulusoy"),
+    "phillips-unger": Format("tanks of a hoist line, CSV; --layout: its empty moves", "phillips_unger"),
+    "hoist": Format("hoist lines as MiniZinc data", "dzn", (".dzn",)),
+    "jobshoplab": Format("JobShopLab's job shops with vehicles, YAML", "jobshoplab", (".yaml", ".yml")),
+    "pyjobshop": Format("PyJobShop's JSON, without breaks and deadlines", "pyjobshop", (".json",)),
 }
 
 
@@ -105,7 +110,7 @@ def _of_numbers(source: Source) -> str | None:
     numbers = [row for _, row in rows if row[0][0].isdigit()]
     if not numbers:
         return None
-    if words & {*taillard.BLOCKS} or {"nb"} & words:
+    if words & {*BLOCKS} or {"nb"} & words:
         return "taillard"
     if not rows[0][1][0][0].isdigit():
         return None

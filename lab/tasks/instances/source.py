@@ -5,8 +5,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import yaml
-
 from lab.errors import BadInput
 from lab.sequencing.cell.cell import MAX_PARTS
 
@@ -80,6 +78,8 @@ class Source:
 
 def json_line(text: str, way: Sequence[str | int]) -> int:
     """The line of a value of a JSON text; of what has none, of what is around it. JSON is YAML, which knows its lines."""
+    import yaml  # here, for it takes its time, and only a refusal needs it
+
     try:
         node = yaml.compose(text, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader))
     except yaml.YAMLError:  # a tab, which YAML does not take for a space

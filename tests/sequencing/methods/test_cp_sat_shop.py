@@ -1,4 +1,4 @@
-"""CP-SAT on flexible shops: by hand, and against every list of decisions."""
+"""CP-SAT on shops, flexible ones among them: by hand, and against every list of decisions."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import MAKESPAN, cost
 from lab.sequencing.cell.stations import UNLIMITED, Begins, Product, Robot, Stage, Station
+from lab.sequencing.methods import cp_sat as module
 from lab.sequencing.methods.cp_sat import cp_sat
 from lab.sequencing.methods.cp_sat_shop import shop_of
 from lab.sequencing.simulate.follow import follow
@@ -63,6 +64,15 @@ def test_a_part_stays_where_its_next_operation_is() -> None:
     cell = flexible([[{1: 4.0}, {1: 3.0, 2: 1.0}]], [[0, 2, 9], [2, 0, 5], [9, 5, 0]], 1)
     found = cp_sat(cell)
     assert (found.status, found.cost) == ("optimal", 9.0)
+
+
+@pytest.mark.parametrize("look", [0.0, 5.0])
+def test_without_a_choice_either_model_proves_it(monkeypatch: pytest.MonkeyPatch, look: float) -> None:
+    """2 s of way to either machine and 4 s of work: 6 s with two vehicles; where the shop's model has no time, the other does."""
+    monkeypatch.setattr(module, "SHOP_LOOK", look)
+    cell = flexible([[{1: 4.0}], [{2: 4.0}]], [[0, 2, 2], [2, 0, 5], [2, 5, 0]], 2)
+    found = cp_sat(cell)
+    assert (found.status, found.cost, found.bound) == ("optimal", 6.0, 6.0)
 
 
 def test_what_is_more_than_a_shop_is_none() -> None:

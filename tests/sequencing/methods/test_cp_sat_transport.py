@@ -170,7 +170,7 @@ def test_it_begins_with_the_sequence_it_is_given(ex11: Callable[[int], Cell]) ->
     assert found.cost == 96.0
     with pytest.raises(BadInput, match="hint"):
         cp_sat(cell, hint=(1, 1, 1, 1, 1, 1, 1, 1))
-    with pytest.raises(BadInput, match="not all parts"):
+    with pytest.raises(BadInput, match="hint: the sequence ends after"):
         cp_sat(cell, hint=first_come(cell)[:-1])
 
 

@@ -1,0 +1,100 @@
+"""Ctrl-C while `lab sequence` looks for an order: each time there is one, with its bound, and exit 130."""
+
+import json
+import random
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+from devtools.commands import LAB, Ended, environment, kill_session
+from devtools.parts import Outcome, Part
+from devtools.plain_pairs import KINDS, drawn, written
+from lab.sequencing import SEQUENCERS
+from lab.sequencing.search import SAME
+
+EACH = 20  # times that each method is stopped
+LATEST_S = 2.5  # after the search has begun
+MOST_S = 60.0
+BEGINS = "Find the order"  # how the line begins that a search begins with
+SHOP, LATE = "larger job shop, 1 vehicle", "larger job shop, due dates"  # what is drawn
+ON = {"earliest-due": LATE, "srl-time": "toast-case-2"}  # which method is not made for SHOP, and what it is stopped on
+METHODS = tuple(SEQUENCERS)
+
+
+def prepare(room: Path, seed: int) -> int:
+    """Writes the shops; as many attempts as methods, EACH times."""
+    for name in (SHOP, LATE):
+        kind = next(one for one in KINDS if one.name == name)
+        (room / name).mkdir(exist_ok=True)
+        words, _ = written(drawn(kind, seed), kind, room / name)
+        (room / name / "words.json").write_text(json.dumps(words), encoding="utf-8")
+    return EACH * len(METHODS)
+
+
+def attempt(number: int, seed: int, room: Path) -> Outcome:
+    """Stops one method at a drawn moment."""
+    method, after_s = METHODS[number % len(METHODS)], LATEST_S * random.Random(f"{seed} {number}").random()
+    on = ON.get(method, SHOP)
+    file = room / on / "words.json"
+    words = json.loads(file.read_text(encoding="utf-8")) if file.exists() else [on, "--toasts", "24"]
+    more = ["--method", method, "--seconds", f"{MOST_S / 2:g}", "--episodes", "100000", "--json"]
+    ended = stopped(["sequence", *words, *more], after_s, room)
+    (room / f"{number}.txt").write_text(ended.stderr, encoding="utf-8")
+    if ended.code == 0:
+        return Outcome(f"{method}: it had ended", f"{method} after {after_s:.2f} s")
+    return Outcome(
+        method, f"{method} after {after_s:.2f} s", judged(ended), figures={"until_end_s": round(ended.seconds, 2)}
+    )
+
+
+def stopped(words: list[str], after_s: float, room: Path) -> Ended:
+    """The command, sent SIGINT so long after its search has begun; seconds: from then to its end."""
+    child = subprocess.Popen(
+        [*LAB, *words], cwd=room, env=environment(room, PYTHONFAULTHANDLER="1"), text=True, start_new_session=True,
+        stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # a shell's background jobs ignore it
+    )  # fmt: skip
+    assert child.stderr is not None
+    said = [child.stderr.readline()]
+    while said[-1] and not said[-1].startswith(BEGINS):
+        said.append(child.stderr.readline())
+    time.sleep(after_s)
+    child.send_signal(signal.SIGINT)
+    begun, late = time.monotonic(), False
+    try:
+        out, rest = child.communicate(timeout=MOST_S)
+    except subprocess.TimeoutExpired:
+        late = True
+        kill_session(child.pid)
+        out, rest = child.communicate()
+    return Ended(child.returncode, out, "".join([*said, rest]), time.monotonic() - begun, 0, late)
+
+
+def judged(ended: Ended) -> str:
+    """What is wrong with how it ended; empty if nothing is."""
+    if broke := ended.fault((130,)):
+        return broke
+    if ended.stdout.count("\n") != 1:
+        return f"{ended.stdout.count(chr(10))} lines instead of one document"
+    found = json.loads(ended.stdout)
+    if "error" in found:
+        return f"no order: {found['error']}"
+    if (found["stopped_by"], found["interrupted"]) != ("Ctrl-C", True):
+        return f"stopped by {found['stopped_by']}"
+    if not found["best_sequence"] or len(found["best_moves"]) != len(found["best_sequence"]):
+        return "its order is empty"
+    if not 0 < found["bound_cost"] <= found["best_cost"] + SAME and found["objective"] == "makespan":
+        return f"bound {found['bound_cost']}, best {found['best_cost']}"
+    if found["optimum_proven"] != (found["best_cost"] <= found["bound_cost"] + SAME):
+        return f"proven: {found['optimum_proven']}, bound {found['bound_cost']}, best {found['best_cost']}"
+    return ""
+
+
+PART = Part(
+    what="Ctrl-C at any time of a search, for each method of `lab sequence`",
+    target="an order each time, with its bound",
+    count=None,
+    prepare=prepare,
+    attempt=attempt,
+)
