@@ -84,7 +84,7 @@ def attempt(number: int, seed: int, room: Path) -> Outcome:
     write_whole(task, text.encode())
     env = environment(folder)
     seeded = ("--seed", str(int(rng.integers(1000))))
-    ran = lab("run", task, "--json", "--no-view", *seeded, cwd=folder, env=env, timeout_s=RUN_S)
+    ran = lab("run", task, "--json", *seeded, cwd=folder, env=env, timeout_s=RUN_S)
     group, broke = judged(ran, lambda: lab("task", "check", task, *seeded, cwd=folder, env=env, timeout_s=RUN_S))
     if not broke:
         rmtree(folder)
