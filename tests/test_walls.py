@@ -15,7 +15,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 LAYERS: tuple[tuple[str, ...], ...] = (
-    ("lab.errors", "lab.lazy", "lab.operating_system"),
+    ("lab.errors", "lab.interrupts", "lab.lazy", "lab.operating_system"),
     ("lab.files", "lab.mdp", "lab.optional", "lab.plugins", "lab.statistics", "lab.workers"),
     ("lab.learning", "lab.vision"),
     ("lab.sequencing", "lab.toolbox"),

@@ -1,9 +1,12 @@
 """Ctrl-C: heard wherever it is pressed, also where Python or a library would drop it."""
 
+import os
 import signal
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+
+from lab.interrupts import UNINTERRUPTED
 
 TYPE_CHECKING = False  # as typing's, which takes longer to load than all else here: Ctrl-C is heard only after that
 if TYPE_CHECKING:
@@ -12,6 +15,7 @@ if TYPE_CHECKING:
 
 AGAIN_S = 0.002  # between two looks whether it can be raised
 LOOKS = 500  # at a library that is busy, before it is raised there all the same
+COMPILERS = {"llvmlite", "numba"}
 OWN = __file__.removesuffix("cli/interrupt.py")
 
 
@@ -20,9 +24,9 @@ def ctrl_c_is_heard() -> Iterator[None]:
     """Raises KeyboardInterrupt on Ctrl-C, but not where a library may drop it unseen, or is in the midst of taking a lock.
 
     It is raised where the lab's own code runs, or where nothing has moved since the last look, as in a wait; in a library
-    that is busy for a second, or when it is pressed once more, there. Never while something is being imported, or in LLVM.
-    It is raised again when Python has ignored it (in a callback). Windows has no interval timer: there it is raised where
-    Python hears it.
+    that is busy for a second, or when it is pressed once more, there. Never while something is being imported, while numba or
+    LLVM compile, or in a function that is `uninterrupted`. It is raised again when Python has ignored it (in a callback).
+    Windows has no interval timer: there it is raised where Python hears it.
     """
     has_timer = hasattr(signal, "setitimer")
     if (
@@ -67,13 +71,16 @@ def ctrl_c_is_heard() -> Iterator[None]:
 
 
 def _must_end(frame: "FrameType | None", last: "FrameType") -> bool:
-    """Whether something is being imported, or LLVM is at work, between a frame and one of those that called it.
+    """Whether something that is not to be interrupted is at work between a frame and one of those that called it.
 
-    What LLVM owns is handed over in two steps: between them Ctrl-C made a module be freed twice, a segmentation fault.
+    What LLVM owns is handed over in two steps: between them Ctrl-C made a module be freed twice, a segmentation fault. In numba's
+    compiler it comes out as another error.
     """
     while frame is not None and frame is not last:
         file = frame.f_code.co_filename
-        if file.startswith("<frozen importlib") or "llvmlite" in file:
+        if file.startswith("<frozen importlib") or COMPILERS.intersection(file.split(os.sep)):
+            return True
+        if frame.f_code in UNINTERRUPTED:
             return True
         frame = frame.f_back
     return False

@@ -1,8 +1,9 @@
 """Sessions of a method on a cell, then the proof beside it: whenever that is stopped, there is an order, and its bound."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
+from lab.interrupts import uninterrupted
 from lab.production.order import SECOND_OPINION_S, reference_of, unit_of
 from lab.sequencing import SEQUENCERS
 from lab.sequencing.cell.cell import Cell
@@ -109,16 +110,22 @@ def looked_for(
         stopped_by = over.by
     except KeyboardInterrupt:
         stopped_by = CTRL_C
+    return _found(heard, best, method, stopped_by)
+
+
+@uninterrupted
+def _found(heard: Sequence[_Heard], best: Shared, method: str, stopped_by: str) -> Found:
+    """What came of the sessions of a method; where none has found an order, what is known beside them."""
     found = [result for one in heard if (result := one.result())]
     if not best.sequence:
-        best.tell(FIRST_COME, any_order(cell))
-    if not best.bound and search.objective in BUILT_IN:  # it was stopped before anything was proven
+        best.tell(FIRST_COME, any_order(best.cell))
+    if not best.bound and best.objective in BUILT_IN:  # it was stopped before anything was proven
         tell_alone(best)
     best.report()
     if not (found or best.sequence):
         if stopped_by == CTRL_C:
-            raise KeyboardInterrupt("stopped by Ctrl-C before an order was found") from None
-        raise not_in_time(cell, method, best.bound) from None
+            raise KeyboardInterrupt("stopped by Ctrl-C before an order was found")
+        raise not_in_time(best.cell, method, best.bound)
     if not found:
         found, method = [SequenceResult(best.sequence, best.cost, (best.cost,))], best.found_by
     return Found(found, method, _known(best), stopped_by or None)

@@ -11,9 +11,10 @@ from lab.advice.advisors import PEOPLE, AdvisorName
 from lab.advice.entries import Closed
 from lab.advice.journal import Again, Journal
 from lab.errors import BadInput, unknown
+from lab.interrupts import uninterrupted
 from lab.learning.requests import Ask
 from lab.learning.settings import GateSettings
-from lab.production.any_time import CTRL_C, looked_for
+from lab.production.any_time import CTRL_C, Found, looked_for
 from lab.production.drawn_times import stochastic
 from lab.production.order import NOBODY, KeepOrder, OrderAdvice, advised_session
 from lab.sequencing import SEQUENCERS, check_method, find_sequence
@@ -215,8 +216,7 @@ def _sessions(
     limits = Limits.of(wanted.seconds, wanted.gap)
     looked = looked_for(cell, method, search, wanted.sessions, find, say, limits, began)
     found, interrupted = looked.sessions, looked.stopped_by == CTRL_C
-    document = _document(cell, looked.method, search, found, looked.known, wanted)
-    document |= {"stopped_by": looked.stopped_by, "interrupted": interrupted}
+    document = _document(cell, search, looked, wanted)
     if wanted.stochastic and not interrupted:
         document["stochastic"] = stochastic(
             cell, method, search, min(found, key=lambda one: one.cost), chance, wanted.seed
@@ -228,9 +228,9 @@ def _sessions(
     return document, found
 
 
-def _document(
-    cell: Cell, method: str, search: Search, found: Sequence[SequenceResult], known: Reference, wanted: Wanted
-) -> dict[str, Any]:
+@uninterrupted
+def _document(cell: Cell, search: Search, looked: Found, wanted: Wanted) -> dict[str, Any]:
+    found, known, method = looked.sessions, looked.known, looked.method
     timed, same_times = search.objective == MAKESPAN, search.chance == NO_CHANCE  # a lucky draw is no success
     # What was found in drawn times is judged by the means, too.
     costs = [result.cost if same_times else cost(follow(cell, result.sequence), search.objective) for result in found]
@@ -273,6 +273,8 @@ def _document(
         "advised": getattr(best, "advised", None),  # None: nobody was to be asked, or the best session was stopped
         "stochastic": None,
         "files": {},
+        "stopped_by": looked.stopped_by,
+        "interrupted": looked.stopped_by == CTRL_C,
     }
 
 
@@ -323,6 +325,7 @@ def _in_words(cell: Cell, sequence: Sequence[int]) -> list[str]:
     return words
 
 
+@uninterrupted
 def draw(cell: Cell, document: dict[str, Any], found: Sequence[SequenceResult], files: dict[str, Path]) -> None:
     """What is asked for by name: "plot", the costs of the episodes, "gantt" and "schedule", of the best order known."""
     from lab.view.gantt import gantt
