@@ -11,7 +11,7 @@ from lab.api.data_frames import data_frame
 from lab.api.options import ToolboxOrPlace, checked, toolbox_of
 from lab.api.pictures import Picture
 from lab.errors import BadInput
-from lab.production.sequencing_job import Wanted, sequence_cell, sequenced_named
+from lab.production.sequencing_job import SequencingOptions, sequence_cell, sequenced_named
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import NO_CHANCE
 from lab.sequencing.search import SequenceResult
@@ -116,7 +116,7 @@ def sequence(
     """
     given = checked(options, OrderOptions, "lab.sequence")
     case, toasts = given.pop("case", None), given.pop("toasts", None)
-    wanted = Wanted(seed=seed, **given)
+    wanted = SequencingOptions(seed=seed, **given)
     if isinstance(cell, Cell):
         if case is not None or toasts is not None:
             raise BadInput(f"case {case}, toasts {toasts} beside a Cell: its order is its own: leave them away")

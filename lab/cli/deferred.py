@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from lab.production.run_journal import RunEnded, RunJournal, is_run, replayed_run
     from lab.production.run_options import RunOptions, begun, kept_task
     from lab.production.run_options import gone_on as run_gone_on
-    from lab.production.sequencing_job import Wanted, sequence_named
+    from lab.production.sequencing_job import SequencingOptions, sequence_named
     from lab.seat.lesson_seat import LessonSeat
     from lab.seat.page.teaching_page import SeatPage
     from lab.seat.run_progress import RunProgress
@@ -166,7 +166,7 @@ TABLE = {
     "lab.production.run_advice": ("RunAdvice",),
     "lab.production.run_journal": ("is_run", "replayed_run", "RunEnded", "RunJournal"),
     "lab.production.run_options": ("begun", "kept_task", "gone_on as run_gone_on", "RunOptions"),
-    "lab.production.sequencing_job": ("sequence_named", "Wanted"),
+    "lab.production.sequencing_job": ("sequence_named", "SequencingOptions"),
     "lab.seat.lesson_seat": ("LessonSeat",),
     "lab.seat.page.teaching_page": ("SeatPage",),
     "lab.seat.run_progress": ("RunProgress",),

@@ -60,7 +60,7 @@ def sequenced(
 ) -> dict[str, Any]:
     """The document of a session of `lab sequence`, whom it may ask behind such names as "terminal", its pictures in files."""
     options = kept.options
-    wanted = deferred.Wanted(
+    wanted = deferred.SequencingOptions(
         options.method,
         options.episodes,
         options.objective,

@@ -216,7 +216,7 @@ def _world(mdp: TabularMDP) -> linear_loop.World:
     physics, bounds = mdp.physics, mdp.physics.bounds
     ends, cells = (np.array(bounds.low), np.array(bounds.high)), np.array(bounds.shape)
     rewards = physics.reward, physics.last_reward
-    return linear_loop.World(physics.number, np.zeros(len(cells)), *ends, cells, *rewards, physics.falls)
+    return linear_loop.World(physics.number, np.zeros(len(cells)), *ends, cells, *rewards, physics.longer_is_better)
 
 
 def play(mdp: CellTable, policy: NDArray[np.int64], drawn: FloatArray, most: int) -> NDArray[np.int64]:

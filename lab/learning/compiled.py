@@ -23,7 +23,7 @@ from lab.errors import Notice, WorkFailed
 from lab.files import source_key
 
 MOST_FOLDERS = 6  # versions of packages whose compiled functions are kept, each of a few tens of MB
-_LEAN: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
+_WITHOUT_REFCOUNTS: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
 _CONFIG: Any = numba.config  # its types do not know what it holds
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -79,23 +79,26 @@ def _not_kept(kept: Path, error: Exception) -> None:
     )
 
 
-def lean(function: Function, **options: Any) -> Function:
-    """The function as njit makes it without reference counting; it must not allocate arrays."""
-    return compiled(function, **_LEAN, **options)
+def without_refcounts(function: Function, **options: Any) -> Function:
+    """The function compiled by njit without reference counting; it must not allocate arrays."""
+    return compiled(function, **_WITHOUT_REFCOUNTS, **options)
 
 
 def inner(function: Function, **options: Any) -> Function:
-    """For what only lean functions call: part of these, so that it is not kept, and Python cannot call it.
+    """The function compiled as part of functions without reference counting, the only ones that call it: it is not kept, and
+    Python cannot call it.
 
     What Python would need to call it takes a third of the time to compile.
     """
     jit: Any = numba.njit
-    jitted: Function = jit(nogil=True, no_cpython_wrapper=True, no_cfunc_wrapper=True, **_LEAN, **options)(function)
+    jitted: Function = jit(nogil=True, no_cpython_wrapper=True, no_cfunc_wrapper=True, **_WITHOUT_REFCOUNTS, **options)(
+        function
+    )
     return jitted
 
 
 def inlined(function: Function) -> Function:
-    """For what lean functions call in every step: becomes part of its callers, so that handing records on costs nothing."""
+    """The function as `inner`, inlined: for what is called in every step, so that handing records on costs nothing."""
     return inner(function, forceinline=True)
 
 

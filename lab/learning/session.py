@@ -63,7 +63,7 @@ class Session:
         self.q = self.update.q  # what the loop touches are plain lists
         self.visits: list[list[int]] = [[0] * mdp.n_actions for _ in range(mdp.n_states)]
         self.actions = range(mdp.n_actions)
-        self.longer_is_better = cells is not None and cells.physics.falls
+        self.longer_is_better = cells is not None and cells.physics.longer_is_better
         self.choose = SELECTIONS[learner.selection].make
         several_starts = bool(mdp.starts) or not (isinstance(environment, TableEnvironment) or cells is not None)
         size = mdp.n_states, mdp.n_actions

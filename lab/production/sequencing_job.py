@@ -46,7 +46,7 @@ PORTFOLIO = "portfolio"  # the method of which it is told what in it found the o
 
 
 @dataclass(frozen=True)
-class Wanted:
+class SequencingOptions:
     """What `lab sequence` is asked for; None: as the file says. advisor: who may be asked which part to move next.
 
     keep: gives the journal of what people say, by default one that is not written. durations: those of a task's moves
@@ -74,7 +74,13 @@ class Wanted:
 
 
 def sequence_named(
-    name: str, case: str | None, toasts: int | None, wanted: Wanted, *, teacher: Teacher, files: dict[str, Path]
+    name: str,
+    case: str | None,
+    toasts: int | None,
+    wanted: SequencingOptions,
+    *,
+    teacher: Teacher,
+    files: dict[str, Path],
 ) -> dict[str, Any]:
     """What `lab sequence` does: the document of `sequenced_named`, and its pictures.
 
@@ -91,7 +97,7 @@ def sequence_named(
 
 
 def sequenced_named(
-    name: str, case: str | None, toasts: int | None, wanted: Wanted, teacher: Teacher
+    name: str, case: str | None, toasts: int | None, wanted: SequencingOptions, teacher: Teacher
 ) -> tuple[Cell, dict[str, Any], list[SequenceResult]]:
     """A cell file's cell, or a task's over durations measured in simulation, with its document and its sessions.
 
@@ -118,13 +124,13 @@ def sequenced_named(
     return cell, {"task": loaded.name} | document, found
 
 
-def _check_names(wanted: Wanted, settings: Sequencing) -> None:
+def _check_names(wanted: SequencingOptions, settings: Sequencing) -> None:
     """BadInput for a name that no table holds, and for advice to a method that asks for none; before any work."""
     method, objective = wanted.method or settings.method, wanted.objective or settings.objective
     check_method(method)
     if objective not in OBJECTIVES:
         raise unknown("objective", objective, OBJECTIVES, "--objective")
-    if wanted.advisor.row != "none" or wanted.gate != Wanted.gate:
+    if wanted.advisor.row != "none" or wanted.gate != SequencingOptions.gate:
         from lab.sequencing.methods.srl_advised import check_gate  # only where it counts: the compiler takes its time
 
         check_gate(wanted.gate)
@@ -147,7 +153,7 @@ def ordered_cell(file: CellFile, case: str | None, toasts: int | None) -> Cell:
     return file.cell(order_from_word(file, case) if case is not None else toasts)
 
 
-def measured_cell(task: Task, toasts: int | None, wanted: Wanted, teacher: Teacher) -> Cell:
+def measured_cell(task: Task, toasts: int | None, wanted: SequencingOptions, teacher: Teacher) -> Cell:
     """The cell of a task, once its skills are learned and their durations measured."""
     from lab.production.durations import Durations, cell_of
     from lab.production.run import teach_all
@@ -164,7 +170,7 @@ def measured_cell(task: Task, toasts: int | None, wanted: Wanted, teacher: Teach
 
 
 def sequence_cell(
-    cell: Cell, settings: Sequencing, wanted: Wanted, chance: Chance, *, tell: Tell = unheard
+    cell: Cell, settings: Sequencing, wanted: SequencingOptions, chance: Chance, *, tell: Tell = unheard
 ) -> tuple[dict[str, Any], list[SequenceResult]]:
     """Sessions of one method on a cell, beside what cannot be beaten; the document of `lab sequence`, and the sessions.
 
@@ -185,7 +191,7 @@ def sequence_cell(
 
 
 def _sessions(
-    cell: Cell, settings: Sequencing, wanted: Wanted, chance: Chance, tell: Tell, journal: Journal | None
+    cell: Cell, settings: Sequencing, wanted: SequencingOptions, chance: Chance, tell: Tell, journal: Journal | None
 ) -> tuple[dict[str, Any], list[SequenceResult]]:
     method = wanted.method or settings.method
     check_method(method)
@@ -229,7 +235,7 @@ def _sessions(
 
 
 @uninterrupted
-def _document(cell: Cell, search: Search, looked: Found, wanted: Wanted) -> dict[str, Any]:
+def _document(cell: Cell, search: Search, looked: Found, wanted: SequencingOptions) -> dict[str, Any]:
     found, known, method = looked.sessions, looked.known, looked.method
     timed, same_times = search.objective == MAKESPAN, search.chance == NO_CHANCE  # a lucky draw is no success
     # What was found in drawn times is judged by the means, too.

@@ -12,7 +12,7 @@ from math import radians, tan
 import numpy as np
 from numpy.typing import NDArray
 
-from lab.learning.compiled import lean
+from lab.learning.compiled import without_refcounts
 from lab.sim.frames import Vector, Viewpoint
 
 Floats = NDArray[np.float64]
@@ -242,4 +242,4 @@ def shade(
                 drawn[y, x, channel] += alpha * (light * colours[face, channel] - drawn[y, x, channel])
 
 
-_fill, _shade = lean(fill), lean(shade)
+_fill, _shade = without_refcounts(fill), without_refcounts(shade)

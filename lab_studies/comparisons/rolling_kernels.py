@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from lab.learning.compiled import inner, lean
+from lab.learning.compiled import inner, without_refcounts
 from lab.sequencing.methods.priority_kernels import carried_on
 from lab.sequencing.simulate.kernels import take
 
@@ -19,7 +19,7 @@ def _as_it_is(run: Any, now: Any) -> None:
     run.robots_at[0], run.robots_s[0] = now.robots_at[0], now.robots_s[0]
 
 
-@lean
+@without_refcounts
 def mean_cost(cell: Any, run: Any, now: Any, order: Any, way: Any, ready_s: Any, seeds: Any) -> float:
     """The mean cost over K futures of a way, (part from 0, option), and of the list after it.
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.learning import splitmix
-from lab.learning.compiled import lean
+from lab.learning.compiled import without_refcounts
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -21,7 +21,11 @@ SRL, MONTE_CARLO, RANDOM = range(3)  # in METHODS
 ALPHA, DISCOUNT, GOAL_REWARD = 0.05, 0.9, 1.5
 LATEST_S = 20_000.0  # the listing gives an episode up then
 MOST_MOVES = 10_000_000  # null moves take no time, so time alone would not end every episode; never met
-_following, _mixed, _fraction = lean(splitmix.following), lean(splitmix.mixed), lean(splitmix.fraction)
+_following, _mixed, _fraction = (
+    without_refcounts(splitmix.following),
+    without_refcounts(splitmix.mixed),
+    without_refcounts(splitmix.fraction),
+)
 ROBOT, STATE, SEEN, MOVED = range(4)  # in `whole`: its station, the state's number, states visited, toasts moved
 
 
@@ -89,14 +93,14 @@ class Found(NamedTuple):
     sequences: Ints
 
 
-@lean
+@without_refcounts
 def _uniform(work: Any) -> float:
     """The next number in [0, 1) of the stream (`splitmix.stream`)."""
     work.stream[0] = _following(work.stream[0])
     return float(_fraction(_mixed(work.stream[0])))
 
 
-@lean
+@without_refcounts
 def processing_s(toasts: Any, work: Any, machine: int) -> float:
     """Not cut off at 0 s, as in the listing. Source: Box and Muller 1958."""
     mean_s = toasts.processing_s[machine]
@@ -106,7 +110,7 @@ def processing_s(toasts: Any, work: Any, machine: int) -> float:
     return float(mean_s * (1.0 + toasts.spread * sqrt(-2.0 * log(1.0 - u)) * cos(2.0 * pi * v)))
 
 
-@lean
+@without_refcounts
 def _target(work: Any, origin: int) -> int:
     """Where a toast that is picked up at a station goes: to the machine ahead when it is free, else to its buffer."""
     if origin == APPLIER:
@@ -115,7 +119,7 @@ def _target(work: Any, origin: int) -> int:
     return machine - 1 if work.busy[machine] else machine
 
 
-@lean
+@without_refcounts
 def reset(work: Any) -> None:
     for toast in range(len(work.place)):
         work.place[toast], work.ready_s[toast] = PLATE, 0.0
@@ -125,7 +129,7 @@ def reset(work: Any) -> None:
     work.whole[ROBOT], work.whole[STATE], work.whole[SEEN], work.whole[MOVED] = TOASTER_BUFFER, 0, 0, 0
 
 
-@lean
+@without_refcounts
 def carry(toasts: Any, rules: Any, work: Any, toast: int) -> None:
     """The robot goes to a toast, waits until it is processed, and takes it on, or leaves it where it is: a null move."""
     origin = work.place[toast]
@@ -146,7 +150,7 @@ def carry(toasts: Any, rules: Any, work: Any, toast: int) -> None:
         work.whole[STATE] += (target - origin) * STATIONS**toast
 
 
-@lean
+@without_refcounts
 def _visit(work: Any) -> None:
     state = work.whole[STATE]
     if work.visits[state] == 0:
@@ -155,7 +159,7 @@ def _visit(work: Any) -> None:
     work.visits[state] += 1
 
 
-@lean
+@without_refcounts
 def list_options(toasts: Any, rules: Any, work: Any) -> int:
     """How many next states may be chosen: by toast, the nearer station first."""
     count, state, weight = 0, work.whole[STATE], 1
@@ -176,7 +180,7 @@ def list_options(toasts: Any, rules: Any, work: Any) -> int:
     return count
 
 
-@lean
+@without_refcounts
 def _choose(rules: Any, work: Any, count: int, epsilon: float) -> int:
     """The toast of one of the options."""
     if _uniform(work) <= epsilon:
@@ -198,7 +202,7 @@ def _choose(rules: Any, work: Any, count: int, epsilon: float) -> int:
     return int(work.toast[chosen])
 
 
-@lean
+@without_refcounts
 def _episode(toasts: Any, rules: Any, work: Any, epsilon: float) -> float:
     """One episode with the step update of SRL; its time [s], LATEST_S when it does not end."""
     reset(work)
@@ -221,7 +225,7 @@ def _episode(toasts: Any, rules: Any, work: Any, epsilon: float) -> float:
     return LATEST_S
 
 
-@lean
+@without_refcounts
 def learn(rules: Any, work: Any, time_s: float, best_s: float) -> None:
     """What the time of an episode does to the values of the states visited, the start left out, once for each visit."""
     gain = 1.0 / time_s
@@ -240,7 +244,7 @@ def learn(rules: Any, work: Any, time_s: float, best_s: float) -> None:
             work.values[state] = gain
 
 
-@lean
+@without_refcounts
 def run_sessions(toasts: Any, rules: Any, work: Any, epsilons: Any, seeds: Any, found: Any) -> None:
     """A session for each seed (N,), with exploration epsilons (E,); what they come to is written to `found`."""
     for n in range(len(seeds)):

@@ -15,10 +15,14 @@ from lab import files
 from lab.files import source_hash, source_key
 from lab.learning import compiled
 
-DOUBLED = (
-    "from lab.learning.compiled import inner, lean\nfrom kitchen import recipe\n\nslices = inner(recipe.slices)\n\n\n"
-)
-DOUBLED += "@lean\ndef doubled(toasts):\n    return 2 * slices(toasts)\n"
+DOUBLED = """from lab.learning.compiled import inner, without_refcounts
+from kitchen import recipe
+
+slices = inner(recipe.slices)
+
+
+"""
+DOUBLED += "@without_refcounts\ndef doubled(toasts):\n    return 2 * slices(toasts)\n"
 SLICES = "from .bread import (\n    PER_TOAST,  # slices\n)\n\n\ndef slices(toasts):\n    return PER_TOAST * toasts\n"
 
 

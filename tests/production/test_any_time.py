@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from lab.errors import BadInput
-from lab.production.sequencing_job import Wanted, sequence_cell
+from lab.production.sequencing_job import SequencingOptions, sequence_cell
 from lab.sequencing import SEQUENCERS
 from lab.sequencing.cell.chance import NO_CHANCE
 from lab.sequencing.cell.objectives import OBJECTIVES
@@ -49,7 +49,9 @@ def pressed_at(monkeypatch: pytest.MonkeyPatch, number: int) -> list[str]:
     return told
 
 
-def found(cell_name: str, wanted: Wanted, tell: Callable[[Event], None] = lambda event: None) -> dict[str, Any]:
+def found(
+    cell_name: str, wanted: SequencingOptions, tell: Callable[[Event], None] = lambda event: None
+) -> dict[str, Any]:
     """The document, whose order is carried out, and costs what it says."""
     cell = load_cell(cell_name).cell()
     document, _ = sequence_cell(cell, Sequencing(), wanted, NO_CHANCE, tell=tell)
@@ -70,14 +72,14 @@ def test_ctrl_c_loses_nothing(monkeypatch: pytest.MonkeyPatch, method: str, cell
     for number in (1, 2, 3, 5):
         with monkeypatch.context() as patch:
             told = pressed_at(patch, number)
-            document = found(cell, Wanted(method, 300))
+            document = found(cell, SequencingOptions(method, 300))
         assert document["stopped_by"] == ("Ctrl-C" if len(told) >= number else None)
 
 
 @pytest.mark.parametrize("method", NAMES)
 def test_when_the_time_is_over_there_is_an_order(method: str) -> None:
     """It is over before anything was tried."""
-    document = found("fms", Wanted(method, 300, seconds=1e-9))
+    document = found("fms", SequencingOptions(method, 300, seconds=1e-9))
     assert document["stopped_by"] == "seconds"
     assert document["bound_s"] > 0.0
 
@@ -85,19 +87,19 @@ def test_when_the_time_is_over_there_is_an_order(method: str) -> None:
 @pytest.mark.parametrize("method", NAMES)
 def test_near_enough(method: str) -> None:
     """The first order that is complete is within a gap of 10,000 %; a deadlock is none."""
-    document = found("fms", Wanted(method, 300, gap=100.0))
+    document = found("fms", SequencingOptions(method, 300, gap=100.0))
     assert document["stopped_by"] == "gap"
     assert document["found_at_episode"] == document["episodes"]
 
 
 def test_each_session_is_near_enough_alone() -> None:
-    document = found("fms", Wanted("random", 300, sessions=3, gap=100.0))
+    document = found("fms", SequencingOptions("random", 300, sessions=3, gap=100.0))
     assert (document["sessions"], document["stopped_by"]) == (3, "gap")
 
 
 def test_a_gap_that_nothing_reaches_ends_nothing() -> None:
     """FIFO is the first order and the last; then it is proven that there are better ones."""
-    document = found("toast-case-1", Wanted("fifo", gap=0.0))
+    document = found("toast-case-1", SequencingOptions("fifo", gap=0.0))
     assert (document["cost"], document["best_cost"], document["proven"]) == (544.0, 513.0, True)
 
 
@@ -105,17 +107,17 @@ def test_a_gap_that_nothing_reaches_ends_nothing() -> None:
 def test_a_rule_waits_for_no_proof_unless_it_is_asked_for(monkeypatch: pytest.MonkeyPatch, method: str) -> None:
     proven = list[float]()
     monkeypatch.setattr("lab.production.any_time.look_on", lambda best, left_s: proven.append(left_s))
-    assert not found("two-on-a-track", Wanted(method))["optimum_proven"]
+    assert not found("two-on-a-track", SequencingOptions(method))["optimum_proven"]
     assert proven == []
-    found("two-on-a-track", Wanted(method, seconds=50.0))
-    found("two-on-a-track", Wanted("random", 5))
+    found("two-on-a-track", SequencingOptions(method, seconds=50.0))
+    found("two-on-a-track", SequencingOptions("random", 5))
     assert len(proven) == 2
 
 
 def test_what_is_told_while_it_runs() -> None:
     """The best order never becomes worse, and the bound never lower; the last that is told is what is known in the end."""
     heard = list[Event]()
-    document = found("fms", Wanted("random", 200), heard.append)
+    document = found("fms", SequencingOptions("random", 200), heard.append)
     stands = [event for event in heard if isinstance(event, SequencingStands)]
     costs, bounds = [one.cost for one in stands], [one.reference.bound for one in stands]
     assert costs == sorted(costs, reverse=True)
@@ -132,7 +134,7 @@ def test_stopped_before_anything_is_proven_there_is_a_bound_that_takes_no_search
         raise KeyboardInterrupt
 
     monkeypatch.setattr("lab.production.any_time.look_first", pressed)
-    document = found("oven.toml", Wanted("srl"))
+    document = found("oven.toml", SequencingOptions("srl"))
     assert (document["stopped_by"], document["best_by"]) == ("Ctrl-C", "first come, first served")
     assert (document["bound_cost"], document["bound_by"]) == (20.0, "each machine alone")
 
@@ -140,7 +142,9 @@ def test_stopped_before_anything_is_proven_there_is_a_bound_that_takes_no_search
 def test_an_objective_without_a_rule_has_no_bound(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(OBJECTIVES, "squared", lambda run: run.now_s**2)
     cell = load_cell("fms").cell()
-    document, _ = sequence_cell(cell, Sequencing(), Wanted("fifo", objective="squared", seconds=9.0), NO_CHANCE)
+    document, _ = sequence_cell(
+        cell, Sequencing(), SequencingOptions("fifo", objective="squared", seconds=9.0), NO_CHANCE
+    )
     assert (document["bound_cost"], document["stopped_by"], document["proven"]) == (0.0, None, False)
 
 

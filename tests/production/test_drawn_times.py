@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from lab.production.sequencing_job import (
-    Wanted,
+    SequencingOptions,
     sequence_cell,
 )
 from lab.sequencing import SEQUENCERS
@@ -111,7 +111,7 @@ def test_the_policy_of_a_file_plans_and_reacts(lab: Lab, monkeypatch: pytest.Mon
 def test_the_best_list_is_the_one_that_is_carried_out(monkeypatch: pytest.MonkeyPatch) -> None:
     few(monkeypatch, 2)
     file = load_cell("toast-case-1")
-    wanted = Wanted("ga", 100, sessions=4, stochastic=True)
+    wanted = SequencingOptions("ga", 100, sessions=4, stochastic=True)
     document, found = sequence_cell(file.cell(3), file.sequencing, wanted, file.chance())
     best = min(found, key=lambda result: result.cost)
     assert best.cost < found[-1].cost

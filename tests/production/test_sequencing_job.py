@@ -12,7 +12,7 @@ import pytest
 from lab.advice.advisors import AdvisorName
 from lab.production.order import reference
 from lab.production.sequencing_job import (
-    Wanted,
+    SequencingOptions,
     sequence_cell,
     sequence_named,
 )
@@ -169,7 +169,7 @@ def test_several_sessions_are_summed_up(method: str) -> None:
     """Each session has chance of its own; the document is of the best one, and counts how many got there."""
     file = load_cell("toast-case-1")
     cell = file.cell(3)
-    document, found = sequence_cell(cell, file.sequencing, Wanted(method, 40, sessions=8, seed=3), NO_CHANCE)
+    document, found = sequence_cell(cell, file.sequencing, SequencingOptions(method, 40, sessions=8, seed=3), NO_CHANCE)
     search = search_for(file.sequencing, episodes=40)
     alone = [find_sequence(cell, method, search, 3, session) for session in range(8)]
     assert [result.episode_costs for result in found] == [result.episode_costs for result in alone]
@@ -302,7 +302,7 @@ def test_what_cannot_be_beaten_comes_from_whom_it_can() -> None:
 def test_an_optimum_that_is_not_proven_is_a_bound(monkeypatch: pytest.MonkeyPatch) -> None:
     cell = load_cell("oven.toml").cell()
     monkeypatch.setattr("lab.production.any_time.look_first", lambda shared: shared.tell("A*", bound=20.0))
-    document, _ = sequence_cell(cell, load_cell("oven.toml").sequencing, Wanted("fifo"), NO_CHANCE)
+    document, _ = sequence_cell(cell, load_cell("oven.toml").sequencing, SequencingOptions("fifo"), NO_CHANCE)
     assert (document["optimal_s"], document["optimal_cost"], document["optimum_proven"]) == (None, None, False)
     assert (document["bound_s"], document["gap"]) == (20.0, pytest.approx(0.45))
     assert (document["success_percent"], document["final_success_percent"]) == (None, None)
@@ -343,7 +343,7 @@ def test_nobody_is_asked_unless_it_is_wanted(lab: Lab) -> None:
 def test_an_advisor_has_chance_of_its_own_in_every_session() -> None:
     """Every decision is a novice's, so what differs between the sessions is what the novice says."""
     file = load_cell("toast-case-1")
-    wanted = Wanted("srl", 5, sessions=2, advisor=AdvisorName.of("novice"), gate="always")
+    wanted = SequencingOptions("srl", 5, sessions=2, advisor=AdvisorName.of("novice"), gate="always")
     _, (one, other) = sequence_cell(file.cell(3), file.sequencing, wanted, NO_CHANCE)
     assert one.episode_costs != other.episode_costs
 
@@ -413,7 +413,7 @@ def test_a_task(lab: Lab, measured: list[tuple[str, Order, int]], method: str | 
 @pytest.mark.usefixtures("measured")
 def test_who_listens_hears_every_session(teacher: Teacher) -> None:
     heard: list[Event] = []
-    wanted = Wanted("random", 4, sessions=3)
+    wanted = SequencingOptions("random", 4, sessions=3)
     document = sequence_named("toast", None, 2, wanted, teacher=replace(teacher, tell=heard.append), files={})
     assert document["sessions"] == 3
     assert heard[0] == PhaseBegan("sequence", 3)
@@ -466,7 +466,7 @@ def test_what_was_found_until_ctrl_c_is_told() -> None:
     def ask(request: object) -> int | None:
         raise KeyboardInterrupt
 
-    wanted = Wanted("srl", 60, advisor=AdvisorName.of("terminal"), people={"terminal": ask})
+    wanted = SequencingOptions("srl", 60, advisor=AdvisorName.of("terminal"), people={"terminal": ask})
     document, found = sequence_cell(file.cell(3), file.sequencing, wanted, Chance())
     assert document["interrupted"] is True
     assert (document["episodes"], len(found)) == (29, 1)
@@ -480,7 +480,7 @@ def test_ctrl_c_before_the_method_found_an_order() -> None:
     def ask(request: object) -> int | None:
         raise KeyboardInterrupt
 
-    wanted = Wanted("srl", 60, advisor=AdvisorName.of("terminal"), gate="always", people={"terminal": ask})
+    wanted = SequencingOptions("srl", 60, advisor=AdvisorName.of("terminal"), gate="always", people={"terminal": ask})
     document, _ = sequence_cell(file.cell(3), file.sequencing, wanted, Chance())
     assert (document["stopped_by"], document["interrupted"]) == ("Ctrl-C", True)
     assert (document["method"], document["cost"], document["proven"]) == ("A*", 513.0, True)

@@ -44,7 +44,7 @@ def rehearsed(heard: Heard, start: int) -> int:
 def starts(heard: Heard, start: int, u: float) -> None:
     """An episode begins: whether it follows advice (rules 3 and 4)."""
     now = heard.now
-    now.followed = now.moves = now.heeded = 0.0
+    now.followed = now.moves = now.advised_moves = 0.0
     now.since = now.clock = now.clock + 1.0
     chance = 1.0
     if now.helped > 0.0:
@@ -56,7 +56,7 @@ def starts(heard: Heard, start: int, u: float) -> None:
         elif known or better:
             chance = 0.0
         else:
-            chance = now.rate * (0.5 + 0.5 * now.heed)
+            chance = now.rate * (0.5 + 0.5 * now.advised_share)
     now.advised = 1.0 if u < chance else 0.0
 
 
@@ -106,7 +106,7 @@ def saw(heard: Heard, number: int, entered: int, over: bool, values: Sequence[fl
     state = number // actions
     now.clock += 1.0
     now.moves += 1.0
-    now.heeded += now.followed
+    now.advised_moves += now.followed
     now.last = number
     heard.greedy[state] = best_of(values)
     if over:
@@ -138,10 +138,10 @@ def ended(heard: Heard, result: float, reached: bool, over: bool) -> None:
             heard.blamed[int(now.blame)] = 1
     won = 1.0 if reached else 0.0
     if now.advised > 0.0:
-        heed = now.heeded / max(now.moves, 1.0)
+        share = now.advised_moves / max(now.moves, 1.0)
         now.rate = won if now.helped == 0.0 else now.rate + RECENT * (won - now.rate)
         now.steps = result if now.helped == 0.0 else now.steps + RECENT * (result - now.steps)
-        now.heed = heed if now.helped == 0.0 else now.heed + RECENT * (heed - now.heed)
+        now.advised_share = share if now.helped == 0.0 else now.advised_share + RECENT * (share - now.advised_share)
         now.helped += 1.0
         now.won += won
     else:

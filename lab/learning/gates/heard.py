@@ -22,11 +22,11 @@ class HeardNow:
     """The numbers of what was heard; the kernel keeps them in a record of the same names.
 
     right, wrong: answers that the learner's own values bore out, or not. helped, won: episodes that followed advice, and those
-    of them that reached the goal; rate, steps, heed: running means of whether they did, how long they took, and the share of
-    their moves that were advised; own, own_rate, own_steps: of the others. several: episodes begin in different states;
-    uncertain: a move has led to different places. Of the episode under way: advised: it follows advice; moves, heeded: all,
-    and those on advice; followed: the last one was; last: its place in `led`; blame: that of a followed move that ended the
-    episode, -1: none; clock: moves of the session; since: when the moves that were all followed began.
+    of them that reached the goal; rate, steps, advised_share: running means of whether they did, how long they took, and the
+    share of their moves that were advised; own, own_rate, own_steps: of the others. several: episodes begin in different
+    states; uncertain: a move has led to different places. Of the episode under way: advised: it follows advice; moves,
+    advised_moves: all, and those on advice; followed: the last one was; last: its place in `led`; blame: that of a followed
+    move that ended the episode, -1: none; clock: moves of the session; since: when the moves that were all followed began.
     """
 
     right: float = 1.0
@@ -42,8 +42,8 @@ class HeardNow:
     uncertain: float = 0.0
     advised: float = 0.0
     moves: float = 0.0
-    heeded: float = 0.0
-    heed: float = 0.0
+    advised_moves: float = 0.0
+    advised_share: float = 0.0
     followed: float = 0.0
     last: float = 0.0
     blame: float = -1.0
@@ -89,7 +89,7 @@ def clear(heard: Heard, several: float) -> None:
     now = heard.now
     now.right = now.wrong = 1.0
     now.helped = now.won = now.rate = now.steps = now.own = now.own_rate = now.own_steps = 0.0
-    now.heed = now.advised = now.moves = now.heeded = 0.0
+    now.advised_share = now.advised = now.moves = now.advised_moves = 0.0
     now.uncertain = now.followed = now.last = now.clock = now.since = 0.0
     now.several, now.blame = several, -1.0
 

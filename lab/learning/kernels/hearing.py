@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from lab.learning import selection
-from lab.learning.compiled import inlined, inner, lean, linked
+from lab.learning.compiled import inlined, inner, linked, without_refcounts
 from lab.learning.gates import earned_trust, heard
 from lab.learning.gates import gate_rules as rules
 from lab.learning.kernels.learners import draw, gauge
@@ -31,7 +31,9 @@ _saw: Any = inlined(linked(earned_trust.saw, best_of=_best_of))
 _ended: Any = inner(earned_trust.ended)
 
 
-@partial(lean, inline="always")  # as source: a compiled function may not return arrays that it was not handed
+@partial(
+    without_refcounts, inline="always"
+)  # as source: a compiled function may not return arrays that it was not handed
 def _of_lane(h: Any, j: int) -> Any:
     """What one lane was told."""
     return _Heard(h.said[j], h.times[j], h.blamed[j], h.led[j], h.greedy[j], h.left[j], h.worth[j], h.now[j])

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.learning import selection, tiles
-from lab.learning.compiled import inlined, inner, lean
+from lab.learning.compiled import inlined, inner, without_refcounts
 from lab.learning.kernels.asking import decided, judge, opens
 from lab.learning.kernels.learners import draw
 from lab.learning.physics import ACROBOT, MOUNTAIN_CAR, acrobot, cart_pole, mountain_car
@@ -30,7 +30,7 @@ _step_car, _step_acrobot, _step_pole = _steps
 
 
 class World(NamedTuple):
-    """Where steps are made: a world's number, its point x (D,), its cells, and its rewards; falls: see `Physics`."""
+    """Where steps are made: a world's number, its point x (D,), its cells, and its rewards; longer_is_better: see `Physics`."""
 
     number: int
     x: FloatArray
@@ -39,7 +39,7 @@ class World(NamedTuple):
     cells: NDArray[np.int64]
     reward: float
     last_reward: float
-    falls: bool
+    longer_is_better: bool
 
 
 class Linear(NamedTuple):
@@ -243,7 +243,7 @@ def _episode(work: Any, linear: Any, world: Any) -> None:
         else:
             over = _moved(world, action)
             entered, reward = _number(world), world.last_reward if over else world.reward
-            won = over and not world.falls
+            won = over and not world.longer_is_better
         last = moves == learning.max_moves
         if linear.lookahead and not over:
             _choose(work, linear, entered)
@@ -254,7 +254,7 @@ def _episode(work: Any, linear: Any, world: Any) -> None:
             following = np.int64(decided(work, None, None, 0)[0])
         state, action = entered, following
     n, count = lane.session, sessions.counts[lane.session]
-    if world.falls:
+    if world.longer_is_better:
         sessions.steps[n, lane.episode - 1] = (learning.max_moves - moves + 2 if over else 1) + learning.count_start
     else:
         sessions.steps[n, lane.episode - 1] = moves + learning.count_start if won else learning.max_steps + 1
@@ -266,7 +266,7 @@ def _episode(work: Any, linear: Any, world: Any) -> None:
         judge(work.asking, lane, sessions.steps[n], count)
 
 
-@lean
+@without_refcounts
 def run(work: Any, linear: Any, world: Any) -> None:
     """All sessions, one after the other."""
     for n in range(len(work.sessions.seeds)):
@@ -279,7 +279,7 @@ def run(work: Any, linear: Any, world: Any) -> None:
                 work.sessions.kept[n, i] = linear.weights[i]
 
 
-@lean
+@without_refcounts
 def play(world: Any, policy: Any, starts: Any, most: int, moves: Any) -> None:
     """The moves (N,) of a policy (S,) from each start (N, D), which is turned into the point where it ends.
 

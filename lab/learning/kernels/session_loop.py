@@ -12,7 +12,7 @@ import numpy as np
 
 from lab.learning import advice_memory as memory
 from lab.learning import selection
-from lab.learning.compiled import inlined, inner, lean
+from lab.learning.compiled import inlined, inner, without_refcounts
 from lab.learning.kernels import hearing as hears
 from lab.learning.kernels.asking import decided, judge, judge_moved, knows, opens
 from lab.learning.kernels.learners import choose, draw, learn
@@ -28,7 +28,9 @@ _moved: Any = inlined(memory.moved)
 _ended: Any = inner(memory.ended)
 
 
-@partial(lean, inline="always")  # as source: a compiled function may not return arrays that it was not handed
+@partial(
+    without_refcounts, inline="always"
+)  # as source: a compiled function may not return arrays that it was not handed
 def _of_lane(m: Any, j: int) -> Any:
     """The memory of one lane."""
     known = m.led[j], m.way[j], m.came[j], m.queue[j]
@@ -169,7 +171,7 @@ def _end(work: Any, memories: Any, hearing: Any, walks: Any, j: int) -> int:
     return 1
 
 
-@lean
+@without_refcounts
 def run(work: Any, memories: Any, hearing: Any, chances: Any, walks: Any) -> None:
     """All sessions: each lane takes the next one when its own is over.
 

@@ -19,7 +19,7 @@ class Physics:
     begin: turns uniform numbers into a start, step: makes a step, both in place; the latter says whether the episode is
     over. number: by which the kernel knows it. axes: what a state is made of; bounds: its cells; tilings: that fit them.
     limit: steps of an episode; threshold: a mean return that counts as solved; reward: of a step, last_reward: of one that
-    ends the episode. falls: such an end is no goal, and an episode is the better the longer it lasts.
+    ends the episode. longer_is_better: such an end is no goal, and an episode is the better the longer it lasts.
     """
 
     name: str
@@ -34,7 +34,7 @@ class Physics:
     threshold: float
     reward: float = -1.0
     last_reward: float = -1.0
-    falls: bool = False
+    longer_is_better: bool = False
 
 
 MOUNTAIN_CAR, ACROBOT, CART_POLE = 1, 2, 3
@@ -84,7 +84,7 @@ PHYSICS = {
             threshold=475.0,
             reward=1.0,
             last_reward=1.0,
-            falls=True,
+            longer_is_better=True,
         ),
     )
 }

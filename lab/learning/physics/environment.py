@@ -40,7 +40,7 @@ class PhysicsEnvironment:
         """One step of the point."""
         over = self.physics.step(self.point, action)
         reward = self.physics.last_reward if over else self.physics.reward
-        return Step(reward, self.physics.bounds.number(self.point), over, over and not self.physics.falls)
+        return Step(reward, self.physics.bounds.number(self.point), over, over and not self.physics.longer_is_better)
 
     def picture(self, state: int) -> str:
         """The world in lines of text: as it is, or where the learner is not, as it would be in the middle of the cell."""
@@ -69,7 +69,7 @@ class PhysicsEnvironment:
 
     @property
     def _better(self) -> float:
-        return -1.0 if self.physics.falls else 1.0
+        return -1.0 if self.physics.longer_is_better else 1.0
 
     def played(self, q: FloatArray, most: int) -> Any:
         """The moves (JUDGED,) of the greedy policy of a table from drawn starts, negative where they did not end it."""
@@ -87,7 +87,7 @@ class PhysicsEnvironment:
         over, made = moves > 0, np.abs(moves)
         returned = physics.reward * made + over * (physics.last_reward - physics.reward)
         solved = bool(returned.mean() >= physics.threshold)
-        if physics.falls:
+        if physics.longer_is_better:
             return Judged(round(float(np.where(over, most - made + 2, 1).mean())) + counted, 1 + counted, solved)
         if over.mean() < GOOD_ENOUGH:
             return Judged(None, None, solved)
@@ -114,6 +114,6 @@ def fitting(physics: Physics) -> LearnerSettings:
         episodes=500,
         max_steps=physics.limit,
     )
-    if physics.falls:
+    if physics.longer_is_better:
         return replace(learner, alpha=0.8, discount=0.99, trace=0.8, start_value=0.0, beta=0.5)
     return learner

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lab.learning.compiled import inner, lean
+from lab.learning.compiled import inner, without_refcounts
 from lab.sequencing.methods.priority_kernels import OrderArrays, carried_out, changed, copied, drawn, most_choices
 from lab.sequencing.simulate.cell_arrays import Floats, Ints
 
@@ -39,7 +39,7 @@ def annealed(cell: Any, run: Any, work: Any, choices: int, temperature: float) -
     return value
 
 
-@lean
+@without_refcounts
 def anneal(cell: Any, run: Any, work: Any, costs: Any, temperature: float) -> None:
     """As many steps as there are costs (N,), which are filled, at a temperature in the objective's unit."""
     choices = most_choices(cell)

@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from lab.learning.compiled import inner, lean
+from lab.learning.compiled import inner, without_refcounts
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.routes import SERVER
 from lab.sequencing.methods.carried_over_features import WAITED
@@ -199,7 +199,7 @@ def _describe(cell: Any, run: Any, known: Any, work: Any, count: int, i: int) ->
     f[QUEUED_TAIL] = f[QUEUE] + (end_s + work_s + known.left_s[there] - work.compared[0]) / scale_s
 
 
-@lean
+@without_refcounts
 def describe_all(cell: Any, run: Any, known: Any, work: Any, found: Any) -> int:
     """`features` of a run as it stands, for all its allowed decisions, into the rows of found; how many there are."""
     count = list_allowed(cell, run)
@@ -231,7 +231,7 @@ def _best(cell: Any, run: Any, known: Any, work: Any, weights: Any, count: int) 
     return best
 
 
-@lean
+@without_refcounts
 def decide(cell: Any, run: Any, known: Any, work: Any, weights: Any) -> int:
     """A whole run with the weights (F,); how many decisions it took, which stand in work.sequence."""
     reset(cell, run, np.uint64(0))
@@ -246,7 +246,7 @@ def decide(cell: Any, run: Any, known: Any, work: Any, weights: Any) -> int:
         take(cell, run, (run.allowed[i] - 1) % parts, run.options[i], np.uint64(0))
 
 
-@lean
+@without_refcounts
 def costs_of(cell: Any, run: Any, known: Any, work: Any, candidates: Any, costs: Any) -> None:
     """What the runs with N weights (N, F) cost (N,)."""
     for n in range(len(candidates)):

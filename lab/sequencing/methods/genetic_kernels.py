@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lab.learning.compiled import inner, lean
+from lab.learning.compiled import inner, without_refcounts
 from lab.sequencing.methods.priority_kernels import (
     OrderArrays,
     below,
@@ -42,7 +42,7 @@ class Population(NamedTuple):
     stream: NDArray[np.uint64]
 
 
-@lean
+@without_refcounts
 def shuffled(parts: Any, choices: Any, stream: Any, most: int) -> None:
     """A list (L,) in an even order, each entry with any of `most` ways. Source: Fisher and Yates 1938."""
     for i in range(len(parts) - 1, -1, -1):
@@ -59,7 +59,7 @@ def _tournament(population: Any, best: bool) -> int:
     return one if (population.costs[one] < population.costs[other]) == best else other
 
 
-@lean
+@without_refcounts
 def crossed(population: Any, one: int, other: int) -> None:
     """The child of two lists: the parts drawn stay where the first one has them, all others fill up in the second one's order.
 
@@ -100,7 +100,7 @@ def _survives(population: Any) -> None:
     population.left[0] = -1
 
 
-@lean
+@without_refcounts
 def evolve(cell: Any, run: Any, population: Any, costs: Any, improved: int) -> None:
     """As many lists are tried as there are costs (N,), which are filled; improved: neighbours of each child that are tried."""
     choices, child = most_choices(cell), population.child

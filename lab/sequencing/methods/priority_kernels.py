@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from lab.learning import splitmix
-from lab.learning.compiled import inlined, inner, lean
+from lab.learning.compiled import inlined, inner, without_refcounts
 from lab.sequencing.simulate.cell_arrays import Flags, Floats, Ints
 from lab.sequencing.simulate.chance_kernels import fraction, mixed
 from lab.sequencing.simulate.kernels import cost, may, reset, take
@@ -165,7 +165,7 @@ def most_choices(cell: Any) -> int:
     return int(most)
 
 
-@lean
+@without_refcounts
 def cost_of(cell: Any, run: Any, order: Any, limit: float) -> float:
     """`carried_out`."""
     return float(carried_out(cell, run, order, limit))

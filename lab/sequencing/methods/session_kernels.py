@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from lab.learning import splitmix
-from lab.learning.compiled import inner, lean
+from lab.learning.compiled import inner, without_refcounts
 from lab.sequencing.methods import session_updates as updates
 from lab.sequencing.methods.session_arrays import LEARNER_CODES
 from lab.sequencing.simulate.chance_kernels import fraction, mixed, uniform
@@ -57,7 +57,7 @@ def _add(memory: Any, key: int, value: float, visits: int) -> Any:
     return row
 
 
-@lean
+@without_refcounts
 def copy_rows(memory: Any, larger: Any) -> None:
     """All rows of a table into an empty one with more room."""
     for row in range(1, memory.used[0] + 1):
@@ -172,7 +172,7 @@ def _keep(work: Any, value: float, moves: int) -> None:
         work.best[m] = work.sequence[m] if m < moves else 0
 
 
-@lean
+@without_refcounts
 def advance(learning: Any, work: Any, seeds: Any, epsilons: Any, first: int, found: Any) -> None:
     """Sessions of the seeds (N,): E episodes numbered from `first`, and what the greedy policy costs then, into `found`.
 

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lab.learning.compiled import inner, lean
+from lab.learning.compiled import inner, without_refcounts
 from lab.sequencing.methods.priority_kernels import OrderArrays, carried_out, changed, copied, drawn
 from lab.sequencing.simulate.cell_arrays import Floats, Ints
 
@@ -110,7 +110,7 @@ def _try(cell: Any, run: Any, learned: Any, limit: float) -> float:
     return float(value)
 
 
-@lean
+@without_refcounts
 def lesson(cell: Any, run: Any, learned: Any, costs: Any, alpha: float, temperature: float) -> None:
     """As many sequences as there are costs (N,), which are filled: one drawn, the others to improve it; then it is learned."""
     _listed(learned, True)
@@ -125,7 +125,7 @@ def lesson(cell: Any, run: Any, learned: Any, costs: Any, alpha: float, temperat
         _learn(learned, alpha * np.exp((learned.cost[1] - learned.cost[0]) / max(1e-9, temperature)))
 
 
-@lean
+@without_refcounts
 def greedy(cell: Any, run: Any, learned: Any) -> float:
     """What the list costs that was learned, without chance; its sequence stands in `tried`."""
     _listed(learned, False)

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from lab.learning import splitmix
-from lab.learning.compiled import inner, lean
+from lab.learning.compiled import inner, without_refcounts
 from lab.sequencing.cell import chance
 from lab.sequencing.simulate.cell_arrays import LAW_CODES
 
@@ -17,7 +17,7 @@ _state_at: Any = inner(splitmix.state_at, inline="always")
 _normal, _exponential = inner(chance.normal), inner(chance.exponential)
 
 
-@lean
+@without_refcounts
 def uniform(seed: Any, number: int) -> float:
     """`splitmix.uniform`."""
     return float(fraction(mixed(_state_at(seed, np.uint64(number)))))

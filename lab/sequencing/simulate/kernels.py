@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from lab.learning.compiled import inner, lean
+from lab.learning.compiled import inner, without_refcounts
 from lab.sequencing.cell.routes import SERVER
 from lab.sequencing.simulate.cell_arrays import ARRIVAL_CODES, NO_ARRIVALS, OBJECTIVE_CODES, WIDTH
 from lab.sequencing.simulate.chance_kernels import apart, interval, uniform, until, worked
@@ -38,7 +38,7 @@ def _batch(cell: Any, run: Any, station: int, at_s: float, seed: Any) -> None:
             run.ready_s[part] = at_s + longest_s
 
 
-@lean
+@without_refcounts
 def reset(cell: Any, run: Any, seed: Any) -> None:
     """`Run.__init__`, with the times of an episode's seed (uint64)."""
     unfinished, came_s = 0, 0.0
@@ -168,7 +168,7 @@ def server_for(cell: Any, run: Any, part: int, o: int) -> Any:
     return best_s, best
 
 
-@lean
+@without_refcounts
 def list_allowed(cell: Any, run: Any) -> int:
     """`Run.allowed`: how many decisions may be taken now; they stand in run.allowed, what they mean in run.options."""
     parts, count = len(run.locations), 0
@@ -198,13 +198,13 @@ def _sort(run: Any, count: int) -> None:
         run.allowed[i], run.options[i] = decision, o
 
 
-@lean
+@without_refcounts
 def move(cell: Any, run: Any, i: int, seed: Any) -> None:
     """`Run.move`: carries out the i-th of the allowed decisions, with the times of an episode's seed."""
     take(cell, run, (run.allowed[i] - 1) % len(run.locations), run.options[i], seed)
 
 
-@lean
+@without_refcounts
 def may(cell: Any, run: Any, part: int, o: int) -> bool:
     """Whether a part (from 0) may take a way of its position now."""
     place = run.locations[part]
@@ -215,7 +215,7 @@ def may(cell: Any, run: Any, part: int, o: int) -> bool:
     return bool(possible(cell, run, part, o) and not (cell.windows and _too_late(cell, run, part, o)))
 
 
-@lean
+@without_refcounts
 def take(cell: Any, run: Any, part: int, o: int, seed: Any) -> None:
     """A part (from 0) takes a way that it may take, with the times of an episode's seed."""
     robot = cell.robot[o]
@@ -293,7 +293,7 @@ def take(cell: Any, run: Any, part: int, o: int, seed: Any) -> None:
         run.whole[1] -= 1
 
 
-@lean
+@without_refcounts
 def cost(cell: Any, run: Any) -> float:
     """`objectives.cost`."""
     if run.whole[1] > 0:
@@ -311,7 +311,7 @@ def cost(cell: Any, run: Any) -> float:
     return total / len(run.locations) if cell.objective == TARDINESS else total
 
 
-@lean
+@without_refcounts
 def follow(cell: Any, run: Any, sequence: Any, seed: Any) -> float:
     """The cost of a sequence of decisions with the times of an episode's seed; NaN when one of them may not be taken.
 
@@ -328,7 +328,7 @@ def follow(cell: Any, run: Any, sequence: Any, seed: Any) -> float:
     return cost(cell, run)
 
 
-@lean
+@without_refcounts
 def follow_all(cell: Any, run: Any, sequences: Any, lengths: Any, seeds: Any, costs: Any) -> None:
     """`follow` of each row of sequences (N, L), as many decisions as lengths (N,) says, with M seeds; costs (N, M)."""
     for n in range(len(sequences)):
