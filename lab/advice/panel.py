@@ -18,7 +18,7 @@ ASKED = ("together", "in-turn")
 
 
 def majority(trusts: Sequence[float], chance: float) -> float:
-    """As many points as advisors say so."""
+    """The number of advisors who say so."""
     return float(len(trusts))
 
 

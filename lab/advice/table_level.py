@@ -50,7 +50,7 @@ class TableLevel:
                 raise BadInput(f"state {state}, action {action} do not exist")
 
     def answered(self, path: Path) -> Mapping[int, int]:
-        """As `answers_of`."""
+        """The action by state that a file of answers holds: see `answers_of`."""
         return answers_of(path, self.mdp)
 
     def learned(self, name: str) -> Advisor:

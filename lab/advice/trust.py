@@ -144,7 +144,7 @@ class Skill:
     answers: int
 
     def __str__(self) -> str:
-        """In one line of plain text."""
+        """The estimate in one line of plain text."""
         word = "no better than chance" if self.tau == TAUS[1] else f"nearest to {self.word}"
         return f"tau {self.tau:.3g} ({self.low:.3g} to {self.high:.3g}, from {self.answers} answers): {word}"
 

@@ -48,5 +48,5 @@ class ChanceTable(TableEnvironment):
         return Step(float(self.reward[number, k]), entered, over, won)
 
     def values(self, discount: float) -> FloatArray:
-        """As they were brought along."""
+        """The optimal action values (S, A) that the table was made with."""
         return self._best

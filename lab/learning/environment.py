@@ -77,7 +77,7 @@ class TableEnvironment:
         return Step(self._reward[state][action], entered, self._terminal[entered], self._goal[entered])
 
     def picture(self, state: int) -> str:
-        """None of its own."""
+        """An empty string: it has no drawing of its own."""
         return ""
 
     def values(self, discount: float) -> FloatArray:

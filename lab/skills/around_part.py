@@ -65,7 +65,7 @@ class AroundPart(Skill):
         return near_pose(goal or self.goal_pose(), self.problem.mdp.state_cell(state), self.surveys.into(self.station))
 
     def begins_at(self) -> ToolPose:
-        """At the station's approach."""
+        """The approach of the station."""
         return self.surveys.approach(self.station)
 
     def down(self, bench: Bench, policy: "Policy", goal: ToolPose) -> Iterator[None]:

@@ -48,13 +48,13 @@ class Cover(Skill):
 
     @classmethod
     def at_machine(cls, task: Task, station: str) -> "CoverPart | None":
-        """In a machine with a process."""
+        """The skill of the machine's head, where the machine has a process; None elsewhere."""
         process, kinds = task.station(station).process, task.kinds_at(station)
         return CoverPart(task, process, station, kinds[0].name) if process is not None and kinds else None
 
     @classmethod
     def at_service(cls, task: Task, stage: Stage) -> "CoverPlace | None":
-        """Where a stage names a service."""
+        """The skill of the robot's hand, where a stage names a service; None elsewhere."""
         return None if stage.service is None else CoverPlace(task, stage.service, stage.station, "")
 
     def setup(self, surveys: Surveys) -> Problem:
@@ -250,7 +250,7 @@ class CoverPlace(Cover):
         return problem
 
     def begins_at(self) -> ToolPose:
-        """At the station's approach."""
+        """The approach of the station."""
         return self.surveys.approach(self.station)
 
     def motion(self, bench: Bench, policy: "Policy") -> Iterator[None]:

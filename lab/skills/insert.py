@@ -57,7 +57,7 @@ class Insert(Skill):
 
     @classmethod
     def on_carry(cls, task: Task, kind: str, origin: str, target: str) -> "Insert | None":
-        """At the end, where a camera's grid leads."""
+        """The skill that inserts the part where the target is entered through a camera's grid; None elsewhere."""
         return cls(task, kind, target) if task.station(target).grid is not None else None
 
     @property
@@ -127,7 +127,7 @@ class Insert(Skill):
         return Photo(self.picture, self.seen)
 
     def begins_at(self) -> ToolPose:
-        """At the grid's start, where a transfer ends."""
+        """The tool pose at the grid's start, where a transfer ends."""
         return ToolPose(*self.grid.settings.start_m, self.grid.settings.height_m, 0.0)
 
     def pose(self, state: int) -> ToolPose:

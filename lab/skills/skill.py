@@ -63,7 +63,7 @@ class Bench:
         return self.true_pose(body, like) if self.sight is None else self.sight.pose(body, like, self.held)
 
     def true_pose(self, body: str, like: float = 0.0) -> ToolPose:
-        """As `part_pose`, by the simulator."""
+        """The pose of `part_pose` as the simulator knows it, whatever a camera sees."""
         position, turn = self.scene.world.pose(body)
         kind = self.scene.kind_of[body]
         yaw = 2.0 * atan2(float(turn[2]), float(turn[3]))

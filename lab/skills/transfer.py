@@ -71,7 +71,7 @@ class Transfer(Skill):
         return self.problem
 
     def pose(self, state: int) -> ToolPose:
-        """In the middle of the workspace's cell."""
+        """The tool pose in the middle of the state's cell of the workspace."""
         return self.surveys.cell_pose(self.problem.mdp.state_cell(state))
 
     def does(self, name: str) -> str:
@@ -79,7 +79,7 @@ class Transfer(Skill):
         return f"{self.doing.format(part=name) if self.carries else 'goes'} from '{self.origin}' to '{self.target}'"
 
     def begins_at(self) -> ToolPose:
-        """At the origin's approach."""
+        """The approach of the origin."""
         return self.surveys.approach(self.origin)
 
     def way_in_words(self) -> tuple[str, str]:

@@ -53,7 +53,7 @@ class CellRobot(Record):
     """The stations where it may pick and drop, such as `["in", "oven"]`; left out: all."""
 
     def built(self) -> Robot:
-        """As the sequencer has it."""
+        """The robot as a record of the cell."""
         return Robot(self.name, self.start, self.speed, self.serves)
 
 
@@ -85,7 +85,7 @@ class CellStation(Record):
     """How long a server takes to change over, from product to product [s], such as `{ bun = { loaf = 20.0 } }`."""
 
     def built(self) -> Station:
-        """As the sequencer has it."""
+        """The station as a record of the cell."""
         setups = tuple((a, b, seconds) for a, row in self.setup_s.items() for b, seconds in row.items())
         return Station(
             self.name,
@@ -124,7 +124,7 @@ class CellStage(Record):
     """Other stages, any of which may be taken in place of this one, such as `["oven2"]`."""
 
     def built(self) -> Stage:
-        """As the sequencer has it."""
+        """The stage as a record of the cell, with its alternatives."""
         return Stage(**dict(self) | {"alternatives": tuple(way.built() for way in self.alternatives)})
 
 
@@ -144,7 +144,7 @@ class CellProduct(Record):
     """The ways that one of them may take, each a list of stages, such as `[["in", "oven", "out"]]`."""
 
     def built(self) -> Product:
-        """As the sequencer has it."""
+        """The product as a record of the cell."""
         return Product(self.name, tuple(tuple(stage.built() for stage in route) for route in self.routes))
 
 
@@ -183,7 +183,7 @@ class Stochastic(Record):
     """The mean time of a robot's repair [s], such as `60.0`."""
 
     def built(self) -> Chance:
-        """As the sequencer has it."""
+        """The distributions of the times, as the search draws from them."""
         return Chance(**self.model_dump())
 
 
@@ -200,7 +200,7 @@ class CellTrack(Record):
     """
 
     def built(self) -> tuple[Stretch, ...]:
-        """As the sequencer has it."""
+        """The stretches of the track, each as a record of the cell."""
         return tuple(Stretch(*one) for one in self.stretches)
 
 

@@ -232,7 +232,7 @@ def check_alone(given: Any, nothing: Any, folder: Path) -> None:
     for name, value in asdict(given).items():
         if value != getattr(nothing, name):
             option = given.typed.get(name, f"--{name}")
-            raise BadInput(f"{option} beside --resume {folder}: it goes on as it was begun: leave it away")
+            raise BadInput(f"{option}: --resume takes its options from the session in {folder}; remove {option}")
 
 
 def check_new(folder: Path) -> None:

@@ -38,7 +38,7 @@ class Fitness:
     the starts from which its greedy steps reach the goal; worst, mean: how many moves above the shortest these ways take,
     None where none reaches it; value: its highest action value in the start, the feasibility score; changed: how many states
     go on or end otherwise than where it was learned, None for another table's size; warm: `reached` of its warm start,
-    None where that was not looked at; moves: of its way from the problem's start, None where it misses the goal, fewest: of the
+    None where that was not looked at; moves: of its path from the problem's start, None where it misses the goal, fewest: of the
     shortest way.
     """
 
@@ -113,7 +113,7 @@ def comparable(policy: Policy, mdp: TabularMDP) -> bool:
 def judged(policy: Policy, mdp: TabularMDP, discount: float = DISCOUNT) -> Fitness:
     """Whether a policy is to be used in a problem as it is, to be learned on from, or refused; nothing is run.
 
-    Used only where its ways from all starts are free and as short as any (from several starts: within TOLERATED in the mean),
+    Used only where its paths from all starts are free and shortest (from several starts: within TOLERATED in the mean),
     so that learning from nothing would give nothing better. Refused where its table has other states or moves, or where it
     knows no way although start or goal are others than its own: its warm start is then no faster than none.
     """
@@ -129,7 +129,7 @@ def judged(policy: Policy, mdp: TabularMDP, discount: float = DISCOUNT) -> Fitne
     if max(warm, fitness.reached) > 0.0 or (same_goal and _has_moved(policy)[known.starts].any()):
         return replace(fitness, warm=warm)
     other = "start" if same_goal else "goal"
-    why = f"{fitness.reason}; the {other} is not where it was, and it knows no way from here to there"
+    why = f"{fitness.reason}; the {other} is not where it was, and it knows no path from here to there"
     return replace(fitness, verdict="refuse", reason=why, warm=warm)
 
 
@@ -145,7 +145,7 @@ def behaviour(policy: Policy, mdp: TabularMDP) -> Fitness:
     if fits:
         reason = _praise(above)
     elif is_free:
-        reason = f"its way is free, but {counted(int(above.max()), 'move')} longer than the shortest"
+        reason = f"its path is free, but {counted(int(above.max()), 'move')} longer than the shortest"
     else:
         reason = _fault(int(end[known.starts][~arrived][0]), known, mdp, len(known.starts) - int(arrived.sum()))
     if not fits:
@@ -166,18 +166,18 @@ def behaviour(policy: Policy, mdp: TabularMDP) -> Fitness:
 
 def _praise(above: NDArray[np.int64]) -> str:
     if len(above) == 1:
-        return "its way is free and as short as any"
+        return "its path is free and shortest"
     if not above.any():
-        return f"its ways from all {len(above)} starts are free and as short as any"
-    return f"its ways from all {len(above)} starts are free, in the mean {above.mean():.2g} moves above the shortest"
+        return f"its paths from all {len(above)} starts are free and shortest"
+    return f"its paths from all {len(above)} starts are free, in the mean {above.mean():.2g} moves above the shortest"
 
 
 def _fault(end: int, known: Measure, mdp: TabularMDP, missing: int) -> str:
-    """Where its way from a start ends that does not reach the goal."""
-    way = "its way" if len(known.starts) == 1 else f"its way from {missing} of {len(known.starts)} starts"
+    """Where the policy's path from a start ends that does not reach the goal."""
+    path = "its path" if len(known.starts) == 1 else f"its path from {missing} of {len(known.starts)} starts"
     if known.kinds[end] == OUT:
-        return f"{way} meets what is in the way at {mdp.state_label(end)}"
-    return f"{way} goes round in circles at {mdp.state_label(end)}"
+        return f"{path} meets what is in the way at {mdp.state_label(end)}"
+    return f"{path} goes round in circles at {mdp.state_label(end)}"
 
 
 def warm_start(policy: Policy, mdp: TabularMDP, discount: float = DISCOUNT) -> FloatArray:
@@ -194,7 +194,7 @@ def warm_start(policy: Policy, mdp: TabularMDP, discount: float = DISCOUNT) -> F
 
 
 def _has_moved(policy: Policy) -> BoolArray:
-    """In which states it has made a move, (S,)."""
+    """Whether the policy was learned with a move in each state, (S,)."""
     moved: BoolArray = policy.visits.max(axis=1) > 0
     return moved
 

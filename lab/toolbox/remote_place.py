@@ -163,10 +163,10 @@ class RemotePlace:
         self._call("moved", self._fs.rm_file, self._path(name))
 
     def sweep(self, under: str) -> None:
-        """Nothing is ever half written there."""
+        """Does nothing: nothing is ever half written there."""
 
     def tidy(self, older_s: float) -> list[str]:
-        """Nothing is ever left there; sessions are in the local folder."""
+        """An empty list: nothing is ever left there; sessions are in the local folder."""
         return FolderPlace(self.folder).tidy(older_s)
 
     def append(self, name: str, line: bytes) -> None:

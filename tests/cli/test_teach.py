@@ -34,12 +34,12 @@ def test_a_session_goes_on_from_another_folder(lab: Lab, folder: Path, monkeypat
         ("replay nowhere", "journal 'nowhere' (DIR): cannot be read: No such file or directory"),
         (
             "teach world-1 --resume lesson",
-            "SUBTASK beside --resume lesson: it goes on as it was begun",
+            "SUBTASK: --resume takes its options from the session in lesson",
         ),
         ("teach world-1 --advisor recorded:lesson", "it is advice about another problem, 'w'"),
         ("teach world-1 --ask all", "unknown way of asking 'all' (--ask): known: in-turn, together"),
         ("teach world-1 --decide majorit", "unknown way of deciding 'majorit' (--decide): did you mean 'majority'?"),
-        ("teach --resume lesson --ask in-turn", "--ask beside --resume lesson: it goes on as it was begun"),
+        ("teach --resume lesson --ask in-turn", "--ask: --resume takes its options from the session in lesson"),
         (
             "teach --resume lesson --out other",
             "--out other beside --resume lesson: a session goes on in its own folder",

@@ -145,9 +145,9 @@ def test_many_reused_skills_are_counted(board: TabularMDP) -> None:
 
 def test_a_skill_of_another_problem_says_why_and_what_it_saved(board: TabularMDP) -> None:
     shown = console(200, terminal=False)
-    fitness = Fitness("adapt", "its way meets what is in the way at (1, 1)")
+    fitness = Fitness("adapt", "its path meets what is in the way at (1, 1)")
     adapted = replace(lesson(board, "adapted"), reason=f"'p 1': {fitness.reason}", fitness=fitness, saved=(171, 80))
-    used = replace(lesson(board, "reused"), reason="'p 2': its way is free", fitness=fitness, saved=(200, 1))
+    used = replace(lesson(board, "reused"), reason="'p 2': its path is free", fitness=fitness, saved=(200, 1))
     with RunProgress(shown) as progress:
         progress.hear(SkillReady("insert at toaster", adapted))
         progress.hear(SkillReady("grasp at plate", replace(lesson(board, "reused"), saved=(600, 0))))
@@ -159,7 +159,7 @@ def test_a_skill_of_another_problem_says_why_and_what_it_saved(board: TabularMDP
     assert saved == "            saved 800 episodes, 1 helped step"
     refused = replace(lesson(board), reason="'p 3': the goal is not where it was", fitness=fitness)
     assert run_text(SkillReady("insert", refused)).endswith("refused 'p 3': the goal is not where it was")
-    assert run_text(SkillReady("insert", used)).endswith("by 'p 2': its way is free, saved 200 episodes, 1 helped step")
+    assert run_text(SkillReady("insert", used)).endswith("by 'p 2': its path is free, saved 200 episodes, 1 helped step")
 
 
 def test_the_rest_of_a_run() -> None:

@@ -99,8 +99,8 @@ def test_what_cannot_be_gone_on_with(lab: Lab, tmp_path: Path) -> None:
     folder = stopped.err.rsplit("--resume ", 1)[1].split()[0]
     for words, message in (
         ("sequence", "nothing to sequence (TASK)"),
-        (f"sequence --resume {folder} --seed 3", "--seed beside --resume"),
-        (f"sequence toast --resume {folder}", "TASK beside --resume"),
+        (f"sequence --resume {folder} --seed 3", "--seed: --resume takes its options"),
+        (f"sequence toast --resume {folder}", "TASK: --resume takes its options"),
         (f"teach --resume {folder}", "it is advice on an order"),
         (f"sequence --resume {tmp_path / 'nowhere'}", "cannot be read"),
     ):

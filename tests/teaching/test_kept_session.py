@@ -263,7 +263,7 @@ def test_a_session_goes_on_as_it_was_begun(tmp_path: Path, maze: Path) -> None:
     journal.write_bytes(b"".join(whole.splitlines(keepends=True)[:-1]))
     kept = KeptSession(tmp_path / "lesson", "--resume")
     assert kept.same(LessonOptions()) == kept.options == options(maze)
-    with pytest.raises(BadInput, match="--seed beside --resume"):
+    with pytest.raises(BadInput, match="--seed: --resume takes its options"):
         kept.same(LessonOptions(seed=4))
     journal.write_bytes(whole)
     with pytest.raises(BadInput, match="is over: look at it again with lab replay"):

@@ -153,7 +153,7 @@ def test_a_way_that_is_free_in_another_scene_is_used_as_it_is(teacher: Teacher) 
     about = elsewhere(beside, name="insert elsewhere")
     lesson = teacher.find_or_teach(plan(HOPELESS, about=about), known(first))
     assert (lesson.source, lesson.result, lesson.policy) == ("reused", None, first)
-    assert lesson.reason == f"'{first.name}': its way is free and as short as any"
+    assert lesson.reason == f"'{first.name}': its path is free and shortest"
     assert (lesson.saved, lesson.parent) == ((60, first.helped_steps), None)
     assert len(teacher.toolbox.list()) == 1  # it is not kept twice
 
@@ -173,7 +173,7 @@ def test_what_is_in_the_way_is_learned_around(teacher: Teacher) -> None:
     about = elsewhere(way(first)[3])
     lesson = teacher.find_or_teach(plan(about=about), known(first))
     assert (lesson.source, lesson.policy.solved, lesson.policy.final_steps) == ("adapted", True, 5)
-    assert lesson.reason.startswith(f"'{first.name}': its way meets what is in the way at {way(first)[3]}; 1 of 12")
+    assert lesson.reason.startswith(f"'{first.name}': its path meets what is in the way at {way(first)[3]}; 1 of 12")
     assert lesson.result is not None
     assert (len(lesson.result.steps), lesson.result.helped_steps) == (WARM_EPISODES, 0)  # alone, and no longer
     assert lesson.saved == (60 - WARM_EPISODES, first.helped_steps)

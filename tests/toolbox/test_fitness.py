@@ -56,7 +56,7 @@ def only(mdp: TabularMDP, *moves: tuple[Cell, int]) -> Policy:
 
 def test_a_change_beside_the_way_does_not_matter() -> None:
     fitness = judged(learned(board()), board((2, 2)))
-    assert (fitness.verdict, fitness.reason) == ("use", "its way is free and as short as any")
+    assert (fitness.verdict, fitness.reason) == ("use", "its path is free and shortest")
     assert (fitness.coverage, fitness.reached, fitness.worst, fitness.mean, fitness.changed) == (1.0, 1.0, 0, 0.0, 1)
     assert fitness.value == pytest.approx(-0.1 + 0.99 * (-0.1 + 0.99 * 1.5))  # two steps, then the goal
 
@@ -81,7 +81,7 @@ def test_several_starts_may_be_a_little_above_the_shortest_in_the_mean() -> None
     assert (fitness.verdict, fitness.worst) == ("adapt", 2)  # 2 / 7 of a move in the mean
     fitness = judged(learned(mdp, q), mdp)
     assert (fitness.verdict, fitness.worst, fitness.mean) == ("use", 2, 0.25)
-    assert fitness.reason == "its ways from all 8 starts are free, in the mean 0.25 moves above the shortest"
+    assert fitness.reason == "its paths from all 8 starts are free, in the mean 0.25 moves above the shortest"
 
 
 # ---- adapted -------------------------------------------------------------------------------------------------------
@@ -91,7 +91,7 @@ def test_what_stands_in_its_way_is_named_and_gone_around() -> None:
     old, mdp = learned(board()), board((0, 1))
     fitness = judged(old, mdp)
     assert fitness.verdict == "adapt"
-    assert fitness.reason == "its way meets what is in the way at (0, 1); 1 of 12 states changed"
+    assert fitness.reason == "its path meets what is in the way at (0, 1); 1 of 12 states changed"
     assert (fitness.reached, fitness.worst, fitness.mean, fitness.warm) == (0.0, None, None, 1.0)
     assert (fitness.moves, fitness.fewest) == (None, 5)
     states, _, reached = greedy_path(warm_start(old, mdp), mdp, 12)
@@ -102,7 +102,7 @@ def test_what_stands_in_its_way_is_named_and_gone_around() -> None:
 def test_a_shorter_way_that_was_blocked_is_to_be_found() -> None:
     old = only(board((0, 1)), *(((0, 0), DOWN), ((1, 0), RIGHT), ((1, 1), RIGHT), ((1, 2), UP), ((0, 2), RIGHT)))
     fitness = judged(old, board())
-    assert fitness.reason == "its way is free, but 2 moves longer than the shortest; 1 of 12 states changed"
+    assert fitness.reason == "its path is free, but 2 moves longer than the shortest; 1 of 12 states changed"
     assert (fitness.verdict, fitness.worst, fitness.moves, fitness.fewest) == ("adapt", 2, 5, 3)
     assert warm_start(old, board())[state((0, 0)), RIGHT] == 0.0  # it knows nothing of that, and may try it
 
@@ -110,7 +110,7 @@ def test_a_shorter_way_that_was_blocked_is_to_be_found() -> None:
 def test_a_way_in_circles_is_told() -> None:
     round_and_round = only(board(), ((0, 0), RIGHT), ((0, 1), LEFT))
     fitness = judged(round_and_round, board((2, 2)))
-    assert fitness.reason.startswith("its way goes round in circles at (0, ")
+    assert fitness.reason.startswith("its path goes round in circles at (0, ")
     assert fitness.verdict == "adapt"  # same start, same goal
 
 
@@ -133,8 +133,8 @@ def test_who_knows_no_way_to_another_goal_is_refused() -> None:
     fitness = judged(along, board((0, 2), goal=(2, 3)))
     assert fitness.verdict == "refuse"
     assert fitness.reason == (
-        "its way meets what is in the way at (0, 2); 3 of 12 states changed; "
-        "the goal is not where it was, and it knows no way from here to there"
+        "its path meets what is in the way at (0, 2); 3 of 12 states changed; "
+        "the goal is not where it was, and it knows no path from here to there"
     )
     assert judged(learned(board()), board(goal=(2, 3))).verdict == "adapt"  # it has been everywhere
     fitness = judged(along, board((1, 0), start=(2, 0)))

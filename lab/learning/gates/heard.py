@@ -71,7 +71,7 @@ class Heard(NamedTuple):
 
 
 def blank(states: int, actions: int) -> Heard:
-    """Nothing was heard yet."""
+    """The record of a session in which nothing was heard yet."""
     said, greedy = [NOTHING] * states, [NOTHING] * states
     times, blamed, led = [0] * (states * actions), [0] * (states * actions), [NOTHING] * (states * actions)
     return Heard(said, times, blamed, led, greedy, [0] * states, [0.0] * (2 * states), HeardNow())

@@ -64,7 +64,7 @@ class MachineSlow(Fault):
         return {"station": one_of(machines, rng), "share": SLOWER} if machines else None
 
     def strikes(self, floor: "Floor") -> Happened:
-        """At any time."""
+        """The machine takes longer from now on; this may strike at any time."""
         station, share = str(self.fields.station), self.fields.share or SLOWER
         floor.machine(station).slow_down(share, floor.now_s)
         words = f"'{station}' takes {share:g} times as long"
@@ -84,7 +84,7 @@ class MachineFails(Fault):
         return {"station": one_of(machines, rng)} if machines else None
 
     def strikes(self, floor: "Floor") -> Happened:
-        """At any time."""
+        """The machine fails now; this may strike at any time."""
         station = str(self.fields.station)
         floor.machine(station).fail(floor.now_s)
         return Happened(self.what, f"'{station}' does not get done", floor.now_s, station=station)
@@ -157,7 +157,7 @@ class ObstacleMoved(Fault):
         return {"obstacle": one_of(names, rng), "by_m": any_way(OBSTACLE_M, rng)} if names else None
 
     def strikes(self, floor: "Floor") -> Happened | None:
-        """In a direction in which there is room."""
+        """The obstacle is moved to where there is room; None while the robot is near."""
         name, world = str(self.fields.obstacle), floor.world
         if not is_robot_away(floor, [name], OUT_OF_THE_WAY_M):
             return None
@@ -282,7 +282,7 @@ class CameraBlind(Fault):
         return None if task.camera is None else {"seconds": round(float(rng.uniform(*BLIND_S)), 1)}
 
     def strikes(self, floor: "Floor") -> Happened:
-        """At any time."""
+        """The camera is covered now; this may strike at any time."""
         floor.world.dark = True
         seconds = self.fields.seconds or BLIND_S[0]
         self.until_s = floor.now_s + seconds

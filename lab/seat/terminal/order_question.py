@@ -70,7 +70,7 @@ class OrderQuestion:
         return f"'{word[:20]}' is none of the moves: {hint}type {known}"
 
     def warned(self, request: SequenceRequest, decision: int) -> str:
-        """Nothing that is allowed leads nowhere."""
+        """An empty string: every decision that is allowed leads on."""
         return ""
 
     def why(self, request: SequenceRequest, guided: int) -> list[str]:

@@ -29,7 +29,7 @@ def normal(mean_s: float, spread: float, u: float, v: float) -> float:
 
 
 def exponential(mean_s: float, spread: float, u: float, v: float) -> float:
-    """Of that mean."""
+    """A time [s] of the exponential distribution with that mean, by the uniform number u."""
     return -mean_s * log(1.0 - u)
 
 

@@ -43,7 +43,7 @@ class Values:
         self.held[key] = value
 
     def table(self) -> Table:
-        """The same by state, then by decision."""
+        """The values by state, then by decision."""
         table: Table = {}
         for (state, decision), value in self.held.items():
             table.setdefault(state, {})[decision] = value
