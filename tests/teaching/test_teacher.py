@@ -239,7 +239,7 @@ def test_what_another_task_left_is_named_by_it(teacher: Teacher) -> None:
         ("adapted", "toast"),
     ]
     assert lessons[0].reason == "it was learned in exactly this problem of task 'toast'"
-    assert all(one.reason.startswith(f"'{first.policy.name}' of task 'toast': its way ") for one in lessons[1:])
+    assert all(one.reason.startswith(f"'{first.policy.name}' of task 'toast': its path ") for one in lessons[1:])
     assert lessons[2].policy.task == "breakfast"
 
 
