@@ -159,7 +159,9 @@ def test_a_skill_of_another_problem_says_why_and_what_it_saved(board: TabularMDP
     assert saved == "            saved 800 episodes, 1 helped step"
     refused = replace(lesson(board), reason="'p 3': the goal is not where it was", fitness=fitness)
     assert run_text(SkillReady("insert", refused)).endswith("refused 'p 3': the goal is not where it was")
-    assert run_text(SkillReady("insert", used)).endswith("by 'p 2': its path is free, saved 200 episodes, 1 helped step")
+    assert run_text(SkillReady("insert", used)).endswith(
+        "by 'p 2': its path is free, saved 200 episodes, 1 helped step"
+    )
 
 
 def test_the_rest_of_a_run() -> None:

@@ -200,10 +200,13 @@ def _check_lowest(places: Places, low: float) -> None:
     standing = {station.name: places.top_m(station) for station in places.task.stations}
     where = max(standing, key=lambda name: standing[name])
     for kind in (places.kinds[comes_as(part)] for part in places.task.made):
-        if low - kind.grip.up_m < standing[where] + OVER_M:
+        lacking_m = standing[where] + OVER_M + kind.grip.up_m - low
+        if lacking_m > 0:
+            lower_m = places.task.workspace.lower_m[2]
             raise BadInput(
-                f"workspace.lower_m: the lowest tool height {low:.3f} m would sweep a carried {kind.name} through what "
-                f"stands at '{where}': at least {standing[where] + OVER_M + kind.grip.up_m:.3f} needed"
+                f"workspace.lower_m: the lowest tool height {low:.3f} m would sweep a carried {kind.name} "
+                f"through what stands at '{where}': at least {low + lacking_m:.3f} needed, so lower_m[2] = "
+                f"{lower_m + lacking_m:.3f} in place of {lower_m:g}"
             )
 
 
