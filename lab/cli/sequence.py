@@ -126,7 +126,18 @@ def sequence(
     What a person advises is kept: --resume goes on with it, lab replay shows it again.
     """
     given = deferred.OrderOptions(
-        *(task or "", case, toasts, method, objective, episodes, sessions, stochastic, advisor, gate, seed, parts),
+        task=task or "",
+        case=case,
+        toasts=toasts,
+        method=method,
+        objective=objective,
+        episodes=episodes,
+        sessions=sessions,
+        stochastic=stochastic,
+        advisor=advisor,
+        gate=gate,
+        seed=seed,
+        parts=parts,
         layout=None if layout is None else str(layout),
         robots=robots,
         policy=None if policy is None else str(policy),
