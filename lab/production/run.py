@@ -147,7 +147,14 @@ def run(
     outcome, recording = carry_out(prepared, taught.cell, order.found.sequence, conditions, teacher.tell, relearner)
     receipts = None if advice is None else advice.receipts(order)
     report = Report(
-        *(prepared, taught, order.found, order.used, order.proven, outcome, recording, began),
+        prepared=prepared,
+        taught=taught,
+        sequenced=order.found,
+        method=order.used,
+        proven=order.proven,
+        outcome=outcome,
+        recording=recording,
+        began_s=began,
         receipts=receipts,
         rhythm=order.rhythm,
         learning=order.learning,
