@@ -1,6 +1,7 @@
 """OR-Tools' `cp_model`, loaded without pandas, which takes twice as long as the rest of it and serves only its `*_series`."""
 
 import sys
+from importlib import import_module
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
@@ -18,9 +19,7 @@ class LazyPandas(ModuleType):
     def __getattr__(self, name: str) -> Any:
         if sys.modules.get("pandas") is self:  # more is looked up at once
             del sys.modules["pandas"]
-        import pandas
-
-        return getattr(pandas, name)
+        return getattr(import_module("pandas"), name)  # OR-Tools' own requirement, not the lab's
 
 
 def _without_pandas() -> ModuleType:

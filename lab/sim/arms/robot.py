@@ -123,7 +123,7 @@ class Robot:
         if fine:
             world.at_least(_FINE_ITERATIONS)
         self._free = [joint for joint in fingers.joints if joint not in fingers.driven]
-        self.closed = False
+        self.closed = self._let_go = False
         self.listener: MotionListener | None = None
         self._touched_at = 0.0  # the tool's yaw [rad] when the contacts of what it holds were last found anew
         self._half_on = False  # whether the tool is half a turn on from the yaw that was asked for
@@ -253,13 +253,16 @@ class Robot:
         fingers = self.arm.fingers
         now = fingers.opening(self.world.joints(NAME, fingers.joints))
         most = max(FINGER_M_S * TIME_STEP, 1.5 * abs(opening - now) / GRIP_STEPS)  # wide ones arrive in time, too
+        self._let_go = False
         for _ in range(GRIP_STEPS):
             now += min(max(opening - now, -most), most)
-            self._press(fingers.at(now), force)
+            if not self._let_go:
+                self._press(fingers.at(now), force)
             yield
 
     def lose(self) -> None:
         """The fingers open by themselves, as when their air fails: who moves the arm still holds them to be closed."""
+        self._let_go = True
         self._press(self.arm.fingers.at(self.arm.fingers.open_m), _OPENS_N)
 
 
