@@ -76,7 +76,7 @@ def in_hand(evidence: Evidence, seen: PartSeen) -> Iterator[Finding]:
     away[frames[off_m > HELD_M]] = True
     places = _in_links(tracks, body)
     jumps_m = np.linalg.norm(np.diff(places, axis=1), axis=2).min(axis=0, initial=np.inf)
-    apart = ((away[1:] & away[:-1]) | (jumps_m > SLIPS_M)) & moves  # as the fingers open, it sinks on what it stands on
+    apart = (away[1:] | away[:-1] | (jumps_m > SLIPS_M)) & moves
     first = [*lasting(seen.carried & away)[:1], *np.flatnonzero(apart)[:1].tolist(), *_creeps(seen.carried, places)[:1]]
     if first:
         at_s = float(tracks.times_s[min(first)])

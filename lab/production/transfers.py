@@ -37,7 +37,7 @@ from lab.teaching.events import (
 )
 
 BEGINS_M = 0.05  # a tool this near to where a skill begins need not be brought there
-ON_TIME_S = 0.05  # a window is kept that is not overrun by more: physics goes in steps
+ON_TIME_S = 2 * TIME_STEP  # a window is kept that is not overrun by more: what a machine does is noticed a step later
 LATE_S = 1.0  # a machine that takes so much longer than it should is late
 MOST_ASIDE = 3  # places at which it is tried to set a part aside
 

@@ -203,10 +203,11 @@ def _check_lowest(places: Places, low: float) -> None:
         lacking_m = standing[where] + OVER_M + kind.grip.up_m - low
         if lacking_m > 0:
             lower_m = places.task.workspace.lower_m[2]
+            enough_m = ceil(1000 * (lower_m + lacking_m) - 1e-6) / 1000
             raise BadInput(
                 f"workspace.lower_m: the lowest tool height {low:.3f} m would sweep a carried {kind.name} "
                 f"through what stands at '{where}': at least {low + lacking_m:.3f} needed, so lower_m[2] = "
-                f"{lower_m + lacking_m:.3f} in place of {lower_m:g}"
+                f"{enough_m:.3f} in place of {lower_m:g}"
             )
 
 

@@ -66,7 +66,7 @@ def test_every_gripper_holds_a_slice_that_is_swung_about(name: str) -> None:
             world.step()
         assert robot.touches("slice")
         before = world.pose("slice")[0]
-        assert np.linalg.norm(before - (0.5, -0.3, 0.35 + 0.03 - SLICE[2] / 2)) < 0.006
+        assert np.linalg.norm(before - (0.5, -0.3, 0.35 + 0.03 - SLICE[2] / 2)) < 0.005
         for _ in robot.rest(240):
             world.step()
         assert np.linalg.norm(world.pose("slice")[0] - before) < 5e-4
