@@ -1,9 +1,10 @@
 """OR-Tools' `cp_model`, loaded without pandas, which takes twice as long as the rest of it and serves only its `*_series`."""
 
 import sys
-from importlib import import_module
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
+
+from lab.optional import optional
 
 __all__ = ["cp_model"]
 
@@ -19,7 +20,10 @@ class LazyPandas(ModuleType):
     def __getattr__(self, name: str) -> Any:
         if sys.modules.get("pandas") is self:  # more is looked up at once
             del sys.modules["pandas"]
-        return getattr(import_module("pandas"), name)  # OR-Tools' own requirement, not the lab's
+        with optional("a series in a model of CP-SAT"):
+            import pandas
+
+        return getattr(pandas, name)
 
 
 def _without_pandas() -> ModuleType:
