@@ -134,8 +134,11 @@ def run(
         journal = RunJournal() if out is None else begun(words, loaded, folder)
         stack.callback(journal.close)
         teacher = Teacher(toolbox_of(toolbox, f"{nowhere}/toolbox"), advising, seed)
-        advice = RunAdvice(teacher.toolbox, words.lessons(), journal, words.order or "", cyclic=words.cyclic)
-        advice.parts_per_cycle = words.parts_per_cycle
+        advice = RunAdvice(
+            *(teacher.toolbox, words.lessons(), journal, words.order or ""),
+            cyclic=words.cyclic,
+            parts_per_cycle=words.parts_per_cycle,
+        )
         conditions = Conditions(words.override / 100, journal=journal, fault_seed=words.faults, advice=advice)
         report = run_task(prepared, teacher, folder, conditions, beside)
         replay = (folder / "replay.html").read_text(encoding="utf-8")

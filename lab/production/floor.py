@@ -2,6 +2,7 @@
 
 from collections import deque
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from math import ceil
 from time import perf_counter
 
@@ -9,7 +10,7 @@ from lab.errors import WorkFailed
 from lab.production.controls import Controls, StopKind
 from lab.production.machine import Machine, Work
 from lab.production.recorder import Recorder, Viewer, extras_of
-from lab.production.stop_record import StopRecord
+from lab.production.stop_record import StopRecord, StopsChanged, unwritten
 from lab.sim.arms.kinematics import ToolPose
 from lab.sim.arms.robot import NAME
 from lab.sim.scene.places import Layout
@@ -20,7 +21,7 @@ from lab.skills.sight import SkillFailed
 from lab.skills.skill import SETTLE_STEPS, STAND_STEPS, Bench, Status
 from lab.skills.skillset import SkillSet
 from lab.tasks.task import Order
-from lab.teaching.events import RunHeld, RunWentOn, Tell, unheard
+from lab.teaching.events import Event, RunHeld, RunWentOn
 
 AT_REST_STEPS = 60  # physics steps at the end of a wait that are simulated in any case
 SKIPPED_STEPS = 240  # at the most without a look at what else goes on
@@ -30,17 +31,49 @@ BACK_STEPS = 120  # physics steps of its way that the arm goes back when it was 
 DISTURBED_S = 2.0  # after a hand has reached into the scene, all of it is simulated for so long
 
 
-def _nothing() -> bool:
+def untouched(floor: "Floor") -> bool:
+    """Nobody reaches into the scene."""
+    return False
+
+
+def _unwatched(floor: "Floor") -> None:
+    """Nobody looks at what a step has done."""
+
+
+def idle() -> bool:
     """Nobody does anything by hand."""
     return False
+
+
+def _unheard(event: Event, step: int) -> None:
+    """Nobody listens."""
+
+
+@dataclass(frozen=True)
+class Hooks:
+    """Whom a floor calls, and when; by default nobody.
+
+    before_step: before each physics step, to reach into the scene as a fault does; returns whether it did.
+    after_step: after each physics step.
+    meanwhile: between moves and while a pause lasts, for what the operator does by hand; returns whether that was anything.
+    hear: for each event that is told, with the physics step at which it happened.
+    note_stops: for each change of the stops, before it counts.
+    """
+
+    before_step: "Callable[[Floor], bool]" = untouched
+    after_step: "Callable[[Floor], None]" = _unwatched
+    meanwhile: Callable[[], bool] = idle
+    hear: Callable[[Event, int], None] = _unheard
+    note_stops: Callable[[StopsChanged], None] = unwritten
+
+
+NO_HOOKS = Hooks()
 
 
 class Floor:
     """A scene in which skills are carried out: one clock, the robot's skill and the machines' processes side by side.
 
-    controls: what stops it and sets its pace; stops: when they did, for the journal. on_tick: called after each physics
-    step; hand: called before each, to reach into the scene as a fault does, and says whether it did. meanwhile: called between
-    moves and while a pause lasts, for what the operator does by hand, and says whether that was anything.
+    controls: what stops it and sets its pace. stops: at which steps they did. hooks: who is called as its time goes by.
     """
 
     def __init__(
@@ -51,36 +84,38 @@ class Floor:
         order: Order = (),
         *,
         parts: int = 0,
-        film: bool = False,
-        viewer: Viewer | None = None,
+        controls: Controls | None = None,
+        hooks: Hooks = NO_HOOKS,
     ) -> None:
-        """Build the scene and let it settle; `parts`: as `Scene` has it; `film` keeps frames, `viewer` sees them live."""
+        """Build the scene and let it settle, with nobody called; parts: for how many stations are built (see `Scene`)."""
         self.world, self.skillset = world, skillset
         self.scene = Scene(world, skillset.task, order, layout, parts)
         self.bench = Bench(self.scene)
         self.machines = {s.name: Machine(s.name) for s in skillset.task.stations if s.kind == "machine"}
-        self.controls, self.stops = Controls(), StopRecord()
-        self.tell: Tell = unheard
-        self.on_tick: Callable[[], None] | None = None
-        self.hand: Callable[[], bool] | None = None
-        self.meanwhile: Callable[[], bool] = _nothing
+        self.hooks, self.controls = hooks, controls or Controls()
+        self.stops = StopRecord(note=hooks.note_stops)
         self.pressing_n = 0.0  # allowed on top of the task's limit, so that the arm gets away from where it was stopped
         self.was_held = False  # by the operator, in the last motion
         self._trail: deque[Array] = deque(maxlen=BACK_STEPS // FORCE_EVERY)  # the joints on the last steps of the way
         for _ in range(SETTLE_STEPS):
             world.step()
         self.recorder: Recorder | None = None
-        if film or viewer:
-            self.record(viewer)
         self.restart_clock()
         self.skipped_s = 0.0
         self._quiet_s = 0.0  # from when on waiting may be skipped
         self._told_held = ""
         self._paced = (0.0, 0.0, 0.0)  # speed, simulated and real time from which on it holds
 
-    def record(self, viewer: Viewer | None = None) -> None:
-        """Keep frames from now on, of all that is there; `viewer` sees them live."""
+    def record(self, viewer: Viewer | None = None) -> Recorder:
+        """What keeps frames from now on, of all that is there; `viewer` sees them live."""
         self.recorder = Recorder(self.world, extras_of(self.scene, self.skillset), viewer)
+        return self.recorder
+
+    def show(self, *names: str) -> None:
+        """Show extra bodies on their parts from now on, where frames are kept (see `extras_of`)."""
+        if self.recorder is not None:
+            for name in names:
+                self.recorder.show(name)
 
     @property
     def now_s(self) -> float:
@@ -96,9 +131,9 @@ class Floor:
         """Let the floor's time begin now."""
         self._zero = self.world.steps
 
-    def machine(self, station: str) -> Machine:
-        """The machine of that name."""
-        return self.machines[station]
+    def tell(self, event: Event) -> None:
+        """Tell what happened."""
+        self.hooks.hear(event, self.steps)
 
     # ---- one step ------------------------------------------------------------------------------------------------
 
@@ -123,14 +158,13 @@ class Floor:
         self.held()
 
     def _reached_in(self) -> bool:
-        if self.hand is not None and self.hand():
+        if self.hooks.before_step(self):
             self._quiet_s = self.now_s + DISTURBED_S
             return True
         return False
 
     def _after(self) -> None:
-        if self.on_tick is not None:
-            self.on_tick()
+        self.hooks.after_step(self)
         if self.recorder is not None:
             self.recorder.step()
         self._pace()
@@ -188,7 +222,9 @@ class Floor:
 
     def between_moves(self) -> None:
         """Wait as long as there is a pause, without any time going by."""
-        while self.meanwhile() or (self.stops.look(self.steps, self.controls) and self.stops.pauses(self.controls)):
+        while self.hooks.meanwhile() or (
+            self.stops.look(self.steps, self.controls) and self.stops.pauses(self.controls)
+        ):
             self._tell_held()
             self.controls.wait(0.0 if self.stops.folding else 0.1)
         self._tell_held()
@@ -288,8 +324,10 @@ class Floor:
             machine.clear(part)
 
     def stand(self, pose: ToolPose) -> None:
-        """Put the open gripper at once to a pose, to begin there."""
+        """Put the open gripper at once to a pose, to begin there; no hook is called meanwhile."""
         self.scene.robot.stand(pose)
         self.scene.robot.open_at_once()
         for _ in range(STAND_STEPS):
-            self.tick()
+            self.world.step()
+            if self.recorder is not None:
+                self.recorder.step()

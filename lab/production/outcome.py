@@ -8,19 +8,9 @@ from lab.export.program import Program
 from lab.production.durations import TimedMove
 from lab.production.faults.fault import Happened
 from lab.production.faults.truth import Verdict, verdict
+from lab.production.run_state import Replanned
 from lab.sequencing.cell.schedule import Schedule
 from lab.teaching.events import Event
-
-
-@dataclass(frozen=True)
-class Replanned:
-    """A new order of the rest: when, why, by which method, of how many moves; gap: to what is proven, None: not known."""
-
-    at_s: float
-    why: str
-    method: str
-    moves: int
-    gap: float | None
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,9 @@ from math import atan2, cos, hypot, pi, sin
 from typing import Literal
 
 from lab.production.floor import Floor
+from lab.production.run_state import LOOK_S, RunState
 from lab.production.standing import DELIVERED_M
+from lab.production.trouble import Trouble
 from lab.sim.arms.robot import NAME
 from lab.sim.parts.kinds import Spot
 from lab.sim.scene import station_bodies
@@ -54,6 +56,31 @@ class Deviation:
     at: Spot | None = None
     by_m: float = 0.0
     obstacle: Obstacle | None = None
+
+
+def look(floor: Floor, state: RunState) -> None:
+    """See, once a second, whether all is where it should be. Raises Trouble for the first thing that is not."""
+    if floor.now_s - state.looked_s < LOOK_S:
+        return
+    state.looked_s = floor.now_s
+    if found := news(floor, state):
+        raise Trouble(found[0].words, found[0].name, found[0].station, seen=True)
+    if not floor.world.dark:
+        state.right_s = floor.now_s
+
+
+def news(floor: Floor, state: RunState) -> list[Deviation]:
+    """What is not as a run believes it; of parts that were given up, and things that belong to nobody, nothing again."""
+    delivered = {state.name(part) for part in state.finished}
+    found = perceive(floor, floor.scene.task, floor.scene.layout, state.spot_of, delivered)
+    return [one for one in found if one.sort != "camera blind" and not _is_known(state, one)]
+
+
+def _is_known(state: RunState, seen: Deviation) -> bool:
+    part = state.part_of(seen.name)
+    if part is None:
+        return seen.name in state.strange and seen.sort != "part gone"
+    return part in state.lost or (part in state.to_put_back and seen.sort == "part moved")
 
 
 def perceive(

@@ -191,7 +191,7 @@ def _carried_out(setting: Setting, person: Attendant | None) -> Ran:
     try:
         conditions = Conditions(faults=drawn, viewer=_Clock(LONGEST * planned_s))
         if person is not None:
-            conditions = replace(conditions, controls=person, on_floor=person.on_floor)
+            conditions = replace(conditions, controls=person, on_floor=person.on_floor, before_step=person.before_step)
         relearner = Relearner(prepared, ready.taught, ready.teacher)
         outcome, _ = carry_out(prepared, ready.taught.cell, ready.sequence, conditions, relearner=relearner)
     except Exception as error:  # whatever a run comes to that is no way to end one

@@ -66,7 +66,7 @@ class MachineSlow(Fault):
     def strikes(self, floor: "Floor") -> Happened:
         """The machine takes longer from now on; this may strike at any time."""
         station, share = str(self.fields.station), self.fields.share or SLOWER
-        floor.machine(station).slow_down(share, floor.now_s)
+        floor.machines[station].slow_down(share, floor.now_s)
         words = f"'{station}' takes {share:g} times as long"
         return Happened(self.what, words, floor.now_s, station=station)
 
@@ -86,7 +86,7 @@ class MachineFails(Fault):
     def strikes(self, floor: "Floor") -> Happened:
         """The machine fails now; this may strike at any time."""
         station = str(self.fields.station)
-        floor.machine(station).fail(floor.now_s)
+        floor.machines[station].fail(floor.now_s)
         return Happened(self.what, f"'{station}' does not get done", floor.now_s, station=station)
 
 

@@ -34,9 +34,12 @@ class Operation:
 
     def __init__(self, task: Task, order: Order, seed: int, teacher: Teacher, conditions: Conditions) -> None:
         """Nothing is laid out before `open`. What happens is told to the teacher's listener."""
-        self.scene = OperatedScene(task, order, seed, teacher, conditions)
-        self.scene.on_laid_out, self.scene.meanwhile = self._laid_out, self._meanwhile
-        self.scene.on_step = self.write
+        self.scene = OperatedScene(
+            *(task, order, seed, teacher, conditions),
+            on_laid_out=self._laid_out,
+            before_step=self.write,
+            meanwhile=self._meanwhile,
+        )
         self.controls, self._journal = conditions.controls, conditions.journal
         self.waiting: deque[tuple[Spoken, str]] = deque()
         self.done: list[Done] = []
@@ -189,21 +192,20 @@ class Operation:
         """The run as `lab run` reports it; None when no plan was made."""
         scene = self.scene
         plan = scene.plan
-        if plan is None or (recorder := scene.floor.recorder) is None:
+        if plan is None:
             return None
-        left = bool(plan.production.sequence)
+        left, moves, cell = bool(plan.state.sequence), plan.state.moves, plan.state.cell
         why = scene.failure or ("the operator left before its end" if left else None)
-        production = plan.production
         outcome = replace(
-            production.outcome(why, left),
+            plan.production.outcome(why, left),
             happened=tuple(scene.injector.happened),
             heard=tuple(scene.heard),
-            program=scene.motions.program(scene.task, scene.seed, production.work.moves, production.cell.part_name),
+            program=scene.motions.program(scene.task, scene.seed, moves, cell.part_name),
         )
-        recorder.take()
+        scene.recorder.take()
         found = plan.found, plan.method, plan.proven
         return Report(
-            scene.prepared, plan.taught, *found, outcome, recorder.recording, self._began, learning=plan.learning
+            scene.prepared, plan.taught, *found, outcome, scene.recorder.recording, self._began, learning=plan.learning
         )
 
 

@@ -1,21 +1,20 @@
 """Where a run that carries itself out is steered: it is stopped, goes on and gets its pace in the operator's words."""
 
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from threading import RLock
-from typing import TYPE_CHECKING
 
 from lab.errors import BadInput
+from lab.production.conditions import Conditions
 from lab.production.controls import Controls
+from lab.production.floor import Floor
 from lab.production.operation.at_once import OPERATOR, Done, press
 from lab.production.operation.commands import COMMANDS, spoken
 from lab.production.run_journal import Commanded, RunJournal
 from lab.production.run_status import RunStatus
 from lab.tasks.task import Order, Task
 from lab.teaching.events import Event, OperatorActed, Tell
-
-if TYPE_CHECKING:
-    from lab.production.floor import Floor
 
 WORDS = tuple(word for word, command in COMMANDS.items() if command.how == "at once")
 
@@ -38,22 +37,21 @@ class RunDesk:
         self._lock, self._status = RLock(), RunStatus.of(task, order)
         self._unwritten = deque[Commanded]()
 
-    def on_floor(self, floor: "Floor") -> None:
+    def steering(self, conditions: Conditions) -> Conditions:
+        """These conditions, of a run that is steered from here."""
+        return replace(
+            conditions, on_floor=self._on_floor, before_step=lambda floor: self._write(), meanwhile=self._write
+        )
+
+    def _on_floor(self, floor: Floor) -> None:
         """The run is carried out on this floor."""
         self._floor, self._tell = floor, floor.tell
-        if floor.hand is not None:
-            floor.hand = self._first(floor.hand)
-        floor.meanwhile = self._first(floor.meanwhile)
 
-    def _first(self, then: Callable[[], bool]) -> Callable[[], bool]:
-        """Write down what was said before anything else is done."""
-
-        def done() -> bool:
-            while self._unwritten:
-                self._journal.write(self._unwritten.popleft())
-            return then()
-
-        return done
+    def _write(self) -> bool:
+        """Write down what was said; nothing in the scene is changed by that."""
+        while self._unwritten:
+            self._journal.write(self._unwritten.popleft())
+        return False
 
     def hear(self, event: Event) -> None:
         """Take over what happened."""

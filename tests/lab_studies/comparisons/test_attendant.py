@@ -30,7 +30,7 @@ def run_with(tmp_path_factory: pytest.TempPathFactory) -> Any:
 
     def run(person: Attendant, *faults: dict[str, Any]) -> Outcome:
         drawn = tuple(FaultFields.model_validate(fields) for fields in faults)
-        conditions = Conditions(faults=drawn, controls=person, on_floor=person.on_floor)
+        conditions = Conditions(faults=drawn, controls=person, on_floor=person.on_floor, before_step=person.before_step)
         return carry_out(prepared, taught.cell, sequence, conditions, relearner=Relearner(prepared, taught, teacher))[0]
 
     return run
