@@ -13,7 +13,7 @@ from lab.api.options import Advisors, ToolboxOrPlace, advising_of, checked, seve
 from lab.api.pictures import Page, Picture
 from lab.errors import BadInput
 from lab.files import check_out
-from lab.production.conditions import Conditions
+from lab.production.composer import Conditions
 from lab.production.report import Report
 from lab.production.run import run as run_task
 from lab.production.run_advice import RunAdvice

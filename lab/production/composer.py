@@ -11,25 +11,27 @@ Then it makes one move after the other (`Production`), and has the frames audite
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 from lab.audit.audit import audit
 from lab.audit.evidence import Evidence, Struck
 from lab.audit.tracks import tracks_of
 from lab.export.recorder import MotionRecorder
-from lab.production.conditions import Conditions
+from lab.production.controls import Controls
 from lab.production.faults.injector import Injector
-from lab.production.floor import Floor, Hooks
+from lab.production.floor import Floor, Hooks, idle, untouched
 from lab.production.outcome import Outcome
 from lab.production.parts_in_machines import PartsInMachines, watch_machines
 from lab.production.perception import look
+from lab.production.recorder import Viewer
 from lab.production.recovery import Recovery
-from lab.production.relearning import Relearner
 from lab.production.replanning import Planner
+from lab.production.run_advice import RunAdvice
 from lab.production.run_journal import Met, Moved, RunJournal
 from lab.production.run_state import RunState
 from lab.production.standing import has_fallen, stands
+from lab.production.taught import Relearner
 from lab.production.transfers import Transfers, beginning
 from lab.production.trouble import RunStopped, Trouble
 from lab.sequencing.cell.cell import Cell
@@ -39,9 +41,36 @@ from lab.sequencing.simulate.follow import simulate
 from lab.sim.frames import Recording
 from lab.sim.world import World
 from lab.skills.prepared_scene import Prepared
+from lab.tasks.fault_fields import FaultFields
 from lab.teaching.events import Event, MoveMade, Tell, TroubleMet, unheard
 
 PUT_RIGHT = "; put it right, then go on"  # what a person is asked
+
+
+def nobody(floor: Floor) -> None:
+    """Nobody looks at it."""
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """Under which conditions a prepared task is carried out: how fast, who watches and may stop it, and what is kept of it.
+
+    override: the share of the task's speed and acceleration with which the arm moves. viewer: who watches live.
+    faults: what goes wrong in it; fault_seed: draws more of that, None: nothing more. advice: who is asked, None: nobody
+    about the order. on_floor: called with the floor when it is ready. before_step, meanwhile: called by the floor, before
+    faults strike (see `Hooks`).
+    """
+
+    override: float = 1.0
+    viewer: Viewer | None = None
+    controls: Controls = field(default_factory=Controls)
+    journal: RunJournal = field(default_factory=RunJournal)
+    faults: tuple[FaultFields, ...] = ()
+    fault_seed: int | None = None
+    advice: RunAdvice | None = None
+    on_floor: Callable[[Floor], None] = nobody
+    before_step: Callable[[Floor], bool] = untouched
+    meanwhile: Callable[[], bool] = idle
 
 
 @dataclass(frozen=True)

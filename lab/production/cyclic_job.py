@@ -11,7 +11,7 @@ from lab.errors import BadInput, LabError
 from lab.production.cyclic_order import check_parts, cycle_document, mix_of
 from lab.production.durations import untimed
 from lab.production.order import check_order
-from lab.production.run import teach_all
+from lab.production.taught import teach_all
 from lab.sequencing.cell.cell import MAX_PARTS, Cell
 from lab.sequencing.cyclic.cycle import Cycle
 from lab.sequencing.cyclic.several import best_rhythm

@@ -7,10 +7,9 @@ from math import ceil
 from time import perf_counter
 
 from lab.errors import WorkFailed
-from lab.production.controls import Controls, StopKind
+from lab.production.controls import Controls, StopKind, StopRecord, StopsChanged, unwritten
 from lab.production.machine import Machine, Work
 from lab.production.recorder import Recorder, Viewer, extras_of
-from lab.production.stop_record import StopRecord, StopsChanged, unwritten
 from lab.sim.arms.kinematics import ToolPose
 from lab.sim.arms.robot import NAME
 from lab.sim.scene.places import Layout

@@ -22,11 +22,12 @@ from lab.sequencing import find_sequence
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import BUILT_IN, MAKESPAN, cost
 from lab.sequencing.cell.routes import part_of
-from lab.sequencing.cell.schedule import Move
+from lab.sequencing.cell.schedule import Move, Schedule
 from lab.sequencing.methods.exact import Optimum, optimum
 from lab.sequencing.methods.portfolio import BestKnown, best_known
 from lab.sequencing.search import SAME, Reference, Search, SequenceResult
 from lab.sequencing.simulate.follow import follow, waits_in
+from lab.sequencing.simulate.rest import rest_of
 from lab.sequencing.simulate.run import NO_WAIT, Run, branch
 from lab.tasks.sequencing import Sequencing, search_for
 from lab.teaching.events import (
@@ -44,6 +45,7 @@ from lab.teaching.lesson_sessions import TellingAdvisor
 if TYPE_CHECKING:
     from lab.sequencing.cyclic.several import Rhythm
     from lab.sequencing.methods.srl_advised import AdvisedResult
+
 
 NOBODY = AdvisorName.of("none")
 KeepOrder = Callable[[Cell, str], Journal]  # given the cell and the objective
@@ -267,3 +269,35 @@ def advised_session(
         tell(LessonEvent(ORDER, event, True if journal is None else journal.tell(event)))
 
     return advised_srl(cell, search, rng, GateSettings(advice.gate, spare_best=True), advisor, hear)
+
+
+@dataclass(frozen=True)
+class TypedOrder:
+    """A sequence that may be carried out: when it ends [s] and how much longer that is than the proven optimum or bound.
+
+    gap: a fraction; proven: against an optimum, not only a bound.
+    """
+
+    sequence: tuple[int, ...]
+    schedule: Schedule
+    gap: float
+    proven: bool
+
+    @property
+    def words(self) -> str:
+        """What came of the check, for people."""
+        against = "proven optimum" if self.proven else "proven bound"
+        longer = (
+            f"{100 * self.gap:.1f} % longer than the {against}" if self.gap > 1e-9 else f"as short as the {against}"
+        )
+        return f"{counted(len(self.sequence), 'move')}, {self.schedule.makespan_s:.1f} s: {longer}"
+
+
+def checked(state: Run, sequence: Sequence[int]) -> TypedOrder:
+    """A typed sequence from a state on, to the end of the work. BadInput names the first move that may not be made, and why."""
+    moves = moves_from(state, sequence, "order")
+    schedule = Schedule.from_moves(state.cell, moves, sequence)
+    rest = rest_of(state, fallback_s=float(np.nanmax(state.cell.empty_s, initial=0.0))).cell
+    proven = optimum(state.cell if rest is None else rest)
+    gap = proven.gap(schedule.makespan_s - state.now_s)
+    return TypedOrder(tuple(sequence), schedule, gap, proven.proven)

@@ -26,10 +26,10 @@ from lab.production.controls import StopKind
 from lab.production.floor import Floor
 from lab.production.parts_in_machines import PartsInMachines
 from lab.production.perception import BELOW_M, Deviation, news, scene_seen, seen_at
-from lab.production.relearning import Relearner, adopt
 from lab.production.replanning import Planner, in_another, plan_again
 from lab.production.run_state import LOOK_S, GivenUp, Replanned, RunState, Strange
 from lab.production.standing import DELIVERED_M, too_near
+from lab.production.taught import Relearner, adopt
 from lab.production.transfers import Transfers
 from lab.production.trouble import RunStopped, Trouble
 from lab.sequencing.simulate.rest import Mishaps

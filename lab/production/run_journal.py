@@ -18,8 +18,7 @@ from lab.advice.entries import MAX_BYTES
 from lab.advice.json_lines import AppendedFile, EntryKinds, differing
 from lab.errors import BadInput, WorkFailed
 from lab.files import json_of, read_limited
-from lab.production.controls import Held, StopKind
-from lab.production.stop_record import StopsChanged
+from lab.production.controls import Held, StopKind, StopsChanged
 from lab.sim.world import TIME_STEP
 from lab.tasks.record import write_whole
 from lab.toolbox.folder_place import FolderPlace

@@ -1,4 +1,4 @@
-"""The order of the robot's transfers: of a task, over measured durations, or of a cell file."""
+"""The order of the robot's transfers: of a task, over measured durations, or of a cell file; what `lab sequence` does."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -15,9 +15,8 @@ from lab.interrupts import uninterrupted
 from lab.learning.requests import Ask
 from lab.learning.settings import GateSettings
 from lab.production.any_time import CTRL_C, Found, looked_for
-from lab.production.drawn_times import stochastic
 from lab.production.order import NOBODY, KeepOrder, OrderAdvice, advised_session
-from lab.sequencing import SEQUENCERS, check_method, find_sequence
+from lab.sequencing import SEQUENCERS, carried_reaction, check_method, find_sequence
 from lab.sequencing.cell.cell import EVERY_PLAN, Cell
 from lab.sequencing.cell.chance import NO_CHANCE, Chance
 from lab.sequencing.cell.objectives import (
@@ -43,6 +42,9 @@ from lab.teaching.events import Event, PhaseBegan, SequenceFound, SequencingBega
 from lab.teaching.teacher import Teacher
 
 PORTFOLIO = "portfolio"  # the method of which it is told what in it found the order
+REPLICATIONS = 200  # drawn episodes in which a list and a policy are compared
+PLANNED = 2000  # of a policy that plans at every decision so many by parts squared, at least FEWEST: it takes its time
+FEWEST = 20
 
 
 @dataclass(frozen=True)
@@ -156,7 +158,7 @@ def ordered_cell(file: CellFile, case: str | None, toasts: int | None) -> Cell:
 def measured_cell(task: Task, toasts: int | None, wanted: SequencingOptions, teacher: Teacher) -> Cell:
     """The cell of a task, once its skills are learned and their durations measured."""
     from lab.production.durations import Durations, cell_of
-    from lab.production.run import teach_all
+    from lab.production.taught import teach_all
     from lab.skills.prepared_scene import prepare
     from lab.skills.skillset import SkillSet
 
@@ -353,3 +355,43 @@ def draw(cell: Cell, document: dict[str, Any], found: Sequence[SequenceResult], 
     if "schedule" in files:
         write_table(document["schedule"], files["schedule"])
     document["files"] = {name: str(path) for name, path in files.items()}
+
+
+def stochastic(
+    cell: Cell, method: str, search: Search, found: SequenceResult, chance: Chance, seed: int
+) -> dict[str, Any]:
+    """The list as it is and a policy that reacts, in the same drawn episodes; means with 95 % intervals."""
+    from lab.sequencing.simulate.replications import replicate
+
+    fixed = _planned(cell, method, search, found, seed)
+    reaction = SEQUENCERS[method].react(cell, search.objective, seed, fixed)
+    if search.policy is not None:
+        reaction = carried_reaction(search.policy)
+    episodes = max(FEWEST, min(REPLICATIONS, PLANNED // cell.parts**2)) if reaction.replans else REPLICATIONS
+    costs = [replicate(cell, how, chance, episodes, seed, search.objective) for how in (fixed, reaction.policy)]
+    difference = costs[0] - costs[1]
+    return {
+        "processing": chance.processing,
+        "arrivals": chance.arrivals if cell.arrivals else None,
+        "spread": chance.spread,
+        "robot_breaks_every_s": chance.robot_breaks_every_s,
+        "robot_repair_s": chance.robot_repair_s,
+        "replications": episodes,
+        "fixed": _mean(costs[0]) | {"sequence": list(fixed)},
+        "reacting": _mean(costs[1]) | {"policy": reaction.words, "replans": reaction.replans},
+        "saved_by_reacting": _mean(difference),
+    }
+
+
+def _planned(cell: Cell, method: str, search: Search, found: SequenceResult, seed: int) -> Sequence[int]:
+    """The list to carry out as it is: what the method finds with the mean times."""
+    if search.chance == NO_CHANCE:
+        return found.sequence
+    return find_sequence(cell, method, replace(search, chance=NO_CHANCE, on_episode=None), seed).sequence
+
+
+def _mean(values: "np.ndarray[Any, np.dtype[np.float64]]") -> dict[str, Any]:
+    from lab.statistics import interval
+
+    mean, low, high = interval(values)
+    return {"mean": mean, "ci95": [low, high]}

@@ -8,8 +8,7 @@ import pytest
 
 from lab.errors import WorkFailed
 from lab.production.answers import MAX_TRIES
-from lab.production.composer import Production, carry_out
-from lab.production.conditions import Conditions
+from lab.production.composer import Conditions, Production, carry_out
 from lab.production.controls import RESET_FIRST
 from lab.production.durations import Durations, cell_of, measure
 from lab.production.floor import AT_REST_STEPS, SKIPPED_STEPS, Floor, Hooks

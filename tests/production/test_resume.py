@@ -8,12 +8,13 @@ from typing import Any
 import pytest
 
 from lab.learning.requests import AdviceRequest
-from lab.production.conditions import Conditions
+from lab.production.composer import Conditions
 from lab.production.order import Ordered
 from lab.production.report import Report
-from lab.production.run import run, teach_all
+from lab.production.run import run
 from lab.production.run_advice import RunAdvice
 from lab.production.run_journal import RunBegan, RunJournal, read_run
+from lab.production.taught import teach_all
 from lab.sequencing.search import SequenceResult
 from lab.skills.prepared_scene import prepare
 from lab.tasks.fault_fields import FaultFields

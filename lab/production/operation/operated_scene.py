@@ -9,27 +9,21 @@ from typing import Any
 from lab.advice.advisors import PYTHON, AdvisorName, RecordedAdvisor
 from lab.errors import BadInput, WorkFailed, unknown
 from lab.export.recorder import MotionRecorder
-from lab.production.composer import Production, noting
-from lab.production.conditions import Conditions
+from lab.production.composer import Conditions, Production, noting
 from lab.production.controls import RESET_FIRST, StopKind
-from lab.production.faults.draw import draw
-from lab.production.faults.injector import Injector
+from lab.production.faults.injector import Injector, draw
 from lab.production.floor import Floor, Hooks
-from lab.production.operation.at_once import OPERATOR
 from lab.production.operation.by_hand import ByHand
-from lab.production.operation.commands import Spoken
+from lab.production.operation.commands import OPERATOR, Spoken
 from lab.production.operation.lead import DROP, END, EVERY, Demonstration, Lead, led_in_words
-from lab.production.operation.typed_order import checked
-from lab.production.order import GIVEN, OrderAdvice, ordered
+from lab.production.order import GIVEN, OrderAdvice, checked, ordered
 from lab.production.order_learning import OrderLearning
 from lab.production.parts_in_machines import watch_machines
-from lab.production.relearning import Relearner
 from lab.production.replanning import Planner
-from lab.production.run import teach_all
 from lab.production.run_journal import Led
 from lab.production.run_state import RunState
 from lab.production.run_status import RunStatus
-from lab.production.taught import Taught, skill_row
+from lab.production.taught import Relearner, Taught, skill_row, teach_all
 from lab.production.transfers import bodies_of
 from lab.sequencing.cell.routes import part_of
 from lab.sequencing.methods.exact import Optimum

@@ -12,14 +12,13 @@ from dataclasses import replace
 from typing import TypeGuard
 
 from lab.errors import LabError, WorkFailed
-from lab.production.conditions import Conditions
-from lab.production.operation.at_once import OPERATOR, Done, press
-from lab.production.operation.commands import Spoken, spoken
+from lab.production.composer import Conditions
+from lab.production.controls import StopsChanged
+from lab.production.operation.commands import OPERATOR, Done, Spoken, press, spoken
 from lab.production.operation.operated_scene import OperatedScene
 from lab.production.report import Report
 from lab.production.run_journal import Commanded, Entry, Stopped, stops_of
 from lab.production.run_status import RunStatus
-from lab.production.stop_record import StopsChanged
 from lab.tasks.task import Order, Task
 from lab.teaching.events import OperatorActed
 from lab.teaching.teacher import Teacher

@@ -3,8 +3,7 @@
 from collections.abc import Callable, Iterable
 from threading import Thread
 
-from lab.production.operation.at_once import Done
-from lab.production.operation.commands import help_lines
+from lab.production.operation.commands import Done, help_lines
 from lab.production.operation.desk import Desk
 from lab.seat.terminal.console_view import plain_lines
 

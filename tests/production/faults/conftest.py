@@ -7,8 +7,7 @@ import pytest
 
 from lab.production.faults.injector import Injector
 from lab.production.floor import Floor, Hooks
-from lab.production.run import teach_all
-from lab.production.taught import Taught
+from lab.production.taught import Taught, teach_all
 from lab.sim.parts.kinds import Spot
 from lab.sim.world import World
 from lab.skills.prepared_scene import Prepared, prepare

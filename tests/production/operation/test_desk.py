@@ -4,13 +4,12 @@ from pathlib import Path
 
 import pytest
 
-from lab.production.conditions import Conditions
-from lab.production.controls import RESET_FIRST, Controls, StopKind
+from lab.production.composer import Conditions
+from lab.production.controls import RESET_FIRST, Controls, StopKind, StopsChanged
 from lab.production.floor import Floor, Hooks
-from lab.production.operation.run_desk import WORDS, RunDesk
+from lab.production.operation.desk import WORDS, RunDesk
 from lab.production.run import run
 from lab.production.run_journal import Commanded, RunBegan, RunEnded, RunJournal, Stopped, read_run
-from lab.production.stop_record import StopsChanged
 from lab.sim.world import World
 from lab.skills.prepared_scene import prepare
 from lab.tasks.task import Task
