@@ -26,6 +26,8 @@ from lab.tasks.task import Task
 from lab.tasks.task_file import load_beside
 from lab.teaching.events import PhaseBegan
 from lab.teaching.teacher import Teacher
+from lab.view.canvas import check_picture
+from lab.view.gantt import cycle_gantt
 
 SHOWN_PERIODS = 3
 FEWEST_CYCLES = 6  # of the finite order that is shown beside: enough for the line to be full
@@ -53,7 +55,6 @@ def cyclic_named(name: str, wanted: CyclicWanted, teacher: Teacher, files: dict[
     much, up to parts_per_cycle parts (see `best_rhythm`); where the parts are named, just these, if it is not given. Raises
     BadInput for what has no cycle, WorkFailed when none was found.
     """
-    from lab.view.canvas import check_picture
 
     for path in files.values():
         check_picture(path)
@@ -77,8 +78,6 @@ def cyclic_named(name: str, wanted: CyclicWanted, teacher: Teacher, files: dict[
     document = {"task": loaded.name, "seed": wanted.seed} | cycle_document(rhythm)
     document["finite"] = _finite(rhythm.cycle, cell)
     if "gantt" in files:
-        from lab.view.gantt import cycle_gantt
-
         cycle_gantt(steady(rhythm.cycle, SHOWN_PERIODS), files["gantt"])
     return document | {"files": {name: str(path) for name, path in files.items()}}
 

@@ -12,6 +12,7 @@ from lab.skills.prepared_scene import Prepared, prepare
 from lab.skills.skill import NOT_OFF
 from lab.skills.skillset import SkillSet
 from lab.skills.trial import carry_out
+from lab.statistics import proportion_interval
 from lab.tasks.task import Task
 from lab.tasks.task_file import load
 from lab.toolbox.policy import Policy
@@ -53,7 +54,6 @@ class Evaluation:
 
     def facts(self) -> dict[str, Any]:
         """What a log keeps of it: how many scenes could be solved, in how many it did, and Wilson's 95 % interval."""
-        from lab.statistics import proportion_interval
 
         counting = [scene for scene in self.scenes if scene.failed_in != "scene"]
         good = [scene for scene in counting if scene.failed_in is None]

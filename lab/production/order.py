@@ -10,6 +10,7 @@ from lab.advice.advising import through
 from lab.advice.advisors import PEOPLE, AdvisorName, make_advisor
 from lab.advice.entries import Closed
 from lab.advice.journal import Again, Journal
+from lab.advice.order_level import OrderLevel, signature_of
 from lab.advice.receipt import receipt
 from lab.errors import BadInput, counted
 from lab.learning.requests import Ask
@@ -23,6 +24,9 @@ from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import BUILT_IN, MAKESPAN, cost
 from lab.sequencing.cell.routes import part_of
 from lab.sequencing.cell.schedule import Move, Schedule
+from lab.sequencing.cyclic.cycle import check_cyclic
+from lab.sequencing.cyclic.line import lines
+from lab.sequencing.cyclic.several import Rhythm
 from lab.sequencing.methods.exact import Optimum, optimum
 from lab.sequencing.methods.portfolio import BestKnown, best_known
 from lab.sequencing.search import SAME, Reference, Search, SequenceResult
@@ -42,10 +46,8 @@ from lab.teaching.events import (
 )
 from lab.teaching.lesson_sessions import TellingAdvisor
 
-if TYPE_CHECKING:
-    from lab.sequencing.cyclic.several import Rhythm
+if TYPE_CHECKING:  # it loads the compiler
     from lab.sequencing.methods.srl_advised import AdvisedResult
-
 
 NOBODY = AdvisorName.of("none")
 KeepOrder = Callable[[Cell, str], Journal]  # given the cell and the objective
@@ -79,9 +81,6 @@ def check_order(cell: Cell, words: str | None, mix: Sequence[str]) -> None:
     if words is not None:
         checked_order(cell, words)
     if mix:
-        from lab.sequencing.cyclic.cycle import check_cyclic  # it loads OR-Tools
-        from lab.sequencing.cyclic.line import lines
-
         check_cyclic(cell, mix)
         next(lines(cell, mix))
 
@@ -149,7 +148,7 @@ class Ordered:
     costs: dict[str, float]
     learning: OrderLearning
     receipt: dict[str, Any] | None = None
-    rhythm: "Rhythm | None" = None
+    rhythm: Rhythm | None = None
 
 
 def ordered(cell: Cell, settings: Sequencing, advice: OrderAdvice, seed: int, tell: Tell = unheard) -> Ordered:
@@ -255,8 +254,7 @@ def advised_session(
     cell: Cell, search: Search, advice: OrderAdvice, seeds: tuple[int, int], journal: Journal | None, tell: Tell
 ) -> "AdvisedResult":
     """A session of SRL with advice; seeds: the command's, and the session's number. Raises Again, and as `advised_srl`."""
-    from lab.advice.order_level import OrderLevel, signature_of
-    from lab.sequencing.methods.srl_advised import advised_srl
+    from lab.sequencing.methods.srl_advised import advised_srl  # only where it counts: the compiler takes its time
 
     seed, session = seeds
     rng, own = (np.random.default_rng([seed, stream, session]) for stream in (2, 3))

@@ -15,6 +15,7 @@ from lab.sequencing.cell.objectives import MAKESPAN, stuck_cost
 from lab.sequencing.methods.srl_time import bound_alone, srl_time
 from lab.sequencing.search import Reference, Search, SequenceResult
 from lab.view.figures import beside, gap_of
+from lab.view.sequencing_plots import sequence_plot
 
 BOUND_ALONE, UNBOUNDED = "its bound alone", "without its bound"
 
@@ -87,7 +88,6 @@ class OrderLearning:
 
     def drawn(self, cell: Cell) -> Callable[[Path], None]:
         """What draws it to a file: the cost by episode, the best so far, and what each part of the method comes to."""
-        from lab.view.sequencing_plots import sequence_plot
 
         lines = {f"{one.by}: {one.cost:.1f}{self.known.unit}": one.cost for one in self.beside if one.cost is not None}
         return partial(

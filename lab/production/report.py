@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass, field
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from lab.audit.tracks import FILE as FRAMES
 from lab.audit.tracks import packed, tracks_of
@@ -23,6 +23,7 @@ from lab.production.taught import Taught
 from lab.sequencing.cell.cell import EVERY_PLAN
 from lab.sequencing.cell.schedule import Schedule
 from lab.sequencing.cell.schedule_rows import csv_of, rows_of
+from lab.sequencing.cyclic.several import Rhythm
 from lab.sequencing.methods.exact import Optimum
 from lab.sequencing.search import SequenceResult
 from lab.sequencing.simulate.follow import simulate
@@ -44,12 +45,12 @@ from lab.teaching.events import (
 )
 from lab.teaching.lesson_plan import Lesson
 from lab.toolbox.policy import Policy
+from lab.view.gantt import gantt
+from lab.view.meshcat import replay_html
+from lab.view.plots import learning_curves, values_seen
 from lab.view.story import Mark, Story
+from lab.vision import write_picture
 from lab.workers import Task, Workers
-
-if TYPE_CHECKING:
-    from lab.sequencing.cyclic.several import Rhythm
-
 
 LEAST_WAIT_S = 0.5  # that is worth a word
 FILES = {
@@ -149,7 +150,7 @@ class Report:
     files: dict[str, str] = field(default_factory=dict)
     missing: dict[str, str] = field(default_factory=dict)
     receipts: dict[str, Any] | None = None
-    rhythm: "Rhythm | None" = None
+    rhythm: Rhythm | None = None
     learning: OrderLearning | None = None
 
     @property
@@ -225,7 +226,6 @@ Drawn = dict[str, Task[bytes]]  # PNG files by their names in FILES, drawn or be
 
 def begin_pictures(prepared: Prepared, taught: Taught, workers: Workers) -> Drawn:
     """What can be drawn as soon as the skills are there: the learning curves, and the value map where there is a photo."""
-    from lab.view.plots import learning_curves, values_seen
 
     drawn = {"learning_curves": workers.begin(_png, partial(learning_curves, _curves(prepared, taught.lessons)))}
     skill = _photographed(prepared)
@@ -264,8 +264,6 @@ def write_files(
     workers = workers or Workers()
     drawn = begin_pictures(report.prepared, report.taught, workers) if drawn is None else drawn
     if report.outcome.schedule.robot:
-        from lab.view.gantt import gantt
-
         drawn = drawn | {"gantt": workers.begin(_png, partial(gantt, report.outcome.schedule, predicted=predicted))}
     if report.learning is not None and len(report.learning.found.episode_costs) > 1:
         drawn = drawn | {"order_learning": workers.begin(_png, report.learning.drawn(report.taught.cell))}
@@ -320,8 +318,6 @@ def _pictures(
     report: Report, paths: dict[str, Path], predicted: Schedule, drawn: Drawn, scene: Task[dict[str, Any]] | None
 ) -> Iterator[tuple[tuple[str, ...], Callable[[], object]]]:
     """What else this run has, and what writes it; what other processes draw comes last."""
-    from lab.view.meshcat import replay_html
-    from lab.vision import write_picture
 
     prepared, outcome = report.prepared, report.outcome
     program = outcome.program

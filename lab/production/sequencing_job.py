@@ -31,6 +31,8 @@ from lab.sequencing.cell.schedule_rows import check_table, rows_of, write_table
 from lab.sequencing.methods.shared import NO_LIMITS, Limits
 from lab.sequencing.search import SAME, LearnedSequence, Reference, Search, SequenceResult
 from lab.sequencing.simulate.follow import follow, simulate, steps
+from lab.sequencing.simulate.replications import replicate
+from lab.statistics import interval
 from lab.tasks.carried_policy import read_policy
 from lab.tasks.cell_file import CellFile, order_from_word, toast_case
 from lab.tasks.grid_world import GridWorld
@@ -40,6 +42,9 @@ from lab.tasks.task import Task
 from lab.tasks.task_file import load_beside
 from lab.teaching.events import Event, PhaseBegan, SequenceFound, SequencingBegan, Tell, unheard
 from lab.teaching.teacher import Teacher
+from lab.view.canvas import check_picture
+from lab.view.gantt import gantt
+from lab.view.sequencing_plots import sequence_plot
 
 PORTFOLIO = "portfolio"  # the method of which it is told what in it found the order
 REPLICATIONS = 200  # drawn episodes in which a list and a policy are compared
@@ -88,7 +93,6 @@ def sequence_named(
 
     files: pictures to draw, by name (see `draw`).
     """
-    from lab.view.canvas import check_picture
 
     for kind, path in files.items():
         check_table(path) if kind == "schedule" else check_picture(path)
@@ -336,8 +340,6 @@ def _in_words(cell: Cell, sequence: Sequence[int]) -> list[str]:
 @uninterrupted
 def draw(cell: Cell, document: dict[str, Any], found: Sequence[SequenceResult], files: dict[str, Path]) -> None:
     """What is asked for by name: "plot", the costs of the episodes, "gantt" and "schedule", of the best order known."""
-    from lab.view.gantt import gantt
-    from lab.view.sequencing_plots import sequence_plot
 
     if "plot" in files:
         label = "makespan [s]" if document["objective"] == MAKESPAN else document["objective"]
@@ -361,7 +363,6 @@ def stochastic(
     cell: Cell, method: str, search: Search, found: SequenceResult, chance: Chance, seed: int
 ) -> dict[str, Any]:
     """The list as it is and a policy that reacts, in the same drawn episodes; means with 95 % intervals."""
-    from lab.sequencing.simulate.replications import replicate
 
     fixed = _planned(cell, method, search, found, seed)
     reaction = SEQUENCERS[method].react(cell, search.objective, seed, fixed)
@@ -391,7 +392,6 @@ def _planned(cell: Cell, method: str, search: Search, found: SequenceResult, see
 
 
 def _mean(values: "np.ndarray[Any, np.dtype[np.float64]]") -> dict[str, Any]:
-    from lab.statistics import interval
 
     mean, low, high = interval(values)
     return {"mean": mean, "ci95": [low, high]}

@@ -503,7 +503,7 @@ def drawn(monkeypatch: pytest.MonkeyPatch, stop: BaseException | None = None) ->
         if stop is not None:
             raise stop
 
-    monkeypatch.setattr("lab.view.plots.learning_curves", quick)
+    monkeypatch.setattr("lab.production.report.learning_curves", quick)
     return names
 
 

@@ -4,19 +4,15 @@ What they need is put out of sight before the run.
 """
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from lab.production.faults import FAULTS
 from lab.production.faults.fault import GROUND_M, NEVER, Fault, Happened
+from lab.production.floor import Floor
 from lab.sim.scene.scene import Scene
 from lab.tasks.fault_fields import FaultFields
 from lab.tasks.task import Order, Task
-
-if TYPE_CHECKING:
-    from lab.production.floor import Floor
-
 
 MOST = 2  # faults of one run
 BETWEEN = (0.02, 0.85)  # of the predicted time, when a fault is due
@@ -62,7 +58,7 @@ class Injector:
             for fault in self.waiting:
                 fault.prepare(scene)
 
-    def tick(self, floor: "Floor") -> bool:
+    def tick(self, floor: Floor) -> bool:
         """To be called before each physics step; whether something in the scene was changed."""
         now_s = floor.now_s
         if now_s < self.next_s:
@@ -83,7 +79,7 @@ class Injector:
         due = [max(fault.fields.at_s, self._look_s) for fault in self.waiting]
         return min([*due, *(fault.until_s for fault in self.lasting)], default=NEVER)
 
-    def _strikes(self, fault: Fault, floor: "Floor") -> bool:
+    def _strikes(self, fault: Fault, floor: Floor) -> bool:
         happened = fault.strikes(floor)
         if happened is None:
             return False
