@@ -1,4 +1,4 @@
-"""The best steady rhythm of a cell or of a task: what `lab sequence --cyclic` does."""
+"""The cycle of a cell or of a task that needs the least time a part: what `lab sequence --cyclic` does."""
 
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -51,8 +51,9 @@ class CyclicWanted:
 def cyclic_named(name: str, wanted: CyclicWanted, teacher: Teacher, files: dict[str, Path]) -> dict[str, Any]:
     """The document of `lab sequence --cyclic` on a cell file, or on a task over durations measured in simulation.
 
-    Without a word on the order one part enters in a cycle, or, of several products, what the file orders, or several times as
-    much, up to parts_per_cycle parts (see `best_rhythm`); where the parts are named, just these, if it is not given. Raises
+    Where no order is asked for, one part enters in a cycle, or, of several products, the smallest mix of what the file orders;
+    or several times as much, up to parts_per_cycle parts (see `best_rhythm`). Where the parts are named and parts_per_cycle is
+    not given, just these enter. Raises
     BadInput for what has no cycle, WorkFailed when none was found.
     """
 

@@ -1,4 +1,4 @@
-"""A cyclic order in a run: found for the products that are ordered, carried out for as many parts as there are, measured."""
+"""A cyclic order in a run: found for the products that are ordered, unrolled for all of the parts, and measured."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -16,7 +16,7 @@ SECONDS_PER_HOUR = 3600.0
 
 
 def cycle_document(rhythm: Rhythm) -> dict[str, Any]:
-    """What is told of the best cycle, and of those that were tried, for JSON."""
+    """The best cycle, and those that were tried, as a JSON document."""
     cycle, per_part_s = rhythm.cycle, rhythm.per_part_s
     products = {move.slot: cycle.product(move) for move in cycle.line.moves}
     return {
@@ -44,7 +44,7 @@ def cycle_document(rhythm: Rhythm) -> dict[str, Any]:
 
 
 def mix_of(order: Sequence[str]) -> tuple[str, ...]:
-    """The smallest mix of products that repeats in an order, whatever their turns: 4 slices and 2 cups are 2 and 1."""
+    """The smallest mix of products that repeats in an order, whatever its sequence: 4 slices and 2 cups give 2 and 1."""
     counts = Counter(order)
     cycles = reduce(gcd, counts.values())
     return tuple(name for name, count in counts.items() for _ in range(count // cycles))

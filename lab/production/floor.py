@@ -1,4 +1,4 @@
-"""A scene with the robot and the machines at work in it: who is where, at one clock, and what stops it."""
+"""A scene with the robot and the machines at work in it, under one clock, and what stops them."""
 
 from collections import deque
 from collections.abc import Callable, Iterator
@@ -145,7 +145,7 @@ class Floor:
         self._after()
 
     def wait(self, until_s: float) -> None:
-        """One physics step, or, when nothing moves, the time until then, a second at the most: nothing happens meanwhile."""
+        """One physics step, or, while nothing moves, the time until then without physics, a second at the most."""
         steps = min(ceil((until_s - self.now_s) / TIME_STEP) - AT_REST_STEPS, SKIPPED_STEPS)
         still = self.now_s >= self._quiet_s and not any(machine.moves for machine in self.machines.values())
         if steps > 0 and still and not self._reached_in():
@@ -169,7 +169,7 @@ class Floor:
         self._pace()
 
     def _pace(self) -> None:
-        """Let the clock on the wall catch up where a speed is set; a stop ends the waiting."""
+        """Wait until real time has caught up with simulated time, where a speed is set; a stop ends the waiting."""
         speed = None if self.stops.folding else self.controls.speed
         if not speed:
             self._paced = (0.0, 0.0, 0.0)
@@ -186,9 +186,9 @@ class Floor:
     # ---- stops ---------------------------------------------------------------------------------------------------
 
     def held(self) -> str:
-        """Hold the arm as long as an emergency or protective stop says; why it was held, "" when it was not.
+        """Hold the arm as long as an emergency or protective stop lasts; returns why it was held, "" when it was not.
 
-        The arm's brakes act in the very step; time goes on meanwhile, at the pace of the clock on the wall at the most.
+        The brakes act in the same physics step. Simulated time goes on, not faster than real time.
         """
         if not self._stopped():
             return ""
@@ -209,9 +209,9 @@ class Floor:
         return why
 
     def protected(self, why: str) -> bool:
-        """A protective stop until somebody has gone on; False, and nothing is stopped, where nobody is there who could.
+        """Hold a protective stop until somebody lets the run go on; False, and nothing is stopped, where nobody attends the run.
 
-        In a run that is done again, somebody was there if it was stopped here.
+        A run that is replayed from its journal was attended if it was stopped at this step.
         """
         if not self.stops.folding:
             if not self.controls.attended:
@@ -220,7 +220,7 @@ class Floor:
         return bool(self.held())
 
     def between_moves(self) -> None:
-        """Wait as long as there is a pause, without any time going by."""
+        """Wait as long as a pause lasts; simulated time stands still."""
         while self.hooks.meanwhile() or (
             self.stops.look(self.steps, self.controls) and self.stops.pauses(self.controls)
         ):
@@ -251,7 +251,7 @@ class Floor:
         return f"the arm presses on '{body}' with {force_n:.0f} N, allowed are {limit_n:g}" if force_n > limit_n else ""
 
     def _back_off(self) -> None:
-        """Go back a little on the way that led against something."""
+        """Go back a little along the path on which the arm pressed on something."""
         while self._trail:
             self.world.drive(NAME, self.scene.robot.arm.joints, self._trail.pop())
             for _ in range(FORCE_EVERY):
@@ -264,7 +264,7 @@ class Floor:
         skill.start(self.bench, self.skillset.policies[skill.name])
 
     def run(self, skill: Skill) -> Status:
-        """Carry one skill out to its end, or until something stops it: it has failed then, as one that is blocked has."""
+        """Carry one skill out to its end; its status. It has failed where something stopped it, and where it is blocked."""
         if why := self.skillset.blocked.get(skill.name):
             skill.fail(why)
             return skill.status
@@ -278,7 +278,7 @@ class Floor:
         return skill.status
 
     def follow(self, motion: Iterator[None]) -> str:
-        """Carry a motion of the arm out that is no skill; what stopped it, "" when nothing did."""
+        """Carry out a motion of the arm that is no skill; returns what stopped it, "" when nothing did."""
         self.was_held = False
         try:
             for _ in motion:
@@ -290,7 +290,7 @@ class Floor:
         return ""
 
     def _stopped_by(self) -> str:
-        """What stops the motion under way now, once that is over; "" when nothing does."""
+        """Hold the motion under way where something stops it; returns what did once that is over, "" when nothing did."""
         if why := self.held():
             self.was_held = True
             return why
@@ -318,7 +318,7 @@ class Floor:
         return next((m.works[part] for m in self.machines.values() if part in m.works), None)
 
     def take_out(self, part: str) -> None:
-        """A part is not in any machine any more."""
+        """Note that a part is in no machine any more."""
         for machine in self.machines.values():
             machine.clear(part)
 

@@ -74,7 +74,7 @@ def checked_order(cell: Cell, words: str, where: str = "--order") -> tuple[int, 
 
 
 def check_order(cell: Cell, words: str | None, mix: Sequence[str]) -> None:
-    """BadInput for an order in words, or for a cycle of a mix of products, that cannot be however long moves take.
+    """Raise BadInput for an order in words, or for a cycle of a mix of products, that no durations make possible.
 
     cell: not timed yet (see `durations.untimed`). mix: empty, there is no cycle.
     """
@@ -152,9 +152,9 @@ class Ordered:
 
 
 def ordered(cell: Cell, settings: Sequencing, advice: OrderAdvice, seed: int, tell: Tell = unheard) -> Ordered:
-    """The order of a job, beside what cannot be beaten: the given one, or the best of those that were found.
+    """The order of a job beside its proven optimum or bound: the given one, or the best of those that were found.
 
-    A cyclic order is used as a given one is. With advice, SRL looks for one with it, and the settings' method for one alone; what
+    A cyclic order is used like a given one. With advice, SRL looks for one with it, and the settings' method for one alone; what
     the exact search finds stands beside them, and is used where the method is `exact`. Of orders that cost the same the advised
     one is used, then the method's; one of SRL that no move was advised to is no advised one, and comes after them.
     Raises BadInput as `checked_order`, `advised_srl` and
@@ -210,18 +210,18 @@ def reference(cell: Cell, objective: str, time_limit_s: float = SECOND_OPINION_S
 
 
 def reference_of(cell: Cell, objective: str, found: BestKnown) -> Reference:
-    """What is known of a cell, as what no sequence can beat."""
+    """The optimum or bound of a cell that is known, as a reference for other sequences."""
     by = found.bound_by if objective in BUILT_IN else UNKNOWN
     return Reference(found.bound, found.proven, by, unit_of(objective), found.sequence, found.found_by)
 
 
 def unit_of(objective: str) -> str:
-    """What stands behind a cost."""
+    """The unit of a cost, to be written behind it."""
     return "" if objective == "tardy-parts" else " s"
 
 
 def _cheapest(orders: Mapping[str, SequenceResult]) -> str:
-    """The first of those that nothing is cheaper than."""
+    """The first of the cheapest orders, by who found it."""
     least = min(order.cost for order in orders.values())
     return next(name for name, order in orders.items() if order.cost <= least + SAME)
 

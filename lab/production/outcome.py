@@ -17,11 +17,11 @@ from lab.teaching.events import Event
 class Outcome:
     """A run in physics: the measured schedule, which parts were delivered, retries, and why not all were (None: all).
 
-    timed: how long each move took in which nothing had to be
-    tried again. skipped_s: of sim_s, the time that passed without physics, while the robot waited and nothing moved.
-    interrupted: by Ctrl-C; all else is what came of it until then. happened: the faults that struck. heard: what the run
-    told. program: what the robot carried out. audit: what the frames show of it (see `lab.audit`), None: nobody has looked;
-    `delivered` are those that it passes, and what it finds is the failure where nothing else is.
+    timed: the duration of each move in which nothing had to be tried again. skipped_s: of sim_s, the time that passed
+    without physics, while the robot waited and nothing moved. interrupted: by Ctrl-C; all else is what came of it until then.
+    happened: the faults that struck. heard: what the run told. program: what the robot carried out. audit: what the frames
+    show (see `lab.audit`), None: nobody has looked; `delivered` are the parts that pass it, and what it finds is the failure
+    where there is no other.
     """
 
     schedule: Schedule

@@ -1,4 +1,4 @@
-"""What stands where, held against what is believed: parts, obstacles, stations, and what belongs to nobody.
+"""What is seen of parts, obstacles, stations and strange parts, compared with where the run believes them to be.
 
 Bodies' poses stand in for a camera that looks at the whole table: with the camera covered nothing is seen.
 """
@@ -43,7 +43,7 @@ Sort = Literal[
 
 @dataclass(frozen=True)
 class Deviation:
-    """Something that is not as it is believed to be: which body, in words, at which station ("": at none).
+    """A difference between what is seen and what is believed: of which body, in words, at which station ("": at none).
 
     at: where a part's foot is seen, or a fixed body's middle, or a station's pose; by_m: how far off [m]; None, 0: it is not
     seen at all. obstacle: of a new one, what is known of it.
@@ -70,7 +70,7 @@ def look(floor: Floor, state: RunState) -> None:
 
 
 def news(floor: Floor, state: RunState) -> list[Deviation]:
-    """What is not as a run believes it; of parts that were given up, and things that belong to nobody, nothing again."""
+    """The deviations that a run does not know of yet: none of parts that it gave up, or of strange parts that it saw before."""
     delivered = {state.name(part) for part in state.finished}
     found = perceive(floor, floor.scene.task, floor.scene.layout, state.spot_of, delivered)
     return [one for one in found if one.sort != "camera blind" and not _is_known(state, one)]
@@ -86,7 +86,7 @@ def _is_known(state: RunState, seen: Deviation) -> bool:
 def perceive(
     floor: Floor, task: Task, layout: Layout, spot_of: Mapping[str, Spot], delivered: Container[str] = ()
 ) -> list[Deviation]:
-    """All that is not as believed: fixed things as task and layout have them, parts on their spots, by body.
+    """All deviations: of fixed things from the task and the layout, of parts from their spots.
 
     delivered: those that have to stay within DELIVERED_M of them. What is in the gripper is left out. The order is that of
     `Sort` for parts, then strange parts, obstacles and stations.
@@ -122,7 +122,7 @@ def _parts(floor: Floor, task: Task, spot_of: Mapping[str, Spot], delivered: Con
 
 
 def moved_off(floor: Floor, name: str, spot: Spot | None) -> bool:
-    """Whether a part is not on its spot any more, seen or unseen: unseen it is found only where it was set down."""
+    """Whether a part is not on its spot any more, whether or not the camera sees it; False where no spot is known."""
     x, y, _ = floor.world.pose(name)[0]
     return spot is not None and hypot(float(x) - spot.x, float(y) - spot.y) > PART_M
 

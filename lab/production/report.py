@@ -79,7 +79,7 @@ class _Story:
     begins_s: list[float] = field(default_factory=list)
 
     def hear(self, event: Event) -> None:
-        """Take over what people read of it."""
+        """Add the captions and marks of an event."""
         match event:
             case SkillBegan(words=words, at_s=at_s):
                 self._say(at_s, f"The robot {words}")
@@ -112,7 +112,7 @@ class _Story:
 
 
 def story_of(outcome: Outcome, planned: Schedule | None) -> Story:
-    """What was told of a run, with the measured schedule beside the plan, and the faults that struck."""
+    """The story of a run for its replay: captions and marks, the measured schedule beside the plan, the faults that struck."""
     found = _Story()
     for event in outcome.heard:
         found.hear(event)

@@ -106,7 +106,10 @@ def run(
 
 
 def remember(report: Report, teacher: Teacher) -> None:
-    """Keeps how long moves took, and in each skill's log that it was used; what cannot be kept is told: the run counts."""
+    """Keep in the toolbox how long moves took, and in each skill's log that it was used.
+
+    What cannot be kept is told, and fails nothing: the run counts without it.
+    """
     taught, outcome, prepared = report.taught, report.outcome, report.prepared
     used = {"task": prepared.task.name, "seed": prepared.seed}
     used["delivered"] = f"{len(outcome.delivered)} of {len(prepared.order)}"

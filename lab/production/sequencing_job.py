@@ -89,7 +89,7 @@ def sequence_named(
     teacher: Teacher,
     files: dict[str, Path],
 ) -> dict[str, Any]:
-    """What `lab sequence` does: the document of `sequenced_named`, and its pictures.
+    """The document of `lab sequence`, as `sequenced_named` makes it; draws its pictures.
 
     files: pictures to draw, by name (see `draw`).
     """
@@ -131,7 +131,7 @@ def sequenced_named(
 
 
 def _check_names(wanted: SequencingOptions, settings: Sequencing) -> None:
-    """BadInput for a name that no table holds, and for advice to a method that asks for none; before any work."""
+    """Raise BadInput, before any work, for an unknown name, and for advice to a method that asks for none."""
     method, objective = wanted.method or settings.method, wanted.objective or settings.objective
     check_method(method)
     if objective not in OBJECTIVES:
@@ -293,7 +293,7 @@ def _document(cell: Cell, search: Search, looked: Found, wanted: SequencingOptio
 def _best_known(
     cell: Cell, method: str, objective: str, own: tuple[float, tuple[int, ...]], known: Reference
 ) -> dict[str, Any]:
-    """The best order that anything found: the method's own, unless the one of what cannot be beaten costs less."""
+    """The best order known: the method's own, unless the one found beside the bound costs less."""
     value, sequence = own
     by = known.found_by if method == PORTFOLIO else method
     if known.sequence:
@@ -339,7 +339,7 @@ def _in_words(cell: Cell, sequence: Sequence[int]) -> list[str]:
 
 @uninterrupted
 def draw(cell: Cell, document: dict[str, Any], found: Sequence[SequenceResult], files: dict[str, Path]) -> None:
-    """What is asked for by name: "plot", the costs of the episodes, "gantt" and "schedule", of the best order known."""
+    """Write the files that are asked for by name: "plot", the costs of the episodes; "gantt" and "schedule", the best order."""
 
     if "plot" in files:
         label = "makespan [s]" if document["objective"] == MAKESPAN else document["objective"]
@@ -362,7 +362,7 @@ def draw(cell: Cell, document: dict[str, Any], found: Sequence[SequenceResult], 
 def stochastic(
     cell: Cell, method: str, search: Search, found: SequenceResult, chance: Chance, seed: int
 ) -> dict[str, Any]:
-    """The list as it is and a policy that reacts, in the same drawn episodes; means with 95 % intervals."""
+    """The costs of the fixed sequence and of a policy that reacts, in the same drawn episodes; means with 95 % intervals."""
 
     fixed = _planned(cell, method, search, found, seed)
     reaction = SEQUENCERS[method].react(cell, search.objective, seed, fixed)
@@ -385,7 +385,7 @@ def stochastic(
 
 
 def _planned(cell: Cell, method: str, search: Search, found: SequenceResult, seed: int) -> Sequence[int]:
-    """The list to carry out as it is: what the method finds with the mean times."""
+    """The fixed sequence: what the method finds for the mean times."""
     if search.chance == NO_CHANCE:
         return found.sequence
     return find_sequence(cell, method, replace(search, chance=NO_CHANCE, on_episode=None), seed).sequence

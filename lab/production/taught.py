@@ -1,7 +1,7 @@
 """What a run knows how to do: its skills, found or learned, and how long moves take; and both again when the scene changes.
 
-`teach_all` comes before a run. `Relearner` surveys a scene that is no more as it was, and learns what has changed, each skill
-from its old table.
+`teach_all` is called before a run. `Relearner` is called in the middle of one: it surveys a scene that has changed, and
+fine-tunes the skills whose problem has changed from their old tables.
 """
 
 from collections.abc import Callable, MutableMapping
@@ -79,8 +79,8 @@ def teach_all(
 ) -> Taught:
     """Every skill of a prepared task, found or learned, and the durations of every move, found or measured.
 
-    journal: of a run that is gone on with; what it holds is taken from it. again: called for each lesson of that run that is
-    over; BadInput where its own journal cannot be read. workers: who shares in the timing; None: nobody.
+    journal: of a run that is resumed; the skills and durations that it holds are taken from it. again: called for each lesson
+    of that run that is over; BadInput where its own journal cannot be read. workers: who shares in the timing; None: nobody.
     """
     task, skillset, journal = prepared.task, prepared.skillset, journal or RunJournal()
     teacher = replace(teacher, trial=trial_of(prepared))
@@ -157,7 +157,10 @@ class Relearned:
 
 @dataclass
 class Relearner:
-    """Learns in the middle of a run what changed in its scene; prepared, taught: how they are now."""
+    """Learns in the middle of a run what changed in its scene.
+
+    prepared, taught: the scene and what is taught in it, as they are after the last change.
+    """
 
     prepared: Prepared
     taught: Taught
@@ -171,12 +174,11 @@ class Relearner:
 
 
 def relearned(prepared: Prepared, taught: Taught, scene: tuple[Task, Layout], teacher: Teacher) -> Relearned:
-    """Survey the scene as it is now seen, and learn what is another problem there, beginning with what was known.
+    """What is prepared and taught once the scene, as it is now seen, was surveyed and the problems that changed were learned.
 
-    Policies of problems that are as they were are kept. Only this run's own policies are looked at, so that it comes to the
-    same whatever else a toolbox holds. A skill without a solution is blocked (`SkillSet.blocked`), its ways keep the times
-    that they had.
-    Raises BadInput for a scene in which nothing can be done.
+    A problem that has not changed keeps its policy; another one is fine-tuned from this run's own policies alone, so that the
+    result does not depend on what else a toolbox holds. A skill without a solution is blocked (`SkillSet.blocked`); paths in
+    which it has a share keep the times that they had. Raises BadInput for a scene in which no task can be done.
     """
     task, layout = scene
     fresh = _surveyed(prepared, check_scene(task), layout)
@@ -204,12 +206,12 @@ def relearned(prepared: Prepared, taught: Taught, scene: tuple[Task, Layout], te
 
 
 def _same(lesson: Lesson, before: Lesson) -> bool:
-    """Whether it follows the same table, and so the same way."""
+    """Whether a lesson has the same table as before, and so leads along the same path."""
     return lesson.policy.q.tobytes() == before.policy.q.tobytes()
 
 
 def _surveyed(prepared: Prepared, task: Task, layout: Layout) -> Prepared:
-    """Every problem of the scene; a skill for which there is none is blocked."""
+    """The prepared scene with all of its problems; a skill for which there is no problem is blocked."""
     order = prepared.order
     skillset, surveys = SkillSet.of(task, order), Surveys(task, order, layout)
     words = scene_in_words(task, order, layout)
@@ -224,7 +226,7 @@ def _surveyed(prepared: Prepared, task: Task, layout: Layout) -> Prepared:
 
 
 def _timed(fresh: Prepared, before: Durations, others: set[str], teacher: Teacher) -> Durations:
-    """What was believed, with the ways measured anew in which a skill with another table has a share."""
+    """The durations as before, except those of paths in which a skill with a new table has a share: these are measured again."""
     skills = fresh.skillset
 
     def changed(names: set[str]) -> bool:
@@ -241,7 +243,10 @@ def _timed(fresh: Prepared, before: Durations, others: set[str], teacher: Teache
 
 
 def _with(before: Durations, fresh: Prepared, ways: SkillSet, teacher: Teacher) -> Durations:
-    """These ways measured; as before where one of them fails when it is tried: that is noticed when it is gone."""
+    """The durations with these paths measured again.
+
+    They stay as before where one of the paths fails: the run notices that when it takes that path.
+    """
     ways.skills, ways.policies = fresh.skillset.skills, fresh.skillset.policies
     ways.processes = {station.name: () for station in fresh.task.stations}
     try:
@@ -252,7 +257,7 @@ def _with(before: Durations, fresh: Prepared, ways: SkillSet, teacher: Teacher) 
 
 
 def adopt(floor: Floor, prepared: Prepared, spot_of: MutableMapping[str, Spot]) -> None:
-    """Go on upon a floor with what was learned in its changed scene; the spots of stations that moved are where they are now."""
+    """Use on a floor what was learned in its changed scene; the spots of stations that moved are moved with them."""
     old, new = floor.scene.places, prepared.surveys.places
     for body, spot in spot_of.items():
         spot_of[body] = _moved_along(spot, old, new)
@@ -262,7 +267,7 @@ def adopt(floor: Floor, prepared: Prepared, spot_of: MutableMapping[str, Spot]) 
 
 
 def _moved_along(spot: Spot, old: Places, new: Places) -> Spot:
-    """Where a spot of a station is now; another place is where it was."""
+    """The spot, moved with its station; a spot that belongs to no station stays where it is."""
     for station in old.task.stations:
         for before, after in zip(old.spots(station), new.spots(new.task.station(station.name)), strict=True):
             if abs(spot.x - before.x) < SAME_SPOT_M and abs(spot.y - before.y) < SAME_SPOT_M:

@@ -61,14 +61,14 @@ class Fault:
         """Put out of sight what the fault will bring into the scene: bodies cannot come later."""
 
     def strikes(self, floor: Floor) -> Happened | None:
-        """Let it happen; None, and nothing has changed, when it cannot happen now."""
+        """Let the fault happen; returns what happened, None, with nothing changed, when it cannot happen now."""
         raise NotImplementedError
 
     def end(self, floor: Floor) -> None:
-        """What lasted for a while is over."""
+        """Undo what was to last only for a while."""
 
     def parts(self, floor: Floor, *how: str) -> list[tuple[str, Whereabouts]]:
-        """The parts that it may strike and that are so now."""
+        """The parts that the fault may strike and that are in one of these ways now, with where they are."""
         own = self.fields.part
         found = [(name, whereabouts(floor, name)) for name in parts_of(floor) if own in (None, name)]
         return [(name, at) for name, at in found if at.how in how]

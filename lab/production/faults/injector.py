@@ -23,7 +23,7 @@ GROUND = "ground"
 
 
 def draw(task: Task, order: Order, seed: int, predicted_makespan_s: float) -> tuple[FaultFields, ...]:
-    """One or two faults, each of a kind that makes sense in a task; the same for the same seed."""
+    """One or two faults, each of a kind that can strike in a task, by their times; the same for the same seed."""
     rng = np.random.default_rng([seed, _SALT])
     found: list[FaultFields] = []
     wanted = int(rng.integers(1, MOST + 1))

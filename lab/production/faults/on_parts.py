@@ -93,7 +93,7 @@ class PartFallen(Fault):
     help = "a standing part falls over"
 
     def strikes(self, floor: Floor) -> Happened | None:
-        """Where it stands, or beside, where there is room to lie."""
+        """The first part that has room to lie where it stands, or beside."""
         for name, where in self.parts(floor, "standing"):
             if not is_robot_away(floor, [name]):
                 continue
@@ -116,7 +116,7 @@ class PartSlips(Fault):
 
     @classmethod
     def drawn(cls, task: Task, order: Order, rng: np.random.Generator) -> dict[str, object]:
-        """For 0.03 to 0.1 s."""
+        """The part slips for 0.03 to 0.1 s."""
         return {"seconds": round(float(rng.uniform(*SLIPS_S)), 3)}
 
     def strikes(self, floor: Floor) -> Happened | None:
@@ -129,7 +129,7 @@ class PartSlips(Fault):
         return None
 
     def end(self, floor: Floor) -> None:
-        """The fingers hold as before."""
+        """Let the fingers hold as before."""
         self._friction(floor, 1.0)
 
     def _friction(self, floor: Floor, share: float) -> None:

@@ -128,7 +128,7 @@ class ObstaclePut(Fault):
             scene.world.disc(f"{self.name}{MARKER}", models.MARKER_RADIUS, models.MARKER_THICK, at, models.MARKER_GREEN)
 
     def strikes(self, floor: Floor) -> Happened | None:
-        """Once nothing is in its place."""
+        """The box is put there; None while something is in its place."""
         (x, y), size, world = self.fields.at_m or (0.0, 0.0), self.fields.size_m or BOX_M, floor.world
         before = world.pose(self.name)[0]
         world.put(self.name, (x, y, size[2] / 2))
@@ -149,7 +149,7 @@ class ObstacleMoved(Fault):
 
     @classmethod
     def drawn(cls, task: Task, order: Order, rng: np.random.Generator) -> dict[str, object] | None:
-        """One of those that the task says may stand elsewhere."""
+        """One of the obstacles that the task says may stand elsewhere."""
         names = [one.name for one in task.obstacles if max(one.area) > 0]
         return {"obstacle": one_of(names, rng), "by_m": any_way(OBSTACLE_M, rng)} if names else None
 
@@ -177,7 +177,7 @@ class ObstacleGone(Fault):
 
     @classmethod
     def drawn(cls, task: Task, order: Order, rng: np.random.Generator) -> dict[str, object] | None:
-        """One of those that the task says may stand elsewhere."""
+        """One of the obstacles that the task says may stand elsewhere."""
         names = [one.name for one in task.obstacles if max(one.area) > 0]
         return {"obstacle": one_of(names, rng)} if names else None
 
@@ -286,7 +286,7 @@ class CameraBlind(Fault):
         return Happened(self.what, f"the camera saw nothing for {seconds:g} s", floor.now_s)
 
     def end(self, floor: Floor) -> None:
-        """It sees again."""
+        """Let the camera see again."""
         floor.world.dark = False
 
 

@@ -98,7 +98,7 @@ def distance(floor: Floor, station: str, at: tuple[float, float]) -> float:
 
 
 def is_robot_away(floor: Floor, bodies: Sequence[str], far_m: float = AWAY_M) -> bool:
-    """Whether the robot is so far from all of these bodies that a hand would reach in."""
+    """Whether the robot is far enough from all of these bodies for a hand to reach in."""
     return all(floor.world.nearest(NAME, body, far_m) >= far_m for body in bodies)
 
 
@@ -126,13 +126,13 @@ class Foot:
 
 
 def grounds(floor: Floor) -> list[str]:
-    """What a hand puts parts on: the table, and what parts stand on without a machine's sides around them."""
+    """The bodies on which a hand puts parts: the table, and stations without sides around what stands on them."""
     return [TABLE, *(station.name for station in floor.scene.task.stations if station.kind != "machine")]
 
 
 def put_down(floor: Floor, bodies: Sequence[str], at: tuple[float, float], yaw: float, tilt: Quaternion = UP) -> bool:
-    """Put a part, or a pallet with its part, to a place where there is level ground and room; False, and nothing moves, where
-    there is none. tilt: before it is turned about the vertical axis."""
+    """Put a part, or a pallet with its part, where there is level ground and room; False, and nothing moves, where there is
+    none. tilt: before it is turned about the vertical axis."""
     world, before = floor.world, {body: floor.world.pose(body) for body in bodies}
     for number, body in enumerate(bodies):
         world.put(body, (0.0, 0.0, 5.0 + number))

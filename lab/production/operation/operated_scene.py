@@ -1,4 +1,4 @@
-"""The scene that the operator works in: laid out, taught, ordered and carried out, each as a command that was checked first."""
+"""The scene in which the operator works: it is laid out, taught, ordered and carried out by commands, each checked first."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -191,7 +191,7 @@ class OperatedScene:
     # ---- commands --------------------------------------------------------------------------------------------------
 
     def checked(self, said: Spoken) -> Deed:
-        """What a command does, once it was checked. Raises BadInput for what may not be."""
+        """A function that does what a command says, which was checked. Raises BadInput for what is not allowed."""
         word, argument = said.word, said.argument
         if word == "lead":
             return self._lead(str(argument))
@@ -346,7 +346,7 @@ class OperatedScene:
         return deed
 
     def _outdate_plan(self) -> None:
-        """A plan that was not begun has the times of the skills as they were."""
+        """Drop a plan that was not begun: its durations are those of the skills as they were before."""
         if self.plan is not None and not self.plan.state.moves:
             self.plan = None
 
@@ -413,7 +413,7 @@ class OperatedScene:
         return deed
 
     def held_first(self) -> None:
-        """What the operator let the arm take up is brought on first. Raises WorkFailed where that may not be."""
+        """Bring on first what the operator had the arm take up. Raises WorkFailed where that is not allowed."""
         held, plan = self.floor.bench.held, self.plan
         if held is None or plan is None or plan.state.under_way is not None:
             return

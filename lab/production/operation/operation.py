@@ -94,7 +94,7 @@ class Operation:
         return self._kept(done) if done.refused else done
 
     def refuse(self, words: str, why: str, by: str = OPERATOR) -> Done:
-        """What is said is not begun: in any thread."""
+        """Refuse what was said, from any thread; what came of it."""
         return self._aside(Done(words, refused=why), by)
 
     def _aside(self, done: Done, by: str) -> Done:
@@ -143,7 +143,7 @@ class Operation:
     # ---- once more ---------------------------------------------------------------------------------------------------
 
     def repeat(self, entries: Sequence[Entry]) -> None:
-        """Do again what a journal says was done. Raises WorkFailed where a command does not come at its step."""
+        """Replay the commands of a journal. Raises WorkFailed where a command does not come at its physics step."""
         self._script = deque(entry for entry in entries if isinstance(entry, Stopped) or _is_deed(entry))
         self.scene.again = True
         self.open()
@@ -159,7 +159,7 @@ class Operation:
         self.scene.again = False
 
     def _laid_out(self) -> None:
-        """Of what is done again, the stops until the scene is laid out the next time."""
+        """Of a journal that is replayed, hand the floor the stops until the scene is laid out the next time."""
         if not self.scene.again:
             return
         stops, last = list[StopsChanged](), 0
