@@ -107,7 +107,7 @@ def taught_by(task: Task, folder: Path, person: Says, hear: Callable[[Event], No
     advice = RunAdvice(toolbox, options, journal)
     teacher = Teacher(toolbox, options.advising({"terminal": person}), tell=hear, keep=advice.keep)
     try:
-        teach_all(prepare(task, task.ordered(1), 0), teacher, journal, advice)
+        teach_all(prepare(task, task.ordered(1), 0), teacher, journal, advice.again)
     finally:
         journal.close()
     return advice
