@@ -30,7 +30,7 @@ def cyclic_found(
     with lesson_seat(()) as seat, seat.progress:
         teacher = teacher_of(toolbox, options, seat)
         beside = given.beside
-        wanted = deferred.CyclicWanted(
+        wanted = deferred.CyclicOptions(
             given.case, given.toasts, given.parts, given.seed, beside.layout, beside.robots, parts_per_cycle
         )
         return deferred.cyclic_named(given.task, wanted, teacher, files)

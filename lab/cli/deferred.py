@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from lab.production import load_run
     from lab.production.composer import Conditions
     from lab.production.controls import Controls
-    from lab.production.cyclic_job import CyclicWanted, cyclic_named
+    from lab.production.cyclic_job import CyclicOptions, cyclic_named
     from lab.production.evaluation import evaluate, skill_of, task_of
     from lab.production.operation.commands import Done, pace
     from lab.production.operation.desk import Desk, RunDesk
@@ -151,7 +151,7 @@ TABLE = {
     "lab.production": ("load_run",),
     "lab.production.composer": ("Conditions",),
     "lab.production.controls": ("Controls",),
-    "lab.production.cyclic_job": ("cyclic_named", "CyclicWanted"),
+    "lab.production.cyclic_job": ("cyclic_named", "CyclicOptions"),
     "lab.production.evaluation": ("evaluate", "skill_of", "task_of"),
     "lab.production.operation.commands": ("Done", "pace"),
     "lab.production.operation.desk": ("Desk", "RunDesk"),

@@ -32,7 +32,7 @@ from lab.production.run_journal import Met, Moved, RunJournal
 from lab.production.run_state import RunState
 from lab.production.standing import has_fallen, stands
 from lab.production.taught import Relearner
-from lab.production.transfers import Transfers, beginning
+from lab.production.transfers import Transfers, first_spots
 from lab.production.trouble import RunStopped, Trouble
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.schedule import Schedule
@@ -90,7 +90,7 @@ class Production:
 
         relearner: learns what changed in the scene, None: nobody does. planner: who orders the rest where it must be.
         """
-        state.spot_of |= beginning(floor, state)
+        state.spot_of |= first_spots(floor, state)
         machines = PartsInMachines(floor, state)
         work = Transfers(floor, state, machines)
         return cls(floor, state, work, Recovery(floor, state, work, machines, relearner, planner or Planner()))

@@ -35,7 +35,7 @@ MAX_EXPANDED = 50_000  # states, for the best finite order
 
 
 @dataclass(frozen=True)
-class CyclicWanted:
+class CyclicOptions:
     """What is asked for: which parts enter in a cycle, as `lab sequence` names an order, and how many at the most; the seed;
     see `Asked`."""
 
@@ -48,7 +48,7 @@ class CyclicWanted:
     parts_per_cycle: int | None = None
 
 
-def cyclic_named(name: str, wanted: CyclicWanted, teacher: Teacher, files: dict[str, Path]) -> dict[str, Any]:
+def cyclic_named(name: str, wanted: CyclicOptions, teacher: Teacher, files: dict[str, Path]) -> dict[str, Any]:
     """The document of `lab sequence --cyclic` on a cell file, or on a task over durations measured in simulation.
 
     Where no order is asked for, one part enters in a cycle, or, of several products, the smallest mix of what the file orders;
@@ -83,7 +83,7 @@ def cyclic_named(name: str, wanted: CyclicWanted, teacher: Teacher, files: dict[
     return document | {"files": {name: str(path) for name, path in files.items()}}
 
 
-def _mix(loaded: CellFile | Task, case: str | None, wanted: CyclicWanted) -> tuple[tuple[str, ...], int]:
+def _mix(loaded: CellFile | Task, case: str | None, wanted: CyclicOptions) -> tuple[tuple[str, ...], int]:
     """The products that enter in a cycle, and how many parts the file orders itself."""
     if isinstance(loaded, CellFile):
         if wanted.parts is not None:

@@ -63,13 +63,13 @@ def look(floor: Floor, state: RunState) -> None:
     if floor.now_s - state.looked_s < LOOK_S:
         return
     state.looked_s = floor.now_s
-    if found := news(floor, state):
+    if found := new_deviations(floor, state):
         raise Trouble(found[0].words, found[0].name, found[0].station, seen=True)
     if not floor.world.dark:
         state.right_s = floor.now_s
 
 
-def news(floor: Floor, state: RunState) -> list[Deviation]:
+def new_deviations(floor: Floor, state: RunState) -> list[Deviation]:
     """The deviations that a run does not know of yet: none of parts that it gave up, or of strange parts that it saw before."""
     delivered = {state.name(part) for part in state.finished}
     found = perceive(floor, floor.scene.task, floor.scene.layout, state.spot_of, delivered)

@@ -25,7 +25,7 @@ from lab.production.answers import (
 from lab.production.controls import StopKind
 from lab.production.floor import Floor
 from lab.production.parts_in_machines import PartsInMachines
-from lab.production.perception import BELOW_M, Deviation, news, scene_seen, seen_at
+from lab.production.perception import BELOW_M, Deviation, new_deviations, scene_seen, seen_at
 from lab.production.replanning import Planner, in_another, plan_again
 from lab.production.run_state import LOOK_S, GivenUp, Replanned, RunState, Strange
 from lab.production.standing import DELIVERED_M, too_near
@@ -84,7 +84,7 @@ class Recovery:
         self._let_go_of_what_is_gone()
         if not trouble.held:
             state.tries[trouble.key] += 1
-        seen = () if trouble.held else tuple(news(floor, state))
+        seen = () if trouble.held else tuple(new_deviations(floor, state))
         answer = answer_to(state, trouble, seen, dark=floor.world.dark)
         if not (trouble.held or trouble.final or trouble.seen or isinstance(answer, Stop)):
             skill = trouble.skill and f" '{trouble.skill}',"

@@ -27,7 +27,7 @@ BEGINS_M = 0.05  # a tool this near to where a skill begins need not be brought 
 MOST_ASIDE = 3  # places at which it is tried to set a part aside
 
 
-def beginning(floor: Floor, state: RunState) -> dict[str, Spot]:
+def first_spots(floor: Floor, state: RunState) -> dict[str, Spot]:
     """The spots on which the bodies of all parts stand at first, by body."""
     scene, found = floor.scene, dict[str, Spot]()
     for part, spot in enumerate(scene.places.begins(scene.order), start=1):
