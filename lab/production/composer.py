@@ -21,6 +21,7 @@ from lab.export.recorder import MotionRecorder
 from lab.production.controls import Controls
 from lab.production.faults.injector import Injector
 from lab.production.floor import Floor, Hooks, idle, untouched
+from lab.production.given_up_parts import GivenUpParts
 from lab.production.outcome import Outcome
 from lab.production.parts_in_machines import PartsInMachines, watch_machines
 from lab.production.perception import look
@@ -93,7 +94,9 @@ class Production:
         state.spot_of |= first_spots(floor, state)
         machines = PartsInMachines(floor, state)
         work = Transfers(floor, state, machines)
-        return cls(floor, state, work, Recovery(floor, state, work, machines, relearner, planner or Planner()))
+        given_up = GivenUpParts(floor, state, machines)
+        recovery = Recovery(floor, state, work, machines, given_up, relearner, planner or Planner())
+        return cls(floor, state, work, recovery)
 
     def carry_out(self, sequence: Sequence[int]) -> str | None:
         """Carry the whole sequence out; None, or why not all parts were made: which, where and why.

@@ -20,22 +20,20 @@ from lab.production.answers import (
     WaitForCamera,
     answer_to,
     belief_in,
-    with_room,
 )
 from lab.production.controls import StopKind
 from lab.production.floor import Floor
+from lab.production.given_up_parts import GivenUpParts
 from lab.production.parts_in_machines import PartsInMachines
-from lab.production.perception import BELOW_M, Deviation, new_deviations, scene_seen, seen_at
+from lab.production.perception import Deviation, new_deviations, scene_seen
 from lab.production.replanning import Planner, in_another, plan_again
-from lab.production.run_state import LOOK_S, GivenUp, Replanned, RunState, Strange
-from lab.production.standing import DELIVERED_M, too_near
+from lab.production.run_state import LOOK_S, Replanned, RunState, Strange
+from lab.production.standing import too_near
 from lab.production.taught import Relearner, adopt
 from lab.production.transfers import Transfers
 from lab.production.trouble import RunStopped, Trouble
 from lab.sequencing.simulate.rest import Mishaps
-from lab.sim.parts.kinds import Spot
-from lab.skills.skill import UPRIGHT
-from lab.teaching.events import MachineFailed, MoveRetried, PartLost, PlanMade, RunHeld, RunWentOn, TroubleMet
+from lab.teaching.events import MachineFailed, MoveRetried, PlanMade, RunHeld, RunWentOn, TroubleMet
 
 BLIND_S = 120.0  # so long a skill waits until the camera sees again
 NOBODY: Mapping[int, int] = MappingProxyType({})
@@ -58,6 +56,7 @@ class Recovery:
     state: RunState
     work: Transfers
     machines: PartsInMachines
+    given_up: GivenUpParts
     relearner: Relearner | None = None
     planner: Planner = field(default_factory=Planner)
 
@@ -145,7 +144,7 @@ class Recovery:
             state.out[trouble.station] = why
             floor.tell(MachineFailed(trouble.station, trouble.part, why, floor.now_s))
         self._tell(trouble, "goes on without it")
-        self._lose(part, text)
+        self.given_up.lose(part, text)
         self.replan(text)
 
     # ---- what was seen ---------------------------------------------------------------------------------------------
@@ -222,11 +221,11 @@ class Recovery:
     def _leave(self, part: int, seen: Deviation) -> None:
         """A part that cannot be taken up is left; where it lies in a machine, that is closed."""
         work = self.machines.work_on(part)
-        left = self._as_left(part, astray=True)
+        left = self.given_up.as_left(part, astray=True)
         if work is not None and seen.sort == "part fallen":
             self.state.out[work.station] = f"{seen.name} lies in '{work.station}'"
         self.floor.take_out(self.state.name(part))
-        self._lose(part, f"{seen.words}: {TO_DO[seen.sort]}", left)
+        self.given_up.lose(part, f"{seen.words}: {TO_DO[seen.sort]}", left)
         self._tell_seen(seen, "leaves it")
 
     def _follow(self, part: int, seen: Deviation, *, put_back: bool, unfinished: bool) -> None:
@@ -284,7 +283,7 @@ class Recovery:
         for part, stuck in found.stuck.items():
             if part not in state.lost:
                 reasons = ", ".join(f"'{station}': {what}" for station, what in state.out.items())
-                self._lose(part, f"{stuck}: {reasons}" if reasons else stuck)
+                self.given_up.lose(part, f"{stuck}: {reasons}" if reasons else stuck)
         state.sequence = [*found.sequence]
         state.go_by(found.run, floor.now_s)
         gap = None
@@ -313,57 +312,21 @@ class Recovery:
         stand where they were left, as in a machine that was out of order. What a machine had not finished, it begins anew.
         Where no order brings them on, they are given up as before.
         """
-        state = self.state
-        asked = {part: left for part, left in state.given_up.items() if attended or left.astray}
-        back = {part: left for part, left in asked.items() if self._is_back(part, left)}
-        standing = {part for part, left in back.items() if left.spot is not None and self._stands(part, left.spot)}
-        found, later = with_room(state, back, standing)
-        state.given_up |= {part: replace(left, astray=True) for part, left in later.items()}
+        state, parts = self.state, self.given_up
+        found = parts.found(attended)
         why = {part: state.lost[part] for part in found}
         for part, left in found.items():
-            self._take_back(part, left)
+            parts.take_back(part, left)
+            self._tell(Trouble("it can be taken up again", state.name(part)), "goes on with it")
         try:
             if found:
                 self.replan("a part can be taken up again", {part: left.position for part, left in found.items()})
         except RunStopped as stopped:
             self._note(str(stopped))
             for part, left in found.items():
-                self._lose(part, why[part], left)
+                self.given_up.lose(part, why[part], left)
             return False
         return bool(found)
-
-    def _is_back(self, part: int, left: GivenUp) -> bool:
-        """Whether a part that was given up can be brought on: it stands where it was left, or can be taken up elsewhere."""
-        cell = self.state.cell
-        if left.undone and cell.names[cell.laid_out[left.position].station] in self.state.out:
-            return False
-        return (left.spot is not None and self._stands(part, left.spot)) or self._can_be_taken_up(part)
-
-    def _stands(self, part: int, spot: Spot) -> bool:
-        """Whether a part is seen to stand upright on a spot."""
-        floor, name = self.floor, self.state.name(part)
-        upright = not floor.world.dark and floor.bench.upright(name) >= UPRIGHT
-        return upright and floor.bench.stands(name, spot, DELIVERED_M)
-
-    def _can_be_taken_up(self, part: int) -> bool:
-        floor, name = self.floor, self.state.name(part)
-        at = seen_at(floor, name)
-        reached = floor.scene.robot.arm.inverse(floor.bench.part_pose(name)) is not None
-        stands = at.z > BELOW_M and floor.bench.upright(name) >= UPRIGHT and not too_near(floor.bench, name)
-        return not floor.world.dark and stands and reached
-
-    def _take_back(self, part: int, left: GivenUp) -> None:
-        """Count on a part again that had been given up."""
-        state, name = self.state, self.state.name(part)
-        del state.given_up[part], state.lost[part]
-        state.left_lying.discard(name)
-        stands = left.spot is not None and self._stands(part, left.spot)
-        state.spot_of[name] = left.spot if left.spot is not None and stands else seen_at(self.floor, name)
-        if left.finished_s is not None:
-            state.finished[part] = left.finished_s
-        if left.undone or (left.finished_s is not None and not stands):
-            self.machines.begin_again(part, stands)
-        self._tell(Trouble("it can be taken up again", name), "goes on with it")
 
     def forget(self) -> None:
         """A person has put things right: what was out of use is used again, and tries are counted anew."""
@@ -377,26 +340,6 @@ class Recovery:
         bench = self.floor.bench
         if bench.held is not None and not bench.holds(bench.held):
             bench.held = None
-
-    def _as_left(self, part: int, astray: bool = False) -> GivenUp | None:
-        """How a part is that is now given up; None where nobody could go on with it."""
-        state, work = self.state, self.machines.work_on(part)
-        position = state.plan.locations[part - 1]
-        if position >= len(state.cell.laid_out):
-            return None
-        undone = part in state.to_put_back or (work is not None and not work.done(self.floor.now_s))
-        return GivenUp(position, state.spot_of.get(state.name(part)), undone, astray, state.finished.get(part))
-
-    def _lose(self, part: int, why: str, left: GivenUp | None = None) -> None:
-        state, name = self.state, self.state.name(part)
-        state.lost[part] = why
-        if (left := left or self._as_left(part)) is not None:
-            state.given_up[part] = left
-        state.left_lying.add(name)
-        state.spot_of.pop(name, None)
-        state.finished.pop(part, None)
-        state.to_put_back = [one for one in state.to_put_back if one != part]
-        self.floor.tell(PartLost(name, why, self.floor.now_s))
 
     # ---- what is told ----------------------------------------------------------------------------------------------
 
