@@ -24,8 +24,7 @@ from lab.production.standing import has_fallen, stands
 from lab.production.transfers import Transfers
 from lab.production.trouble import RunStopped, Trouble
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.cell.schedule import Schedule
-from lab.sequencing.cell.schedule_rows import rows_of
+from lab.sequencing.cell.schedule import Schedule, rows_of
 from lab.sequencing.simulate.follow import simulate
 from lab.sequencing.simulate.rest import Mishaps
 from lab.sim.frames import Recording

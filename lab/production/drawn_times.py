@@ -20,7 +20,7 @@ def stochastic(
     cell: Cell, method: str, search: Search, found: SequenceResult, chance: Chance, seed: int
 ) -> dict[str, Any]:
     """The list as it is and a policy that reacts, in the same drawn episodes; means with 95 % intervals."""
-    from lab.sequencing.simulate.replications import replicate
+    from lab.sequencing.simulate.several import replicate
 
     fixed = _planned(cell, method, search, found, seed)
     reaction = SEQUENCERS[method].react(cell, search.objective, seed, fixed)

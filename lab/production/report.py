@@ -22,8 +22,7 @@ from lab.production.outcome import Outcome
 from lab.production.run_story import story_of
 from lab.production.taught import Taught
 from lab.sequencing.cell.cell import EVERY_PLAN
-from lab.sequencing.cell.schedule import Schedule
-from lab.sequencing.cell.schedule_rows import csv_of, rows_of
+from lab.sequencing.cell.schedule import Schedule, csv_of, rows_of
 from lab.sequencing.methods.exact import Optimum
 from lab.sequencing.search import SequenceResult
 from lab.sequencing.simulate.follow import simulate

@@ -17,7 +17,7 @@ from lab.teaching.events import (
     SkillBegan,
     TroubleMet,
 )
-from lab.view.story import Mark, Story
+from lab.view.scene_data import Mark, Story
 
 LEAST_WAIT_S = 0.5  # that is worth a word
 

@@ -2,13 +2,21 @@
 
 from typing import Any
 
-from lab.learning.gates import gate_rules as rules
+from lab.learning.gates import gate as rules
 from lab.learning.gates.ccrl import Ccrl, Combined
-from lab.learning.gates.constant_performance import ConstantPerformance
-from lab.learning.gates.gate import Gate, GateClass, Never, Surroundings
-from lab.learning.gates.gate_rules import CompiledGate, Steps, improvement
-from lab.learning.gates.per_step import Importance, Introspection, Random
-from lab.learning.gates.uncertainty import Uncertainty, deviation
+from lab.learning.gates.gate import (
+    CompiledGate,
+    Gate,
+    GateClass,
+    Importance,
+    Introspection,
+    Never,
+    Random,
+    Steps,
+    Surroundings,
+    improvement,
+)
+from lab.learning.gates.other_gates import ConstantPerformance, Uncertainty, deviation
 from lab.learning.gates.weighing import Fading, Novelty, Reliability, Shaping, Trust, TwoLevels
 from lab.learning.members import Member
 from lab.plugins.family import Family, first_line, takes, wanted

@@ -12,7 +12,7 @@ from urllib.request import urlopen
 import pytest
 
 from lab.sim.frames import Body, Frame, Shape
-from lab.view import server_limits
+from lab.view import server_page
 from lab.view.meshcat import LiveView
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ def test_the_oldest_stranger_makes_room_and_a_page_stays(
     view: LiveView, opens: "Opens", monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Four connections are allowed, one is a page: of ten that say nothing the first seven have to go."""
-    monkeypatch.setattr(server_limits, "MOST", 4)
+    monkeypatch.setattr(server_page, "MOST", 4)
     with ExitStack() as stack:
         page = stack.enter_context(opens(view))
         page.hear()
@@ -60,7 +60,7 @@ def test_who_asks_for_nothing_does_not_wait_for_ever(
     view: LiveView, opens: "Opens", monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Neither with nothing said, nor with half a request; a page may be silent as long as it likes."""
-    monkeypatch.setattr(server_limits, "IDLE_S", 0.2)
+    monkeypatch.setattr(server_page, "IDLE_S", 0.2)
     with opens(view) as page, bare(view) as silent, bare(view) as half:
         half.sendall(b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nX: ")
         page.hear()
@@ -99,7 +99,7 @@ def test_without_descriptors_the_server_waits_and_says_nothing(
 
 
 def test_pings_whose_answers_nobody_reads_end_the_connection(view: LiveView, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(server_limits, "MOST_UNREAD", 1 << 16)
+    monkeypatch.setattr(server_page, "MOST_UNREAD", 1 << 16)
     path = view.url.partition(str(view.port))[2].replace("/?", "/frames?")
     ask = f"GET {path} HTTP/1.1\r\nHost: 127.0.0.1:{view.port}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
     with bare(view) as page:

@@ -5,7 +5,7 @@ import pytest
 
 from lab.learning.selection import chances
 from lab.mdp import coverage, grid
-from lab.seat.page.page_grid import HIGHER, LOWER, MOST_ARROWS, directions, place_of, slice_of, spot
+from lab.seat.page.page_question import HIGHER, LOWER, MOST_ARROWS, directions, place_of, slice_of, spot
 
 SPACE = ("left", "right", "backward", "forward", "down", "up")
 

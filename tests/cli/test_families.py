@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from lab.cli import glossary
+from lab.cli import families
 from lab.learning.gates import GATES
 from lab.learning.updates import UPDATES
 from lab.sequencing import SEQUENCERS
@@ -23,12 +23,12 @@ def test_help_explains_every_member(lab: Lab, command: str, table: dict[str, Any
 
 def test_help_explains_every_word(lab: Lab) -> None:
     text = " ".join(lab("teach", "--help").out.split())
-    for word, meaning in glossary.TERMS.items():
+    for word, meaning in families.TERMS.items():
         assert f"{word}: {meaning}" in text
-    assert {"psi", "tau", "mislead", "helped step"} <= glossary.TERMS.keys()
+    assert {"psi", "tau", "mislead", "helped step"} <= families.TERMS.keys()
 
 
 def test_the_documentation_shows_the_same_table(root: Path) -> None:
-    meanings = glossary.TERMS | {name: row.help for name, row in GATES.items()}
+    meanings = families.TERMS | {name: row.help for name, row in GATES.items()}
     table = ["| word | what it means |", "|---|---|", *(f"| `{word}` | {means} |" for word, means in meanings.items())]
     assert "\n".join(table) in (root / "docs" / "words.md").read_text(encoding="utf-8")

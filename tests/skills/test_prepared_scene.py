@@ -6,7 +6,7 @@ import pytest
 
 from lab.errors import BadInput
 from lab.sequencing.cell.precedence import Precedence, Step
-from lab.skills.precedences import precedences
+from lab.skills.prepared_scene import precedences
 from lab.tasks.task import Task
 from lab.tasks.task_file import load
 

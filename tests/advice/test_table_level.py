@@ -9,8 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lab.advice.advisors import AdvisorName
-from lab.advice.answers_file import answers_of
-from lab.advice.table_level import TableLevel
+from lab.advice.table_level import TableLevel, answers_of
 from lab.errors import BadInput
 from lab.learning.session import Session
 from lab.learning.settings import GateSettings, LearnerSettings

@@ -6,7 +6,7 @@ import pytest
 
 AFTER = """
 import sys
-from lab.sequencing.methods.ortools_cp_sat import cp_model
+from lab.sequencing.methods.cp_sat_solver import cp_model
 print("pandas" in sys.modules, *(name for name in sys.modules if name.startswith("pandas.")))
 import pandas
 model = cp_model.CpModel()
@@ -39,5 +39,5 @@ def test_pandas_is_loaded_when_a_series_is_wanted_and_not_before(root: Path) -> 
 
 @pytest.mark.parametrize("first", ["pandas", "ortools.sat.python.cp_model"])
 def test_it_is_the_same_module_whoever_loads_it_first(root: Path, first: str) -> None:
-    code = f"import {first}, ortools.sat.python.cp_model as theirs\nfrom lab.sequencing.methods.ortools_cp_sat import cp_model\n"
+    code = f"import {first}, ortools.sat.python.cp_model as theirs\nfrom lab.sequencing.methods.cp_sat_solver import cp_model\n"
     assert printed(code + "import pandas\nprint(cp_model is theirs, cp_model.pd is pandas)", root) == ["True True"]

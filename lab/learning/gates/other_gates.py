@@ -2,12 +2,26 @@
 
 from collections.abc import Sequence
 
-from lab.learning.gates.gate import Surroundings, Values
-from lab.learning.gates.gate_rules import Steps
-from lab.learning.gates.per_step import PerStep
-from lab.learning.reasons import TablesDiffer
+from lab.learning.gates.gate import Gate, PerStep, Steps, Surroundings, Values, window_mean
+from lab.learning.requests import TablesDiffer, TooLong
 from lab.learning.settings import GateSettings
 from lab.learning.updates.update import Update
+
+
+class ConstantPerformance(Gate):
+    """Asks for whole episodes while the mean of the last K is above a constant (CQ(lambda): Kartoun et al. 2006)."""
+
+    def opens(self, episode: int, steps: Steps) -> bool:
+        """Whether performance is not good enough yet."""
+        settings = self.settings
+        if episode < settings.first_episode or len(steps) < settings.window:
+            return False
+        mean = window_mean(steps, len(steps), settings.window)
+        self.why = TooLong(settings.window, mean, settings.enough_steps)
+        return mean > settings.enough_steps
+
+
+# ---- uncertainty ------------------------------------------------------------------------------------------------------
 
 
 class Uncertainty(PerStep):
