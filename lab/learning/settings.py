@@ -100,10 +100,10 @@ class GateSettings:
     psi: Annotated[
         float, Ge(0), Le(1_000_000), doc("Psi: distance of action values at which ia, combined and importance decide")
     ] = 1.0
-    spread: Annotated[float, Ge(0), Le(1_000_000), doc("deviation of its tables from which uncertainty asks")] = 0.1
+    spread: Annotated[float, Ge(0), Le(1_000_000), doc("deviation of its tables at which uncertainty asks")] = 0.1
     rate: Annotated[float, Ge(0), Le(1), doc("share of the steps that random asks about")] = 0.1
     fading: Annotated[
-        float, Ge(0), Le(1), doc("factor of fading for the share of the steps that it asks about, each episode")
+        float, Ge(0), Le(1), doc("factor by which the share of the steps that fading asks about falls, each episode")
     ] = 0.97
     consistency: Annotated[float, Gt(0.5), Lt(1), doc("shaping's probability that an answer is right")] = 0.9
     enough_steps: Annotated[float, Gt(0), Le(1_000_000), doc("mean step count that satisfies cq")] = 50.0
