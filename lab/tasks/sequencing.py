@@ -56,7 +56,7 @@ class Sequencing(Record):
     """How the order of the robot's transfers is found, and what it is judged by."""
 
     method: str = "srl-time"
-    """Who finds the order: a name that `lab sequence --help` lists."""
+    """The method that finds the order: a name that `lab sequence --help` lists."""
     episodes: Annotated[int, Field(ge=1, le=1_000_000)] = 400
     """How many sequences are tried."""
     alpha: Annotated[float, Field(gt=0, le=1)] = 0.05
