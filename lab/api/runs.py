@@ -12,7 +12,7 @@ from lab.api.options import Advisors, ToolboxOrPlace, advising_of, checked, data
 from lab.api.pictures import Page, Picture
 from lab.errors import BadInput
 from lab.files import check_out
-from lab.production.conditions import Conditions
+from lab.production.composer import Conditions
 from lab.production.report import Report
 from lab.production.run import run as run_task
 from lab.production.run_advice import RunAdvice
@@ -133,8 +133,11 @@ def run(
         journal = RunJournal() if out is None else begun(words, loaded, folder)
         stack.callback(journal.close)
         teacher = Teacher(toolbox_of(toolbox, f"{nowhere}/toolbox"), advising, seed)
-        advice = RunAdvice(teacher.toolbox, words.lessons(), journal, words.order or "", cyclic=words.cyclic)
-        advice.parts_per_cycle = words.parts_per_cycle
+        advice = RunAdvice(
+            *(teacher.toolbox, words.lessons(), journal, words.order or ""),
+            cyclic=words.cyclic,
+            parts_per_cycle=words.parts_per_cycle,
+        )
         conditions = Conditions(words.override / 100, journal=journal, fault_seed=words.faults, advice=advice)
         report = run_task(prepared, teacher, folder, conditions, beside)
         replay = (folder / "replay.html").read_text(encoding="utf-8")

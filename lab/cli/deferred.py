@@ -24,15 +24,13 @@ if TYPE_CHECKING:
     from lab.learning.updates import UPDATES
     from lab.plugins.code_file import is_file_word, take
     from lab.production import load_run
-    from lab.production.conditions import Conditions
+    from lab.production.composer import Conditions
     from lab.production.controls import Controls
     from lab.production.cyclic_job import CyclicWanted, cyclic_named
     from lab.production.evaluation import evaluate, skill_of, task_of
-    from lab.production.operation.at_once import Done
-    from lab.production.operation.commands import pace
-    from lab.production.operation.desk import Desk
+    from lab.production.operation.commands import Done, pace
+    from lab.production.operation.desk import Desk, RunDesk
     from lab.production.operation.operation import Operation
-    from lab.production.operation.run_desk import RunDesk
     from lab.production.publication import CARD, publish, write_card
     from lab.production.report import write_files
     from lab.production.run import remember
@@ -147,15 +145,13 @@ TABLE = {
     "lab.learning.updates": ("UPDATES",),
     "lab.plugins.code_file": ("is_file_word", "take"),
     "lab.production": ("load_run",),
-    "lab.production.conditions": ("Conditions",),
+    "lab.production.composer": ("Conditions",),
     "lab.production.controls": ("Controls",),
     "lab.production.cyclic_job": ("cyclic_named", "CyclicWanted"),
     "lab.production.evaluation": ("evaluate", "skill_of", "task_of"),
-    "lab.production.operation.at_once": ("Done",),
-    "lab.production.operation.commands": ("pace",),
-    "lab.production.operation.desk": ("Desk",),
+    "lab.production.operation.commands": ("Done", "pace"),
+    "lab.production.operation.desk": ("Desk", "RunDesk"),
     "lab.production.operation.operation": ("Operation",),
-    "lab.production.operation.run_desk": ("RunDesk",),
     "lab.production.publication": ("CARD", "publish", "write_card"),
     "lab.production.report": ("write_files",),
     "lab.production.run": ("remember", "run as run_task"),

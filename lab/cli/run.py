@@ -103,9 +103,10 @@ def run(
             with lesson_seat(options.advisors, page=page, port=port, wait_s=wait) as seat:
                 teacher = teacher_of(toolbox, lessons, seat)
                 advice = deferred.RunAdvice(
-                    teacher.toolbox, lessons, journal, options.order or "", cyclic=options.cyclic
+                    *(teacher.toolbox, lessons, journal, options.order or ""),
+                    cyclic=options.cyclic,
+                    parts_per_cycle=options.parts_per_cycle,
                 )
-                advice.parts_per_cycle = options.parts_per_cycle
                 teacher = replace(teacher, keep=advice.keep)
                 share = options.override / 100
                 conditions = deferred.Conditions(
@@ -113,7 +114,7 @@ def run(
                 )
                 if seat.page is not None:
                     desk = deferred.RunDesk(loaded, prepared.order, controls, journal, seat.hear)
-                    conditions = replace(conditions, on_floor=desk.on_floor)
+                    conditions = desk.steering(conditions)
                     seat.page.steer(desk)
                 with seat.progress:
                     report = deferred.run_task(prepared, teacher, folder, conditions, beside)

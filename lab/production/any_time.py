@@ -1,4 +1,4 @@
-"""Sessions of a method on a cell, then the proof beside it: whenever that is stopped, there is an order, and its bound."""
+"""Sessions of a method on a cell, then a proof: whenever that is stopped, it returns an order and a bound."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -21,9 +21,9 @@ Session = Callable[[Search, int], SequenceResult]  # given the search and the se
 
 @dataclass(frozen=True)
 class Found:
-    """What was found and what is known. sessions: one at least; method: by what.
+    """The results of a search. sessions: at least one; method: what found them; known: what no order can beat.
 
-    stopped_by: "Ctrl-C", "seconds" or "gap", then all is as it was until then; None: everything came to its end.
+    stopped_by: "Ctrl-C", "seconds" or "gap", where the search was cut short; None where it came to its end.
     """
 
     sessions: list[SequenceResult]
@@ -34,7 +34,7 @@ class Found:
 
 @dataclass
 class _Heard:
-    """What a session has found so far, of which it tells. whole: its result, once it has come to its end."""
+    """What a session has found and told so far. whole: its result, once the session has ended."""
 
     method: str
     search: Search
@@ -53,7 +53,7 @@ class _Heard:
         self.shared.look()
 
     def result(self) -> SequenceResult | None:
-        """What has come of it; None: nothing yet."""
+        """The result of the session so far; None where it has found no order yet."""
         if self.whole is not None or (self.best is None and not self.shared.sequence):
             return self.whole
         if self.best is not None and self.search.chance != NO_CHANCE:  # each episode has times of its own
@@ -75,11 +75,11 @@ def looked_for(
     limits: Limits = NO_LIMITS,
     began: Callable[[Reference | None], SequencingBegan] | None = None,
 ) -> Found:
-    """What so many sessions find, and what is proven of the best order, unless the method's answer stands alone.
+    """What so many sessions find, and what is proven of the best order, unless the method's answer needs no proof beside it.
 
-    A bound is known within a second, of small cells the optimum. limits: a session ends within their gap, everything at their
-    moment; where they are given a proof is looked for beside any method. Raises KeyboardInterrupt and WorkFailed only where
-    there is no order at all, and as `find` does.
+    A bound is known within a second, for small cells the optimum. limits: a session ends when its order is within their gap,
+    the whole search at their moment; with limits a proof is looked for whatever the method.
+    Raises KeyboardInterrupt and WorkFailed only where there is no order at all, and as `find` does.
     """
     best = Shared(cell, search.objective, limits, lambda shared: tell(_stands(shared)))
     heard, stopped_by = list[_Heard](), ""
@@ -115,7 +115,7 @@ def looked_for(
 
 @uninterrupted
 def _found(heard: Sequence[_Heard], best: Shared, method: str, stopped_by: str) -> Found:
-    """What came of the sessions of a method; where none has found an order, what is known beside them."""
+    """The results of the sessions; where none has found an order, the best one that is known from elsewhere."""
     found = [result for one in heard if (result := one.result())]
     if not best.sequence:
         best.tell(FIRST_COME, any_order(best.cell))

@@ -1,4 +1,4 @@
-"""The best steady rhythm of a cell or of a task: what `lab sequence --cyclic` does."""
+"""The cycle of a cell or of a task that needs the least time a part: what `lab sequence --cyclic` does."""
 
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -11,7 +11,7 @@ from lab.errors import BadInput, LabError
 from lab.production.cyclic_order import check_parts, cycle_document, mix_of
 from lab.production.durations import untimed
 from lab.production.order import check_order
-from lab.production.run import teach_all
+from lab.production.taught import teach_all
 from lab.sequencing.cell.cell import MAX_PARTS, Cell
 from lab.sequencing.cyclic.cycle import Cycle
 from lab.sequencing.cyclic.several import best_rhythm
@@ -25,6 +25,8 @@ from lab.tasks.task import Task
 from lab.tasks.task_file import load_beside
 from lab.teaching.events import PhaseBegan
 from lab.teaching.teacher import Teacher
+from lab.view.canvas import check_picture
+from lab.view.gantt import cycle_gantt
 
 SHOWN_PERIODS = 3
 FEWEST_CYCLES = 6  # of the finite order that is shown beside: enough for the line to be full
@@ -48,11 +50,11 @@ class CyclicWanted:
 def cyclic_named(name: str, wanted: CyclicWanted, teacher: Teacher, files: dict[str, Path]) -> dict[str, Any]:
     """The document of `lab sequence --cyclic` on a cell file, or on a task over durations measured in simulation.
 
-    Without a word on the order one part enters in a cycle, or, of several products, what the file orders, or several times as
-    much, up to parts_per_cycle parts (see `best_rhythm`); where the parts are named, just these, if it is not given. Raises
+    Where no order is asked for, one part enters in a cycle, or, of several products, the smallest mix of what the file orders;
+    or several times as much, up to parts_per_cycle parts (see `best_rhythm`). Where the parts are named and parts_per_cycle is
+    not given, just these enter. Raises
     BadInput for what has no cycle, WorkFailed when none was found.
     """
-    from lab.view.canvas import check_picture
 
     for path in files.values():
         check_picture(path)
@@ -76,8 +78,6 @@ def cyclic_named(name: str, wanted: CyclicWanted, teacher: Teacher, files: dict[
     document = {"task": loaded.name, "seed": wanted.seed} | cycle_document(rhythm)
     document["finite"] = _finite(rhythm.cycle, cell)
     if "gantt" in files:
-        from lab.view.gantt import cycle_gantt
-
         cycle_gantt(steady(rhythm.cycle, SHOWN_PERIODS), files["gantt"])
     return document | {"files": {name: str(path) for name, path in files.items()}}
 

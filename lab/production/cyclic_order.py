@@ -1,24 +1,22 @@
-"""A cyclic order in a run: found for the products that are ordered, carried out for as many parts as there are, measured."""
+"""A cyclic order in a run: found for the products that are ordered, unrolled for all of the parts, and measured."""
 
 from collections import Counter
 from collections.abc import Sequence
 from functools import reduce
 from math import gcd
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from lab.errors import BadInput, counted
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.schedule import Schedule
-
-if TYPE_CHECKING:  # and below where it is needed: OR-Tools takes its time
-    from lab.sequencing.cyclic.several import Rhythm
-    from lab.sequencing.cyclic.unrolled import Unrolled
+from lab.sequencing.cyclic.several import Rhythm, best_rhythm
+from lab.sequencing.cyclic.unrolled import Unrolled, period_of, unrolled
 
 SECONDS_PER_HOUR = 3600.0
 
 
-def cycle_document(rhythm: "Rhythm") -> dict[str, Any]:
-    """What is told of the best cycle, and of those that were tried, for JSON."""
+def cycle_document(rhythm: Rhythm) -> dict[str, Any]:
+    """The best cycle, and those that were tried, as a JSON document."""
     cycle, per_part_s = rhythm.cycle, rhythm.per_part_s
     products = {move.slot: cycle.product(move) for move in cycle.line.moves}
     return {
@@ -46,7 +44,7 @@ def cycle_document(rhythm: "Rhythm") -> dict[str, Any]:
 
 
 def mix_of(order: Sequence[str]) -> tuple[str, ...]:
-    """The smallest mix of products that repeats in an order, whatever their turns: 4 slices and 2 cups are 2 and 1."""
+    """The smallest mix of products that repeats in an order, whatever its sequence: 4 slices and 2 cups give 2 and 1."""
     counts = Counter(order)
     cycles = reduce(gcd, counts.values())
     return tuple(name for name, count in counts.items() for _ in range(count // cycles))
@@ -63,9 +61,8 @@ def check_parts(most_parts: int, mix: Sequence[str], cyclic: bool) -> None:
         )
 
 
-def measured_period(rhythm: "Rhythm", planned: Schedule, measured: Schedule) -> dict[str, Any]:
+def measured_period(rhythm: Rhythm, planned: Schedule, measured: Schedule) -> dict[str, Any]:
     """The period of a run that carried a cycle out, beside the planned one; None where too few parts were delivered."""
-    from lab.sequencing.cyclic.unrolled import period_of
 
     cycle = rhythm.cycle
     found_s = period_of(measured, cycle)
@@ -76,14 +73,12 @@ def measured_period(rhythm: "Rhythm", planned: Schedule, measured: Schedule) -> 
     }
 
 
-def cyclic_order(cell: Cell, seed: int, most_parts: int | None = None) -> "tuple[Rhythm, Unrolled]":
+def cyclic_order(cell: Cell, seed: int, most_parts: int | None = None) -> tuple[Rhythm, Unrolled]:
     """The cycle of a cell's products that needs the least time a part, and its order for the cell's parts, as a run carries it
     out.
 
     most_parts: of a cycle, see `best_rhythm`; never more than the cell has. BadInput as `best_rhythm`.
     """
-    from lab.sequencing.cyclic.several import best_rhythm
-    from lab.sequencing.cyclic.unrolled import unrolled
 
     rhythm = best_rhythm(cell, mix_of(cell.order), most_parts and min(most_parts, cell.parts), seed)
     return rhythm, unrolled(rhythm.cycle, cell)

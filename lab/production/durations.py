@@ -1,4 +1,4 @@
-"""How long a job's moves take: measured once in physics, kept under a key of all that decides it, and the cell they make."""
+"""How long the moves of a job take: measured once in physics, kept under a hash of all that they depend on; and the cell."""
 
 import hashlib
 import json
@@ -307,9 +307,10 @@ def cell_of(task: Task, durations: Durations, order: Order) -> Cell:
 
 
 def untimed(task: Task, order: Order) -> Cell:
-    """The sequencing problem before anything is timed, every move taking 1 s and nothing having a window: what an order may do.
+    """The sequencing problem before anything is timed: every move takes 1 s, and there are no windows.
 
-    With one robot that hangs on no other time. BadInput, with its place in the file, for a task that makes no such problem.
+    It tells whether an order is allowed, which with one robot does not depend on times.
+    BadInput, with its place in the file, for a task that makes no such problem.
     """
     with task.in_its_file():
         skillset = SkillSet.of(task, order)

@@ -1,4 +1,4 @@
-"""How often a policy of the toolbox does what it is for: its skill carried out in physics, in one drawn scene after another."""
+"""The success rate of a policy: its skill is carried out in physics, in one drawn scene after another."""
 
 import time
 from collections.abc import Callable, Sequence
@@ -12,6 +12,7 @@ from lab.skills.prepared_scene import Prepared, prepare
 from lab.skills.skill import NOT_OFF
 from lab.skills.skillset import SkillSet
 from lab.skills.trial import carry_out
+from lab.statistics import proportion_interval
 from lab.tasks.task import Task
 from lab.tasks.task_file import load
 from lab.toolbox.policy import Policy
@@ -24,8 +25,8 @@ Why = Literal["scene", "table", "physics"]
 class SceneResult(NamedTuple):
     """What came of one scene.
 
-    failed_in: None where the skill succeeded; "scene": nobody can reach the goal there; "table": what was learned does not
-    lead to it; "physics": it was carried out, and failed. sim_s: how long that took [s].
+    failed_in: None where the skill succeeded; "scene": the goal cannot be reached there; "table": the greedy policy does not
+    lead to it; "physics": the skill was carried out, and failed. sim_s: how long that took [s].
     """
 
     seed: int
@@ -53,7 +54,6 @@ class Evaluation:
 
     def facts(self) -> dict[str, Any]:
         """What a log keeps of it: how many scenes could be solved, in how many it did, and Wilson's 95 % interval."""
-        from lab.statistics import proportion_interval
 
         counting = [scene for scene in self.scenes if scene.failed_in != "scene"]
         good = [scene for scene in counting if scene.failed_in is None]
@@ -131,19 +131,22 @@ def _starts(mdp: TabularMDP) -> list[int]:
 
 
 def _starts_without_a_way(policy: Policy, mdp: TabularMDP) -> list[int]:
-    """From where the policy's best moves do not reach the goal."""
+    """The starts from which the greedy policy does not reach the goal."""
     return [start for start in _starts(mdp) if not greedy_path(policy.q, mdp, mdp.n_states, start)[2]]
 
 
 def _astray(policy: Policy, mdp: TabularMDP, start: int) -> str:
-    """Where the policy's best moves lead instead of to the goal."""
+    """Where the greedy policy leads instead of to the goal, in words."""
     last = greedy_path(policy.q, mdp, mdp.n_states, start)[0][-1]
     where = "run into something at" if mdp.terminal[last] else "go round and round at"
     return f"its best moves from {mdp.state_label(start)} {where} {mdp.state_label(last)}"
 
 
 def _off(prepared: Prepared, skill: Skill) -> tuple[float, float, float]:
-    """How far off its spot a part stands where the skill takes it up: elsewhere than at first the robot has set it down."""
+    """How far off its spot, x, y [m] and yaw [rad], the skill finds its part.
+
+    That is as drawn at the first station of a part; elsewhere the robot has set it down, and it is 0.
+    """
     stand = zip(prepared.order, prepared.layout.parts, strict=True)
     first = (off for kind, off in stand if prepared.task.starts(kind) == skill.station)
     return NOT_OFF if skill.carries else next(first, NOT_OFF)

@@ -1,15 +1,15 @@
-"""A scene with the robot and the machines at work in it: who is where, at one clock, and what stops it."""
+"""A scene with the robot and the machines at work in it, under one clock, and what stops them."""
 
 from collections import deque
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from math import ceil
 from time import perf_counter
 
 from lab.errors import WorkFailed
-from lab.production.controls import Controls, StopKind
+from lab.production.controls import Controls, StopKind, StopRecord, StopsChanged, unwritten
 from lab.production.machine import Machine, Work
 from lab.production.recorder import Recorder, Viewer, extras_of
-from lab.production.stop_record import StopRecord
 from lab.sim.arms.kinematics import ToolPose
 from lab.sim.arms.robot import NAME
 from lab.sim.scene.places import Layout
@@ -20,7 +20,7 @@ from lab.skills.sight import SkillFailed
 from lab.skills.skill import SETTLE_STEPS, STAND_STEPS, Bench, Status
 from lab.skills.skillset import SkillSet
 from lab.tasks.task import Order
-from lab.teaching.events import RunHeld, RunWentOn, Tell, unheard
+from lab.teaching.events import Event, RunHeld, RunWentOn
 
 AT_REST_STEPS = 60  # physics steps at the end of a wait that are simulated in any case
 SKIPPED_STEPS = 240  # at the most without a look at what else goes on
@@ -30,17 +30,49 @@ BACK_STEPS = 120  # physics steps of its way that the arm goes back when it was 
 DISTURBED_S = 2.0  # after a hand has reached into the scene, all of it is simulated for so long
 
 
-def _nothing() -> bool:
+def untouched(floor: "Floor") -> bool:
+    """Nobody reaches into the scene."""
+    return False
+
+
+def _unwatched(floor: "Floor") -> None:
+    """Nobody looks at what a step has done."""
+
+
+def idle() -> bool:
     """Nobody does anything by hand."""
     return False
+
+
+def _unheard(event: Event, step: int) -> None:
+    """Nobody listens."""
+
+
+@dataclass(frozen=True)
+class Hooks:
+    """Whom a floor calls, and when; by default nobody.
+
+    before_step: before each physics step, to reach into the scene as a fault does; returns whether it did.
+    after_step: after each physics step.
+    meanwhile: between moves and while a pause lasts, for what the operator does by hand; returns whether that was anything.
+    hear: for each event that is told, with the physics step at which it happened.
+    note_stops: for each change of the stops, before it counts.
+    """
+
+    before_step: "Callable[[Floor], bool]" = untouched
+    after_step: "Callable[[Floor], None]" = _unwatched
+    meanwhile: Callable[[], bool] = idle
+    hear: Callable[[Event, int], None] = _unheard
+    note_stops: Callable[[StopsChanged], None] = unwritten
+
+
+NO_HOOKS = Hooks()
 
 
 class Floor:
     """A scene in which skills are carried out: one clock, the robot's skill and the machines' processes side by side.
 
-    controls: what stops it and sets its pace; stops: when they did, for the journal. on_tick: called after each physics
-    step; hand: called before each, to reach into the scene as a fault does, and says whether it did. meanwhile: called between
-    moves and while a pause lasts, for what the operator does by hand, and says whether that was anything.
+    controls: what stops it and sets its pace. stops: at which steps they did. hooks: who is called as its time goes by.
     """
 
     def __init__(
@@ -51,36 +83,38 @@ class Floor:
         order: Order = (),
         *,
         parts: int = 0,
-        film: bool = False,
-        viewer: Viewer | None = None,
+        controls: Controls | None = None,
+        hooks: Hooks = NO_HOOKS,
     ) -> None:
-        """Build the scene and let it settle; `parts`: as `Scene` has it; `film` keeps frames, `viewer` sees them live."""
+        """Build the scene and let it settle, with nobody called; parts: for how many stations are built (see `Scene`)."""
         self.world, self.skillset = world, skillset
         self.scene = Scene(world, skillset.task, order, layout, parts)
         self.bench = Bench(self.scene)
         self.machines = {s.name: Machine(s.name) for s in skillset.task.stations if s.kind == "machine"}
-        self.controls, self.stops = Controls(), StopRecord()
-        self.tell: Tell = unheard
-        self.on_tick: Callable[[], None] | None = None
-        self.hand: Callable[[], bool] | None = None
-        self.meanwhile: Callable[[], bool] = _nothing
+        self.hooks, self.controls = hooks, controls or Controls()
+        self.stops = StopRecord(note=hooks.note_stops)
         self.pressing_n = 0.0  # allowed on top of the task's limit, so that the arm gets away from where it was stopped
         self.was_held = False  # by the operator, in the last motion
         self._trail: deque[Array] = deque(maxlen=BACK_STEPS // FORCE_EVERY)  # the joints on the last steps of the way
         for _ in range(SETTLE_STEPS):
             world.step()
         self.recorder: Recorder | None = None
-        if film or viewer:
-            self.record(viewer)
         self.restart_clock()
         self.skipped_s = 0.0
         self._quiet_s = 0.0  # from when on waiting may be skipped
         self._told_held = ""
         self._paced = (0.0, 0.0, 0.0)  # speed, simulated and real time from which on it holds
 
-    def record(self, viewer: Viewer | None = None) -> None:
-        """Keep frames from now on, of all that is there; `viewer` sees them live."""
+    def record(self, viewer: Viewer | None = None) -> Recorder:
+        """What keeps frames from now on, of all that is there; `viewer` sees them live."""
         self.recorder = Recorder(self.world, extras_of(self.scene, self.skillset), viewer)
+        return self.recorder
+
+    def show(self, *names: str) -> None:
+        """Show extra bodies on their parts from now on, where frames are kept (see `extras_of`)."""
+        if self.recorder is not None:
+            for name in names:
+                self.recorder.show(name)
 
     @property
     def now_s(self) -> float:
@@ -96,9 +130,9 @@ class Floor:
         """Let the floor's time begin now."""
         self._zero = self.world.steps
 
-    def machine(self, station: str) -> Machine:
-        """The machine of that name."""
-        return self.machines[station]
+    def tell(self, event: Event) -> None:
+        """Tell what happened."""
+        self.hooks.hear(event, self.steps)
 
     # ---- one step ------------------------------------------------------------------------------------------------
 
@@ -111,7 +145,7 @@ class Floor:
         self._after()
 
     def wait(self, until_s: float) -> None:
-        """One physics step, or, when nothing moves, the time until then, a second at the most: nothing happens meanwhile."""
+        """One physics step, or, while nothing moves, the time until then without physics, a second at the most."""
         steps = min(ceil((until_s - self.now_s) / TIME_STEP) - AT_REST_STEPS, SKIPPED_STEPS)
         still = self.now_s >= self._quiet_s and not any(machine.moves for machine in self.machines.values())
         if steps > 0 and still and not self._reached_in():
@@ -123,20 +157,19 @@ class Floor:
         self.held()
 
     def _reached_in(self) -> bool:
-        if self.hand is not None and self.hand():
+        if self.hooks.before_step(self):
             self._quiet_s = self.now_s + DISTURBED_S
             return True
         return False
 
     def _after(self) -> None:
-        if self.on_tick is not None:
-            self.on_tick()
+        self.hooks.after_step(self)
         if self.recorder is not None:
             self.recorder.step()
         self._pace()
 
     def _pace(self) -> None:
-        """Let the clock on the wall catch up where a speed is set; a stop ends the waiting."""
+        """Wait until real time has caught up with simulated time, where a speed is set; a stop ends the waiting."""
         speed = None if self.stops.folding else self.controls.speed
         if not speed:
             self._paced = (0.0, 0.0, 0.0)
@@ -153,9 +186,9 @@ class Floor:
     # ---- stops ---------------------------------------------------------------------------------------------------
 
     def held(self) -> str:
-        """Hold the arm as long as an emergency or protective stop says; why it was held, "" when it was not.
+        """Hold the arm as long as an emergency or protective stop lasts; returns why it was held, "" when it was not.
 
-        The arm's brakes act in the very step; time goes on meanwhile, at the pace of the clock on the wall at the most.
+        The brakes act in the same physics step. Simulated time goes on, not faster than real time.
         """
         if not self._stopped():
             return ""
@@ -176,9 +209,9 @@ class Floor:
         return why
 
     def protected(self, why: str) -> bool:
-        """A protective stop until somebody has gone on; False, and nothing is stopped, where nobody is there who could.
+        """Hold a protective stop until somebody lets the run go on; False, and nothing is stopped, where nobody attends the run.
 
-        In a run that is done again, somebody was there if it was stopped here.
+        A run that is replayed from its journal was attended if it was stopped at this step.
         """
         if not self.stops.folding:
             if not self.controls.attended:
@@ -187,8 +220,10 @@ class Floor:
         return bool(self.held())
 
     def between_moves(self) -> None:
-        """Wait as long as there is a pause, without any time going by."""
-        while self.meanwhile() or (self.stops.look(self.steps, self.controls) and self.stops.pauses(self.controls)):
+        """Wait as long as a pause lasts; simulated time stands still."""
+        while self.hooks.meanwhile() or (
+            self.stops.look(self.steps, self.controls) and self.stops.pauses(self.controls)
+        ):
             self._tell_held()
             self.controls.wait(0.0 if self.stops.folding else 0.1)
         self._tell_held()
@@ -216,7 +251,7 @@ class Floor:
         return f"the arm presses on '{body}' with {force_n:.0f} N, allowed are {limit_n:g}" if force_n > limit_n else ""
 
     def _back_off(self) -> None:
-        """Go back a little on the way that led against something."""
+        """Go back a little along the path on which the arm pressed on something."""
         while self._trail:
             self.world.drive(NAME, self.scene.robot.arm.joints, self._trail.pop())
             for _ in range(FORCE_EVERY):
@@ -229,7 +264,7 @@ class Floor:
         skill.start(self.bench, self.skillset.policies[skill.name])
 
     def run(self, skill: Skill) -> Status:
-        """Carry one skill out to its end, or until something stops it: it has failed then, as one that is blocked has."""
+        """Carry one skill out to its end; its status. It has failed where something stopped it, and where it is blocked."""
         if why := self.skillset.blocked.get(skill.name):
             skill.fail(why)
             return skill.status
@@ -243,7 +278,7 @@ class Floor:
         return skill.status
 
     def follow(self, motion: Iterator[None]) -> str:
-        """Carry a motion of the arm out that is no skill; what stopped it, "" when nothing did."""
+        """Carry out a motion of the arm that is no skill; returns what stopped it, "" when nothing did."""
         self.was_held = False
         try:
             for _ in motion:
@@ -255,7 +290,7 @@ class Floor:
         return ""
 
     def _stopped_by(self) -> str:
-        """What stops the motion under way now, once that is over; "" when nothing does."""
+        """Hold the motion under way where something stops it; returns what did once that is over, "" when nothing did."""
         if why := self.held():
             self.was_held = True
             return why
@@ -283,13 +318,15 @@ class Floor:
         return next((m.works[part] for m in self.machines.values() if part in m.works), None)
 
     def take_out(self, part: str) -> None:
-        """A part is not in any machine any more."""
+        """Note that a part is in no machine any more."""
         for machine in self.machines.values():
             machine.clear(part)
 
     def stand(self, pose: ToolPose) -> None:
-        """Put the open gripper at once to a pose, to begin there."""
+        """Put the open gripper at once to a pose, to begin there; no hook is called meanwhile."""
         self.scene.robot.stand(pose)
         self.scene.robot.open_at_once()
         for _ in range(STAND_STEPS):
-            self.tick()
+            self.world.step()
+            if self.recorder is not None:
+                self.recorder.step()

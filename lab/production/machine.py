@@ -1,4 +1,4 @@
-"""A machine at work on the parts that stand in it, each by a clock of its own or with its learned process."""
+"""A machine and the parts that stand in it, on each of which it works for a time of its own or by its learned process."""
 
 from dataclasses import dataclass, field
 
@@ -80,21 +80,21 @@ class Machine:
         return any(work.moves for work in self.works.values())
 
     def slow_down(self, share: float, now_s: float) -> None:
-        """Take so many times as long from now on, also for what is left to do with the parts in it."""
+        """Take `share` times as long from now on, also for the rest of the work on the parts in it."""
         for work in self.works.values():
             if work.until_s > now_s:
                 work.until_s = now_s + (work.until_s - now_s) * share / self.share
         self.share = share
 
     def fail(self, now_s: float) -> None:
-        """Never be done from now on; what is done by now stays so."""
+        """Never finish a part from now on; parts that are done stay done."""
         self.fails = True
         for work in self.works.values():
             if not work.done(now_s):
                 work.until_s = NEVER
 
     def step(self) -> None:
-        """Set what the next physics step needs; a slow machine's process stands still in some of them."""
+        """Command the machine's head for the next physics step; the process of a slow machine pauses in some of the steps."""
         skills = [work.skill for work in self.works.values() if work.skill is not None]
         if not skills and self.share == 1.0:
             return

@@ -10,6 +10,7 @@ from lab.advice.advising import through
 from lab.advice.advisors import PEOPLE, AdvisorName, make_advisor
 from lab.advice.entries import Closed
 from lab.advice.journal import Again, Journal
+from lab.advice.order_level import OrderLevel, signature_of
 from lab.advice.receipt import receipt
 from lab.errors import BadInput, counted
 from lab.learning.requests import Ask
@@ -22,11 +23,15 @@ from lab.sequencing import find_sequence
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import BUILT_IN, MAKESPAN, cost
 from lab.sequencing.cell.routes import part_of
-from lab.sequencing.cell.schedule import Move
+from lab.sequencing.cell.schedule import Move, Schedule
+from lab.sequencing.cyclic.cycle import check_cyclic
+from lab.sequencing.cyclic.line import lines
+from lab.sequencing.cyclic.several import Rhythm
 from lab.sequencing.methods.exact import Optimum, optimum
 from lab.sequencing.methods.portfolio import BestKnown, best_known
 from lab.sequencing.search import SAME, Reference, Search, SequenceResult
 from lab.sequencing.simulate.follow import follow, waits_in
+from lab.sequencing.simulate.rest import rest_of
 from lab.sequencing.simulate.run import NO_WAIT, Run, branch
 from lab.tasks.sequencing import Sequencing, search_for
 from lab.teaching.events import (
@@ -41,8 +46,7 @@ from lab.teaching.events import (
 )
 from lab.teaching.lesson_sessions import TellingAdvisor
 
-if TYPE_CHECKING:
-    from lab.sequencing.cyclic.several import Rhythm
+if TYPE_CHECKING:  # it loads the compiler
     from lab.sequencing.methods.srl_advised import AdvisedResult
 
 NOBODY = AdvisorName.of("none")
@@ -70,16 +74,13 @@ def checked_order(cell: Cell, words: str, where: str = "--order") -> tuple[int, 
 
 
 def check_order(cell: Cell, words: str | None, mix: Sequence[str]) -> None:
-    """BadInput for an order in words, or for a cycle of a mix of products, that cannot be however long moves take.
+    """Raise BadInput for an order in words, or for a cycle of a mix of products, that no durations make possible.
 
     cell: not timed yet (see `durations.untimed`). mix: empty, there is no cycle.
     """
     if words is not None:
         checked_order(cell, words)
     if mix:
-        from lab.sequencing.cyclic.cycle import check_cyclic  # it loads OR-Tools
-        from lab.sequencing.cyclic.line import lines
-
         check_cyclic(cell, mix)
         next(lines(cell, mix))
 
@@ -147,13 +148,13 @@ class Ordered:
     costs: dict[str, float]
     learning: OrderLearning
     receipt: dict[str, Any] | None = None
-    rhythm: "Rhythm | None" = None
+    rhythm: Rhythm | None = None
 
 
 def ordered(cell: Cell, settings: Sequencing, advice: OrderAdvice, seed: int, tell: Tell = unheard) -> Ordered:
-    """The order of a job, beside what cannot be beaten: the given one, or the best of those that were found.
+    """The order of a job beside its proven optimum or bound: the given one, or the best of those that were found.
 
-    A cyclic order is used as a given one is. With advice, SRL looks for one with it, and the settings' method for one alone; what
+    A cyclic order is used like a given one. With advice, SRL looks for one with it, and the settings' method for one alone; what
     the exact search finds stands beside them, and is used where the method is `exact`. Of orders that cost the same the advised
     one is used, then the method's; one of SRL that no move was advised to is no advised one, and comes after them.
     Raises BadInput as `checked_order`, `advised_srl` and
@@ -209,18 +210,18 @@ def reference(cell: Cell, objective: str, time_limit_s: float = SECOND_OPINION_S
 
 
 def reference_of(cell: Cell, objective: str, found: BestKnown) -> Reference:
-    """What is known of a cell, as what no sequence can beat."""
+    """The optimum or bound of a cell that is known, as a reference for other sequences."""
     by = found.bound_by if objective in BUILT_IN else UNKNOWN
     return Reference(found.bound, found.proven, by, unit_of(objective), found.sequence, found.found_by)
 
 
 def unit_of(objective: str) -> str:
-    """What stands behind a cost."""
+    """The unit of a cost, to be written behind it."""
     return "" if objective == "tardy-parts" else " s"
 
 
 def _cheapest(orders: Mapping[str, SequenceResult]) -> str:
-    """The first of those that nothing is cheaper than."""
+    """The first of the cheapest orders, by who found it."""
     least = min(order.cost for order in orders.values())
     return next(name for name, order in orders.items() if order.cost <= least + SAME)
 
@@ -253,8 +254,7 @@ def advised_session(
     cell: Cell, search: Search, advice: OrderAdvice, seeds: tuple[int, int], journal: Journal | None, tell: Tell
 ) -> "AdvisedResult":
     """A session of SRL with advice; seeds: the command's, and the session's number. Raises Again, and as `advised_srl`."""
-    from lab.advice.order_level import OrderLevel, signature_of
-    from lab.sequencing.methods.srl_advised import advised_srl
+    from lab.sequencing.methods.srl_advised import advised_srl  # only where it counts: the compiler takes its time
 
     seed, session = seeds
     rng, own = (np.random.default_rng([seed, stream, session]) for stream in (2, 3))
@@ -267,3 +267,35 @@ def advised_session(
         tell(LessonEvent(ORDER, event, True if journal is None else journal.tell(event)))
 
     return advised_srl(cell, search, rng, GateSettings(advice.gate, spare_best=True), advisor, hear)
+
+
+@dataclass(frozen=True)
+class TypedOrder:
+    """A sequence that may be carried out: when it ends [s] and how much longer that is than the proven optimum or bound.
+
+    gap: a fraction; proven: against an optimum, not only a bound.
+    """
+
+    sequence: tuple[int, ...]
+    schedule: Schedule
+    gap: float
+    proven: bool
+
+    @property
+    def words(self) -> str:
+        """What came of the check, for people."""
+        against = "proven optimum" if self.proven else "proven bound"
+        longer = (
+            f"{100 * self.gap:.1f} % longer than the {against}" if self.gap > 1e-9 else f"as short as the {against}"
+        )
+        return f"{counted(len(self.sequence), 'move')}, {self.schedule.makespan_s:.1f} s: {longer}"
+
+
+def checked(state: Run, sequence: Sequence[int]) -> TypedOrder:
+    """A typed sequence from a state on, to the end of the work. BadInput names the first move that may not be made, and why."""
+    moves = moves_from(state, sequence, "order")
+    schedule = Schedule.from_moves(state.cell, moves, sequence)
+    rest = rest_of(state, fallback_s=float(np.nanmax(state.cell.empty_s, initial=0.0))).cell
+    proven = optimum(state.cell if rest is None else rest)
+    gap = proven.gap(schedule.makespan_s - state.now_s)
+    return TypedOrder(tuple(sequence), schedule, gap, proven.proven)

@@ -1,4 +1,4 @@
-"""How a method learned the order of a job: what its episodes cost, when it found its best, and what of that is its bound."""
+"""How a method learned the order of a job: the costs of its episodes, when it found its best, and what its bound alone does."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,13 +15,14 @@ from lab.sequencing.cell.objectives import MAKESPAN, stuck_cost
 from lab.sequencing.methods.srl_time import bound_alone, srl_time
 from lab.sequencing.search import Reference, Search, SequenceResult
 from lab.view.figures import beside, gap_of
+from lab.view.sequencing_plots import sequence_plot
 
 BOUND_ALONE, UNBOUNDED = "its bound alone", "without its bound"
 
 
 @dataclass(frozen=True)
 class Beside:
-    """What a part of a method comes to by itself: its best cost, None where it found no order, and in which episode."""
+    """What a part of a method reaches by itself: its best cost, None where it found no order, and in which episode."""
 
     by: str
     cost: float | None
@@ -86,8 +87,7 @@ class OrderLearning:
         return lines
 
     def drawn(self, cell: Cell) -> Callable[[Path], None]:
-        """What draws it to a file: the cost by episode, the best so far, and what each part of the method comes to."""
-        from lab.view.sequencing_plots import sequence_plot
+        """A function that draws it to a file: the cost by episode, the best so far, and what each part of the method reaches."""
 
         lines = {f"{one.by}: {one.cost:.1f}{self.known.unit}": one.cost for one in self.beside if one.cost is not None}
         return partial(
@@ -110,7 +110,7 @@ class OrderLearning:
 
 
 def bound_shares(cell: Cell, method: str, search: Search, seed: int) -> tuple[Beside, ...]:
-    """What the bound of srl-time comes to without learning, and the learning without the bound; of other methods nothing.
+    """What the bound of srl-time reaches without learning, and learning without the bound; empty for other methods.
 
     Both draw what the session 0 of this seed draws (see `find_sequence`).
     """

@@ -8,30 +8,20 @@ from lab.export.program import Program
 from lab.production.durations import TimedMove
 from lab.production.faults.fault import Happened
 from lab.production.faults.truth import Verdict, verdict
+from lab.production.run_state import Replanned
 from lab.sequencing.cell.schedule import Schedule
 from lab.teaching.events import Event
-
-
-@dataclass(frozen=True)
-class Replanned:
-    """A new order of the rest: when, why, by which method, of how many moves; gap: to what is proven, None: not known."""
-
-    at_s: float
-    why: str
-    method: str
-    moves: int
-    gap: float | None
 
 
 @dataclass(frozen=True)
 class Outcome:
     """A run in physics: the measured schedule, which parts were delivered, retries, and why not all were (None: all).
 
-    timed: how long each move took in which nothing had to be
-    tried again. skipped_s: of sim_s, the time that passed without physics, while the robot waited and nothing moved.
-    interrupted: by Ctrl-C; all else is what came of it until then. happened: the faults that struck. heard: what the run
-    told. program: what the robot carried out. audit: what the frames show of it (see `lab.audit`), None: nobody has looked;
-    `delivered` are those that it passes, and what it finds is the failure where nothing else is.
+    timed: the duration of each move in which nothing had to be tried again. skipped_s: of sim_s, the time that passed
+    without physics, while the robot waited and nothing moved. interrupted: by Ctrl-C; all else is what came of it until then.
+    happened: the faults that struck. heard: what the run told. program: what the robot carried out. audit: what the frames
+    show (see `lab.audit`), None: nobody has looked; `delivered` are the parts that pass it, and what it finds is the failure
+    where there is no other.
     """
 
     schedule: Schedule

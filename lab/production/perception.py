@@ -1,4 +1,4 @@
-"""What stands where, held against what is believed: parts, obstacles, stations, and what belongs to nobody.
+"""What is seen of parts, obstacles, stations and strange parts, compared with where the run believes them to be.
 
 Bodies' poses stand in for a camera that looks at the whole table: with the camera covered nothing is seen.
 """
@@ -9,7 +9,9 @@ from math import atan2, cos, hypot, pi, sin
 from typing import Literal
 
 from lab.production.floor import Floor
+from lab.production.run_state import LOOK_S, RunState
 from lab.production.standing import DELIVERED_M
+from lab.production.trouble import Trouble
 from lab.sim.arms.robot import NAME
 from lab.sim.parts.kinds import Spot
 from lab.sim.scene import station_bodies
@@ -41,7 +43,7 @@ Sort = Literal[
 
 @dataclass(frozen=True)
 class Deviation:
-    """Something that is not as it is believed to be: which body, in words, at which station ("": at none).
+    """A difference between what is seen and what is believed: of which body, in words, at which station ("": at none).
 
     at: where a part's foot is seen, or a fixed body's middle, or a station's pose; by_m: how far off [m]; None, 0: it is not
     seen at all. obstacle: of a new one, what is known of it.
@@ -56,10 +58,35 @@ class Deviation:
     obstacle: Obstacle | None = None
 
 
+def look(floor: Floor, state: RunState) -> None:
+    """See, once a second, whether all is where it should be. Raises Trouble for the first thing that is not."""
+    if floor.now_s - state.looked_s < LOOK_S:
+        return
+    state.looked_s = floor.now_s
+    if found := news(floor, state):
+        raise Trouble(found[0].words, found[0].name, found[0].station, seen=True)
+    if not floor.world.dark:
+        state.right_s = floor.now_s
+
+
+def news(floor: Floor, state: RunState) -> list[Deviation]:
+    """The deviations that a run does not know of yet: none of parts that it gave up, or of strange parts that it saw before."""
+    delivered = {state.name(part) for part in state.finished}
+    found = perceive(floor, floor.scene.task, floor.scene.layout, state.spot_of, delivered)
+    return [one for one in found if one.sort != "camera blind" and not _is_known(state, one)]
+
+
+def _is_known(state: RunState, seen: Deviation) -> bool:
+    part = state.part_of(seen.name)
+    if part is None:
+        return seen.name in state.strange and seen.sort != "part gone"
+    return part in state.lost or (part in state.to_put_back and seen.sort == "part moved")
+
+
 def perceive(
     floor: Floor, task: Task, layout: Layout, spot_of: Mapping[str, Spot], delivered: Container[str] = ()
 ) -> list[Deviation]:
-    """All that is not as believed: fixed things as task and layout have them, parts on their spots, by body.
+    """All deviations: of fixed things from the task and the layout, of parts from their spots.
 
     delivered: those that have to stay within DELIVERED_M of them. What is in the gripper is left out. The order is that of
     `Sort` for parts, then strange parts, obstacles and stations.
@@ -95,7 +122,7 @@ def _parts(floor: Floor, task: Task, spot_of: Mapping[str, Spot], delivered: Con
 
 
 def moved_off(floor: Floor, name: str, spot: Spot | None) -> bool:
-    """Whether a part is not on its spot any more, seen or unseen: unseen it is found only where it was set down."""
+    """Whether a part is not on its spot any more, whether or not the camera sees it; False where no spot is known."""
     x, y, _ = floor.world.pose(name)[0]
     return spot is not None and hypot(float(x) - spot.x, float(y) - spot.y) > PART_M
 

@@ -13,6 +13,8 @@ from lab.toolbox.hub_folder import MODEL, README, check_license, header, hub_fil
 from lab.toolbox.names import SUFFIX, slug
 from lab.toolbox.policy import Policy
 from lab.toolbox.policy_file import encode
+from lab.view.plots import learning_curves
+from lab.view.value_levels import can_be_drawn, value_levels
 
 CARD = "card.md"
 PICTURES = {"learning curve": "learning-curve.png", "value map": "value-map.png"}
@@ -45,7 +47,6 @@ def _what(policy: Policy) -> str:
 
 def _pictures(policy: Policy) -> Files:
     """The pictures that there can be of a policy."""
-    from lab.view.value_levels import can_be_drawn
 
     there = {"learning curve": bool(policy.curve), "value map": can_be_drawn(policy)}
     return {name: file for name, file in PICTURES.items() if there[name]}
@@ -53,8 +54,6 @@ def _pictures(policy: Policy) -> Files:
 
 def _write(policy: Policy, contents: dict[str, bytes], out: Path) -> Files:
     """Files and pictures, all drawn before any of them stands in `out`; pictures of another policy go."""
-    from lab.view.plots import learning_curves
-    from lab.view.value_levels import value_levels
 
     check_out(out)
     pictures = _pictures(policy)

@@ -1,29 +1,44 @@
-"""What is done about trouble: look what is where, take up again, learn again, order anew, leave a part, or stop and say why."""
+"""What is done about trouble: look what is where, take up again, learn again, order anew, leave a part, or stop and say why.
 
-from collections import Counter
-from collections.abc import Callable, Sequence
+What to do is decided in `answers`, as a function of the state and of what was seen; here it is done.
+"""
+
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from types import MappingProxyType
+from typing import assert_never
 
 from lab.errors import LabError
+from lab.production.answers import (
+    Belief,
+    Believe,
+    GiveUp,
+    GoOn,
+    Stop,
+    TryAgain,
+    WaitForCamera,
+    answer_to,
+    belief_in,
+    with_room,
+)
 from lab.production.controls import StopKind
-from lab.production.perception import BELOW_M, Deviation, perceive, seen_at
+from lab.production.floor import Floor
+from lab.production.parts_in_machines import PartsInMachines
+from lab.production.perception import BELOW_M, Deviation, news, scene_seen, seen_at
+from lab.production.replanning import Planner, in_another, plan_again
+from lab.production.run_state import LOOK_S, GivenUp, Replanned, RunState, Strange
 from lab.production.standing import DELIVERED_M, too_near
+from lab.production.taught import Relearner, adopt
 from lab.production.transfers import Transfers
 from lab.production.trouble import RunStopped, Trouble
+from lab.sequencing.simulate.rest import Mishaps
 from lab.sim.parts.kinds import Spot
-from lab.sim.scene.scene import pallet_of
 from lab.skills.skill import UPRIGHT
-from lab.teaching.events import MachineFailed, MoveRetried, PartLost, RunHeld, RunWentOn, TroubleMet
+from lab.teaching.events import MachineFailed, MoveRetried, PartLost, PlanMade, RunHeld, RunWentOn, TroubleMet
 
-MAX_TRIES = 3  # what fails is tried again from the state reached, at most twice
-PAUSES_S = (0.0, 0.0, 30.0)  # before each try [s]: what disturbs may go away
-LOOK_S = 1.0  # between two looks at the table
 BLIND_S = 120.0  # so long a skill waits until the camera sees again
-MOST_TROUBLES = 40  # in one run; then it is stopped
-LOST = ("part fallen", "part gone", "part out of reach")
-FIXED = ("obstacle moved", "obstacle gone", "obstacle new", "station moved")
+NOBODY: Mapping[int, int] = MappingProxyType({})
 TO_DO = {  # by a person, with a part that is left
     "part fallen": "stand it up",
     "part gone": "bring it back",
@@ -33,189 +48,65 @@ TO_DO = {  # by a person, with a part that is left
 
 
 @dataclass(frozen=True)
-class GivenUp:
-    """How a part was when it was given up: its position on its routes, and the spot on which it was believed to stand.
-
-    undone: a machine had begun it and was not done. astray: it could not be taken up, but may be later. finished_s: when it
-    had reached the end of its route [s]; None: it had not.
-    """
-
-    position: int
-    spot: Spot | None
-    undone: bool
-    astray: bool
-    finished_s: float | None
-
-
-class Strange(NamedTuple):
-    """What belongs to nobody: the station that it closes, "" for none, and the spot on which nothing else fits."""
-
-    closes: str = ""
-    spot: Spot | None = None
-
-
-@dataclass
 class Recovery:
-    """The answers to trouble, for parts that are being brought on.
+    """Does what is decided about trouble: to the scene by `work` and `machines`, to what is believed in the state.
 
-    replan: orders the rest of the work anew, given why, and parts that are back in play, with their positions.
-    relearn: learns what changed in the scene, given what was seen.
-    lost: why a part was given up, by its number. out: why nothing is brought to a station any more.
+    relearner: learns what changed in the scene, None: nobody does. planner: who orders the rest where it must be.
     """
 
+    floor: Floor
+    state: RunState
     work: Transfers
-    replan: Callable[..., None]
-    relearn: Callable[[Sequence[Deviation]], None]
-    lost: dict[int, str] = field(default_factory=dict)
-    out: dict[str, str] = field(default_factory=dict)
-    notes: list[str] = field(default_factory=list)
-    _strange: dict[str, Strange] = field(default_factory=dict)  # what belongs to nobody, by its name
-    _given_up: dict[int, GivenUp] = field(default_factory=dict)  # of `lost`, those of which a position is known
-    _tries: Counter[tuple[str, str, str]] = field(default_factory=Counter)
-    _first: dict[str, str] = field(default_factory=dict)
-    _looked_s: float = -LOOK_S
-    _right_s: float = -LOOK_S  # when all was seen last to be where it should be
-
-    def find_again(self, attended: bool = False) -> bool:
-        """Go on with parts that were given up and can now be brought on; whether there are any.
-
-        Unattended, these are parts that could not be taken up. Attended, a person has put things right: then also those that
-        stand where they were left, as in a machine that was out of order. What a machine had not finished, it begins anew.
-        Where no order brings them on, they are given up as before.
-        """
-        found = {part: one for part, one in self._given_up.items() if attended or one.astray}
-        found = self._with_room({part: one for part, one in found.items() if self._is_back(part, one)})
-        why = {part: self.lost[part] for part in found}
-        for part, one in found.items():
-            self._take_back(part, one)
-        try:
-            if found:
-                self.replan("a part can be taken up again", {part: one.position for part, one in found.items()})
-        except RunStopped as stopped:
-            self._note(str(stopped))
-            for part, one in found.items():
-                self._lose(part, why[part], one)
-            return False
-        return bool(found)
-
-    def _with_room(self, found: dict[int, GivenUp]) -> dict[int, GivenUp]:
-        """Those for which there is room at the stations of their positions, those that stand there first; others come later."""
-        cell, chosen = self.work.cell, dict[int, GivenUp]()
-        places = [place for part, place in enumerate(self.work.plan.locations, 1) if part not in self.lost]
-        taken = Counter(station for place in places for station in self.work.plan.cell.positions[place].holds)
-
-        def is_elsewhere(part: int) -> bool:
-            return (spot := found[part].spot) is None or not self._stands(part, spot)
-
-        for part in sorted(found, key=lambda part: (is_elsewhere(part), part)):
-            holds = cell.laid_out[found[part].position].holds
-            if all(taken[station] < cell.capacities[station] for station in holds):
-                taken.update(holds)
-                chosen[part] = found[part]
-            else:
-                self._given_up[part] = replace(found[part], astray=True)
-        return chosen
-
-    def _take_back(self, part: int, left: GivenUp) -> None:
-        """Count on a part again that had been given up."""
-        work, name = self.work, self.work.name(part)
-        del self._given_up[part], self.lost[part]
-        work.left_lying.discard(name)
-        stands = left.spot is not None and self._stands(part, left.spot)
-        work.spot_of[name] = left.spot if left.spot is not None and stands else seen_at(work.floor, name)
-        if left.finished_s is not None:
-            work.finished[part] = left.finished_s
-        if left.undone or (left.finished_s is not None and not stands):
-            work.begin_again(part, stands)
-        self._tell(Trouble("it can be taken up again", name), "goes on with it")
-
-    def _is_back(self, part: int, left: GivenUp) -> bool:
-        """Whether a part that was given up can be brought on: it stands where it was left, or can be taken up elsewhere."""
-        place = self.work.cell.laid_out[left.position].station
-        if left.undone and self.work.cell.names[place] in self.out:
-            return False
-        return (left.spot is not None and self._stands(part, left.spot)) or self._can_be_taken_up(part)
-
-    def _stands(self, part: int, spot: Spot) -> bool:
-        """Whether a part is seen to stand upright on a spot."""
-        floor, name = self.work.floor, self.work.name(part)
-        upright = not floor.world.dark and floor.bench.upright(name) >= UPRIGHT
-        return upright and floor.bench.stands(name, spot, DELIVERED_M)
-
-    def _can_be_taken_up(self, part: int) -> bool:
-        floor, name = self.work.floor, self.work.name(part)
-        at = seen_at(floor, name)
-        reached = floor.scene.robot.arm.inverse(floor.bench.part_pose(name)) is not None
-        stands = at.z > BELOW_M and floor.bench.upright(name) >= UPRIGHT and not too_near(floor.bench, name)
-        return not floor.world.dark and stands and reached
-
-    def forget(self) -> None:
-        """A person has put things right: what was out of use is used again, and tries are counted anew."""
-        bench = self.work.floor.bench
-        if bench.held is not None and not bench.holds(bench.held):  # it was taken out of the gripper
-            bench.held = None
-        self.out.clear()
-        self._tries.clear()
-        self._first.clear()
-
-    def failure(self) -> str | None:
-        """Why not all parts were made; None when they were."""
-        why = self.work.spoilt | self.lost
-        return "; ".join(dict.fromkeys(why[part] for part in sorted(why))) or None
-
-    def to_put_right(self) -> str:
-        """Why parts were given up that a person may yet help on; "" where there are none."""
-        why = [self.lost[part] for part in sorted(self._given_up)]
-        return "; ".join(dict.fromkeys(why))
-
-    def look(self) -> None:
-        """See, once a second, whether all is where it should be. Raises Trouble."""
-        now_s = self.work.floor.now_s
-        if now_s - self._looked_s < LOOK_S:
-            return
-        self._looked_s = now_s
-        found = self._deviations()
-        if found:
-            raise Trouble(found[0].words, found[0].name, found[0].station, seen=True)
-        if not self.work.floor.world.dark:
-            self._right_s = now_s
+    machines: PartsInMachines
+    relearner: Relearner | None = None
+    planner: Planner = field(default_factory=Planner)
 
     # ---- answers ---------------------------------------------------------------------------------------------------
 
     def answer(self, trouble: Trouble) -> None:
         """Do what lets the run go on, perhaps without a part. Raises RunStopped."""
-        work, floor = self.work, self.work.floor
+        floor = self.floor
         if trouble.late:
             self._put_off(trouble)
             return
-        work.place = ""
+        self.state.place = ""
         floor.scene.robot.brake()
         if not trouble.held:  # a protective stop
-            work.tell(RunHeld(StopKind.PROTECTIVE, str(trouble), "robot", floor.now_s))
+            floor.tell(RunHeld(StopKind.PROTECTIVE, str(trouble), "robot", floor.now_s))
         try:
             self._answer(trouble)
         finally:
             if not trouble.held:
-                work.tell(RunWentOn(floor.now_s))
+                floor.tell(RunWentOn(floor.now_s))
 
     def _answer(self, trouble: Trouble) -> None:
-        floor = self.work.floor
-        if floor.bench.held is not None and not floor.bench.holds(floor.bench.held):
-            floor.bench.held = None
-        if trouble.held:
-            self._tell(trouble, "goes on from where it is")
-            return
-        key = (trouble.part, trouble.station, trouble.skill)
-        self._tries[key] += 1
-        if self._tries.total() >= MOST_TROUBLES:
-            raise RunStopped(f"{trouble} (after {MOST_TROUBLES} troubles)")
-        if not (trouble.final or trouble.seen):
+        floor, state = self.floor, self.state
+        self._let_go_of_what_is_gone()
+        if not trouble.held:
+            state.tries[trouble.key] += 1
+        seen = () if trouble.held else tuple(news(floor, state))
+        answer = answer_to(state, trouble, seen, dark=floor.world.dark)
+        if not (trouble.held or trouble.final or trouble.seen or isinstance(answer, Stop)):
             skill = trouble.skill and f" '{trouble.skill}',"
-            self._note(f"{trouble.part} at '{trouble.station}',{skill} try {self._tries[key]}: {trouble.what}")
-        if floor.world.dark:
-            self._wait_for_camera(trouble)
-        elif not self._see() and not trouble.seen:
-            self._try_again(trouble, self._tries[key])
+            self._note(f"{trouble.part} at '{trouble.station}',{skill} try {state.tries[trouble.key]}: {trouble.what}")
+        match answer:
+            case GoOn():
+                if trouble.held:
+                    self._tell(trouble, "goes on from where it is")
+            case Stop(why):
+                raise RunStopped(why)
+            case WaitForCamera():
+                self._wait_for_camera(trouble)
+            case Believe():
+                self._believe(answer)
+            case TryAgain(pause_s):
+                state.first.setdefault(trouble.part, trouble.what)
+                self._try_again(trouble, pause_s)
+            case GiveUp(why):
+                state.first.setdefault(trouble.part, trouble.what)
+                self._give_up(trouble, why)
+            case _:
+                assert_never(answer)
 
     def _put_off(self, trouble: Trouble) -> None:
         """A machine is late: what can be done meanwhile comes first, and its part is fetched as if the machine took as long as it
@@ -224,88 +115,104 @@ class Recovery:
         with suppress(RunStopped):
             self.replan(str(trouble))
 
-    def set_aside(self, why: str) -> bool:
-        """Set down what is in the gripper, for it cannot be brought on now; whether that was done."""
-        held = self.work.floor.bench.held
-        if held is None or not self.work.set_aside():
-            return False
-        self._tell(Trouble(why, held), "sets it down again")
-        return True
-
-    def _try_again(self, trouble: Trouble, tries: int) -> None:
-        """Nothing is to be seen that explains it: try it again, a few times, then give up."""
-        first = self._first.setdefault(trouble.part, trouble.what)
-        if tries >= MAX_TRIES or trouble.final:
-            self._give_up(trouble, trouble.what if trouble.final else f"{first} (tried {tries} times)")
-            return
+    def _try_again(self, trouble: Trouble, pause_s: float) -> None:
+        floor = self.floor
         self._tell(trouble, "tries again")
-        self._wait(PAUSES_S[tries])
-        work = self.work.floor.work_on(trouble.part)
+        until_s = floor.now_s + pause_s
+        while floor.now_s < until_s:
+            floor.wait(until_s)
+        work = floor.work_on(trouble.part)
         if work is not None and work.station == trouble.station and work.failed:
-            self.work.floor.again(work)
+            floor.again(work)
 
     def _wait_for_camera(self, trouble: Trouble) -> None:
         self._tell(trouble, "waits until the camera sees again")
-        floor = self.work.floor
+        floor = self.floor
         until_s = floor.now_s + BLIND_S
         while floor.world.dark:
             if floor.now_s >= until_s:
                 raise RunStopped(f"{trouble}: the camera has seen nothing for {BLIND_S:.0f} s: uncover it")
             floor.wait(min(floor.now_s + LOOK_S, until_s))
 
-    def _see(self) -> bool:
-        """Look what is where, and take it into account; whether anything was not as believed."""
-        found = self._deviations()
-        for one in found:
-            self._account(one)
-        fixed = [one for one in found if one.sort in FIXED]
-        if fixed:
-            self._learn_again(fixed)
-        if found:
-            self.replan(found[0].words)
-        return bool(found)
+    def _give_up(self, trouble: Trouble, why: str) -> None:
+        """Go on without a machine or without a part; RunStopped when the part cannot be set down, or it is about none."""
+        floor, state = self.floor, self.state
+        text = str(Trouble(why, trouble.part, trouble.station))
+        part = state.part_of(trouble.part)
+        if part is None or (floor.bench.held is not None and not self.set_aside(why)):
+            raise RunStopped(text)
+        if (work := floor.work_on(trouble.part)) is not None and work.station == trouble.station:
+            state.out[trouble.station] = why
+            floor.tell(MachineFailed(trouble.station, trouble.part, why, floor.now_s))
+        self._tell(trouble, "goes on without it")
+        self._lose(part, text)
+        self.replan(text)
+
+    # ---- what was seen ---------------------------------------------------------------------------------------------
+
+    def _believe(self, answer: Believe) -> None:
+        """Take into account what was seen, body by body, and order the rest anew. Raises RunStopped."""
+        for seen in answer.seen:
+            self._account(seen)
+        if answer.fixed:
+            self._learn_again(answer.fixed)
+        self.replan(answer.seen[0].words)
 
     def _account(self, seen: Deviation) -> None:
         """Believe what was seen of one body."""
-        work, part = self.work, self._part_of(seen.name)
-        if seen.name in self._strange:  # it was there, and is not any more
-            closes, spot = self._strange.pop(seen.name)
-            self.out.pop(closes, None)
-            self.work.taken -= {spot}
-            work.spot_of.pop(seen.name, None)
-        elif seen.sort == "strange part":
-            self._avoid(seen)
-        elif part is not None and seen.sort in LOST:
-            self._leave(part, seen)
-        elif part is not None and seen.sort == "part moved":
-            self._follow(part, seen)
+        floor, state, part = self.floor, self.state, self.state.part_of(seen.name)
+        near, unfinished = "", False
+        if part is not None and seen.sort == "part moved":
+            near, work = too_near(floor.bench, seen.name), self.machines.work_on(part)
+            served = work is None or not self.machines.to_be_served(part, work.station)
+            unfinished = work is not None and not (work.done(floor.now_s) and served)
+        belief = belief_in(state, seen, blocked=bool(near), unfinished=unfinished)
+        match belief:
+            case Belief.FORGET:
+                closes, spot = state.strange.pop(seen.name)
+                state.out.pop(closes, None)
+                state.taken -= {spot}
+                state.spot_of.pop(seen.name, None)
+            case Belief.AVOID:
+                self._avoid(seen)
+            case Belief.LEAVE:
+                assert part is not None
+                words = f"{seen.words}, too near to {near} to be taken up" if near else seen.words
+                self._leave(part, replace(seen, words=words))
+            case Belief.TAKE_UP | Belief.PUT_BACK:
+                assert part is not None
+                self._follow(part, seen, put_back=belief is Belief.PUT_BACK, unfinished=unfinished)
+            case Belief.SURVEY:
+                pass  # once, for all that is fixed
+            case _:
+                assert_never(belief)
 
     def _avoid(self, seen: Deviation) -> None:
         """Something stands where it does not belong: its spot is taken; where that was the only one, it is set aside, or else the
         station is closed."""
         assert seen.at is not None
-        floor = self.work.floor
-        self._strange[seen.name] = Strange()
-        self.work.spot_of[seen.name] = seen.at
+        floor, state = self.floor, self.state
+        state.strange[seen.name] = Strange()
+        state.spot_of[seen.name] = seen.at
         if seen.station:
             spots = floor.scene.places.spots(floor.skillset.task.station(seen.station))
             near = min(spots, key=lambda spot: (spot.x - seen.at.x) ** 2 + (spot.y - seen.at.y) ** 2)  # type: ignore[union-attr]
-            self.work.taken.add(near)
-            self._strange[seen.name] = Strange("", near)
+            state.taken.add(near)
+            state.strange[seen.name] = Strange("", near)
             if len(spots) == 1 and self._clear_away(seen):
-                self.work.taken.discard(near)
-                self._strange[seen.name] = Strange()
+                state.taken.discard(near)
+                state.strange[seen.name] = Strange()
                 self._tell_seen(seen, "sets it aside")
                 return
             if len(spots) == 1:
-                self._strange[seen.name] = Strange(seen.station, near)
-                self.out[seen.station] = seen.words
+                state.strange[seen.name] = Strange(seen.station, near)
+                state.out[seen.station] = seen.words
         self._tell_seen(seen, "brings nothing there")
 
     def _clear_away(self, seen: Deviation) -> bool:
         """Whether what belongs to nobody was set aside; what is in the gripper is set down first."""
         try:
-            if self.work.floor.bench.held is not None and not self.set_aside(seen.words):
+            if self.floor.bench.held is not None and not self.set_aside(seen.words):
                 return False
             return self.work.clear_away(seen.name, seen.station)
         except Trouble as trouble:
@@ -314,123 +221,193 @@ class Recovery:
 
     def _leave(self, part: int, seen: Deviation) -> None:
         """A part that cannot be taken up is left; where it lies in a machine, that is closed."""
-        work = self.work.work_on(part)
+        work = self.machines.work_on(part)
         left = self._as_left(part, astray=True)
         if work is not None and seen.sort == "part fallen":
-            self.out[work.station] = f"{seen.name} lies in '{work.station}'"
-        self.work.floor.take_out(self.work.name(part))
+            self.state.out[work.station] = f"{seen.name} lies in '{work.station}'"
+        self.floor.take_out(self.state.name(part))
         self._lose(part, f"{seen.words}: {TO_DO[seen.sort]}", left)
         self._tell_seen(seen, "leaves it")
 
-    def _follow(self, part: int, seen: Deviation) -> None:
-        """A part that was moved is taken up where it stands; out of its machine before that was done, or before the robot served
-        it there, it is put back there.
+    def _follow(self, part: int, seen: Deviation, *, put_back: bool, unfinished: bool) -> None:
+        """A part that was moved is put back, or taken up where it stands.
 
-        Where the machine is done by now, and the part was not seen in it since, it is noted that nobody knows.
+        Where the machine that it stood in is done by now, and the part was not seen in it since, it is noted that nobody knows.
         """
         assert seen.at is not None
-        if other := too_near(self.work.floor.bench, seen.name):
-            self._leave(part, replace(seen, words=f"{seen.words}, too near to {other} to be taken up"))
-            return
-        work, begun, answer = self.work, self.work.work_on(part), "takes it up there"
-        unfinished = begun is not None and (not begun.done(work.floor.now_s) or work.to_be_served(part, begun.station))
-        if unfinished or seen.name in work.waiting or part in work.finished:
-            answer = "puts it back"
-            work.to_put_back.append(part)
+        state, work = self.state, self.machines.work_on(part)
+        if put_back:
+            state.to_put_back.append(part)
         else:
-            work.spot_of[seen.name] = seen.at
-        if begun is not None and not unfinished and self._right_s < begun.until_s:
-            self._note(f"{seen.name} was taken out of '{begun.station}': whether it was done there was not seen")
-        work.floor.take_out(work.name(part))
-        self._tell_seen(seen, answer)
+            state.spot_of[seen.name] = seen.at
+        if work is not None and not unfinished and state.right_s < work.until_s:
+            self._note(f"{seen.name} was taken out of '{work.station}': whether it was done there was not seen")
+        self.floor.take_out(state.name(part))
+        self._tell_seen(seen, "puts it back" if put_back else "takes it up there")
 
     def _learn_again(self, fixed: Sequence[Deviation]) -> None:
         """Learn what is another problem in the scene as it is now. RunStopped when nothing can be done in it."""
+        floor, state = self.floor, self.state
         for one in fixed:
             self._tell_seen(one, "surveys the scene again, and learns what has changed")
+        if self.relearner is None:
+            raise RunStopped(f"{fixed[0].words}: nobody is there to teach what changed")
         try:
-            self.relearn(fixed)
+            cell = self.relearner.learn(scene_seen(floor.scene.task, floor.scene.layout, [*fixed]))
+            adopt(floor, self.relearner.prepared, state.spot_of)
+            state.go_by(in_another(state.plan, cell), floor.now_s)
         except LabError as error:
             raise RunStopped(f"{fixed[0].words}: {error}") from None
 
-    def _give_up(self, trouble: Trouble, why: str) -> None:
-        """Go on without a machine or without a part; RunStopped when the part cannot be set down, or it is about none."""
-        floor = self.work.floor
-        text = str(Trouble(why, trouble.part, trouble.station))
-        part = self._part_of(trouble.part)
-        if part is None or (floor.bench.held is not None and not self.set_aside(why)):
-            raise RunStopped(text)
-        if (work := floor.work_on(trouble.part)) is not None and work.station == trouble.station:
-            self.out[trouble.station] = why
-            self.work.tell(MachineFailed(trouble.station, trouble.part, why, floor.now_s))
-        self._tell(trouble, "goes on without it")
-        self._lose(part, text)
-        self.replan(text)
+    # ---- the order of what remains ---------------------------------------------------------------------------------
 
-    def lose(self, stuck: dict[int, str]) -> None:
-        """Give parts up that cannot be finished any more."""
-        for part, why in stuck.items():
-            if part not in self.lost:
-                reasons = ", ".join(f"'{station}': {what}" for station, what in self.out.items())
-                self._lose(part, f"{why}: {reasons}" if reasons else why)
+    def replan(self, why: str, back: Mapping[int, int] = NOBODY) -> None:
+        """Order the work that remains anew, from the state that was reached. Raises RunStopped where no order ends it.
+
+        back: parts that had been given up and are to be brought on after all, and their positions.
+        """
+        floor, state, machines, now_s = self.floor, self.state, self.machines, self.floor.now_s
+        machines.begin_batches()
+        first = state.sequence[0] if state.sequence and floor.bench.held is not None else None
+        in_work = [part for part in range(1, state.cell.parts + 1) if machines.work_on(part) is not None]
+        ready_s = {part: machines.left_s(part) for part in in_work}
+        taken_up = {*back, *machines.taken_out()} - {*ready_s, *state.to_put_back}
+        ready_s |= dict.fromkeys(sorted(taken_up), 0.0)
+        mishaps = Mishaps(frozenset(state.lost), tuple(state.out), ready_s, back)
+        try:
+            found = plan_again(state.plan, mishaps, first, self.planner)
+        except LabError as error:
+            if first is None or not self.set_aside(why):
+                raise RunStopped(f"{why}: {error}") from None
+            self.replan(why, back)
+            return
+        for part, stuck in found.stuck.items():
+            if part not in state.lost:
+                reasons = ", ".join(f"'{station}': {what}" for station, what in state.out.items())
+                self._lose(part, f"{stuck}: {reasons}" if reasons else stuck)
+        state.sequence = [*found.sequence]
+        state.go_by(found.run, floor.now_s)
+        gap = None
+        if found.schedule is not None:
+            is_proven = found.proven is not None and found.proven.proven
+            gap = None if found.proven is None else found.proven.gap(found.schedule.makespan_s)
+            plan = found.schedule.later(now_s)
+            floor.tell(PlanMade(plan, len(state.sequence), gap, is_proven, now_s, why, found.method))
+        if found.method:
+            state.replanned.append(Replanned(now_s, why, found.method, len(state.sequence), gap))
+
+    def set_aside(self, why: str) -> bool:
+        """Set down what is in the gripper, for it cannot be brought on now; whether that was done."""
+        held = self.floor.bench.held
+        if held is None or not self.work.set_aside():
+            return False
+        self._tell(Trouble(why, held), "sets it down again")
+        return True
+
+    # ---- parts that were given up ----------------------------------------------------------------------------------
+
+    def find_again(self, attended: bool = False) -> bool:
+        """Go on with parts that were given up and can now be brought on; whether there are any.
+
+        Unattended, these are parts that could not be taken up. Attended, a person has put things right: then also those that
+        stand where they were left, as in a machine that was out of order. What a machine had not finished, it begins anew.
+        Where no order brings them on, they are given up as before.
+        """
+        state = self.state
+        asked = {part: left for part, left in state.given_up.items() if attended or left.astray}
+        back = {part: left for part, left in asked.items() if self._is_back(part, left)}
+        standing = {part for part, left in back.items() if left.spot is not None and self._stands(part, left.spot)}
+        found, later = with_room(state, back, standing)
+        state.given_up |= {part: replace(left, astray=True) for part, left in later.items()}
+        why = {part: state.lost[part] for part in found}
+        for part, left in found.items():
+            self._take_back(part, left)
+        try:
+            if found:
+                self.replan("a part can be taken up again", {part: left.position for part, left in found.items()})
+        except RunStopped as stopped:
+            self._note(str(stopped))
+            for part, left in found.items():
+                self._lose(part, why[part], left)
+            return False
+        return bool(found)
+
+    def _is_back(self, part: int, left: GivenUp) -> bool:
+        """Whether a part that was given up can be brought on: it stands where it was left, or can be taken up elsewhere."""
+        cell = self.state.cell
+        if left.undone and cell.names[cell.laid_out[left.position].station] in self.state.out:
+            return False
+        return (left.spot is not None and self._stands(part, left.spot)) or self._can_be_taken_up(part)
+
+    def _stands(self, part: int, spot: Spot) -> bool:
+        """Whether a part is seen to stand upright on a spot."""
+        floor, name = self.floor, self.state.name(part)
+        upright = not floor.world.dark and floor.bench.upright(name) >= UPRIGHT
+        return upright and floor.bench.stands(name, spot, DELIVERED_M)
+
+    def _can_be_taken_up(self, part: int) -> bool:
+        floor, name = self.floor, self.state.name(part)
+        at = seen_at(floor, name)
+        reached = floor.scene.robot.arm.inverse(floor.bench.part_pose(name)) is not None
+        stands = at.z > BELOW_M and floor.bench.upright(name) >= UPRIGHT and not too_near(floor.bench, name)
+        return not floor.world.dark and stands and reached
+
+    def _take_back(self, part: int, left: GivenUp) -> None:
+        """Count on a part again that had been given up."""
+        state, name = self.state, self.state.name(part)
+        del state.given_up[part], state.lost[part]
+        state.left_lying.discard(name)
+        stands = left.spot is not None and self._stands(part, left.spot)
+        state.spot_of[name] = left.spot if left.spot is not None and stands else seen_at(self.floor, name)
+        if left.finished_s is not None:
+            state.finished[part] = left.finished_s
+        if left.undone or (left.finished_s is not None and not stands):
+            self.machines.begin_again(part, stands)
+        self._tell(Trouble("it can be taken up again", name), "goes on with it")
+
+    def forget(self) -> None:
+        """A person has put things right: what was out of use is used again, and tries are counted anew."""
+        self._let_go_of_what_is_gone()
+        self.state.out.clear()
+        self.state.tries.clear()
+        self.state.first.clear()
+
+    def _let_go_of_what_is_gone(self) -> None:
+        """Believe the gripper to be empty where what it held is not in it any more."""
+        bench = self.floor.bench
+        if bench.held is not None and not bench.holds(bench.held):
+            bench.held = None
 
     def _as_left(self, part: int, astray: bool = False) -> GivenUp | None:
         """How a part is that is now given up; None where nobody could go on with it."""
-        work, position = self.work.work_on(part), self.work.plan.locations[part - 1]
-        if position >= len(self.work.cell.laid_out):
+        state, work = self.state, self.machines.work_on(part)
+        position = state.plan.locations[part - 1]
+        if position >= len(state.cell.laid_out):
             return None
-        undone = part in self.work.to_put_back or (work is not None and not work.done(self.work.floor.now_s))
-        spot, finished_s = self.work.spot_of.get(self.work.name(part)), self.work.finished.get(part)
-        return GivenUp(position, spot, undone, astray, finished_s)
+        undone = part in state.to_put_back or (work is not None and not work.done(self.floor.now_s))
+        return GivenUp(position, state.spot_of.get(state.name(part)), undone, astray, state.finished.get(part))
 
     def _lose(self, part: int, why: str, left: GivenUp | None = None) -> None:
-        self.lost[part] = why
+        state, name = self.state, self.state.name(part)
+        state.lost[part] = why
         if (left := left or self._as_left(part)) is not None:
-            self._given_up[part] = left
-        self.work.left_lying.add(self.work.name(part))
-        self.work.spot_of.pop(self.work.name(part), None)
-        self.work.finished.pop(part, None)
-        self.work.to_put_back = [one for one in self.work.to_put_back if one != part]
-        self.work.tell(PartLost(self.work.name(part), why, self.work.floor.now_s))
+            state.given_up[part] = left
+        state.left_lying.add(name)
+        state.spot_of.pop(name, None)
+        state.finished.pop(part, None)
+        state.to_put_back = [one for one in state.to_put_back if one != part]
+        self.floor.tell(PartLost(name, why, self.floor.now_s))
 
-    def _wait(self, seconds: float) -> None:
-        floor = self.work.floor
-        until_s = floor.now_s + seconds
-        while floor.now_s < until_s:
-            floor.wait(until_s)
-
-    # ---- what is seen and told -------------------------------------------------------------------------------------
-
-    def _deviations(self) -> list[Deviation]:
-        """What is not as believed; of parts that were given up, and things that belong to nobody, nothing new."""
-        floor = self.work.floor
-        delivered = {self.work.name(part) for part in self.work.finished}
-        found = perceive(floor, floor.scene.task, floor.scene.layout, self.work.spot_of, delivered)
-        return [one for one in found if one.sort != "camera blind" and not self._is_known(one)]
-
-    def _is_known(self, one: Deviation) -> bool:
-        part = self._part_of(one.name)
-        if part is None:
-            return one.name in self._strange and one.sort != "part gone"
-        return part in self.lost or (part in self.work.to_put_back and one.sort == "part moved")
-
-    def _part_of(self, body: str) -> int | None:
-        """The number of the part that a body is, or whose pallet."""
-        for part in range(1, self.work.cell.parts + 1):
-            name = self.work.name(part)
-            if body in (name, pallet_of(name)):
-                return part
-        return None
+    # ---- what is told ----------------------------------------------------------------------------------------------
 
     def _note(self, text: str) -> None:
-        self.notes.append(text)
-        self.work.tell(MoveRetried(text))
+        self.state.notes.append(text)
+        self.floor.tell(MoveRetried(text))
 
     def _tell(self, trouble: Trouble, answer: str) -> None:
-        now_s = self.work.floor.now_s
-        self.work.tell(TroubleMet(trouble.what, answer, trouble.part, trouble.station, now_s))
+        self.floor.tell(TroubleMet(trouble.what, answer, trouble.part, trouble.station, self.floor.now_s))
 
     def _tell_seen(self, seen: Deviation, answer: str) -> None:
-        name = "" if self._part_of(seen.name) is None else seen.name
+        name = "" if self.state.part_of(seen.name) is None else seen.name
         about = seen.station or ("" if name else seen.name)
-        self.work.tell(TroubleMet(seen.words, answer, name, about, self.work.floor.now_s))
+        self.floor.tell(TroubleMet(seen.words, answer, name, about, self.floor.now_s))

@@ -29,9 +29,9 @@ class Planner:
     seed: int = 0
 
     def order(self, cell: Cell, proven: Optimum) -> tuple[tuple[int, ...], str]:
-        """The order that the method finds, which ends as soon as nothing can be better, and its name.
+        """The order that the method finds, and the method's name; the search ends as soon as its order is proven to be optimal.
 
-        The one of the exact search, and its name, where the method finds none, or is not made for what is left.
+        It is the order of the exact search where the method finds none, or cannot order what is left.
         """
         method, search = self.settings.method, search_for(self.settings)
         is_timed = search.objective == MAKESPAN
@@ -51,7 +51,7 @@ class Planner:
 
 
 class _NothingBetter(Exception):
-    """A search has found an order that costs no more than what no order is below."""
+    """A search has found an order that costs no more than the proven bound."""
 
     def __init__(self, sequence: tuple[int, ...]) -> None:
         self.sequence = sequence

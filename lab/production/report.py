@@ -1,4 +1,4 @@
-"""What a run is made of and what it leaves behind: its records, its pictures, its replay and its numbers as JSON."""
+"""What a run is made of and what it leaves behind: its records, its pictures, its replay with a story, its numbers as JSON."""
 
 import json
 import time
@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass, field
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from lab.audit.tracks import FILE as FRAMES
 from lab.audit.tracks import packed, tracks_of
@@ -19,23 +19,39 @@ from lab.operating_system import replace
 from lab.production.cyclic_order import measured_period
 from lab.production.order_learning import OrderLearning
 from lab.production.outcome import Outcome
-from lab.production.run_story import story_of
 from lab.production.taught import Taught
 from lab.sequencing.cell.cell import EVERY_PLAN
 from lab.sequencing.cell.schedule import Schedule, csv_of, rows_of
+from lab.sequencing.cyclic.several import Rhythm
 from lab.sequencing.methods.exact import Optimum
 from lab.sequencing.search import SequenceResult
 from lab.sequencing.simulate.follow import simulate
 from lab.sim.frames import Recording
 from lab.skills import Skill
 from lab.skills.prepared_scene import Prepared
+from lab.teaching.events import (
+    Event,
+    MachineFailed,
+    MoveBegan,
+    OperatorActed,
+    PartDone,
+    PartLost,
+    PlanMade,
+    RunHeld,
+    RunWentOn,
+    SkillBegan,
+    TroubleMet,
+)
 from lab.teaching.lesson_plan import Lesson
 from lab.toolbox.policy import Policy
+from lab.view.gantt import gantt
+from lab.view.meshcat import replay_html
+from lab.view.plots import learning_curves, values_seen
+from lab.view.scene_data import Mark, Story
+from lab.vision import write_picture
 from lab.workers import Task, Workers
 
-if TYPE_CHECKING:
-    from lab.sequencing.cyclic.several import Rhythm
-
+LEAST_WAIT_S = 0.5  # that is worth a word
 FILES = {
     "gantt": "gantt.png",
     "order_learning": "order-learning.png",
@@ -51,6 +67,66 @@ FILES = {
     "trajectory": TRAJECTORY,
     "run": "run.json",
 }
+
+
+@dataclass
+class _Story:
+    """What people read of a run's events."""
+
+    captions: list[tuple[float, str]] = field(default_factory=list)
+    marks: list[Mark] = field(default_factory=list)
+    begins_s: list[float] = field(default_factory=list)
+
+    def hear(self, event: Event) -> None:
+        """Add the captions and marks of an event."""
+        match event:
+            case SkillBegan(words=words, at_s=at_s):
+                self._say(at_s, f"The robot {words}")
+            case MoveBegan(part=part, origin=origin, target=target, at_s=at_s):
+                self.begins_s.append(at_s)
+                self._say(at_s, f"The robot brings {part} from '{origin}' to '{target}'")
+            case PartDone(part, at_s):
+                self._say(at_s, f"{part} is done")
+            case PartLost(part, why, at_s):
+                self._mark(Mark(at_s, "lost", f"{part} is given up: {why}"))
+            case TroubleMet(what, answer, part, _, at_s):
+                self._mark(Mark(at_s, "trouble", f"{part}: {what}; {answer}" if part else f"{what}; {answer}"))
+            case MachineFailed(station, part, why, at_s):
+                self._mark(Mark(at_s, "trouble", f"'{station}' with {part}: {why}"))
+            case RunHeld(kind, why, by, at_s):
+                self._mark(Mark(at_s, "stop", f"{held_words(kind)} by the {by}{why and f': {why}'}"))
+            case RunWentOn(at_s):
+                self._say(at_s, "The run goes on")
+            case OperatorActed(words, _, at_s, refused):
+                self._mark(Mark(at_s, "operator", f"{words}{refused and f': refused, {refused}'}"))
+            case PlanMade(at_s=at_s, why=why, method=by) if why:
+                self._say(at_s, f"A new plan{by and f' by {by}'}: {why}")
+
+    def _say(self, at_s: float, words: str) -> None:
+        self.captions.append((round(at_s, 3), words))
+
+    def _mark(self, mark: Mark) -> None:
+        self.marks.append(mark)
+        self._say(mark.at_s, mark.words)
+
+
+def story_of(outcome: Outcome, planned: Schedule | None) -> Story:
+    """The story of a run for its replay: captions and marks, the measured schedule beside the plan, the faults that struck."""
+    found = _Story()
+    for event in outcome.heard:
+        found.hear(event)
+    schedule = outcome.schedule
+    names = {activity.part: activity.resource for activity in schedule.parts}
+    for did in schedule.robot:
+        if did.kind == "wait" and did.end_s - did.start_s > LEAST_WAIT_S:
+            found._say(did.start_s, f"The robot waits at '{did.origin}' for {names.get(did.part, 'its part')}")
+    struck = tuple(Mark(fault.at_s, "fault", fault.words) for fault in outcome.happened)
+    return Story(schedule, planned, tuple(found.captions), (*found.marks, *struck), tuple(found.begins_s))
+
+
+def held_words(kind: str) -> str:
+    """A kind of stop in words."""
+    return "paused" if kind == "pause" else f"{kind} stop"
 
 
 @dataclass
@@ -73,7 +149,7 @@ class Report:
     files: dict[str, str] = field(default_factory=dict)
     missing: dict[str, str] = field(default_factory=dict)
     receipts: dict[str, Any] | None = None
-    rhythm: "Rhythm | None" = None
+    rhythm: Rhythm | None = None
     learning: OrderLearning | None = None
 
     @property
@@ -149,7 +225,6 @@ Drawn = dict[str, Task[bytes]]  # PNG files by their names in FILES, drawn or be
 
 def begin_pictures(prepared: Prepared, taught: Taught, workers: Workers) -> Drawn:
     """What can be drawn as soon as the skills are there: the learning curves, and the value map where there is a photo."""
-    from lab.view.plots import learning_curves, values_seen
 
     drawn = {"learning_curves": workers.begin(_png, partial(learning_curves, _curves(prepared, taught.lessons)))}
     skill = _photographed(prepared)
@@ -188,8 +263,6 @@ def write_files(
     workers = workers or Workers()
     drawn = begin_pictures(report.prepared, report.taught, workers) if drawn is None else drawn
     if report.outcome.schedule.robot:
-        from lab.view.gantt import gantt
-
         drawn = drawn | {"gantt": workers.begin(_png, partial(gantt, report.outcome.schedule, predicted=predicted))}
     if report.learning is not None and len(report.learning.found.episode_costs) > 1:
         drawn = drawn | {"order_learning": workers.begin(_png, report.learning.drawn(report.taught.cell))}
@@ -244,8 +317,6 @@ def _pictures(
     report: Report, paths: dict[str, Path], predicted: Schedule, drawn: Drawn, scene: Task[dict[str, Any]] | None
 ) -> Iterator[tuple[tuple[str, ...], Callable[[], object]]]:
     """What else this run has, and what writes it; what other processes draw comes last."""
-    from lab.view.meshcat import replay_html
-    from lab.vision import write_picture
 
     prepared, outcome = report.prepared, report.outcome
     program = outcome.program

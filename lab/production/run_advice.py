@@ -24,8 +24,8 @@ class RunAdvice:
     """Who is asked in a run; where people are, what they say is kept in the toolbox's sessions, each named in the run's journal.
 
     given: the words of an order that is not to be looked for, "" for none; gate: when SRL asks about the order;
-    cyclic: the order is to repeat the shortest cycle, of at most parts_per_cycle parts. Of a run that is gone on with, the
-    sessions that it began go on.
+    cyclic: the order is to repeat the shortest cycle, of at most parts_per_cycle parts. Of a run that is resumed, the
+    sessions that it began are continued.
     """
 
     toolbox: Toolbox
@@ -39,13 +39,13 @@ class RunAdvice:
 
     @property
     def asks_people(self) -> bool:
-        """Whether anybody is asked who has to be shown things."""
+        """Whether a person is among the advisors."""
         return any(name in PEOPLE for name in self.options.advisors)
 
     # ---- the lessons
 
     def keep(self, plan: LessonPlan) -> Journal:
-        """The journal of a lesson: that of the run which is gone on with, or a new one."""
+        """The journal of a lesson: the one that a resumed run has begun, or a new one."""
         name = plan.problem.name
         if not self.asks_people:
             return Journal()
@@ -59,7 +59,7 @@ class RunAdvice:
         return made
 
     def again(self, plan: LessonPlan) -> Journal | None:
-        """The journal of a lesson that the run which is gone on with has begun, None of no such one.
+        """The journal of a lesson that a resumed run has begun; None where it has not.
 
         A scene that changed is another problem of the same name, with a session of its own.
         """

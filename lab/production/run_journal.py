@@ -1,9 +1,9 @@
 """A run's journal, `run.jsonl` in its folder: what decides the run, one line of JSON each, written before it counts.
 
 A run is a function of its task, its options and seed, what the toolbox held when it began, what people answered, and at
-which physics steps it was stopped or told to do something. So these are kept, and with them what came of it: to go on with
-a run, it is carried out again from its beginning while the journal stands in for the people, and each move is held against
-what was written. Skills that were learned before are taken from the run's folder.
+which physics steps it was stopped or told to do something. So these are kept, and with them what came of it: a run is
+resumed by carrying it out again from its beginning: the journal stands in for the people, and each move is compared with
+its line. Skills that were learned before are taken from the run's folder.
 """
 
 import json
@@ -18,8 +18,7 @@ from lab.advice.entries import MAX_BYTES
 from lab.advice.json_lines import AppendedFile, EntryKinds, differing
 from lab.errors import BadInput, WorkFailed
 from lab.files import json_of, read_limited
-from lab.production.controls import Held, StopKind
-from lab.production.stop_record import StopsChanged
+from lab.production.controls import Held, StopKind, StopsChanged
 from lab.sim.world import TIME_STEP
 from lab.tasks.record import write_whole
 from lab.toolbox.folder_place import FolderPlace
@@ -161,7 +160,7 @@ class KeptSkill(NamedTuple):
 class RunJournal:
     """The journal of a run under way; without a path, one that is not written.
 
-    known: the lines of a run that is gone on with, without its head; outputs that it tells again are held against them.
+    known: the lines of a run that is resumed, without its head; what the run tells again is compared with them.
     """
 
     path: Path | None = None
@@ -206,12 +205,12 @@ class RunJournal:
         journal._again = [entry for entry in journal.known if isinstance(entry, Led | Moved | Met)]
         return journal
 
-    # ---- what is known of a run that is gone on with ---------------------------------------------------------------
+    # ---- what is known of a run that is resumed --------------------------------------------------------------------
 
     def known_at_first(self, now: KnownPolicies) -> KnownPolicies:
         """Of the toolbox's policies those that were there when the run began, and those that it has kept since.
 
-        So what it does does not depend on its break.
+        So a run does not depend on whether it was interrupted.
         """
         if self.path is None:
             return now
@@ -277,7 +276,7 @@ class RunJournal:
         self.write(Stopped(changed.step, [(str(held.kind), held.why, held.by) for held in changed.stops]))
 
     def tell(self, entry: Entry) -> None:
-        """Write what came of it; of a run that is gone on with, hold it against what was written. WorkFailed."""
+        """Write an outcome; of a run that is resumed, compare it with the line written before. WorkFailed if it differs."""
         if not self._again:
             self.write(entry)
             return
@@ -294,7 +293,7 @@ class RunJournal:
             self.file.write(line_of(entry))
 
     def forget(self) -> None:
-        """Take away what a run has written that cannot be carried out."""
+        """Delete what was written of a run that cannot be carried out."""
         self.close()
         if self.path is not None:
             self.path.unlink(missing_ok=True)

@@ -60,7 +60,7 @@ class RunOptions(SessionOptions):
         return asdict(self) | {"task": whole_path(self.task), "advisors": [recorded_whole(a) for a in self.advisors]}
 
     def ordered(self, task: Task) -> tuple[str, ...]:
-        """The parts of the order, by their kinds; BadInput, too, for words on their order that cannot be, or not together."""
+        """The kinds of the ordered parts. BadInput, too, for an impossible order of the moves, and for --cyclic beside one."""
         if self.cyclic and self.order is not None:
             raise BadInput(f"--cyclic and --order {self.order}: an order is one or the other")
         order = task.ordered(self.toasts, self.parts)
@@ -74,7 +74,7 @@ class RunOptions(SessionOptions):
         return order
 
     def lessons(self) -> LessonOptions:
-        """What they say of the lessons in it."""
+        """The options of the lessons in the run."""
         return LessonOptions(
             task=self.task,
             advisors=self.advisors,
@@ -92,20 +92,21 @@ def begun(options: RunOptions, task: Task, folder: Path, command: str = "run") -
 
 
 def gone_on(given: RunOptions, folder: Path, out: Path | None, command: str = "run") -> tuple[RunOptions, Task]:
-    """What the run in a folder was begun with, and its task; BadInput for options beside it, for another command's run, and
-    when the task has changed."""
+    """The options with which the run in a folder was begun, and its task. BadInput for other options beside it, for the run of
+    another command, and when the task has changed."""
     if out is not None:
-        raise BadInput(f"--out {out} beside --resume {folder}: a run goes on in its own folder: leave it away")
+        raise BadInput(f"--out {out} beside --resume {folder}: a run is resumed in its own folder; remove --out")
     head, _, _ = read_run(folder, "--resume")
     if head.command != command:
         raise BadInput(
-            f"the run in '{folder}' (--resume) was begun otherwise: go on with lab {head.command} --resume {folder}"
+            f"the run in '{folder}' (--resume) was begun by lab {head.command}: "
+            f"resume it with lab {head.command} --resume {folder}"
         )
     options, task = kept_task(folder, "--resume")
     if options.method is not None and options.method not in SEQUENCERS:
         raise BadInput(
-            f"the run in '{folder}' (--resume) finds its order by '{options.method}', which is not the lab's: name its code "
-            "again, --method FILE.py:NAME"
+            f"the run in '{folder}' (--resume) finds its order by '{options.method}', which is no method of the lab: "
+            "name its code again, --method FILE.py:NAME"
         )
     if given.method == options.method:  # one's own has to be named again: no file says which code runs
         given = replace(given, method=None)
@@ -114,7 +115,7 @@ def gone_on(given: RunOptions, folder: Path, out: Path | None, command: str = "r
 
 
 def kept_task(folder: Path, where: str) -> tuple[RunOptions, Task]:
-    """What the run in a folder was begun with, and its task. BadInput when the task has changed since."""
+    """The options with which the run in a folder was begun, and its task. BadInput when the task has changed since."""
     head, _, _ = read_run(folder, where)
     options = RunOptions.from_json(head.words, f"journal in '{folder}' ({where})")
     task = load(options.task)
@@ -124,5 +125,5 @@ def kept_task(folder: Path, where: str) -> tuple[RunOptions, Task]:
 
 
 def hash_of(task: Task) -> str:
-    """What a task says, as a hash: another one is another run."""
+    """A hash (24 hex digits) of all that a task says; a run can be resumed only with the same one."""
     return hashlib.sha256(task.model_dump_json(exclude_defaults=True).encode()).hexdigest()[:24]

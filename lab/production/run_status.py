@@ -1,4 +1,4 @@
-"""Where a run stands, folded from what it tells: what a console, a page and the progress lines show."""
+"""Where a run stands, gathered from its events, as a console, a page and the progress lines show it."""
 
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field, replace
@@ -204,7 +204,7 @@ class RunStatus:
                 machine.light, machine.part = "failed", event.part
 
     def _fetched(self, station: str, part: str, at_s: float) -> None:
-        """A part was taken out of a machine: what it did with it is history."""
+        """Note that a part was taken out of a machine, whose work on it is added to what was measured."""
         for machine in [one for one in self.machines if (one.station, one.part) == (station, part)]:
             self.measured += self._work(machine, at_s)
             machine.light, machine.part, machine.until_s = "idle", "", None

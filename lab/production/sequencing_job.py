@@ -1,4 +1,4 @@
-"""The order of the robot's transfers: of a task, over measured durations, or of a cell file."""
+"""The order of the robot's transfers: of a task, over measured durations, or of a cell file; what `lab sequence` does."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -15,9 +15,8 @@ from lab.interrupts import uninterrupted
 from lab.learning.requests import Ask
 from lab.learning.settings import GateSettings
 from lab.production.any_time import CTRL_C, Found, looked_for
-from lab.production.drawn_times import stochastic
 from lab.production.order import NOBODY, KeepOrder, OrderAdvice, advised_session
-from lab.sequencing import SEQUENCERS, check_method, find_sequence
+from lab.sequencing import SEQUENCERS, carried_reaction, check_method, find_sequence
 from lab.sequencing.cell.cell import EVERY_PLAN, Cell
 from lab.sequencing.cell.chance import NO_CHANCE, Chance
 from lab.sequencing.cell.objectives import (
@@ -32,6 +31,8 @@ from lab.sequencing.cell.schedule import check_table, rows_of, write_table
 from lab.sequencing.methods.shared import NO_LIMITS, Limits
 from lab.sequencing.search import SAME, LearnedSequence, Reference, Search, SequenceResult
 from lab.sequencing.simulate.follow import follow, simulate, steps
+from lab.sequencing.simulate.several import replicate
+from lab.statistics import interval
 from lab.tasks.cell_file import CellFile, order_from_word, toast_case
 from lab.tasks.grid_world import GridWorld
 from lab.tasks.instances import Asked
@@ -40,8 +41,14 @@ from lab.tasks.task import Task
 from lab.tasks.task_file import load_beside
 from lab.teaching.events import Event, PhaseBegan, SequenceFound, SequencingBegan, Tell, unheard
 from lab.teaching.teacher import Teacher
+from lab.view.canvas import check_picture
+from lab.view.gantt import gantt
+from lab.view.sequencing_plots import sequence_plot
 
 PORTFOLIO = "portfolio"  # the method of which it is told what in it found the order
+REPLICATIONS = 200  # drawn episodes in which a list and a policy are compared
+PLANNED = 2000  # of a policy that plans at every decision so many by parts squared, at least FEWEST: it takes its time
+FEWEST = 20
 
 
 @dataclass(frozen=True)
@@ -81,11 +88,10 @@ def sequence_named(
     teacher: Teacher,
     files: dict[str, Path],
 ) -> dict[str, Any]:
-    """What `lab sequence` does: the document of `sequenced_named`, and its pictures.
+    """The document of `lab sequence`, as `sequenced_named` makes it; draws its pictures.
 
     files: pictures to draw, by name (see `draw`).
     """
-    from lab.view.canvas import check_picture
 
     for kind, path in files.items():
         check_table(path) if kind == "schedule" else check_picture(path)
@@ -124,7 +130,7 @@ def sequenced_named(
 
 
 def _check_names(wanted: SequencingOptions, settings: Sequencing) -> None:
-    """BadInput for a name that no table holds, and for advice to a method that asks for none; before any work."""
+    """Raise BadInput, before any work, for an unknown name, and for advice to a method that asks for none."""
     method, objective = wanted.method or settings.method, wanted.objective or settings.objective
     check_method(method)
     if objective not in OBJECTIVES:
@@ -155,7 +161,7 @@ def ordered_cell(file: CellFile, case: str | None, toasts: int | None) -> Cell:
 def measured_cell(task: Task, toasts: int | None, wanted: SequencingOptions, teacher: Teacher) -> Cell:
     """The cell of a task, once its skills are learned and their durations measured."""
     from lab.production.durations import Durations, cell_of
-    from lab.production.run import teach_all
+    from lab.production.taught import teach_all
     from lab.skills.prepared_scene import prepare
     from lab.skills.skillset import SkillSet
 
@@ -286,7 +292,7 @@ def _document(cell: Cell, search: Search, looked: Found, wanted: SequencingOptio
 def _best_known(
     cell: Cell, method: str, objective: str, own: tuple[float, tuple[int, ...]], known: Reference
 ) -> dict[str, Any]:
-    """The best order that anything found: the method's own, unless the one of what cannot be beaten costs less."""
+    """The best order known: the method's own, unless the one found beside the bound costs less."""
     value, sequence = own
     by = known.found_by if method == PORTFOLIO else method
     if known.sequence:
@@ -332,9 +338,7 @@ def _in_words(cell: Cell, sequence: Sequence[int]) -> list[str]:
 
 @uninterrupted
 def draw(cell: Cell, document: dict[str, Any], found: Sequence[SequenceResult], files: dict[str, Path]) -> None:
-    """What is asked for by name: "plot", the costs of the episodes, "gantt" and "schedule", of the best order known."""
-    from lab.view.gantt import gantt
-    from lab.view.sequencing_plots import sequence_plot
+    """Write the files that are asked for by name: "plot", the costs of the episodes; "gantt" and "schedule", the best order."""
 
     if "plot" in files:
         label = "makespan [s]" if document["objective"] == MAKESPAN else document["objective"]
@@ -352,3 +356,41 @@ def draw(cell: Cell, document: dict[str, Any], found: Sequence[SequenceResult], 
     if "schedule" in files:
         write_table(document["schedule"], files["schedule"])
     document["files"] = {name: str(path) for name, path in files.items()}
+
+
+def stochastic(
+    cell: Cell, method: str, search: Search, found: SequenceResult, chance: Chance, seed: int
+) -> dict[str, Any]:
+    """The costs of the fixed sequence and of a policy that reacts, in the same drawn episodes; means with 95 % intervals."""
+
+    fixed = _planned(cell, method, search, found, seed)
+    reaction = SEQUENCERS[method].react(cell, search.objective, seed, fixed)
+    if search.policy is not None:
+        reaction = carried_reaction(search.policy)
+    episodes = max(FEWEST, min(REPLICATIONS, PLANNED // cell.parts**2)) if reaction.replans else REPLICATIONS
+    costs = [replicate(cell, how, chance, episodes, seed, search.objective) for how in (fixed, reaction.policy)]
+    difference = costs[0] - costs[1]
+    return {
+        "processing": chance.processing,
+        "arrivals": chance.arrivals if cell.arrivals else None,
+        "spread": chance.spread,
+        "robot_breaks_every_s": chance.robot_breaks_every_s,
+        "robot_repair_s": chance.robot_repair_s,
+        "replications": episodes,
+        "fixed": _mean(costs[0]) | {"sequence": list(fixed)},
+        "reacting": _mean(costs[1]) | {"policy": reaction.words, "replans": reaction.replans},
+        "saved_by_reacting": _mean(difference),
+    }
+
+
+def _planned(cell: Cell, method: str, search: Search, found: SequenceResult, seed: int) -> Sequence[int]:
+    """The fixed sequence: what the method finds for the mean times."""
+    if search.chance == NO_CHANCE:
+        return found.sequence
+    return find_sequence(cell, method, replace(search, chance=NO_CHANCE, on_episode=None), seed).sequence
+
+
+def _mean(values: "np.ndarray[Any, np.dtype[np.float64]]") -> dict[str, Any]:
+
+    mean, low, high = interval(values)
+    return {"mean": mean, "ci95": [low, high]}

@@ -30,9 +30,10 @@ ASIDE_M = 0.03  # around a part that is set aside on the table
 def free_spot(
     bench: Bench, name: str, way: Carried, standing: Mapping[str, Spot], taken: Collection[Spot], lying: Collection[str]
 ) -> Spot:
-    """The first spot at the end of a way that is not taken, and on which nothing of what lies about is. Raises Trouble.
+    """The first free spot at the target of a way: not taken, and with nothing that lies on it. Raises Trouble.
 
-    standing: on which spot each other body is. One of a layer is free once what carries it stands below.
+    standing: the spot of each other body. lying: the bodies that may lie anywhere. A spot of a layer is free only if what
+    carries it stands below.
     """
     scene, why = bench.scene, ""
     kind, station = scene.kinds[way.kind], scene.task.station(way.target)
@@ -59,8 +60,8 @@ def _carries(bench: Bench, body: str, spot: Spot, lying: Collection[str]) -> boo
 
 
 def spots_aside(bench: Bench, surveys: Surveys, name: str, way: Carried, spot_of: Mapping[str, Spot]) -> Iterator[Spot]:
-    """Where a part in the gripper may be set down for now: where it was taken up, unless a machine would keep it, then free
-    places of the table, the nearest first."""
+    """Spots on which a part in the gripper may be set down for now: the one from which it was taken up, unless a machine would
+    begin with it there, then free places on the table, the nearest first."""
     scene, own = bench.scene, bench.scene.bodies_of(name, way.kind)
     kind, begun, origin = scene.kinds[way.kind], spot_of.get(own[0]), scene.task.station(way.origin)
     others = [
@@ -105,9 +106,9 @@ def set_down(bench: Bench, surveys: Surveys, spot: Spot, carried: str) -> Iterat
 
 
 def too_near(bench: Bench, body: str) -> str:
-    """What the arm with open fingers would touch as it comes down to a part where that stands; "" for nothing.
+    """What the arm with open fingers would touch on its way down to a part; "" for nothing.
 
-    It is tried in a copy of the scene, with all bodies where they are now.
+    A copy of the scene is searched, with all bodies where they are now.
     """
     scene, goal = bench.scene, bench.part_pose(body)
     own = {body, pallet_of(body), body.removesuffix(pallet_of(""))}
@@ -133,7 +134,7 @@ def in_fingers_way(scene: Scene, tool: ToolPose, bodies: Collection[str]) -> str
 
 
 def _standing_in(scene: Scene, room: Rectangle, above_m: float, bodies: Collection[str]) -> str:
-    """Which of the bodies reaches into a piece of ground, above a height [m]; "" for none."""
+    """The first of the bodies that overlaps a rectangle of the ground above a height [m]; "" for none."""
     for body in bodies:
         low, high = scene.world.bounds(body)
         middle, half = (low + high) / 2, (high - low) / 2
@@ -143,7 +144,7 @@ def _standing_in(scene: Scene, room: Rectangle, above_m: float, bodies: Collecti
 
 
 def station_near(bench: Bench, body: str, way: Carried, skillset: SkillSet) -> str:
-    """The station of the two on a way that a part stands at; its origin when it stands at neither."""
+    """The station at which a part stands, origin or target of its way; the origin when it stands at neither."""
     at, places = bench.part_pose(body), bench.scene.places
     for station in (way.origin, way.target):
         foots = places.spots(bench.scene.task.station(station))

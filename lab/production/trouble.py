@@ -26,6 +26,11 @@ class Trouble(Exception):
         self.what, self.part, self.station, self.skill = what, part, station, skill
         self.held, self.final, self.late, self.seen = held, final, late, seen
 
+    @property
+    def key(self) -> tuple[str, str, str]:
+        """By what tries are counted: the part, the station and the skill."""
+        return self.part, self.station, self.skill
+
     def __str__(self) -> str:
         where = " at ".join(one for one in (self.part, self.station and f"'{self.station}'") if one)
         return f"{where}: {self.what}" if where else self.what

@@ -36,27 +36,24 @@ class Attendant(Controls):
     attended: bool = True
     asked: list[str] = field(default_factory=list)
     did: list[str] = field(default_factory=list)
-    _floor: Floor | None = field(default=None, repr=False)
     _since_s: float | None = None
     _stood: dict[str, tuple[Vector, Quaternion]] = field(default_factory=dict, repr=False)
 
     def on_floor(self, floor: Floor) -> None:
-        """Attend the run that is carried out on a floor, as its conditions have it."""
-        self._floor, hand = floor, floor.hand
+        """Note where what is fixed stands on the floor that is attended, as its conditions have it."""
         task = floor.scene.task
         fixed = [one.name for one in task.stations] + [one.name for one in task.obstacles]
         for body in [body for name in fixed for body in (name, f"{name}{MARKER}") if body in floor.world.names()]:
             (x, y, z), (i, j, k, w) = floor.world.pose(body)
             self._stood[body] = (float(x), float(y), float(z)), (float(i), float(j), float(k), float(w))
-        floor.hand = lambda: self._tick() | (hand is not None and hand())
 
     def wait(self, timeout_s: float) -> None:
         """Only the run's own time counts."""
 
-    def _tick(self) -> bool:
-        """Before each physics step: whether anything in the scene was changed."""
-        held, floor = self.held, self._floor
-        if floor is None or held is None or held.kind is not StopKind.PROTECTIVE:
+    def before_step(self, floor: Floor) -> bool:
+        """Put right what is asked for, once its time has come; whether anything in the scene was changed."""
+        held = self.held
+        if held is None or held.kind is not StopKind.PROTECTIVE:
             return False
         if self._since_s is None:
             self._since_s = floor.now_s

@@ -150,7 +150,7 @@ class _Ready:
 
 @lru_cache(maxsize=len(TASKS))
 def _ready(name: str) -> _Ready:
-    from lab.production.run import teach_all
+    from lab.production.taught import teach_all
     from lab.sequencing import find_sequence
     from lab.skills.prepared_scene import prepare
     from lab.tasks.sequencing import search_for
@@ -178,10 +178,9 @@ def carried_out(setting: Setting) -> Ran:
 
 def _carried_out(setting: Setting, person: Attendant | None) -> Ran:
     """One run, attended by a person, or None."""
-    from lab.production.composer import carry_out
-    from lab.production.conditions import Conditions
-    from lab.production.faults.draw import draw
-    from lab.production.relearning import Relearner
+    from lab.production.composer import Conditions, carry_out
+    from lab.production.faults.injector import draw
+    from lab.production.taught import Relearner
 
     ready, began = _ready(setting.task), time.perf_counter()
     prepared, planned_s = ready.prepared, ready.planned_s
@@ -191,7 +190,7 @@ def _carried_out(setting: Setting, person: Attendant | None) -> Ran:
     try:
         conditions = Conditions(faults=drawn, viewer=_Clock(LONGEST * planned_s))
         if person is not None:
-            conditions = replace(conditions, controls=person, on_floor=person.on_floor)
+            conditions = replace(conditions, controls=person, on_floor=person.on_floor, before_step=person.before_step)
         relearner = Relearner(prepared, ready.taught, ready.teacher)
         outcome, _ = carry_out(prepared, ready.taught.cell, ready.sequence, conditions, relearner=relearner)
     except Exception as error:  # whatever a run comes to that is no way to end one

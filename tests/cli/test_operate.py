@@ -92,4 +92,4 @@ def test_what_was_done_by_hand_is_done_again_and_gone_on_with(lab: Lab, tmp_path
     steps = [line["step"] for line in lines if line["kind"] == "commanded"]
     assert steps[0] == 0 < steps[1]
     other = lab("run", "--resume", str(out))
-    assert other.err.endswith(f"was begun otherwise: go on with lab operate --resume {out}\n")
+    assert other.err.endswith(f"lab operate --resume {out}\n")

@@ -86,5 +86,5 @@ def measured(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, Order, int]]:
         return SimpleNamespace(cell=Cell(stations, made, order, step, 2 * step, one_robot("in")))
 
     monkeypatch.setattr("lab.skills.prepared_scene.prepare", prepare)
-    monkeypatch.setattr("lab.production.run.teach_all", cell)
+    monkeypatch.setattr("lab.production.taught.teach_all", cell)
     return prepared

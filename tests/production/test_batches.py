@@ -5,8 +5,7 @@ from pathlib import Path
 import pytest
 
 from lab.export.commands import Reset, Start, jobs_of
-from lab.production.composer import carry_out
-from lab.production.conditions import Conditions
+from lab.production.composer import Conditions, carry_out
 from lab.production.durations import cell_of, measure
 from lab.sequencing.methods.exact import optimum
 from lab.sequencing.simulate.follow import follow, simulate

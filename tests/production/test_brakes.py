@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lab.production.floor import Floor
+from lab.production.floor import Floor, Hooks
 from lab.sim.arms.robot import NAME
 from lab.sim.world import World
 from lab.skills.prepared_scene import lay_out
@@ -22,13 +22,10 @@ def test_every_joint_holds_in_the_next_step(name: str) -> None:
     task = load(name)
     order = task.ordered(1)
     with World() as world:
-        floor = Floor(world, SkillSet.of(task, order), lay_out(task, order, 0), order)
-        robot = floor.scene.robot
-        floor.restart_clock()
         speeds: list[list[float]] = []
 
-        def press() -> None:
-            fastest = float(np.abs(world.joint_speeds(NAME, robot.arm.joints)).max())
+        def press(floor: Floor) -> None:
+            fastest = float(np.abs(world.joint_speeds(NAME, floor.scene.robot.arm.joints)).max())
             controls = floor.controls
             if controls.stops:
                 speeds[-1].append(fastest)
@@ -39,7 +36,9 @@ def test_every_joint_holds_in_the_next_step(name: str) -> None:
                 controls.emergency()
                 speeds.append([fastest])
 
-        floor.on_tick = press
+        scene = SkillSet.of(task, order), lay_out(task, order, 0), order
+        floor = Floor(world, *scene, hooks=Hooks(after_step=press))
+        robot = floor.scene.robot
         here = robot.tool()
         aside = replace(here, x=here.y, y=here.x, z=here.z + 0.1)
         for _ in STOPS:
@@ -53,15 +52,16 @@ def test_the_solver_works_as_before_once_it_goes_on() -> None:
     task = load("toast-panda")
     order = task.ordered(1)
     with World() as world:
-        floor = Floor(world, SkillSet.of(task, order), lay_out(task, order, 0), order)
-        before = world.iterations(60)
-        world.iterations(before)
 
-        def release() -> None:
+        def release(floor: Floor) -> None:
             floor.controls.reset()
             floor.controls.go_on()
 
-        floor.on_tick = release
+        scene = SkillSet.of(task, order), lay_out(task, order, 0), order
+        floor = Floor(world, *scene, hooks=Hooks(after_step=release))
+        before = world.iterations(60)
+        world.iterations(before)
+
         floor.controls.emergency()
         assert floor.held() == "emergency stop: pressed by hand"
         assert world.iterations(60) == before

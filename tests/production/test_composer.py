@@ -7,14 +7,15 @@ import numpy as np
 import pytest
 
 from lab.errors import WorkFailed
-from lab.production.composer import Production, carry_out
-from lab.production.conditions import Conditions
+from lab.production.answers import MAX_TRIES
+from lab.production.composer import Conditions, Production, carry_out
 from lab.production.controls import RESET_FIRST
 from lab.production.durations import Durations, cell_of, measure
-from lab.production.floor import AT_REST_STEPS, SKIPPED_STEPS, Floor
+from lab.production.floor import AT_REST_STEPS, SKIPPED_STEPS, Floor, Hooks
 from lab.production.machine import Work
 from lab.production.outcome import Outcome
-from lab.production.recovery import MAX_TRIES
+from lab.production.parts_in_machines import watch_machines
+from lab.production.run_state import RunState
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.simulate.follow import simulate
 from lab.sim.arms.robot import NAME
@@ -260,15 +261,24 @@ class Ground:
     """A floor with a production on it, begun at the robot's start."""
 
     def __init__(self, world: World, prepared: Prepared, cell: Cell) -> None:
-        self.floor = Floor(world, prepared.skillset, prepared.layout, prepared.order)
+        self.state, self.heard = RunState.of(cell), list[Event]()
+        self.spoil: Callable[[], None] | None = None  # called after each step instead of looking after the machines
+        scene = prepared.skillset, prepared.layout, prepared.order
+        hooks = Hooks(after_step=self.after_step, hear=lambda event, step: self.heard.append(event))
+        self.floor = Floor(world, *scene, hooks=hooks)
         self.floor.stand(prepared.surveys.approach(cell.robot_start))
         self.floor.restart_clock()
-        self.production = Production(self.floor, cell)
-        self.work = self.production.work
+        self.production = Production.of(self.floor, self.state)
+
+    def after_step(self, floor: Floor) -> None:
+        if self.spoil is None:
+            watch_machines(self.state, floor)
+        else:
+            self.spoil()
 
     @property
     def notes(self) -> list[str]:
-        return self.production.recovery.notes
+        return self.state.notes
 
     def put(self, name: str, x: float, y: float, z: float) -> None:
         self.floor.world.put(name, (x, y, z))
@@ -282,13 +292,11 @@ def ground(prepared: Prepared, cell: Cell) -> Iterator[Ground]:
 
 def test_a_slice_that_was_moved_is_taken_up_where_it_stands(ground: Ground) -> None:
     ground.put("slice 1", 0.30, 0.30, 0.061)  # on the table, half a metre from its plate
-    heard: list[Event] = []
-    ground.work.tell = heard.append
     assert ground.production.carry_out((1,)) is None
-    trouble = [event for event in heard if isinstance(event, TroubleMet)]
+    trouble = [event for event in ground.heard if isinstance(event, TroubleMet)]
     assert [(one.part, one.answer) for one in trouble] == [("slice 1", "takes it up there")]
     assert ground.notes == []
-    assert ground.work.moves[0].target == "toaster"
+    assert ground.state.moves[0].target == "toaster"
 
 
 def test_a_way_that_cannot_be_gone_is_tried_a_few_times_not_for_ever(
@@ -299,7 +307,7 @@ def test_a_way_that_cannot_be_gone_is_tried_a_few_times_not_for_ever(
         raise WorkFailed("the tool cannot reach (0.541, -0.330, 0.460) m")
 
     monkeypatch.setattr("lab.production.transfers.by_free_cells", too_high)
-    ground.work.place = ""
+    ground.state.place = ""
     stopped = ground.production.carry_out((1,))
     assert stopped == "'plate': the tool cannot reach (0.541, -0.330, 0.460) m (tried 3 times)"
 
@@ -315,7 +323,7 @@ def test_a_slice_set_down_beside_the_slot_is_picked_up_again_and_inserted(ground
             spoiled.append(floor.now_s)
             floor.world.put("slice 1", (x, y - 0.11, 0.06))  # beside the toaster
 
-    floor.on_tick = spoil
+    ground.spoil = spoil
     failure = ground.production.carry_out((1,))
     assert spoiled
     assert failure is None, ground.notes
@@ -336,24 +344,24 @@ def test_a_slice_set_down_beside_its_spot_on_the_last_plate_is_taken_up_again_an
             spoiled.append(floor.now_s)
             floor.world.put("slice 1", (x - 0.03, y + 0.02, 0.073))
 
-    floor.on_tick = spoil
+    ground.spoil = spoil
     failure = ground.production.carry_out((1, 1, 1))
     assert spoiled
     assert failure is None, ground.notes
     assert [note for note in ground.notes if "does not stand on 'finished_plate'" in note] == ground.notes
     assert len(ground.notes) == 1
-    assert floor.bench.stands("slice 1", ground.work.spot_of["slice 1"], 0.012)
+    assert floor.bench.stands("slice 1", ground.state.spot_of["slice 1"], 0.012)
 
 
 def at_butter(ground: Ground, surveys: Surveys) -> Work:
     """Slice 1 and the robot are at the butter applier, which begins with it."""
-    floor, work = ground.floor, ground.work
+    floor, state = ground.floor, ground.state
     for decision in (1, 1):  # plate to toaster, toaster to butter_applier
-        work.plan.move(decision)
+        state.plan.move(decision)
     ground.put("slice 1", 0.80, -0.52, 0.0805)
-    work.spot_of["slice 1"] = floor.scene.places.spots(floor.skillset.task.station("butter_applier"))[0]
+    state.spot_of["slice 1"] = floor.scene.places.spots(floor.skillset.task.station("butter_applier"))[0]
     floor.stand(surveys.approach("butter_applier"))
-    work.place = "butter_applier"
+    state.place = "butter_applier"
     return floor.begin("butter_applier", "slice 1", 20.0)
 
 
@@ -361,16 +369,16 @@ def test_a_machine_that_failed_while_the_robot_was_away_is_noticed_and_tried_aga
     ground: Ground, surveys: Surveys, task: Task
 ) -> None:
     """The butter's failure is over long before the robot asks for the slice; that goes to the first plate that is free."""
-    work, places = ground.work, ground.floor.scene.places
+    state, places = ground.state, ground.floor.scene.places
     plates = places.spots(task.station("finished_plate"))
     butter = at_butter(ground, surveys).skill
     assert isinstance(butter, Cover)
     butter.fail("the butter missed 9 of 9 cells")
-    work.taken |= {plates[0]}
+    state.taken |= {plates[0]}
     assert ground.production.carry_out((1,)) is None
     assert ground.notes == ["slice 1 at 'butter_applier', try 1: the butter missed 9 of 9 cells"]
     assert len(butter.covered) == 9
-    assert work.spot_of["slice 1"] == plates[1]
+    assert state.spot_of["slice 1"] == plates[1]
 
 
 def test_a_machine_that_goes_on_failing_is_out_of_order_and_its_part_is_left(
@@ -382,12 +390,12 @@ def test_a_machine_that_goes_on_failing_is_out_of_order_and_its_part_is_left(
     assert failure is not None
     assert failure.startswith("slice 1 at 'butter_applier': policy 'butter at butter_applier ")
     assert failure.endswith(f"(tried {MAX_TRIES} times)")
-    assert list(ground.production.recovery.out) == ["butter_applier"]
+    assert list(ground.state.out) == ["butter_applier"]
 
 
 def test_a_part_that_may_not_move_is_a_failure_in_words(ground: Ground) -> None:
     for decision in (1, 1, 1):
-        ground.work.plan.move(decision)
+        ground.state.plan.move(decision)
     assert ground.production.carry_out((1,)) == "slice 1 is already at 'finished_plate'"
 
 
@@ -435,11 +443,11 @@ def test_an_emergency_stop_holds_every_joint_within_one_step(ground: Ground) -> 
             assert floor.controls.reset() == ""
             assert floor.controls.go_on() == ""
 
-    floor.on_tick = press
-    heard: list[Event] = []
-    floor.tell = heard.append
+    ground.spoil = press
     assert ground.production.carry_out((1,)) is None
     assert held[0] > 0.5
     assert held[1:] == pytest.approx([0.0, 0.0], abs=1e-3)
-    stops = [(e.kind, e.by) if isinstance(e, RunHeld) else "on" for e in heard if isinstance(e, (RunHeld, RunWentOn))]
+    stops = [
+        (e.kind, e.by) if isinstance(e, RunHeld) else "on" for e in ground.heard if isinstance(e, (RunHeld, RunWentOn))
+    ]
     assert stops == [("emergency", "operator"), "on"]

@@ -5,8 +5,7 @@ from collections.abc import Callable
 
 import pytest
 
-from lab.production.controls import RESET_FIRST, Controls, Held, StopKind
-from lab.production.stop_record import StopRecord, StopsChanged
+from lab.production.controls import RESET_FIRST, Controls, Held, StopKind, StopRecord, StopsChanged
 
 
 def test_nothing_is_stopped_at_first() -> None:

@@ -8,12 +8,13 @@ from typing import Any
 import pytest
 
 from lab.learning.requests import AdviceRequest
-from lab.production.conditions import Conditions
+from lab.production.composer import Conditions
 from lab.production.order import Ordered
 from lab.production.report import Report
-from lab.production.run import run, teach_all
+from lab.production.run import run
 from lab.production.run_advice import RunAdvice
 from lab.production.run_journal import RunBegan, RunJournal, read_run
+from lab.production.taught import teach_all
 from lab.sequencing.search import SequenceResult
 from lab.skills.prepared_scene import prepare
 from lab.tasks.fault_fields import FaultFields
@@ -106,7 +107,7 @@ def taught_by(task: Task, folder: Path, person: Says, hear: Callable[[Event], No
     advice = RunAdvice(toolbox, options, journal)
     teacher = Teacher(toolbox, options.advising({"terminal": person}), tell=hear, keep=advice.keep)
     try:
-        teach_all(prepare(task, task.ordered(1), 0), teacher, journal, advice)
+        teach_all(prepare(task, task.ordered(1), 0), teacher, journal, advice.again)
     finally:
         journal.close()
     return advice

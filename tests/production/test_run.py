@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-import lab.production.run
+import lab.production.taught
 from lab.audit.tracks import packed, read_tracks
 from lab.errors import BadInput, WorkFailed
 from lab.export.program import Program
@@ -22,8 +22,8 @@ from lab.mdp import shortest_steps
 from lab.production.durations import Durations
 from lab.production.outcome import Outcome
 from lab.production.report import FILES, Report, write_files
-from lab.production.run import remember, teach_all
-from lab.production.taught import Taught
+from lab.production.run import remember
+from lab.production.taught import Taught, teach_all
 from lab.sequencing import SEQUENCERS, find_sequence
 from lab.sequencing.cell.schedule import Schedule
 from lab.sequencing.methods.exact import optimum
@@ -306,7 +306,7 @@ def measured(monkeypatch: pytest.MonkeyPatch) -> list[Prepared]:
         empty, loaded = dict.fromkeys(skills.travels, 5.0), dict.fromkeys(skills.legs, 5.0)
         return Durations(empty, loaded, {"butter_applier": 5.0})
 
-    monkeypatch.setattr(lab.production.run, "measure", measure)
+    monkeypatch.setattr(lab.production.taught, "measure", measure)
     return timed
 
 
@@ -503,7 +503,7 @@ def drawn(monkeypatch: pytest.MonkeyPatch, stop: BaseException | None = None) ->
         if stop is not None:
             raise stop
 
-    monkeypatch.setattr("lab.view.plots.learning_curves", quick)
+    monkeypatch.setattr("lab.production.report.learning_curves", quick)
     return names
 
 

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lab.errors import BadInput, WorkFailed
-from lab.production.controls import Held, StopKind
+from lab.production.controls import Held, StopKind, StopsChanged
 from lab.production.run_journal import (
     FILE,
     KINDS,
@@ -29,7 +29,6 @@ from lab.production.run_journal import (
     line_of,
     read_run,
 )
-from lab.production.stop_record import StopsChanged
 
 HEAD = RunBegan({"task": "toast", "seed": 3}, "toast", "abc")
 MOVED = Moved(4150, "slice 1", "plate", "toaster", 1.5, 17.25)

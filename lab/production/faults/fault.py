@@ -1,17 +1,15 @@
 """What all faults share: when they strike, what they do in physics, how long that lasts, and what is then true."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
 from lab.production.faults.where import Whereabouts, parts_of, whereabouts
+from lab.production.floor import Floor
 from lab.sim.scene.scene import Scene
 from lab.tasks.fault_fields import FaultFields
 from lab.tasks.task import Order, Task
-
-if TYPE_CHECKING:
-    from lab.production.floor import Floor
 
 GROUND_M = -0.75  # [m] below the table top
 NEVER = float("inf")
@@ -62,15 +60,15 @@ class Fault:
     def prepare(self, scene: Scene) -> None:
         """Put out of sight what the fault will bring into the scene: bodies cannot come later."""
 
-    def strikes(self, floor: "Floor") -> Happened | None:
-        """Let it happen; None, and nothing has changed, when it cannot happen now."""
+    def strikes(self, floor: Floor) -> Happened | None:
+        """Let the fault happen; returns what happened, None, with nothing changed, when it cannot happen now."""
         raise NotImplementedError
 
-    def end(self, floor: "Floor") -> None:
-        """What lasted for a while is over."""
+    def end(self, floor: Floor) -> None:
+        """Undo what was to last only for a while."""
 
-    def parts(self, floor: "Floor", *how: str) -> list[tuple[str, Whereabouts]]:
-        """The parts that it may strike and that are so now."""
+    def parts(self, floor: Floor, *how: str) -> list[tuple[str, Whereabouts]]:
+        """The parts that the fault may strike and that are in one of these ways now, with where they are."""
         own = self.fields.part
         found = [(name, whereabouts(floor, name)) for name in parts_of(floor) if own in (None, name)]
         return [(name, at) for name, at in found if at.how in how]

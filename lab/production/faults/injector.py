@@ -1,19 +1,40 @@
-"""The faults of a run: what they need is put out of sight before it, and each strikes as soon as it can after its time."""
+"""The faults of a run: given or drawn; each strikes as soon as it can after its time.
+
+What they need is put out of sight before the run.
+"""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+
+import numpy as np
 
 from lab.production.faults import FAULTS
 from lab.production.faults.fault import GROUND_M, NEVER, Fault, Happened
+from lab.production.floor import Floor
 from lab.sim.scene.scene import Scene
 from lab.tasks.fault_fields import FaultFields
+from lab.tasks.task import Order, Task
 
-if TYPE_CHECKING:
-    from lab.production.floor import Floor
-
+MOST = 2  # faults of one run
+BETWEEN = (0.02, 0.85)  # of the predicted time, when a fault is due
+_SALT = 14  # keeps these draws apart from others of the same seed
 LOOKS_EVERY_S = 0.1  # at faults that are due and wait for their chance
 GROUND_SIZE_M, GROUND_RGBA = (6.0, 6.0, 0.02), (0.55, 0.56, 0.58, 1.0)
 GROUND = "ground"
+
+
+def draw(task: Task, order: Order, seed: int, predicted_makespan_s: float) -> tuple[FaultFields, ...]:
+    """One or two faults, each of a kind that can strike in a task, by their times; the same for the same seed."""
+    rng = np.random.default_rng([seed, _SALT])
+    found: list[FaultFields] = []
+    wanted = int(rng.integers(1, MOST + 1))
+    while len(found) < wanted:
+        kinds = list(FAULTS.values())
+        kind = kinds[int(rng.integers(len(kinds)))]
+        at_s = round(float(rng.uniform(*BETWEEN)) * predicted_makespan_s, 1)
+        fields = kind.drawn(task, order, rng)
+        if fields is not None and kind.what not in [one.what for one in found]:
+            found.append(FaultFields.model_validate({"what": kind.what, "at_s": at_s, **fields}))
+    return tuple(sorted(found, key=lambda one: one.at_s))
 
 
 class Injector:
@@ -37,7 +58,7 @@ class Injector:
             for fault in self.waiting:
                 fault.prepare(scene)
 
-    def tick(self, floor: "Floor") -> bool:
+    def tick(self, floor: Floor) -> bool:
         """To be called before each physics step; whether something in the scene was changed."""
         now_s = floor.now_s
         if now_s < self.next_s:
@@ -58,7 +79,7 @@ class Injector:
         due = [max(fault.fields.at_s, self._look_s) for fault in self.waiting]
         return min([*due, *(fault.until_s for fault in self.lasting)], default=NEVER)
 
-    def _strikes(self, fault: Fault, floor: "Floor") -> bool:
+    def _strikes(self, fault: Fault, floor: Floor) -> bool:
         happened = fault.strikes(floor)
         if happened is None:
             return False

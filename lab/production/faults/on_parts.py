@@ -1,7 +1,6 @@
 """Faults that strike a part: a hand moves it, takes it away or lays it down; the fingers let it slip or drop it."""
 
 from math import hypot, pi
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,11 +19,9 @@ from lab.production.faults.where import (
     stand,
     yaw_of,
 )
+from lab.production.floor import Floor
 from lab.sim.world import PART_SPINNING
 from lab.tasks.task import Order, Task
-
-if TYPE_CHECKING:
-    from lab.production.floor import Floor
 
 MOVED_M, OUT_OF_MACHINE_M, TURNED_RAD = (0.03, 0.08), 0.20, pi / 6
 LAID_M = 0.06  # from where it stood, where there is no room to lie
@@ -52,7 +49,7 @@ class PartMoved(Fault):
         by_m = (round(far * np.cos(way), 3), round(far * np.sin(way), 3))
         return {"when": "in machine" if in_machine else "standing", "by_m": by_m, "turn_rad": round(turn, 3)}
 
-    def strikes(self, floor: "Floor") -> Happened | None:
+    def strikes(self, floor: Floor) -> Happened | None:
         """The first part for which there is room."""
         for name, where in self.parts(floor, self.fields.when or "standing"):
             bodies = stack_of(floor, name)
@@ -77,7 +74,7 @@ class PartGone(Fault):
     what = "part gone"
     help = "a standing part is taken off the table"
 
-    def strikes(self, floor: "Floor") -> Happened | None:
+    def strikes(self, floor: Floor) -> Happened | None:
         """The first part that stands; its pallet stays."""
         how = ("standing", "in machine") if self.fields.when is None else (self.fields.when,)
         for name, where in self.parts(floor, *how):
@@ -95,8 +92,8 @@ class PartFallen(Fault):
     what = "part fallen"
     help = "a standing part falls over"
 
-    def strikes(self, floor: "Floor") -> Happened | None:
-        """Where it stands, or beside, where there is room to lie."""
+    def strikes(self, floor: Floor) -> Happened | None:
+        """The first part that has room to lie where it stands, or beside."""
         for name, where in self.parts(floor, "standing"):
             if not is_robot_away(floor, [name]):
                 continue
@@ -119,10 +116,10 @@ class PartSlips(Fault):
 
     @classmethod
     def drawn(cls, task: Task, order: Order, rng: np.random.Generator) -> dict[str, object]:
-        """For 0.03 to 0.1 s."""
+        """The part slips for 0.03 to 0.1 s."""
         return {"seconds": round(float(rng.uniform(*SLIPS_S)), 3)}
 
-    def strikes(self, floor: "Floor") -> Happened | None:
+    def strikes(self, floor: Floor) -> Happened | None:
         """The part that is carried."""
         for name, where in self.parts(floor, "carried"):
             self._body = floor.bench.held or name
@@ -131,11 +128,11 @@ class PartSlips(Fault):
             return Happened(self.what, f"{name} slipped in the gripper", floor.now_s, name, where.station)
         return None
 
-    def end(self, floor: "Floor") -> None:
-        """The fingers hold as before."""
+    def end(self, floor: Floor) -> None:
+        """Let the fingers hold as before."""
         self._friction(floor, 1.0)
 
-    def _friction(self, floor: "Floor", share: float) -> None:
+    def _friction(self, floor: Floor, share: float) -> None:
         own = floor.scene.kind_of[self._body].part.friction
         floor.world.friction(self._body, share * own, spinning=share * PART_SPINNING)
 
@@ -156,7 +153,7 @@ class PartDropped(Fault):
             return {"by_m": (round(far * np.cos(way), 3), round(far * np.sin(way), 3))}
         return {"at_m": FAR_M[int(rng.integers(len(FAR_M)))]}
 
-    def strikes(self, floor: "Floor") -> Happened | None:
+    def strikes(self, floor: Floor) -> Happened | None:
         """The part that is carried; where it is to come to stand and there is no room, it falls."""
         for name, where in self.parts(floor, "carried"):
             body = floor.bench.held or name

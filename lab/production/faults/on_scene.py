@@ -1,7 +1,6 @@
 """Faults that strike what stands around: machines, obstacles, stations, the camera."""
 
 from math import pi
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,14 +17,12 @@ from lab.production.faults.where import (
     stack_of,
     stand,
 )
+from lab.production.floor import Floor
 from lab.sim import models
 from lab.sim.scene.places import Rectangle
 from lab.sim.scene.scene import MARKER, MARKER_ABOVE, TABLE, Scene, in_grid
 from lab.sim.scene.scene_check import places_of
 from lab.tasks.task import Order, Task
-
-if TYPE_CHECKING:
-    from lab.production.floor import Floor
 
 SLOWER, OBSTACLE_M, STATION_M, BLIND_S = 1.5, 0.06, 0.02, (10.0, 60.0)
 BOX_M = (0.06, 0.06, 0.34)  # as high as the ways between stations
@@ -63,10 +60,10 @@ class MachineSlow(Fault):
         machines = machines_of(task)
         return {"station": one_of(machines, rng), "share": SLOWER} if machines else None
 
-    def strikes(self, floor: "Floor") -> Happened:
+    def strikes(self, floor: Floor) -> Happened:
         """The machine takes longer from now on; this may strike at any time."""
         station, share = str(self.fields.station), self.fields.share or SLOWER
-        floor.machine(station).slow_down(share, floor.now_s)
+        floor.machines[station].slow_down(share, floor.now_s)
         words = f"'{station}' takes {share:g} times as long"
         return Happened(self.what, words, floor.now_s, station=station)
 
@@ -83,10 +80,10 @@ class MachineFails(Fault):
         machines = machines_of(task)
         return {"station": one_of(machines, rng)} if machines else None
 
-    def strikes(self, floor: "Floor") -> Happened:
+    def strikes(self, floor: Floor) -> Happened:
         """The machine fails now; this may strike at any time."""
         station = str(self.fields.station)
-        floor.machine(station).fail(floor.now_s)
+        floor.machines[station].fail(floor.now_s)
         return Happened(self.what, f"'{station}' does not get done", floor.now_s, station=station)
 
 
@@ -130,8 +127,8 @@ class ObstaclePut(Fault):
             at = (x, y, GROUND_M + size[2] + MARKER_ABOVE)
             scene.world.disc(f"{self.name}{MARKER}", models.MARKER_RADIUS, models.MARKER_THICK, at, models.MARKER_GREEN)
 
-    def strikes(self, floor: "Floor") -> Happened | None:
-        """Once nothing is in its place."""
+    def strikes(self, floor: Floor) -> Happened | None:
+        """The box is put there; None while something is in its place."""
         (x, y), size, world = self.fields.at_m or (0.0, 0.0), self.fields.size_m or BOX_M, floor.world
         before = world.pose(self.name)[0]
         world.put(self.name, (x, y, size[2] / 2))
@@ -152,11 +149,11 @@ class ObstacleMoved(Fault):
 
     @classmethod
     def drawn(cls, task: Task, order: Order, rng: np.random.Generator) -> dict[str, object] | None:
-        """One of those that the task says may stand elsewhere."""
+        """One of the obstacles that the task says may stand elsewhere."""
         names = [one.name for one in task.obstacles if max(one.area) > 0]
         return {"obstacle": one_of(names, rng), "by_m": any_way(OBSTACLE_M, rng)} if names else None
 
-    def strikes(self, floor: "Floor") -> Happened | None:
+    def strikes(self, floor: Floor) -> Happened | None:
         """The obstacle is moved to where there is room; None while the robot is near."""
         name, world = str(self.fields.obstacle), floor.world
         if not is_robot_away(floor, [name], OUT_OF_THE_WAY_M):
@@ -180,11 +177,11 @@ class ObstacleGone(Fault):
 
     @classmethod
     def drawn(cls, task: Task, order: Order, rng: np.random.Generator) -> dict[str, object] | None:
-        """One of those that the task says may stand elsewhere."""
+        """One of the obstacles that the task says may stand elsewhere."""
         names = [one.name for one in task.obstacles if max(one.area) > 0]
         return {"obstacle": one_of(names, rng)} if names else None
 
-    def strikes(self, floor: "Floor") -> Happened | None:
+    def strikes(self, floor: Floor) -> Happened | None:
         """Once the robot is away."""
         name, (x, y) = str(self.fields.obstacle), out_of_sight(self.number)
         if not is_robot_away(floor, [name], OUT_OF_THE_WAY_M):
@@ -209,7 +206,7 @@ class StationMoved(Fault):
         seen = [name for name in machines if task.station(name).grid is not None]
         return {"station": one_of(seen or machines, rng), "by_m": any_way(STATION_M, rng)} if machines else None
 
-    def strikes(self, floor: "Floor") -> Happened | None:
+    def strikes(self, floor: Floor) -> Happened | None:
         """Once the robot is away, in a direction in which there is room."""
         name, world = str(self.fields.station), floor.world
         if not is_robot_away(floor, [name], OUT_OF_THE_WAY_M):
@@ -255,7 +252,7 @@ class StationFull(Fault):
         )
         scene.kind_of[self.name] = own
 
-    def strikes(self, floor: "Floor") -> Happened | None:
+    def strikes(self, floor: Floor) -> Happened | None:
         """The first spot on which nothing stands."""
         scene, station = floor.scene, floor.scene.task.station(str(self.fields.station))
         others = [name for name in scene.kind_of if name != self.name]
@@ -281,15 +278,15 @@ class CameraBlind(Fault):
         """For 10 to 60 s."""
         return None if task.camera is None else {"seconds": round(float(rng.uniform(*BLIND_S)), 1)}
 
-    def strikes(self, floor: "Floor") -> Happened:
+    def strikes(self, floor: Floor) -> Happened:
         """The camera is covered now; this may strike at any time."""
         floor.world.dark = True
         seconds = self.fields.seconds or BLIND_S[0]
         self.until_s = floor.now_s + seconds
         return Happened(self.what, f"the camera saw nothing for {seconds:g} s", floor.now_s)
 
-    def end(self, floor: "Floor") -> None:
-        """It sees again."""
+    def end(self, floor: Floor) -> None:
+        """Let the camera see again."""
         floor.world.dark = False
 
 
@@ -297,12 +294,12 @@ def _in_a_grid(task: Task, at: tuple[float, float]) -> bool:
     return any(in_grid(station.grid, at) for station in task.stations if station.grid is not None)
 
 
-def _is_at(floor: "Floor", part: str, station: str) -> bool:
+def _is_at(floor: Floor, part: str, station: str) -> bool:
     x, y, z = floor.world.pose(part)[0]
     return part != floor.bench.held and z > -0.1 and distance(floor, station, (float(x), float(y))) < AT_STATION_M
 
 
-def _along(floor: "Floor", bodies: list[str], dx: float, dy: float) -> None:
+def _along(floor: Floor, bodies: list[str], dx: float, dy: float) -> None:
     """Move bodies that are there as far as what they stand on was moved."""
     for body in bodies:
         if body in floor.world.names():

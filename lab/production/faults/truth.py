@@ -1,4 +1,4 @@
-"""Whether what was told of a run's troubles is true: each reason is held against the faults that had struck by then."""
+"""Whether a run told the truth about its troubles: each reason is compared with the faults that had struck by then."""
 
 import re
 from collections.abc import Iterator, Sequence
@@ -45,9 +45,10 @@ class Verdict:
 def verdict(
     happened: Sequence[Happened], heard: Sequence[Event], failure: str | None, lacking: Sequence[str]
 ) -> Verdict:
-    """heard: what the run told; failure: why not all was delivered, as it says, None: all was; lacking: the parts that do not
-    stand at the end of their routes.
+    """What a run with faults came to.
 
+    heard: what the run told. failure: why not all was delivered, as it says; None: all was. lacking: the parts that do not
+    stand at the end of their routes.
     Delivered: all parts are there, and each was finished. Stopped: some are not there, the run said why, and each reason is
     about a fault. Else it is wrong; a run in which nothing struck may stop for reasons that nobody can check.
     """
@@ -62,7 +63,7 @@ def verdict(
 def _wrong(
     happened: Sequence[Happened], heard: Sequence[Event], failure: str | None, lacking: Sequence[str]
 ) -> Iterator[str]:
-    """What is not true."""
+    """What the run said, or did not say, that is not true."""
     for one in happened:
         if one.undone and one.part not in lacking and not _begun_again(one, heard):
             yield f"{one.part} was delivered, and '{one.station}' had not finished it"

@@ -3,10 +3,10 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import cos, hypot, pi, sin
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from lab.production.floor import Floor
 from lab.sim.arms.robot import NAME
 from lab.sim.frames import Quaternion, Vector
 from lab.sim.parts.kinds import Kind, beside
@@ -14,9 +14,6 @@ from lab.sim.scene.scene import TABLE, pallet_of
 from lab.sim.urdf_reader import rotation
 from lab.skills.skill import UPRIGHT
 from lab.tasks.task import part_name
-
-if TYPE_CHECKING:
-    from lab.production.floor import Floor
 
 AWAY_M = 0.12  # a hand reaches in only where the robot is at least so far away
 IN_MACHINE_M, AT_STATION_M = 0.03, 0.15  # from a spot: what is in the machine, and what is at the station
@@ -39,12 +36,12 @@ class Whereabouts:
     station: str = ""
 
 
-def parts_of(floor: "Floor") -> list[str]:
+def parts_of(floor: Floor) -> list[str]:
     """The parts of the order."""
     return [part_name(floor.scene.order, number) for number in range(1, len(floor.scene.order) + 1)]
 
 
-def stack_of(floor: "Floor", name: str) -> list[str]:
+def stack_of(floor: Floor, name: str) -> list[str]:
     """A part, with the pallet under it first where it stands on one."""
     scene, pallet = floor.scene, pallet_of(name)
     if pallet not in scene.kind_of:
@@ -53,7 +50,7 @@ def stack_of(floor: "Floor", name: str) -> list[str]:
     return [pallet, name] if hypot(x - i, y - j) < IN_MACHINE_M and z > k else [name]
 
 
-def whereabouts(floor: "Floor", name: str) -> Whereabouts:
+def whereabouts(floor: Floor, name: str) -> Whereabouts:
     """Where a part is now."""
     scene, bench = floor.scene, floor.bench
     x, y, z = scene.world.pose(name)[0]
@@ -73,20 +70,20 @@ def whereabouts(floor: "Floor", name: str) -> Whereabouts:
     return Whereabouts("standing", station)
 
 
-def is_undone(floor: "Floor", name: str) -> bool:
+def is_undone(floor: Floor, name: str) -> bool:
     """Whether a machine works on a part and has not finished it."""
     work = floor.work_on(name)
     return work is not None and not work.done(floor.now_s)
 
 
-def in_the_air(floor: "Floor", body: str) -> bool:
+def in_the_air(floor: Floor, body: str) -> bool:
     """Whether there is nothing for 3 cm below a body."""
     scene = floor.scene
     (x, y, z), foot = scene.world.pose(body)[0], scene.kind_of[body].shape.foot_m
     return scene.world.ray((x, y, z - foot - 0.001), (x, y, z - foot - IN_THE_AIR_M)) is None
 
 
-def station_at(floor: "Floor", name: str, at: tuple[float, float]) -> str:
+def station_at(floor: Floor, name: str, at: tuple[float, float]) -> str:
     """The station of a part's routes that has the spot nearest to a place; "" where none is near."""
     places = floor.scene.kind_of[name].part.places
     found = [(distance(floor, station, at), station) for station in places]
@@ -94,14 +91,14 @@ def station_at(floor: "Floor", name: str, at: tuple[float, float]) -> str:
     return station if far < AT_STATION_M else ""
 
 
-def distance(floor: "Floor", station: str, at: tuple[float, float]) -> float:
+def distance(floor: Floor, station: str, at: tuple[float, float]) -> float:
     """From a place to the nearest spot of a station [m]."""
     spots = floor.scene.places.spots(floor.scene.task.station(station))
     return min(hypot(at[0] - spot.x, at[1] - spot.y) for spot in spots)
 
 
-def is_robot_away(floor: "Floor", bodies: Sequence[str], far_m: float = AWAY_M) -> bool:
-    """Whether the robot is so far from all of these bodies that a hand would reach in."""
+def is_robot_away(floor: Floor, bodies: Sequence[str], far_m: float = AWAY_M) -> bool:
+    """Whether the robot is far enough from all of these bodies for a hand to reach in."""
     return all(floor.world.nearest(NAME, body, far_m) >= far_m for body in bodies)
 
 
@@ -128,14 +125,14 @@ class Foot:
                 yield beside(at, yaw, (x, y))
 
 
-def grounds(floor: "Floor") -> list[str]:
-    """What a hand puts parts on: the table, and what parts stand on without a machine's sides around them."""
+def grounds(floor: Floor) -> list[str]:
+    """The bodies on which a hand puts parts: the table, and stations without sides around what stands on them."""
     return [TABLE, *(station.name for station in floor.scene.task.stations if station.kind != "machine")]
 
 
-def put_down(floor: "Floor", bodies: Sequence[str], at: tuple[float, float], yaw: float, tilt: Quaternion = UP) -> bool:
-    """Put a part, or a pallet with its part, to a place where there is level ground and room; False, and nothing moves, where
-    there is none. tilt: before it is turned about the vertical axis."""
+def put_down(floor: Floor, bodies: Sequence[str], at: tuple[float, float], yaw: float, tilt: Quaternion = UP) -> bool:
+    """Put a part, or a pallet with its part, where there is level ground and room; False, and nothing moves, where there is
+    none. tilt: before it is turned about the vertical axis."""
     world, before = floor.world, {body: floor.world.pose(body) for body in bodies}
     for number, body in enumerate(bodies):
         world.put(body, (0.0, 0.0, 5.0 + number))
@@ -154,7 +151,7 @@ def put_down(floor: "Floor", bodies: Sequence[str], at: tuple[float, float], yaw
     return good
 
 
-def stand(floor: "Floor", bodies: Sequence[str], ground: Vector, yaw: float, tilt: Quaternion = UP) -> None:
+def stand(floor: Floor, bodies: Sequence[str], ground: Vector, yaw: float, tilt: Quaternion = UP) -> None:
     """Put a part, or a pallet and its part on it, on the ground at a place, whatever is there."""
     x, y, z = ground
     for body in bodies:
@@ -163,7 +160,7 @@ def stand(floor: "Floor", bodies: Sequence[str], ground: Vector, yaw: float, til
         z += kind.shape.height_m + ABOVE_M
 
 
-def is_clear(floor: "Floor", bodies: Sequence[str], but: set[str]) -> bool:
+def is_clear(floor: Floor, bodies: Sequence[str], but: set[str]) -> bool:
     """Whether there is room on all sides of these bodies; but: what they stand on."""
     others = [name for name in floor.world.names() if name not in (*bodies, *but)]
     return all(floor.world.nearest(body, name, CLEAR_M) >= CLEAR_M for body in bodies for name in others)
@@ -183,7 +180,7 @@ def turned(yaw: float, tilt: Quaternion) -> Quaternion:
     return (c * x - s * y, c * y + s * x, c * z + s * w, c * w - s * z)
 
 
-def yaw_of(floor: "Floor", body: str) -> float:
+def yaw_of(floor: Floor, body: str) -> float:
     """How a body is turned about the vertical axis [rad]."""
     x, y, z, w = floor.world.pose(body)[1]
     return float(np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)))

@@ -1,4 +1,7 @@
-"""The operator's commands: one table, and how a typed line is read. Terminal, page and pipe all send these words."""
+"""The operator's commands: one table, how a typed line is read, and how those are done that are done at once.
+
+Terminal, page and pipe all send these words.
+"""
 
 import re
 from collections.abc import Callable
@@ -7,6 +10,7 @@ from math import inf
 from typing import Literal
 
 from lab.errors import BadInput, unknown
+from lab.production.controls import Controls
 
 Argument = str | float | tuple[float, float, float] | tuple[int, ...] | None
 How = Literal["at once", "by hand", "in turn", "console"]
@@ -14,6 +18,7 @@ MOST_POINT_MM = 10_000.0
 MOST_MM, MOST_DEGREES, MOST_SPEED, MOST_ENTRIES, MOST_CHARACTERS = 500.0, 180.0, 100.0, 10_000, 4000
 AXES = {"x": 0, "y": 1, "z": 2}
 _SIGN = re.compile(r"([+-])([xyz])")
+OPERATOR = "operator"
 
 
 @dataclass(frozen=True)
@@ -177,3 +182,37 @@ def help_lines() -> list[str]:
     """The commands, one a line."""
     width = max(len(f"{word} {command.arguments}") for word, command in COMMANDS.items())
     return [f"{f'{word} {command.arguments}':{width}}  {command.help}" for word, command in COMMANDS.items()]
+
+
+@dataclass(frozen=True)
+class Done:
+    """What came of a command: refused, why it was not begun; failed, why it did not come to its end; said, what it came to."""
+
+    words: str
+    refused: str = ""
+    failed: str = ""
+    said: str = ""
+
+    @property
+    def well(self) -> bool:
+        """Whether it was carried out."""
+        return not (self.refused or self.failed)
+
+
+def press(controls: Controls, said: Spoken, by: str = OPERATOR) -> str:
+    """Do a command that is done at once, in any thread; why it may not be, "" when it was."""
+    match said.word:
+        case "stop":
+            controls.emergency(by=by)
+        case "pause":
+            controls.pause(by)
+        case "reset":
+            return controls.reset()
+        case "go":
+            return controls.go_on()
+        case "step":
+            return controls.step()
+        case "speed":
+            assert not isinstance(said.argument, str | tuple)
+            controls.set_speed(said.argument)
+    return ""

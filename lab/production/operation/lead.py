@@ -47,7 +47,7 @@ class Demonstration:
         return {mdp.state_label(state): mdp.action_labels[action] for state, action in self.moves.items()}
 
     def judged(self, lesson: Lesson) -> dict[str, Any]:
-        """What came of it: its moves beside the learned policy's and the fewest, from the start, and whether it was believed."""
+        """The verdict on it: its moves beside the learned policy's and the fewest, from the start; whether it was believed."""
         mdp, result = self.skill.problem.mdp, lesson.result
         assert result is not None
         begins = self.first in (mdp.starts or (mdp.start,))
@@ -175,7 +175,7 @@ class Seen(NamedTuple):
 
 
 def _from_start(mdp: TabularMDP, states: list[int]) -> list[int]:
-    """The states from the one on that is nearest to a start, that start before them; all of them where none is near to one."""
+    """The states from the one nearest to a start on, with that start first; all of them where none is near a start."""
     starts = [*(mdp.starts or (mdp.start,))]
     far = np.where(np.isin(states, starts), 0, distances(mdp.successor, mdp.terminal, mdp.start)[states])
     least = int(far[far >= 0].min(initial=NEAR + 1))

@@ -1,4 +1,4 @@
-"""The scene that the operator works in: laid out, taught, ordered and carried out, each as a command that was checked first."""
+"""The scene in which the operator works: it is laid out, taught, ordered and carried out by commands, each checked first."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -9,25 +9,22 @@ from typing import Any
 from lab.advice.advisors import PYTHON, AdvisorName, RecordedAdvisor
 from lab.errors import BadInput, WorkFailed, unknown
 from lab.export.recorder import MotionRecorder
-from lab.production.composer import Production, noting
-from lab.production.conditions import Conditions
+from lab.production.composer import Conditions, Production, noting
 from lab.production.controls import RESET_FIRST, StopKind
-from lab.production.faults.draw import draw
-from lab.production.faults.injector import Injector
-from lab.production.floor import Floor
-from lab.production.operation.at_once import OPERATOR
+from lab.production.faults.injector import Injector, draw
+from lab.production.floor import Floor, Hooks
 from lab.production.operation.by_hand import ByHand
-from lab.production.operation.commands import Spoken
+from lab.production.operation.commands import OPERATOR, Spoken
 from lab.production.operation.lead import DROP, END, EVERY, Demonstration, Lead, led_in_words
-from lab.production.operation.typed_order import checked
-from lab.production.order import GIVEN, OrderAdvice, ordered
+from lab.production.order import GIVEN, OrderAdvice, checked, ordered
 from lab.production.order_learning import OrderLearning
-from lab.production.relearning import Relearner
+from lab.production.parts_in_machines import watch_machines
 from lab.production.replanning import Planner
-from lab.production.run import teach_all
 from lab.production.run_journal import Led
+from lab.production.run_state import RunState
 from lab.production.run_status import RunStatus
-from lab.production.taught import Taught, skill_row
+from lab.production.taught import Relearner, Taught, skill_row, teach_all
+from lab.production.transfers import bodies_of
 from lab.sequencing.cell.routes import part_of
 from lab.sequencing.methods.exact import Optimum
 from lab.sequencing.search import SequenceResult
@@ -62,16 +59,35 @@ class Plan:
     production: Production
     learning: OrderLearning
 
+    @property
+    def state(self) -> RunState:
+        """The job as it is carried out by this plan."""
+        return self.production.state
+
 
 class OperatedScene:
     """One scene and all that is in it; it belongs to the thread that simulates, but for `now` and the controls.
 
     leaving: what is under way is broken off. resting: a pause lasts. again: it is carried out once more, as a journal says.
-    meanwhile: called in a pause of the run, for what is done by hand.
     """
 
-    def __init__(self, task: Task, order: Order, seed: int, teacher: Teacher, conditions: Conditions) -> None:
-        """Nothing is laid out before `open`. What happens is told to the teacher's listener."""
+    def __init__(
+        self,
+        task: Task,
+        order: Order,
+        seed: int,
+        teacher: Teacher,
+        conditions: Conditions,
+        *,
+        on_laid_out: Callable[[], None],
+        before_step: Callable[[], None],
+        meanwhile: Callable[[], bool],
+    ) -> None:
+        """Nothing is laid out before `open`. What happens is told to the teacher's listener.
+
+        on_laid_out: called when the scene was laid out; before_step: before each physics step; meanwhile: in a pause of the
+        run, for what is done by hand, and says whether that was anything.
+        """
         self.task, self.order, self.seed, self.conditions = task, order, seed, conditions
         self.controls, self.journal = conditions.controls, conditions.journal
         self.leaving = self.again = self.resting = False
@@ -79,9 +95,7 @@ class OperatedScene:
         self.lead: Lead | None = None
         self.demonstrations: list[dict[str, Any]] = []  # what came of each, as `Demonstration.judged`
         self.failure: str | None = None
-        self.on_laid_out: Callable[[], None] = lambda: None
-        self.on_step: Callable[[], None] = lambda: None
-        self.meanwhile: Callable[[], bool] = lambda: False
+        self._on_laid_out, self._before_step, self._meanwhile = on_laid_out, before_step, meanwhile
         self._world: World | None = None
         self.lock, self._status = RLock(), RunStatus.of(task, order)
         self._told, self.teacher = teacher.tell, replace(teacher, tell=self.tell)
@@ -95,23 +109,27 @@ class OperatedScene:
         """The floor, with nothing done on it yet."""
         self.close()
         prepared, self.plan, self.lead, self.failure = self.prepared, None, None, None
+        self.injector, self.heard = Injector(faults), list[Event]()
+        hooks = Hooks(
+            before_step=self._reach_in,
+            after_step=self._watch,
+            meanwhile=self._meanwhile,
+            hear=noting(self.journal, self.heard, self.tell),
+            note_stops=self.journal.note_stops,
+        )
         world = World()
-        floor = self.floor = Floor(world, prepared.skillset, prepared.layout, prepared.order)
-        self.injector = Injector(faults)
+        scene = prepared.skillset, prepared.layout, prepared.order
+        floor = self.floor = Floor(world, *scene, controls=self.controls, hooks=hooks)
         self.injector.prepare(floor.scene)
-        floor.record(self.conditions.viewer)
+        self.recorder = floor.record(self.conditions.viewer)
         self.motions = MotionRecorder(floor.scene.robot)
         floor.scene.robot.override(self.conditions.override)
         floor.stand(prepared.surveys.approach(self.task.robot.start))
         floor.restart_clock()
-        self.heard: list[Event] = []
-        floor.tell = noting(floor, self.journal, self.heard, self.tell)
-        floor.hand, floor.meanwhile = self._hand, lambda: self.meanwhile()
-        floor.controls, floor.stops.note = self.controls, self.journal.note_stops
         self._world, self.by_hand = world, ByHand(floor, self._ready)
         with self.lock:
             self._status = RunStatus.of(self.task, prepared.order)
-        self.on_laid_out()
+        self._on_laid_out()
 
     def close(self) -> None:
         """Take the scene down; safe to call again."""
@@ -124,13 +142,17 @@ class OperatedScene:
         if self.leaving:
             raise Left("the operator left")
 
-    def _hand(self) -> bool:
-        self._status.now_s, self.resting = self.floor.now_s, False
-        if self.lead is not None and self.floor.steps % EVERY == 0:
-            self.lead.see(self.floor.scene.robot.tool())
-        self.on_step()
+    def _reach_in(self, floor: Floor) -> bool:
+        self._status.now_s, self.resting = floor.now_s, False
+        if self.lead is not None and floor.steps % EVERY == 0:
+            self.lead.see(floor.scene.robot.tool())
+        self._before_step()
         self.check_leaving()
-        return self.injector.tick(self.floor)
+        return self.injector.tick(floor)
+
+    def _watch(self, floor: Floor) -> None:
+        if self.plan is not None:
+            watch_machines(self.plan.state, floor)
 
     @property
     def steps(self) -> int:
@@ -169,7 +191,7 @@ class OperatedScene:
     # ---- commands --------------------------------------------------------------------------------------------------
 
     def checked(self, said: Spoken) -> Deed:
-        """What a command does, once it was checked. Raises BadInput for what may not be."""
+        """A function that does what a command says, which was checked. Raises BadInput for what is not allowed."""
         word, argument = said.word, said.argument
         if word == "lead":
             return self._lead(str(argument))
@@ -205,9 +227,9 @@ class OperatedScene:
             try:
                 deed()
             finally:
-                self.floor.recorder.take()  # type: ignore[union-attr]
+                self.recorder.take()
                 if self.plan is not None:
-                    self.plan.production.work.place = ""
+                    self.plan.state.place = ""
             if self.lead is None:
                 return ""
             self.lead.see(self.floor.scene.robot.tool())
@@ -218,7 +240,7 @@ class OperatedScene:
     # ---- skills and order --------------------------------------------------------------------------------------------
 
     def _policy(self) -> Deed:
-        if self.plan is not None and self.plan.production.work.moves:
+        if self.plan is not None and self.plan.state.moves:
             raise BadInput("policy: the run has begun: parts lays the scene out anew")
         drawn = self.conditions.fault_seed is not None
         if drawn and self.floor.steps:
@@ -238,9 +260,9 @@ class OperatedScene:
                 )
             relearner = Relearner(self.prepared, taught, self.teacher)
             planner = Planner(self.task.sequencing, self.seed)
-            production = Production(self.floor, taught.cell, self.floor.tell, relearner, planner)
+            production = Production.of(self.floor, RunState.of(taught.cell, self.floor.now_s), relearner, planner)
             self.plan = Plan(taught, found, chosen.used, proven, production, chosen.learning)
-            production.sequence = [*found.sequence]
+            self.plan.state.sequence = [*found.sequence]
             self._tell_plan("")
             return f"{len(found.sequence)} moves, {found.cost:.1f} s"
 
@@ -260,19 +282,19 @@ class OperatedScene:
 
     def _order(self, sequence: tuple[int, ...]) -> Deed:
         plan = self._planned()
-        production = plan.production
-        order = checked(production.work.plan, sequence)
-        if production.recovery.lost or production.recovery.out:
+        state = plan.state
+        order = checked(state.plan, sequence)
+        if state.lost or state.out:
             raise BadInput("order: parts or machines were given up in this run: its plan has to leave them out")
 
         def deed() -> str:
-            production.sequence = [*order.sequence]
-            if not production.work.moves:
+            state.sequence = [*order.sequence]
+            if not state.moves:
                 plan.found = replace(plan.found, sequence=order.sequence, cost=order.schedule.makespan_s)
                 plan.method = GIVEN
                 self._tell_plan(f"the operator's order: {order.words}")
             else:
-                schedule = order.schedule.later(self.floor.now_s - production.work.plan.now_s)
+                schedule = order.schedule.later(self.floor.now_s - state.plan.now_s)
                 now_s, why = self.floor.now_s, f"the operator's order: {order.words}"
                 self.tell(PlanMade(schedule, len(order.sequence), order.gap, order.proven, now_s, why))
             return order.words
@@ -324,8 +346,8 @@ class OperatedScene:
         return deed
 
     def _outdate_plan(self) -> None:
-        """A plan that was not begun has the times of the skills as they were."""
-        if self.plan is not None and not self.plan.production.work.moves:
+        """Drop a plan that was not begun: its durations are those of the skills as they were before."""
+        if self.plan is not None and not self.plan.state.moves:
             self.plan = None
 
     # ---- what a person shows -----------------------------------------------------------------------------------------
@@ -372,39 +394,34 @@ class OperatedScene:
 
     def _run(self) -> Deed:
         plan = self._planned()
-        production = plan.production
-        if not production.sequence:
+        state = plan.state
+        if not state.sequence:
             raise BadInput("run: nothing is left to do: parts lays the scene out anew")
         if not self.again and self.controls.waits and (why := self.controls.go_on()):
             raise BadInput(f"run: {why}")
 
         def deed() -> str:
-            self.tell(PhaseBegan("carry out", len(production.sequence)))
-            if not production.work.moves:
+            self.tell(PhaseBegan("carry out", len(state.sequence)))
+            if not state.moves:
                 self._tell_plan("")
             self.held_first()
-            self.failure = production.carry_out(production.sequence)
+            self.failure = plan.production.carry_out(state.sequence)
             if self.failure is not None:
                 raise WorkFailed(self.failure)
-            return f"{len(production.work.finished)} of {len(self.prepared.order)} parts made"
+            return f"{len(state.finished)} of {len(self.prepared.order)} parts made"
 
         return deed
 
     def held_first(self) -> None:
-        """What the operator let the arm take up is brought on first. Raises WorkFailed where that may not be."""
+        """Bring on first what the operator had the arm take up. Raises WorkFailed where that is not allowed."""
         held, plan = self.floor.bench.held, self.plan
-        if held is None or plan is None or plan.production.work.under_way:
+        if held is None or plan is None or plan.state.under_way is not None:
             return
-        production = plan.production
-        run = production.work.plan
-        own = [d for d in run.allowed() if held in self._bodies(part_of(d, run.cell.parts))]
+        state = plan.state
+        parts = state.plan.cell.parts
+        own = [d for d in state.plan.allowed() if held in bodies_of(self.floor, state, part_of(d, parts))]
         if not own:
             raise WorkFailed(f"{held} is in the gripper and may not be brought on now: put it down, and open")
-        if production.sequence[0] not in own:
-            production.sequence.insert(0, own[0])
-            production.replan(f"the robot holds {held}")
-
-    def _bodies(self, part: int) -> list[str]:
-        assert self.plan is not None
-        work = self.plan.production.work
-        return self.floor.scene.bodies_of(work.name(part), work.comes_as(part))
+        if state.sequence[0] not in own:
+            state.sequence.insert(0, own[0])
+            plan.production.recovery.replan(f"the robot holds {held}")

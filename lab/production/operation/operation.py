@@ -12,14 +12,13 @@ from dataclasses import replace
 from typing import TypeGuard
 
 from lab.errors import LabError, WorkFailed
-from lab.production.conditions import Conditions
-from lab.production.operation.at_once import OPERATOR, Done, press
-from lab.production.operation.commands import Spoken, spoken
+from lab.production.composer import Conditions
+from lab.production.controls import StopsChanged
+from lab.production.operation.commands import OPERATOR, Done, Spoken, press, spoken
 from lab.production.operation.operated_scene import OperatedScene
 from lab.production.report import Report
 from lab.production.run_journal import Commanded, Entry, Stopped, stops_of
 from lab.production.run_status import RunStatus
-from lab.production.stop_record import StopsChanged
 from lab.tasks.task import Order, Task
 from lab.teaching.events import OperatorActed
 from lab.teaching.teacher import Teacher
@@ -34,9 +33,12 @@ class Operation:
 
     def __init__(self, task: Task, order: Order, seed: int, teacher: Teacher, conditions: Conditions) -> None:
         """Nothing is laid out before `open`. What happens is told to the teacher's listener."""
-        self.scene = OperatedScene(task, order, seed, teacher, conditions)
-        self.scene.on_laid_out, self.scene.meanwhile = self._laid_out, self._meanwhile
-        self.scene.on_step = self.write
+        self.scene = OperatedScene(
+            *(task, order, seed, teacher, conditions),
+            on_laid_out=self._laid_out,
+            before_step=self.write,
+            meanwhile=self._meanwhile,
+        )
         self.controls, self._journal = conditions.controls, conditions.journal
         self.waiting: deque[tuple[Spoken, str]] = deque()
         self.done: list[Done] = []
@@ -92,7 +94,7 @@ class Operation:
         return self._kept(done) if done.refused else done
 
     def refuse(self, words: str, why: str, by: str = OPERATOR) -> Done:
-        """What is said is not begun: in any thread."""
+        """Refuse what was said, from any thread; what came of it."""
         return self._aside(Done(words, refused=why), by)
 
     def _aside(self, done: Done, by: str) -> Done:
@@ -141,7 +143,7 @@ class Operation:
     # ---- once more ---------------------------------------------------------------------------------------------------
 
     def repeat(self, entries: Sequence[Entry]) -> None:
-        """Do again what a journal says was done. Raises WorkFailed where a command does not come at its step."""
+        """Replay the commands of a journal. Raises WorkFailed where a command does not come at its physics step."""
         self._script = deque(entry for entry in entries if isinstance(entry, Stopped) or _is_deed(entry))
         self.scene.again = True
         self.open()
@@ -157,7 +159,7 @@ class Operation:
         self.scene.again = False
 
     def _laid_out(self) -> None:
-        """Of what is done again, the stops until the scene is laid out the next time."""
+        """Of a journal that is replayed, hand the floor the stops until the scene is laid out the next time."""
         if not self.scene.again:
             return
         stops, last = list[StopsChanged](), 0
@@ -189,21 +191,20 @@ class Operation:
         """The run as `lab run` reports it; None when no plan was made."""
         scene = self.scene
         plan = scene.plan
-        if plan is None or (recorder := scene.floor.recorder) is None:
+        if plan is None:
             return None
-        left = bool(plan.production.sequence)
+        left, moves, cell = bool(plan.state.sequence), plan.state.moves, plan.state.cell
         why = scene.failure or ("the operator left before its end" if left else None)
-        production = plan.production
         outcome = replace(
-            production.outcome(why, left),
+            plan.production.outcome(why, left),
             happened=tuple(scene.injector.happened),
             heard=tuple(scene.heard),
-            program=scene.motions.program(scene.task, scene.seed, production.work.moves, production.cell.part_name),
+            program=scene.motions.program(scene.task, scene.seed, moves, cell.part_name),
         )
-        recorder.take()
+        scene.recorder.take()
         found = plan.found, plan.method, plan.proven
         return Report(
-            scene.prepared, plan.taught, *found, outcome, recorder.recording, self._began, learning=plan.learning
+            scene.prepared, plan.taught, *found, outcome, scene.recorder.recording, self._began, learning=plan.learning
         )
 
 

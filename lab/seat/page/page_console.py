@@ -5,7 +5,7 @@ from dataclasses import asdict
 from typing import Any, Protocol
 
 from lab.production.controls import Controls, StopKind
-from lab.production.operation.at_once import Done
+from lab.production.operation.commands import Done
 from lab.production.run_status import RunStatus
 from lab.seat.event_text import PHASES
 from lab.seat.order_text import OrderMove, move_of, title

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from lab.learning.requests import AdviceRequest, Request
-from lab.production.operation.at_once import OPERATOR
+from lab.production.operation.commands import OPERATOR
 from lab.seat.grid_text import ARROWS, direction_of
 from lab.seat.page.page_console import ONLOOKER, STOP, held_of
 from lab.seat.page.page_console import PARTS as RUN_PARTS

@@ -18,8 +18,7 @@ from prompt_toolkit.output import create_output
 from rich.text import Text
 
 from lab.errors import printable
-from lab.production.operation.at_once import Done
-from lab.production.operation.commands import COMMANDS, help_lines
+from lab.production.operation.commands import COMMANDS, Done, help_lines
 from lab.production.operation.desk import Desk
 from lab.seat.terminal.console_view import plain_lines, view
 from lab.seat.terminal.screen import folded

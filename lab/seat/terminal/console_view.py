@@ -5,8 +5,7 @@ from threading import Thread
 
 from rich.text import Text
 
-from lab.production.operation.at_once import Done
-from lab.production.operation.commands import help_lines
+from lab.production.operation.commands import Done, help_lines
 from lab.production.operation.desk import Desk
 from lab.production.run_status import MachineStatus, PartStatus, RunStatus
 from lab.seat.terminal.screen import folded

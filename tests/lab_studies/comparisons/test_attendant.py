@@ -4,11 +4,9 @@ from typing import Any
 
 import pytest
 
-from lab.production.composer import carry_out
-from lab.production.conditions import Conditions
+from lab.production.composer import Conditions, carry_out
 from lab.production.outcome import Outcome
-from lab.production.relearning import Relearner
-from lab.production.run import teach_all
+from lab.production.taught import Relearner, teach_all
 from lab.sequencing.methods.exact import optimum
 from lab.skills.prepared_scene import prepare
 from lab.tasks.fault_fields import FaultFields
@@ -30,7 +28,7 @@ def run_with(tmp_path_factory: pytest.TempPathFactory) -> Any:
 
     def run(person: Attendant, *faults: dict[str, Any]) -> Outcome:
         drawn = tuple(FaultFields.model_validate(fields) for fields in faults)
-        conditions = Conditions(faults=drawn, controls=person, on_floor=person.on_floor)
+        conditions = Conditions(faults=drawn, controls=person, on_floor=person.on_floor, before_step=person.before_step)
         return carry_out(prepared, taught.cell, sequence, conditions, relearner=Relearner(prepared, taught, teacher))[0]
 
     return run

@@ -6,9 +6,8 @@ from typing import Any
 import pytest
 
 from lab.production.faults.injector import Injector
-from lab.production.floor import Floor
-from lab.production.run import teach_all
-from lab.production.taught import Taught
+from lab.production.floor import Floor, Hooks
+from lab.production.taught import Taught, teach_all
 from lab.sim.parts.kinds import Spot
 from lab.sim.world import World
 from lab.skills.prepared_scene import Prepared, prepare
@@ -40,10 +39,10 @@ def floor_with() -> Iterator[Callable[[Prepared, Sequence[dict[str, Any]]], tupl
 
     def make(prepared: Prepared, faults: Sequence[dict[str, Any]]) -> tuple[Floor, Injector]:
         worlds.append(World())
-        floor = Floor(worlds[-1], prepared.skillset, prepared.layout, prepared.order)
         injector = Injector([FaultFields.model_validate(fields) for fields in faults])
+        scene = prepared.skillset, prepared.layout, prepared.order
+        floor = Floor(worlds[-1], *scene, hooks=Hooks(before_step=injector.tick))
         injector.prepare(floor.scene)
-        floor.hand = lambda: injector.tick(floor)
         return floor, injector
 
     yield make

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from lab.production.faults import FAULTS
-from lab.production.faults.draw import draw
-from lab.production.faults.injector import Injector
+from lab.production.faults.injector import Injector, draw
 from lab.production.faults.where import whereabouts
 from lab.production.floor import Floor
 from lab.sim.arms.kinematics import ToolPose

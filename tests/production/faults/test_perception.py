@@ -11,8 +11,7 @@ from lab.errors import BadInput
 from lab.production.faults.injector import Injector
 from lab.production.floor import Floor
 from lab.production.perception import perceive, scene_seen
-from lab.production.relearning import adopt, relearned
-from lab.production.taught import Taught
+from lab.production.taught import Taught, adopt, relearned
 from lab.skills.prepared_scene import Prepared, prepare
 from lab.skills.skill import Status
 from lab.teaching.teacher import Teacher

@@ -4,11 +4,9 @@ from typing import Any
 
 import pytest
 
-from lab.production.composer import carry_out
-from lab.production.conditions import Conditions
+from lab.production.composer import Conditions, carry_out
 from lab.production.outcome import Outcome
-from lab.production.relearning import Relearner
-from lab.production.taught import Taught
+from lab.production.taught import Relearner, Taught
 from lab.sequencing.methods.exact import optimum
 from lab.skills.prepared_scene import Prepared
 from lab.tasks.fault_fields import FaultFields

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from lab.production.conditions import Conditions
+from lab.production.composer import Conditions
 from lab.production.operation.operation import Operation
 from lab.production.run_journal import RunBegan, RunJournal
 from lab.tasks.task import Task

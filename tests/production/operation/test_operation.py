@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from lab.production.conditions import Conditions
+from lab.production.composer import Conditions
 from lab.production.operation.desk import AT_WORK, Desk
 from lab.production.operation.operation import Operation
 from lab.production.run_journal import Commanded, SkillKept, read_run

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from lab.production.controls import Controls, StopKind
-from lab.production.operation.run_desk import RunDesk
+from lab.production.operation.desk import RunDesk
 from lab.production.run_journal import RunJournal
 from lab.seat.page.teaching_page import SeatPage
 from lab.sequencing.cell.schedule import Move

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from lab.production.controls import Controls
-from lab.production.operation.run_desk import RunDesk
+from lab.production.operation.desk import RunDesk
 from lab.production.run_journal import RunJournal
 from lab.seat.page.page_console import changed_by, held_of, measured_of, plan_of, run_of
 from lab.sequencing.cell.schedule import Move

@@ -11,7 +11,7 @@ from lab.learning.requests import AdviceRequest
 from lab.learning.session_events import EpisodeEnded
 from lab.mdp import TabularMDP, grid
 from lab.production.controls import Controls, Held, StopKind
-from lab.production.operation.run_desk import RunDesk
+from lab.production.operation.desk import RunDesk
 from lab.production.run_journal import RunJournal
 from lab.seat.page.page_messages import Answer
 from lab.seat.page.page_panel import SeatPanel, plain_json, word_of

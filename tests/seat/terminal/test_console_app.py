@@ -12,7 +12,7 @@ from prompt_toolkit.data_structures import Size
 from prompt_toolkit.input import PipeInput, create_pipe_input
 from prompt_toolkit.output import DummyOutput
 
-from lab.production.conditions import Conditions
+from lab.production.composer import Conditions
 from lab.production.operation.desk import Desk
 from lab.production.operation.operation import Operation
 from lab.seat.terminal.console_app import HINTS, LETTER_S, OperatorConsole

@@ -1,17 +1,16 @@
 """A run that carries itself out, steered in words: what it takes, what it refuses, what is written, who attends it."""
 
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from lab.production.conditions import Conditions
-from lab.production.controls import RESET_FIRST, Controls, StopKind
-from lab.production.operation.operation import Operation
-from lab.production.operation.run_desk import WORDS, RunDesk
+from lab.production.composer import Conditions
+from lab.production.controls import RESET_FIRST, Controls, StopKind, StopsChanged
+from lab.production.floor import Floor, Hooks
+from lab.production.operation.desk import WORDS, RunDesk
 from lab.production.run import run
 from lab.production.run_journal import Commanded, RunBegan, RunEnded, RunJournal, Stopped, read_run
-from lab.production.stop_record import StopsChanged
+from lab.sim.world import World
 from lab.skills.prepared_scene import prepare
 from lab.tasks.task import Task
 from lab.teaching.events import Event, MoveBegan, MoveMade, OperatorActed, RunHeld
@@ -74,7 +73,7 @@ def test_what_is_said_while_it_moves_and_while_it_waits_is_in_the_journal(
         if isinstance(event, RunHeld) and event.kind == "pause":
             assert steered.say("go").well
 
-    conditions = Conditions(1.0, None, steered.controls, journal, on_floor=steered.on_floor)
+    conditions = steered.steering(Conditions(1.0, None, steered.controls, journal))
     report = run(prepared, Teacher(toolbox, tell=hear), folder, conditions)
     journal.close()
     assert report.success
@@ -88,30 +87,24 @@ def test_what_is_said_while_it_moves_and_while_it_waits_is_in_the_journal(
     assert any(isinstance(event, OperatorActed) for event in report.outcome.heard)
 
 
-def test_a_protective_stop_waits_for_who_attends_and_is_done_again_without_them(made: Callable[..., Operation]) -> None:
-    operation = made()
-    operation.open()
-    floor, noted = operation.scene.floor, list[StopsChanged]()
-    floor.stops.note = noted.append
-    floor.controls.attended = False
-    assert not floor.protected("it presses")
-    assert noted == []
-    floor.controls.attended = True
+def test_a_protective_stop_waits_for_who_attends_and_is_done_again_without_them(brisk: Task) -> None:
+    prepared, noted = prepare(brisk, brisk.ordered(1), 0), list[StopsChanged]()
+    scene = prepared.skillset, prepared.layout, prepared.order
+    controls = Controls()
 
-    def go_on(event: Event) -> None:
+    def go_on(event: Event, step: int) -> None:
         if isinstance(event, RunHeld):
-            floor.controls.go_on()
+            controls.go_on()
 
-    floor.tell = go_on
-    assert floor.protected("it presses")
+    with World() as world:
+        floor = Floor(world, *scene, controls=controls, hooks=Hooks(hear=go_on, note_stops=noted.append))
+        assert not floor.protected("it presses")
+        assert noted == []
+        controls.attended = True
+        assert floor.protected("it presses")
     assert [[held.why for held in one.stops] for one in noted] == [["it presses"], []]
-    operation.close()
-
-    again = made(folder="again")
-    again.open()
-    floor = again.scene.floor
-    floor.controls.attended = False
-    floor.stops.again([*noted], noted[-1].step)
-    assert floor.protected("it presses")
-    assert (floor.steps, floor.controls.held) == (noted[-1].step, None)
-    again.close()
+    with World() as world:
+        floor = Floor(world, *scene)
+        floor.stops.again([*noted], noted[-1].step)
+        assert floor.protected("it presses")
+        assert (floor.steps, floor.controls.held) == (noted[-1].step, None)

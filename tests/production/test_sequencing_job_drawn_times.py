@@ -41,7 +41,7 @@ REACTING = {
 def few(monkeypatch: pytest.MonkeyPatch, episodes: int) -> None:
     """Draw so many episodes, whatever the method and however many parts."""
     for name in ("REPLICATIONS", "FEWEST"):
-        monkeypatch.setattr(f"lab.production.drawn_times.{name}", episodes)
+        monkeypatch.setattr(f"lab.production.sequencing_job.{name}", episodes)
 
 
 @pytest.mark.parametrize("method", REACTING)
@@ -90,7 +90,7 @@ def test_who_plans_at_every_decision_is_given_fewer_episodes(
 ) -> None:
     """Here 24 by parts squared, from 2 to 30."""
     for name, number in (("REPLICATIONS", 30), ("PLANNED", 24), ("FEWEST", 2)):
-        monkeypatch.setattr(f"lab.production.drawn_times.{name}", number)
+        monkeypatch.setattr(f"lab.production.sequencing_job.{name}", number)
     drawn = asked(lab, f"oven.toml --toasts {toasts} --method {method} --stochastic")["stochastic"]
     assert drawn["replications"] == episodes
 

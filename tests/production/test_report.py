@@ -2,7 +2,7 @@
 
 from lab.production.faults.fault import Happened
 from lab.production.outcome import Outcome
-from lab.production.run_story import story_of
+from lab.production.report import story_of
 from lab.sequencing.cell.schedule import Activity, Schedule
 from lab.teaching.events import MoveBegan, PartDone, PhaseBegan, PlanMade, RunHeld, RunWentOn, SkillBegan, TroubleMet
 
