@@ -42,14 +42,14 @@ if TYPE_CHECKING:
     from lab.production.sequencing_job import SequencingOptions, sequence_named
     from lab.seat.lesson_seat import LessonSeat
     from lab.seat.page.teaching_page import SeatPage
-    from lab.seat.replay_pace import HELP as KEYS_HELP
-    from lab.seat.replay_pace import replay_keys
     from lab.seat.run_progress import RunProgress
     from lab.seat.terminal.console_app import OperatorConsole
     from lab.seat.terminal.console_view import PlainConsole
     from lab.seat.terminal.line_reader import default_reader
     from lab.seat.terminal.new_task_questions import ask
     from lab.seat.terminal.prompt import TeachingPrompt
+    from lab.seat.terminal.replay_keys import HELP as KEYS_HELP
+    from lab.seat.terminal.replay_keys import replay_keys
     from lab.sequencing import SEQUENCERS
     from lab.sequencing.cell.objectives import OBJECTIVES
     from lab.sequencing.methods.srl_advised import FITTING
@@ -167,7 +167,7 @@ TABLE = {
     "lab.seat.terminal.line_reader": ("default_reader",),
     "lab.seat.terminal.new_task_questions": ("ask",),
     "lab.seat.terminal.prompt": ("TeachingPrompt",),
-    "lab.seat.replay_pace": ("HELP as KEYS_HELP", "replay_keys"),
+    "lab.seat.terminal.replay_keys": ("HELP as KEYS_HELP", "replay_keys"),
     "lab.sequencing": ("SEQUENCERS",),
     "lab.sequencing.cell.objectives": ("OBJECTIVES",),
     "lab.sequencing.methods.srl_advised": ("FITTING",),

@@ -1,14 +1,9 @@
 """How fast a replay goes from one answer to the next, and whether it waits: told by keys and buttons, from any thread."""
 
-import signal
-import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from typing import Any
-
-from prompt_toolkit.input import create_input
 
 WORDS = ("pause", "go", "step", "faster", "slower")
 KEYS = {
@@ -66,43 +61,3 @@ class ReplayPace:
                 if left_s <= 0:
                     return
                 self._lock.wait(min(left_s, LISTEN_S))
-
-
-# ---- replay keys ------------------------------------------------------------------------------------------------------
-
-
-HELP = "space: pause and go on, n: one step, + and -: faster and slower, q: end"
-LOOK_S = 0.05  # between two looks for keys
-ENDS = ("q", "c-c")  # and Ctrl-C, which is a key here
-
-
-@contextmanager
-def replay_keys(pace: ReplayPace) -> Iterator[bool]:
-    """Reads keys of the terminal, if stdin is one, until it is left; whether it is. The terminal is then as it was."""
-    if not sys.stdin.isatty():
-        yield False
-        return
-    keys, over = create_input(sys.stdin), threading.Event()
-
-    def read() -> None:
-        try:
-            while not over.wait(LOOK_S) and not keys.closed:
-                for pressed in keys.read_keys():
-                    key = pressed.key.lower()
-                    if key in ENDS:
-                        signal.raise_signal(signal.SIGINT)
-                        return
-                    if key in KEYS:
-                        pace.do(KEYS[key])
-        except Exception:  # in raw mode Ctrl-C is a key like another, and nobody would hear it any more
-            signal.raise_signal(signal.SIGINT)
-            raise
-
-    reader = threading.Thread(target=read, daemon=True)
-    with keys.raw_mode():
-        reader.start()
-        try:
-            yield True
-        finally:
-            over.set()
-            reader.join()
