@@ -20,8 +20,8 @@ from lab.sim.arms.arm import Arm
 from lab.sim.arms.arm_models import arm_of
 from lab.sim.arms.kinematics import ToolPose
 from lab.sim.parts.kinds import beside
+from lab.sim.scene.ground_plan import ring_of
 from lab.sim.scene.places import Places
-from lab.sim.scene.reach import ring_of
 from lab.sim.scene.scene_check import check_apart, places_of
 from lab.tasks.robot_fields import RobotSettings
 from lab.tasks.task import Task

@@ -193,8 +193,7 @@ def _meshes(folder: Path, sound: Path) -> None:
 
 def _exported(folder: Path, sound: Path) -> None:
     from lab.export import FORMATS
-    from lab.export.options import Options
-    from lab.export.program import Program
+    from lab.export.program import Options, Program
 
     program = Program.load(sound / "run")
     for name, form in FORMATS.items():
@@ -230,8 +229,8 @@ def _many_policies(folder: Path, sound: Path) -> None:
 
 
 def _carried(folder: Path, sound: Path) -> None:
-    from lab.sequencing.methods.carried_over_weights import DEFAULT
-    from lab.tasks.carried_policy import write_policy
+    from lab.sequencing.methods.carried_over_policy import DEFAULT
+    from lab.tasks.sequencing import write_policy
 
     write_policy(folder / "carried.json", DEFAULT)
 
@@ -338,7 +337,7 @@ def _world() -> Any:
 
 
 def _answers(path: Path) -> object:
-    from lab.advice.answers_file import answers_of
+    from lab.advice.table_level import answers_of
 
     return answers_of(path, _world())
 
@@ -374,8 +373,7 @@ def _run(path: Path) -> object:
 
 def _program(path: Path) -> object:
     from lab.export import FORMATS
-    from lab.export.options import Options
-    from lab.export.program import Program
+    from lab.export.program import Options, Program
 
     program = Program.load(path.parent)
     if len(program.carried.actions) > MOST_ACTIONS:  # to write them is real work
@@ -453,7 +451,7 @@ def _index(path: Path) -> object:
 
 
 def _carried_read(path: Path) -> object:
-    from lab.tasks.carried_policy import read_policy
+    from lab.tasks.sequencing import read_policy
 
     return read_policy(path)
 

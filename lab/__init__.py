@@ -1,6 +1,6 @@
 """Teaching Lab: a robot that learns sub-tasks with advice, orders them and carries them out in physics.
 
-What is listed in `__all__` is stable: see docs/api.md. Each is loaded when it is touched.
+What is listed in `__all__` is stable: see docs/reference.md. Each is loaded when it is touched.
 """
 
 TYPE_CHECKING = False  # as typing's, which would be all that `import lab` takes time for

@@ -15,7 +15,7 @@ from lab.sequencing.cell.chance import NO_CHANCE, Chance
 from lab.sequencing.cell.objectives import MAKESPAN, check_objective
 from lab.sequencing.methods import session_kernels
 from lab.sequencing.methods.monte_carlo import MonteCarlo
-from lab.sequencing.methods.session_arrays import Found, session_arrays, value_table
+from lab.sequencing.methods.session_kernels import Found, session_arrays, value_table
 from lab.sequencing.methods.session_readable import SessionLearner, learn
 from lab.sequencing.methods.srl import Srl
 from lab.sequencing.methods.state_keys import Keys

@@ -90,7 +90,7 @@ def test_the_reference_names_what_is_there() -> None:
 
 
 def test_the_stable_names_are_those_of_the_package() -> None:
-    told = (DOCS / "api.md").read_text(encoding="utf-8").split("## Stable names")[1]
+    told = (DOCS / "reference.md").read_text(encoding="utf-8").split("## Stable names")[1]
     rows = [line.split("|")[1] for line in told.splitlines() if line.startswith("| `")]
     assert sorted(name for row in rows for name in re.findall(r"`(\w+)`", row)) == sorted(lab.__all__)
 

@@ -22,7 +22,7 @@ from lab.learning.members import Member
 from lab.learning.requests import Advisor
 from lab.learning.selection import SELECTIONS, greedy
 from lab.learning.updates import UPDATES
-from lab.learning.updates.one_step import QLearning
+from lab.learning.updates.tabular import QLearning
 from lab.sequencing import SEQUENCERS, Sequencer
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.methods.fifo import fifo

@@ -40,14 +40,14 @@ ALONE: dict[str, set[str]] = (
         "cv2": {"lab.vision.opencv"},
         "PIL": {"lab.view.movie"},
         "numba": {"lab.learning.compiled"},  # what is kept of it is kept in one place
-        "ortools": {"lab.sequencing.methods.ortools_cp_sat"},  # without pandas
+        "ortools": {"lab.sequencing.methods.cp_sat_solver"},  # without pandas
         "starlette": {"lab.view.server", "lab.view.server_page"},
-        "uvicorn": {"lab.view.server", "lab.view.server_limits"},
+        "uvicorn": {"lab.view.server", "lab.view.server_page"},
         "websockets": set(),  # uvicorn's
         "jinja2": {"lab.studies.report"},
         "fsspec": {"lab.toolbox.remote_place"},
         "s3fs": set(),  # fsspec's
-        "optuna": {"lab.studies.tuning_search"},
+        "optuna": {"lab.studies.tuning"},
         "joblib": {"lab.studies.runner"},  # to work in several processes; its files are pickles, and nobody reads those
         "psutil": {"lab.studies.runner"},
     }
@@ -301,7 +301,7 @@ def faults(module: str, source: str) -> list[str]:
         (
             "lab.sequencing.methods.exact",
             "from ortools.sat.python import cp_model",
-            "allowed in ['lab.sequencing.methods.ortools_cp_sat']",
+            "allowed in ['lab.sequencing.methods.cp_sat_solver']",
         ),
         ("lab.sequencing.methods.fifo", "def f():\n    import jinja2", "allowed in ['lab.studies.report']"),
         ("lab.mdp", "import random", "allowed in no module"),

@@ -14,9 +14,8 @@ from lab.learning.requests import Advisor, Ask
 from lab.learning.selection import softmax
 from lab.learning.simulated_advice import tau_schedule
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.methods.exact import optimum
-from lab.sequencing.methods.exact_values import ExactValues
-from lab.sequencing.request import SequenceRequest
+from lab.sequencing.methods.exact import ExactValues, optimum
+from lab.sequencing.search import SequenceRequest
 
 
 def signature_of(cell: Cell, objective: str) -> str:

@@ -7,10 +7,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Unpack
 
-from lab.api.data_frames import data_frame
-from lab.api.options import Advisors, ToolboxOrPlace, advising_of, toolbox_of
+from lab.api.options import Advisors, Settings, ToolboxOrPlace, advising_of, data_frame, toolbox_of
 from lab.api.pictures import Picture
-from lab.api.settings import Settings
 from lab.errors import BadInput
 from lab.learning.problem import Problem
 from lab.learning.session_result import SessionResult

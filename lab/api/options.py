@@ -1,14 +1,72 @@
-"""What the functions take beside their own arguments: options by name, advisors, toolboxes."""
+"""The options that the functions of `import lab` share: settings, toolboxes, own code, and data frames on request."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypedDict
 
 from lab.advice.advising import Advising
 from lab.errors import unknown
+from lab.learning.gates import Gate
 from lab.learning.requests import Advisor, Ask
+from lab.learning.updates import Update
+from lab.optional import optional
 from lab.toolbox.registry import Toolbox
+
+if TYPE_CHECKING:
+    import pandas
+
+
+def data_frame(rows: Iterable[Mapping[str, Any]]) -> "pandas.DataFrame":
+    """Rows as a DataFrame. BadInput when pandas is not installed."""
+    with optional("to_dataframe()"):
+        from pandas import DataFrame
+    return DataFrame.from_records([dict(row) for row in rows])
+
+
+# ---- settings ---------------------------------------------------------------------------------------------------------
+
+
+class Settings(TypedDict, total=False):
+    """The settings of `LearnerSettings` and `GateSettings`; those that are not given stay as the problem's file has them.
+
+    learner and gate: a name, or a class of one's own.
+    """
+
+    learner: str | type[Update]
+    alpha: float
+    discount: float
+    trace: float
+    replacing: bool
+    tilings: int
+    start_value: float
+    planning: int
+    selection: str
+    exploration: float
+    beta: float
+    episodes: int
+    max_steps: int
+    count_start: bool
+    gate: str | type[Gate]
+    lambda_threshold: float
+    omega: int
+    first_episode: int
+    window: int
+    psi: float
+    spread: float
+    rate: float
+    fading: float
+    consistency: float
+    enough_steps: float
+    ensemble: int
+    budget: int
+    judge_unhelped: bool
+    spare_best: bool
+    memory: bool
+
+
+# ---- options ----------------------------------------------------------------------------------------------------------
+
 
 OneAdvisor = str | Advisor | Ask
 Advisors = OneAdvisor | Sequence[OneAdvisor] | None

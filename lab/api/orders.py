@@ -7,8 +7,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
-from lab.api.data_frames import data_frame
-from lab.api.options import ToolboxOrPlace, checked, toolbox_of
+from lab.api.options import ToolboxOrPlace, checked, data_frame, toolbox_of
 from lab.api.pictures import Picture
 from lab.errors import BadInput
 from lab.production.sequencing_job import SequencingOptions, sequence_cell, sequenced_named

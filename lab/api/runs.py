@@ -8,8 +8,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
-from lab.api.data_frames import data_frame
-from lab.api.options import Advisors, ToolboxOrPlace, advising_of, checked, several, toolbox_of
+from lab.api.options import Advisors, ToolboxOrPlace, advising_of, checked, data_frame, several, toolbox_of
 from lab.api.pictures import Page, Picture
 from lab.errors import BadInput
 from lab.files import check_out
@@ -19,7 +18,7 @@ from lab.production.run import run as run_task
 from lab.production.run_advice import RunAdvice
 from lab.production.run_journal import RunJournal
 from lab.production.run_options import RunOptions, begun
-from lab.sequencing.cell.schedule_rows import rows_of
+from lab.sequencing.cell.schedule import rows_of
 from lab.skills.prepared_scene import prepare
 from lab.tasks.task_file import load
 from lab.teaching.teacher import Teacher

@@ -43,7 +43,7 @@ def seen(what: str | Path | GridWorld | Task, asked: Asked) -> "Iterator[tuple[s
     from lab.skills.prepared_scene import lay_out
     from lab.tasks.cell_file import CellFile
     from lab.tasks.task_file import load, load_any
-    from lab.view.still import Still
+    from lab.view.rasterizer import Still
     from lab.view.world_bodies import WorldBodies
 
     found = load_any(str(what)) if isinstance(what, str | Path) else what

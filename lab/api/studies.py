@@ -6,8 +6,7 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from lab.api.data_frames import data_frame
-from lab.api.options import Advisors, OneAdvisor, several
+from lab.api.options import Advisors, OneAdvisor, data_frame, several
 from lab.api.pictures import Picture
 from lab.learning.tuned_ranges import USUAL
 from lab.studies import checked, study_of

@@ -8,11 +8,54 @@ from io import TextIOWrapper
 from typing import Annotated, Any, NamedTuple, cast
 
 import typer
+from typer.core import TyperCommand, TyperGroup
 
 from lab import __version__
-from lab.cli.command_group import CommandGroup, UnloadedCommand
 from lab.cli.output import begin, end, fail, silence, write
 from lab.errors import LabError, out_of_memory
+
+
+class UnloadedCommand(TyperCommand):
+    """A command of which no more is known than its name, the first line of its help, and what loads the rest of it."""
+
+    def __init__(self, name: str, help_text: str, load: Callable[[], Any]) -> None:
+        super().__init__(name, help=help_text)
+        self.load = load
+
+
+class CommandGroup(TyperGroup):
+    """Commands, loaded when they are typed; its help is drawn as typer draws one, without rich's Markdown."""
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> tuple[str | None, Any, list[str]]:
+        """The name, the command and the words that follow."""
+        name, command, rest = super().resolve_command(ctx, args)
+        return name, command.load() if isinstance(command, UnloadedCommand) else command, rest
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """Prints the help of the group."""
+        from rich.console import Console
+        from rich.padding import Padding
+        from rich.panel import Panel
+        from rich.table import Table
+        from rich.text import Text
+
+        options = [record for param in self.get_params(ctx) if (record := param.get_help_record(ctx))]
+        commands = [(name, command.help or "") for name, command in self.commands.items()]
+        console = Console(highlight=False)
+        usage = self.get_usage(ctx).split(" ", 1)
+        console.print(Padding(Text.assemble((usage[0], "yellow"), f" {usage[1]}"), 1), style="bold")
+        console.print(Padding(Text(self.help or ""), (0, 1, 1, 1)))
+        for title, rows in (("Options", options), ("Commands", commands)):
+            table = Table(show_header=False, box=None, expand=True, pad_edge=False)
+            table.add_column(style="bold cyan", no_wrap=True)
+            table.add_column(ratio=1)
+            for name, meaning in rows:
+                table.add_row(name, Text(meaning))
+            console.print(Panel(table, title=title, title_align="left", border_style="dim"))
+
+
+# ---- app --------------------------------------------------------------------------------------------------------------
+
 
 INTERRUPTED = 130
 STOPPED = "stopped by Ctrl-C"
@@ -116,27 +159,27 @@ COMMANDS = {  # what is typed after `lab` -> the command
         "lab toolbox verify",
     ),
     "toolbox evaluate": Command(
-        "toolbox_evaluate",
+        "toolbox",
         "Carry a policy out in physics, in scenes drawn from the seed on: how often it does what it is for, for its log.",
         "lab toolbox evaluate 'insert at toaster 1a2b3c4d' --scenes 50",
     ),
     "toolbox card": Command(
-        "toolbox_archive",
+        "toolbox",
         "A policy's card: what it does, where and with whose advice it was learned, its curve and its values as pictures.",
         "lab toolbox card 'insert at toaster 1a2b3c4d' --out insert-card",
     ),
     "toolbox export": Command(
-        "toolbox_archive",
+        "toolbox",
         "Policies as one archive; the same policies give the same bytes.",
         "lab toolbox export --out my-skills.zip",
     ),
     "toolbox import": Command(
-        "toolbox_archive",
+        "toolbox",
         "Bring in policies that somebody gave you: every one is checked before the first is kept, and all are kept or none.",
         "lab toolbox import my-skills.zip",
     ),
     "toolbox publish": Command(
-        "toolbox_archive",
+        "toolbox",
         "A folder as the Hugging Face Hub has it: model card, safetensors, metadata, pictures. Nothing is sent anywhere.",
         "lab toolbox publish 'insert at toaster 1a2b3c4d' --out insert --license mit",
     ),
@@ -210,7 +253,7 @@ def guarded(function: Callable[..., None]) -> Callable[..., None]:
         except OSError as error:  # a full disk, a folder taken away meanwhile
             end(str(error), 1)
         except Exception as error:
-            from lab.plugins.sources import blame
+            from lab.plugins.family import blame
 
             why = blame(error) or out_of_memory(error)
             if why is None:

@@ -13,9 +13,8 @@ if TYPE_CHECKING:
     from lab.audit.audit import audit, kept_evidence
     from lab.export import FORMATS
     from lab.export.commands import Path as Lines
-    from lab.export.options import POSITIONS, Options
     from lab.export.play import deviation
-    from lab.export.program import Program
+    from lab.export.program import POSITIONS, Options, Program
     from lab.files import check_out, tasks_folder, write_whole
     from lab.gym import parse_name
     from lab.learning.gates import GATES
@@ -45,7 +44,7 @@ if TYPE_CHECKING:
     from lab.seat.page.teaching_page import SeatPage
     from lab.seat.run_progress import RunProgress
     from lab.seat.terminal.console_app import OperatorConsole
-    from lab.seat.terminal.console_plain import PlainConsole
+    from lab.seat.terminal.console_view import PlainConsole
     from lab.seat.terminal.line_reader import default_reader
     from lab.seat.terminal.new_task_questions import ask
     from lab.seat.terminal.prompt import TeachingPrompt
@@ -65,8 +64,7 @@ if TYPE_CHECKING:
     from lab.studies.compared import Compared, compared
     from lab.studies.runner import Job
     from lab.studies.tuning import FILE, Tuning, tuned
-    from lab.tasks.cell_file import CellFile
-    from lab.tasks.cell_toml import toml_of
+    from lab.tasks.cell_file import CellFile, toml_of
     from lab.tasks.grid_world import write_random
     from lab.tasks.instances import INSTANCES, pyjobshop
     from lab.tasks.instances import Asked as InstanceAsked
@@ -89,11 +87,10 @@ if TYPE_CHECKING:
     from lab.teaching.subjects import subject_of
     from lab.teaching.teacher import Teacher
     from lab.toolbox.archive import pack, take_in, unpack
-    from lab.toolbox.history import EVALUATED
     from lab.toolbox.hub_folder import read_folder
     from lab.toolbox.policy import Policy
     from lab.toolbox.registry import Toolbox
-    from lab.toolbox.versions import Version
+    from lab.toolbox.versions import EVALUATED, Version
     from lab.view.canvas import check_picture
     from lab.view.cell_plan import draw_cell
     from lab.view.cyclic_summary import cyclic_summary
@@ -137,9 +134,8 @@ TABLE = {
     "lab.audit.audit": ("audit", "kept_evidence"),
     "lab.export": ("FORMATS",),
     "lab.export.commands": ("Path as Lines",),
-    "lab.export.options": ("Options", "POSITIONS"),
+    "lab.export.program": ("Options", "POSITIONS", "Program"),
     "lab.export.play": ("deviation",),
-    "lab.export.program": ("Program",),
     "lab.files": ("check_out", "tasks_folder", "write_whole"),
     "lab.gym": ("parse_name",),
     "lab.learning.gates": ("GATES",),
@@ -167,7 +163,7 @@ TABLE = {
     "lab.seat.page.teaching_page": ("SeatPage",),
     "lab.seat.run_progress": ("RunProgress",),
     "lab.seat.terminal.console_app": ("OperatorConsole",),
-    "lab.seat.terminal.console_plain": ("PlainConsole",),
+    "lab.seat.terminal.console_view": ("PlainConsole",),
     "lab.seat.terminal.line_reader": ("default_reader",),
     "lab.seat.terminal.new_task_questions": ("ask",),
     "lab.seat.terminal.prompt": ("TeachingPrompt",),
@@ -186,8 +182,7 @@ TABLE = {
     "lab.studies.compared": ("Compared", "compared"),
     "lab.studies.runner": ("Job",),
     "lab.studies.tuning": ("FILE", "tuned", "Tuning"),
-    "lab.tasks.cell_file": ("CellFile",),
-    "lab.tasks.cell_toml": ("toml_of",),
+    "lab.tasks.cell_file": ("CellFile", "toml_of"),
     "lab.tasks.grid_world": ("write_random",),
     "lab.tasks.instances": ("Asked as InstanceAsked", "INSTANCES", "pyjobshop"),
     "lab.tasks.new_task": ("file_of", "MACHINE", "new_task"),
@@ -207,11 +202,10 @@ TABLE = {
     "lab.teaching.subjects": ("subject_of",),
     "lab.teaching.teacher": ("Teacher",),
     "lab.toolbox.archive": ("pack", "take_in", "unpack"),
-    "lab.toolbox.history": ("EVALUATED",),
+    "lab.toolbox.versions": ("EVALUATED", "Version"),
     "lab.toolbox.hub_folder": ("read_folder",),
     "lab.toolbox.policy": ("Policy",),
     "lab.toolbox.registry": ("Toolbox",),
-    "lab.toolbox.versions": ("Version",),
     "lab.view.canvas": ("check_picture",),
     "lab.view.cell_plan": ("draw_cell",),
     "lab.view.cyclic_summary": ("cyclic_summary",),

@@ -41,7 +41,7 @@ MethodName = Annotated[
     str | None,
     typer.Option(
         "--method",
-        help="Who finds the order: {methods}; default: as the file says.",
+        help="The method that finds the order: {methods}; default: as the file says.",
         autocompletion=offers("methods"),
         callback=from_files("methods"),
     ),

@@ -1,14 +1,14 @@
 """`lab sequence`: the high level alone."""
 
+from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from lab.cli import deferred
-from lab.cli.cyclic import cyclic_found
 from lab.cli.families import offers
-from lab.cli.lessons import lesson_seat, say_read, sequenced
+from lab.cli.lessons import lesson_seat, say_read, sequenced, teacher_of
 from lab.cli.options import (
     MAX_EPISODES,
     MAX_SESSIONS,
@@ -25,6 +25,36 @@ from lab.cli.options import (
 )
 from lab.cli.output import end, show
 from lab.errors import BadInput
+
+OF_A_CYCLE = ("task", "case", "toasts", "parts", "seed", "layout", "robots")
+
+
+def cyclic_found(
+    given: "deferred.OrderOptions", toolbox: str | None, files: dict[str, Path], parts_per_cycle: int | None
+) -> dict[str, Any]:
+    """The document of the shortest cycle; BadInput for options that say how an order is looked for, which a cycle is not."""
+    none = asdict(deferred.OrderOptions())
+    for name, value in asdict(given).items():
+        if name not in OF_A_CYCLE and value != none[name]:
+            said = "" if value is True else f" {value}"
+            raise BadInput(
+                f"--cyclic beside --{name}{said}: the shortest cycle of its parts is found and proven, by its period alone"
+            )
+    if "plot" in files:
+        raise BadInput(f"--cyclic beside --plot {files['plot']}: a cycle has no episodes; --gantt draws it")
+    if "schedule" in files:
+        raise BadInput(f"--cyclic beside --schedule {files['schedule']}: a cycle has no end: --gantt draws it")
+    options = deferred.LessonOptions(advisors=deferred.DEFAULT_ADVISORS, seed=given.seed)
+    with lesson_seat(()) as seat, seat.progress:
+        teacher = teacher_of(toolbox, options, seat)
+        beside = given.beside
+        wanted = deferred.CyclicOptions(
+            given.case, given.toasts, given.parts, given.seed, beside.layout, beside.robots, parts_per_cycle
+        )
+        return deferred.cyclic_named(given.task, wanted, teacher, files)
+
+
+# ---- sequence ---------------------------------------------------------------------------------------------------------
 
 
 def sequence(

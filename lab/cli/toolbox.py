@@ -1,15 +1,160 @@
 """`lab toolbox`: the policies that were learned."""
 
-from collections.abc import Callable
-from typing import Annotated, Any
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from lab.cli import deferred
 from lab.cli.families import offers
-from lab.cli.options import Json, ToolboxPlace
-from lab.cli.output import end, show
+from lab.cli.options import Json, Seed, ToolboxPlace
+from lab.cli.output import complain, console, end, show
 from lab.errors import BadInput, counted, unknown
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+
+OutFolder = Annotated[Path, typer.Option("--out", help="The folder for its files.")]
+
+
+def toolbox_card(name: str, out: OutFolder, toolbox: ToolboxPlace = None, as_json: Json = False) -> None:
+    """A policy's card: what it does, where and with whose advice it was learned, its curve and its values as pictures."""
+    policy, events = _told(deferred.Toolbox(toolbox), name)
+    files = deferred.write_card(policy, events, out)
+    show(
+        {"policy": policy.name, "folder": str(out), "files": files},
+        as_json,
+        lambda d: f"the card: {d['files'][deferred.CARD]}",
+    )
+
+
+def toolbox_publish(
+    name: str,
+    out: OutFolder,
+    license_name: Annotated[
+        str, typer.Option("--license", help="Under which others may use it, as the Hub names it, such as mit.")
+    ] = "unknown",
+    toolbox: ToolboxPlace = None,
+    as_json: Json = False,
+) -> None:
+    """A folder as the Hugging Face Hub has it: model card, safetensors, metadata, pictures. Nothing is sent anywhere."""
+    policy, events = _told(deferred.Toolbox(toolbox), name)
+    files = deferred.publish(policy, events, license_name, out)
+    document = {"policy": policy.name, "folder": str(out), "license": license_name, "files": files}
+    push = f"hf upload YOUR-NAME/REPOSITORY {out} pushes it to the Hub"
+    show(document, as_json, lambda d: f"{counted(len(files), 'file')} in {d['folder']}; {push}")
+
+
+def toolbox_export(
+    out: Annotated[Path, typer.Option("--out", help="The .zip file to write.")],
+    names: Annotated[list[str] | None, typer.Argument(help="Which policies; none: all of them.")] = None,
+    toolbox: ToolboxPlace = None,
+    as_json: Json = False,
+) -> None:
+    """Policies as one archive; the same policies give the same bytes."""
+    box = deferred.Toolbox(toolbox)
+    wanted = list(dict.fromkeys(names or [row["name"] for row in box.list()]))
+    if not wanted:
+        raise BadInput(f"toolbox {box.address}: there is nothing to export")
+    content, manifest = deferred.pack(_told(box, name)[0] for name in wanted)
+    damaged = [] if names else box.index()[1]
+    try:
+        deferred.write_whole(out, content)
+    except OSError as error:
+        raise BadInput(f"archive '{out}' (--out) cannot be written: {error.strerror or error}") from error
+    for reason in damaged:
+        complain(f"left out: {reason}")
+    document = {"file": str(out), "bytes": len(content), "damaged": damaged}
+    document |= {"policies": [row.model_dump() for row in manifest.files]}
+    exported = counted(len(manifest.files), "policy").replace("policys", "policies")
+    show(document, as_json, lambda d: f"{d['file']}: {exported}, {d['bytes']} bytes")
+
+
+def toolbox_import(
+    file: Annotated[Path, typer.Argument(help="An archive of lab toolbox export, or a folder of lab toolbox publish.")],
+    replace: Annotated[
+        bool, typer.Option("--replace", help="Also where another policy of that name is there already.")
+    ] = False,
+    toolbox: ToolboxPlace = None,
+    as_json: Json = False,
+) -> None:
+    """Bring in policies that somebody gave you: every one is checked before the first is kept, and all are kept or none."""
+    box = deferred.Toolbox(toolbox)
+    policies = [deferred.read_folder(file)] if file.is_dir() else deferred.unpack(file)
+    taken = deferred.take_in(box, policies, replace)
+    document = {"file": str(file), "toolbox": box.address, **taken._asdict()}
+
+    def told(d: dict[str, Any]) -> str:
+        words = {"imported": "imported", "replaced": "in place of another", "unchanged": "there already"}
+        return "\n".join(f"{words[kind]}: {name}" for kind in words for name in d[kind])
+
+    show(document, as_json, told)
+
+
+def _told(box: "deferred.Toolbox", name: str) -> "tuple[deferred.Policy, list[dict[str, Any]]]":
+    """A policy and its log."""
+    shown = box.show(name)
+    return box.load(shown["file"]), shown["events"]
+
+
+# ---- toolbox evaluate -------------------------------------------------------------------------------------------------
+
+
+MAX_SCENES = 100_000
+
+
+def toolbox_evaluate(
+    name: str,
+    scenes: Annotated[int, typer.Option("--scenes", min=1, max=MAX_SCENES, help="How many scenes are drawn.")] = 20,
+    task: Annotated[
+        str | None, typer.Option("--task", help="Whose scenes; default: the task that it was learned in.")
+    ] = None,
+    skill: Annotated[
+        str | None, typer.Option("--skill", help="The skill that it is for, where its name does not tell.")
+    ] = None,
+    seed: Seed = 0,
+    toolbox: ToolboxPlace = None,
+    as_json: Json = False,
+) -> None:
+    """Carry a policy out in physics, in scenes drawn from the seed on: how often it does what it is for, for its log."""
+    box = deferred.Toolbox(toolbox)
+    policy = box.load(box.show(name)["file"])
+    found = deferred.task_of(policy, task)
+    wanted = deferred.skill_of(policy, found, skill)
+    with deferred.counting(console(), "scenes") as told:
+        evaluation = deferred.evaluate(policy, found, wanted, scenes, seed, told)
+    document = evaluation.to_json()
+    if document["scenes"]:
+        box.note(policy.name, deferred.EVALUATED, **evaluation.facts())
+    show(document, as_json, evaluation_summary)
+    if evaluation.interrupted:
+        end(f"stopped by Ctrl-C after {counted(len(evaluation.scenes), 'scene')} of {scenes}", 130)
+    if not document["scenes"]:
+        end(f"in none of {counted(scenes, 'drawn scene')} can '{wanted}' reach its goal", 1)
+
+
+def evaluation_summary(found: Mapping[str, Any]) -> "RenderableType":
+    """What `lab toolbox evaluate` shows, from its JSON document: the share, and a line for each scene that failed."""
+    from rich.console import Group
+    from rich.text import Text
+
+    scenes = f"{counted(found['scenes'], 'drawn scene')} of {found['task']} from seed {found['seed']}"
+    lines = [f"'{found['policy']}' as '{found['skill']}': {found['successes']} of {scenes} succeeded"]
+    if found["success_percent"] is not None:
+        low, high = found["ci95"]
+        lines.append(f"success {found['success_percent']:.1f} % (95 % interval {low:.1f} to {high:.1f})")
+    if found["mean_sim_s"] is not None:
+        lines.append(f"a success takes {found['mean_sim_s']:.1f} s on average")
+    if found["unsolvable"]:
+        lines.append(f"not counted: {counted(found['unsolvable'], 'scene')} in which nobody could reach the goal")
+    failed = [row for row in found["rows"] if not row["success"]]
+    return Group(*map(Text, lines), *(Text(f"seed {row['seed']}: {row['reason']}", "red") for row in failed))
+
+
+# ---- toolbox ----------------------------------------------------------------------------------------------------------
+
 
 Name = Annotated[str, typer.Argument(help="A policy's name; lab toolbox list shows them.")]
 

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 
 from lab.export import jbi, trajectory_csv, trajectory_json, urscript
 from lab.export.commands import Command
-from lab.export.options import Options
-from lab.export.program import Program
+from lab.export.program import Options, Program
 from lab.export.timed import TimedPoints
 from lab.sim.arms.arm import Arm
 

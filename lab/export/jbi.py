@@ -48,8 +48,7 @@ from lab.export.inform import (
     Wait,
     read_job,
 )
-from lab.export.options import GRIPPER, PULSE_S, Options, done_input, reset_output, start_output
-from lab.export.program import Array, Program
+from lab.export.program import GRIPPER, PULSE_S, Array, Options, Program, done_input, reset_output, start_output
 from lab.sim.arms.arm import Arm
 from lab.sim.arms.tool_path import ROUNDINGS_M, YAW_ARM
 

@@ -6,8 +6,7 @@ from io import StringIO
 from math import isfinite
 
 from lab.errors import BadInput
-from lab.export.options import Options
-from lab.export.program import Program
+from lab.export.program import Options, Program
 from lab.export.timed import DIGITS, Point, TimedPoints, timed
 from lab.sim.arms.arm import Arm
 

@@ -7,8 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field, ValidationError
 
 from lab.errors import BadInput
-from lab.export.options import Options
-from lab.export.program import Program
+from lab.export.program import Options, Program
 from lab.export.timed import Point, TimedPoints, timed
 from lab.sim.arms.arm import Arm
 from lab.tasks.record import Record

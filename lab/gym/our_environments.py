@@ -18,7 +18,7 @@ from lab.sequencing.simulate.run import Run
 from lab.tasks.cell_file import order_from_word, toast_case
 from lab.tasks.task import TAUGHT_WITH
 from lab.tasks.task_file import load, load_cell, load_world
-from lab.view.grid_planes import GridPlanes
+from lab.view.value_levels import GridPlanes
 
 ROOM = 10  # an episode in a cell may take so many times the decisions that its parts need at most
 METADATA: dict[str, Any] = {"render_modes": ["ansi"], "render_fps": 4}

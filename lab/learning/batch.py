@@ -14,7 +14,7 @@ from lab.learning.advice_memory import Memory, places
 from lab.learning.chance_table import ChanceTable
 from lab.learning.environment import Environment, TableEnvironment
 from lab.learning.gates import GATES
-from lab.learning.gates.gate_rules import ASKS_WHERE_TABLES_DIFFER, WEIGHS_NOTHING
+from lab.learning.gates.gate import ASKS_WHERE_TABLES_DIFFER, WEIGHS_NOTHING
 from lab.learning.gates.heard import Heard
 from lab.learning.kernels import linear_loop, records
 from lab.learning.kernels.records import LANES

@@ -54,31 +54,29 @@ class LearnerSettings:
 
     learner: Annotated[str, doc("how it learns")] = "q-lambda"
     alpha: Annotated[float, Gt(0), Le(1), doc("learning rate")] = 0.95
-    discount: Annotated[float, Gt(0), Le(1), doc("gamma: what the next step counts for, compared with this one")] = 0.99
+    discount: Annotated[float, Gt(0), Le(1), doc("gamma: the weight of the next step, compared with this one")] = 0.99
     trace: Annotated[float, Ge(0), Le(1), doc("lambda, of the learners with traces")] = 0.5
     replacing: Annotated[bool, doc("a trace is set to 1 on each visit instead of growing by 1")] = False
     tilings: Annotated[
         int,
         Ge(1),
         Le(64),
-        doc("tile coding: values are sums over so many shifted grids of tiles, each so many cells wide; 1: a table"),
+        doc("tile coding: the number of shifted grids of tiles, and the width of a tile in cells; 1: a table"),
     ] = 1
     start_value: Annotated[
         float,
         Ge(-1_000_000),
         Le(1_000_000),
-        doc(
-            "what every move is thought to be worth at first: above the truth it tries all out, below it keeps to what it knows"
-        ),
+        doc("initial value of every action: optimistic values, above the true ones, explore; pessimistic ones exploit"),
     ] = 0.0
-    planning: Annotated[int, Ge(0), Le(1000), doc("earlier moves that dyna-q learns from again after each one")] = 5
+    planning: Annotated[int, Ge(0), Le(1000), doc("earlier moves that dyna-q replays after each move")] = 5
     selection: Annotated[str, doc("how it chooses its actions")] = "softmax"
     exploration: Annotated[float, Gt(0), Le(1_000_000), doc("temperature, or epsilon, of the first episode")] = 1.0
     beta: Annotated[float, Ge(0), Le(100), doc("decay: in episode n it explores by exploration * n**-beta")] = 1.3
     episodes: Annotated[int, Ge(1), Le(1_000_000), doc("session length N")] = 200
-    max_steps: Annotated[int, Ge(1), Le(1_000_000), doc("steps after which an episode is broken off")] = 200
+    max_steps: Annotated[int, Ge(1), Le(1_000_000), doc("steps after which an episode is truncated")] = 200
     count_start: Annotated[
-        bool, doc("the start counts as a step, as in the thesis's listing: a way of 12 moves has 13 steps")
+        bool, doc("the start counts as a step, as in the thesis's listing: a path of 12 moves has 13 steps")
     ] = False
 
     def __post_init__(self) -> None:
@@ -100,22 +98,22 @@ class GateSettings:
     first_episode: Annotated[int, Ge(1), Le(1_000_000), doc("X: the first episode that may ask")] = 30
     window: Annotated[int, Ge(1), Le(100_000), doc("K: episodes in a moving average")] = 5
     psi: Annotated[
-        float, Ge(0), Le(1_000_000), doc("Psi: width of action values that ia, combined and importance compare with")
+        float, Ge(0), Le(1_000_000), doc("Psi: distance of action values at which ia, combined and importance decide")
     ] = 1.0
-    spread: Annotated[float, Ge(0), Le(1_000_000), doc("deviation of its tables that lets uncertainty ask")] = 0.1
+    spread: Annotated[float, Ge(0), Le(1_000_000), doc("deviation of its tables at which uncertainty asks")] = 0.1
     rate: Annotated[float, Ge(0), Le(1), doc("share of the steps that random asks about")] = 0.1
     fading: Annotated[
-        float, Ge(0), Le(1), doc("by what fading multiplies the share of the steps that it asks about, each episode")
+        float, Ge(0), Le(1), doc("factor by which the share of the steps that fading asks about falls, each episode")
     ] = 0.97
-    consistency: Annotated[float, Gt(0.5), Lt(1), doc("how often shaping takes an answer to be right")] = 0.9
+    consistency: Annotated[float, Gt(0.5), Lt(1), doc("shaping's probability that an answer is right")] = 0.9
     enough_steps: Annotated[float, Gt(0), Le(1_000_000), doc("mean step count that satisfies cq")] = 50.0
-    ensemble: Annotated[int, Ge(2), Le(100), doc("tables of uncertainty")] = 5
+    ensemble: Annotated[int, Ge(2), Le(100), doc("number of tables of uncertainty")] = 5
     budget: Annotated[int, Ge(0), Le(1_000_000_000), doc("helped steps that any gate may use in a session")] = (
         1_000_000_000
     )
     judge_unhelped: Annotated[
         bool,
-        doc("an episode that was open for advice and got none is judged, too (the thesis's listing; its words: not)"),
+        doc("an episode that was open for advice and got none is judged, too (the thesis's listing, not its text)"),
     ] = True
     spare_best: Annotated[bool, doc("an episode as good as the best so far is no mislead")] = False
     memory: Annotated[bool, doc("what was shown, or found alone, is remembered and practised without asking again")] = (

@@ -36,8 +36,7 @@ from lab.production.taught import Relearner
 from lab.production.transfers import Transfers, first_spots
 from lab.production.trouble import RunStopped, Trouble
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.cell.schedule import Schedule
-from lab.sequencing.cell.schedule_rows import rows_of
+from lab.sequencing.cell.schedule import Schedule, rows_of
 from lab.sequencing.simulate.follow import simulate
 from lab.sim.frames import Recording
 from lab.sim.world import World

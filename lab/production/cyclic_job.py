@@ -15,8 +15,7 @@ from lab.production.taught import teach_all
 from lab.sequencing.cell.cell import MAX_PARTS, Cell
 from lab.sequencing.cyclic.cycle import Cycle
 from lab.sequencing.cyclic.several import best_rhythm
-from lab.sequencing.cyclic.steady import steady
-from lab.sequencing.cyclic.unrolled import of_parts, unrolled
+from lab.sequencing.cyclic.unrolled import of_parts, steady, unrolled
 from lab.sequencing.methods.exact import optimum
 from lab.skills.prepared_scene import prepare
 from lab.tasks.cell_file import CellFile, order_from_word, toast_case

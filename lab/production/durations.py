@@ -21,8 +21,7 @@ from lab.sim.scene.places import Layout
 from lab.sim.scene.scene import ABOVE_FOOT_M
 from lab.sim.world import TIME_STEP, World, engine
 from lab.skills import Skill
-from lab.skills.precedences import precedences
-from lab.skills.prepared_scene import Prepared
+from lab.skills.prepared_scene import Prepared, precedences
 from lab.skills.skill import Status, stand_below
 from lab.skills.skillset import Carried, Pair, SkillSet, products, stations, ways_of
 from lab.tasks.task import Order, Task

@@ -21,8 +21,7 @@ from lab.production.order_learning import OrderLearning
 from lab.production.outcome import Outcome
 from lab.production.taught import Taught
 from lab.sequencing.cell.cell import EVERY_PLAN
-from lab.sequencing.cell.schedule import Schedule
-from lab.sequencing.cell.schedule_rows import csv_of, rows_of
+from lab.sequencing.cell.schedule import Schedule, csv_of, rows_of
 from lab.sequencing.cyclic.several import Rhythm
 from lab.sequencing.methods.exact import Optimum
 from lab.sequencing.search import SequenceResult
@@ -48,7 +47,7 @@ from lab.toolbox.policy import Policy
 from lab.view.gantt import gantt
 from lab.view.meshcat import replay_html
 from lab.view.plots import learning_curves, values_seen
-from lab.view.story import Mark, Story
+from lab.view.scene_data import Mark, Story
 from lab.vision import write_picture
 from lab.workers import Task, Workers
 

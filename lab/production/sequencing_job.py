@@ -27,17 +27,16 @@ from lab.sequencing.cell.objectives import (
     cost,
     stuck_cost,
 )
-from lab.sequencing.cell.schedule_rows import check_table, rows_of, write_table
+from lab.sequencing.cell.schedule import check_table, rows_of, write_table
 from lab.sequencing.methods.shared import NO_LIMITS, Limits
 from lab.sequencing.search import SAME, LearnedSequence, Reference, Search, SequenceResult
 from lab.sequencing.simulate.follow import follow, simulate, steps
-from lab.sequencing.simulate.replications import replicate
+from lab.sequencing.simulate.several import replicate
 from lab.statistics import interval
-from lab.tasks.carried_policy import read_policy
 from lab.tasks.cell_file import CellFile, order_from_word, toast_case
 from lab.tasks.grid_world import GridWorld
 from lab.tasks.instances import Asked
-from lab.tasks.sequencing import Sequencing, search_for
+from lab.tasks.sequencing import Sequencing, read_policy, search_for
 from lab.tasks.task import Task
 from lab.tasks.task_file import load_beside
 from lab.teaching.events import Event, PhaseBegan, SequenceFound, SequencingBegan, Tell, unheard

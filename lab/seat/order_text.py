@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from lab.errors import counted
 from lab.sequencing.cell.routes import part_of
-from lab.sequencing.request import SequenceRequest
+from lab.sequencing.search import SequenceRequest
 
 
 @dataclass(frozen=True)

@@ -1,20 +1,18 @@
 """What a learner shows when it asks, in lines and in plain sentences: its preference, its progress, how advice stands."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from rich.text import Text
 
 from lab.errors import counted
 from lab.learning.environment import TableEnvironment
-from lab.learning.reasons import TooSlow
-from lab.learning.requests import AdviceRequest, Standing
+from lab.learning.requests import AdviceRequest, Request, Standing, TooSlow
 from lab.learning.session_events import EpisodeEnded
 from lab.learning.settings import GateSettings
 from lab.mdp import TabularMDP
-from lab.seat.grid_text import Marks, Picture, nearest_goal, points_by_name
-from lab.seat.grid_views import StateWords
-from lab.view.grid_planes import is_map
+from lab.seat.grid_text import Marks, Picture, StateWords, nearest_goal, points_by_name
+from lab.view.value_levels import is_map
 
 GOAL, OBSTACLE, DEAD_END, NOWHERE = "to the goal", "into an obstacle", "to an end that is no goal", "nowhere"
 ALIKE = 1e-9  # chances that differ by less are the same
@@ -323,3 +321,30 @@ def misled(misleads: int, guided: int, whose: str = "Your advice") -> str:
     """ "Your advice did not help in 3 of 4 episodes"; of how many is left out where that is not known."""
     of = f"{misleads} of {counted(guided, 'episode')}" if guided >= misleads else counted(misleads, "episode")
     return f"{whose} did not help in {of}"
+
+
+# ---- path ahead -------------------------------------------------------------------------------------------------------
+
+
+class PathAhead:
+    """Moves that were typed or drawn at once, given one by one at the next questions of the episode, where they lead."""
+
+    def __init__(self, request: AdviceRequest | None = None, moves: Iterable[int] = ()) -> None:
+        self.request, self.left = request, list(moves)
+        self._state, self._step = (-1, 0) if request is None else (request.state, request.step)
+
+    def goes_on(self, request: Request) -> bool:
+        """Whether this question comes where the path leads; where no table says that, whether it is the next one."""
+        begun = self.request
+        if not self.left or begun is None or not isinstance(request, AdviceRequest):
+            return False
+        if begun.mdp is not request.mdp or begun.episode != request.episode:
+            return False
+        return request.state == self._state if is_known(request.mdp) else request.step == self._step
+
+    def step(self) -> int:
+        """The next move."""
+        assert self.request is not None
+        action = self.left.pop(0)
+        self._state, self._step = int(self.request.mdp.successor[self._state, action]), self._step + 1
+        return action

@@ -9,7 +9,7 @@ if TYPE_CHECKING:
 
     from lab.sequencing.methods.anneal import anneal
     from lab.sequencing.methods.carried_over import carried, rule_of
-    from lab.sequencing.methods.carried_over_weights import DEFAULT
+    from lab.sequencing.methods.carried_over_policy import DEFAULT
     from lab.sequencing.methods.cp_sat import cp_sat_sequencer
     from lab.sequencing.methods.exact import exact
     from lab.sequencing.methods.fifo import fifo, first_in_first_out
@@ -21,13 +21,12 @@ if TYPE_CHECKING:
     from lab.sequencing.methods.rules import RULES, dispatched
     from lab.sequencing.methods.srl import srl
     from lab.sequencing.methods.srl_improved import srl_improved
-    from lab.sequencing.methods.srl_time import srl_time
-    from lab.sequencing.methods.srl_time_reacting import reacting
+    from lab.sequencing.methods.srl_time import reacting, srl_time
 
 TABLE = {
     "lab.sequencing.methods.anneal": ("anneal",),
     "lab.sequencing.methods.carried_over": ("carried", "rule_of"),
-    "lab.sequencing.methods.carried_over_weights": ("DEFAULT",),
+    "lab.sequencing.methods.carried_over_policy": ("DEFAULT",),
     "lab.sequencing.methods.cp_sat": ("cp_sat_sequencer",),
     "lab.sequencing.methods.exact": ("exact",),
     "lab.sequencing.methods.fifo": ("fifo", "first_in_first_out"),
@@ -39,8 +38,7 @@ TABLE = {
     "lab.sequencing.methods.rules": ("RULES", "dispatched"),
     "lab.sequencing.methods.srl": ("srl",),
     "lab.sequencing.methods.srl_improved": ("srl_improved",),
-    "lab.sequencing.methods.srl_time": ("srl_time",),
-    "lab.sequencing.methods.srl_time_reacting": ("reacting",),
+    "lab.sequencing.methods.srl_time": ("reacting", "srl_time"),
     "numpy.random": ("default_rng",),
 }
 

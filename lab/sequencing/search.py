@@ -6,12 +6,36 @@ from math import inf
 from typing import TYPE_CHECKING, Literal, Protocol
 
 from lab.errors import BadInput, WorkFailed, counted, unknown
+from lab.learning.requests import Request
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import NO_CHANCE, Chance
 from lab.sequencing.cell.objectives import MAKESPAN, check_objective
+from lab.sequencing.simulate.run import Run
 
 if TYPE_CHECKING:
     from lab.sequencing.methods.carried_over_policy import CarriedPolicy
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SequenceRequest(Request):
+    """A request about which part to move next; the means of its improvement are costs. run: where the work stands; made: the
+    decisions of the episode until now.
+    """
+
+    run: Run
+    made: tuple[int, ...] = ()
+
+
+def state_of(run: Run) -> int:
+    """A number for where robot and parts are, whatever the time; as long as it takes."""
+    number = run.robot
+    for location in run.locations:
+        number = number * len(run.cell.positions) + location
+    return number
+
+
+# ---- search -----------------------------------------------------------------------------------------------------------
+
 
 FACTORS = ("A", "B")
 VALUES = ("pairs", "states")

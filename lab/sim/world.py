@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from lab.errors import WorkFailed
 from lab.sim import urdf_reader
 from lab.sim.frames import Body, Frame, Pose, Rgba, Shape
-from lab.sim.parts.part_body import seen_of, solid_of
-from lab.sim.parts.part_shape import PartShape
+from lab.sim.parts.part_shape import PartShape, seen_of, solid_of
 from lab.sim.silence import silence
 
 TIME_STEP = 1.0 / 240.0  # [s]

@@ -1,6 +1,9 @@
 """A grid that the overhead camera looks at, before one station and for one kind of part: its picture, view and survey."""
 
+from collections.abc import Callable, Hashable
+from functools import wraps
 from math import hypot
+from typing import Any, Concatenate, ParamSpec, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,11 +18,47 @@ from lab.sim.scene.blocked_cells import OUT_OF_REACH, Survey, Surveyor
 from lab.sim.scene.places import Layout, Places
 from lab.sim.scene.scene import MARKER_ABOVE, Scene, in_grid
 from lab.sim.world import World
-from lab.skills.once import Made, once
 from lab.tasks.task import Task
 from lab.tasks.task_fields import CameraGrid, Station
 from lab.vision import View
 from lab.vision.calibration import read_calibration
+
+Made = dict[tuple[Hashable, ...], Any]  # by the method's name and its arguments
+Arguments = ParamSpec("Arguments")
+Result = TypeVar("Result")
+
+
+class Holder(Protocol):
+    """What keeps the results of its own methods."""
+
+    made: Made
+
+
+Self = TypeVar("Self", bound=Holder)
+
+
+def once(
+    method: Callable[Concatenate[Self, Arguments], Result],
+) -> Callable[Concatenate[Self, Arguments], Result]:
+    """The method, whose result is kept in the object's `made` for each set of positional arguments.
+
+    Unlike `functools.cache` it holds no object alive, and an object with results can be pickled.
+    """
+
+    def made_once(self: Self, /, *args: Arguments.args, **kwargs: Arguments.kwargs) -> Result:
+        if kwargs:
+            raise TypeError(f"{method.__name__} takes its arguments by their places")
+        key = (method.__name__, *args)
+        if key not in self.made:
+            self.made[key] = method(self, *args, **kwargs)
+        result: Result = self.made[key]
+        return result
+
+    return wraps(method)(made_once)
+
+
+# ---- camera grids -----------------------------------------------------------------------------------------------------
+
 
 RELEASE_ABOVE = 0.002  # [m] a part is let go this high above its foot
 TOUCH_CLEARANCE = {True: 0.0012, False: 0.004}  # [m] near a station, by whether a part is carried

@@ -21,9 +21,9 @@ from lab.sim.scene.ground_plan import (
     PlannedObstacle,
     PlannedSpot,
     PlannedStation,
+    ring_of,
 )
 from lab.sim.scene.places import Layout, Places
-from lab.sim.scene.reach import ring_of
 from lab.sim.scene.scene import TABLE_M, TABLE_MIDDLE_M
 from lab.sim.scene.scene_check import places_of
 from lab.skills.prepared_scene import lay_out

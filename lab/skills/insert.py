@@ -14,12 +14,10 @@ from lab.learning.problem import Problem
 from lab.mdp import NoPath, grid
 from lab.sim.arms.kinematics import ToolPose
 from lab.sim.parts.kinds import Spot
-from lab.skills.free_way import by_free_cells
-from lab.skills.looking import look_at
+from lab.skills.free_way import by_free_cells, look_at
 from lab.skills.place import let_go, release_pose
 from lab.skills.sight import SkillFailed
-from lab.skills.skill import Bench, Photo, Skill, learned_path, no_way
-from lab.skills.state_words import plain
+from lab.skills.skill import Bench, Photo, Skill, learned_path, no_way, plain
 from lab.skills.surveys import SurveyName, Surveys
 from lab.tasks.task import Task
 from lab.tasks.task_fields import Obstacle

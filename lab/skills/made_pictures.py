@@ -24,7 +24,7 @@ from lab.tasks.task_fields import CameraGrid, Obstacle
 from lab.tasks.task_file import load
 from lab.vision import Image, Lens, write_picture
 from lab.vision.calibration import PRINTED, Mat
-from lab.vision.photo_effects import drawn_lens, hide, spoiled
+from lab.vision.lens import drawn_lens, hide, spoiled
 
 MOST_PICTURES = 100_000
 MATS = 6  # pictures of the mat: one where it lies, the others tilted

@@ -10,7 +10,7 @@ from lab.sim.arms.arm import Arm
 from lab.sim.arms.arm_models import arm_of
 from lab.sim.parts.grip import grip_of
 from lab.sim.parts.part_shape import shape_of
-from lab.sim.scene.reach import ring_of
+from lab.sim.scene.ground_plan import ring_of
 from lab.skills.prepared_scene import prepare
 from lab.tasks.new_task import HEAVIEST_KG, LIGHTEST_KG, Around, NewPart, NewTask, does_not_fit, heights_m, layouts
 from lab.tasks.new_task_text import text_of

@@ -11,7 +11,7 @@ from pydantic import Field, ValidationError
 
 from lab.errors import BadInput, LabError
 from lab.files import read_limited
-from lab.sim.hand_camera import seen_corners
+from lab.sim.camera import seen_corners
 from lab.sim.scene.scene_check import places_of
 from lab.skills.camera_grids import camera_view
 from lab.skills.made_pictures import INDEX, MOST_PICTURES, mat_of

@@ -6,13 +6,13 @@ import numpy as np
 
 from lab.errors import WorkFailed
 from lab.sim.arms.kinematics import ToolPose
-from lab.sim.hand_camera import hand_camera, seen_corners
+from lab.sim.camera import hand_camera, seen_corners
 from lab.sim.parts.kinds import Spot, comes_as
 from lab.sim.scene.scene import Scene
 from lab.tasks.task import part_name
 from lab.vision import Image
+from lab.vision.lens import spoiled
 from lab.vision.part_outline import Outlined, PartSeen, find_part
-from lab.vision.photo_effects import spoiled
 
 ABOVE_M = 0.16  # from the grasp up to where the tool looks from, at least
 REACHES = ((0.03, 0.2), (0.07, 0.4))  # [m], [rad] around where a part should be; the second when it is not in the first

@@ -1,28 +1,57 @@
 """What the sub-tasks survey of one scene, each survey made once: the workspace, the surroundings of a station, the grids."""
 
-from collections.abc import Hashable, Iterable, Sequence
+from collections.abc import Callable, Hashable, Iterable, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from functools import partial, reduce
-from math import hypot, pi
+from math import ceil, hypot, pi
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lab.errors import BadInput, LabError
 from lab.sim.arms.kinematics import ToolPose
+from lab.sim.arms.tool_path import COUNTED, bending, way_of
 from lab.sim.parts.kinds import Spot, beside, comes_as
 from lab.sim.scene.blocked_cells import OUT_OF_REACH, Survey, Surveyor, in_the_way
 from lab.sim.scene.places import Layout
 from lab.sim.scene.scene import Scene
 from lab.sim.scene.scene_check import places_of
 from lab.sim.world import World
-from lab.skills.camera_grids import RELEASE_ABOVE, TOUCH_CLEARANCE, SurveyedGrid
-from lab.skills.once import Made, once
-from lab.skills.shortcuts import corners
+from lab.skills.camera_grids import RELEASE_ABOVE, TOUCH_CLEARANCE, Made, SurveyedGrid, once
 from lab.tasks.task import Order, Task
 from lab.tasks.task_fields import CameraGrid, Station
 from lab.workers import Workers
+
+Free = Callable[[Sequence[ToolPose]], bool]  # whether the tool can be at all of these poses
+
+
+def corners(path: Sequence[ToolPose], step_m: float, free: Free) -> tuple[int, ...]:
+    """Which poses of a path are left, both ends included: those of the fewest free lines, and of as few of the shortest.
+
+    Lines are asked about at poses at most `step_m` apart, a turn counted as way; those of the path itself are free.
+    """
+    points = np.array([[p.x, p.y, p.z, p.yaw] for p in path])
+    rows = bending(points * COUNTED)
+    best: list[tuple[int, float, tuple[int, ...]]] = [(0, 0.0, (rows[0],))]  # lines, way [m] and poses, to each corner
+    for at, row in enumerate(rows[1:], 1):
+        ways = []
+        for before, (lines, way, kept) in enumerate(best):
+            long = float(way_of(points[[rows[before], row]])[-1])
+            if before == at - 1 or free(_straight(points[rows[before]], points[row], step_m, long)):
+                ways.append((lines + 1, way + long, (*kept, row)))
+        best.append(min(ways))
+    return best[-1][2]
+
+
+def _straight(one: np.ndarray, other: np.ndarray, step_m: float, long: float) -> list[ToolPose]:
+    """The poses on a line, both ends included."""
+    shares = np.linspace(0.0, 1.0, ceil(long / step_m) + 1)
+    return [ToolPose(*map(float, one + share * (other - one))) for share in shares]
+
+
+# ---- surveys ----------------------------------------------------------------------------------------------------------
+
 
 Cell = tuple[int, ...]
 SurveyName = tuple[Hashable, ...]  # a method of Surveys and its arguments

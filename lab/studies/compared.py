@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
 from hashlib import sha256
 from itertools import product
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from zlib import crc32
 
 import numpy as np
@@ -26,15 +26,127 @@ from lab.learning.session import Session
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.learning.simulated_advice import TableAdvisor
 from lab.learning.updates import UPDATES
-from lab.mdp import FloatArray
+from lab.mdp import BoolArray, FloatArray
 from lab.plugins.code_file import files_taken, take
 from lab.plugins.family import Family
-from lab.studies.compared_figures import figures
-from lab.studies.compared_sessions import Sessions
+from lab.statistics import interval, share
+from lab.studies.charts import legend_below
 from lab.studies.findings import Findings, Row, mean_row, share_row, varying_row
 from lab.studies.runner import Job
 from lab.teaching.lesson import Subject
 from lab.teaching.subjects import Teachable, subject_from
+from lab.view.canvas import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, RED, SKY, picture_bytes
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+Result = tuple[Row, "Sessions"]
+COLOURS = (BLUE, ORANGE, GREEN, RED, PURPLE, SKY, GREY)
+DASHES = ("-", "--", ":", "-.")
+MOST_CURVES = 12  # more cannot be told apart
+MOST_DOTS = 60  # lines of text of a picture
+
+
+def figures(results: Sequence[Result]) -> dict[str, bytes]:
+    """By caption, as SVG; of many settings the first, which the caption says."""
+    ranked = sorted(results, key=lambda one: (-one[1].solved.mean(), one[1].mean_steps.mean()))
+    most = "" if len(ranked) <= MOST_DOTS else f", the best {MOST_DOTS} of {len(ranked)} settings"
+    several = "" if len(ranked) <= MOST_CURVES else f", the best {MOST_CURVES} of {len(ranked)} settings"
+    return {
+        f"Sessions that are solved in the end, steps and helped steps, with intervals{most}": _dots(ranked[:MOST_DOTS]),
+        f"Mean steps of each episode{several}": _curves(ranked[:MOST_CURVES]),
+    }
+
+
+def words(named: Row, among: Sequence[Row]) -> str:
+    """A setting by what differs among several: "ccrl, expert, psi 0.1"."""
+    varies = [name for name in named if len({repr(one[name]) for one in among}) > 1] or [*named][:1]
+    plain = ("advisor", "gate", "learner", "selection")
+    return ", ".join(str(named[name]) if name in plain else f"{name} {named[name]}" for name in varies)
+
+
+def _dots(results: Sequence[Result]) -> bytes:
+    """A line a setting, a column a measure."""
+    names = [words(named, [other for other, _ in results]) for named, _ in results]
+
+    def draw(figure: "Figure") -> None:
+        columns = figure.subplots(1, 3, sharey=True)
+        measured: list[tuple[str, list[Any]]] = [
+            ("solved [%]", [share(found.solved) for _, found in results]),
+            ("mean steps of an episode", [_mean(found.mean_steps) for _, found in results]),
+            ("helped steps of a session", [_mean(found.helped_steps) for _, found in results]),
+        ]
+        for axes, (title, values) in zip(columns, measured, strict=True):
+            for line, (middle, low, high) in enumerate(values):
+                axes.hlines(line, low, high, color=BLUE, linewidth=1.6)
+                axes.plot(middle, line, "o", color=BLUE, markersize=4)
+            axes.set_title(title)
+            axes.grid(axis="x")
+            axes.set_xlim(left=0)
+        columns[0].set_xlim(0, 103)
+        columns[0].set_yticks(range(len(names)), names)
+        columns[0].set_ylim(len(names) - 0.5, -0.5)
+
+    return picture_bytes(draw, 9.5, 0.9 + 0.24 * len(results))
+
+
+def _mean(values: Any) -> tuple[float, float, float]:
+    if np.ptp(values) == 0.0:
+        return float(values[0]), float(values[0]), float(values[0])
+    return interval(values)
+
+
+def _curves(results: Sequence[Result]) -> bytes:
+    def draw(figure: "Figure") -> None:
+        axes: Axes = figure.add_subplot()
+        for n, (named, found) in enumerate(results):
+            name = words(named, [other for other, _ in results])
+            look: dict[str, Any] = {"color": COLOURS[n % len(COLOURS)], "linestyle": DASHES[n // len(COLOURS)]}
+            axes.plot(np.arange(1, len(found.curve) + 1), found.curve, label=name, linewidth=1.3, **look)
+        axes.set(xlabel="episode", ylabel="steps", ylim=(0, None))
+        axes.yaxis.label.set_color(INK)
+        axes.grid(axis="y")
+        legend_below(figure)
+
+    return picture_bytes(draw, 8.0, 4.2)
+
+
+# ---- compared sessions ------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class Sessions:
+    """What N sessions of E episodes came to: curve (E,) the mean steps of each episode; the others (N,), one a session."""
+
+    curve: FloatArray
+    solved: BoolArray
+    mean_steps: FloatArray
+    last_steps: FloatArray
+    helped_steps: FloatArray
+    requests: FloatArray
+    misleads: FloatArray
+    rejected: BoolArray
+
+    def to_json(self) -> dict[str, list[float]]:
+        """Plain lists."""
+        return {name: np.asarray(value, np.float64).tolist() for name, value in vars(self).items()}
+
+    @classmethod
+    def from_json(cls, record: Mapping[str, list[float]], sessions: int) -> "Sessions":
+        """What `to_json` wrote of so many sessions. Raises KeyError, TypeError or ValueError for anything else."""
+        kinds = {"solved": np.bool_, "rejected": np.bool_}
+        found: dict[str, Any] = {
+            name: np.array(record[name], kinds.get(name, np.float64)) for name in cls.__dataclass_fields__
+        }
+        if any(one.shape != (sessions,) for name, one in found.items() if name != "curve") or found["curve"].ndim != 1:
+            raise ValueError("lists of other lengths")
+        return cls(**found)
+
+
+# ---- compared ---------------------------------------------------------------------------------------------------------
+
 
 MOST_SETTINGS = 1000
 FAMILIES: dict[str, Family[Any]] = {"gates": GATES, "learners": UPDATES, "advisors": ADVISORS}

@@ -13,8 +13,7 @@ from typing import Any
 from lab import __version__, files
 from lab.errors import BadInput, WorkFailed
 from lab.statistics import PERCENT_POINTS, RELATIVE, allowed
-from lab.studies.counted_apart import JUDGED, counts, share
-from lab.studies.findings import Findings
+from lab.studies.findings import JUDGED, Findings, counts, share_within
 
 Row = Mapping[str, Any]  # settings under their names, and RESULTS; `lab_version` where another version measured it
 Line = tuple[tuple[str, Any], ...]  # some settings of a row
@@ -130,7 +129,7 @@ def _apart(rows: Sequence[Row]) -> Table | None:
     """Agreement by both rules, counted apart for cells that were used to choose, that were not, and easy ones."""
     parts = counts([dict(row) for row in rows if row.get("within") is not None])
     lines = [
-        [TableCell(name, ""), *(TableCell(share(of, judged)) for judged in ("within", "within_errors"))]
+        [TableCell(name, ""), *(TableCell(share_within(of, judged)) for judged in ("within", "within_errors"))]
         for name, of in parts.items()
         if of
     ]
@@ -159,8 +158,8 @@ def _shares(rows: Sequence[Row], measures: Sequence[str]) -> list[TableCell]:
     cells = []
     for group in [*([row for row in rows if row["measure"] == measure] for measure in measures), rows]:
         inside = sum(bool(row["within"]) for row in group)
-        share = f"{100 * inside / len(group):.0f} %" if group else ""
-        cells.append(TableCell(f"{inside} of {len(group)}" if group else "–", small=share))
+        share_within = f"{100 * inside / len(group):.0f} %" if group else ""
+        cells.append(TableCell(f"{inside} of {len(group)}" if group else "–", small=share_within))
     return cells
 
 

@@ -1,10 +1,13 @@
 """Settings of learner and gate tuned to a problem, and what that gains over its own on seeds that were not seen."""
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
+from warnings import simplefilter
+
+import numpy as np
 
 from lab.advice.advising import Advising
 from lab.errors import BadInput, counted, unknown
@@ -14,15 +17,158 @@ from lab.learning.settings import SETTINGS, LearnerSettings
 from lab.learning.tuned_ranges import RANGES, USUAL, Range, Span
 from lab.learning.updates import UPDATES
 from lab.mdp import FloatArray
+from lab.optional import optional
 from lab.statistics import interval
-from lab.studies.compared import Compared, Setting, key_of, prepared, sessions_of
-from lab.studies.compared_sessions import Sessions
+from lab.studies.compared import Compared, Sessions, Setting, key_of, prepared, sessions_of
 from lab.studies.findings import Findings, Row, mean_row, row, share_row
 from lab.studies.report import write_file
 from lab.studies.runner import Job
-from lab.studies.tuning_figures import figures
-from lab.studies.tuning_search import Trial, Values, search
 from lab.teaching.subjects import Teachable
+from lab.view.canvas import BLUE, GREY, INK, ORANGE, picture_bytes
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+BATCH = 8  # trials that are asked for at once, whatever the number of workers
+Values = dict[str, Any]
+# a rung and the settings that are still in it -> their costs, None for settings that cannot be
+Measure = Callable[[int, Sequence[Values]], list[float | None]]
+
+
+@dataclass(frozen=True)
+class Trial:
+    """Settings that were tried: their cost on each rung that they reached; pruned: they did not reach the last."""
+
+    number: int
+    values: Values
+    costs: tuple[float, ...]
+    pruned: bool
+
+
+def search(
+    ranges: Mapping[str, Range], first: Values, trials: int, seed: int, rungs: int, measure: Measure
+) -> tuple[list[Trial], dict[str, float]]:
+    """Trials in order, and the importance of each setting for the cost (shares of 1; empty where it cannot be told).
+
+    first: the settings of the first trial. On each rung but the last a trial is given up when it does worse than the median
+    of those that came to the end. Source of the sampler: Bergstra et al., NIPS 24 (2011); of the importances: Watanabe et al.,
+    IJCAI 2023. Raises BadInput without Optuna.
+    """
+    optuna = _optuna()
+    kinds = {name: _distribution(optuna, allowed) for name, allowed in ranges.items()}
+    study = optuna.create_study(
+        sampler=optuna.samplers.TPESampler(seed=seed, constant_liar=True),
+        pruner=optuna.pruners.MedianPruner(n_startup_trials=BATCH),
+    )
+    study.enqueue_trial(first)
+    done: list[Trial] = []
+    while len(done) < trials:
+        asked = [study.ask(kinds) for _ in range(min(BATCH, trials - len(done)))]
+        costs: dict[int, list[float]] = {one.number: [] for one in asked}
+        left, given_up = list(asked), set()
+        for rung in range(rungs):
+            found = measure(rung, [one.params for one in left])
+            for one, cost in zip(list(left), found, strict=True):
+                if cost is not None:
+                    costs[one.number].append(cost)
+                    one.report(cost, rung)
+                if cost is None or (rung < rungs - 1 and one.should_prune()):
+                    given_up.add(one.number)
+            left = [one for one in left if one.number not in given_up]
+        for one in asked:
+            pruned = one.number in given_up
+            state = optuna.trial.TrialState
+            if not costs[one.number]:
+                study.tell(one, state=state.FAIL)
+            elif pruned:
+                study.tell(one, state=state.PRUNED)
+            else:
+                study.tell(one, costs[one.number][-1])
+            done.append(Trial(one.number, one.params, tuple(costs[one.number]), pruned))
+    return done, _importances(optuna, study)
+
+
+def _optuna() -> Any:
+    with optional("tuning"):
+        import optuna
+    simplefilter("ignore", optuna.exceptions.ExperimentalWarning)
+    optuna.logging.set_verbosity(optuna.logging.ERROR)
+    return optuna
+
+
+def _distribution(optuna: Any, allowed: Range) -> Any:
+    if not isinstance(allowed, Span):
+        return optuna.distributions.CategoricalDistribution(allowed)
+    if isinstance(allowed.low, int) and isinstance(allowed.high, int):
+        return optuna.distributions.IntDistribution(allowed.low, allowed.high, log=allowed.log)
+    return optuna.distributions.FloatDistribution(allowed.low, allowed.high, log=allowed.log)
+
+
+def _importances(optuna: Any, study: Any) -> dict[str, float]:
+    ended = study.get_trials(deepcopy=False, states=(optuna.trial.TrialState.COMPLETE,))
+    if len({one.value for one in ended}) < BATCH:
+        return {}
+    evaluator = optuna.importance.PedAnovaImportanceEvaluator()
+    found = optuna.importance.get_param_importances(study, evaluator=evaluator)
+    return {name: float(share) for name, share in found.items()}
+
+
+# ---- tuning figures ---------------------------------------------------------------------------------------------------
+
+
+def figures(trials: Sequence[Trial], importances: Mapping[str, float], gained: FloatArray) -> dict[str, bytes]:
+    """By caption, as SVG; gained (N,): of each unseen session."""
+    found = {"Gain of each session over the problem's own settings, on unseen seeds": _gain(gained)}
+    if importances:
+        found["Which settings the cost hangs on"] = _importance(importances)
+    return found | {"Cost of each trial, and the best so far": _history(trials)}
+
+
+def _gain(gained: FloatArray) -> bytes:
+    def draw(figure: "Figure") -> None:
+        axes = figure.add_subplot()
+        axes.hist(gained, bins=30, color=BLUE)
+        axes.axvline(0.0, color=INK, linewidth=1.0)
+        axes.axvline(float(gained.mean()), color=ORANGE, linewidth=1.6, label="mean")
+        axes.set_xlabel("steps an episode less than with its own settings")
+        axes.set_ylabel("sessions")
+        axes.legend()
+
+    return picture_bytes(draw, 6.5, 3.0)
+
+
+def _importance(importances: Mapping[str, float]) -> bytes:
+    def draw(figure: "Figure") -> None:
+        axes = figure.add_subplot()
+        axes.barh(range(len(importances)), [100 * one for one in importances.values()], color=BLUE)
+        axes.set_yticks(range(len(importances)), list(importances))
+        axes.invert_yaxis()
+        axes.set_xlabel("share of the importance [%]")
+
+    return picture_bytes(draw, 6.5, 0.9 + 0.26 * len(importances))
+
+
+def _history(trials: Sequence[Trial]) -> bytes:
+    def draw(figure: "Figure") -> None:
+        axes = figure.add_subplot()
+        for pruned, colour, name in ((True, GREY, "given up early"), (False, BLUE, "tried to the end")):
+            shown = [one for one in trials if one.pruned == pruned and one.costs]
+            axes.plot(
+                [one.number for one in shown], [one.costs[-1] for one in shown], "o", ms=4, color=colour, label=name
+            )
+        ended = [one for one in trials if not one.pruned]
+        best = np.minimum.accumulate([one.costs[-1] for one in ended])
+        axes.step([one.number for one in ended], best, where="post", color=ORANGE, label="best so far")
+        axes.set_xlabel("trial")
+        axes.set_ylabel("cost [steps an episode]")
+        axes.legend()
+
+    return picture_bytes(draw, 6.5, 3.2)
+
+
+# ---- tuning -----------------------------------------------------------------------------------------------------------
+
 
 FAMILIES: dict[str, Mapping[str, Any]] = {"learner": UPDATES, "gate": GATES, "selection": SELECTIONS}
 SHARES = (9, 3, 1)  # of the sessions of a trial that each rung has, one in so many: the last one has all

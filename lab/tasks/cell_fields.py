@@ -48,7 +48,7 @@ class CellRobot(Record):
     name: Name = ROBOT
     """Its name; needed where there are several."""
     speed: Annotated[float, Field(ge=1e-3, le=1e3)] = 1.0
-    """How many times faster it is than the travel times say [-]."""
+    """The factor by which it is faster than the travel times [-]."""
     serves: Annotated[tuple[Name, ...], BeforeValidator(as_tuple)] | None = None
     """The stations where it may pick and drop, such as `["in", "oven"]`; left out: all."""
 
@@ -69,17 +69,15 @@ class CellStation(Record):
     processing_s: Seconds | None = None
     """How long the machine works on each part [s], such as `60.0`; a stage of a route may have its own."""
     at_most_s: Seconds | None = None
-    """How long a part may stay in the machine after that before it is spoilt [s], such as `4.0`; left out: as long as
-    you like.
-    """
+    """How long a part may stay in the machine after that before it is spoilt [s], such as `4.0`; left out: no limit."""
     servers: Room | None = None
-    """How many parts the machine works on at once, such as `1`; the others wait in its room, and those that are done,
-    too. Left out: all that stand in it, each from when it comes.
+    """How many parts the machine works on at once, such as `1`; others, and finished ones, wait in its room. Left out: all
+    parts in it, each from its arrival.
     """
     batch: bool = False
-    """Whether the machine works on all parts that stand in it together, such as `true`: they begin with the last that is
-    brought before one is taken out, take the longest of their times, and nothing comes in until all are out. It needs a
-    capacity of 2 or more, and one robot.
+    """Whether the machine works on all parts that stand in it together, such as `true`: the batch begins with the last
+    part that is brought before one is taken out, takes the longest of their times, and nothing comes in until all are
+    out. It needs a capacity of 2 or more, and one robot.
     """
     setup_s: Times = Field(default={})
     """How long a server takes to change over, from product to product [s], such as `{ bun = { loaf = 20.0 } }`."""
@@ -136,12 +134,12 @@ Route = Annotated[
 
 
 class CellProduct(Record):
-    """A type of part, and the routes that the robot may take one of them along."""
+    """A type of part, and its routes."""
 
     name: Name
     """The product's name, such as `"bun"`."""
     routes: Annotated[tuple[Route, ...], BeforeValidator(as_tuple), Field(min_length=1, max_length=50)]
-    """The ways that one of them may take, each a list of stages, such as `[["in", "oven", "out"]]`."""
+    """The routes that one of them may take, each a list of stages, such as `[["in", "oven", "out"]]`."""
 
     def built(self) -> Product:
         """The product as a record of the cell."""
@@ -154,7 +152,7 @@ class CellArrivals(Record):
     interval_s: Seconds
     """The time before each part [s], such as `90.0`."""
     after: Literal["clock", "pick"] = "clock"
-    """From when it counts: from the arrival before ("clock"), or from when the part before was taken away ("pick")."""
+    """When the interval begins: at the arrival before ("clock"), or when the part before is taken away ("pick")."""
 
 
 Law = Annotated[str, _known("law", LAWS, "stochastic")]
@@ -174,10 +172,10 @@ class Stochastic(Record):
     repair_s: Seconds = 0.0
     """The mean time of a repair [s], such as `120.0`."""
     late_s: Seconds = 0.0
-    """By how much a part with a release_s comes later than that, in the mean [s], such as `30.0`."""
+    """The mean delay of a part after its release_s [s], such as `30.0`."""
     robot_breaks_every_s: Seconds = 0.0
-    """The mean time that a robot is in order, at work or not, between two breakdowns [s], such as `600.0`; 0: none. It then
-    stops where it is, with what it holds. At least 1 s; not beside a track.
+    """The mean time between a robot's repair and its next breakdown, at work or not [s], such as `600.0`; 0: none. It then
+    stops where it is, with the part that it holds. At least 1 s; not in a cell with a track.
     """
     robot_repair_s: Seconds = 0.0
     """The mean time of a robot's repair [s], such as `60.0`."""
@@ -188,14 +186,14 @@ class Stochastic(Record):
 
 
 class CellTrack(Record):
-    """What several robots drive on: stretches between two stations, each of which holds one robot at a time."""
+    """The track of several robots: stretches between two stations, each of which holds one robot at a time."""
 
     stretches: Annotated[
         tuple[Annotated[tuple[Name, Name, Seconds], BeforeValidator(as_tuple)], ...],
         BeforeValidator(as_tuple),
         Field(min_length=1, max_length=200),
     ]
-    """A stretch each: the two stations that it joins, and how long a robot drives along it [s], such as
+    """For each stretch the two stations that it joins, and how long a robot drives along it [s], such as
     `[["in", "oven", 5.0]]`.
     """
 
@@ -222,11 +220,11 @@ class CellFields(Record):
     buffers: Literal["busy", "free"] = "busy"
     """Whether a part goes to a buffer only while its machine is full ("busy"), or whenever the order says so ("free")."""
     due_s: Annotated[tuple[Seconds, ...], BeforeValidator(as_tuple)] | None = None
-    """When each part is wanted [s], such as `[120.0, 300.0, 240.0]`; one for each part."""
+    """When each part is due [s], such as `[120.0, 300.0, 240.0]`; one for each part."""
     release_s: Annotated[tuple[Seconds, ...], BeforeValidator(as_tuple)] | None = None
-    """When each part is there at first [s], such as `[0.0, 60.0, 60.0]`; one for each part."""
+    """When each part arrives [s], such as `[0.0, 60.0, 60.0]`; one for each part."""
     due_factor: Annotated[float, Field(gt=0, le=1000)] | None = None
-    """A part is due so many times its own work after it arrives [-], such as `3.0`; in place of due_s."""
+    """A part is due this many times its own work after its arrival [-], such as `3.0`; in place of due_s."""
     robot: CellRobot | None = None
     """The only robot; in place of robots."""
     robots: Annotated[tuple[CellRobot, ...], BeforeValidator(as_tuple), Field(max_length=50)] | None = None
@@ -237,12 +235,12 @@ class CellFields(Record):
     """The types of parts."""
     travel: Times = Field(default={})
     """How long a robot drives from a station (the row) to another [s], such as `{ in = { oven = 10.0 } }`; a pair that
-    is left out is no allowed move.
+    is left out is a forbidden move.
     """
     track: CellTrack | None = None
-    """What several robots drive on; its ways then give the times, in place of travel."""
+    """The track of several robots; its stretches give the times, in place of travel."""
     loaded: Times = Field(default={})
-    """Those times that differ when the robot carries something [s], such as `{ in = { oven = 12.0 } }`."""
+    """The travel times that differ when the robot carries something [s], such as `{ in = { oven = 12.0 } }`."""
     arrivals: CellArrivals | None = None
     """When parts come; left out: all are there at time 0."""
     stochastic: Stochastic = Stochastic()

@@ -84,9 +84,9 @@ class FaultFields(Record):
     what: FaultKind
     """What goes wrong."""
     at_s: Annotated[float, Field(ge=0, le=86_400)] = 0.0
-    """It happens as soon as it can after this time of the run [s]."""
+    """It happens as early as possible after this time of the run [s]."""
     when: When | None = None
-    """It waits until the part is so: carried, in a machine, or standing at a station, such as `"standing"`."""
+    """It waits until the part is in this state: carried, in a machine, or standing at a station, such as `"standing"`."""
     part: PartName | None = None
     """Which part: its kind and number, such as `"bun 1"`; left out: the first that fits."""
     station: Name | None = None
@@ -94,7 +94,7 @@ class FaultFields(Record):
     obstacle: Name | None = None
     """Which obstacle, such as `"tower"`."""
     by_m: XY | None = None
-    """How far what is moved, or falls, comes to lie off where it was: x and y [m], such as `[0.05, 0.0]`."""
+    """How far the part, obstacle or station that is moved, or falls, is displaced: x and y [m], such as `[0.05, 0.0]`."""
     turn_rad: Annotated[float, Field(ge=-3.2, le=3.2)] = 0.0
     """By how much the part is turned [rad]."""
     share: Annotated[float, Field(ge=0, le=100)] | None = None
@@ -102,7 +102,7 @@ class FaultFields(Record):
     seconds: Annotated[float, Field(gt=0, le=86_400)] | None = None
     """How long it lasts [s], such as `30.0`."""
     at_m: XY | None = None
-    """Where what is moved, dropped or put comes to be: x and y [m], such as `[0.5, 0.3]`."""
+    """The new position of what is moved, dropped or put: x and y [m], such as `[0.5, 0.3]`."""
     size_m: Edges | None = None
     """Length, width and height of the obstacle that is put there [m], such as `[0.06, 0.06, 0.34]`."""
 

@@ -188,13 +188,16 @@ def unit_of(description: str) -> str:
 HEADS = {
     "task": (
         "Keys of a task file",
-        "A task file is a cell in physics: `lab run FILE` carries it out, `lab task check FILE` checks it.",
+        "This page lists the keys of a task file, a cell in physics: `lab run FILE` runs it, `lab task check FILE` checks it.",
     ),
     "cell": (
         "Keys of a cell file",
-        "A cell file is a cell without physics: `lab sequence FILE` looks for the order of its parts.",
+        "This page lists the keys of a cell file, a cell without physics: `lab sequence FILE` orders its parts.",
     ),
-    "world": ("Keys of a world file", "A world file is a grid of cells: `lab teach FILE` learns the way through it."),
+    "world": (
+        "Keys of a world file",
+        "This page lists the keys of a world file, a grid of cells: `lab teach FILE` learns the path through it.",
+    ),
 }
 
 
@@ -212,8 +215,8 @@ def page_of(kind: str) -> str:
     lines = [
         f"# {title}",
         "",
-        f"{first} This page is made from the records that check it (`lab task schema {kind} --out keys.md`). Where the unit is",
-        "-, the key is a bare number. Whatever is not *required* may be left out.",
+        f"{first} It is generated from the records that check the file (`lab task schema {kind} --out keys.md`). The unit -",
+        "means a number without a unit. A key that is not *required* may be left out.",
         "",
     ]
     for table in tables_of(schema):

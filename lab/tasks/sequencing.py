@@ -1,22 +1,62 @@
 """How a file wants the order of the robot's transfers to be found, and the search that it asks for."""
 
+import json
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, ValidationError
 
 from lab.errors import BadInput, unknown
 from lab.sequencing.cell.chance import NO_CHANCE, Chance
 from lab.sequencing.cell.objectives import MAKESPAN, OBJECTIVES, WITH_DUE_TIMES
+from lab.sequencing.methods.carried_over_policy import CarriedPolicy
 from lab.sequencing.search import Search, SrlSettings
-from lab.tasks.record import Record
+from lab.tasks.record import Record, read_text, write_whole
+
+FORMAT: Literal["carried-policy-1"] = "carried-policy-1"
+
+
+class _Held(Record):
+    """What such a file holds."""
+
+    format: Literal["carried-policy-1"]
+    weights: dict[str, float]
+    objective: str = MAKESPAN
+    learned_on: str = ""
+
+
+def write_policy(path: Path, policy: CarriedPolicy) -> None:
+    """Writes a policy whole or not at all: the same one always gives the same bytes. BadInput when it cannot be written."""
+    held = _Held(format=FORMAT, weights=dict(policy.weights), objective=policy.objective, learned_on=policy.learned_on)
+    write_whole(path, json.dumps(held.model_dump(), indent=1) + "\n")
+
+
+def read_policy(path: Path, where: str = "--policy") -> CarriedPolicy:
+    """The policy of a file; BadInput, in one line that names it, for one that cannot be read or is damaged."""
+    text = read_text(path)
+    try:
+        held = _Held.model_validate_json(text)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        at = ".".join(str(part) for part in first["loc"])[:60]
+        raise BadInput(
+            f"policy {path} ({where}): {f'{at}: ' if at else ''}{first['msg']}; wanted what lab study run carried-over writes"
+        ) from None
+    try:
+        return CarriedPolicy(held.weights, held.objective, held.learned_on)
+    except BadInput as error:
+        raise BadInput(f"policy {path} ({where}): {error}") from None
+
+
+# ---- sequencing -------------------------------------------------------------------------------------------------------
 
 
 class Sequencing(Record):
     """How the order of the robot's transfers is found, and what it is judged by."""
 
     method: str = "srl-time"
-    """Who finds the order: a name that `lab sequence --help` lists."""
+    """The method that finds the order: a name that `lab sequence --help` lists."""
     episodes: Annotated[int, Field(ge=1, le=1_000_000)] = 400
     """How many sequences are tried."""
     alpha: Annotated[float, Field(gt=0, le=1)] = 0.05

@@ -70,9 +70,9 @@ class CameraGrid(Record):
     shape: Annotated[tuple[Count, Count], BeforeValidator(as_tuple)] = (12, 12)
     """How many cells there are along x and y."""
     start_m: XY
-    """Where the way through the grid begins: x and y [m], such as `[0.65, 0.2]`."""
+    """Where the path through the grid begins: x and y [m], such as `[0.65, 0.2]`."""
     height_m: Size
-    """How high the finger tips are on that way [m], such as `0.3`."""
+    """How high the finger tips are on that path [m], such as `0.3`."""
     marker_m: XYZ
     """Where the station's cyan marker lies: off its pose along and across its axes, and above the table [m], such as
     `[0.0, 0.038, 0.1]`.
@@ -138,17 +138,17 @@ class After(Record):
     part: Name
     """The kind that waits, such as `"label"`."""
     station: Name
-    """The station on its routes to which it is not brought yet, such as `"tray"`."""
+    """The station on its routes whose transfer waits, such as `"tray"`."""
     step: Literal["comes", "leaves"] = "comes"
     """Which transfer waits: the one that brings the part to that station ("comes"), or that takes it away ("leaves")."""
     of: Name
     """The other kind that it waits for, such as `"box"`."""
     of_station: Name | None = None
-    """The station that those have to have come to, or left, such as `"sealer"`; left out: the same one."""
+    """The station to which those must have come, or which they must have left, such as `"sealer"`; left out: the same one."""
     of_step: Literal["comes", "leaves"] = "comes"
-    """What those have to have done there: stand there ("comes"), or have been taken away and set down elsewhere ("leaves")."""
+    """What must have happened to those: they stand there ("comes"), or were taken away and set down elsewhere ("leaves")."""
     count: Literal["each", "all"] = "each"
-    """How many of those: as many as the part is the so-manyth to go, one for each ("each"), or all of the order ("all")."""
+    """How many of those: one for each waiting part up to and including this one ("each"), or all of the order ("all")."""
 
 
 class Station(Record):
@@ -163,21 +163,21 @@ class Station(Record):
     0, 0.
     """
     capacity: Count
-    """How many parts it holds at once, such as `1`. A machine works on each of them from when it comes, one with a process on
-    one at a time, and one with a batch on all together.
+    """How many parts it holds at once, such as `1`. A machine works on each of them from its arrival, one with a process on one
+    at a time, and one with a batch on all together.
     """
     batch: bool = False
-    """Whether the machine works on all parts that stand in it together, such as `true`: it begins with the last that the order
-    brings before one is taken out, takes the longest of their times, and nothing comes in until all are out. It needs a
-    capacity of 2 or more.
+    """Whether the machine works on all parts that stand in it together, such as `true`: the batch begins with the last part
+    that the order brings before one is taken out, takes the longest of their times, and nothing comes in until all are
+    out. It needs a capacity of 2 or more.
     """
     processing_s: Time | None = None
     """How long the machine works on each part [s], such as `60.0`; a stage of a route may have its own."""
     process: Name | None = None
     """The process that the machine carries out, which is learned; in place of processing_s, such as `"butter"`."""
     at_most_s: Time | None = None
-    """How long a part may stay in the machine after that before it is spoilt [s], such as `4.0`; left out: as long as
-    you like. In physics it ends when the gripper goes to the part to take it up, which takes up to 4 s more.
+    """How long a part may stay in the machine after that before it is spoilt [s], such as `4.0`; left out: no
+    limit. In physics the stay ends when the gripper goes to the part to take it up, which takes up to 4 s more.
     """
     body: Annotated[str, Field(min_length=1, max_length=200)] | None = None
     """What stands there: "slab", "box", or a URDF, OBJ or STL file beside the task file, such as `"toaster.urdf"`.
@@ -321,8 +321,8 @@ class Part(PartFields):
     pallet: Name | None = None
     """The kind on which it comes and goes, which has no routes of its own, such as `"carrier"`."""
     routes: Annotated[tuple[Route, ...], BeforeValidator(as_tuple), Field(max_length=MOST_THINGS)] = ()
-    """The ways that one of them may take, each a list of stages, such as `[["input", "oven", "output"]]`; of several
-    the order picks one for each part.
+    """The routes that one of them may take, each a list of stages, such as `[["input", "oven", "output"]]`; the order
+    chooses one of them for each part.
     """
 
     @property

@@ -8,8 +8,8 @@ from statistics import mean
 from typing import Any
 
 from lab.errors import counted, printable
-from lab.toolbox.history import EVALUATED
 from lab.toolbox.policy import Policy
+from lab.toolbox.versions import EVALUATED
 
 Event = Mapping[str, Any]  # "time", "what", and facts; see the toolbox's log
 _PLUMBING = ("time", "what", "hash", "version")  # of an event, beside its facts

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 from lab.errors import BadInput
 from lab.files import read_limited, write_whole
 from lab.toolbox import deferred
+from lab.toolbox.folder_place import FileState, Place
 from lab.toolbox.names import SUFFIX, VERSIONS, hash_of
-from lab.toolbox.place import FileState, Place
 
 if TYPE_CHECKING:
     from lab.toolbox.policy import Policy

@@ -1,20 +1,91 @@
 """The toolbox: learned policies in versions and measured records, written whole or not at all, never loaded damaged."""
 
+import json
 from contextlib import suppress
 from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lab.errors import BadInput, WorkFailed, unknown
-from lab.toolbox import deferred, records
-from lab.toolbox.folder_place import FolderPlace
+from lab.files import json_of
+from lab.toolbox import deferred
+from lab.toolbox.folder_place import FolderPlace, Place, read_file
 from lab.toolbox.index import Index, Key, KnownPolicies, Row
 from lab.toolbox.names import SUFFIX, TRASH, VERSIONS, default_address, hash_of, is_address, slug
-from lab.toolbox.place import Place, read_file
 
 if TYPE_CHECKING:
     from lab.toolbox.policy import Policy
     from lab.toolbox.versions import Saved, Version, Versions
+
+
+FOLDER = "records"
+_SUFFIX = ".json"
+
+
+def file_of(kind: str, key: str) -> str:
+    """The file of a record in the toolbox."""
+    return f"{FOLDER}/{slug(kind)}/{slug(key)}{_SUFFIX}"
+
+
+def save(place: Place, kind: str, key: str, record: dict[str, Any]) -> None:
+    """Writes a record. Raises BadInput for what JSON cannot hold."""
+    try:
+        whole = {"kind": kind, "key": key, "hash": _hash(record), "record": record}
+        text = json.dumps(whole, indent=1, allow_nan=False)
+    except (TypeError, ValueError) as error:
+        raise BadInput(f"record '{key}' ({kind}): {error}") from error
+    place.write(file_of(kind, key), text.encode())
+
+
+def load(place: Place, kind: str, key: str) -> dict[str, Any] | None:
+    """The record of that kind and key; None when there is none. Raises BadInput when its file is damaged or was edited."""
+    file = file_of(kind, key)
+    folder, _, name = file.rpartition("/")
+    if name not in place.names(folder):
+        return None
+    whole = _read(place, file)
+    record: dict[str, Any] = whole["record"]
+    return record if (whole["kind"], whole["key"]) == (kind, key) else None
+
+
+def faults(place: Place) -> dict[str, str]:
+    """What is wrong with each record's file, by file; "" where nothing is."""
+    found = {}
+    for folder in place.folders(FOLDER):
+        for name in sorted(place.names(f"{FOLDER}/{folder}")):
+            file = f"{FOLDER}/{folder}/{name}"
+            if name.endswith(_SUFFIX):
+                try:
+                    _read(place, file)
+                    found[file] = ""
+                except BadInput as error:
+                    found[file] = str(error)
+    return found
+
+
+def _read(place: Place, file: str) -> dict[str, Any]:
+    try:
+        whole = json_of(place.read(file))
+    except (BadInput, ValueError, RecursionError) as error:
+        raise BadInput(f"record file {place.where(file)}: {error}") from error
+    if (
+        not isinstance(whole, dict)
+        or not isinstance(whole.get("record"), dict)
+        or not {"kind", "key", "hash"} <= whole.keys()
+    ):
+        raise BadInput(f"record file {place.where(file)}: it must hold kind, key, hash and record")
+    if whole["hash"] != _hash(whole["record"]):
+        raise BadInput(f"record file {place.where(file)}: it does not hold what was written: it was changed")
+    return whole
+
+
+def _hash(record: dict[str, Any]) -> str:
+    """The hash of a record, however its file is laid out."""
+    return hash_of(json.dumps(record, sort_keys=True).encode())
+
+
+# ---- registry ---------------------------------------------------------------------------------------------------------
+
 
 Rows = list[Row]
 Words = list[str]
@@ -227,7 +298,7 @@ class Toolbox:
                     reason = str(error)
                 report.append((self.folder / versions.in_use_file, not reason, reason))
             report += [(self.folder / file, False, reason) for file, reason in versions.faults()]
-        checked = records.faults(self.place).items()
+        checked = faults(self.place).items()
         return report + [(self.folder / file, not reason, reason) for file, reason in checked]
 
     def repair(self) -> Words:
@@ -236,12 +307,12 @@ class Toolbox:
 
     def save_record(self, kind: str, key: str, record: dict[str, Any]) -> Path:
         """Keeps a JSON record, such as the measured duration of a transfer, under its kind and key."""
-        records.save(self.place, kind, key, record)
-        return self.folder / records.file_of(kind, key)
+        save(self.place, kind, key, record)
+        return self.folder / file_of(kind, key)
 
     def load_record(self, kind: str, key: str) -> dict[str, Any] | None:
         """The record of that kind and key; None when there is none. Raises BadInput when its file is damaged or was edited."""
-        return records.load(self.place, kind, key)
+        return load(self.place, kind, key)
 
     def _content(self, file: str) -> bytes:
         try:

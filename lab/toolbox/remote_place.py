@@ -13,9 +13,8 @@ from typing import Any, TypeVar
 from lab.errors import BadInput, WorkFailed
 from lab.files import write_whole
 from lab.optional import optional
-from lab.toolbox.folder_place import FolderPlace
+from lab.toolbox.folder_place import MAX_FILE_BYTES, FileState, FolderPlace
 from lab.toolbox.names import hash_of, slug
-from lab.toolbox.place import MAX_FILE_BYTES, FileState
 
 LIMIT_S = 30.0  # for one call
 _AT_ONCE = 64  # files that are read in one call

@@ -11,7 +11,7 @@ import numpy as np
 
 from lab.errors import BadInput
 from lab.sequencing.cell.schedule import Schedule
-from lab.sequencing.cyclic.steady import Steady
+from lab.sequencing.cyclic.unrolled import Steady
 from lab.view.canvas import GREY, INK, RED, picture_bytes, picture_file, seconds, tip
 from lab.view.gantt_bars import LOOKS, Bar, Chart, CycleChart, mixed
 

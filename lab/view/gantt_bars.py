@@ -6,7 +6,7 @@ from functools import cached_property
 
 from lab.errors import counted
 from lab.sequencing.cell.schedule import Activity, Schedule
-from lab.sequencing.cyclic.steady import Steady
+from lab.sequencing.cyclic.unrolled import Steady
 from lab.view.canvas import BLUE, GREEN, INK, ORANGE, PALE_GREY, PURPLE, RED, SKY, YELLOW, seconds
 
 TOUCHING_S = 1e-3  # measured activities that overlap by less follow one another

@@ -23,10 +23,9 @@ from lab.sim.frames import Body, Frame, Recording, Viewpoint
 
 if TYPE_CHECKING:
     from lab.view.keyframes import Motion, Track
-    from lab.view.scene_data import Json
+    from lab.view.scene_data import Json, Story
     from lab.view.server import File, Server
     from lab.view.server_page import Panel
-    from lab.view.story import Story
 
 HERE = Path(__file__).parent
 GANTT_SCRIPT = HERE / "gantt.js"

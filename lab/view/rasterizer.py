@@ -13,7 +13,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.learning.compiled import without_refcounts
-from lab.sim.frames import Vector, Viewpoint
+from lab.sim.frames import Body, Frame, Recording, Vector, Viewpoint
+
+
+class Still:
+    """A viewer that keeps the bodies and frames that it is given."""
+
+    def __init__(self) -> None:
+        self.recording = Recording(())
+
+    def show(self, bodies: Sequence[Body]) -> None:
+        """Begin anew with these bodies."""
+        self.recording = Recording(tuple(bodies))
+
+    def update(self, frame: Frame) -> None:
+        """Keep a frame, too."""
+        self.recording.frames.append(frame)
+
+
+# ---- rasterizer -------------------------------------------------------------------------------------------------------
+
 
 Floats = NDArray[np.float64]
 Whole = NDArray[np.int64]

@@ -18,8 +18,8 @@ from lab.view.camera_placement import camera_for
 from lab.view.canvas import seconds
 from lab.view.gantt_bars import PRODUCTS, mixed
 from lab.view.keyframes import Motion, Track, continuous
+from lab.view.scene_data import Story
 from lab.view.schedule_floor import IDLE, INK, PART_M, WORKS, Arm, Carrier, Spot, Stop, Vehicle, laid_out
-from lab.view.story import Story
 
 START, FINISHED = (
     "start",

@@ -26,8 +26,7 @@ from uvicorn import Server as Uvicorn
 
 from lab.errors import BadInput, WorkFailed
 from lab.operating_system import keep_port
-from lab.view.server_limits import BACKLOG, LimitedConnection, LimitedSocket, quiet_when_full
-from lab.view.server_page import PAUSE_S, News, Page, Panel
+from lab.view.server_page import BACKLOG, PAUSE_S, LimitedConnection, LimitedSocket, News, Page, Panel, quiet_when_full
 
 ADDRESS = "127.0.0.1"
 HOSTS = ("127.0.0.1", "localhost")  # also through a forwarded port; no other name may lead here

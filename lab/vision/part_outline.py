@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lab.vision.hidden_discs import calmed
+from lab.vision.markers import calmed
 from lab.vision.opencv import cv2
 from lab.vision.picture_files import Image, check_picture
 

@@ -18,7 +18,7 @@ from lab.sequencing.simulate.run import Run
 from lab.studies.charts import bars
 from lab.studies.findings import Findings, Row, row, those, varying_row
 from lab.studies.runner import Job, record_of
-from lab.tasks.carried_policy import write_policy
+from lab.tasks.sequencing import write_policy
 from lab_studies.comparisons.carried_over_families import SMALL, Unseen, small_cells, unseen, unseen_cell
 from lab_studies.comparisons.carried_over_learning import CarriedLearning, learn_policy
 

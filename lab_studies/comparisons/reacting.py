@@ -15,7 +15,7 @@ from lab.sequencing.methods.exact import optimum
 from lab.sequencing.methods.rollout import by_rule, replan
 from lab.sequencing.methods.rules import usable
 from lab.sequencing.simulate.cell_arrays import Floats
-from lab.sequencing.simulate.replications import replicate
+from lab.sequencing.simulate.several import replicate
 from lab.studies.charts import bars
 from lab.studies.findings import Findings, Row, mean_row, row, those
 from lab.studies.runner import Job

@@ -12,7 +12,7 @@ from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import Chance, Episode
 from lab.sequencing.cell.objectives import MAKESPAN, check_objective
 from lab.sequencing.cell.routes import choice_of, part_of
-from lab.sequencing.methods.priority_kernels import OrderArrays
+from lab.sequencing.methods.priorities import OrderArrays
 from lab.sequencing.methods.rules import dispatch, usable
 from lab.sequencing.simulate.cell_arrays import Floats, Ints, RunArrays, cell_arrays, moves_each, run_arrays
 from lab.sequencing.simulate.execution import Choose, Observed, Policy

@@ -3,7 +3,7 @@
 from typing import Any
 
 from lab.learning.compiled import inner, without_refcounts
-from lab.sequencing.methods.priority_kernels import carried_on
+from lab.sequencing.methods.priorities import carried_on
 from lab.sequencing.simulate.kernels import take
 
 

@@ -10,8 +10,7 @@ from lab.errors import BadInput, WorkFailed
 from lab.sequencing import SEQUENCERS, find_sequence
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import MAKESPAN
-from lab.sequencing.cell.schedule import Schedule
-from lab.sequencing.cell.schedule_rows import rows_of
+from lab.sequencing.cell.schedule import Schedule, rows_of
 from lab.sequencing.search import EpisodeSequenced, Search
 from lab.sequencing.simulate.follow import follow, simulate
 from lab.studies.runner import record_of

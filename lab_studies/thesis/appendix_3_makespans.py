@@ -12,10 +12,10 @@ from lab.sequencing.cell.chance import LAWS, Chance, drawn_seed
 from lab.sequencing.cell.stations import Arrivals
 from lab.sequencing.methods.exact import optimum
 from lab.sequencing.methods.rollout import replan
-from lab.sequencing.methods.srl_time_reacting import reacting
+from lab.sequencing.methods.srl_time import reacting
 from lab.sequencing.search import Search, SrlSettings
 from lab.sequencing.simulate.execution import Policy
-from lab.sequencing.simulate.replications import replicate
+from lab.sequencing.simulate.several import replicate
 from lab_studies.many_sessions import evaluate, run_sessions
 from lab_studies.thesis.appendix_3_fifo import STARTS, queued_fifo
 from lab_studies.thesis.chapter_7_cells import beta_of

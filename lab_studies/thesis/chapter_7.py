@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from lab.statistics import Comparison
-from lab.studies.counted_apart import marked
-from lab.studies.findings import Findings, Row, agreement, row
+from lab.studies.findings import Findings, Row, agreement, marked, row
 from lab.studies.runner import Job
 from lab_studies.thesis import appendix_4
 from lab_studies.thesis import chapter_7_figures as figures

@@ -3,8 +3,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from lab.studies.counted_apart import marked
-from lab.studies.findings import Findings, Row, agreement, share_row, those
+from lab.studies.findings import Findings, Row, agreement, marked, share_row, those
 from lab.studies.runner import Job
 from lab_studies.thesis import chapter_9_figures as figures
 from lab_studies.thesis.chapter_9_cells import BEST_BETA, TABLES, appendix, by_beta, table

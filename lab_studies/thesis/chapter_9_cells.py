@@ -10,8 +10,7 @@ import numpy as np
 from lab.advice.advisors import SKILL_TAUS
 from lab.mdp import FloatArray
 from lab.statistics import Comparison, Range, compare, part_means, ranges, score
-from lab.studies.counted_apart import marked
-from lab.studies.findings import Row, mean_row, row, share_row
+from lab.studies.findings import Row, marked, mean_row, row, share_row
 from lab.studies.runner import Job
 from lab_studies.thesis import printed_lines
 from lab_studies.thesis.chapter_9_sessions import AdviceOutcome, AdviceSetting, learner_of, measured

@@ -24,7 +24,7 @@ from lab.learning.selection import softmax
 from lab.learning.session_events import AdviceGiven
 from lab.learning.simulated_advice import Advice, TableAdvisor, advice_chances
 from lab.mdp import FloatArray, TabularMDP, grid, optimal_values, shortest_steps
-from lab.sequencing.request import SequenceRequest, state_of
+from lab.sequencing.search import SequenceRequest, state_of
 from lab.sequencing.simulate.follow import follow
 from lab.sequencing.simulate.run import Run
 from lab.tasks.task_file import load_cell

@@ -123,6 +123,6 @@ def test_a_world_of_rows_says_what_is_wrong_with_them() -> None:
 
 
 def test_the_settings_are_those_of_learner_and_gate() -> None:
-    from lab.api.settings import Settings
+    from lab.api.options import Settings
 
     assert [*Settings.__annotations__] == [*vars(LearnerSettings()), *vars(GateSettings())]

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lab.cli.toolbox_evaluate import evaluation_summary
+from lab.cli.toolbox import evaluation_summary
 from lab.mdp import optimal_values
 from lab.production.evaluation import Evaluation, SceneResult
 from lab.skills.prepared_scene import prepare

@@ -4,9 +4,8 @@ import pytest
 
 from lab.errors import BadInput
 from lab.export import FORMATS
-from lab.export.options import Options
 from lab.export.play import deviation
-from lab.export.program import Program
+from lab.export.program import Options, Program
 
 NEEDS_AXES = {"urscript": 6}
 

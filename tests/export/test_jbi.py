@@ -26,8 +26,7 @@ from lab.export.inform import (
     Wait,
     read_job,
 )
-from lab.export.options import Options
-from lab.export.program import Program
+from lab.export.program import Options, Program
 from lab.sim.arms.arm_models import arm_named
 from lab.sim.arms.kinematics import ToolPose
 from tests.export.conftest import carried_out

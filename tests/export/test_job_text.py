@@ -5,8 +5,7 @@ import pytest
 
 from lab.export import jbi
 from lab.export.commands import jobs_of
-from lab.export.options import Options
-from lab.export.program import Motion, Program
+from lab.export.program import Motion, Options, Program
 from tests.export.job_text import Stretch, farthest, signals, stretches
 
 

@@ -9,9 +9,8 @@ from lab.errors import BadInput
 from lab.export import jbi, trajectory_csv
 from lab.export.commands import Path
 from lab.export.inform import Position, read_job
-from lab.export.options import Options
 from lab.export.play import apart, deviation
-from lab.export.program import Program
+from lab.export.program import Options, Program
 
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 

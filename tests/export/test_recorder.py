@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from lab.export import FORMATS
-from lab.export.options import Options
 from lab.export.play import deviation
-from lab.export.program import Motion, Press, Program, Rest
+from lab.export.program import Motion, Options, Press, Program, Rest
 from lab.export.recorder import SEEN_EVERY, MotionRecorder, tips
 from lab.sim.arms.arm_models import arm_named
 from lab.sim.arms.kinematics import ToolPose

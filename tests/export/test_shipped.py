@@ -10,8 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from lab.export import FORMATS
-from lab.export.options import Options
-from lab.export.program import Program
+from lab.export.program import Options, Program
 from tests.export.job_text import Stretch, farthest, moves, script_stretches, stretches
 from tests.export.test_job_text import dense, ways_of
 

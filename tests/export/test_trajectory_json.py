@@ -8,8 +8,7 @@ import pytest
 
 from lab.errors import BadInput
 from lab.export import trajectory_json
-from lab.export.options import Options
-from lab.export.program import Program
+from lab.export.program import Options, Program
 from lab.export.timed import Point, TimedPoints
 from lab.export.trajectory_json import read_document, text_of
 

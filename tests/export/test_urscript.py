@@ -9,8 +9,7 @@ import pytest
 from lab.errors import BadInput
 from lab.export import urscript
 from lab.export.commands import Await, Grip, Joint, Path, Pause, Payload
-from lab.export.options import Options
-from lab.export.program import Program
+from lab.export.program import Options, Program
 from lab.sim.arms.arm_models import arm_named
 from lab.sim.arms.kinematics import ToolPose
 

@@ -11,7 +11,7 @@ from lab.advice.table_level import TableLevel
 from lab.errors import BadInput
 from lab.learning.gates import GATES, Gate, Surroundings, deviation, improvement
 from lab.learning.members import Member
-from lab.learning.reasons import TooSlow
+from lab.learning.requests import TooSlow
 from lab.learning.session import Session
 from lab.learning.session_result import SessionResult
 from lab.learning.settings import GateSettings, LearnerSettings

@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lab.learning.splitmix import stream, uniform
-from lab.sequencing.simulate import chance_kernels as kernels
+from lab.sequencing.simulate import room_kernels as kernels
 
 SEEDS = st.integers(0, 2**64 - 1)
 

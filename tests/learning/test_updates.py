@@ -10,9 +10,7 @@ from hypothesis import strategies as st
 from lab.errors import BadInput
 from lab.learning.settings import LearnerSettings
 from lab.learning.updates import UPDATES, Row
-from lab.learning.updates.afterstate import afterstate_value
-from lab.learning.updates.one_step import q_target, sarsa_target
-from lab.learning.updates.traces import is_greedy
+from lab.learning.updates.tabular import afterstate_value, is_greedy, q_target, sarsa_target
 from lab.learning.updates.update import towards
 from lab.mdp import TabularMDP
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lab.learning.gates import GATES, Surroundings, earned_trust, heard
+from lab.learning.gates import GATES, Surroundings, heard, weighing
 from lab.learning.gates.weighing import Weighing
 from lab.learning.selection import exp_of
 from lab.learning.settings import GateSettings, LearnerSettings
@@ -122,7 +122,7 @@ def test_trust_drops_what_leads_round() -> None:
     one = gate("earned-trust")
     walk(one, [(0, RIGHT, LEFT, 1), (1, LEFT, RIGHT, 0), (0, RIGHT, LEFT, 1)], False)
     assert np.flatnonzero(one.heard.blamed).tolist() == [RIGHT]  # back in 0 by advised moves alone
-    assert earned_trust.favourite(one.heard, 0) == heard.NOTHING
+    assert weighing.favourite(one.heard, 0) == heard.NOTHING
     own = gate("earned-trust")
     walk(own, [(0, RIGHT, LEFT, 1), (1, None, LEFT, 0), (0, RIGHT, LEFT, 1)], False)
     assert not any(own.heard.blamed)  # the learner itself had a hand in it
@@ -143,13 +143,13 @@ def test_trust_goes_alone_once_its_own_way_is_as_short() -> None:
     values = {0: [0.0, 1.0, 0.0], 1: [0.0, 1.0, 0.0]}
     one = gate("earned-trust", u=0.0, values=lambda state: values[state])
     walk(one, [(0, RIGHT, LEFT, 1), (1, RIGHT, LEFT, 2)], True)
-    assert earned_trust.rehearsed(one.heard, 0) == 2  # its values say right twice, and that was walked
+    assert weighing.rehearsed(one.heard, 0) == 2  # its values say right twice, and that was walked
     one.begins(0)
     assert one.heard.now.advised == 0.0
     assert not one.asks(0, [])
     values[1] = [2.0, 1.0, 0.0]  # left in 1, where nobody went
     one.saw(1, LEFT, 0.0, 1.0, 1, 0)
-    assert earned_trust.rehearsed(one.heard, 0) == heard.NOTHING
+    assert weighing.rehearsed(one.heard, 0) == heard.NOTHING
     one.begins(0)
     assert one.heard.now.advised == 1.0
 

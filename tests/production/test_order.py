@@ -18,7 +18,7 @@ from lab.production.run_journal import RunBegan, RunJournal
 from lab.sequencing import find_sequence
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.stations import Product, Stage, Station, one_robot
-from lab.sequencing.request import SequenceRequest
+from lab.sequencing.search import SequenceRequest
 from lab.sequencing.simulate.follow import simulate
 from lab.sequencing.simulate.run import Run
 from lab.tasks.sequencing import Sequencing, search_for

@@ -19,7 +19,7 @@ from lab.production.sequencing_job import (
 from lab.sequencing import SEQUENCERS, find_sequence
 from lab.sequencing.cell.chance import NO_CHANCE, Chance
 from lab.sequencing.cell.objectives import OBJECTIVES
-from lab.sequencing.cell.schedule_rows import rows_of
+from lab.sequencing.cell.schedule import rows_of
 from lab.sequencing.methods.rules import RULES
 from lab.sequencing.search import Reference
 from lab.sequencing.simulate.follow import simulate

@@ -13,8 +13,8 @@ from lab.production.sequencing_job import (
 from lab.sequencing import SEQUENCERS
 from lab.sequencing.cell.chance import Chance
 from lab.sequencing.methods.carried_over_policy import CarriedPolicy
-from lab.sequencing.simulate.replications import replicate
-from lab.tasks.carried_policy import write_policy
+from lab.sequencing.simulate.several import replicate
+from lab.tasks.sequencing import write_policy
 from lab.tasks.task_file import load_cell
 
 Lab = Callable[..., Any]  # the fixture of tests/conftest.py; it returns a Ran

@@ -13,7 +13,7 @@ from lab.learning.requests import AdviceRequest
 from lab.learning.session_events import Improvement
 from lab.mdp import TabularMDP, coverage, grid
 from lab.seat.grid_text import Marks, Picture, bracketed, direction_of, picture_of, safe_ansi, window
-from lab.view.grid_planes import GridPlanes
+from lab.view.value_levels import GridPlanes
 
 CUBE = ("left", "right", "backward", "forward", "down", "up")
 SKY = ("south", "north", "east", "west", "pick up")

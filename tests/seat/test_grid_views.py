@@ -5,8 +5,7 @@ import pytest
 
 from lab.learning.requests import AdviceRequest
 from lab.mdp import TabularMDP, grid
-from lab.seat.grid_text import Marks
-from lab.seat.grid_views import both_views, views_of
+from lab.seat.grid_text import Marks, both_views, views_of
 
 CUBE = ("left", "right", "backward", "forward", "down", "up")
 FROM_SIDE = ("lower", "higher", "backward", "forward", "in", "out")

@@ -14,7 +14,7 @@ from lab.seat.lesson_seat import LessonSeat
 from lab.seat.page.teaching_page import SeatPage
 from lab.seat.run_progress import RunProgress
 from lab.seat.terminal.prompt import TeachingPrompt
-from lab.sequencing.request import SequenceRequest
+from lab.sequencing.search import SequenceRequest
 from lab.sequencing.simulate.run import Run
 from lab.skills.prepared_scene import Prepared, prepare
 from lab.tasks.task_file import load, load_cell

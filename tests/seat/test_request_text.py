@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from lab.learning.environment import TableEnvironment
-from lab.learning.reasons import TooSlow, ValuesAlike
-from lab.learning.requests import AdviceRequest, Standing
+from lab.learning.requests import AdviceRequest, Standing, TooSlow, ValuesAlike
 from lab.learning.session_events import EpisodeEnded, Improvement, Verdict
 from lab.mdp import TabularMDP, coverage, grid
 from lab.seat import request_text as facts

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lab.sim.arms.kinematics import ToolPose
-from lab.sim.hand_camera import AHEAD_M, PIXELS, UP_M, hand_camera, seen_corners
+from lab.sim.camera import AHEAD_M, PIXELS, UP_M, hand_camera, seen_corners
 from lab.sim.parts.part_shape import shape_of
 from lab.tasks.part_fields import PartFields
 from lab.tasks.task_file import load

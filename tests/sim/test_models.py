@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lab.files import assets_folder
-from lab.sim import models, urdf_writer
+from lab.sim import models
 from lab.sim.urdf_reader import validate
 from lab.sim.world import World
 
@@ -21,7 +21,7 @@ def test_the_committed_files_are_what_the_parameters_make(tmp_path: Path) -> Non
 
 @pytest.mark.parametrize("name", models.MODELS)
 def test_every_model_is_a_valid_urdf_of_its_own_name(name: str) -> None:
-    text, meshes = urdf_writer.urdf(models.MODELS[name]())
+    text, meshes = models.urdf(models.MODELS[name]())
     assert f'<robot name="{name}">' in text
     assert all(f'filename="{mesh}"' in text for mesh in meshes)
     validate(assets_folder() / f"{name}.urdf")
@@ -30,7 +30,7 @@ def test_every_model_is_a_valid_urdf_of_its_own_name(name: str) -> None:
 def test_an_obj_has_a_normal_for_every_face_and_no_negative_zero() -> None:
     import trimesh
 
-    text = urdf_writer.obj(trimesh.creation.box(extents=(2.0, 4.0, 6.0)))
+    text = models.obj(trimesh.creation.box(extents=(2.0, 4.0, 6.0)))
     lines = text.splitlines()
     vertices = np.array([line.split()[1:] for line in lines if line.startswith("v ")], dtype=float)
     assert sorted(map(tuple, np.unique(np.abs(vertices), axis=0))) == [(1.0, 2.0, 3.0)]
@@ -45,7 +45,7 @@ def test_an_obj_has_a_normal_for_every_face_and_no_negative_zero() -> None:
 
 
 def test_a_slice_weighs_and_turns_like_a_homogeneous_box() -> None:
-    text, _ = urdf_writer.urdf(models.bread())
+    text, _ = models.urdf(models.bread())
     (x, y, z), kg = models.SLICE, models.SLICE_KG
     expected = f'ixx="{kg * (y**2 + z**2) / 12:.9g}" ixy="0" ixz="0" iyy="{kg * (x**2 + z**2) / 12:.9g}"'
     assert f'<mass value="{kg:g}" />' in text

@@ -9,11 +9,11 @@ from lab.errors import BadInput
 from lab.files import tasks_folder
 from lab.learning.problem import Problem
 from lab.sim.arms.kinematics import ToolPose
+from lab.sim.models import Link, Model, urdf
+from lab.sim.models import Part as Piece
 from lab.sim.scene.blocked_cells import Surveyor
 from lab.sim.scene.places import Layout
 from lab.sim.scene.scene import TABLE, Scene
-from lab.sim.urdf_writer import Link, Model, urdf
-from lab.sim.urdf_writer import Part as Piece
 from lab.sim.world import World
 from lab.skills.prepared_scene import prepare
 from lab.skills.skill import SETTLE_STEPS

@@ -5,8 +5,7 @@ from collections.abc import Sequence
 import pytest
 
 from lab.sim.arms.kinematics import ToolPose
-from lab.skills.shortcuts import corners
-from lab.skills.surveys import Surveys
+from lab.skills.surveys import Surveys, corners
 
 STAIRS = [(0, 0), (1, 0), (1, 1), (2, 1), (2, 2), (3, 2)]
 

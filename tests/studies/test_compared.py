@@ -13,8 +13,7 @@ from lab.errors import BadInput
 from lab.learning.batch import run_sessions
 from lab.learning.gates import GATES
 from lab.learning.members import Member
-from lab.studies.compared import Compared, Setting, compared, sessions_of
-from lab.studies.compared_figures import words
+from lab.studies.compared import Compared, Setting, compared, sessions_of, words
 from lab.studies.runner import STORE, Job
 from lab.tasks.grid_world import from_rows
 

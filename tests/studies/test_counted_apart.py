@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lab.studies.counted_apart import counts, in_short, marked, middle, ordered, ranked, share
+from lab.studies.findings import counts, in_short, marked, middle, ordered, ranked, share_within
 
 
 def printed(thesis: float | None, measure: str = "score", **more: Any) -> dict[str, Any]:
@@ -50,7 +50,7 @@ def test_a_headline_by_hand() -> None:
     assert {name: len(of) for name, of in counts(told).items()} == {"not used": 2, "used to choose": 2, "easy": 1}
     assert in_short(told[-1:]) == counts(told[-1:]) == {}
     assert in_short(told[4:5])["headline"] == "all cells are easy"
-    assert share([]) == "0 of 0 agree"
+    assert share_within([]) == "0 of 0 agree"
 
 
 def test_ranks_as_numbers() -> None:

@@ -12,7 +12,7 @@ import lab
 from lab.errors import BadInput
 from lab.learning.settings import SETTINGS
 from lab.learning.tuned_ranges import RANGES, USUAL, Span
-from lab.studies.compared_sessions import Sessions
+from lab.studies.compared import Sessions
 from lab.studies.findings import Findings, those
 from lab.studies.runner import STORE, Job
 from lab.studies.tuning import FILE, Tuning, costs, settings_text, tuned

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from lab.errors import BadInput
 from lab.sequencing.methods.carried_over_policy import FEATURES, CarriedPolicy
-from lab.tasks.carried_policy import FORMAT, read_policy, write_policy
+from lab.tasks.sequencing import FORMAT, read_policy, write_policy
 
 POLICY = CarriedPolicy({"delay": -1.5, "tail": 0.25}, "mean-tardiness", "three toasts")
 HELD = {"format": FORMAT, "weights": {"delay": -1.5, "tail": 0.25}, "objective": "makespan", "learned_on": ""}

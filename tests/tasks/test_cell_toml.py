@@ -4,8 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from lab.tasks.cell_file import CellFile
-from lab.tasks.cell_toml import toml_of
+from lab.tasks.cell_file import CellFile, toml_of
 from lab.tasks.task_file import load_cell, names_of
 from lab.tasks.toml_text import TomlText
 

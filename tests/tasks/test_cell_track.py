@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from lab.errors import BadInput
-from lab.tasks.cell_toml import toml_of
+from lab.tasks.cell_file import toml_of
 from lab.tasks.task_file import load_cell
 
 TRACK = '[track]\nstretches = [["in", "saw", 3], ["saw", "out", 4.5]]\n'

@@ -24,7 +24,7 @@ from lab.advice.table_level import TableLevel
 from lab.errors import BadInput, LabError, WorkFailed
 from lab.gym.environment_name import names_environment, parse_name
 from lab.gym.gym_environment import ALONE, GymEnvironment
-from lab.gym.space_numbering import CellNumbering, Numbering, Unsupported
+from lab.gym.numbered_environment import CellNumbering, Numbering, Unsupported
 from lab.gym.transition_model import TransitionModel, Worth
 from lab.learning.environment import Judged
 from lab.learning.physics.environment import PhysicsEnvironment

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from lab.errors import BadInput
-from lab.toolbox.history import event, in_use_before, line_of, read_events, success_percents
+from lab.toolbox.versions import event, in_use_before, line_of, read_events, success_percents
 
 
 def put(digits: str) -> dict[str, Any]:

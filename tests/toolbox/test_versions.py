@@ -11,7 +11,7 @@ import pytest
 
 from lab.errors import BadInput, WorkFailed
 from lab.files import read_limited
-from lab.toolbox import place
+from lab.toolbox import folder_place
 from lab.toolbox.names import hash_of
 from lab.toolbox.policy import Policy
 from lab.toolbox.policy_file import encode
@@ -186,7 +186,7 @@ def test_one_that_may_not_be_read_is_not_replaced(
         return plain(path, most)
 
     with monkeypatch.context() as patch:
-        patch.setattr(place, "read_limited", refuse)
+        patch.setattr(folder_place, "read_limited", refuse)
         with pytest.raises(BadInput, match=r"policy file .*insert.safetensors: Input/output error"):
             box.save(make_policy(2.0, final_steps=9))
     assert in_use(box) == 1.0

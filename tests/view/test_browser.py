@@ -11,9 +11,9 @@ from lab.sequencing.cell.schedule import Activity, Schedule
 from lab.sim.frames import IDENTITY, Body, Frame, Recording, Shape
 from lab.tasks.schedule_table import read_schedule
 from lab.view.meshcat import LiveView, replay_html
+from lab.view.scene_data import Mark, Story
 from lab.view.schedule_floor import HIGH_M, PART_M
 from lab.view.schedule_scene import scene_of
-from lab.view.story import Mark, Story
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page

@@ -17,7 +17,7 @@ from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.schedule import Activity, Schedule
 from lab.sequencing.cell.stations import Arrivals, Product, Stage, Station, one_robot
 from lab.sequencing.cyclic.cycle import best_cycle
-from lab.sequencing.cyclic.steady import steady
+from lab.sequencing.cyclic.unrolled import steady
 from lab.sequencing.simulate.follow import simulate
 from lab.sequencing.simulate.run import Run
 from lab.tasks.task_file import load_cell

@@ -3,7 +3,7 @@
 import numpy as np
 
 from lab.mdp import coverage, grid
-from lab.view.grid_planes import GridPlanes, is_map
+from lab.view.value_levels import GridPlanes, is_map
 
 BLOCKED = np.array([[0, 1, 0], [0, 0, 0]], bool)
 

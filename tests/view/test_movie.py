@@ -16,7 +16,7 @@ from lab.view import movie
 from lab.view.meshcat import replay_html
 from lab.view.movie import FRAMES_PER_S, readable, write_movie
 from lab.view.replay_file import read_replay
-from lab.view.story import Story
+from lab.view.scene_data import Story
 
 
 @pytest.fixture

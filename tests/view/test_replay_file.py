@@ -16,7 +16,7 @@ from lab.sequencing.cell.schedule import Schedule
 from lab.sim.frames import Body, Frame, Pose, Recording, Shape
 from lab.view.meshcat import replay_html
 from lab.view.replay_file import read_replay
-from lab.view.story import Story
+from lab.view.scene_data import Story
 
 HALF = 0.5**0.5
 RED = (1.0, 0.0, 0.0, 1.0)

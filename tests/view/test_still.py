@@ -1,7 +1,7 @@
 """A viewer that keeps what it is shown."""
 
 from lab.sim.frames import IDENTITY, Body, Frame, Shape
-from lab.view.still import Still
+from lab.view.rasterizer import Still
 
 
 def test_it_keeps_what_was_shown_last() -> None:

@@ -6,7 +6,7 @@ import pytest
 
 from lab.errors import BadInput
 from lab.sequencing.cell.schedule import Activity, Schedule
-from lab.view.story import MARKS, Mark, Story
+from lab.view.scene_data import MARKS, Mark, Story
 
 CARRY = Activity("robot", "carry", 1, "plate", "toaster", 1.00049, 4.0)
 TOASTS = Activity("toaster", "process", 1, "toaster", "toaster", 4.0, 64.0)

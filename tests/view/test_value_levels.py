@@ -11,8 +11,7 @@ from lab.errors import BadInput
 from lab.toolbox.policy import GOAL, ON, OUT, Policy
 from lab.view import value_levels as levels
 from lab.view.canvas import ORANGE, RED
-from lab.view.grid_planes import Planes
-from lab.view.value_levels import Learned, can_be_drawn, value_levels
+from lab.view.value_levels import Learned, Planes, can_be_drawn, value_levels
 
 MakePolicy = Callable[..., Policy]
 SPACE = ("left", "right", "backward", "forward", "down", "up")

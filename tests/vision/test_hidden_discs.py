@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lab.vision import MARKERS, Image, View, find_markers
-from lab.vision.hidden_discs import calmed
+from lab.vision.markers import calmed
 
 SIDE, RADIUS = 200, 14.0
 FLAT = View(np.array([[1.0, 0, 0, 0], [0, 1.0, 0, 0], [0, 0, 0, 1.0]]), (0.0, 0.0), 50.0, (4, 4), radius_m=RADIUS)

@@ -6,7 +6,7 @@ import pytest
 
 from lab.vision import Image
 from lab.vision.calibration import pinhole
-from lab.vision.photo_effects import CORNER_SHIFT, HIDDEN, drawn_lens, hide, spoiled
+from lab.vision.lens import CORNER_SHIFT, HIDDEN, drawn_lens, hide, spoiled
 
 
 def grey(side: int = 200) -> Image:

@@ -2,13 +2,21 @@
 
 from typing import Any
 
-from lab.learning.gates import gate_rules as rules
+from lab.learning.gates import gate as rules
 from lab.learning.gates.ccrl import Ccrl, Combined
-from lab.learning.gates.constant_performance import ConstantPerformance
-from lab.learning.gates.gate import Gate, GateClass, Never, Surroundings
-from lab.learning.gates.gate_rules import CompiledGate, Steps, improvement
-from lab.learning.gates.per_step import Importance, Introspection, Random
-from lab.learning.gates.uncertainty import Uncertainty, deviation
+from lab.learning.gates.gate import (
+    CompiledGate,
+    Gate,
+    GateClass,
+    Importance,
+    Introspection,
+    Never,
+    Random,
+    Steps,
+    Surroundings,
+    improvement,
+)
+from lab.learning.gates.other_gates import ConstantPerformance, Uncertainty, deviation
 from lab.learning.gates.weighing import Fading, Novelty, Reliability, Shaping, Trust, TwoLevels
 from lab.learning.members import Member
 from lab.plugins.family import Family, first_line, takes, wanted
@@ -37,7 +45,7 @@ _SHIPPED: dict[str, Member[GateClass]] = {
     ),
     "ia": Member(
         Introspection,
-        "introspection: asks wherever the values of the moves lie within psi of each other, so that it is unsure",
+        "introspection: asks wherever the values of the moves lie within psi of each other, because it is unsure there",
         CompiledGate(rules.OPENS_FROM_X, rules.ASKS_WHERE_ALIKE),
     ),
     "combined": Member(
@@ -67,27 +75,27 @@ _SHIPPED: dict[str, Member[GateClass]] = {
     ),
     "novelty": Member(Novelty, "asks in every state until it has been answered there", _weighing(rules.WEIGHS_NOVELTY)),
     "fading": Member(
-        Fading, "asks about a share of the steps that fades with the episodes", _weighing(rules.WEIGHS_FADING)
+        Fading, "asks about a share of the steps that decays with the episodes", _weighing(rules.WEIGHS_FADING)
     ),
     "shaping": Member(
         Shaping,
-        "policy shaping: asks about every step, and multiplies what was said with its own chances",
+        "policy shaping: asks about every step, and multiplies its own action probabilities by those of the advice",
         _weighing(rules.WEIGHS_SHAPING),
     ),
     "reliability": Member(
         Reliability,
-        "asks once a state, while it explores, and follows an advisor whose answers its own values bear out (CLUE)",
+        "asks once per state, while it explores, and follows an advisor whose answers its own values confirm (CLUE)",
         _weighing(rules.WEIGHS_RELIABILITY),
     ),
     "two-levels": Member(
         TwoLevels,
-        "learns in every state whether asking or going on alone is worth more",
+        "learns in every state whether asking or acting alone is worth more",
         _weighing(rules.WEIGHS_WORTH),
     ),
     "earned-trust": Member(
         Trust,
-        "remembers what it is told, follows it while episodes with advice do better than those without, and drops what "
-        "leads round",
+        "remembers advice, follows it while episodes with advice do better than those without, and drops what leads in "
+        "circles",
         _weighing(rules.WEIGHS_TRUST),
     ),
 }

@@ -2,10 +2,19 @@
 
 from math import inf
 
-from lab.learning.gates.gate import Gate, Surroundings, Values
-from lab.learning.gates.gate_rules import Steps, improvement, misled, too_slow, unsure, window_mean
-from lab.learning.gates.per_step import width_of
-from lab.learning.reasons import Both, Reason, TooSlow, ValuesAlike
+from lab.learning.gates.gate import (
+    Gate,
+    Steps,
+    Surroundings,
+    Values,
+    improvement,
+    misled,
+    too_slow,
+    unsure,
+    width_of,
+    window_mean,
+)
+from lab.learning.requests import Both, Reason, TooSlow, ValuesAlike
 from lab.learning.settings import GateSettings
 
 

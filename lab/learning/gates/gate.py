@@ -2,13 +2,66 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
-from lab.learning.gates.gate_rules import Steps
-from lab.learning.reasons import Reason
+from lab.learning.requests import ByChance, Reason, ValuesAlike, ValuesApart
 from lab.learning.selection import Draw
-from lab.learning.session_events import Verdict
+from lab.learning.session_events import Improvement, Verdict
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.learning.updates.update import Update
+
+Steps = Sequence[float]  # whole numbers, unless the high level compares makespans
+
+OPENS_NEVER, OPENS_ALWAYS, OPENS_FROM_X, OPENS_WHILE_SLOW, OPENS_WHILE_LONG = range(5)
+WEIGHS_NOTHING, WEIGHS_NOVELTY, WEIGHS_FADING, WEIGHS_SHAPING, WEIGHS_RELIABILITY, WEIGHS_WORTH, WEIGHS_TRUST = range(7)
+ASKS_ALWAYS, ASKS_WHERE_ALIKE, ASKS_WHERE_APART, ASKS_BY_CHANCE, ASKS_WHERE_TABLES_DIFFER = range(5)
+
+
+class CompiledGate(NamedTuple):
+    """A gate by the rules that the kernel knows: which episodes it opens (OPENS_...), which steps of these it asks about
+    (ASKS_...), whether it judges episodes as CCRL does, and how it weighs what it is told (WEIGHS_...).
+    """
+
+    opens: int
+    asks: int
+    judges: bool = False
+    weighs: int = WEIGHS_NOTHING
+
+
+def window_mean(steps: Steps, end: int, window: int) -> float:
+    """The mean of the `window` step counts before index `end`."""
+    total: float = 0
+    for i in range(end - window, end):
+        total += steps[i]
+    return total / window
+
+
+def too_slow(current_mean: float, previous_mean: float, threshold: float) -> bool:
+    """Whether the improvement rate is below Lambda. Source: thesis eqs. 6.1 and 6.2 and the listing's ratio."""
+    return current_mean / previous_mean > 1.0 - threshold
+
+
+def misled(result: float, mean_before: float) -> bool:
+    """Whether an episode was not better than the mean of the K before it. Source: thesis eq. 6.3 and listing."""
+    return result >= mean_before
+
+
+def unsure(width: float, psi: float) -> bool:
+    """Whether the values of a state span at most Psi. Source: Clouse 1996; thesis eq. 9.3 (<), listing (<=)."""
+    return width <= psi
+
+
+def improvement(steps: Steps, window: int) -> Improvement | None:
+    """The improvement of the step counts so far; None while fewer than two windows have ended."""
+    n = len(steps)
+    if n < 2 * window:
+        return None
+    current, previous = window_mean(steps, n, window), window_mean(steps, n - window, window)
+    return Improvement(1.0 - current / previous, current, previous)
+
+
+# ---- gate -------------------------------------------------------------------------------------------------------------
+
 
 Values = Sequence[float]
 
@@ -84,3 +137,46 @@ class Never(Gate):
 
 
 GateClass = Callable[[GateSettings, int, int, Surroundings | None], Gate]
+
+
+# ---- per step ---------------------------------------------------------------------------------------------------------
+
+
+class PerStep(Gate):
+    """From episode X on, whether to ask is decided at each step."""
+
+    def opens(self, episode: int, steps: Steps) -> bool:
+        """Every episode from X on may ask."""
+        return episode >= self.settings.first_episode
+
+
+def width_of(values: Values) -> float:
+    return max(values) - min(values)
+
+
+class Introspection(PerStep):
+    """Asks in each state whose values span at most Psi (Clouse 1996; thesis eq. 9.3)."""
+
+    def asks(self, state: int, values: Values) -> bool:
+        """Whether the learner is unsure of its choice."""
+        self.why = ValuesAlike(width_of(values), self.settings.psi)
+        return unsure(width_of(values), self.settings.psi)
+
+
+class Importance(PerStep):
+    """Asks in each state whose values span at least Psi: there a wrong choice costs most (Torrey and Taylor 2013)."""
+
+    def asks(self, state: int, values: Values) -> bool:
+        """Whether much depends on the choice."""
+        self.why = ValuesApart(width_of(values), self.settings.psi)
+        return width_of(values) >= self.settings.psi
+
+
+class Random(PerStep):
+    """Asks in a random share of the steps: what any rule must beat."""
+
+    def asks(self, state: int, values: Values) -> bool:
+        """Whether chance says so."""
+        assert self.around is not None
+        self.why = ByChance(self.settings.rate)
+        return self.around.draw() < self.settings.rate

@@ -1,11 +1,148 @@
 """Gates that keep what they are told and weigh it: the field's rules, and the lab's own, "earned-trust"."""
 
-from lab.learning.gates import earned_trust, heard
-from lab.learning.gates.gate import Gate, Surroundings, Values
-from lab.learning.gates.gate_rules import Steps
-from lab.learning.reasons import ByChance, Reason, ToldSeldom, Trusted
+from collections.abc import Sequence
+
+from lab.learning.gates import heard
+from lab.learning.gates.gate import Gate, Steps, Surroundings, Values
+from lab.learning.gates.heard import GOAL, NOTHING, NOWHERE, Heard, answers, best_of
+from lab.learning.requests import ByChance, Reason, ToldSeldom, Trusted
 from lab.learning.selection import COLDEST, temperature
 from lab.learning.settings import GateSettings
+
+SURE = 1.0
+ANSWERS = 20  # in a state
+OWN = 3.0  # episodes of its own that it has judged itself by
+RECENT = 0.3  # the weight of the last episode in a running mean
+
+
+def rehearsed(heard: Heard, start: int) -> int:
+    """The moves of the greedy way from a state to the goal by moves that were made, NOTHING where it is not known."""
+    states, actions = len(heard.said), len(heard.led) // len(heard.said)
+    state, moves = start, 0
+    while moves < states:
+        action = heard.greedy[state]
+        if action == NOTHING:
+            return NOTHING
+        moves += 1
+        led = heard.led[state * actions + action]
+        if led == GOAL:
+            return moves
+        if led < 0:
+            return NOTHING
+        state = led
+    return NOTHING
+
+
+def starts(heard: Heard, start: int, u: float) -> None:
+    """An episode begins: whether it follows advice (rules 3 and 4)."""
+    now = heard.now
+    now.followed = now.moves = now.advised_moves = 0.0
+    now.since = now.clock = now.clock + 1.0
+    chance = 1.0
+    if now.helped > 0.0:
+        moves = rehearsed(heard, start)
+        known = moves != NOTHING and (now.several > 0.0 or moves <= now.steps)
+        better = now.own >= OWN and now.own_rate >= now.rate and now.own_steps <= now.steps
+        if now.won == 0.0:
+            chance = (now.helped + 1.0) ** -5.0
+        elif known or better:
+            chance = 0.0
+        else:
+            chance = now.rate * (0.5 + 0.5 * now.advised_share)
+    now.advised = 1.0 if u < chance else 0.0
+
+
+def favourite(heard: Heard, state: int) -> int:
+    """The answer that was given most often and is not blamed, NOTHING where there is none; ties: the lowest index."""
+    actions = len(heard.led) // len(heard.said)
+    found, most = NOTHING, 0
+    for action in range(actions):
+        number = state * actions + action
+        if heard.times[number] > most and heard.blamed[number] == 0:
+            found, most = action, heard.times[number]
+    return found
+
+
+def wants(heard: Heard, state: int) -> bool:
+    """Whether to ask (rule 1)."""
+    if heard.now.advised == 0.0:
+        return False
+    given = answers(heard, state)
+    if given >= ANSWERS:
+        return False
+    actions = len(heard.led) // len(heard.said)
+    most = second = 0
+    for number in range(state * actions, (state + 1) * actions):
+        if heard.blamed[number] == 0:
+            times = heard.times[number]
+            if times > most:
+                most, second = times, most
+            elif times > second:
+                second = times
+    return bool(most - second <= SURE * given**0.5)
+
+
+def takes(heard: Heard, state: int, own: int) -> int:
+    """What is known of this state, or the learner's own choice."""
+    if heard.now.advised == 0.0:
+        return own
+    said = favourite(heard, state)
+    heard.now.followed = 0.0 if said == NOTHING else 1.0
+    return own if said == NOTHING else said
+
+
+def saw(heard: Heard, number: int, entered: int, over: bool, values: Sequence[float]) -> None:
+    """Takes in a move; values: of the state that it left, after it was learned from."""
+    now, led = heard.now, heard.led
+    actions = len(led) // len(heard.said)
+    state = number // actions
+    now.clock += 1.0
+    now.moves += 1.0
+    now.advised_moves += now.followed
+    now.last = number
+    heard.greedy[state] = best_of(values)
+    if over:
+        now.blame = number if now.followed > 0.0 else NOTHING
+        return
+    if led[number] == NOTHING:
+        led[number] = entered
+    elif led[number] != entered:
+        led[number] = NOWHERE
+        now.uncertain = 1.0
+    if now.followed == 0.0:
+        now.since = now.clock
+        return
+    heard.left[state] = int(now.clock)
+    heard.said[state] = number - state * actions
+    if heard.left[entered] > now.since and now.uncertain == 0.0:
+        heard.blamed[entered * actions + heard.said[entered]] = 1
+
+
+def ended(heard: Heard, result: float, reached: bool, over: bool) -> None:
+    """An episode is over; result: its steps; over: it ended in a terminal state."""
+    now = heard.now
+    last = int(now.last)
+    if reached:
+        heard.led[last] = GOAL if heard.led[last] in (NOTHING, GOAL) else NOWHERE
+    elif over:
+        heard.led[last] = NOWHERE
+        if now.blame != NOTHING and now.uncertain == 0.0:
+            heard.blamed[int(now.blame)] = 1
+    won = 1.0 if reached else 0.0
+    if now.advised > 0.0:
+        share = now.advised_moves / max(now.moves, 1.0)
+        now.rate = won if now.helped == 0.0 else now.rate + RECENT * (won - now.rate)
+        now.steps = result if now.helped == 0.0 else now.steps + RECENT * (result - now.steps)
+        now.advised_share = share if now.helped == 0.0 else now.advised_share + RECENT * (share - now.advised_share)
+        now.helped += 1.0
+        now.won += won
+    else:
+        now.own_rate = won if now.own == 0.0 else now.own_rate + RECENT * (won - now.own_rate)
+        now.own_steps = result if now.own == 0.0 else now.own_steps + RECENT * (result - now.own_steps)
+        now.own += 1.0
+
+
+# ---- weighing ---------------------------------------------------------------------------------------------------------
 
 
 class Weighing(Gate):
@@ -128,7 +265,7 @@ class TwoLevels(Weighing):
 
 
 class Trust(Weighing):
-    """Follows advice while it does better than going alone, and remembers it (see lab/learning/gates/earned_trust.py)."""
+    """Follows advice while it does better than going alone, and remembers it (see lab/learning/gates/py)."""
 
     def __init__(self, settings: GateSettings, episodes: int, max_steps: int, around: Surroundings | None = None):
         super().__init__(settings, episodes, max_steps, around)
@@ -136,25 +273,25 @@ class Trust(Weighing):
 
     def begins(self, state: int) -> None:
         """Whether this episode follows advice."""
-        earned_trust.starts(self.heard, state, self._around.draw())
+        starts(self.heard, state, self._around.draw())
 
     def asks(self, state: int, values: Values) -> bool:
         """Whether this episode follows advice and the answers so far leave it unsure."""
         now = self.heard.now
         self.why = Trusted(now.rate) if now.helped else Reason()
-        return earned_trust.wants(self.heard, state)
+        return wants(self.heard, state)
 
     def weighed(self, state: int, own: int, said: int | None) -> int:
         """What is known of this state, or the learner's own choice."""
-        return earned_trust.takes(self.heard, state, own)
+        return takes(self.heard, state, own)
 
     def learns(self, state: int, action: int, reward: float, discount: float, entered: int) -> None:
         """Where the move led, and whether it led round."""
         self._over = discount == 0.0
         number = state * self._around.size[1] + action
-        earned_trust.saw(self.heard, number, entered, self._over, self._around.values(state))
+        saw(self.heard, number, entered, self._over, self._around.values(state))
 
     def judges(self, steps: Steps, opened: bool) -> None:
         """How the episode went."""
         reached = steps[-1] <= self.max_steps
-        earned_trust.ended(self.heard, float(steps[-1]), reached, self._over)
+        ended(self.heard, float(steps[-1]), reached, self._over)

@@ -13,10 +13,9 @@ import numpy as np
 from lab.learning import advice_memory as memory
 from lab.learning import selection
 from lab.learning.compiled import inlined, inner, without_refcounts
-from lab.learning.kernels import hearing as hears
+from lab.learning.kernels import asking as hears
 from lab.learning.kernels.asking import decided, judge, judge_moved, knows, opens
-from lab.learning.kernels.learners import choose, draw, learn
-from lab.learning.kernels.records import LANES
+from lab.learning.kernels.records import LANES, choose, draw, learn
 
 _Memory: Any = memory.Memory
 _Move: Any = memory.Move

@@ -1,19 +1,130 @@
 """A world of continuous states as the place where the lab's learners act: its states are the numbers of its cells."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from math import atan2, cos, sin
 from typing import Any
 
 import numpy as np
 
 from lab.learning import splitmix
 from lab.learning.environment import Judged, Step
-from lab.learning.physics import Physics
+from lab.learning.physics import Physics, cart_pole, mountain_car
 from lab.learning.physics.cells import CellTable
-from lab.learning.physics.pictures import Shape, drawn, shapes
 from lab.learning.selection import Draw
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import FloatArray
+
+WIDTH, HEIGHT = 61, 9
+
+
+def drawn(name: str, point: Sequence[float]) -> str:
+    """The world of that name at a point; "" for one that has no picture."""
+    return _mountain_car(*point) if name == "MountainCar-v0" else ""
+
+
+def _mountain_car(position: float, speed: float) -> str:
+    """The hill with the car and the flag, and which way it rolls how fast."""
+    span = mountain_car.HIGH - mountain_car.LOW
+    lines = [[" "] * WIDTH for _ in range(HEIGHT)]
+    for column in range(WIDTH):
+        lines[_row(mountain_car.LOW + span * column / (WIDTH - 1))][column] = "."
+    for mark, place in (("F", mountain_car.FLAG), ("O", position)):
+        lines[max(_row(place) - 1, 0)][round((place - mountain_car.LOW) / span * (WIDTH - 1))] = mark
+    way = "stands" if speed == 0.0 else f"rolls {'right' if speed > 0.0 else 'left'}, {abs(speed):.3f} a step"
+    said = f"O car at {position:+.2f}, {way}; F flag at {mountain_car.FLAG:+.2f}"
+    return "\n".join([*("".join(line).rstrip() for line in lines), said])
+
+
+def _row(position: float) -> int:
+    """The line of the ground, from above."""
+    return round((1.0 - sin(3 * position)) / 2.0 * (HEIGHT - 2)) + 1
+
+
+# ---- as shapes ------------------------------------------------------------------------------------------------------
+
+Shape = dict[str, Any]  # a line's or an area's points [[x, y], ...], or a disc's x, y and r; and its kind
+# in a drawing that is 100 wide and 50 high; y runs down
+
+
+def shapes(name: str, point: Sequence[float]) -> list[Shape]:
+    """The world of that name at a point, as lines, areas and discs of the kinds ground, goal, body and motion."""
+    draw: dict[str, Callable[..., list[Shape]]] = {
+        "MountainCar-v0": _car_shapes,
+        "CartPole-v1": _pole_shapes,
+        "Acrobot-v1": _acrobot_shapes,
+    }
+    return draw[name](*point)
+
+
+def _line(kind: str, *points: tuple[float, float]) -> Shape:
+    return {"line": [[round(x, 2), round(y, 2)] for x, y in points], "kind": kind}
+
+
+def _area(kind: str, *points: tuple[float, float]) -> Shape:
+    return {"area": _line(kind, *points)["line"], "kind": kind}
+
+
+def _disc(kind: str, x: float, y: float, r: float) -> Shape:
+    return {"disc": [round(x, 2), round(y, 2), r], "kind": kind}
+
+
+def _on_hill(position: float) -> tuple[float, float]:
+    across = (position - mountain_car.LOW) / (mountain_car.HIGH - mountain_car.LOW)
+    return 2.0 + 96.0 * across, 28.0 - 18.0 * sin(3 * position)
+
+
+def _car_shapes(position: float, speed: float) -> list[Shape]:
+    """The hill, the flag, the car on its wheels, and an arrow that is as long as it is fast."""
+    ends = mountain_car.LOW, mountain_car.HIGH
+    hill = [_on_hill(ends[0] + (ends[1] - ends[0]) * n / 60) for n in range(61)]
+    x, y = _on_hill(position)
+    flag_x, flag_y = _on_hill(mountain_car.FLAG)
+    angle = atan2(_on_hill(position - 0.01)[1] - _on_hill(position + 0.01)[1], 0.02 * 96.0 / (ends[1] - ends[0]))
+    along, up = (cos(angle), -sin(angle)), (-sin(angle), -cos(angle))
+
+    def at(far: float, high: float) -> tuple[float, float]:
+        return x + far * along[0] + high * up[0], y + far * along[1] + high * up[1]
+
+    arrow = [] if speed == 0.0 else [_line("motion", at(0.0, 6.0), at(speed / mountain_car.FASTEST * 14.0, 6.0))]
+    pole = flag_x, flag_y - 8.0
+    return [
+        _line("ground", *hill),
+        _line("goal", (flag_x, flag_y), pole),
+        _area("goal", pole, (flag_x - 4.0, flag_y - 6.5), (flag_x, flag_y - 5.0)),
+        _area("body", at(-3.0, 1.0), at(-3.0, 3.5), at(-1.5, 4.5), at(1.5, 4.5), at(3.0, 3.5), at(3.0, 1.0)),
+        *(_disc("body", *at(far, 0.9), 0.9) for far in (-1.8, 1.8)),
+        *arrow,
+    ]
+
+
+def _pole_shapes(place: float, speed: float, angle: float, turning: float) -> list[Shape]:
+    """The rail with its ends, the cart, the pole, and an arrow for the cart's speed."""
+    x, y = 50.0 + 46.0 * place / cart_pole.FARTHEST, 40.0
+    top = x + 30.0 * sin(angle), y - 30.0 * cos(angle)
+    return [
+        _line("ground", (4.0, y + 3.0), (96.0, y + 3.0)),
+        _area("body", (x - 5.0, y), (x + 5.0, y), (x + 5.0, y + 3.0), (x - 5.0, y + 3.0)),
+        _line("goal", (x, y), top),
+        _line("motion", (x, y + 6.0), (x + 5.0 * speed, y + 6.0)),
+    ]
+
+
+def _acrobot_shapes(angle: float, bend: float, speed: float, bending: float) -> list[Shape]:
+    """The bar that the tip is to reach, and both links."""
+    elbow = 50.0 + 11.0 * sin(angle), 25.0 + 11.0 * cos(angle)
+    tip = elbow[0] + 11.0 * sin(angle + bend), elbow[1] + 11.0 * cos(angle + bend)
+    links = _line("body", (50.0, 25.0), elbow), _line("body", elbow, tip)
+    return [
+        _line("goal", (20.0, 14.0), (80.0, 14.0)),
+        *links,
+        _disc("ground", 50.0, 25.0, 1.2),
+        _disc("body", *elbow, 1.2),
+    ]
+
+
+# ---- environment ------------------------------------------------------------------------------------------------------
+
 
 JUDGED = 200  # starts from which a policy is tried
 MASTERS = 8  # sessions alone, of the seeds 0, 1, ..., whose best table is what an advisor knows

@@ -8,12 +8,8 @@ import numpy as np
 from lab.learning.members import Member
 from lab.learning.selection import Draw
 from lab.learning.settings import LearnerSettings
-from lab.learning.updates.afterstate import Afterstate
-from lab.learning.updates.episode_returns import MonteCarlo
 from lab.learning.updates.linear import LINEAR
-from lab.learning.updates.one_step import QLearning, Sarsa
-from lab.learning.updates.planning import DynaQ
-from lab.learning.updates.traces import SarsaLambda, WatkinsQLambda
+from lab.learning.updates.tabular import Afterstate, DynaQ, MonteCarlo, QLearning, Sarsa, SarsaLambda, WatkinsQLambda
 from lab.learning.updates.update import ACTION_VALUES, STATE_VALUES, Row, Table, Update
 from lab.mdp import FloatArray, TabularMDP
 from lab.plugins.family import Family, first_line, takes, wanted

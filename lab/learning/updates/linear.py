@@ -11,8 +11,7 @@ import numpy as np
 from lab.learning.selection import Draw
 from lab.learning.settings import LearnerSettings
 from lab.learning.tiles import TileCoding
-from lab.learning.updates.one_step import q_target, sarsa_target
-from lab.learning.updates.traces import is_greedy
+from lab.learning.updates.tabular import is_greedy, q_target, sarsa_target
 from lab.learning.updates.update import Row, Update
 from lab.mdp import FloatArray, TabularMDP
 

@@ -3,8 +3,7 @@
 from dataclasses import replace
 
 from lab.seat.event_text import PARTS_DONE, run_text
-from lab.seat.page.page_console import changed_by
-from lab.seat.page.page_order import bars_of
+from lab.seat.page.page_console import bars_of, changed_by
 from lab.seat.page.page_state import MOST_LINES, Known, Progress, ShownLesson
 from lab.sequencing.search import EpisodeSequenced
 from lab.teaching.events import (

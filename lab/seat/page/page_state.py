@@ -6,20 +6,77 @@ Nothing here waits, sends or draws. PARTS say all; `Known.since` finds what has 
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
+from itertools import accumulate
+from math import inf
 from typing import Any
 
 from lab.learning.gates import improvement
 from lab.learning.requests import Request, Standing
+from lab.learning.session_events import (
+    AdviceEnded,
+    AdviceGiven,
+    AdviceRejected,
+    AdviceRemembered,
+    AdviceRequested,
+    EpisodeEnded,
+    Event,
+)
 from lab.learning.settings import GateSettings
 from lab.learning.updates import Table
 from lab.mdp import TabularMDP
 from lab.seat.event_text import SessionText, Told
-from lab.seat.grid_views import StateWords
+from lab.seat.grid_text import StateWords
 from lab.seat.page.page_console import Console, measured_of, plan_of, run_of
-from lab.seat.page.page_curve import Curve
-from lab.seat.page.page_grid import place_of, slice_of, spot
-from lab.seat.page.page_question import question_of
+from lab.seat.page.page_question import place_of, question_of, slice_of, spot
 from lab.sequencing.cell.schedule import Move
+
+MOST = 400  # stretches that a page draws
+
+
+@dataclass
+class Curve:
+    """What episodes cost, in stretches of `per` episodes: the mean of each, its least, and how many of them were guided.
+
+    best: the least cost of all, and the episode that first had it, from 1; None before the first.
+    """
+
+    per: int = 1
+    count: int = 0
+    sums: list[float] = field(default_factory=list)
+    lows: list[float] = field(default_factory=list)
+    guided: list[int] = field(default_factory=list)
+    best: tuple[float, int] | None = None
+
+    def add(self, cost: float, guided: bool) -> None:
+        """One more episode; stretches become twice as long when there would be too many."""
+        if self.count == self.per * MOST:
+            self.sums = [a + b for a, b in zip(self.sums[::2], self.sums[1::2], strict=True)]
+            self.lows = [*map(min, self.lows[::2], self.lows[1::2])]
+            self.guided = [a + b for a, b in zip(self.guided[::2], self.guided[1::2], strict=True)]
+            self.per *= 2
+        if self.count == self.per * len(self.sums):
+            self.sums.append(0.0)
+            self.lows.append(inf)
+            self.guided.append(0)
+        self.sums[-1] += cost
+        self.lows[-1] = min(self.lows[-1], cost)
+        self.guided[-1] += guided
+        self.count += 1
+        if self.best is None or cost < self.best[0]:
+            self.best = cost, self.count
+
+    def document(self) -> dict[str, Any]:
+        """The curve as the page draws it."""
+        last = self.count - self.per * (len(self.sums) - 1)
+        sizes = [self.per] * (len(self.sums) - 1) + [last] * bool(self.sums)
+        means = [float(f"{total / size:.5g}") for total, size in zip(self.sums, sizes, strict=True)]
+        bests = [float(f"{low:.5g}") for low in accumulate(self.lows, min)]
+        known = {"per": self.per, "count": self.count, "means": means, "guided": self.guided.copy()}
+        return known | {"bests": bests, "best": None if self.best is None else [*self.best]}
+
+
+# ---- page state -------------------------------------------------------------------------------------------------------
+
 
 Json = dict[str, Any]
 MOST_NOTICES = 60
@@ -256,3 +313,54 @@ def standing_of(learning: ShownLesson, standing: Standing) -> None:
         text = f"The last lesson did not help: {standing.misleads} so far, {standing.omega} are tolerated."
         learning.notice(Told(text, "bad"))
     learning.misleads, learning.helped_steps = standing.misleads, standing.helped_steps
+
+
+# ---- page events ------------------------------------------------------------------------------------------------------
+
+
+STEP = ("standing", "robot", "slice")
+EPISODE = ("standing", "curve", "slice", "notices")
+
+
+def hear(learning: ShownLesson, event: Event) -> tuple[str, ...]:
+    """Take an event over; the parts of the document that it has changed. Called for every answer, so it does little."""
+    kind = type(event)
+    if kind is AdviceGiven:
+        return _given(learning, event)  # type: ignore[arg-type]
+    if kind is EpisodeEnded:
+        return _episode(learning, event)  # type: ignore[arg-type]
+    told = learning.text.told(event, learning.mdp)
+    match event:
+        case AdviceRequested():
+            learning.requests += 1
+            learning.means = (event.current_mean, event.previous_mean)
+            return STEP
+        case AdviceRemembered():
+            learning.remembered += event.steps
+            return STEP
+        case AdviceRejected():
+            learning.verdict, learning.misleads = "rejected", event.misleads
+        case AdviceEnded():
+            learning.verdict = "converged" if event.reason == "converged" else "left"
+    if told is not None:
+        learning.notice(told)
+    return ("standing", "notices")
+
+
+def _given(learning: ShownLesson, event: AdviceGiven) -> tuple[str, ...]:
+    if event.action is None:
+        learning.skipped += 1
+    else:
+        learning.taken += 1
+        learning.helped_steps += 1
+    learning.state = event.state
+    return STEP
+
+
+def _episode(learning: ShownLesson, event: EpisodeEnded) -> tuple[str, ...]:
+    learning.curve.add(event.steps, event.guided)
+    learning.lately.append(event.steps)
+    learning.rate = event.improvement_rate
+    if told := learning.text.told(event, learning.mdp):
+        learning.notice(told)
+    return EPISODE if event.guided else EPISODE[:-1]

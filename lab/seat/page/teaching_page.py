@@ -16,19 +16,17 @@ from lab.errors import BadInput, counted
 from lab.learning.requests import AdviceRequest, AdvisorLeft, Request
 from lab.mdp import NoPath, shortest_steps
 from lab.seat.event_text import Told
-from lab.seat.grid_views import StateWords
+from lab.seat.grid_text import StateWords
 from lab.seat.page.page_console import PARTS as RUN_PARTS
-from lab.seat.page.page_console import Console
-from lab.seat.page.page_events import hear
+from lab.seat.page.page_console import Console, bars_of, made_until
 from lab.seat.page.page_messages import Answer
-from lab.seat.page.page_order import bars_of, made_until
 from lab.seat.page.page_panel import CLOSED, SeatPanel
 from lab.seat.page.page_question import said_of
 from lab.seat.page.page_run import hear_run
-from lab.seat.page.page_state import Pending, ShownLesson, standing_of
-from lab.seat.path_ahead import PathAhead
+from lab.seat.page.page_state import Pending, ShownLesson, hear, standing_of
 from lab.seat.replay_pace import ReplayPace
-from lab.sequencing.request import SequenceRequest
+from lab.seat.request_text import PathAhead
+from lab.sequencing.search import SequenceRequest
 from lab.teaching.events import ORDER, Event, LessonBegan, LessonEvent
 from lab.teaching.lesson_plan import LessonPlan
 from lab.view.meshcat import LiveView

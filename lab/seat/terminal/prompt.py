@@ -1,6 +1,7 @@
 """Teaching at a terminal: what the learner sees as text, and the person's answer, in a table and in the order alike."""
 
 from collections.abc import Iterable
+from difflib import get_close_matches
 from itertools import groupby
 from typing import Any
 
@@ -12,16 +13,173 @@ from lab.advice.journal import Undo
 from lab.errors import counted, printable
 from lab.learning.requests import AdviceRequest, AdvisorLeft, Request
 from lab.learning.session_events import EpisodeEnded
-from lab.seat import request_text
+from lab.seat import order_text, request_text
 from lab.seat.event_text import SessionText
-from lab.seat.grid_views import StateWords
-from lab.seat.path_ahead import PathAhead
+from lab.seat.grid_text import Marks, StateWords
+from lab.seat.request_text import PathAhead
 from lab.seat.terminal.line_reader import Outside, ReadLine, default_reader
-from lab.seat.terminal.order_question import OrderQuestion
-from lab.seat.terminal.screen import folded, room
-from lab.seat.terminal.table_question import TableQuestion
-from lab.sequencing.request import SequenceRequest
+from lab.seat.terminal.screen import folded, question, room, screen
+from lab.seat.terminal.typed_answer import COMMANDS, Understood, explained, explained_words, understand
+from lab.sequencing.search import SequenceRequest
 from lab.teaching.events import ORDER, Event, LessonEvent
+
+WORDS = ("why", "undo", "skip", "auto", "quit")
+TABLE = 56  # columns of a terminal; below, each move is a line of words
+
+
+class OrderQuestion:
+    """How a `SequenceRequest` is shown, and what may be typed; plain: sentences instead of a table."""
+
+    introduction = (
+        "The learner is stuck and asks you which part to move next. It does what you say, and learns from it as if the "
+        "move were its own. When episodes with your advice are no better than those before, it counts that, and after a "
+        "few of them it asks no more. You can type:"
+    )
+
+    def __init__(self, console: Console, plain: bool) -> None:
+        self._console, self._plain = console, plain
+        self._episode = 0
+
+    def subject(self, request: SequenceRequest) -> object:
+        """What is learned."""
+        return request.run.cell
+
+    def asked(self, request: SequenceRequest) -> str:
+        """The words before the cursor."""
+        wide = room(self._console)[0] >= TABLE
+        return f"Which move? [enter = {request.own}, ? explains] " if wide else f"Which move? [{request.own}] "
+
+    def shown(self, request: SequenceRequest) -> list[RenderableType]:
+        """Where the work stands, and what may be moved; in the first question of an episode, why it asks."""
+        width = room(self._console)[0]
+        lines: list[RenderableType] = [Text(), *folded([f"{order_text.title(request)}."], width, "bold")]
+        if request.episode != self._episode:
+            self._episode = request.episode
+            lines += folded([order_text.progress(request)], width, "dim")
+        moves = [order_text.move_of(request, decision) for decision in request.allowed]
+        if self._plain or width < TABLE:
+            own = ", its own choice"
+            return [*lines, *folded([f"{one}{own * (one.decision == request.own)}." for one in moves], width)]
+        table = Table(box=None, pad_edge=False, header_style="bold")
+        for column in ("move", "part", "from", "to", "ready in", ""):
+            table.add_column(column, justify="right" if column in ("move", "ready in") else "left")
+        for one in moves:
+            is_own = one.decision == request.own
+            cells = (str(one.decision), one.name, one.origin, one.target, one.ready, "its own choice" * is_own)
+            table.add_row(*map(Text, cells), style="green" if is_own else None)
+        return [*lines, table]
+
+    def understood(self, line: str, request: SequenceRequest) -> Understood:
+        """The decision that a number means, one of ANSWERS, or else a hint of one line."""
+        word = line.strip().lower()
+        if word in map(str, request.allowed):
+            return int(word)
+        if word in COMMANDS and word != "path":
+            return COMMANDS[word][0]
+        near = get_close_matches(word, WORDS, n=1, cutoff=0.7)
+        hint = f"did you mean '{near[0]}'? " if near else ""
+        known = f"{', '.join(map(str, request.allowed))}, enter, {', '.join(WORDS)} or ?"
+        return f"'{word[:20]}' is none of the moves: {hint}type {known}"
+
+    def warned(self, request: SequenceRequest, decision: int) -> str:
+        """An empty string: every decision that is allowed leads on."""
+        return ""
+
+    def why(self, request: SequenceRequest, guided: int) -> list[str]:
+        """Why it asks."""
+        return order_text.reasons(request)
+
+    def explained(self, request: SequenceRequest) -> list[tuple[str, str]]:
+        """What can be typed, and what it does."""
+        return [("a number", "of the list: that move is made next"), *explained_words()]
+
+    def named(self, request: SequenceRequest, decision: int) -> str:
+        """A decision in words."""
+        return f"move {decision}"
+
+    def briefly(self, request: SequenceRequest, decision: int) -> str:
+        """A decision as one of many."""
+        return str(decision)
+
+    def where(self, request: SequenceRequest, state: int) -> str:
+        """Where the robot is."""
+        return f"at {request.run.cell.names[request.run.robot]}"
+
+
+# ---- table question ---------------------------------------------------------------------------------------------------
+
+
+ROOMY = 18  # lines of a terminal; below, no empty line parts the questions
+
+
+class TableQuestion:
+    """How an `AdviceRequest` is shown, and what may be typed; plain: sentences instead of a picture."""
+
+    introduction = (
+        "The learner is stuck and asks you where to go. It does what you say, and learns from it as if the move were its "
+        "own. When episodes with your advice are no shorter than those before, it counts that, and after a few of them, or when "
+        "it has had all the help that it may have, it asks no more. You can type:"
+    )
+
+    def __init__(self, console: Console, plain: bool) -> None:
+        self._console, self._plain = console, plain
+        self.known: StateWords | None = None  # what says in words where the learner is
+        self.marks = request_text.WORDS_ONLY if plain else Marks.of(console)
+
+    def subject(self, request: AdviceRequest) -> object:
+        """What is learned."""
+        return request.mdp
+
+    def asked(self, request: AdviceRequest) -> str:
+        """The words before the cursor."""
+        return question(request, self.marks, room(self._console)[0])
+
+    def shown(self, request: AdviceRequest) -> list[RenderableType]:
+        """Where the learner is, what it would do, and how it has been doing."""
+        width, height = room(self._console)
+        if self._plain:
+            return [Text(), *folded(request_text.sentences(request, self.known), width)]
+        gap = [Text()] * (height >= ROOMY)
+        left = height - len(gap) - 1 - len(self.asked(request)) // width
+        return [*gap, *screen(request, self.marks, width, left, self.known)]
+
+    def understood(self, line: str, request: AdviceRequest) -> Understood:
+        """What a line means; see `understand`."""
+        return understand(line, request.mdp)
+
+    def warned(self, request: AdviceRequest, action: int) -> str:
+        """What is said of an action that leads nowhere, "" for any other."""
+        if request_text.outcome(request, action) not in (
+            request_text.NOWHERE,
+            request_text.OBSTACLE,
+            request_text.DEAD_END,
+        ):
+            return ""
+        return f"{self.named(request, action)}: that {request_text.leads(request, action)}: given all the same."
+
+    def why(self, request: AdviceRequest, guided: int) -> list[str]:
+        """Why it asks, with all its numbers; guided: the episodes that were given advice until now."""
+        return request_text.reasons(request, self.marks, guided)
+
+    def explained(self, request: AdviceRequest) -> list[tuple[str, str]]:
+        """What can be typed, and what it does."""
+        return explained(request.mdp)
+
+    def named(self, request: AdviceRequest, action: int) -> str:
+        """An action in words."""
+        return self.marks.named(request.mdp, action)
+
+    def briefly(self, request: AdviceRequest, action: int) -> str:
+        """An action as one of many."""
+        return request.mdp.action_labels[action] if self._plain else self.named(request, action).split()[0]
+
+    def where(self, request: AdviceRequest, state: int) -> str:
+        """Where a state is, shortly; where that takes many words, the question has them."""
+        return f"at {request.mdp.state_label(state)}" if self.known is None else "elsewhere"
+
+
+# ---- prompt -----------------------------------------------------------------------------------------------------------
+
 
 STYLES = {"": "", "ask": "bold", "note": "yellow", "good": "green", "bad": "yellow", "lost": "bold red"}
 MOST_DRAWN = 5  # equal moves of a path that are drawn one by one

@@ -10,8 +10,7 @@ from rich.text import Text
 
 from lab.learning.requests import AdviceRequest
 from lab.seat import request_text
-from lab.seat.grid_text import GAP, Marks, Picture, picture_of
-from lab.seat.grid_views import StateWords, both_views
+from lab.seat.grid_text import GAP, Marks, Picture, StateWords, both_views, picture_of
 from lab.seat.terminal.typed_answer import example, letters
 
 Parts = dict[str, list[Text]]

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from lab.sequencing.cell.ways import TICKS_PER_S
 from lab.sequencing.cyclic.line import Line, Span
-from lab.sequencing.methods.ortools_cp_sat import cp_model
+from lab.sequencing.methods.cp_sat_solver import cp_model
 
 TICKS = round(TICKS_PER_S)
 COARSE = 1000  # units of the model a second, where times are no whole numbers of so many parts of one

@@ -2,14 +2,67 @@
 
 from collections.abc import Sequence
 from math import exp, inf, log
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
+from lab.learning.compiled import inner, without_refcounts
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import drawn_seed
-from lab.sequencing.methods import anneal_kernels
-from lab.sequencing.methods.priorities import Orders, Priorities
+from lab.sequencing.methods.priorities import (
+    OrderArrays,
+    Orders,
+    Priorities,
+    carried_out,
+    changed,
+    copied,
+    drawn,
+    most_choices,
+)
 from lab.sequencing.search import Log, Search, SequenceResult
+from lab.sequencing.simulate.cell_arrays import Floats, Ints
+
+
+class AnnealArrays(NamedTuple):
+    """tried: the neighbour, carried out. parts, choices (L,): the list that it is one of. best (L,): the best decisions, then
+    zeros. cost (2,): of the list, and of the best. stream (1,): the state of the random numbers."""
+
+    tried: OrderArrays
+    parts: Ints
+    choices: Ints
+    best: Ints
+    cost: Floats
+    stream: NDArray[np.uint64]
+
+
+@inner
+def annealed(cell: Any, run: Any, work: Any, choices: int, temperature: float) -> float:
+    """One step; what the neighbour costs, or more than what is kept where it was given up."""
+    copied(work.parts, work.choices, work.tried.parts, work.tried.choices)
+    changed(work.tried, work.stream, choices)
+    limit = work.cost[0] - temperature * np.log(1.0 - drawn(work.stream))
+    value = carried_out(cell, run, work.tried, limit)
+    if value <= limit:
+        work.cost[0] = value
+        copied(work.tried.parts, work.tried.choices, work.parts, work.choices)
+        if value < work.cost[1] and run.whole[1] == 0:
+            work.cost[1] = value
+            for i in range(len(work.best)):
+                work.best[i] = work.tried.sequence[i]
+    return value
+
+
+@without_refcounts
+def annealed_session(cell: Any, run: Any, work: Any, costs: Any, temperature: float) -> None:
+    """As many steps as there are costs (N,), which are filled, at a temperature in the objective's unit."""
+    choices = most_choices(cell)
+    for n in range(len(costs)):
+        costs[n] = annealed(cell, run, work, choices, temperature)
+
+
+# ---- anneal -----------------------------------------------------------------------------------------------------------
+
 
 ROUND = 500  # sequences between two looks at the clock, the listener and Ctrl-C
 HOT, COLD = 0.02, 0.004  # temperatures at first and in the end, as shares of the first order's cost
@@ -43,7 +96,7 @@ class Annealing:
         self.orders = orders = Orders(cell, objective, "annealing")
         first = Priorities.of(cell, known) if known else orders.first
         cost = inf if known else orders.best.cost if orders.best.done else orders.stuck_cost
-        self._work = anneal_kernels.AnnealArrays(
+        self._work = AnnealArrays(
             tried=orders.order(),
             parts=first.parts.copy(),
             choices=first.choices.copy(),
@@ -67,5 +120,5 @@ class Annealing:
         """So many more steps, a share `done` of all being behind; the best sequence so far."""
         temperature = self.orders.scale * HOT * exp(log(COLD / HOT) * done)
         self.costs = np.zeros(steps)
-        anneal_kernels.anneal(self.orders.arrays, self.orders.run, self._work, self.costs, temperature)
+        annealed_session(self.orders.arrays, self.orders.run, self._work, self.costs, temperature)
         return self.best

@@ -5,8 +5,7 @@ import numpy as np
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import MAKESPAN, cost
 from lab.sequencing.methods.carried_over_features import FeatureArrays, feature_arrays, features
-from lab.sequencing.methods.carried_over_policy import CarriedPolicy
-from lab.sequencing.methods.carried_over_weights import DEFAULT
+from lab.sequencing.methods.carried_over_policy import DEFAULT, CarriedPolicy
 from lab.sequencing.methods.rules import Rule
 from lab.sequencing.search import SAME, Search, SequenceResult, only_one
 from lab.sequencing.simulate.cell_arrays import Floats, cell_arrays, run_arrays

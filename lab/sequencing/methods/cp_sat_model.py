@@ -10,9 +10,8 @@ from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import MAKESPAN, WITH_DUE_TIMES, machine_places
 from lab.sequencing.cell.routes import entry
 from lab.sequencing.cell.ways import Way, distances, follows, ways_of
-from lab.sequencing.methods.cp_sat_solver import Solution
+from lab.sequencing.methods.cp_sat_solver import Solution, cp_model
 from lab.sequencing.methods.cp_sat_times import Timed, Times, longest, timed
-from lab.sequencing.methods.ortools_cp_sat import cp_model
 
 
 class Task(NamedTuple):

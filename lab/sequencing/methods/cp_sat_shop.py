@@ -14,11 +14,9 @@ from typing import NamedTuple
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import MAKESPAN, WITH_DUE_TIMES, cost
 from lab.sequencing.cell.routes import SERVER, Option, entry
-from lab.sequencing.methods.cp_sat_rooms import add_chains
-from lab.sequencing.methods.cp_sat_solver import Solution
-from lab.sequencing.methods.cp_sat_tasks import teams_of
+from lab.sequencing.methods.cp_sat_solver import Solution, cp_model
+from lab.sequencing.methods.cp_sat_tasks import add_chains, teams_of
 from lab.sequencing.methods.cp_sat_times import Times
-from lab.sequencing.methods.ortools_cp_sat import cp_model
 from lab.sequencing.simulate.follow import follow
 
 

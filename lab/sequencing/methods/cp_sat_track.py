@@ -2,8 +2,8 @@
 
 from collections import defaultdict
 
+from lab.sequencing.methods.cp_sat_solver import cp_model
 from lab.sequencing.methods.cp_sat_tasks import Tasks
-from lab.sequencing.methods.ortools_cp_sat import cp_model
 
 
 class Track:

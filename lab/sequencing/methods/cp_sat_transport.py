@@ -15,12 +15,10 @@ from typing import NamedTuple
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import MAKESPAN, WITH_DUE_TIMES, cost, machine_places
 from lab.sequencing.cell.routes import SERVER, choice_of, entry, part_of
-from lab.sequencing.methods.cp_sat_rooms import add_chains, add_rooms
-from lab.sequencing.methods.cp_sat_solver import Solution
-from lab.sequencing.methods.cp_sat_tasks import Follows, Task, Tasks, Team
+from lab.sequencing.methods.cp_sat_solver import Solution, cp_model
+from lab.sequencing.methods.cp_sat_tasks import Follows, Task, Tasks, Team, add_chains, add_rooms
 from lab.sequencing.methods.cp_sat_times import Times
 from lab.sequencing.methods.cp_sat_track import Track
-from lab.sequencing.methods.ortools_cp_sat import cp_model
 from lab.sequencing.simulate.follow import follow, spoils, steps
 from lab.sequencing.simulate.run import Run, Windowless
 

@@ -8,10 +8,11 @@ from operator import le
 
 import numpy as np
 
-from lab.errors import WorkFailed, counted
+from lab.errors import BadInput, WorkFailed, counted
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import MAKESPAN
-from lab.sequencing.cell.ways import FAR, TICKS_PER_S
+from lab.sequencing.cell.routes import choice_of, part_of
+from lab.sequencing.cell.ways import FAR, TICKS_PER_S, Way
 from lab.sequencing.methods.lower_bound import LowerBound
 from lab.sequencing.methods.one_robot import TIME_LIMIT_S as TOURS_S
 from lab.sequencing.methods.one_robot import OneRobot, one_robot, why_not
@@ -19,8 +20,51 @@ from lab.sequencing.methods.rules import first_come
 from lab.sequencing.methods.shared import Shared, shared_of
 from lab.sequencing.search import Search, SequenceResult, gap, only_one
 from lab.sequencing.simulate.follow import simulate
-from lab.sequencing.simulate.merged import MergedCell, MergedState
+from lab.sequencing.simulate.merged import MergedCell, MergedKey, MergedState
+from lab.sequencing.simulate.run import Run
 from lab.sequencing.simulate.windowed import WindowedCell
+
+MOST_STATES = 100_000
+MOST_PARTS = 40  # each adds to the depth of the search
+
+
+class ExactValues:
+    """The least time [s] that a cell still needs after each decision, by all ways on, each state looked at once.
+
+    Raises BadInput for more than MOST_PARTS parts or MOST_STATES states: fewer parts are wanted then.
+    """
+
+    def __init__(self, cell: Cell) -> None:
+        if cell.parts > MOST_PARTS:
+            raise BadInput(f"an advisor who knows exact values: {cell.parts} parts are too many, at most {MOST_PARTS}")
+        self.cell, self._merged = cell, MergedCell(cell)
+        self._left: dict[MergedKey, float] = {}
+
+    def of(self, run: Run, allowed: tuple[int, ...]) -> list[float]:
+        """The time from now to the end after each of the decisions; infinite where it ends in a deadlock."""
+        state, parts = self._merged.of_run(run)._replace(who=None), self.cell.parts
+        left_s = {at: self._after(state, way) / TICKS_PER_S for at, way in self._merged.choices(state).items()}
+        return [left_s[run.locations[part_of(d, parts) - 1], choice_of(d, parts)] for d in allowed]
+
+    def _after(self, state: MergedState, way: Way) -> float:
+        ahead = self._merged.after(state, way)
+        return ahead.now - state.now + self._least(ahead)
+
+    def _least(self, state: MergedState) -> float:
+        if self._merged.done(state):
+            return 0.0
+        key = self._merged.key(state)
+        if key not in self._left:
+            if len(self._left) >= MOST_STATES:
+                what = f"{self.cell.parts} parts have more than {MOST_STATES} states"
+                raise BadInput(f"an advisor who knows exact values: {what}; take fewer")
+            ways = self._merged.choices(state).values()
+            self._left[key] = min((self._after(state, way) for way in ways), default=inf)
+        return self._left[key]
+
+
+# ---- exact ------------------------------------------------------------------------------------------------------------
+
 
 MAX_EXPANDED = 300_000
 ROUND = 500  # states opened between two looks at limits and the listener

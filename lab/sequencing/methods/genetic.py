@@ -1,13 +1,139 @@
 """A genetic algorithm as a rival: it begins with the dispatching rules, crosses lists of priorities and improves each child."""
 
-import numpy as np
+from typing import Any, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
+from lab.learning.compiled import inner, without_refcounts
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import drawn_seed
-from lab.sequencing.methods import genetic_kernels
-from lab.sequencing.methods.genetic_kernels import Population
-from lab.sequencing.methods.priorities import Orders, Priorities
+from lab.sequencing.methods.priorities import (
+    OrderArrays,
+    Orders,
+    Priorities,
+    below,
+    carried_out,
+    changed,
+    copied,
+    drawn,
+    most_choices,
+)
 from lab.sequencing.search import Log, Search, SequenceResult
+from lab.sequencing.simulate.cell_arrays import Flags, Floats, Ints
+
+
+class Population(NamedTuple):
+    """N lists of L priorities of K parts, and the child that is being improved.
+
+    parts, choices (N, L), costs (N,): the lists; tried (1,): how many of them have been carried out. child: the neighbour of
+    child_parts, child_choices (L,), which cost child_cost (1,) and have `left` (1,) neighbours still to be tried; -1: there is no
+    child. inherited (K,): the parts that it has from its first parent. best (L,): the best decisions, then zeros; best_cost (1,).
+    stream (1,): the state of the random numbers.
+    """
+
+    parts: Ints
+    choices: Ints
+    costs: Floats
+    tried: Ints
+    child: OrderArrays
+    child_parts: Ints
+    child_choices: Ints
+    child_cost: Floats
+    left: Ints
+    inherited: Flags
+    best: Ints
+    best_cost: Floats
+    stream: NDArray[np.uint64]
+
+
+@without_refcounts
+def shuffled(parts: Any, choices: Any, stream: Any, most: int) -> None:
+    """A list (L,) in an even order, each entry with any of `most` ways. Source: Fisher and Yates 1938."""
+    for i in range(len(parts) - 1, -1, -1):
+        other = below(stream, i + 1)
+        parts[i], parts[other] = parts[other], parts[i]
+        choices[i] = below(stream, most)
+
+
+@inner
+def _tournament(population: Any, best: bool) -> int:
+    """The better, or the worse, of two lists that are drawn."""
+    one = below(population.stream, len(population.costs))
+    other = below(population.stream, len(population.costs))
+    return one if (population.costs[one] < population.costs[other]) == best else other
+
+
+@without_refcounts
+def crossed(population: Any, one: int, other: int) -> None:
+    """The child of two lists: the parts drawn stay where the first one has them, all others fill up in the second one's order.
+
+    Source: job-based order crossover, Ono, Yamamura and Kobayashi 1996.
+    """
+    child = population.child
+    for part in range(len(population.inherited)):
+        population.inherited[part] = drawn(population.stream) < 0.5
+    at, size = 0, len(child.parts)
+    for i in range(size):
+        if population.inherited[population.parts[one, i]]:
+            child.parts[i], child.choices[i] = population.parts[one, i], population.choices[one, i]
+            continue
+        while population.inherited[population.parts[other, at]]:
+            at += 1
+        child.parts[i], child.choices[i] = population.parts[other, at], population.choices[other, at]
+        at += 1
+
+
+@inner
+def _note(cell: Any, run: Any, population: Any, limit: float) -> float:
+    """What the child's list costs; the best decisions are kept."""
+    value = carried_out(cell, run, population.child, limit)
+    if value < population.best_cost[0] and run.whole[1] == 0:
+        population.best_cost[0] = value
+        for i in range(len(population.best)):
+            population.best[i] = population.child.sequence[i]
+    return float(value)
+
+
+@inner
+def _survives(population: Any) -> None:
+    """The child takes the place of the worse of two lists, unless it is worse itself."""
+    n = _tournament(population, False)
+    if population.child_cost[0] <= population.costs[n]:
+        copied(population.child_parts, population.child_choices, population.parts[n], population.choices[n])
+        population.costs[n] = population.child_cost[0]
+    population.left[0] = -1
+
+
+@without_refcounts
+def evolve(cell: Any, run: Any, population: Any, costs: Any, improved: int) -> None:
+    """As many lists are tried as there are costs (N,), which are filled; improved: neighbours of each child that are tried."""
+    choices, child = most_choices(cell), population.child
+    for n in range(len(costs)):
+        if population.tried[0] < len(population.costs):
+            i = population.tried[0]
+            copied(population.parts[i], population.choices[i], child.parts, child.choices)
+            costs[n] = population.costs[i] = _note(cell, run, population, np.inf)
+            population.tried[0] += 1
+            continue
+        if population.left[0] < 0:
+            crossed(population, _tournament(population, True), _tournament(population, True))
+            population.child_cost[0] = np.inf
+            population.left[0] = improved + 1
+        else:
+            copied(population.child_parts, population.child_choices, child.parts, child.choices)
+            changed(child, population.stream, choices)
+        costs[n] = _note(cell, run, population, population.child_cost[0])
+        if costs[n] <= population.child_cost[0]:
+            population.child_cost[0] = costs[n]
+            copied(child.parts, child.choices, population.child_parts, population.child_choices)
+        population.left[0] -= 1
+        if population.left[0] == 0:
+            _survives(population)
+
+
+# ---- genetic ----------------------------------------------------------------------------------------------------------
+
 
 SMALLEST, LARGEST = 4, 50  # lists in a population: a 20th of the root of the budget, within these
 CHILDREN = 20  # for each list of the population; what is left of the budget goes into improving them
@@ -34,7 +160,7 @@ def genetic(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceRes
     neighbours = left // (CHILDREN * size)
     while left > 0:
         costs = np.zeros(min(ROUND, left))
-        genetic_kernels.evolve(orders.arrays, orders.run, population, costs, neighbours)
+        evolve(orders.arrays, orders.run, population, costs, neighbours)
         best = tuple(int(one) for one in population.best if one)
         for value in costs.tolist():
             log.note(best, value, value < orders.stuck_cost)
@@ -53,7 +179,7 @@ def _population(orders: Orders, size: int, seed: int) -> Population:
             listed = Priorities.of(orders.cell, ruled[n].sequence)
             parts[n], choices[n] = listed.parts, listed.choices
         else:
-            genetic_kernels.shuffled(parts[n], choices[n], stream, most)
+            shuffled(parts[n], choices[n], stream, most)
     costs, one = np.full(size, np.inf), np.zeros(1, np.int64)
     return Population(
         parts=parts,

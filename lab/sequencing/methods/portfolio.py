@@ -1,5 +1,6 @@
 """The methods together: rules, annealing, and the exact search that proves most, each going on from the best order so far."""
 
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass
@@ -9,16 +10,60 @@ from time import perf_counter
 
 import numpy as np
 
-from lab.errors import WorkFailed
+from lab.errors import BadInput, WorkFailed
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import MAKESPAN, cost
+from lab.sequencing.cell.routes import entry, part_of
 from lab.sequencing.methods.exact import MAX_EXPANDED, optimum
-from lab.sequencing.methods.fewer_moves import fewer_moves
 from lab.sequencing.methods.rules import first_come, loads_s, work_left_s
 from lab.sequencing.methods.shared import Shared, shared_of
 from lab.sequencing.search import SAME, Search, SequenceResult, not_in_time, only_one
 from lab.sequencing.simulate.cell_arrays import most_moves
-from lab.sequencing.simulate.follow import follow
+from lab.sequencing.simulate.follow import follow, steps
+
+
+def fewer_moves(cell: Cell, sequence: Sequence[int], objective: str = MAKESPAN) -> tuple[int, ...]:
+    """The sequence with as many stopovers left out as can be, one after the other, at no more cost.
+
+    A stopover is a place where nothing is done with the part. Both are tried: to go straight on when the part set out, and
+    when it would have left the stopover. It is a local search: of several that exclude each other the first is left out.
+    """
+    best, least = tuple(sequence), _cost(cell, sequence, objective)
+    while True:
+        shorter = next((one for one in _straight(cell, best) if _cost(cell, one, objective) <= least + SAME), None)
+        if shorter is None:
+            return best
+        best, least = shorter, _cost(cell, shorter, objective)
+
+
+def _straight(cell: Cell, sequence: Sequence[int]) -> Iterator[tuple[int, ...]]:
+    """Each sequence that is left when one stopover is left out."""
+    came = dict[int, tuple[int, int]]()  # by part: where in the sequence it set out last, and from where
+    for number, (run, decision, wait) in enumerate(steps(cell, sequence)):
+        part = part_of(decision, cell.parts)
+        here, option = run.locations[part - 1], run.option(decision)
+        assert option is not None
+        if part in came and not cell.positions[here].processing_s:
+            before, place = came[part]
+            for way in cell.positions[place].options:
+                if way.to == option.to:
+                    direct = entry(part, way.choice, cell.parts)
+                    yield (*sequence[:before], direct, *sequence[before + 1 : number], *sequence[number + 1 :])
+                    yield (*sequence[:before], *sequence[before + 1 : number], direct, *sequence[number + 1 :])
+        came[part] = number, here
+        run.move(decision, wait)
+
+
+def _cost(cell: Cell, sequence: Sequence[int], objective: str) -> float:
+    """What a sequence costs; infinite where it may not be carried out, or does not come to its end."""
+    try:
+        return cost(run, objective) if (run := follow(cell, sequence)).done else float("inf")
+    except BadInput:
+        return float("inf")
+
+
+# ---- portfolio --------------------------------------------------------------------------------------------------------
+
 
 MOVES, ROUND = 12_000_000, 3_000  # of all sequences that annealing tries; how many it tries between two looks at Ctrl-C
 EACH = 500  # how often it tries each of a list's neighbours, on average: a short list takes far fewer moves

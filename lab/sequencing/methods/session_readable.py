@@ -15,8 +15,8 @@ from lab.learning.splitmix import MASK, stream, uniform
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import Episode
 from lab.sequencing.cell.objectives import MAKESPAN, cost
-from lab.sequencing.methods import session_arrays as arrays
 from lab.sequencing.methods import session_kernels
+from lab.sequencing.methods import session_kernels as arrays
 from lab.sequencing.methods.session_updates import best_of, explore, log_of
 from lab.sequencing.methods.state_keys import Key, Keys, State, decoded, key_of, keys_of, no_keys
 from lab.sequencing.search import Log, Search, SrlSettings

@@ -14,8 +14,7 @@ from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import drawn_seed
 from lab.sequencing.methods.session_readable import Guide, learn_readably
 from lab.sequencing.methods.srl import Srl
-from lab.sequencing.request import SequenceRequest, state_of
-from lab.sequencing.search import LearnedSequence, Search
+from lab.sequencing.search import LearnedSequence, Search, SequenceRequest, state_of
 from lab.sequencing.simulate.run import Run
 
 NEVER_REACHED = 10**12  # a cost that no episode has, so that a gate takes every episode for a finished one

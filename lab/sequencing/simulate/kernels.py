@@ -7,8 +7,20 @@ import numpy as np
 from lab.learning.compiled import inner, without_refcounts
 from lab.sequencing.cell.routes import SERVER
 from lab.sequencing.simulate.cell_arrays import ARRIVAL_CODES, NO_ARRIVALS, OBJECTIVE_CODES, WIDTH
-from lab.sequencing.simulate.chance_kernels import apart, interval, uniform, until, worked
-from lab.sequencing.simulate.room_kernels import free, grant, hold_part, in_order, may_go_s, possible, room_s
+from lab.sequencing.simulate.room_kernels import (
+    apart,
+    free,
+    grant,
+    hold_part,
+    in_order,
+    interval,
+    may_go_s,
+    possible,
+    room_s,
+    uniform,
+    until,
+    worked,
+)
 from lab.sequencing.simulate.run import SLACK_S
 
 CLOCK, PICK = ARRIVAL_CODES["clock"], ARRIVAL_CODES["pick"]

@@ -10,8 +10,7 @@ from lab.sequencing.cell.chance import Episode
 from lab.sequencing.cell.precedence import missing
 from lab.sequencing.cell.routes import SERVER, Option, Position, choice_of, entry, part_of
 from lab.sequencing.cell.schedule import Move
-from lab.sequencing.simulate.refusals import refusal
-from lab.sequencing.simulate.rooms import Rooms, rooms_of
+from lab.sequencing.simulate.refusals import Rooms, refusal, rooms_of
 
 SLACK_S = 1e-6  # so much later is not too late: what sums of times may differ by
 

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.errors import BadInput
-from lab.sim.arms.fingers import Fingers
-from lab.sim.arms.gripper import Gripper
+from lab.sim.arms.fingers import Fingers, Gripper
 from lab.sim.arms.kinematics import ToolPose
 from lab.sim.arms.level_tool import LevelTool
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from lab.errors import WorkFailed
 from lab.sim.arms.arm import Arm
-from lab.sim.arms.gripper import PAD_M
+from lab.sim.arms.fingers import PAD_M
 from lab.sim.arms.kinematics import ToolPose
 from lab.sim.arms.tool_path import timed
 from lab.sim.urdf_reader import rotation

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.errors import BadInput
-from lab.sim.arms.gripper import Gripper
+from lab.sim.arms.fingers import Gripper
 from lab.sim.parts.part_shape import PartShape
 from lab.tasks.part_fields import GripFields
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from math import hypot, inf
 
 from lab.errors import BadInput
-from lab.sim.arms.gripper import PAD_M
+from lab.sim.arms.fingers import PAD_M
 from lab.sim.frames import ShapeKind
 from lab.sim.parts.kinds import Kind
 from lab.tasks.robot_fields import STRONGEST_N, RobotSettings

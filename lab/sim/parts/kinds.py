@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from lab.errors import BadInput
-from lab.sim.arms.gripper import Gripper
+from lab.sim.arms.fingers import Gripper
 from lab.sim.arms.kinematics import ToolPose
 from lab.sim.parts.grip import Grip, grip_of
 from lab.sim.parts.part_shape import PartShape, shape_of

@@ -4,7 +4,7 @@ Physics knows a part as a box, a cylinder or a convex hull: hollows of a mesh ar
 a box is one, too: a box touches a flat side with four corners at once, a hull with one after the other.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from io import BytesIO
@@ -19,11 +19,12 @@ from lab.errors import BadInput, counted
 from lab.files import assets_folder, is_file, within
 from lab.sim import urdf_reader
 from lab.sim.frames import Quaternion, Shape, ShapeKind, Vector
-from lab.sim.mesh_file import MAX_BYTES, is_binary, readable
+from lab.sim.mesh_file import MAX_BYTES, is_binary, readable, text_corners
 from lab.tasks.part_fields import PartFields
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
+
 
 MOST_TEXT = 40_000  # triangles of an STL in text: PyBullet, which reads none, is handed them one by one
 MOST_HULL = 256  # vertices: more make physics slow and no rounder
@@ -298,3 +299,36 @@ def _check_closed(where: str, mesh: "Trimesh") -> None:
         f"{where}: its surface is not closed: {' and '.join(faults) or 'faces are missing'}; close it, "
         "or set hull = true, which takes its convex hull"
     )
+
+
+# ---- part body --------------------------------------------------------------------------------------------------------
+
+
+Call = Callable[..., Any]
+
+
+def solid_of(engine: Any, call: Call, shape: PartShape) -> int:
+    """The number of what is felt of a part; engine: PyBullet, `call` calls it by a function's name."""
+    if shape.solid == "box":
+        return int(call("createCollisionShape", engine.GEOM_BOX, halfExtents=[s / 2 for s in shape.size]))
+    if shape.solid == "cylinder":
+        diameter, height = shape.size
+        return int(call("createCollisionShape", engine.GEOM_CYLINDER, radius=diameter / 2, height=height))
+    return int(call("createCollisionShape", engine.GEOM_MESH, vertices=shape.inner[0].tolist()))
+
+
+def seen_of(engine: Any, call: Call, shape: PartShape) -> int:
+    """The number of what cameras see of a part; of meshes in text, which PyBullet cannot read, the first alone."""
+    back = engine.invertTransform([0, 0, 0], list(shape.turn))[1]
+    places = [engine.multiplyTransforms([0, 0, 0], back, look.position, look.quaternion) for look in shape.looks]
+    if (corners := text_corners(shape.looks[0].mesh)) is not None:
+        look = shape.looks[0]
+        place = dict(zip(("visualFramePosition", "visualFrameOrientation"), places[0], strict=True))
+        corners, faces = corners * (look.size or (1.0, 1.0, 1.0)), list(range(len(corners)))
+        place |= {"vertices": corners.tolist(), "indices": faces, "rgbaColor": look.rgba}
+        return int(call("createVisualShape", engine.GEOM_MESH, **place))
+    arrays = visual_arrays(shape.looks)
+    kinds = [getattr(engine, f"GEOM_{look.kind.upper()}") for look in shape.looks]
+    at, turns = ([list(one) for one in ways] for ways in zip(*places, strict=True))  # PyBullet crashes over tuples
+    arrays |= {"shapeTypes": kinds, "visualFramePositions": at, "visualFrameOrientations": turns}
+    return int(call("createVisualShapeArray", **arrays))

@@ -8,7 +8,7 @@ from lab.sequencing.methods.carried_over import Decider
 from lab.sequencing.methods.carried_over_policy import CarriedPolicy
 from lab.studies.findings import those
 from lab.studies.runner import STORE, Job
-from lab.tasks.carried_policy import read_policy
+from lab.tasks.sequencing import read_policy
 from lab_studies.comparisons import carried_over as study
 from lab_studies.comparisons.carried_over import (
     ALL,

@@ -10,7 +10,7 @@ from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import NO_CHANCE, Chance, Episode
 from lab.sequencing.methods.exact import optimum
 from lab.sequencing.simulate.execution import Execution
-from lab.sequencing.simulate.replications import carry_out, replicate
+from lab.sequencing.simulate.several import carry_out, replicate
 from lab.tasks.task_file import load_cell
 from lab_studies.comparisons.rolling import rolling
 

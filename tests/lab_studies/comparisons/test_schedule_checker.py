@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from lab.errors import WorkFailed
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.cell.schedule_rows import rows_of
+from lab.sequencing.cell.schedule import rows_of
 from lab.sequencing.methods.cp_sat import cp_sat
 from lab.sequencing.methods.portfolio import best_known
 from lab.sequencing.search import SAME

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scipy.stats import ttest_rel
 
 from lab.sequencing.cell.chance import Chance, Episode
-from lab.sequencing.simulate.replications import carry_out, replicate
+from lab.sequencing.simulate.several import carry_out, replicate
 from lab.studies.findings import Findings
 from lab.studies.report import write_rows
 from lab.studies.runner import Job

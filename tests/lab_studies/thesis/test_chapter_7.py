@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 
 from lab.statistics import compare
-from lab.studies.counted_apart import JUDGED
-from lab.studies.findings import Findings, agreement, row, those
+from lab.studies.findings import JUDGED, Findings, agreement, row, those
 from lab.studies.report import write_report, write_rows
 from lab.studies.runner import Job
 from lab_studies.thesis import chapter_7

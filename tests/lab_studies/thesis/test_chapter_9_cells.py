@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from lab.statistics import compare, interval, proportion_interval, score
-from lab.studies.counted_apart import marked
+from lab.studies.findings import marked
 from lab.studies.runner import Job
 from lab_studies.thesis import chapter_9_cells
 from lab_studies.thesis.chapter_9_cells import (

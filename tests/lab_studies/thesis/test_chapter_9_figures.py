@@ -10,8 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lab.errors import BadInput
-from lab.studies.counted_apart import JUDGED
-from lab.studies.findings import row, those
+from lab.studies.findings import JUDGED, row, those
 from lab.studies.runner import Job
 from lab_studies.thesis import chapter_9_figures as figures
 from lab_studies.thesis.chapter_9_cells import TABLES, appendix

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lab.advice.answers_file import answers_of
+from lab.advice.table_level import answers_of
 from lab.errors import BadInput
 from lab.learning.problem import Problem
 from lab.mdp import grid

@@ -12,14 +12,12 @@ from lab.advice.entries import Entry
 from lab.advice.receipt import receipt
 from lab.learning.physics import PHYSICS
 from lab.learning.physics.environment import PhysicsEnvironment
-from lab.learning.reasons import Reason, TooSlow
-from lab.learning.requests import AdviceRequest
+from lab.learning.requests import AdviceRequest, Reason, TooSlow
 from lab.learning.session_events import AdviceGiven, AdviceRequested, EpisodeEnded, Improvement
 from lab.learning.settings import GateSettings
 from lab.mdp import TabularMDP, grid, optimal_values
 from lab.seat.page.teaching_page import SeatPage
-from lab.sequencing.request import SequenceRequest
-from lab.sequencing.search import Reference
+from lab.sequencing.search import Reference, SequenceRequest
 from lab.sequencing.simulate.follow import follow
 from lab.sequencing.simulate.run import Run
 from lab.tasks.task_file import load_cell

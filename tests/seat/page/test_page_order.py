@@ -6,15 +6,14 @@ import numpy as np
 import pytest
 
 from lab.advice.advisors import Person
-from lab.learning.reasons import TooSlow
+from lab.learning.requests import TooSlow
 from lab.learning.session_events import Improvement
 from lab.learning.settings import GateSettings
-from lab.seat.page.page_order import bars_of, made_until
+from lab.seat.page.page_console import bars_of, made_until
 from lab.seat.page.page_question import question_of
 from lab.sequencing.cell.schedule import Move
 from lab.sequencing.methods.srl_advised import advised_srl
-from lab.sequencing.request import SequenceRequest
-from lab.sequencing.search import Search
+from lab.sequencing.search import Search, SequenceRequest
 from lab.sequencing.simulate.follow import follow, simulate
 from lab.sequencing.simulate.run import Run
 from lab.tasks.task_file import load_cell

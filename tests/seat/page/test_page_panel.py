@@ -13,11 +13,10 @@ from lab.mdp import TabularMDP, grid
 from lab.production.controls import Controls, Held, StopKind
 from lab.production.operation.desk import RunDesk
 from lab.production.run_journal import RunJournal
-from lab.seat.page.page_events import hear
 from lab.seat.page.page_messages import Answer
 from lab.seat.page.page_panel import SeatPanel, plain_json, word_of
 from lab.seat.page.page_run import hear_run
-from lab.seat.page.page_state import PARTS, Pending, ShownLesson
+from lab.seat.page.page_state import PARTS, Pending, ShownLesson, hear
 from lab.tasks.task_file import load
 from lab.teaching.events import SkillBegan
 

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lab.learning.reasons import TooSlow
-from lab.learning.requests import AdviceRequest, Standing
+from lab.learning.requests import AdviceRequest, Standing, TooSlow
 from lab.learning.session_events import (
     AdviceEnded,
     AdviceGiven,
@@ -26,10 +25,8 @@ from lab.learning.session_events import (
 )
 from lab.learning.settings import GateSettings
 from lab.mdp import TabularMDP, grid
-from lab.seat.page.page_curve import MOST, Curve
-from lab.seat.page.page_events import hear
 from lab.seat.page.page_question import picture_of
-from lab.seat.page.page_state import PARTS, Known, Pending, ShownLesson, layer_of, standing_of
+from lab.seat.page.page_state import MOST, PARTS, Curve, Known, Pending, ShownLesson, hear, layer_of, standing_of
 
 LABELS = ("up", "down", "left", "right")
 

@@ -15,8 +15,7 @@ from lab.advice.advisors import Person
 from lab.advice.journal import Undo
 from lab.errors import BadInput, WorkFailed
 from lab.learning.problem import Problem
-from lab.learning.reasons import Reason, TooSlow
-from lab.learning.requests import AdviceRequest, AdvisorLeft
+from lab.learning.requests import AdviceRequest, AdvisorLeft, Reason, TooSlow
 from lab.learning.session import Session
 from lab.learning.session_events import EpisodeEnded, Event, Improvement
 from lab.learning.session_result import SessionResult
@@ -25,8 +24,7 @@ from lab.mdp import TabularMDP, grid
 from lab.seat.page.teaching_page import SeatPage
 from lab.seat.replay_pace import ReplayPace
 from lab.sequencing.cell.schedule import Move
-from lab.sequencing.request import SequenceRequest
-from lab.sequencing.search import EpisodeSequenced, Reference, SequenceResult
+from lab.sequencing.search import EpisodeSequenced, Reference, SequenceRequest, SequenceResult
 from lab.sequencing.simulate.follow import follow
 from lab.tasks.task_file import load_cell
 from lab.teaching.events import (

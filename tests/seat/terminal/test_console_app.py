@@ -16,7 +16,7 @@ from lab.production.composer import Conditions
 from lab.production.operation.desk import Desk
 from lab.production.operation.operation import Operation
 from lab.seat.terminal.console_app import HINTS, LETTER_S, OperatorConsole
-from lab.seat.terminal.console_plain import PlainConsole
+from lab.seat.terminal.console_view import PlainConsole
 from lab.tasks.task_file import load
 from lab.teaching.teacher import Teacher
 from lab.toolbox.registry import Toolbox

@@ -9,12 +9,11 @@ from prompt_toolkit.input import create_pipe_input
 from prompt_toolkit.output import DummyOutput
 from rich.console import Console
 
-from lab.learning.reasons import TooSlow
-from lab.learning.requests import AdvisorLeft
+from lab.learning.requests import AdvisorLeft, TooSlow
 from lab.learning.session_events import Improvement
 from lab.seat.terminal.line_reader import TerminalReader
 from lab.seat.terminal.prompt import TeachingPrompt
-from lab.sequencing.request import SequenceRequest
+from lab.sequencing.search import SequenceRequest
 from lab.sequencing.simulate.run import Run
 from lab.tasks.task_file import load_cell
 

@@ -12,8 +12,7 @@ from prompt_toolkit.input import create_pipe_input
 from prompt_toolkit.output import DummyOutput
 from rich.console import Console
 
-from lab.learning.reasons import TooSlow
-from lab.learning.requests import AdviceRequest, AdvisorLeft, Standing
+from lab.learning.requests import AdviceRequest, AdvisorLeft, Standing, TooSlow
 from lab.learning.session_events import (
     AdviceEnded,
     AdviceGiven,

@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 from rich.console import Console
 from rich.text import Text
 
-from lab.learning.reasons import TooSlow
-from lab.learning.requests import AdviceRequest, Standing
+from lab.learning.requests import AdviceRequest, Standing, TooSlow
 from lab.learning.session_events import Improvement
 from lab.mdp import TabularMDP
 from lab.seat.grid_text import Marks

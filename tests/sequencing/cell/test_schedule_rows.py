@@ -11,7 +11,7 @@ import pytest
 
 from lab.errors import BadInput
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.cell.schedule_rows import COLUMNS, csv_of, rows_of, write_table
+from lab.sequencing.cell.schedule import COLUMNS, csv_of, rows_of, write_table
 from lab.sequencing.cell.stations import Product, Stage, Station, one_robot
 from lab.sequencing.simulate.follow import simulate
 

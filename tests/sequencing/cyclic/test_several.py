@@ -11,9 +11,8 @@ from lab.errors import BadInput
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.stations import Product, Stage, Station, one_robot
 from lab.sequencing.cyclic import line, several
-from lab.sequencing.cyclic.fluid import least_s
 from lab.sequencing.cyclic.line import at_speed, away_s
-from lab.sequencing.cyclic.several import EVERY_CYCLE, Tried, best_rhythm, usual_parts
+from lab.sequencing.cyclic.several import EVERY_CYCLE, Tried, best_rhythm, least_s, usual_parts
 
 CellMaker = Callable[..., Cell]
 NEAR = 1e-5

@@ -7,7 +7,7 @@ import pytest
 from lab.errors import BadInput
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cyclic.cycle import best_cycle
-from lab.sequencing.cyclic.steady import steady
+from lab.sequencing.cyclic.unrolled import steady
 
 CellMaker = Callable[..., Cell]
 

@@ -6,9 +6,9 @@ from dataclasses import replace
 import pytest
 
 from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cyclic.cycle import shortest_period
 from lab.sequencing.cyclic.line import Line, lines
-from lab.sequencing.cyclic.times import shortest_period
-from lab.sequencing.simulate.constraints import Arc, earliest
+from lab.sequencing.simulate.waits import Arc, earliest
 
 CellMaker = Callable[..., Cell]
 

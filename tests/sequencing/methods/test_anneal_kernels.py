@@ -8,9 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.methods.anneal_kernels import AnnealArrays, anneal
-from lab.sequencing.methods.priorities import Orders
-from lab.sequencing.methods.priority_kernels import cost_of
+from lab.sequencing.methods.anneal import AnnealArrays, annealed_session
+from lab.sequencing.methods.priorities import Orders, cost_of
 from lab.sequencing.simulate.cell_arrays import moves_each
 from lab.sequencing.simulate.follow import simulate
 
@@ -39,7 +38,7 @@ def test_what_is_kept(cells: Cells, shops: Cells, data: st.DataObject, seed: int
     orders = Orders(cell, "makespan", "a test")
     work, first = begun(orders, seed), cost_of(orders.arrays, orders.run, orders.order(), np.inf)
     costs = np.zeros(40)
-    anneal(orders.arrays, orders.run, work, costs, temperature)
+    annealed_session(orders.arrays, orders.run, work, costs, temperature)
     assert np.bincount(work.parts, minlength=cell.parts).tolist() == moves_each(cell)
     assert ((work.choices >= 0) & (work.choices < cell.most_choices)).all()
     order = orders.order()
@@ -60,7 +59,7 @@ def test_neighbours_reach_every_order_and_way(ex11: Callable[[int], Cell]) -> No
     orders = Orders(ex11(2), "makespan", "a test")
     work, stood, ways = begun(orders, 5), set[int](), set[int]()
     for _ in range(600):
-        anneal(orders.arrays, orders.run, work, np.zeros(50), 1e9)
+        annealed_session(orders.arrays, orders.run, work, np.zeros(50), 1e9)
         at = int(np.flatnonzero(work.parts == 0)[0])
         stood.add(at)
         ways.add(int(work.choices[at]))

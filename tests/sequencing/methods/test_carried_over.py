@@ -8,8 +8,7 @@ from lab.errors import WorkFailed
 from lab.sequencing import SEQUENCERS, find_sequence
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.methods.carried_over import rule_of
-from lab.sequencing.methods.carried_over_policy import CarriedPolicy
-from lab.sequencing.methods.carried_over_weights import DEFAULT
+from lab.sequencing.methods.carried_over_policy import DEFAULT, CarriedPolicy
 from lab.sequencing.methods.exact import optimum
 from lab.sequencing.methods.rules import dispatch, nearest_ready
 from lab.sequencing.search import Search

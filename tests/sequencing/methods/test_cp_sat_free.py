@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import OBJECTIVES, cost
 from lab.sequencing.cell.stations import Robot
-from lab.sequencing.methods.cp_sat_free import carried_out, free_robots
+from lab.sequencing.methods.cp_sat import carried_out, free_robots
 from lab.sequencing.methods.shared import Shared
 from lab.sequencing.search import SAME
 from lab.sequencing.simulate.follow import simulate

@@ -8,8 +8,7 @@ from hypothesis import strategies as st
 
 from lab.errors import BadInput
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.methods.exact import optimum
-from lab.sequencing.methods.exact_values import ExactValues
+from lab.sequencing.methods.exact import ExactValues, optimum
 from lab.sequencing.simulate.run import Run
 
 CellMaker = Callable[..., Cell]

@@ -10,7 +10,7 @@ from hypothesis.strategies import SearchStrategy
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import OBJECTIVES, cost
 from lab.sequencing.cell.stations import Product, Stage, Station, one_robot
-from lab.sequencing.methods.fewer_moves import fewer_moves
+from lab.sequencing.methods.portfolio import fewer_moves
 from lab.sequencing.simulate.follow import follow, simulate
 from lab.sequencing.simulate.run import Run
 

@@ -11,7 +11,7 @@ from lab.sequencing.cell.stations import Arrivals, Product, Stage, Station, one_
 from lab.sequencing.methods.fifo import fifo, first_in_first_out
 from lab.sequencing.search import Search
 from lab.sequencing.simulate.follow import simulate
-from lab.sequencing.simulate.replications import carry_out
+from lab.sequencing.simulate.several import carry_out
 
 CellMaker = Callable[..., Cell]
 

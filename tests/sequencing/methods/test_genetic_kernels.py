@@ -7,8 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.methods.genetic import _population
-from lab.sequencing.methods.genetic_kernels import crossed, evolve, shuffled
+from lab.sequencing.methods.genetic import _population, crossed, evolve, shuffled
 from lab.sequencing.methods.priorities import Orders
 from lab.sequencing.simulate.cell_arrays import moves_each
 

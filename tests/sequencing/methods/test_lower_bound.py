@@ -12,8 +12,7 @@ from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.stations import Arrivals, Product, Stage, Station
 from lab.sequencing.cell.ways import TICKS_PER_S
 from lab.sequencing.methods.exact import optimum
-from lab.sequencing.methods.lower_bound import LowerBound
-from lab.sequencing.methods.robot_bound import RobotWork
+from lab.sequencing.methods.lower_bound import LowerBound, RobotWork
 from lab.sequencing.simulate.merged import MergedCell, MergedState
 from lab.sequencing.simulate.run import Run
 

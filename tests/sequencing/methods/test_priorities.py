@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import BUILT_IN, cost
-from lab.sequencing.methods.priorities import Orders, Priorities
-from lab.sequencing.methods.priority_kernels import cost_of
+from lab.sequencing.methods.priorities import Orders, Priorities, cost_of
 from lab.sequencing.simulate.cell_arrays import moves_each
 from lab.sequencing.simulate.follow import follow
 from lab.sequencing.simulate.run import Run

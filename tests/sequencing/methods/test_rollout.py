@@ -13,8 +13,8 @@ from lab.sequencing.cell.objectives import cost
 from lab.sequencing.methods.rollout import by_rule, replan, rollout
 from lab.sequencing.methods.rules import RULES, dispatch, usable
 from lab.sequencing.simulate.follow import follow
-from lab.sequencing.simulate.replications import carry_out, replicate
 from lab.sequencing.simulate.run import Run
+from lab.sequencing.simulate.several import carry_out, replicate
 
 CellMaker = Callable[..., Cell]
 NORMAL, EXPONENTIAL = Chance("normal", "normal"), Chance("exponential", "exponential")

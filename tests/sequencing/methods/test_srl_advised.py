@@ -8,8 +8,7 @@ import pytest
 from lab.advice.advisors import AdvisorName, make_advisor
 from lab.advice.order_level import OrderLevel
 from lab.errors import BadInput
-from lab.learning.reasons import TooSlow
-from lab.learning.requests import Advisor, AdvisorLeft
+from lab.learning.requests import Advisor, AdvisorLeft, TooSlow
 from lab.learning.settings import GateSettings
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.methods.exact import optimum
@@ -19,8 +18,7 @@ from lab.sequencing.methods.srl_advised import (
     advised_srl,
     check_gate,
 )
-from lab.sequencing.request import SequenceRequest
-from lab.sequencing.search import Search
+from lab.sequencing.search import Search, SequenceRequest
 
 CellMaker = Callable[..., Cell]
 EPISODES = 80

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import NO_CHANCE, Chance
 from lab.sequencing.methods.exact import optimum
-from lab.sequencing.methods.srl_time_reacting import reacting
-from lab.sequencing.simulate.replications import replicate
+from lab.sequencing.methods.srl_time import reacting
+from lab.sequencing.simulate.several import replicate
 
 CellMaker = Callable[..., Cell]
 Cells = Callable[..., st.SearchStrategy[Cell]]

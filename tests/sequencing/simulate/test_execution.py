@@ -16,8 +16,8 @@ from lab.sequencing.methods.rollout import by_rule, rollout
 from lab.sequencing.methods.rules import RULES
 from lab.sequencing.simulate.execution import WAIT, Execution, Observed
 from lab.sequencing.simulate.follow import follow, simulate
-from lab.sequencing.simulate.replications import carry_out, replicate
 from lab.sequencing.simulate.run import Run, branch
+from lab.sequencing.simulate.several import carry_out, replicate
 
 CellMaker = Callable[..., Cell]
 NORMAL, EXPONENTIAL = Chance("normal", "normal"), Chance("exponential", "exponential")

@@ -26,9 +26,9 @@ from lab.sequencing.simulate import kernels
 from lab.sequencing.simulate.cell_arrays import cell_arrays, run_arrays
 from lab.sequencing.simulate.follow import follow, simulate, steps
 from lab.sequencing.simulate.merged import MergedCell
-from lab.sequencing.simulate.replications import replicate
 from lab.sequencing.simulate.rest import Mishaps, rest_of
 from lab.sequencing.simulate.run import Run
+from lab.sequencing.simulate.several import replicate
 from lab_studies.many_sessions import evaluate
 from lab_studies.thesis.branch_and_bound import branch_and_bound
 

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from lab.errors import BadInput
 from lab.files import assets_folder
 from lab.sim.arms.arm_models import arm_named
-from lab.sim.arms.gripper import Gripper
+from lab.sim.arms.fingers import Gripper
 from lab.sim.parts.grip import BESIDE_M, HOLD_M, OVER_FLOOR_M, UNDER_PALM_M, Grip, grip_of
 from lab.sim.parts.part_shape import PartShape, shape_of
 from lab.tasks.part_fields import GripFields, PartFields

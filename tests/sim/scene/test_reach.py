@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from lab.sim.arms.arm_models import arm_of
 from lab.sim.arms.kinematics import ELBOW_UP, FLANGE, FOREARM, SHOULDER_OUT, SHOULDER_UP, TOOL, UPPER_ARM, ToolPose
-from lab.sim.scene.reach import ring_of
+from lab.sim.scene.ground_plan import ring_of
 from lab.tasks.robot_fields import RobotSettings
 
 UP6 = arm_of(RobotSettings(start="rack"))

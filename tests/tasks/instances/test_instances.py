@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lab.errors import BadInput
-from lab.tasks.cell_toml import toml_of
+from lab.tasks.cell_file import toml_of
 from lab.tasks.instances import INSTANCES, Asked, format_of, is_instance, read_instance, takes_case
 from lab.tasks.instances.source import Source
 from lab.tasks.toml_text import TomlText

@@ -1,0 +1,254 @@
+"""Learners on a table: Q-learning and Sarsa, their traces, whole episodes, planning, and afterstates."""
+
+from collections.abc import Sequence
+from typing import overload
+
+from lab.learning.selection import Draw
+from lab.learning.settings import LearnerSettings
+from lab.learning.updates.update import OnTable, Row, Update, towards
+from lab.mdp import TabularMDP
+
+
+def q_target(r_t: float, discount_t: float, q_t: Row) -> float:
+    """r + gamma max_a Q(s', a); discount_t is 0 when s' is terminal. Source: Watkins 1989, thesis fig. 2.2."""
+    return r_t + discount_t * max(q_t)
+
+
+def sarsa_target(r_t: float, discount_t: float, q_t: Row, a_t: int) -> float:
+    """r + gamma Q(s', a'); discount_t is 0 when s' is terminal. Source: thesis fig. 2.1."""
+    return r_t + discount_t * q_t[a_t]
+
+
+class QLearning(OnTable):
+    """One-step Q-learning: Q(s,a) += alpha (r + gamma max Q(s',.) - Q(s,a)). Source: thesis fig. 2.2."""
+
+    def learn(self, s_tm1: int, a_tm1: int, r_t: float, discount_t: float, s_t: int, a_t: int) -> None:
+        """One update of Q(s, a)."""
+        row = self.q[s_tm1]
+        row[a_tm1] = towards(row[a_tm1], q_target(r_t, discount_t, self.q[s_t]), self._alpha)
+
+
+class Sarsa(OnTable):
+    """One-step SARSA: Q(s,a) += alpha (r + gamma Q(s',a') - Q(s,a)). Source: thesis fig. 2.1."""
+
+    lookahead = True
+
+    def learn(self, s_tm1: int, a_tm1: int, r_t: float, discount_t: float, s_t: int, a_t: int) -> None:
+        """One update of Q(s, a)."""
+        row = self.q[s_tm1]
+        row[a_tm1] = towards(row[a_tm1], sarsa_target(r_t, discount_t, self.q[s_t], a_t), self._alpha)
+
+
+# ---- episode returns --------------------------------------------------------------------------------------------------
+
+
+class MonteCarlo(OnTable):
+    """First-visit Monte Carlo with a constant step: Q(s,a) += alpha (G - Q(s,a)) when the episode is over.
+
+    A broken-off episode counts as if the start value came after it: nothing, where that is 0.
+    Source: Sutton and Barto 1998, section 5.4.
+    """
+
+    chained = True
+
+    def __init__(self, q: list[Row], settings: LearnerSettings, mdp: TabularMDP):
+        super().__init__(q, settings, mdp)
+        self._episode: list[tuple[int, int, float]] = []
+        self._after = 0.0
+
+    def begin(self) -> None:
+        """Forgets the last episode."""
+        self._episode.clear()
+
+    def learn(self, s_tm1: int, a_tm1: int, r_t: float, discount_t: float, s_t: int, a_t: int) -> None:
+        """Remembers the step."""
+        self._after = self._settings.start_value if discount_t else 0.0
+        self._episode.append((s_tm1, a_tm1, r_t))
+
+    def end(self) -> None:
+        """Learns from the returns that followed the first visits."""
+        outcome, returns = self._after, dict[tuple[int, int], float]()
+        for state, action, reward in reversed(self._episode):
+            outcome = reward + self._settings.discount * outcome
+            returns[state, action] = outcome  # the last one written is that of the first visit
+        for (state, action), outcome in returns.items():
+            self.q[state][action] = towards(self.q[state][action], outcome, self._alpha)
+        self._episode.clear()
+
+
+# ---- planning ---------------------------------------------------------------------------------------------------------
+
+
+class DynaQ(QLearning):
+    """Q-learning that learns from `planning` of the moves that it has seen again after each one.
+
+    Its model of the world holds what each move last led to, and is gone through in turn, the newest first; where steps are
+    left to chance, that is only the last outcome. Source: Sutton 1990, who draws these moves by chance; Sutton and Barto
+    1998, fig. 9.4.
+    """
+
+    def __init__(self, q: list[Row], settings: LearnerSettings, mdp: TabularMDP):
+        super().__init__(q, settings, mdp)
+        self._outcomes: dict[tuple[int, int], tuple[float, float, int]] = {}
+        self._moves: list[tuple[int, int]] = []
+        self._turn = 0
+
+    def learn(self, s_tm1: int, a_tm1: int, r_t: float, discount_t: float, s_t: int, a_t: int) -> None:
+        """One update of Q(s, a), and of the values of earlier moves."""
+        learn, outcomes, moves = super().learn, self._outcomes, self._moves
+        learn(s_tm1, a_tm1, r_t, discount_t, s_t, a_t)
+        if (s_tm1, a_tm1) not in outcomes:
+            moves.append((s_tm1, a_tm1))
+        outcomes[s_tm1, a_tm1] = r_t, discount_t, s_t
+        for _ in range(min(self._settings.planning, len(moves))):
+            self._turn = (self._turn or len(moves)) - 1
+            state, action = moves[self._turn]
+            learn(state, action, *outcomes[state, action], a_t)
+
+
+# ---- afterstate -------------------------------------------------------------------------------------------------------
+
+
+def afterstate_value(step_reward: float, discount: float, v_t: float) -> float:
+    """r + gamma V(s'): a move is worth what the state after it is. Source: thesis App. VII; Sutton and Barto, 6.8."""
+    return step_reward + discount * v_t
+
+
+class AfterstateRows(Sequence[Row]):
+    """Action values read off a value per state: row s is r + gamma V(s') over the actions; zeros where episodes end."""
+
+    def __init__(self, mdp: TabularMDP, discount: float, values: Row):
+        self.values = values
+        self._step_reward, self._discount = mdp.step_reward, discount
+        self._successor: list[list[int]] = mdp.successor.tolist()
+        self._over: list[bool] = mdp.terminal.tolist()
+
+    def __len__(self) -> int:
+        return len(self._successor)
+
+    @overload
+    def __getitem__(self, state: int) -> Row: ...
+    @overload
+    def __getitem__(self, state: slice) -> list[Row]: ...
+    def __getitem__(self, state: int | slice) -> Row | list[Row]:
+        if isinstance(state, slice):
+            return [self[s] for s in range(*state.indices(len(self)))]
+        if self._over[state]:
+            return [0.0] * len(self._successor[state])
+        reward, discount, values = self._step_reward, self._discount, self.values
+        return [afterstate_value(reward, discount, values[entered]) for entered in self._successor[state]]
+
+    def after(self, state: int) -> Row:
+        """The values of the states that the actions lead to."""
+        return [self.values[entered] for entered in self._successor[state]]
+
+
+class Afterstate(Update):
+    """TD(0) on afterstates: V(s) += alpha (r + gamma V(s') - V(s)), s' being where the chosen action led.
+
+    A terminal state is worth 0 until it is first entered, then its reward. All ordinary moves must have one reward.
+    Raises BadInput where they do not, or where entering a terminal state is worth more from one side.
+    Source: thesis App. VII (the text speaks of Q(s,a), the listing keeps a value per state).
+    """
+
+    def __init__(self, q: list[Row], settings: LearnerSettings, mdp: TabularMDP):
+        self._alpha, self._discount = settings.alpha, settings.discount
+        self._step_reward = mdp.step_reward
+        self._arrival: Row = mdp.arrival.tolist()
+        self._values = _values_behind(q, mdp, settings.discount)
+        self._rows = AfterstateRows(mdp, settings.discount, self._values)
+        self.q = self._rows
+
+    def gauge(self, state: int) -> Row:
+        """The values of the states that the actions lead to, as the listing compares them."""
+        return self._rows.after(state)
+
+    def scatter(self, draw: Draw) -> None:
+        """Every state's value."""
+        self._values[:] = [draw() - 0.5 for _ in self._values]
+
+    def learn(self, s_tm1: int, a_tm1: int, r_t: float, discount_t: float, s_t: int, a_t: int) -> None:
+        """One update of V(s); entering a terminal state shows its worth."""
+        values = self._values
+        target = afterstate_value(self._step_reward, self._discount, values[s_t])
+        values[s_tm1] = towards(values[s_tm1], target, self._alpha)
+        if not discount_t:
+            values[s_t] = self._arrival[s_t]
+
+
+def _values_behind(q: list[Row], mdp: TabularMDP, discount: float) -> Row:
+    """The values per state that a table of action values was read off; zeros for a table of zeros."""
+    values = [0.0] * mdp.n_states
+    if any(map(any, q)):
+        for row, entered, over in zip(q, mdp.successor.tolist(), mdp.terminal.tolist(), strict=True):
+            if not over:
+                for value, state in zip(row, entered, strict=True):
+                    values[state] = (value - mdp.step_reward) / discount
+    return values
+
+
+# ---- traces -----------------------------------------------------------------------------------------------------------
+
+
+TRACE_FLOOR = 1e-6  # an eligibility below this moves no value noticeably, and dropping it keeps a step cheap
+
+
+def is_greedy(q_t: Row, a_t: int) -> bool:
+    """Whether a' is a best action of s'; a tie counts as best. Source: thesis fig. 2.3."""
+    return q_t[a_t] == max(q_t)
+
+
+class Traced(OnTable):
+    """A learner with eligibility traces: accumulating ones grow by 1 on a visit, replacing ones are set to 1.
+
+    Source: Singh and Sutton 1996; thesis fig. 2.3.
+    """
+
+    lookahead = chained = True
+
+    def __init__(self, q: list[Row], settings: LearnerSettings, mdp: TabularMDP):
+        super().__init__(q, settings, mdp)
+        self._decay = settings.discount * settings.trace
+        self._growing = not settings.replacing
+        self._traces: dict[int, tuple[Row, int, float]] = {}
+
+    def begin(self) -> None:
+        """Forgets the traces of the last episode."""
+        self._traces.clear()
+
+    def _spread(self, s_tm1: int, a_tm1: int, error: float, follow: bool) -> None:
+        """Moves every value that led here by its eligibility; then lets the traces fade, or cuts them."""
+        row, traces, decay = self.q[s_tm1], self._traces, self._decay
+        step = self._alpha * error
+        key = s_tm1 * len(row) + a_tm1
+        earlier = traces.pop(key, None)  # put back last, so that the oldest traces stay in front
+        traces[key] = (row, a_tm1, earlier[2] + 1.0 if earlier and self._growing else 1.0)
+        for trace_row, action, eligibility in traces.values():
+            trace_row[action] += step * eligibility
+        if follow and decay > 0.0:
+            self._traces = {
+                k: (trace_row, action, eligibility * decay)
+                for k, (trace_row, action, eligibility) in traces.items()
+                if eligibility > TRACE_FLOOR
+            }
+        else:
+            traces.clear()
+
+
+class WatkinsQLambda(Traced):
+    """Watkins's Q(lambda): traces are cut when the next action is not greedy. Source: thesis fig. 2.3."""
+
+    def learn(self, s_tm1: int, a_tm1: int, r_t: float, discount_t: float, s_t: int, a_t: int) -> None:
+        """One update of every value that led here, by its eligibility."""
+        q_t = self.q[s_t]
+        error = q_target(r_t, discount_t, q_t) - self.q[s_tm1][a_tm1]
+        self._spread(s_tm1, a_tm1, error, discount_t > 0.0 and is_greedy(q_t, a_t))
+
+
+class SarsaLambda(Traced):
+    """SARSA(lambda): traces follow whatever is done. Source: Sutton and Barto 1998, fig. 7.11."""
+
+    def learn(self, s_tm1: int, a_tm1: int, r_t: float, discount_t: float, s_t: int, a_t: int) -> None:
+        """One update of every value that led here, by its eligibility."""
+        error = sarsa_target(r_t, discount_t, self.q[s_t], a_t) - self.q[s_tm1][a_tm1]
+        self._spread(s_tm1, a_tm1, error, discount_t > 0.0)
