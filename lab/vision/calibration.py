@@ -78,7 +78,7 @@ class Mat:
         )
         return lens.bent(np.asarray(wide, dtype=np.uint8), pinhole)
 
-    def found(self, image: Image, where: str = "picture") -> tuple[Array, Array]:
+    def corners(self, image: Image, where: str = "picture") -> tuple[Array, Array]:
         """World points (n, 3) [m] and pixels (n, 2) of the markers' corners; BadInput names how many markers were seen."""
         check_picture(image, where)
         settings = cv2.aruco.DetectorParameters()
@@ -138,7 +138,7 @@ def calibrate(pictures: Sequence[tuple[str, Image]], mat: Mat, angle_rad: float 
     Raises BadInput for too few pictures, pictures without the mat or of different sizes, and WorkFailed when the focal
     length cannot be determined. Source: Z. Zhang, 2000.
     """
-    found = [mat.found(image, name) for name, image in pictures]
+    found = [mat.corners(image, name) for name, image in pictures]
     sizes = {(image.shape[1], image.shape[0]) for _, image in pictures}
     if len(sizes) > 1:
         raise BadInput(f"pictures of {len(sizes)} sizes: {sorted(sizes)}: wanted one camera's")

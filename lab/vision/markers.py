@@ -36,7 +36,9 @@ def calmed(image: Image) -> Image:
     """The picture (H, W, 3), smoothed if it is noisy; a clean rendered picture is returned unchanged."""
     second = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], dtype=np.float64)
     grey = cv2.cvtColor(image, cv2.COLOR_RGB2GRAY)
-    rough: Any = np.abs(cv2.filter2D(grey, cv2.CV_64F, second))  # noise estimate, J. Immerkaer, 1996; the median ignores edges
+    rough: Any = np.abs(
+        cv2.filter2D(grey, cv2.CV_64F, second)
+    )  # noise estimate, J. Immerkaer, 1996; the median ignores edges
     noise = float(np.median(rough)) / 0.6745 / 6.0
     if noise <= NOISY:
         return image
