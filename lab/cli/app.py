@@ -11,8 +11,10 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from lab import __version__
+from lab.cli.families import CommandOfFamilies
 from lab.cli.output import begin, end, fail, silence, write
 from lab.errors import LabError, out_of_memory
+from lab.plugins.family import blame
 
 
 class UnloadedCommand(TyperCommand):
@@ -253,8 +255,6 @@ def guarded(function: Callable[..., None]) -> Callable[..., None]:
         except OSError as error:  # a full disk, a folder taken away meanwhile
             end(str(error), 1)
         except Exception as error:
-            from lab.plugins.family import blame
-
             why = blame(error) or out_of_memory(error)
             if why is None:
                 raise
@@ -293,7 +293,6 @@ def made() -> CommandGroup:
 
 def loaded(words: str) -> Any:
     """The command behind these words, with its parameters."""
-    from lab.cli.families import CommandOfFamilies
 
     row = COMMANDS[words]
     function = row.function

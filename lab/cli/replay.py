@@ -11,6 +11,7 @@ from lab.cli.families import from_files
 from lab.cli.lessons import lesson_seat, say_read, sequenced
 from lab.cli.options import Json, Plain, Port, ToolboxPlace, TrustModule
 from lab.cli.output import complain, console, end, show
+from lab.cli.view import replay_page, serve
 from lab.errors import BadInput
 
 
@@ -120,7 +121,6 @@ def _replay_run(
     folder: Path, page: bool, port: int, as_json: bool, movie: Path | None = None, seconds: float = 15.0
 ) -> None:
     """What was done in a run and what came of it, from its journal; its film as a moving picture, or on a page."""
-    from lab.cli.view import replay_page, serve
 
     document = deferred.replayed_run(folder, "DIR")
     if movie is not None:

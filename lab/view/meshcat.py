@@ -20,10 +20,10 @@ from typing import TYPE_CHECKING, Any, Self
 from lab import files
 from lab.errors import BadInput, WorkFailed, unknown
 from lab.sim.frames import Body, Frame, Recording, Viewpoint
+from lab.view.keyframes import Motion, Track, motions
+from lab.view.scene_data import Json, Story, describe, pack
 
-if TYPE_CHECKING:
-    from lab.view.keyframes import Motion, Track
-    from lab.view.scene_data import Json, Story
+if TYPE_CHECKING:  # the server loads starlette and uvicorn, which only a served page needs
     from lab.view.server import File, Server
     from lab.view.server_page import Panel
 
@@ -116,7 +116,6 @@ class LiveView:
 
         Raises BadInput for a mesh that cannot be read and for two bodies of one name.
         """
-        from lab.view.scene_data import describe
         from lab.view.server_page import News
 
         scene = describe(bodies, camera or Viewpoint())
@@ -174,8 +173,6 @@ def replay_html(
     written whole or not at all; its folder is made when it is missing. Raises BadInput for a speed that is not above 0, a
     recording that contradicts itself, an unreadable mesh and a path that cannot be written.
     """
-    from lab.view.keyframes import motions
-    from lab.view.scene_data import describe
 
     if not (math.isfinite(speed) and speed > 0):
         raise BadInput(f"replay speed {speed}: must be finite and above 0 (1 is real time)")
@@ -203,7 +200,6 @@ def replay_html(
 
 
 def _motion(motion: "Motion") -> dict[str, Any]:
-    from lab.view.scene_data import pack
 
     def packed(track: "Track | None") -> dict[str, str] | None:
         return None if track is None else {"times": pack(track.times_s), "values": pack(track.values)}
