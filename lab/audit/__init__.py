@@ -1,1 +1,4 @@
-"""Whether a run did what its task asked for: judged from frames and the task file, by code that did not carry it out."""
+"""The auditor: judges from frames and the task file alone whether a run did what its task asked for.
+
+It shares no code with what carried the run out.
+"""

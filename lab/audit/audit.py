@@ -1,4 +1,4 @@
-"""The audit of a run: what is delivered by the frames and the task file, and what is wrong, part by part."""
+"""The audit of a run: which parts were delivered according to frames and task file, and every finding against it."""
 
 from csv import DictReader
 from dataclasses import asdict, dataclass
@@ -16,25 +16,25 @@ from lab.tasks.task import Order, Task
 
 @dataclass(frozen=True)
 class Audit:
-    """What came of an audit: the evidence, and all that is wrong with it, by time."""
+    """The result of an audit: the evidence, and the findings against it, by time."""
 
     evidence: Evidence
     findings: tuple[Finding, ...]
 
     @property
     def claimed(self) -> tuple[str, ...]:
-        """The parts that were said to be delivered, by name, part 1 first."""
+        """The names of the parts that the run claims to have delivered, part 1 first."""
         return tuple(seen.name for seen in self.evidence.parts if seen.name in self.evidence.claimed)
 
     @property
     def delivered(self) -> tuple[str, ...]:
-        """Those of them that are: nothing that is wrong names them."""
+        """The claimed parts that no finding names."""
         guilty = {one.part for one in self.findings}
         return tuple(name for name in self.claimed if name not in guilty)
 
     @property
     def failure(self) -> str | None:
-        """The first thing that is wrong and how many there are, in one line; None for nothing."""
+        """The first finding and the number of the others, in one line; None when there are none."""
         if not self.findings:
             return None
         first, more = self.findings[0], len(self.findings) - 1
@@ -42,9 +42,11 @@ class Audit:
         return f"audit: {about}{f' (and {more} more)' if more else ''}"
 
     def to_json(self) -> dict[str, Any]:
-        """`claimed` and `delivered`: names. `struck`: the faults, each what, part, station. `plan_kept`: whether the run had a
-        plan that was not changed. `findings`: rule, part, station, at_s, words. `stays`: part, station, from when to when [s] it
-        stood there.
+        """The audit as a JSON document.
+
+        `claimed` and `delivered`: names. `struck`: the faults, each with what, part, station. `plan_kept`: whether the run
+        had a plan that was not changed. `findings`: rule, part, station, at_s, words. `stays`: part, station, start and
+        end [s].
         """
         stays = [{"part": seen.name} | asdict(stay) for seen in self.evidence.parts for stay in seen.stays]
         return {
@@ -58,7 +60,7 @@ class Audit:
 
 
 def audit(evidence: Evidence) -> Audit:
-    """Judges a run by its evidence. A part is delivered when it is claimed to be and nothing that is wrong names it."""
+    """The audit of a run's evidence. A part counts as delivered when the run claims so and no finding names it."""
     return Audit(evidence, tuple(findings(evidence)))
 
 
@@ -84,8 +86,9 @@ def kept_evidence(folder: Path, task: Task, order: Order) -> Evidence:
 
 
 def schedule_rows(text: str) -> dict[str, list[dict[str, Any]]]:
-    """The rows of a `schedule.csv`, "planned" and "measured", their times as numbers [s]. Raises ValueError and KeyError for
-    another file.
+    """The rows of a `schedule.csv`, by "planned" and "measured", with times as numbers [s].
+
+    Raises ValueError and KeyError for another file.
     """
     rows: dict[str, list[dict[str, Any]]] = {"planned": [], "measured": []}
     for row in DictReader(StringIO(text)):

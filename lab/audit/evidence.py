@@ -1,4 +1,4 @@
-"""What an audit goes by, and what it finds: evidence, faults that struck, findings."""
+"""The records of an audit: the evidence that it judges, the faults that struck, and its findings."""
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
@@ -10,12 +10,12 @@ from lab.audit.tracks import Array, BodyTracks
 from lab.tasks.task import Order, Task
 from lab.tasks.task_fields import Stage
 
-SLACK_S = 0.25  # two frames, and what rounding does
+SLACK_S = 0.25  # tolerance of times: two frames and rounding
 
 
 @dataclass(frozen=True)
 class Finding:
-    """Something that is not as the task asks: by which rule, about which part ("": about none alone), where and when [s]."""
+    """A violation of the task: its rule, the part ("": not of a single part), the station and the time [s]."""
 
     rule: str
     part: str
@@ -26,7 +26,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class Struck:
-    """A fault that a hand or a machine had in a run, about a part or a station ("": about none)."""
+    """A fault of the gripper or a machine in a run, and the part and station that it affected ("": none)."""
 
     what: str
     part: str = ""
@@ -35,10 +35,10 @@ class Struck:
 
 @dataclass
 class Evidence:
-    """What a run left: the task and its order, the tracks of its bodies, the measured rows of its schedule, what was claimed.
+    """The evidence of a run: task and order, the tracks of its bodies, the measured schedule, and its claims.
 
-    rows: as `schedule.csv` has them. claimed: the names of the parts that are said to be delivered. struck: the faults.
-    planned: the rows of the plan that the run had; none where it was changed on the way, or there was none.
+    rows: the measured rows of `schedule.csv`. claimed: the names of the parts that the run claims to have delivered.
+    struck: the faults. planned: the rows of the run's plan; empty if there was none or it was changed during the run.
     """
 
     task: Task
@@ -57,15 +57,15 @@ class Evidence:
         self._touched |= {one.name for one in self.parts for stay in one.stays if stay.station in moved}
 
     def undisturbed(self, part: str) -> bool:
-        """Whether no fault has touched a part."""
+        """Whether no fault has affected a part."""
         return part not in self._touched
 
     def own_rows(self, part: str, operation: str) -> list[dict[str, Any]]:
-        """The measured rows of a part of one kind, by time."""
+        """The measured rows of a part for one kind of operation, by time."""
         return [row for row in self.rows if row["part"] == part and row["operation"] == operation]
 
     def work_s(self, kind: str, stage: Stage) -> float | None:
-        """How long a part of a kind is to be worked on in a stage by the task [s]; None where it is no machine's."""
+        """The processing time [s] of a stage for a part of a kind; None where no machine works."""
         station = self.task.station(stage.station)
         if station.kind != "machine":
             return None
@@ -75,11 +75,11 @@ class Evidence:
         return stage.processing_s if stage.processing_s is not None else station.processing_s
 
     def at_most_s(self, stage: Stage) -> float | None:
-        """How long it may stay there after that by the task [s]; None: for ever."""
+        """The longest time [s] that a part may stay after its processing; None: no limit."""
         return stage.at_most_s if stage.at_most_s is not None else self.task.station(stage.station).at_most_s
 
     def off_pose(self, station: str, place: Array) -> tuple[float, float]:
-        """A point in the frame of a station's body [m], off the station's pose along and across, wherever the body is by now."""
+        """A point in the frame of a station's body [m], relative to the station's pose, along and across."""
         x, y, _, *turn = self.tracks.poses[0, self.tracks.number(station)]
         at_x, at_y, yaw = self.task.station(station).pose
         along, across = turned(place[0], place[1], 2.0 * atan2(turn[2], turn[3]))
@@ -87,5 +87,5 @@ class Evidence:
 
 
 def turned(x: float, y: float, yaw: float) -> tuple[float, float]:
-    """A vector, turned about the vertical."""
+    """The vector (x, y), rotated about the vertical by `yaw` [rad]."""
     return cos(yaw) * x - sin(yaw) * y, sin(yaw) * x + cos(yaw) * y

@@ -1,4 +1,4 @@
-"""What an audit asks of how parts stand and move: straight, still, in the robot's hand, one at a time, none in another."""
+"""The audit's rules of motion: parts stand upright and still, move only in the robot's hand, singly, and never overlap."""
 
 from collections.abc import Iterator, Sequence
 from itertools import combinations
@@ -10,21 +10,21 @@ from lab.audit.evidence import Evidence, Finding
 from lab.audit.stays import Mask, PartSeen, Stay, gap_of, pallet_of
 from lab.audit.tracks import Array, BodyTracks, Numbers, in_frame, on_grid
 
-LEANS = 0.97  # cosine of the tilt, fourteen degrees, from which on a part does not stand in a station on its way
-NEAR_SPOT_M = 0.03  # a part this near to a station's only spot stands on it on its way
-FLOATS_M = 0.002  # its foot may be so far from what it stands on; measured are 0.03 mm
-SHIFTS_M = 0.005  # a part that stands may move so far; measured are 2 mm, in a stack that is built
-TAKES_S = 4.0  # the gripper may be so long at a part before it stands free, and before it leaves
-HELD_M = 0.025  # the robot's hand may be so far from what it moves; measured are 14 mm, as the fingers open
-SLIPS_M = 0.01  # from one frame to the next it may move so far in the hand
-MOVES_M = 0.002  # a part that moves less from one frame to the next may settle
-FASTER = 1.2  # times the robot's speed no part is carried, and SHIFTS_M beside
-SEVERAL_FRAMES = 3  # in a row, for what a single frame may show by chance
-BETWEEN_M = 0.002  # by so much two parts may stand in one another: what is recorded is not finer
+LEANS = 0.97  # cosine of the largest tilt, fourteen degrees, of a part at a station along its route
+NEAR_SPOT_M = 0.03  # largest distance from a station's only spot, along the route
+FLOATS_M = 0.002  # largest gap between a foot and what carries it; measured: 0.03 mm
+SHIFTS_M = 0.005  # largest movement of a standing part; measured: 2 mm, while a stack is built
+TAKES_S = 4.0  # longest time that the gripper is at a part after setting it down or before leaving with it
+HELD_M = 0.025  # largest distance between the robot's hand and what it moves; measured: 14 mm, as the fingers open
+SLIPS_M = 0.01  # largest movement in the hand from one frame to the next
+MOVES_M = 0.002  # largest movement between frames of a part that is only settling
+FASTER = 1.2  # factor of the robot's speed, plus SHIFTS_M, that no carried part exceeds
+SEVERAL_FRAMES = 3  # consecutive frames required where a single frame may be a coincidence
+BETWEEN_M = 0.002  # largest overlap of two parts, the resolution of the recording
 
 
 def stood(evidence: Evidence, seen: PartSeen) -> Iterator[Finding]:
-    """It stood straight, its foot on what carries it, still between its two transfers, on the spot where there is only one."""
+    """Findings on how a part stood: upright, its foot supported, still between transfers, and on a station's only spot."""
     tracks, body = evidence.tracks, evidence.tracks.number(seen.name)
     for number, stay in enumerate(seen.stays):
         station, during = evidence.task.station(stay.station), stay.frames(tracks)
@@ -44,7 +44,7 @@ def stood(evidence: Evidence, seen: PartSeen) -> Iterator[Finding]:
 
 
 def _shifted(evidence: Evidence, seen: PartSeen, stay: Stay, places: Array) -> Iterator[Finding]:
-    """It did not move in a stay, the time aside in which a gripper lets go of it or takes hold."""
+    """A finding if the part moved during a stay, other than while the gripper releases or grasps it."""
     tracks, last_s = evidence.tracks, float(evidence.tracks.times_s[-1])
     start_s = stay.start_s + (TAKES_S if stay.start_s > tracks.times_s[0] else 0.0)
     free = Stay("", start_s, stay.end_s - (TAKES_S if stay.end_s < last_s else 0.0)).frames(tracks)
@@ -59,7 +59,7 @@ def _shifted(evidence: Evidence, seen: PartSeen, stay: Stay, places: Array) -> I
 
 
 def in_hand(evidence: Evidence, seen: PartSeen) -> Iterator[Finding]:
-    """Where it moves, and in the air, it is in the robot's hand and moves with it, no faster than the robot carries."""
+    """Findings on a moving or lifted part: the robot's hand holds it, moves with it, and is no faster than the robot."""
     tracks, body = evidence.tracks, evidence.tracks.number(seen.name)
     steps_m, spans_s = np.linalg.norm(np.diff(tracks.poses[:, body, :3], axis=0), axis=1), np.diff(tracks.times_s)
     moves = steps_m > MOVES_M
@@ -90,7 +90,7 @@ def in_hand(evidence: Evidence, seen: PartSeen) -> Iterator[Finding]:
 
 
 def _in_links(tracks: BodyTracks, body: int) -> Array:
-    """Where a body's middle is in the frame of each of the robot's links (links, n, 3) [m]."""
+    """The position of a body's middle in the frame of each of the robot's links (links, n, 3) [m]."""
     own = tracks.poses[:, body]
     return np.array([in_frame(own, tracks.poses[:, link], np.zeros((1, 3)))[0] for link in tracks.robot]).reshape(
         -1, len(own), 3
@@ -98,7 +98,7 @@ def _in_links(tracks: BodyTracks, body: int) -> Array:
 
 
 def _creeps(carried: Mask, places: Array) -> list[int]:
-    """The frames at which a flight begins in which a part leaves its place in the hand, which is the link that it moves with."""
+    """The first frames of the transports in which a part moves within the hand (the link that it moves with)."""
     found = []
     for first, after in runs(carried):
         flight = places[:, first:after]
@@ -109,7 +109,7 @@ def _creeps(carried: Mask, places: Array) -> list[int]:
 
 
 def _apart(tracks: BodyTracks, body: int, others: Sequence[int], frames: Numbers) -> Array:
-    """How far a body's box is from the nearest box of others in some frames (n,) [m], each box by a grid of points."""
+    """The distance (n,) [m] from a body's box to the nearest box of others in some frames, by a grid of points each."""
     least = np.full(len(frames), np.inf)
     for one, other in [pair for link in others for pair in ((body, link), (link, body))]:
         points = on_grid(tracks.low[one], tracks.high[one])
@@ -120,7 +120,7 @@ def _apart(tracks: BodyTracks, body: int, others: Sequence[int], frames: Numbers
 
 
 def one_gripper(evidence: Evidence) -> Iterator[Finding]:
-    """The gripper carries one part at a time."""
+    """Findings where the gripper carries more than one part at a time."""
     own = [seen for seen in evidence.parts if evidence.undisturbed(seen.name)]
     carried = np.array([seen.carried for seen in own])
     if not len(own):
@@ -134,7 +134,7 @@ def one_gripper(evidence: Evidence) -> Iterator[Finding]:
 
 
 def in_one_another(evidence: Evidence) -> Iterator[Finding]:
-    """No two parts are in one place: the circles within their feet, and their heights, do not overlap."""
+    """Findings where two parts overlap: the circles inside their feet and their heights intersect."""
     tracks = evidence.tracks
     own = [(seen, tracks.number(seen.name)) for seen in evidence.parts if tracks.number(seen.name) >= 0]
     middles = {body: tracks.middle(body) for _, body in own}  # a mesh's frame is where its mass is, and that may be low
@@ -151,11 +151,11 @@ def in_one_another(evidence: Evidence) -> Iterator[Finding]:
 
 
 def lasting(mask: Mask) -> list[int]:
-    """The first frame of each run of frames in which something holds, where it lasts."""
+    """The first frame of each run of at least SEVERAL_FRAMES frames in which `mask` holds."""
     return [first for first, after in runs(mask) if after - first >= SEVERAL_FRAMES]
 
 
 def runs(mask: Mask) -> list[tuple[int, int]]:
-    """The first frame of each run of frames in which something holds, and the one after its last."""
+    """The first frame, and the one after the last, of each run of frames in which `mask` holds."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
     return [(int(first), int(after)) for first, after in zip(edges[::2], edges[1::2], strict=True)]

@@ -1,4 +1,4 @@
-"""Where each part of an order stood, from when to when, read from the tracks of the bodies and the task file alone."""
+"""The stays of an order's parts, each at a station from start to end, from the bodies' tracks and the task file alone."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,18 +11,18 @@ from lab.sim.parts.part_shape import shape_of
 from lab.tasks.task import Order, Task, part_name
 from lab.tasks.task_fields import Station
 
-LOW_M, HIGH_M = -0.005, 0.01  # a foot so far from what it should stand on stands on it
-TILTED = 0.94  # cosine of a part's tilt from which on it does not stand
-LEAST_S = 0.5  # a stay; shorter is passing through
-GAP_S = 0.5  # a part that is nudged out of its stay for less than this has not left it
-FLIES_M = 0.02  # above the lowest place where it stood: it is carried
+LOW_M, HIGH_M = -0.005, 0.01  # range of a foot's height above its support at which a part counts as standing
+TILTED = 0.94  # cosine of the largest tilt of a part that counts as standing
+LEAST_S = 0.5  # shortest stay; anything shorter is a passage
+GAP_S = 0.5  # a shorter interruption, as by a nudge, does not end a stay
+FLIES_M = 0.02  # height above its lowest support from which a part counts as carried
 
 Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
 class Stay:
-    """A part stood at a station from `start_s` to `end_s` [s]."""
+    """A part's stay at a station from `start_s` to `end_s` [s]."""
 
     station: str
     start_s: float
@@ -30,20 +30,20 @@ class Stay:
 
     @property
     def seconds(self) -> float:
-        """How long."""
+        """The duration of the stay [s]."""
         return self.end_s - self.start_s
 
     def frames(self, tracks: BodyTracks) -> Numbers:
-        """The numbers of the frames in it (n,)."""
+        """The numbers (n,) of the frames within the stay."""
         return np.flatnonzero((tracks.times_s >= self.start_s) & (tracks.times_s <= self.end_s))
 
 
 @dataclass(frozen=True, eq=False)
 class PartSeen:
-    """What the frames show of one part: its stays in their order.
+    """One part as the frames show it, with its stays in order.
 
-    at (n,): the number of the station at which it stands at each frame, -1 for none. occupies (n,): the same, of the part or its
-    pallet. carried (n,): whether it is in the air.
+    at (n,): the number of the station at which it stands at each frame, -1 for none. occupies (n,): the same for the part
+    or its pallet. carried (n,): whether it is in the air.
     """
 
     name: str
@@ -55,12 +55,12 @@ class PartSeen:
 
 
 def parts_seen(task: Task, order: Order, tracks: BodyTracks) -> list[PartSeen]:
-    """What the frames show of each part of an order, part 1 first; a part that was not recorded has no stays."""
+    """Each part of an order as the frames show it, part 1 first; a part that was not recorded has no stays."""
     return [_seen(task, part_name(order, number), kind, tracks) for number, kind in enumerate(order, start=1)]
 
 
 def pallet_of(name: str) -> str:
-    """What the pallet of a part is called in the frames."""
+    """The name of a part's pallet in the frames."""
     return f"{name}'s pallet"
 
 
@@ -82,7 +82,10 @@ def _seen(task: Task, name: str, kind: str, tracks: BodyTracks) -> PartSeen:
 
 
 def _stands_at(task: Task, tracks: BodyTracks, body: int, foot_m: float, heights: Sequence[float]) -> NDArray[np.int64]:
-    """The station on whose body one stands at each frame, on its floor or a layer, or so much higher [m]; -1 for none."""
+    """The number of the station on which a body stands at each frame (n,), -1 for none.
+
+    It may stand on the station's floor or a layer, or higher by one of `heights` [m].
+    """
     at, up = np.full(len(tracks.times_s), -1), tracks.up(body) >= TILTED
     point = tracks.poses[:, body, :3]
     for number, station in enumerate(task.stations):
@@ -99,7 +102,7 @@ def _stands_at(task: Task, tracks: BodyTracks, body: int, foot_m: float, heights
 
 
 def gap_of(task: Task, kind: str, station: Station, tracks: BodyTracks, body: int) -> Array:
-    """How far a part's foot is above the floor or layer of a station, or its pallet there, that is nearest (n,) [m]."""
+    """The height (n,) [m] of a part's foot above the nearest support at a station: floor, layer, or its pallet there."""
     part = task.part(kind)
     foot = tracks.poses[:, body, 2] - shape_of(part, task.folder).foot_m - floor_of(station, tracks)
     heights = [0.0] if part.pallet is None else [0.0, shape_of(task.part(part.pallet), task.folder).height_m]
@@ -108,12 +111,12 @@ def gap_of(task: Task, kind: str, station: Station, tracks: BodyTracks, body: in
 
 
 def levels_of(station: Station) -> set[float]:
-    """How high parts may stand above a station's floor [m]."""
+    """The heights above a station's floor [m] at which parts may stand."""
     return {0.0} if station.places is None else {place.height_m for place in station.places}
 
 
 def floor_of(station: Station, tracks: BodyTracks) -> Array:
-    """How high the floor of a recorded station is at each frame (n,) [m]: as the file says, else its body's top."""
+    """The height (n,) [m] of a recorded station's floor at each frame: from the file, else the top of its body."""
     own = tracks.number(station.name)
     if station.floor_m is not None:
         return np.full(len(tracks.times_s), station.floor_m)
@@ -136,6 +139,6 @@ def _stays(task: Task, tracks: BodyTracks, at: NDArray[np.int64]) -> tuple[Stay,
 
 
 def _carried(tracks: BodyTracks, body: int, at: NDArray[np.int64]) -> Mask:
-    """Whether a body stands nowhere, high above the lowest place where it ever was."""
+    """Whether a body stands nowhere and is more than FLIES_M above the lowest place where it stood, at each frame."""
     height = tracks.poses[:, body, 2]
     return np.asarray((at < 0) & (height > height.min() + FLIES_M))

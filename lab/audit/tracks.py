@@ -1,4 +1,4 @@
-"""Where the bodies of a run were: frames as arrays, kept in a run's folder as `frames.npz`, which numpy alone reads."""
+"""The tracks of a run's bodies: frames as arrays, in the run's folder as `frames.npz`, which numpy alone can read."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -17,16 +17,16 @@ from lab.sim.frames import Body, Recording, Shape
 from lab.sim.mesh_file import readable
 
 FILE = "frames.npz"
-MAX_BYTES = 1_000_000_000  # of its arrays: a day of a cell with a hundred bodies has half of them
+MAX_BYTES = 1_000_000_000  # of the unpacked arrays; a day of a cell with a hundred bodies takes half of that
 Array = NDArray[np.float64]
 Numbers = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
 class BodyTracks:
-    """Every body at every frame of a run.
+    """The pose of every body at every frame of a run.
 
-    names: one a body. times_s (n,) [s], rising. poses (n, bodies, 7): x, y, z [m] and a quaternion xyzw of the body's frame.
+    names: one per body. times_s (n,) [s], increasing. poses (n, bodies, 7): x, y, z [m] and a quaternion xyzw of its frame.
     low, high (bodies, 3): the corners of each body's bounds in its own frame [m].
     """
 
@@ -37,11 +37,11 @@ class BodyTracks:
     high: Array
 
     def number(self, name: str) -> int:
-        """Which of the bodies is called so; -1 for none."""
+        """The number of the body with this name; -1 when there is none."""
         return self.names.index(name) if name in self.names else -1
 
     def up(self, body: int) -> Array:
-        """The cosine of a body's tilt at each frame (n,): 1 for one that stands upright."""
+        """The cosine (n,) of a body's tilt at each frame; 1 when it is upright."""
         x, y = self.poses[:, body, 3], self.poses[:, body, 4]
         return np.asarray(1.0 - 2.0 * (x * x + y * y))
 
@@ -56,14 +56,14 @@ class BodyTracks:
         return [n for n in self.robot if "finger" in self.names[n]]
 
     def middle(self, body: int) -> Array:
-        """The middle of a body's bounds at each frame (n, 3) [m]."""
+        """The middle (n, 3) [m] of a body's bounds at each frame."""
         from scipy.spatial.transform import Rotation
 
         middle = (self.low[body] + self.high[body]) / 2
         return np.asarray(self.poses[:, body, :3] + Rotation.from_quat(self.poses[:, body, 3:]).apply(middle))
 
     def inside(self, body: int, point: Array) -> Array:
-        """The points (n, 3) [m], one a frame, in the frame of a body that may be turned about the vertical axis."""
+        """Points (n, 3) [m], one per recorded frame, in the coordinate frame of a body that may be turned about the vertical."""
         off = point - self.poses[:, body, :3]
         yaw = 2.0 * np.arctan2(self.poses[:, body, 5], self.poses[:, body, 6])
         c, s = np.cos(yaw), np.sin(yaw)
@@ -100,7 +100,7 @@ def tracks_of(recording: Recording) -> BodyTracks:
                 poses[now, place[name]] = pose
     there = [
         number for number in range(len(names)) if not np.isnan(poses[:, number]).any()
-    ]  # no finish that came later
+    ]  # without finishes that appeared later
     corners = [_bounds(bodies[number]) for number in there]
     return BodyTracks(
         tuple(names[number] for number in there),
@@ -124,7 +124,7 @@ def _bounds(body: Body) -> tuple[Array, Array]:
 
 
 def _corners(shape: Shape) -> Array:
-    """Points (n, 3) [m] whose bounds are those of a shape."""
+    """Points (n, 3) [m] with the same bounds as a shape."""
     if shape.kind == "mesh":
         import trimesh
 
@@ -144,7 +144,7 @@ def _corners(shape: Shape) -> Array:
 
 
 def packed(tracks: BodyTracks) -> bytes:
-    """The content of a `frames.npz`: arrays `names`, `times_s`, `poses`, `low` and `high` as `BodyTracks` has them."""
+    """The content of a `frames.npz`: the arrays `names`, `times_s`, `poses`, `low` and `high` of `BodyTracks`."""
     data = BytesIO()
     arrays: Mapping[str, Any] = {
         "names": np.array(tracks.names),
@@ -158,7 +158,7 @@ def packed(tracks: BodyTracks) -> bytes:
 
 
 def read_tracks(path: Path) -> BodyTracks:
-    """The tracks in a file. Raises BadInput for one that is missing, damaged, or larger than any run's."""
+    """The tracks in a file. Raises BadInput when it is missing, damaged, or larger than MAX_BYTES."""
     try:
         data = read_limited(path)
         with ZipFile(BytesIO(data)) as archive:

@@ -1,20 +1,22 @@
-"""The command line, a file a command: parse, call one function, render. The only room that prints."""
+"""The command line, one file for each command: parse, call one function, render. Only this room prints."""
 
-GARBAGE = 10_000  # objects before cycles are looked for; with Python's 700 they are 180 times while a command loads
+GARBAGE = 10_000  # new objects between two garbage collections; with Python's 700 there are 180 while a command loads
 
 
 def main() -> None:
-    """The `lab` command. Nothing is loaded before Ctrl-C is heard: the libraries of the commands take a while."""
+    """Run the `lab` command. Nothing is loaded before Ctrl-C is handled, because the commands' libraries load slowly."""
     import atexit
     import gc
     import os
     import sys
 
-    # the interpreter ends without a last look for cycles in all that was loaded, which takes 0.3 s of processor
+    # the interpreter then ends without a last garbage collection, which takes 0.3 s of processor time
     atexit.register(gc.freeze)
     gc.set_threshold(GARBAGE)
     for number, name in enumerate(("stdin", "stdout", "stderr")):
-        if getattr(sys, name) is None:  # it was closed: no file of ours may take its place and be printed into
+        if (
+            getattr(sys, name) is None
+        ):  # it is closed: otherwise the next file that is opened would get its descriptor and the output
             os.open(os.devnull, os.O_RDWR)
             setattr(sys, name, open(number, "w" if number else "r", closefd=False))  # noqa: SIM115
     try:
@@ -24,7 +26,7 @@ def main() -> None:
             from lab.cli.app import called
 
             code = called()
-    except KeyboardInterrupt:  # before any command had begun
+    except KeyboardInterrupt:  # before a command has begun
         from lab.cli.output import fail
 
         code = 130

@@ -1,4 +1,4 @@
-"""The `lab` command: all commands in one table, and how each of them ends. Contract: see the README."""
+"""The `lab` command: the table of all commands, and the exit codes and error lines of each. Contract: see the README."""
 
 import sys
 from collections.abc import Callable
@@ -11,12 +11,14 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from lab import __version__
+from lab.cli.families import CommandOfFamilies
 from lab.cli.output import begin, end, fail, silence, write
 from lab.errors import LabError, out_of_memory
+from lab.plugins.family import blame
 
 
 class UnloadedCommand(TyperCommand):
-    """A command of which no more is known than its name, the first line of its help, and what loads the rest of it."""
+    """A command that is not loaded yet: its name, the first line of its help, and the function that loads it."""
 
     def __init__(self, name: str, help_text: str, load: Callable[[], Any]) -> None:
         super().__init__(name, help=help_text)
@@ -24,15 +26,15 @@ class UnloadedCommand(TyperCommand):
 
 
 class CommandGroup(TyperGroup):
-    """Commands, loaded when they are typed; its help is drawn as typer draws one, without rich's Markdown."""
+    """A group of commands, each loaded when it is called; its help looks like typer's, but without rich's Markdown."""
 
     def resolve_command(self, ctx: Any, args: list[str]) -> tuple[str | None, Any, list[str]]:
-        """The name, the command and the words that follow."""
+        """The name, the loaded command, and the remaining arguments."""
         name, command, rest = super().resolve_command(ctx, args)
         return name, command.load() if isinstance(command, UnloadedCommand) else command, rest
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
-        """Prints the help of the group."""
+        """Print the help of the group."""
         from rich.console import Console
         from rich.padding import Padding
         from rich.panel import Panel
@@ -54,7 +56,7 @@ class CommandGroup(TyperGroup):
             console.print(Panel(table, title=title, title_align="left", border_style="dim"))
 
 
-# ---- app --------------------------------------------------------------------------------------------------------------
+# ---- the table of commands ----------------------------------------------------------------------------------------------
 
 
 INTERRUPTED = 130
@@ -67,15 +69,17 @@ GROUPS = {
 
 
 class Command(NamedTuple):
-    """A command: where it is, and what its help says."""
+    """A row of the table: where a command's function is, and its help."""
 
-    function: str | Callable[..., None]  # or the module of `lab.cli` that holds it, named as the command's words
+    function: (
+        str | Callable[..., None]
+    )  # or the module of `lab.cli` with the function, which is named after the command
     help: str  # the first paragraph of its docstring
     example: str
-    more: str = ""  # what its help says below the example (see `lab.cli.families`)
+    more: str = ""  # text of the help below the example (see `lab.cli.families`)
 
 
-COMMANDS = {  # what is typed after `lab` -> the command
+COMMANDS = {  # words after `lab` -> the command
     "run": Command(
         "run",
         "Find or learn the skills, time them, find an order for them, and carry them out in physics.",
@@ -94,17 +98,17 @@ COMMANDS = {  # what is typed after `lab` -> the command
     ),
     "tune": Command(
         "tune",
-        "Tune settings to a problem with Optuna, and say what that gains over its own on seeds that no trial had.",
+        "Tune settings to a problem with Optuna, and measure the gain over the problem's own on seeds that no trial used.",
         "lab tune world-1 --advisor moderate --trials 100 --workers 2",
     ),
     "replay": Command(
         "replay",
-        "Show a kept teaching session, or a run, again: what was asked, answered or done, and what came of it.",
+        "Replay a kept teaching session or a run: questions, answers, actions and results.",
         "lab replay lesson",
     ),
     "sequence": Command(
         "sequence",
-        "The high level alone: the order of the robot's transfers, beside the proven optimum or bound.",
+        "The high level alone: find an order of the robot's transfers, and compare it with the proven optimum or bound.",
         "lab sequence toast --case II --toasts 4 --gantt order.svg",
         more="{words of sequencing}",
     ),
@@ -137,12 +141,12 @@ COMMANDS = {  # what is typed after `lab` -> the command
     "toolbox list": Command("toolbox", "The policies in the toolbox.", "lab toolbox list --subtask insert --solved"),
     "toolbox show": Command(
         "toolbox",
-        "All that is known of one policy: where it comes from, its versions, and what happened to it.",
+        "One policy: its origin, its versions and its history.",
         "lab toolbox show 'insert at toaster 1a2b3c4d'",
     ),
     "toolbox log": Command(
         "toolbox",
-        "What happened to the policies of a name: learned, put in use, evaluated, removed.",
+        "The history of the policies of a name: learned, put in use, evaluated, removed.",
         "lab toolbox log 'insert at toaster 1a2b3c4d'",
     ),
     "toolbox promote": Command(
@@ -150,7 +154,7 @@ COMMANDS = {  # what is typed after `lab` -> the command
     ),
     "toolbox rollback": Command(
         "toolbox",
-        "Put the version of a policy in use that was in use before; again for the one before that.",
+        "Put the previously used version of a policy back in use; repeat for the one before that.",
         "lab toolbox rollback 'insert at toaster 1a2b3c4d'",
     ),
     "toolbox verify": Command(
@@ -160,7 +164,7 @@ COMMANDS = {  # what is typed after `lab` -> the command
     ),
     "toolbox evaluate": Command(
         "toolbox",
-        "Carry a policy out in physics, in scenes drawn from the seed on: how often it does what it is for, for its log.",
+        "Measure a policy's success rate in physics, in scenes drawn from the seed, and record it in the policy's log.",
         "lab toolbox evaluate 'insert at toaster 1a2b3c4d' --scenes 50",
     ),
     "toolbox card": Command(
@@ -170,17 +174,17 @@ COMMANDS = {  # what is typed after `lab` -> the command
     ),
     "toolbox export": Command(
         "toolbox",
-        "Policies as one archive; the same policies give the same bytes.",
+        "Write policies to one archive; the same policies give the same bytes.",
         "lab toolbox export --out my-skills.zip",
     ),
     "toolbox import": Command(
         "toolbox",
-        "Bring in policies that somebody gave you: every one is checked before the first is kept, and all are kept or none.",
+        "Import policies from others: every policy is checked before the first is kept, and either all are kept or none.",
         "lab toolbox import my-skills.zip",
     ),
     "toolbox publish": Command(
         "toolbox",
-        "A folder as the Hugging Face Hub has it: model card, safetensors, metadata, pictures. Nothing is sent anywhere.",
+        "Write a folder for the Hugging Face Hub: model card, safetensors, metadata, pictures. Nothing is uploaded.",
         "lab toolbox publish 'insert at toaster 1a2b3c4d' --out insert --license mit",
     ),
     "toolbox remove": Command(
@@ -190,7 +194,7 @@ COMMANDS = {  # what is typed after `lab` -> the command
     ),
     "toolbox restore": Command(
         "toolbox",
-        "Bring back the policy that was removed last under this name.",
+        "Restore the policy that was removed last under this name.",
         "lab toolbox restore 'insert at toaster 1a2b3c4d'",
     ),
     "task list": Command(
@@ -203,7 +207,7 @@ COMMANDS = {  # what is typed after `lab` -> the command
     ),
     "task convert": Command(
         "task",
-        "Read an instance as the field writes it, and write it as the lab's own cell file (TOML), or as PyJobShop's JSON.",
+        "Read an instance in a common format, and write it as the lab's own cell file (TOML), or as PyJobShop's JSON.",
         "lab task convert bilge-ulusoy-jobs.csv --layout bilge-ulusoy-layouts.csv --case 7:1 --robots 2 --out ex71.toml",
         more="{words of instances}",
     ),
@@ -214,12 +218,12 @@ COMMANDS = {  # what is typed after `lab` -> the command
     ),
     "task random": Command(
         "task",
-        "Write a random grid world as a task file; a way always leads from its start to its goal.",
+        "Write a random grid world as a task file; a path always leads from its start to its goal.",
         "lab task random 10x10x10 --density 0.06 --seed 7 --out my-world.toml",
     ),
     "task check": Command(
         "task",
-        "Check a task file: its text, its reach, and that a way exists for every sub-task, or through the world. Exit 2 if not.",
+        "Check a task file: its text, its reach, and that every sub-task, or the world, has a path. Exit 2 if not.",
         "lab task check my-toast.toml",
     ),
     "study list": Command("study", "The studies that can be run.", "lab study list"),
@@ -230,14 +234,14 @@ COMMANDS = {  # what is typed after `lab` -> the command
     ),
     "study compare": Command(
         "compare",
-        "Compare settings: every combination of the values that the options name, with commas between, in many sessions each.",
+        "Compare settings: every combination of the options' values, separated by commas, in many sessions each.",
         "lab study compare maze.txt --gate ccrl,ia --advisor expert,novice --psi .05,.1 --workers 2",
     ),
 }
 
 
 def guarded(function: Callable[..., None]) -> Callable[..., None]:
-    """A command whose errors end it with one line and the exit code of the contract."""
+    """The command, whose errors end it with one line and the contract's exit code."""
 
     @wraps(function)
     def run_guarded(*args: Any, **kwargs: Any) -> None:
@@ -250,11 +254,9 @@ def guarded(function: Callable[..., None]) -> Callable[..., None]:
         except BrokenPipeError:
             silence()
             end("", 1)
-        except OSError as error:  # a full disk, a folder taken away meanwhile
+        except OSError as error:  # a full disk, a folder that was removed meanwhile
             end(str(error), 1)
         except Exception as error:
-            from lab.plugins.family import blame
-
             why = blame(error) or out_of_memory(error)
             if why is None:
                 raise
@@ -278,7 +280,7 @@ def _lab(
 
 
 def made() -> CommandGroup:
-    """The command `lab` as the tables say; what a row names is loaded when it is typed."""
+    """The command `lab`, built from the tables; a row's function is loaded when its command is called."""
     app = typer.Typer(cls=CommandGroup, no_args_is_help=True)
     app.callback()(_lab)
     top: Any = typer.main.get_command(app)
@@ -292,8 +294,7 @@ def made() -> CommandGroup:
 
 
 def loaded(words: str) -> Any:
-    """The command behind these words, with its parameters."""
-    from lab.cli.families import CommandOfFamilies
+    """The loaded command of these words, with its parameters."""
 
     row = COMMANDS[words]
     function = row.function
@@ -306,22 +307,24 @@ def loaded(words: str) -> Any:
 
 
 def called() -> int:
-    """Runs the command that `sys.argv` holds; its exit code. typer's own complaints come in one line, too."""
+    """The exit code of the command in `sys.argv`, after running it; typer's errors come in one line as well."""
     if isinstance(sys.stdout, TextIOWrapper):
-        sys.stdout.reconfigure(errors="backslashreplace")  # as stderr: a name must not end a command
+        sys.stdout.reconfigure(
+            errors="backslashreplace"
+        )  # as for stderr: a name that cannot be encoded must not end a command
     begin()
     try:
         code = made()(prog_name="lab", standalone_mode=False) or 0
     except Exception as error:
         code = _usage(error)
-    if code == INTERRUPTED:  # typer's word for Ctrl-C before the command had begun; a command ends by itself
+    if code == INTERRUPTED:  # typer's result for Ctrl-C before the command has begun; a command handles it itself
         raise KeyboardInterrupt
     return int(code)
 
 
 def _usage(error: Exception) -> int:
-    """Say in one line what is wrong with the words of a command; raises again what is no complaint of typer's."""
-    if isinstance(error, LabError):  # of a callback: before the command itself
+    """The exit code after reporting a usage error in one line; raises other errors again."""
+    if isinstance(error, LabError):  # raised by a callback, before the command itself
         fail(str(error), error.exit_code)
         return error.exit_code
     explain, context = getattr(error, "format_message", None), getattr(error, "ctx", None)

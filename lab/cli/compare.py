@@ -1,4 +1,4 @@
-"""`lab study compare`: settings of learner, gate and advisor compared in a problem of the user's own."""
+"""`lab study compare`: compare settings of learner, gate and advisor on a problem of the user's choice."""
 
 from collections.abc import Callable
 from inspect import Parameter, signature
@@ -19,7 +19,7 @@ SWITCHES = {"true": True, "false": False}
 
 
 def _with_settings(function: Callable[..., None]) -> Callable[..., None]:
-    """The command with an option for each setting of learner and gate, in place of **values."""
+    """The command with an option for each setting of learner and gate in place of **values."""
     shown = signature(function)
     own = [one for one in shown.parameters.values() if one.kind is not Parameter.VAR_KEYWORD]
     more = []
@@ -47,13 +47,13 @@ def study_compare(
         str,
         typer.Option(
             "--advisor",
-            help="Who advises: {advisors}; several with commas between.",
+            help="Who advises: {advisors}; several separated by commas.",
             callback=from_files("advisors"),
         ),
     ] = "expert",
     task: TaskOfSkill = None,
     sight: SightInWorld = None,
-    sessions: Annotated[int, typer.Option("--sessions", min=2, max=1_000_000, help="Of each setting.")] = 100,
+    sessions: Annotated[int, typer.Option("--sessions", min=2, max=1_000_000, help="Sessions for each setting.")] = 100,
     workers: Annotated[int, typer.Option("--workers", min=1, max=256, help="Processes; the rows are the same.")] = 1,
     dask: Annotated[str | None, typer.Option("--dask", help="The address of a Dask scheduler to work on.")] = None,
     seed: Seed = 0,
@@ -61,7 +61,7 @@ def study_compare(
     as_json: Json = False,
     **values: str | None,
 ) -> None:
-    """Compare settings: every combination of the values that the options name, with commas between, in many sessions each.
+    """Compare settings: every combination of the options' values, separated by commas, in many sessions each.
 
     Same seed, same rows. What the folder already holds is not run again.
     """
@@ -76,7 +76,7 @@ def study_compare(
 
 
 def listed(name: str, text: str) -> list[str]:
-    """The values of an option, with commas between; BadInput for an empty one."""
+    """The values of an option, separated by commas; BadInput for an empty one."""
     found = [one.strip() for one in text.split(",")]
     if not all(found):
         raise BadInput(f"--{name.replace('_', '-')} '{text}': wanted one value, or several with commas between")
@@ -84,7 +84,7 @@ def listed(name: str, text: str) -> list[str]:
 
 
 def parsed(name: str, text: str) -> list[Any]:
-    """The values of a setting's option, as its type is; BadInput for what is none."""
+    """The values of a setting's option, converted to its type; BadInput for an invalid one."""
     kind = type(SETTINGS[name].default)
 
     def one(word: str) -> Any:

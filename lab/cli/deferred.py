@@ -1,4 +1,4 @@
-"""What the commands call: each name is loaded when it is touched, so that `lab run --help` loads nothing heavy."""
+"""The functions that commands call: each name is loaded when it is first used, so that `lab run --help` loads nothing heavy."""
 
 from typing import TYPE_CHECKING
 
@@ -242,5 +242,5 @@ TABLE = {
     "lab.workers": ("Workers",),
 }
 
-if not TYPE_CHECKING:  # so that mypy knows the names of the table alone
+if not TYPE_CHECKING:  # hidden from mypy, so that it accepts only the names of the table
     __getattr__ = loader(__name__, TABLE)

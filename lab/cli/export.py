@@ -1,4 +1,4 @@
-"""`lab export`: a run for the real robot, checked before it is trusted."""
+"""`lab export`: a run for the real robot, read back and played in physics as a check."""
 
 from datetime import datetime
 from math import degrees
@@ -21,10 +21,14 @@ def export(
     run: Annotated[Path, typer.Argument(help="The folder of a `lab run`.")],
     to: Annotated[str, typer.Option("--format", help="{export formats}.", autocompletion=offers("export formats"))],
     positions: Annotated[
-        str, typer.Option("--positions", help="Of job files: rectan, or pulse (assumed pulses of the lab's own arm).")
+        str,
+        typer.Option(
+            "--positions",
+            help="Kind of positions in job files: rectan, or pulse (assumed pulses of the lab's own arm).",
+        ),
     ] = "rectan",
     any_arm: Annotated[
-        bool, typer.Option("--any-arm", help="Write job files also for an arm that is none of the controller's maker.")
+        bool, typer.Option("--any-arm", help="Write job files also for an arm of another maker than the controller's.")
     ] = False,
     out: Annotated[Path | None, typer.Option("--out", help="Folder for the files; default: RUN/FORMAT.")] = None,
     as_json: Json = False,
@@ -73,7 +77,7 @@ def export(
 
 
 def _written(texts: dict[str, str], folder: Path) -> list[Path]:
-    """The files, each written whole."""
+    """The paths of the files, after writing each atomically."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for name, text in texts.items():

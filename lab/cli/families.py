@@ -1,7 +1,7 @@
-"""What a person can choose from, as help, glossary and the shell's completion show it: read from the families' tables.
+"""The choices of options, from the families' tables, for help texts, the glossary and the shell's completion.
 
-An option's help, or the text below a command's options, holds "{gates}" where the members of that family belong. They
-are filled in when the help of that very command is asked for: `lab --help` loads no table.
+An option's help, or the text below a command's options, contains "{gates}" where the members of that family belong. They
+are filled in when the help of that command is requested, so that `lab --help` loads no table.
 """
 
 import re
@@ -27,7 +27,7 @@ TERMS = {
     "tau": "the skill of a simulated advisor, the smaller the better: .01 an expert, .1 moderate, .3 limited, 1 a novice",
     "sight": "where in a world a simulated advisor sees the robot and can advise: everywhere, or in a region",
 }
-TEXTS = {  # what stands below a command's options -> its headings, each with a family of `lab.cli.families`
+TEXTS = {  # name of the text below a command's options -> its headings, each with a family
     "words of teaching": {"Learners": "learners", "Gates": "gates", "Words": "terms"},
     "words of sequencing": {"Methods": "methods", "Instance files": "instances"},
     "words of instances": {"Instance files": "instances"},
@@ -35,7 +35,7 @@ TEXTS = {  # what stands below a command's options -> its headings, each with a 
 }
 
 
-# ---- families ---------------------------------------------------------------------------------------------------------
+# ---- the families' tables, and the help that lists them -----------------------------------------------------------------
 
 
 Tables = dict[str, Mapping[str, Any] | Sequence[str]]
@@ -71,7 +71,7 @@ def _of_export() -> Tables:
 
 
 def members(family: str) -> Mapping[str, Any] | Sequence[str]:
-    """The table of a family, such as "gates", or its names; only tables are loaded that are needed to find it."""
+    """The table of a family, such as "gates", or its names; only the tables needed for it are loaded."""
     for room in (_of_studies, _of_teaching, _of_sequencing, _of_tasks, _of_export):
         if family in (found := room()):
             return found[family]
@@ -79,7 +79,7 @@ def members(family: str) -> Mapping[str, Any] | Sequence[str]:
 
 
 def offers(family: str) -> Callable[[str], list[str]]:
-    """What the shell completes with."""
+    """The function that gives the shell's completions for a family."""
 
     def offered(incomplete: str) -> list[str]:
         return [name for name in members(family) if name.startswith(incomplete)]
@@ -88,9 +88,9 @@ def offers(family: str) -> Callable[[str], list[str]]:
 
 
 def from_files(*families: str) -> Callable[[Any, Any], Any]:
-    """What an option's words mean: "./mine.py:MyGate" is loaded into its family, which is said, for its code runs.
+    """The callback of an option that loads "./mine.py:MyGate" into its family, with a notice, because its code runs.
 
-    Of several families it is the first that it fits.
+    Of several families, the first that accepts the member is used.
     """
 
     def taken(context: typer.Context, value: Any) -> Any:
@@ -110,12 +110,12 @@ def from_files(*families: str) -> Callable[[Any, Any], Any]:
 
 
 class CommandOfFamilies(TyperCommand):
-    """A command whose help names the members of families."""
+    """A command whose help lists the members of families."""
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
-        """The help, filled in."""
+        """Print the help with the members filled in."""
         for param in self.params:
-            described: Any = param  # an argument or an option: they have no class in common that has a help
+            described: Any = param  # an argument or an option, which share no class with a help
             described.help = _filled(described.help or "")
         self.epilog = _filled(self.epilog or "")
         super().format_help(ctx, formatter)
@@ -132,7 +132,7 @@ def _filled(text: str) -> str:
 
 
 def _explained(heading: str, family: str) -> str:
-    """The members of a family, one a line with what it means, as typer sets the text below a command's options."""
+    """The members of a family with their meanings, one per line, in typer's format of the text below the options."""
     table: Any = members(family)
     rows = [f"  {name}: {getattr(row, 'help', row)}" for name, row in table.items()]
     return "\n".join([f"{heading}:", *rows])

@@ -1,4 +1,4 @@
-"""Ctrl-C: heard wherever it is pressed, also where Python or a library would drop it."""
+"""Ctrl-C: it interrupts a command at any time, also where Python or a library would drop it."""
 
 import os
 import signal
@@ -8,35 +8,35 @@ from contextlib import contextmanager
 
 from lab.interrupts import UNINTERRUPTED
 
-TYPE_CHECKING = False  # as typing's, which takes longer to load than all else here: Ctrl-C is heard only after that
+TYPE_CHECKING = False  # instead of typing's, which loads slowly; until this module is loaded, Ctrl-C is not handled
 if TYPE_CHECKING:
     from sys import UnraisableHookArgs
     from types import FrameType
 
-AGAIN_S = 0.002  # between two looks whether it can be raised
-LOOKS = 500  # at a library that is busy, before it is raised there all the same
+AGAIN_S = 0.002  # interval at which it is checked whether the interrupt can be raised
+LOOKS = 500  # checks during a busy library, after which it is raised in any case
 COMPILERS = {"llvmlite", "numba"}
 OWN = __file__.removesuffix("cli/interrupt.py")
 
 
 @contextmanager
 def ctrl_c_is_heard() -> Iterator[None]:
-    """Raises KeyboardInterrupt on Ctrl-C, but not where a library may drop it unseen, or is in the midst of taking a lock.
+    """A context in which Ctrl-C raises KeyboardInterrupt, but not where a library may swallow it or is taking a lock.
 
-    It is raised where the lab's own code runs, or where nothing has moved since the last look, as in a wait; in a library
-    that is busy for a second, or when it is pressed once more, there. Never while something is being imported, while numba or
-    LLVM compile, or in a function that is `uninterrupted`. It is raised again when Python has ignored it (in a callback).
-    Windows has no interval timer: there it is raised where Python hears it.
+    It is raised in the lab's own code, or where execution has not moved since the last check, as in a wait; in a library
+    that is busy for a second, or on a second Ctrl-C, it is raised there. It is never raised during an import, while numba
+    or LLVM compile, or in an `uninterrupted` function. It is raised again when Python has ignored it (in a callback).
+    Windows has no interval timer: there it is raised wherever Python handles it.
     """
     has_timer = hasattr(signal, "setitimer")
     if (
         not has_timer or signal.getsignal(signal.SIGINT) is not signal.default_int_handler
-    ):  # somebody else's, or not wanted
+    ):  # another handler is set, or Ctrl-C is ignored
         yield
         return
     main_frame = sys._getframe(2)
     looks = 0
-    looked_at: tuple[FrameType | None, int] = None, 0  # the frame itself: another one may come to lie where it lay
+    looked_at: tuple[FrameType | None, int] = None, 0  # the frame itself, because another one may get the same id
 
     def stop(number: int, frame: "FrameType | None") -> None:
         nonlocal looks, looked_at
@@ -61,7 +61,7 @@ def ctrl_c_is_heard() -> Iterator[None]:
     sys.unraisablehook = ignored
     try:
         yield
-        if signal.getitimer(signal.ITIMER_REAL)[0]:  # it was all over before the import was
+        if signal.getitimer(signal.ITIMER_REAL)[0]:  # the body ended before the import in which Ctrl-C came
             raise KeyboardInterrupt
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
@@ -71,10 +71,10 @@ def ctrl_c_is_heard() -> Iterator[None]:
 
 
 def _must_end(frame: "FrameType | None", last: "FrameType") -> bool:
-    """Whether something that is not to be interrupted is at work between a frame and one of those that called it.
+    """Whether a frame, or one of its callers up to `last`, must not be interrupted.
 
-    What LLVM owns is handed over in two steps: between them Ctrl-C made a module be freed twice, a segmentation fault. In numba's
-    compiler it comes out as another error.
+    LLVM's modules change their owner in two steps: Ctrl-C between them led to a double free and a segmentation fault. In
+    numba's compiler it is turned into another error.
     """
     while frame is not None and frame is not last:
         file = frame.f_code.co_filename

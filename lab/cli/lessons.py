@@ -1,4 +1,4 @@
-"""What the commands that teach share: who hears of it, the teacher of the options, what a kept session reads."""
+"""The shared code of the commands that teach: the seat, the teacher, and the notices of a kept session."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
@@ -16,7 +16,7 @@ from lab.files import is_file
 def lesson_seat(
     names: Sequence[str], *, page: bool = False, port: int = 0, wait_s: float | None = None, plain: bool = False
 ) -> Iterator["deferred.LessonSeat"]:
-    """Who hears of a command's lessons: the progress lines, and, when they are wanted, the prompt and the page."""
+    """The seat of a command's lessons: the progress lines, and on request the prompt and the page."""
     progress = deferred.RunProgress(console())
     with ExitStack() as stack:
         shown = None
@@ -39,9 +39,10 @@ def lesson_seat(
 def teacher_of(
     toolbox: str | None, options: "deferred.LessonOptions", seat: "deferred.LessonSeat"
 ) -> "deferred.Teacher":
-    """The teacher that the options describe; raises BadInput for options that cannot be.
+    """The teacher that the options describe; raises BadInput for impossible options.
 
-    Whether policies can be kept is looked at before one is learned: whoever learns nothing needs not write.
+    Whether the toolbox can be written is checked just before a policy is learned, so that commands that learn nothing need
+    no write access.
     """
     box = deferred.Toolbox(toolbox)
     box.check(to_write=False)
@@ -58,7 +59,7 @@ def sequenced(
     toolbox: str | None,
     files: dict[str, Path],
 ) -> dict[str, Any]:
-    """The document of a session of `lab sequence`, whom it may ask behind such names as "terminal", its pictures in files."""
+    """The document of a session of `lab sequence`; people: who is asked, by names such as "terminal"; files: its pictures."""
     options = kept.options
     wanted = deferred.SequencingOptions(
         method=options.method,
@@ -88,7 +89,7 @@ def _say_cut(read: "deferred.Read") -> None:
 
 
 def say_read(kept: "deferred.KeptSession | deferred.OrderSession", where: str) -> None:
-    """Says of a session that goes on or is shown again what was cut off, and which files are read that are not its own."""
+    """Report, for a session that is continued or replayed, a line that was cut off, and files outside its folder."""
     assert kept.read is not None
     if kept.read.cut:
         _say_cut(kept.read)

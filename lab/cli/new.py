@@ -1,4 +1,4 @@
-"""`lab new`: a task file of one's own."""
+"""`lab new`: write a new task file."""
 
 from typing import Annotated, Any
 
@@ -12,7 +12,7 @@ from lab.errors import counted
 
 
 def new(
-    name: Annotated[str, typer.Argument(help="What the task is called; the file is NAME.toml.")],
+    name: Annotated[str, typer.Argument(help="The task's name; the file is NAME.toml.")],
     part: Annotated[
         list[str] | None,
         typer.Option(
@@ -30,7 +30,7 @@ def new(
     ] = None,
     mass: Annotated[
         list[str] | None,
-        typer.Option("--mass", help="What a kind of part weighs, PART=KG, such as pin=0.05; default: as much as wood."),
+        typer.Option("--mass", help="The mass of a kind of part, PART=KG, such as pin=0.05; default: that of wood."),
     ] = None,
     friction: Annotated[
         list[str] | None,
@@ -52,12 +52,14 @@ def new(
     ] = None,
     arm: Annotated[str | None, typer.Option("--arm", help="The robot: {arms}.", autocompletion=offers("arms"))] = None,
     buffer: Annotated[bool, typer.Option("--buffer", help="A buffer before each machine.")] = False,
-    yes: Annotated[bool, typer.Option("--yes", help="Ask nothing: three boxes, one press.")] = False,
+    yes: Annotated[
+        bool, typer.Option("--yes", help="Ask nothing and take the defaults: three boxes, one press.")
+    ] = False,
     as_json: Json = False,
 ) -> None:
     """Write a task file that runs: parts go from an input through machines to an output, laid out around the arm.
 
-    Without options it asks; with any it does not.
+    Without options it asks for them; with any option it asks nothing.
     """
     path, task_name = deferred.file_of(name)
     numbers = (mass or (), friction or (), capacity or (), batch or ())

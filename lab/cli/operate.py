@@ -34,7 +34,7 @@ def operate(
     seed: Seed = 0,
     toolbox: ToolboxPlace = None,
     resume: Annotated[
-        Path | None, typer.Option("--resume", help="Go on with what was done by hand in this folder, from there.")
+        Path | None, typer.Option("--resume", help="Continue the run by hand in this folder from where it ended.")
     ] = None,
     out: Annotated[
         Path | None, typer.Option("--out", help="Folder for journal, pictures and replay; default: TASK-run.")
@@ -83,7 +83,7 @@ def operate(
 
 
 def _at_console(desk: "deferred.Desk", live: bool, as_json: bool, stay: bool) -> "deferred.Done | None":
-    """The command that ended a pipe, None for none; stay: beside a page, which goes on when the pipe has ended."""
+    """The command that ended a pipe, None for none; stay: whether a page keeps the run open after the pipe."""
     if live:
         deferred.OperatorConsole(desk).run()
         return None
@@ -92,7 +92,7 @@ def _at_console(desk: "deferred.Desk", live: bool, as_json: bool, stay: bool) ->
 
 
 def _kept(operation: "deferred.Operation", folder: Path) -> dict[str, Any]:
-    """Write the files of the run, where one was carried out, and the document of what was done."""
+    """The document of what was done, after writing the files of the run, if there was one."""
     scene, report = operation.scene, operation.report()
     document = {
         "task": scene.task.name,
@@ -115,7 +115,7 @@ def _kept(operation: "deferred.Operation", folder: Path) -> dict[str, Any]:
 
 
 def _summary(document: dict[str, Any]) -> Any:
-    """The end of a console's session."""
+    """The text at the end of a console's session."""
     made = deferred.delivered_in_words(document["delivered"], document["parts"])
     said = counted(len(document["commands"]), "command")
     return f"{made}; {said} (seed {document['seed']})"

@@ -1,4 +1,4 @@
-"""The options that several commands have."""
+"""The options that several commands share."""
 
 from typing import Annotated
 
@@ -10,7 +10,7 @@ MAX_EPISODES = 1_000_000
 MAX_SESSIONS = 10_000
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")]
-Seed = Annotated[int, typer.Option("--seed", min=0, help="Where all chance comes from.")]
+Seed = Annotated[int, typer.Option("--seed", min=0, help="Seed of all random numbers.")]
 ToolboxPlace = Annotated[
     str | None,
     typer.Option(
@@ -32,7 +32,7 @@ GateName = Annotated[
     str | None,
     typer.Option(
         "--gate",
-        help="When it asks: {gates}, or one of your own, ./mine.py:MyGate, whose code runs; default: the problem's.",
+        help="The rule for asking: {gates}, or your own, ./mine.py:MyGate, whose code runs; default: the problem's.",
         autocompletion=offers("gates"),
         callback=from_files("gates"),
     ),
@@ -71,13 +71,16 @@ Asked = Annotated[
     str, typer.Option("--ask", help="Several advisors are asked: {asked}.", autocompletion=offers("asked"))
 ]
 Decide = Annotated[
-    str, typer.Option("--decide", help="Whom of several to follow: {decisions}.", autocompletion=offers("decisions"))
+    str,
+    typer.Option(
+        "--decide", help="Which of several advisors to follow: {decisions}.", autocompletion=offers("decisions")
+    ),
 ]
 Plain = Annotated[bool, typer.Option("--plain", help="Plain sentences instead of pictures, as screen readers want.")]
 ShowPage = Annotated[
-    bool, typer.Option("--page", help="Show it on a page on 127.0.0.1, too, where questions can be answered as well.")
+    bool, typer.Option("--page", help="Also show it on a page on 127.0.0.1, where questions can be answered as well.")
 ]
-Port = Annotated[int, typer.Option("--port", min=0, max=65535, help="Of the page; 0: any free one.")]
+Port = Annotated[int, typer.Option("--port", min=0, max=65535, help="The page's port; 0: any free one.")]
 Wait = Annotated[
     float | None,
     typer.Option(
@@ -101,6 +104,6 @@ PartsPerCycle = Annotated[
     int | None,
     typer.Option(
         "--parts-per-cycle",
-        help="A cycle has up to so many parts: their mix once, twice, ...; default: up to 4, while 1 % could be gained.",
+        help="Most parts of a cycle: their mix once, twice, ...; default: up to 4, while 1 % could be gained.",
     ),
 ]

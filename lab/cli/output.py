@@ -1,4 +1,4 @@
-"""What a command writes: its document to stdout, as JSON or as text, and everything else to stderr. Only here is printed."""
+"""The output of commands: a document to stdout, as JSON or as text, and everything else to stderr. Only this file prints."""
 
 import json
 import os
@@ -13,24 +13,24 @@ from lab.errors import LabError, Notice, WorkFailed, escaped
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
 
-_FILE_WIDTH = 200  # characters; where stdout is no terminal, nothing needs to be folded
-_PLAIN = str.maketrans("▁▂▃▄▅▆▇█·", "_.-:=+*#.")  # for a stdout that is not Unicode
+_FILE_WIDTH = 200  # characters; used when stdout is no terminal, so that lines are not wrapped
+_PLAIN = str.maketrans("▁▂▃▄▅▆▇█·", "_.-:=+*#.")  # replacements for a stdout without Unicode
 
 
 class Stdout:
-    """Whether this command has printed its JSON document: there is one and no more, whatever comes."""
+    """Whether this command has printed its JSON document, of which there is exactly one."""
 
     told = False
 
 
 def begin() -> None:
-    """A command begins: nothing is printed yet."""
+    """Mark the beginning of a command: nothing is printed yet."""
     Stdout.told = False
     warnings.showwarning = _warned
 
 
 def _warned(message: Warning | str, category: type[Warning], *where: Any, **more: Any) -> None:
-    """What the lab itself gives notice of is said in one line; any other warning as Python says it."""
+    """Print the lab's own notices in one line, and other warnings as Python does."""
     if issubclass(category, Notice):
         complain(str(message))
     else:
@@ -38,7 +38,7 @@ def _warned(message: Warning | str, category: type[Warning], *where: Any, **more
 
 
 def write(text: str) -> None:
-    """Text to stdout, at once; what cannot be printed in it, such as an escape code in a file that is shown, as its escape."""
+    """Write text to stdout immediately; unprintable characters, as in a file that is shown, are escaped."""
     _print(escaped(text))
 
 
@@ -49,18 +49,18 @@ def _print(text: str) -> None:
         raise
     except OSError as error:
         silence()
-        Stdout.told = True  # what it was is lost, and another document would be as well
+        Stdout.told = True  # this output is lost, and another document would be lost as well
         raise WorkFailed(f"what is printed cannot be written to stdout: {error.strerror or error}") from error
 
 
 def write_json(document: dict[str, Any]) -> None:
-    """The command's one document, in one line."""
+    """Print the command's only JSON document, in one line."""
     Stdout.told = True
     write(json.dumps(document, allow_nan=False) + "\n")
 
 
 def fail(message: str, code: int) -> None:
-    """Say in one line why a command ends; with --json also as its document, unless that has come already."""
+    """Report in one line why a command ends; with --json also as its document, unless one was printed already."""
     line = LabError(" ".join(message.split()))
     complain(str(line))
     if "--json" in sys.argv[1:] and not Stdout.told:
@@ -71,33 +71,33 @@ def fail(message: str, code: int) -> None:
 
 
 def end(message: str, code: int) -> NoReturn:
-    """End the command so. "": there is nothing to say, or nobody to hear it."""
+    """End the command with a message and an exit code; "": no message."""
     if message:
         fail(message, code)
     sys.exit(code)
 
 
 def complain(message: str) -> None:
-    """Write one line to stderr, whatever the message holds."""
+    """Write one line to stderr, whatever characters the message contains."""
     try:
         sys.stderr.write(f"lab: {LabError(' '.join(message.split()))}\n")
         sys.stderr.flush()
-    except OSError:  # nobody can hear it: the exit code says it all the same
+    except OSError:  # stderr is closed; the exit code remains
         silence(sys.stderr)
 
 
 def silence(stream: TextIO | None = None) -> None:
-    """Nobody reads stdout, or this stream, any more: let the interpreter's last flush go nowhere."""
+    """Redirect a stream (stdout by default) that nobody reads any more to nowhere, for the interpreter's last flush."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), (stream or sys.stdout).fileno())
 
 
 def console() -> "Console":
-    """The terminal that stderr goes to."""
+    """The console of stderr."""
     return deferred.EscapingConsole(stderr=True, highlight=False)
 
 
 def show(document: dict[str, Any], as_json: bool, render: Callable[[dict[str, Any]], "RenderableType"]) -> None:
-    """Print a document as JSON, or as `render` shows it."""
+    """Print a document as JSON, or as text made by `render`."""
     if as_json:
         write_json(document)
         return

@@ -1,4 +1,4 @@
-"""`lab replay`: a kept session again."""
+"""`lab replay`: show a kept session or a run again."""
 
 from contextlib import nullcontext
 from pathlib import Path
@@ -11,19 +11,22 @@ from lab.cli.families import from_files
 from lab.cli.lessons import lesson_seat, say_read, sequenced
 from lab.cli.options import Json, Plain, Port, ToolboxPlace, TrustModule
 from lab.cli.output import complain, console, end, show
+from lab.cli.view import replay_page, serve
 from lab.errors import BadInput
 
 
 def replay(
     folder: Annotated[
         Path | None,
-        typer.Argument(help="The folder of a session or of a run (--out); none: lists the sessions in the toolbox."),
+        typer.Argument(
+            help="The folder of a session or of a run (--out); without one, the sessions in the toolbox are listed."
+        ),
     ] = None,
     pause: Annotated[
         float, typer.Option("--pause", min=0.0, max=3600.0, help="Seconds between two answers; default: half a second.")
     ] = 0.5,
     trust_module: TrustModule = None,
-    page: Annotated[bool, typer.Option("--page", help="Show it on a page on 127.0.0.1, too.")] = False,
+    page: Annotated[bool, typer.Option("--page", help="Also show it on a page on 127.0.0.1.")] = False,
     port: Port = 0,
     plain: Plain = False,
     own: Annotated[
@@ -36,30 +39,27 @@ def replay(
     ] = None,
     minari: Annotated[
         str | None,
-        typer.Option("--minari", help="Keep its steps as a Minari dataset of this name, such as lab/mine-v0."),
+        typer.Option("--minari", help="Save its steps as a Minari dataset of this name, such as lab/mine-v0."),
     ] = None,
     tensorboard: Annotated[
         Path | None, typer.Option("--tensorboard", help="Write its learning curve for TensorBoard into this folder.")
     ] = None,
     movie: Annotated[
         Path | None,
-        typer.Option(
-            "--movie", help="Draw a run as a moving picture into this .gif or .webp file; no display is needed."
-        ),
+        typer.Option("--movie", help="Draw a run as a movie into this .gif or .webp file; no display is needed."),
     ] = None,
-    seconds: Annotated[
-        float, typer.Option("--seconds", min=1.0, max=60.0, help="How long the moving picture lasts [s].")
-    ] = 15.0,
+    seconds: Annotated[float, typer.Option("--seconds", min=1.0, max=60.0, help="Length of the movie [s].")] = 15.0,
     audit: Annotated[
         bool,
         typer.Option(
-            "--audit", help="Hold a run's frames against its task once more: where each part stood, what is wrong."
+            "--audit",
+            help="Audit a run again: compare its frames with its task, and list each part's stays and all faults.",
         ),
     ] = False,
     toolbox: ToolboxPlace = None,
     as_json: Json = False,
 ) -> None:
-    """Show a kept teaching session, or a run, again: what was asked, answered or done, and what came of it."""
+    """Replay a kept teaching session or a run: questions, answers, actions and results."""
     for option, given in (("--movie", movie is not None), ("--audit", audit)):
         if given and (folder is None or not deferred.is_run(folder)):
             where = "" if folder is None else f"'{folder}': "
@@ -108,7 +108,7 @@ def replay(
 
 
 def _audit_run(folder: Path, as_json: bool) -> None:
-    """Hold what a run's folder keeps against its task; exit 1 when something is wrong."""
+    """Print the audit of a run's folder; exit 1 when it has findings."""
     options, task = deferred.kept_task(folder, "DIR")
     found = deferred.audit(deferred.kept_evidence(folder, task, task.ordered(options.toasts, options.parts)))
     show({"run": str(folder), "task": task.name} | found.to_json(), as_json, deferred.audit_summary)
@@ -119,8 +119,7 @@ def _audit_run(folder: Path, as_json: bool) -> None:
 def _replay_run(
     folder: Path, page: bool, port: int, as_json: bool, movie: Path | None = None, seconds: float = 15.0
 ) -> None:
-    """What was done in a run and what came of it, from its journal; its film as a moving picture, or on a page."""
-    from lab.cli.view import replay_page, serve
+    """Show a run from its journal; on request write its movie, or serve its replay on a page."""
 
     document = deferred.replayed_run(folder, "DIR")
     if movie is not None:
@@ -140,15 +139,15 @@ def _replay_run(
 
 
 def _replayed(kept: "deferred.OrderSession", seat: "deferred.LessonSeat", toolbox: str | None) -> dict[str, Any]:
-    """Advice on an order again: the session is run once more, and the journal answers for the people."""
+    """The document of a replayed session on an order: it is run again, and the journal answers for people."""
 
     def nobody(request: "deferred.Request") -> int | None:
         raise KeyboardInterrupt
 
     try:
         stopped = sequenced(kept, dict.fromkeys(deferred.PEOPLE, nobody), seat, toolbox, files={})["interrupted"]
-    except KeyboardInterrupt:  # before an order was found
+    except KeyboardInterrupt:  # no order was found before
         stopped = True
-    if stopped and (kept.journal is None or kept.journal.folding):  # by Ctrl-C, not by the journal's end
+    if stopped and (kept.journal is None or kept.journal.folding):  # stopped by Ctrl-C, not by the end of the journal
         raise KeyboardInterrupt
     return kept.replayed()

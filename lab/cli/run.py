@@ -1,4 +1,4 @@
-"""`lab run`: the main job."""
+"""`lab run`: a whole task, from learning to a run in physics."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -46,7 +46,9 @@ def run(
     wait: Wait = None,
     override: Annotated[
         int,
-        typer.Option("--override", min=10, max=100, help="The arm's speed override [%]; the next plan knows of it."),
+        typer.Option(
+            "--override", min=10, max=100, help="The arm's speed override [%], which the next plan takes into account."
+        ),
     ] = 100,
     faults: Annotated[
         int | None, typer.Option("--faults", min=0, help="Draw faults for the run with this seed; default: none.")
@@ -72,7 +74,7 @@ def run(
     ] = None,
     toolbox: ToolboxPlace = None,
     resume: Annotated[
-        Path | None, typer.Option("--resume", help="Go on with the run in this folder, as it was begun.")
+        Path | None, typer.Option("--resume", help="Continue the run in this folder, with its original options.")
     ] = None,
     out: Annotated[
         Path | None, typer.Option("--out", help="Folder for pictures, replay and JSON; default: TASK-run.")

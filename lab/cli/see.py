@@ -1,4 +1,4 @@
-"""`lab see`: picture to grid; a camera calibrated; pictures with known truth, made and read back."""
+"""`lab see`: read a picture as a grid, calibrate a camera, and make and score pictures with ground truth."""
 
 import re
 from dataclasses import replace
@@ -12,7 +12,7 @@ from lab.cli.options import Json, Seed
 from lab.cli.output import complain, show
 from lab.errors import BadInput
 
-TASK = "toast"  # whose camera takes pictures that are made, unless another is named
+TASK = "toast"  # default task for pictures that are made
 
 
 def see(
@@ -26,11 +26,15 @@ def see(
     grid: Annotated[str | None, typer.Option("--grid", help="Rows x columns; default: 12x12, or the task's.")] = None,
     task: Annotated[
         str | None,
-        typer.Option("--task", help="The task whose camera took it; without, the whole picture is taken for the grid."),
+        typer.Option(
+            "--task", help="The task whose camera took the picture; without it, the whole picture is the grid."
+        ),
     ] = None,
     calibration: Annotated[
         Path | None,
-        typer.Option("--calibration", help="A file of --calibrate: the picture is straightened before it is read."),
+        typer.Option(
+            "--calibration", help="A file from --calibrate, with which the picture is undistorted before it is read."
+        ),
     ] = None,
     overlay: Annotated[
         Path | None,
@@ -56,10 +60,15 @@ def see(
     ] = None,
     make: Annotated[
         int | None,
-        typer.Option("--make", help="Make so many pictures of a task's scenes with known truth, into --out."),
+        typer.Option(
+            "--make", help="The number of pictures of a task's scenes, with ground truth, to write into --out."
+        ),
     ] = None,
     score: Annotated[
-        bool, typer.Option("--score", help="Read the pictures of a folder that --make made; how many are exact.")
+        bool,
+        typer.Option(
+            "--score", help="Read the pictures of a folder from --make, and count those that are read exactly."
+        ),
     ] = False,
     seed: Seed = 0,
     as_json: Json = False,
@@ -91,12 +100,12 @@ def see(
 
 
 def made(task: str, count: int, out: Path, seed: int) -> dict[str, Any]:
-    """Pictures made, the document of `lab see --make --json`."""
+    """The document of `lab see --make --json`, after making the pictures."""
     return deferred.make_pictures(task, count, out, seed) | {"files": {"folder": str(out)}}
 
 
 def scored(folder: Path, calibration: Path | None) -> dict[str, Any]:
-    """Pictures read back, the document of `lab see --score --json`."""
+    """The document of `lab see --score --json`: how many pictures are read exactly."""
     return deferred.score_pictures(folder, _calibration(calibration))
 
 
@@ -108,9 +117,9 @@ def calibrate_camera(
     out: Path | None,
     overlay: Path | None,
 ) -> dict[str, Any]:
-    """The camera's lens and place, the document of `lab see --calibrate --json`.
+    """The document of `lab see --calibrate --json`: the camera's lens and pose.
 
-    From pictures of the mat; or from the pixels of four corners, with the lens that is `known` or that the task states.
+    It is computed from pictures of the mat, or from the pixels of four corners and the `known` lens or the task's.
     """
     loaded = None if task is None else deferred.load(task)
     pictures = [(str(path), deferred.read_picture(path)) for path in images]
@@ -157,10 +166,10 @@ def _calibration(path: Path | None) -> "deferred.Calibration | None":
 def see_picture(
     image: Path, grid: str | None, task: str | None, out: Path | None, calibration: Path | None = None
 ) -> dict[str, Any]:
-    """A picture's markers as a grid, the document of `lab see --json`.
+    """The document of `lab see --json`: a picture's markers as a grid.
 
-    With a task the grid is the one of its overhead camera, which a calibration straightens and places; without, the frame is
-    the grid, 12 x 12 unless `grid` says so. Where the picture is drawn, parts are looked for, too.
+    With a task, the grid is that of its overhead camera, whose lens and pose a calibration corrects; without one, the whole
+    picture is the grid, 12 x 12 unless `grid` is given. If the picture is drawn, parts are searched for as well.
     """
     shape = _shape(grid)
     picture = deferred.read_picture(image)
@@ -195,8 +204,9 @@ def _shape(grid: str | None) -> tuple[int, int]:
 
 
 def _camera(task: str, pixels: int, wanted: tuple[int, int] | None) -> "tuple[deferred.View, float]":
-    """How a task's camera with so many pixels a side sees its grid, and its field of view [rad]; BadInput when a grid of
-    another shape is wanted.
+    """The view of a task's camera, for pictures of `pixels` width and height, and its field of view [rad].
+
+    Raises BadInput when the requested grid has another shape.
     """
     loaded = deferred.load(task)
     station = next((station.name for station in loaded.stations if station.grid is not None), None)

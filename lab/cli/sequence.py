@@ -1,4 +1,4 @@
-"""`lab sequence`: the high level alone."""
+"""`lab sequence`: find an order of transfers, or the shortest cycle."""
 
 from dataclasses import asdict
 from pathlib import Path
@@ -32,7 +32,7 @@ OF_A_CYCLE = ("task", "case", "toasts", "parts", "seed", "layout", "robots")
 def cyclic_found(
     given: "deferred.OrderOptions", toolbox: str | None, files: dict[str, Path], parts_per_cycle: int | None
 ) -> dict[str, Any]:
-    """The document of the shortest cycle; BadInput for options that say how an order is looked for, which a cycle is not."""
+    """The document of the shortest cycle; BadInput for options of the search for an order, which do not apply to cycles."""
     none = asdict(deferred.OrderOptions())
     for name, value in asdict(given).items():
         if name not in OF_A_CYCLE and value != none[name]:
@@ -54,14 +54,14 @@ def cyclic_found(
         return deferred.cyclic_named(given.task, wanted, teacher, files)
 
 
-# ---- sequence ---------------------------------------------------------------------------------------------------------
+# ---- the command --------------------------------------------------------------------------------------------------------
 
 
 def sequence(
     task: Annotated[
         str | None,
         typer.Argument(
-            help="A task or a cell that ships, a .toml file, or an instance file ({instances}); none: with --resume."
+            help="A task or a cell that ships, a .toml file, or an instance file ({instances}); leave it out with --resume."
         ),
     ] = None,
     case: Annotated[
@@ -92,7 +92,7 @@ def sequence(
     method: MethodName = None,
     policy: Annotated[
         Path | None,
-        typer.Option("--policy", help="What --method carried decides by: a file of lab study run carried-over."),
+        typer.Option("--policy", help="The policy of --method carried: a file from lab study run carried-over."),
     ] = None,
     objective: Annotated[
         str | None,
@@ -102,11 +102,17 @@ def sequence(
         int | None, typer.Option("--episodes", min=1, max=MAX_EPISODES, help="Session length; default: the file's.")
     ] = None,
     sessions: Annotated[
-        int, typer.Option("--sessions", min=1, max=MAX_SESSIONS, help="How many sessions, each with its own chance.")
+        int,
+        typer.Option(
+            "--sessions", min=1, max=MAX_SESSIONS, help="The number of sessions, each with its own random numbers."
+        ),
     ] = 1,
     stochastic: Annotated[
         bool,
-        typer.Option("--stochastic", help="Draw processing times (and arrivals): the list as it is, and reacting."),
+        typer.Option(
+            "--stochastic",
+            help="Draw processing times (and arrivals), and compare the fixed list with one that reacts.",
+        ),
     ] = False,
     advisor: Annotated[
         str,
@@ -119,11 +125,13 @@ def sequence(
     ] = "ccrl",
     seconds: Annotated[
         float | None,
-        typer.Option("--seconds", help="End after so many seconds with the best order until then, and its bound."),
+        typer.Option("--seconds", help="End after this time [s] with the incumbent and its bound."),
     ] = None,
     gap: Annotated[
         float | None,
-        typer.Option("--gap", help="End when the best order costs at most so much more than the bound, such as 0.05."),
+        typer.Option(
+            "--gap", help="End when the gap between the incumbent and the bound is at most this, such as 0.05."
+        ),
     ] = None,
     cyclic: Annotated[
         bool,
@@ -134,7 +142,8 @@ def sequence(
     ] = False,
     parts_per_cycle: PartsPerCycle = None,
     resume: Annotated[
-        Path | None, typer.Option("--resume", help="Go on with the advice in this folder, as it was begun.")
+        Path | None,
+        typer.Option("--resume", help="Continue the session with advice in this folder, with its original options."),
     ] = None,
     plot: Annotated[
         Path | None, typer.Option("--plot", help="A .png or .svg file for the costs of the episodes.")
@@ -151,9 +160,9 @@ def sequence(
     toolbox: ToolboxPlace = None,
     as_json: Json = False,
 ) -> None:
-    """The high level alone: the order of the robot's transfers, beside the proven optimum or bound.
+    """The high level alone: find an order of the robot's transfers, and compare it with the proven optimum or bound.
 
-    What a person advises is kept: --resume goes on with it, lab replay shows it again.
+    A person's advice is kept: --resume continues the session, lab replay shows it again.
     """
     given = deferred.OrderOptions(
         task=task or "",

@@ -1,4 +1,4 @@
-"""`lab show`: any schedule in 3D, its Gantt chart beside it, as one page."""
+"""`lab show`: any schedule in 3D with its Gantt chart, as one page."""
 
 from pathlib import Path
 from typing import Annotated, Any
@@ -26,7 +26,7 @@ def show(
 
 
 def write_page(schedule: list[Path], out: Path | None) -> dict[str, Any]:
-    """Write the page; the document of `lab show --json`: its file, and what it shows. BadInput for what is no schedule."""
+    """The document of `lab show --json`, after writing the page: its file and its content. BadInput without a schedule."""
     page = Path(f"{schedule[0].stem}.html") if out is None else out
     if page.suffix != ".html":
         raise BadInput(f"page '{page}' (--out): its name must end in .html")

@@ -1,4 +1,4 @@
-"""`lab study`: the thesis's tables and comparisons of our own."""
+"""`lab study`: run the thesis's tables and our own comparisons."""
 
 from pathlib import Path
 from typing import Annotated
@@ -36,7 +36,7 @@ def study_run(
     workers: Annotated[int, typer.Option("--workers", min=1, max=256, help="Processes; the rows are the same.")] = 1,
     dask: Annotated[str | None, typer.Option("--dask", help="The address of a Dask scheduler to work on.")] = None,
     advisor_table: Annotated[
-        str | None, typer.Option("--advisor-table", help="What advisors know: learned (default) or exact values.")
+        str | None, typer.Option("--advisor-table", help="The advisors' knowledge: learned (default) or exact values.")
     ] = None,
     seconds: Annotated[
         float | None,
@@ -44,7 +44,7 @@ def study_run(
     ] = None,
     methods: Annotated[
         str | None,
-        typer.Option("--methods", help="transport, advicebench: some methods or rules only, with commas between."),
+        typer.Option("--methods", help="transport, advicebench: only these methods or rules, separated by commas."),
     ] = None,
     problem: Annotated[
         list[str] | None,
@@ -53,14 +53,17 @@ def study_run(
     advisors: Annotated[
         str | None,
         typer.Option(
-            "--advisors", help="advicebench: some only, or others, such as recorded:DIR, with commas between."
+            "--advisors", help="advicebench: only these advisors, or others such as recorded:DIR, separated by commas."
         ),
     ] = None,
     instances: Annotated[
         list[Path] | None, typer.Option("--instances", help="transport: files or folders of your own instead.")
     ] = None,
     verify: Annotated[
-        bool, typer.Option("--verify", help="transport: hold every schedule against its instance, by a checker apart.")
+        bool,
+        typer.Option(
+            "--verify", help="transport: check every schedule against its instance with an independent checker."
+        ),
     ] = False,
     seed: Seed = 0,
     out: Annotated[

@@ -1,4 +1,4 @@
-"""`lab task`: task files."""
+"""`lab task`: list, show, convert, create and check task files."""
 
 import json
 from pathlib import Path
@@ -32,7 +32,7 @@ def task_schema(
     kind: Annotated[
         str,
         typer.Argument(
-            help="Of which files: task, cell or world.",
+            help="The kind of files: task, cell or world.",
             autocompletion=lambda: ["task", "cell", "world"],
             metavar="[KIND]",
         ),
@@ -70,7 +70,8 @@ def task_convert(
         int | None, typer.Option("--robots", min=1, max=50, help="How many robots carry parts, all alike; default: 1.")
     ] = None,
     case: Annotated[
-        str | None, typer.Option("--case", help="Of job sets and layouts as CSV: SET:LAYOUT, such as 7:1, or EX71.")
+        str | None,
+        typer.Option("--case", help="The case of job sets and layouts as CSV: SET:LAYOUT, such as 7:1, or EX71."),
     ] = None,
     out: Annotated[
         Path | None,
@@ -78,7 +79,7 @@ def task_convert(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Read an instance as the field writes it, and write it as the lab's own cell file (TOML), or as PyJobShop's JSON."""
+    """Read an instance in a common format, and write it as the lab's own cell file (TOML), or as PyJobShop's JSON."""
     found = deferred.load_cell_beside(file, deferred.InstanceAsked(layout, robots, case))
     if out is not None and out.suffix not in (".toml", ".json"):
         raise BadInput(f"file '{out}' (--out): wanted one that ends with .toml or .json")
@@ -101,7 +102,7 @@ def task_random(
     seed: Seed = 0,
     as_json: Json = False,
 ) -> None:
-    """Write a random grid world as a task file; a way always leads from its start to its goal."""
+    """Write a random grid world as a task file; a path always leads from its start to its goal."""
 
     def told(d: dict[str, Any]) -> str:
         return (
@@ -126,16 +127,16 @@ def task_check(
         Path | None,
         typer.Option(
             "--plot",
-            help="A .png or .svg file for the cell from above: reach, stations, obstacles, what is blocked by what.",
+            help="A .png or .svg file for the cell from above: reach, stations, obstacles, and what blocks which cells.",
         ),
     ] = None,
     seed: Seed = 0,
     as_json: Json = False,
 ) -> None:
-    """Check a task file: its text, its reach, and that a way exists for every sub-task, or through the world. Exit 2 if not.
+    """Check a task file: its text, its reach, and that every sub-task, or the world, has a path. Exit 2 if not.
 
-    Of a cell: that its order can be made, with the line of what is wrong. With --json the document comes in both cases, and
-    so does the picture of a task that can be read: what is wrong is marked in it.
+    A cell is checked for whether its order can be made. With --json the document is printed in both cases; the picture of a
+    task that can be read is drawn in both cases, with the faults marked.
     """
     task = None if plot is None else _to_draw(file, plot)
     errors, warnings = deferred.check_task(file, toasts, seed)
@@ -151,11 +152,11 @@ def task_check(
 
 
 def _to_draw(file: str, plot: Path) -> "deferred.Task | None":
-    """The task to be drawn, None when it cannot be read; BadInput for what has no picture, and for a bad path of one."""
+    """The task to draw, None when it cannot be read; BadInput for a cell or a world, and for a bad path of the picture."""
     deferred.check_picture(plot)
     try:
         found = deferred.load_any(file)
-    except LabError:  # which the check tells
+    except LabError:  # which the check reports
         return None
     if not isinstance(found, deferred.Task):
         instead = f"lab sequence {file} --gantt {plot}" if isinstance(found, deferred.CellFile) else f"lab view {file}"

@@ -45,7 +45,8 @@ def teach(
     memory: Annotated[
         bool | None,
         typer.Option(
-            "--memory/--no-memory", help="Remember what was shown and practise it unasked; default: the task's."
+            "--memory/--no-memory",
+            help="Whether the learner memorizes advice and repeats it unasked; default: the task's.",
         ),
     ] = None,
     advisor: AdvisorNames = None,
@@ -63,7 +64,7 @@ def teach(
         ),
     ] = None,
     resume: Annotated[
-        Path | None, typer.Option("--resume", help="Go on with the session in this folder, as it was begun.")
+        Path | None, typer.Option("--resume", help="Continue the session in this folder, with its original options.")
     ] = None,
     trust_module: TrustModule = None,
     page: ShowPage = False,
@@ -80,7 +81,7 @@ def teach(
 ) -> None:
     """One teaching session: learn one sub-task, a world or a Gymnasium environment with an advisor, and keep the policy.
 
-    Each session keeps a journal: --resume goes on with one that was broken off, lab replay shows it again.
+    Each session keeps a journal: --resume continues an interrupted session, lab replay shows it again.
     """
     who = (tuple(advisor or ()), asked, decide)
     given = deferred.LessonOptions(subtask or "", task, sight, learner, gate, memory, *who, episodes, seed, save)

@@ -1,4 +1,4 @@
-"""`lab toolbox`: the policies that were learned."""
+"""`lab toolbox`: list, evaluate, exchange and remove the policies that were learned."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -34,12 +34,12 @@ def toolbox_publish(
     name: str,
     out: OutFolder,
     license_name: Annotated[
-        str, typer.Option("--license", help="Under which others may use it, as the Hub names it, such as mit.")
+        str, typer.Option("--license", help="The licence for others, by its name on the Hub, such as mit.")
     ] = "unknown",
     toolbox: ToolboxPlace = None,
     as_json: Json = False,
 ) -> None:
-    """A folder as the Hugging Face Hub has it: model card, safetensors, metadata, pictures. Nothing is sent anywhere."""
+    """Write a folder for the Hugging Face Hub: model card, safetensors, metadata, pictures. Nothing is uploaded."""
     policy, events = _told(deferred.Toolbox(toolbox), name)
     files = deferred.publish(policy, events, license_name, out)
     document = {"policy": policy.name, "folder": str(out), "license": license_name, "files": files}
@@ -53,7 +53,7 @@ def toolbox_export(
     toolbox: ToolboxPlace = None,
     as_json: Json = False,
 ) -> None:
-    """Policies as one archive; the same policies give the same bytes."""
+    """Write policies to one archive; the same policies give the same bytes."""
     box = deferred.Toolbox(toolbox)
     wanted = list(dict.fromkeys(names or [row["name"] for row in box.list()]))
     if not wanted:
@@ -74,13 +74,11 @@ def toolbox_export(
 
 def toolbox_import(
     file: Annotated[Path, typer.Argument(help="An archive of lab toolbox export, or a folder of lab toolbox publish.")],
-    replace: Annotated[
-        bool, typer.Option("--replace", help="Also where another policy of that name is there already.")
-    ] = False,
+    replace: Annotated[bool, typer.Option("--replace", help="Replace other policies of the same names.")] = False,
     toolbox: ToolboxPlace = None,
     as_json: Json = False,
 ) -> None:
-    """Bring in policies that somebody gave you: every one is checked before the first is kept, and all are kept or none."""
+    """Import policies from others: every policy is checked before the first is kept, and either all are kept or none."""
     box = deferred.Toolbox(toolbox)
     policies = [deferred.read_folder(file)] if file.is_dir() else deferred.unpack(file)
     taken = deferred.take_in(box, policies, replace)
@@ -94,12 +92,12 @@ def toolbox_import(
 
 
 def _told(box: "deferred.Toolbox", name: str) -> "tuple[deferred.Policy, list[dict[str, Any]]]":
-    """A policy and its log."""
+    """The policy and its log."""
     shown = box.show(name)
     return box.load(shown["file"]), shown["events"]
 
 
-# ---- toolbox evaluate -------------------------------------------------------------------------------------------------
+# ---- evaluate -----------------------------------------------------------------------------------------------------------
 
 
 MAX_SCENES = 100_000
@@ -109,16 +107,17 @@ def toolbox_evaluate(
     name: str,
     scenes: Annotated[int, typer.Option("--scenes", min=1, max=MAX_SCENES, help="How many scenes are drawn.")] = 20,
     task: Annotated[
-        str | None, typer.Option("--task", help="Whose scenes; default: the task that it was learned in.")
+        str | None,
+        typer.Option("--task", help="The task whose scenes are drawn; default: the task in which it was learned."),
     ] = None,
     skill: Annotated[
-        str | None, typer.Option("--skill", help="The skill that it is for, where its name does not tell.")
+        str | None, typer.Option("--skill", help="The policy's skill, if its name does not show it.")
     ] = None,
     seed: Seed = 0,
     toolbox: ToolboxPlace = None,
     as_json: Json = False,
 ) -> None:
-    """Carry a policy out in physics, in scenes drawn from the seed on: how often it does what it is for, for its log."""
+    """Measure a policy's success rate in physics, in scenes drawn from the seed, and record it in the policy's log."""
     box = deferred.Toolbox(toolbox)
     policy = box.load(box.show(name)["file"])
     found = deferred.task_of(policy, task)
@@ -136,7 +135,7 @@ def toolbox_evaluate(
 
 
 def evaluation_summary(found: Mapping[str, Any]) -> "RenderableType":
-    """What `lab toolbox evaluate` shows, from its JSON document: the share, and a line for each scene that failed."""
+    """The text of `lab toolbox evaluate`, from its JSON document: the success rate, and a line for each failed scene."""
     from rich.console import Group
     from rich.text import Text
 
@@ -153,7 +152,7 @@ def evaluation_summary(found: Mapping[str, Any]) -> "RenderableType":
     return Group(*map(Text, lines), *(Text(f"seed {row['seed']}: {row['reason']}", "red") for row in failed))
 
 
-# ---- toolbox ----------------------------------------------------------------------------------------------------------
+# ---- list, show, versions, verify, remove -------------------------------------------------------------------------------
 
 
 Name = Annotated[str, typer.Argument(help="A policy's name; lab toolbox list shows them.")]
@@ -163,10 +162,12 @@ def toolbox_list(
     subtask: Annotated[
         str | None, typer.Option("--subtask", help="Only policies of this sub-task.", autocompletion=offers("skills"))
     ] = None,
-    task: Annotated[str | None, typer.Option("--task", help="Only those learned for this task.")] = None,
-    advisor: Annotated[str | None, typer.Option("--advisor", help="Only those that this advisor helped.")] = None,
+    task: Annotated[str | None, typer.Option("--task", help="Only policies learned for this task.")] = None,
+    advisor: Annotated[
+        str | None, typer.Option("--advisor", help="Only policies that this advisor helped to learn.")
+    ] = None,
     solved: Annotated[
-        bool | None, typer.Option("--solved/--unsolved", help="Only those that are solved, or are not.")
+        bool | None, typer.Option("--solved/--unsolved", help="Only policies that are solved, or that are not.")
     ] = None,
     toolbox: ToolboxPlace = None,
     as_json: Json = False,
@@ -184,7 +185,7 @@ def toolbox_list(
 def _check_filter(
     box: "deferred.Toolbox", what: str, field: str, value: str | None, known: Callable[[str], bool]
 ) -> None:
-    """BadInput for a word that neither the toolbox nor the lab knows; an empty toolbox knows none, and says so."""
+    """Raise BadInput for a filter's word that neither the toolbox nor the lab knows."""
     held = {row[field] for row in box.list()}
     if value is not None and held and value not in held and not known(value):
         raise unknown(what, value, held, f"--{field}, toolbox {box.address}")
@@ -207,12 +208,12 @@ def _is_advisor(word: str) -> bool:
 
 
 def toolbox_show(name: Name, toolbox: ToolboxPlace = None, as_json: Json = False) -> None:
-    """All that is known of one policy: where it comes from, its versions, and what happened to it."""
+    """One policy: its origin, its versions and its history."""
     show(deferred.Toolbox(toolbox).show(name), as_json, deferred.policy_summary)
 
 
 def toolbox_log(name: Name, toolbox: ToolboxPlace = None, as_json: Json = False) -> None:
-    """What happened to the policies of a name: learned, put in use, evaluated, removed."""
+    """The history of the policies of a name: learned, put in use, evaluated, removed."""
     show({"name": name, "events": deferred.Toolbox(toolbox).log(name)}, as_json, deferred.log_summary)
 
 
@@ -230,7 +231,7 @@ def toolbox_promote(
 
 
 def toolbox_rollback(name: Name, toolbox: ToolboxPlace = None, as_json: Json = False) -> None:
-    """Put the version of a policy in use that was in use before; again for the one before that."""
+    """Put the previously used version of a policy back in use; repeat for the one before that."""
     box = deferred.Toolbox(toolbox)
     _show_in_use(box, name, box.rollback(name), as_json)
 
@@ -243,7 +244,7 @@ def _show_in_use(box: "deferred.Toolbox", name: str, version: "deferred.Version"
 
 def toolbox_verify(
     repair: Annotated[
-        bool, typer.Option("--repair", help="Remove what commands that were killed have left: half-written files.")
+        bool, typer.Option("--repair", help="Remove half-written files that killed commands have left.")
     ] = False,
     toolbox: ToolboxPlace = None,
     as_json: Json = False,
@@ -270,6 +271,6 @@ def toolbox_remove(name: Name, toolbox: ToolboxPlace = None, as_json: Json = Fal
 
 
 def toolbox_restore(name: Name, toolbox: ToolboxPlace = None, as_json: Json = False) -> None:
-    """Bring back the policy that was removed last under this name."""
+    """Restore the policy that was removed last under this name."""
     box = deferred.Toolbox(toolbox)
     show({"restored": box.where(box.restore(name))}, as_json, lambda d: f"restored {d['restored']}")

@@ -1,4 +1,4 @@
-"""`lab tune`: settings of learner and gate tuned to a problem."""
+"""`lab tune`: tune settings of learner and gate to a problem."""
 
 from pathlib import Path
 from typing import Annotated
@@ -29,13 +29,13 @@ def tune(
         str | None,
         typer.Option(
             "--over",
-            help="Settings that are tuned, with commas between; default: alpha, trace, exploration, beta, lambda_threshold, "
+            help="Settings that are tuned, separated by commas; default: alpha, trace, exploration, beta, lambda_threshold, "
             "omega.",
         ),
     ] = None,
     trials: Annotated[int, typer.Option("--trials", min=1, max=100_000, help="Combinations that are tried.")] = 100,
     sessions: Annotated[
-        int, typer.Option("--sessions", min=2, max=100_000, help="Of each trial that is not given up early.")
+        int, typer.Option("--sessions", min=2, max=100_000, help="Sessions of each trial that is not pruned.")
     ] = 45,
     task: TaskOfSkill = None,
     sight: SightInWorld = None,
@@ -46,12 +46,12 @@ def tune(
     ),
     as_json: Json = False,
 ) -> None:
-    """Tune settings to a problem with Optuna, and say what that gains over its own on seeds that no trial had.
+    """Tune settings to a problem with Optuna, and measure the gain over the problem's own on seeds that no trial used.
 
-    What is made small: the mean steps of a session's episodes (the area under the learning curve), a failed one as the step
-    limit + 1; a session that is not solved in the end costs the step limit + 1 as a whole. The best settings are written as
-    settings.toml, to be pasted into the problem's file. What the folder already holds is not run again: the same command goes on
-    where it was broken off, or with more --trials.
+    The objective is the mean steps of a session's episodes (the area under the learning curve), where a failed episode counts
+    as the step limit + 1; a session that is not solved at its end counts as the step limit + 1. The best settings are written to
+    settings.toml, for the problem's file. Results in the folder are not computed again: the same command continues after an
+    interruption, or with more --trials.
     """
     held = {name: value for name, value in (("learner", learner), ("gate", gate)) if value is not None}
     names = deferred.USUAL if over is None else [name.replace("-", "_") for name in listed("over", over)]

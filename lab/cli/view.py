@@ -1,4 +1,4 @@
-"""`lab view`: a scene, a grid world or a replay on a page."""
+"""`lab view`: show a scene, a grid world or a replay on a page."""
 
 import time
 from collections.abc import Callable
@@ -25,7 +25,7 @@ def view(
     ],
     toasts: Toasts = None,
     parts: Parts = None,
-    port: Annotated[int, typer.Option("--port", min=0, max=65535, help="0: any free one.")] = 0,
+    port: Annotated[int, typer.Option("--port", min=0, max=65535, help="The page's port; 0: any free one.")] = 0,
     out: Annotated[
         Path | None, typer.Option("--out", help="An .html file to write instead: the page, for any browser, offline.")
     ] = None,
@@ -52,7 +52,7 @@ def view(
 
 
 def serve(what: str, asked: "deferred.SceneAsked | None", port: int, tell: Tell) -> None:
-    """Serve a run's replay, a task's scene or a world on 127.0.0.1 until interrupted; `tell(url, hint)` once it is there."""
+    """Serve a run's replay, a task's scene or a world on 127.0.0.1 until interrupted; calls `tell(url, hint)` when ready."""
     if Path(what).is_dir():
         with deferred.LiveView(port, replay=replay_page(Path(what))) as page:
             tell(page.url, page.hint)
@@ -68,7 +68,7 @@ def serve(what: str, asked: "deferred.SceneAsked | None", port: int, tell: Tell)
 
 
 def replay_page(folder: Path) -> Path:
-    """The page with a run's replay in its folder. Raises BadInput when there is none."""
+    """The path of a run's replay page in its folder. Raises BadInput when there is none."""
     page = folder / "replay.html"
     if not page.is_file():
         raise BadInput(
@@ -78,7 +78,7 @@ def replay_page(folder: Path) -> Path:
 
 
 def write_page(what: str, asked: "deferred.SceneAsked", out: Path) -> dict[str, str]:
-    """Write a task's scene or a world as one HTML file; the document of `lab view --out --json`."""
+    """The document of `lab view --out --json`, after writing a task's scene or a world as one HTML file."""
     if Path(what).is_dir():
         raise BadInput(f"'{what}' is the folder of a run: its replay.html is such a page already (--out)")
     if out.suffix != ".html":

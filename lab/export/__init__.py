@@ -1,4 +1,4 @@
-"""A run for the real robot: job files and trajectories, read back and played before anybody trusts them."""
+"""Export of a run for a real robot: job files and trajectories, which are read back and played in physics as a check."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ def _nothing(program: Program) -> list[str]:
 
 @dataclass(frozen=True)
 class Format:
-    """How a program becomes files (texts by name), and such files something that can be played.
+    """A file format: how a program is written to files (texts by name), and read back to something that can be played.
 
     warnings: what a person must know before such a program runs on a robot.
     """

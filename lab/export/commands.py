@@ -1,4 +1,7 @@
-"""A program as a controller takes it: straight lines with rounded corners, outputs, inputs, timers, one job a transfer."""
+"""A program as a controller's commands: straight lines with rounded corners, outputs, inputs, timers; one job a transfer.
+
+`jobs_of` makes the jobs; the rest of the file reduces a motion's poses to as few lines as keep to its path.
+"""
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
@@ -13,24 +16,22 @@ from lab.sim.arms.robot import GRIP_STEPS
 from lab.sim.arms.tool_path import COUNTED, bending, roundings, timed, way_of
 from lab.sim.world import TIME_STEP
 
-WITHIN_M = 2e-4  # a way is written as lines and arcs that deviate so little from it; a turn counts as YAW_ARM
-PASSED_M = 0.0005  # the rounding of a pose that lies on a curve or straight on: it is passed without a stop
-HELD_M = 7e-4  # a pose is left away where the tool keeps so near to its way without it
-_TURN_M = 0.001 / radians(1.0)  # [m/rad]: a tool that is turned by 1 degree is as far off as by 1 mm
-_ALIKE = 1.5  # times as fast: motions that are one line stay two where their speeds differ more
-_BRIEF_M = (
-    0.005  # a line that is shorter is over before it says how fast the tool goes; a way may become so much shorter
-)
-_SAMPLED_M_S = 0.12  # at which a path of lines and arcs has a point every half millimetre
-STILL_M = 1e-5  # a motion that leads no farther than this is left out
-MOST_TURN = pi / 2  # [rad] of one piece: a controller turns the shorter way round
-GRIP_S = GRIP_STEPS * TIME_STEP  # what fingers need to close or open
-START_PERCENT = 10.0  # of the joints' speed, to where a job begins: the thesis's
+WITHIN_M = 2e-4  # largest deviation of the lines and arcs from a path; turns are converted to lengths with YAW_ARM
+PASSED_M = 0.0005  # rounding of a pose on a curve or a straight line, so that it is passed without a stop
+HELD_M = 7e-4  # a pose is dropped if the path without it deviates by no more than this
+_TURN_M = 0.001 / radians(1.0)  # [m/rad]: a turn of 1 degree counts as a deviation of 1 mm
+_ALIKE = 1.5  # largest ratio of speeds at which two motions on one line become one
+_BRIEF_M = 0.005  # lines shorter than this are ignored for speed, and a path may become shorter by this much
+_SAMPLED_M_S = 0.12  # speed at which a path is sampled, which gives a point every half millimetre
+STILL_M = 1e-5  # a motion no longer than this is dropped
+MOST_TURN = pi / 2  # [rad] largest turn on one line, because a controller turns in the shorter direction
+GRIP_S = GRIP_STEPS * TIME_STEP  # time that fingers need to close or open
+START_PERCENT = 10.0  # of the joints' speed, for the move to a job's start, as in the thesis
 
 
 @dataclass(frozen=True)
 class Joint:
-    """All joints (k,) [rad] at once, with a share of their speed [%]."""
+    """A move of all joints (k,) [rad] together, with a share of their speed [%]."""
 
     joints: tuple[float, ...]
     percent: float = START_PERCENT
@@ -40,8 +41,8 @@ class Joint:
 class Path:
     """Straight lines through tool poses x, y, z [m], yaw [rad] (n, 4) in the world, to a stop at the last.
 
-    roundings (n,) [m]: from where before each pose to where behind it an arc stands for the corner; 0: the tool stops there.
-    speeds (n,) [m/s]: of each line, of the way in which a turn of the tool counts as YAW_ARM.
+    roundings (n,) [m]: the distance before and after each pose in which an arc replaces the corner; 0: the tool stops there.
+    speeds (n,) [m/s]: of each line, along a length in which turns of the tool are converted with YAW_ARM.
     """
 
     points: Array
@@ -51,21 +52,21 @@ class Path:
 
 @dataclass(frozen=True)
 class Grip:
-    """The gripper's output."""
+    """Sets the gripper's output."""
 
     closed: bool
 
 
 @dataclass(frozen=True)
 class Pause:
-    """A timer."""
+    """Waits for a time [s]."""
 
     seconds: float
 
 
 @dataclass(frozen=True)
 class Await:
-    """Waits until a machine's input, counted from 1, says that it is done; `station`: the machine, where that is known."""
+    """Waits until a machine's input, counted from 1, reports that it is done; `station`: the machine's name, if known."""
 
     machine: int
     station: str = ""
@@ -73,7 +74,7 @@ class Await:
 
 @dataclass(frozen=True)
 class Start:
-    """Tells a machine, counted from 1, to begin, until it says no longer that it is done."""
+    """Tells a machine, counted from 1, to begin, and waits until it no longer reports that it is done."""
 
     machine: int
     station: str = ""
@@ -81,7 +82,7 @@ class Start:
 
 @dataclass(frozen=True)
 class Reset:
-    """Tells a machine, counted from 1, that its part was taken out, until it says no longer that it is done."""
+    """Tells a machine, counted from 1, that its part was taken out, and waits until it no longer reports that it is done."""
 
     machine: int
     station: str = ""
@@ -89,12 +90,12 @@ class Reset:
 
 @dataclass(frozen=True)
 class Check:
-    """Goes on only where the gripper's input says that it holds something."""
+    """Continues only if the gripper's input reports that it holds something."""
 
 
 @dataclass(frozen=True)
 class Payload:
-    """What the gripper carries from now on [kg], 0 for nothing."""
+    """Sets the mass that the gripper carries from now on [kg], 0 for nothing."""
 
     mass_kg: float
 
@@ -104,7 +105,7 @@ Command = Joint | Path | Grip | Pause | Await | Start | Reset | Check | Payload
 
 @dataclass(frozen=True)
 class Job:
-    """One transfer's commands, in order; ways: the motions that each `Path` stands for, one after the other without a pause."""
+    """The commands of one transfer, in order; ways: the uninterrupted motions that each `Path` stands for."""
 
     words: str
     commands: tuple[Command, ...]
@@ -112,7 +113,7 @@ class Job:
 
 
 def jobs_of(program: Program) -> list[Job]:
-    """One job a transfer; what the robot did after the last one, where a run failed, is a job of its own."""
+    """The jobs of a program, one for each transfer; actions after the last transfer, as of a failed run, are one more job."""
     jobs, left, transfers = [], list(program.carried.actions), program.carried.transfers
     for number, transfer in enumerate(transfers):
         own = [action for action in left if action.at_s < transfer.drop_s]
@@ -125,13 +126,13 @@ def jobs_of(program: Program) -> list[Job]:
 
 
 def _more_of_batch(program: Program, transfer: Transfer, following: Sequence[Transfer]) -> set[str]:
-    """The machines with batches for which another transfer does the same: it brings another part, or takes another one out."""
-    found = set()
+    """The batch machines whose next transfer continues this one: it, too, loads the machine, or it, too, unloads it."""
+    continued = set()
     for name in program.carried.batches:
-        own = next((one for one in following if name in (one.origin, one.target)), None)
+        own = next((later for later in following if name in (later.origin, later.target)), None)
         if own is not None and name in (transfer.origin, transfer.target):
-            found |= {name} if (own.target == name) == (transfer.target == name) else set()
-    return found
+            continued |= {name} if (own.target == name) == (transfer.target == name) else set()
+    return continued
 
 
 def _job(
@@ -185,7 +186,7 @@ def _job(
 
 
 def _path(program: Program, way: Sequence[Motion]) -> Path:
-    """Motions, one after the other, as few lines with rounded corners."""
+    """The path of consecutive motions, as few lines with rounded corners."""
     points: list[Array] = []
     rounded, speeds = list[float](), list[float]()
     for motion in way:
@@ -205,9 +206,9 @@ def _path(program: Program, way: Sequence[Motion]) -> Path:
 
 
 def _corners(motion: Motion, rows: Array) -> tuple[Array, Array]:
-    """The poses (n, 4) at which a motion bends, its ends included, and their roundings (n,) [m]; `rows`: where it led."""
+    """The poses (n, 4) at which a motion bends, ends included, and their roundings (n,) [m]; `rows`: its poses when driven."""
     poses = np.array(motion.poses)
-    poses[:, 3] += pi * np.round((rows[-1, 3] - poses[-1, 3]) / pi)  # a gripper may be half a turn on
+    poses[:, 3] += pi * np.round((rows[-1, 3] - poses[-1, 3]) / pi)  # a gripper is symmetric under half a turn
     corners = np.vstack([rows[:1], poses])
     corners = corners[bending(corners * COUNTED)]
     cuts = roundings(corners * COUNTED, np.full(len(corners), motion.blend_m))
@@ -218,7 +219,7 @@ def _corners(motion: Motion, rows: Array) -> tuple[Array, Array]:
 
 
 def _apart(rows: Array, shape: Array) -> float:
-    """How far the farthest of poses (n, 4) is off the nearest place of a way (m, 4) [m], or turned there, see _TURN_M."""
+    """The largest deviation [m] of poses (n, 4) from a path (m, 4), turns included by _TURN_M."""
     from scipy.spatial import cKDTree
 
     lines = np.vstack([shape[:-1] + share * np.diff(shape, axis=0) for share in (0.0, 0.25, 0.5, 0.75)] + [shape[-1:]])
@@ -227,15 +228,15 @@ def _apart(rows: Array, shape: Array) -> float:
 
 
 def _shape(points: Array, rounded: Array) -> Array:
-    """Where the tool is (m, 4) on lines through poses (n, 4), rounded by so much [m], every half millimetre."""
+    """The tool poses (m, 4), every half millimetre, on lines through poses (n, 4) with roundings [m]."""
     poses, blends = [ToolPose(*pose) for pose in points.tolist()], (2.0 * rounded).tolist()
     return np.vstack([points[:1], timed(poses, _SAMPLED_M_S, 1e3, blends)])
 
 
 def _needed(points: Array, rounded: Array, speeds: Sequence[float]) -> list[int]:
-    """The rows of points (n, 4) that lines need, from the last to the first: without any other the tool keeps to its way.
+    """The rows of points (n, 4) that remain after dropping, from the last to the first, those that the path does not need.
 
-    Lines that are gone about as fast on both sides of what is left away become one; so do brief ones with any other.
+    Two lines become one if their speeds are alike (_ALIKE), or one of them is brief (_BRIEF_M), and the path keeps to HELD_M.
     """
     kept, far = [*range(len(points))], np.diff(way_of(points))
     for row in range(len(points) - 2, 0, -1):
@@ -255,12 +256,12 @@ def _needed(points: Array, rounded: Array, speeds: Sequence[float]) -> list[int]
 
 
 def _pace(far: Array, speeds: Sequence[float]) -> float:
-    """How fast the tool goes [m/s] on lines (n,) [m] that become one: as on the slowest that is not brief."""
-    return min((v for way, v in zip(far, speeds, strict=True) if way > _BRIEF_M), default=max(speeds))
+    """The speed [m/s] on lines (n,) [m] that become one: that of the slowest line that is not brief."""
+    return min((speed for line_m, speed in zip(far, speeds, strict=True) if line_m > _BRIEF_M), default=max(speeds))
 
 
 def _turning(points: Array, rounded: Array, speeds: Array) -> Path:
-    """The way without its first pose, and with poses between on lines (n - 1,) that turn the tool by more than MOST_TURN."""
+    """The path without its first pose, with intermediate poses on lines that turn the tool by more than MOST_TURN."""
     rows, cuts, fast = list[Array](), list[float](), list[float]()
     for row in range(1, len(points)):
         start, end = points[row - 1], points[row]
@@ -272,7 +273,7 @@ def _turning(points: Array, rounded: Array, speeds: Array) -> Path:
 
 
 def step_between(start: Array, end: Array) -> Array:
-    """From one tool pose (4,) to another: x, y, z [m], and the shorter way round [rad]."""
+    """The difference of two tool poses (4,): x, y, z [m], and the turn in the shorter direction [rad]."""
     step = np.asarray(end - start)
     step[3] = (step[3] + pi) % (2 * pi) - pi
     return step
@@ -283,12 +284,12 @@ def _length(poses: Array) -> float:
 
 
 def _speed(poses: Array) -> float:
-    """The highest speed [m/s] of tool poses (n, 4), one a physics step."""
+    """The highest speed [m/s] between tool poses (n, 4), one per physics step."""
     return float(np.diff(way_of(poses)).max()) / TIME_STEP
 
 
 def straightened(poses: Array) -> Array:
-    """Few tool poses (m, 4) whose straight pieces keep within WITHIN_M of the way through `poses` (n, 4), ends included."""
+    """Few tool poses (m, 4), ends included, whose straight lines stay within WITHIN_M of the path through `poses` (n, 4)."""
     way = way_of(poses)
     kept = thinned(way, poses * COUNTED, WITHIN_M)
     rows = [poses[:1]]
@@ -299,7 +300,7 @@ def straightened(poses: Array) -> Array:
 
 
 def thinned(along: Array, values: Array, within: float) -> list[int]:
-    """The rows to keep so that straight lines over `along` (n,) pass within `within` of all `values` (n, k).
+    """The rows to keep so that straight lines over `along` (n,) stay within `within` of all `values` (n, k).
 
     Source: D. Douglas and T. Peucker, 1973, with the distance taken at the same `along`.
     """

@@ -1,10 +1,10 @@
-"""INFORM II job files as text: what a controller's job file may say here, written and read.
+"""INFORM II job files as text: the instructions and positions that the lab writes and reads.
 
-Source of the dialect: the listings of the thesis (Appendix VI; an XRC controller), which write /JOB, //NAME, //POS, ///NPOS,
+Source of the dialect: the listings of the thesis (Appendix VI; an XRC controller), which use /JOB, //NAME, //POS, ///NPOS,
 ///TOOL, ///POSTYPE PULSE or ROBOT, ///PULSE or ///RECTAN, ///RCONF, C00000=..., //INST, ///DATE, ///ATTR SC,RW, ///GROUP1 RB1,
-NOP, MOVJ, TIMER, CALL JOB and END; beyond these MOVL
-with V, VR and PL, DOUT and PULSE OT#, WAIT and PAUSE IF IN#, ///COMM and comments, as in Yaskawa's manuals of job data and
-INFORM II (XRC, NX100: HW0481924, section 4.1). No controller has read what is written here.
+NOP, MOVJ, TIMER, CALL JOB and END; in addition MOVL with V, VR and PL, DOUT and PULSE OT#, WAIT and PAUSE IF IN#, ///COMM
+and comments, as in Yaskawa's manuals of job data and INFORM II (XRC, NX100: HW0481924, section 4.1). These files have not
+been tested on a controller.
 """
 
 import re
@@ -23,7 +23,7 @@ _NUMBER = r"-?\d+(?:\.\d+)?"
 
 @dataclass(frozen=True)
 class MoveJ:
-    """To position `c`, joints interpolated, with so much [%] of their speed."""
+    """Moves to position `c` with interpolated joints, at a share of their speed [%]."""
 
     c: int
     percent: float
@@ -34,9 +34,9 @@ class MoveJ:
 
 @dataclass(frozen=True)
 class MoveL:
-    """To position `c` in a straight line: "V", at so many mm/s, or "VR", a turn at so many degrees/s.
+    """Moves to position `c` in a straight line: "V" at a speed in mm/s, or "VR", a turn at a speed in degrees/s.
 
-    level: 0, to a stop at the position, to 8, rounded most.
+    level: of rounding at the position, from 0 (the tool stops) to 8 (most).
     """
 
     c: int
@@ -72,7 +72,7 @@ class Wait:
 
 @dataclass(frozen=True)
 class Pulse:
-    """Sets an output for so many seconds, and goes on meanwhile."""
+    """Sets an output for some seconds, without waiting."""
 
     output: int
     seconds: float
@@ -83,7 +83,7 @@ class Pulse:
 
 @dataclass(frozen=True)
 class PauseIfOff:
-    """Stops the job, for a person, where an input is off."""
+    """Pauses the job, until a person continues it, if an input is off."""
 
     input: int
 
@@ -93,7 +93,7 @@ class PauseIfOff:
 
 @dataclass(frozen=True)
 class Timer:
-    """Waits for so many seconds."""
+    """Waits for some seconds."""
 
     seconds: float
 
@@ -103,7 +103,7 @@ class Timer:
 
 @dataclass(frozen=True)
 class Call:
-    """Does another job, and goes on."""
+    """Calls another job, and continues after it."""
 
     job: str
 
@@ -122,7 +122,9 @@ class Comment:
 
 
 Instruction = MoveJ | MoveL | Dout | Wait | Pulse | PauseIfOff | Timer | Call | Comment
-_INSTRUCTIONS: dict[str, tuple[str, Callable[..., Instruction]]] = {  # first word -> the whole line, and what it makes
+_INSTRUCTIONS: dict[
+    str, tuple[str, Callable[..., Instruction]]
+] = {  # first word -> pattern of the whole line, and its class
     "MOVJ": (rf"MOVJ C(\d{{5}}) VJ=({_NUMBER})", lambda c, v: MoveJ(int(c), float(v))),
     "MOVL": (
         rf"MOVL C(\d{{5}}) (VR?)=({_NUMBER}) PL=([0-8])",
@@ -148,7 +150,7 @@ class Position:
 
 @dataclass(frozen=True)
 class InformJob:
-    """One job; its positions are all of one sort."""
+    """One job; its positions are either all pulses or all rectangular."""
 
     name: str
     comment: str
@@ -157,7 +159,7 @@ class InformJob:
     instructions: tuple[Instruction, ...]
 
     def text(self) -> str:
-        """The file, lines ending as controllers want it."""
+        """The text of the job file, with the line ends that controllers expect."""
         lines = ["/JOB", f"//NAME {self.name}", "//POS", f"///NPOS {len(self.positions)},0,0,0,0,0"]
         before: tuple[int, ...] | None = None
         tool = -1
@@ -184,7 +186,7 @@ def _written(position: Position) -> list[str]:
 
 
 class _Lines:
-    """A file's lines one by one, and where in it something is wrong."""
+    """A reader of a file's lines, which knows the line number for error messages."""
 
     def __init__(self, text: str, where: str) -> None:
         self.lines, self.where, self.number = text.splitlines(), where, 0
@@ -210,7 +212,7 @@ class _Lines:
 
 
 def read_job(text: str, where: str) -> InformJob:
-    """The job that a file's text holds, `where` its name. BadInput names the line that is no part of this dialect."""
+    """The job in a file's text; `where`: the file's name. BadInput names a line that is not part of this dialect."""
     lines = _Lines(text, where)
     lines.matched("/JOB", "/JOB")
     name = lines.matched(rf"//NAME ({NAME.pattern})", "//NAME and up to 8 capital letters and digits")[1]
@@ -257,7 +259,7 @@ def _read_positions(lines: _Lines, count: int) -> list[Position]:
 
 
 def _read_sort(lines: _Lines) -> tuple[int, bool]:
-    """The tool of the positions that follow, and whether they are pulses."""
+    """The tool number of the positions that follow, and whether they are pulses."""
     tool = int(lines.matched(r"///TOOL (\d{1,2})", "///TOOL and its number")[1])
     pulses = lines.matched("///POSTYPE (PULSE|ROBOT)", "///POSTYPE PULSE or ROBOT")[1] == "PULSE"
     sort = "///PULSE" if pulses else "///RECTAN"

@@ -1,8 +1,8 @@
-"""A run as INFORM II jobs, one a transfer and a master that calls them, and such jobs as commands again.
+"""A run as INFORM II jobs, one for each transfer and a master that calls them; and the way back from jobs to commands.
 
-In the manner of the thesis (Appendix VI): a transfer is a job, the gripper's OPEN and CLOSE are jobs of their own, which a
-site changes to suit. Rectangular positions are the finger tips' in the robot's own axes, from its foot: `///TOOL 0` must have
-the tool's length, its z out of the gripper. PULSES is assumed: a real arm's must be read from its parameters first.
+As in the thesis (Appendix VI), each transfer is a job, and the gripper's OPEN and CLOSE are jobs of their own, which a site
+adapts. Rectangular positions are those of the finger tips in the robot's axes, from its foot: `///TOOL 0` must be set to
+the tool's length, with z pointing out of the gripper. PULSES is assumed: for a real arm, read it from its parameters.
 """
 
 import re
@@ -56,7 +56,7 @@ PULSES = {
     "up6": tuple(n * 4096 / (2 * pi) for n in (120.0, 120.0, 120.0, 50.0, 50.0, 30.0))
 }  # by arm, pulses/rad, assumed
 MAKER, NAMES = "Yaskawa", r"up\d+|motoman.*|yaskawa.*|(gp|hc|hp|mh|ma|ar|sia)\d+.*"
-_TOOL = re.compile(r"TOOL (\d+): (\d+\.\d{3}) KG")  # how a comment says what the gripper carries from there on
+_TOOL = re.compile(r"TOOL (\d+): (\d+\.\d{3}) KG")  # the comment that gives the mass carried from there on
 _ALMOST_M = 1e-6
 _OWN = re.compile(r"M\d{3}|OPEN|CLOSE")
 
@@ -71,13 +71,13 @@ def warnings(program: Program) -> list[str]:
 
 
 def _tools(program: Program) -> dict[float, int]:
-    """The number of the tool that carries so many [kg], as a comment writes them; 0 carries nothing."""
+    """The tool number for each carried mass [kg], rounded as in the comments; tool 0 carries nothing."""
     masses = sorted({round(transfer.mass_kg, 3) for transfer in program.carried.transfers} - {0.0})
     return {0.0: 0} | {mass: number for number, mass in enumerate(masses, start=1)}
 
 
 def write(program: Program, options: Options) -> dict[str, str]:
-    """The jobs' texts by file name, the master first. BadInput for pulses of an arm whose table is not known."""
+    """The jobs' texts by file name, the master first. BadInput for pulse positions of an arm whose PULSES are not known."""
     arm = program.arm
     options.check_arm("jbi", MAKER, NAMES, arm.name, level=arm.level is not None)
     if options.positions == "pulse" and arm.name not in PULSES:
@@ -99,7 +99,7 @@ def write(program: Program, options: Options) -> dict[str, str]:
 
 @dataclass
 class _Writer:
-    """Writes one job down: its positions, its instructions, and where the arm is meanwhile."""
+    """Writes one job: its positions, its instructions, and the arm's pose along the way."""
 
     arm: Arm
     options: Options
@@ -113,7 +113,7 @@ class _Writer:
     def job(self, name: str, job: Job) -> InformJob:
         before: Command | None = None
         for command in job.commands:
-            if not (isinstance(command, Pause) and isinstance(before, Grip)):  # that is in the gripper's jobs
+            if not (isinstance(command, Pause) and isinstance(before, Grip)):  # which the gripper's jobs contain
                 self._add(command)
             before = command
         if len(self.positions) > MOST_POSITIONS:
@@ -173,12 +173,12 @@ class _Writer:
 
 
 def _level(rounding_m: float) -> int:
-    """The position level whose radius is nearest to it; 0 to a stop."""
+    """The position level whose radius is closest to a rounding [m]; 0 for a stop."""
     return 0 if rounding_m == 0.0 else 1 + int(np.argmin(np.abs(np.array(ROUNDINGS_M) - rounding_m)))
 
 
 def _spoken_speed(step: Array, speed_m_s: float) -> tuple[Literal["V", "VR"], float]:
-    """The unit and the speed of one straight piece (4,) at a speed of its way [m/s]: in mm/s, or in degrees/s of a mere turn."""
+    """The unit and the speed of one straight line (4,) for a path speed [m/s]: "V" [mm/s], or "VR" [degrees/s] of a pure turn."""
     far, turn = hypot(*step[:3]), abs(step[3])
     way = hypot(far, YAW_ARM * turn)
     if far < max(_ALMOST_M, 1e-3 * YAW_ARM * turn):
@@ -187,7 +187,7 @@ def _spoken_speed(step: Array, speed_m_s: float) -> tuple[Literal["V", "VR"], fl
 
 
 def _way_speed(step: Array, move: MoveL) -> float:
-    """The speed of the way [m/s] that `_spoken_speed` was told."""
+    """The path speed [m/s]: the inverse of `_spoken_speed`."""
     far, turn = hypot(*step[:3]), abs(step[3])
     if move.unit == "VR":
         return radians(move.speed) * YAW_ARM
@@ -204,13 +204,13 @@ def _tool(arm: Arm, joints: Array) -> Array:
 
 
 def _configuration(joints: Array) -> tuple[int, ...]:
-    """The manipulator's type: not flipped, upper arm, in front; then whether R, T and S are half a turn off zero or more."""
+    """The manipulator type: no flip, upper arm, front; then whether R, T and S are at least half a turn from zero."""
     far = [int(not -pi < float(joint) <= pi) for joint in (joints[3], joints[-1], joints[0])]
     return (0, 0, 0, *far, 0, 0)
 
 
 def read(files: Mapping[str, str], arm: Arm) -> list[Command]:
-    """The commands of jobs, by file name, from the one that no other calls. BadInput says what is wrong, and in which line."""
+    """The commands of jobs (texts by file name), starting at the job that no other calls. BadInput names fault and line."""
     jobs: dict[str, InformJob] = {}
     for file, text in files.items():
         job = read_job(text, file)
@@ -228,7 +228,7 @@ def read(files: Mapping[str, str], arm: Arm) -> list[Command]:
 
 @dataclass
 class _Reader:
-    """Follows the calls, and knows where the arm is meanwhile."""
+    """Reads jobs along their calls, and keeps the arm's pose along the way."""
 
     arm: Arm
     jobs: Mapping[str, InformJob]
@@ -299,7 +299,7 @@ class _Reader:
         return np.array([x / 1000.0, y / 1000.0, z / 1000.0 + self.arm.base_up_m, radians(rz)])
 
     def _joints(self, position: Position, where: str) -> Array:
-        """The joints of a position: by its pulses, or by where the tool is and whether T is half a turn off zero."""
+        """The joints of a position: from its pulses, or from the tool's pose and whether T is half a turn from zero."""
         if position.configuration is None:
             if self.arm.name not in PULSES:
                 raise BadInput(f"{where}: pulses of arm '{self.arm.name}' are not known; known: {', '.join(PULSES)}")

@@ -1,4 +1,4 @@
-"""What was exported, read back and played by the arm alone in physics; and how far its tool is off the run's then."""
+"""A check of exported files: they are read back, played in physics by the arm alone, and compared with the run's tool."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -19,17 +19,17 @@ from lab.sim.parts.holding import USUAL_N
 from lab.sim.world import TIME_STEP, World
 from lab.tasks.robot_fields import RobotSettings
 
-MOST_M, MOST_RAD = 0.001, radians(1.0)  # what is near enough
-HOLD_STEPS = 60  # physics steps of a rest that are simulated; the rest of it nothing moves
-_AT_REST_RAD = 1e-3  # between two points that are far apart in time: the arm rests
+MOST_M, MOST_RAD = 0.001, radians(1.0)  # largest accepted deviations
+HOLD_STEPS = 60  # physics steps of a rest that are simulated; after them nothing moves
+_AT_REST_RAD = 1e-3  # two points far apart in time whose joints differ by less than this are a rest
 
 
 @dataclass(frozen=True)
 class Deviation:
-    """How far the tool was off the run's at the worst [m], [rad]: along the ways, and where they end at rest.
+    """The largest deviations of the played tool from the run's [m], [rad]: along the paths, and at rest at their ends.
 
-    motions: how many ways were compared, poses: at how many points of them. run_off_m: how far the run's own tool was off
-    where it was driven to, where its ways end, as when something was in its way: nothing is when the arm plays alone.
+    motions: the number of paths compared; poses: the number of points on them. run_off_m: the largest deviation of the
+    run's own tool from its target at the end of a path, as after a collision, which cannot happen when the arm plays alone.
     """
 
     along_m: float
@@ -42,22 +42,22 @@ class Deviation:
 
     @property
     def max_m(self) -> float:
-        """The largest distance."""
+        """The largest distance [m]."""
         return max(self.along_m, self.at_rest_m)
 
     @property
     def max_rad(self) -> float:
-        """The largest angle."""
+        """The largest angle [rad]."""
         return max(self.along_rad, self.at_rest_rad)
 
     @property
     def near_enough(self) -> bool:
-        """Whether all lies within 1 mm and 1 degree."""
+        """Whether all deviations are within 1 mm and 1 degree."""
         return self.max_m <= MOST_M and self.max_rad <= MOST_RAD
 
 
 def deviation(program: Program, played: "list[Command] | TimedPoints") -> Deviation:
-    """Play it and compare. BadInput when it has not the ways, gripper outputs and waits of the run, in their order."""
+    """The deviation of what is `played` from the run. BadInput unless it has the run's paths, outputs and waits in order."""
     arm, robot = program.arm, program.carried.robot
     jobs = jobs_of(program)
     wanted = [command for job in jobs for command in job.commands]
@@ -84,7 +84,7 @@ def deviation(program: Program, played: "list[Command] | TimedPoints") -> Deviat
 
 
 def signals(played: "Sequence[Command] | TimedPoints", program: Program) -> list[str]:
-    """What the gripper does when it changes, and the machines waited for, in order; it begins open."""
+    """The gripper's changes, beginning open, and the waits for machines, in order, as comparable words."""
     machines, found, closed = program.carried.machines, list[str](), False
     if isinstance(played, TimedPoints):
         told: list[Command] = []
@@ -117,7 +117,7 @@ def _compared_by_time(program: Program, played: Array) -> Deviation:
 
 
 def run_off(program: Program) -> float:
-    """How far the run's own tool was off where it was driven to, at the ends of its ways, at the worst [m]."""
+    """The largest deviation [m] of the run's own tool from its target at the ends of its paths."""
     ends = [motion for motion in program.motions if motion.complete]
     wanted = [program.tools(motion.last - 1, motion.last)[0, :3] for motion in ends]
     seen = [program.seen[motion.seen_last - 1, :3] for motion in ends]
@@ -128,7 +128,7 @@ def run_off(program: Program) -> float:
 
 
 def play(commands: Sequence[Command], arm: Arm, settings: RobotSettings) -> list[Array]:
-    """Where the tool was on each `Path` (n, 7), see `Program.seen`, a row a physics step, when the arm alone does it all."""
+    """The tool's poses on each `Path` (n, 7), see `Program.seen`, one row per physics step, when the arm plays alone."""
     with World() as world:
         robot = Robot(world, arm, settings.speed_m_s, settings.acceleration_m_s2, settings.grip_force_n or USUAL_N)
         ways: list[Array] = []
@@ -153,7 +153,7 @@ def play(commands: Sequence[Command], arm: Arm, settings: RobotSettings) -> list
 
 
 def _run(world: World, motion: Iterator[None], robot: Robot | None = None) -> Array:
-    """Carry a motion out; with a robot, where its tool was, the place where it began included."""
+    """The tool's poses (n, 7) while a motion is carried out, the first one included; empty without a robot."""
     seen = [] if robot is None else [_link(world, robot.arm)]
     for _ in motion:
         world.step()
@@ -167,7 +167,7 @@ def _link(world: World, arm: Arm) -> Array:
 
 
 def _joint_motion(robot: Robot, target: Array, percent: float) -> Iterator[None]:
-    """All joints at once and evenly, with a share of their speed; nothing where they are there already."""
+    """Move all joints together and evenly, with a share of their speed; no steps if they are there already."""
     here = robot.world.joints(NAME, robot.arm.joints)
     seconds = float(np.max(np.abs(target - here) / (robot.arm.speed * percent / 100.0)))
     steps = ceil(seconds / TIME_STEP - 1e-9)
@@ -178,7 +178,7 @@ def _joint_motion(robot: Robot, target: Array, percent: float) -> Iterator[None]
 
 
 def play_timed(played: TimedPoints, arm: Arm, settings: RobotSettings, at_s: Array) -> Array:
-    """Where the tool was at times `at_s` (n,) [s], (n, 7) as in `Program.seen`, when the arm alone goes through the points."""
+    """The tool's poses (n, 7), see `Program.seen`, at times `at_s` (n,) [s], when the arm alone goes through the points."""
     if not played.points:
         raise BadInput("there are no points to play")
     times = np.array([point.t_s for point in played.points]) / TIME_STEP  # in physics steps from here on
@@ -201,7 +201,7 @@ def play_timed(played: TimedPoints, arm: Arm, settings: RobotSettings, at_s: Arr
 
 
 def _rests(times: Array, joints: Array) -> dict[int, int]:
-    """From which physics step to which the arm need not be simulated: it rests, and has come to rest."""
+    """The physics steps to skip, first -> last: the arm rests in between and has come to a stop."""
     found = {}
     for number in range(len(times) - 1):
         first, last = ceil(times[number]) + HOLD_STEPS, int(times[number + 1]) - HOLD_STEPS
@@ -211,7 +211,7 @@ def _rests(times: Array, joints: Array) -> dict[int, int]:
 
 
 def _at(times: Array, joints: Array, step: int) -> Array:
-    """The joints (k,) at a physics step."""
+    """The joints (k,) [rad] at a physics step, by linear interpolation."""
     after = int(np.searchsorted(times, step, side="left"))
     if after == 0 or after == len(times):
         return np.asarray(joints[min(after, len(times) - 1)])
@@ -223,7 +223,7 @@ def _at(times: Array, joints: Array, step: int) -> Array:
 
 
 def _gaps(one: Array, other: Array) -> tuple[Array, Array]:
-    """How far (n,) [m] and by what angle (n,) [rad] poses (n, 7) are apart, row by row."""
+    """The distances (n,) [m] and angles (n,) [rad] between two rows of poses (n, 7), row by row."""
     from scipy.spatial.transform import Rotation
 
     turn = Rotation.from_quat(one[:, 3:]).inv() * Rotation.from_quat(other[:, 3:])
@@ -231,9 +231,9 @@ def _gaps(one: Array, other: Array) -> tuple[Array, Array]:
 
 
 def apart(seen: Array, way: Array) -> tuple[Array, Array]:
-    """How far (n,) [m] and by what angle (n,) [rad] each pose of `seen` (n, 7) is off the nearest place of `way` (m, 7).
+    """The distance (n,) [m] and angle (n,) [rad] of each pose of `seen` (n, 7) from the nearest one of the path `way` (m, 7).
 
-    A turn counts as YAW_ARM in what is nearest.
+    For the nearest pose, turns are converted to lengths with YAW_ARM.
     """
     way = np.repeat(way, 2, axis=0) if len(way) == 1 else way
     points, line = _flat(seen), _flat(way)
@@ -245,13 +245,13 @@ def apart(seen: Array, way: Array) -> tuple[Array, Array]:
         share = np.clip(((point - starts) * steps).sum(axis=1) / lengths, 0.0, 1.0)
         at = int(np.argmin(((point - starts - share[:, None] * steps) ** 2).sum(axis=1)))
         before, after = way[at], way[at + 1].copy()
-        after[3:] *= np.sign(before[3:] @ after[3:]) or 1.0  # of a quaternion's two signs the nearer one
+        after[3:] *= np.sign(before[3:] @ after[3:]) or 1.0  # q and -q are the same rotation: take the closer sign
         nearest[row] = before + share[at] * (after - before)
     return _gaps(seen, nearest)
 
 
 def _flat(poses: Array) -> Array:
-    """x, y, z [m] and the yaw times YAW_ARM, without jumps, of poses (n, 7)."""
+    """The coordinates (n, 4) [m] of poses (n, 7): x, y, z, and the unwrapped yaw times YAW_ARM."""
     from scipy.spatial.transform import Rotation
 
     across = Rotation.from_quat(poses[:, 3:]).apply([0.0, 1.0, 0.0])

@@ -1,4 +1,7 @@
-"""What a robot carried out in a run: its motions, gripper outputs, rests and transfers, as the run's folder keeps them."""
+"""The program of a run: the robot's motions, gripper outputs, rests and transfers, as kept in the run's folder.
+
+Also the options of an export, and the numbers of inputs and outputs that all controllers share.
+"""
 
 import re
 from dataclasses import dataclass
@@ -25,9 +28,10 @@ POSITIONS = ("rectan", "pulse")
 
 @dataclass(frozen=True)
 class Options:
-    """positions: of job files, rectangular or in pulses. date: that they bear, yyyy/mm/dd hh:mm.
+    """The options of an export.
 
-    any_arm: programs are also written for arms of other makers than the controller's.
+    positions: of job files, rectangular or in pulses. date: in their headers, yyyy/mm/dd hh:mm. any_arm: whether programs
+    are also written for arms of other makers than the controller's.
     """
 
     positions: Literal["rectan", "pulse"] = "rectan"
@@ -35,7 +39,7 @@ class Options:
     any_arm: bool = False
 
     def check_arm(self, form: str, maker: str, names: str, arm: str, *, level: bool) -> None:
-        """BadInput for an arm that is none of a controller's maker, whose names match `names`, unless any will do; or level."""
+        """Raise BadInput for an arm whose name does not match the maker's `names`, unless any arm is allowed; or a level tool."""
         if level:
             raise BadInput(
                 f"--format {form}: its poses are of a tool that hangs; this run's is level: csv and json fit any"
@@ -46,31 +50,31 @@ class Options:
             )
 
 
-GRIPPER = 1  # its output, and its input that says that it holds something
-PULSE_S = 0.5  # of an output that a machine waits for
+GRIPPER = 1  # number of its output, and of its input that reports that it holds something
+PULSE_S = 0.5  # duration of a pulse on an output to a machine
 
 
 def done_input(machine: int) -> int:
-    """By which a machine, counted from 1, says that it is done."""
+    """The input by which a machine, counted from 1, reports that it is done."""
     return 1 + machine
 
 
 def start_output(machine: int) -> int:
-    """By which a machine, counted from 1, is told to begin."""
+    """The output that tells a machine, counted from 1, to begin."""
     return 2 * machine
 
 
 def reset_output(machine: int) -> int:
-    """By which a machine, counted from 1, is told that its part was taken out."""
+    """The output that tells a machine, counted from 1, that its part was taken out."""
     return 2 * machine + 1
 
 
-# ---- program ----------------------------------------------------------------------------------------------------------
+# ---- the program as kept in the run's folder ----------------------------------------------------------------------------
 
 
 PROGRAM, TRAJECTORY = "program.json", "trajectory.npz"
-MAX_TEXT_BYTES, MAX_BYTES = 20_000_000, 200_000_000  # of the two files, the second one unpacked
-_ARRAYS = {"at_s": 1, "joints": 2, "closed": 1, "seen_at_s": 1, "seen": 2}  # and how many dimensions they have
+MAX_TEXT_BYTES, MAX_BYTES = 20_000_000, 200_000_000  # largest sizes of `program.json`, and of `trajectory.npz` unpacked
+_ARRAYS = {"at_s": 1, "joints": 2, "closed": 1, "seen_at_s": 1, "seen": 2}  # number of dimensions of each array
 
 _HEADS = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}  # by version
 
@@ -80,10 +84,10 @@ Row = Annotated[int, Field(ge=0)]
 
 
 class Motion(Record):
-    """The tool's way along `poses` (x, y, z [m], yaw [rad], each), rounded by `blend_m`, from rest to rest.
+    """A motion from rest to rest through `poses` (x, y, z [m], yaw [rad] each), with corners rounded by `blend_m` [m].
 
-    Rows `first` to `last` of the joints were driven, `seen_first` to `seen_last` of what was seen. complete: to the end; if
-    not, it was broken off, and its last row is where the arm was when it went on.
+    It covers rows `first` to `last` of the program's joints, and rows `seen_first` to `seen_last` of `seen`. complete: False
+    for a motion that was aborted; its last row is then the arm's position when the next action began.
     """
 
     what: Literal["motion"] = "motion"
@@ -136,15 +140,15 @@ class Transfer(Record):
 
     @property
     def words(self) -> str:
-        """What it does, for people."""
+        """The transfer in words, for people."""
         what = self.part if self.carries == "part" else f"pallet of {self.part}"
         return f"{what}: {self.origin} to {self.target}"
 
 
 class Carried(Record):
-    """What `program.json` says; the rows that it counts stand in `trajectory.npz`. folder: of an arm that is a URDF file.
+    """The content of `program.json`; its row numbers refer to the arrays of `trajectory.npz`.
 
-    batches: the machines that work on all parts in them together.
+    folder: of an arm that is a URDF file. batches: the machines that process all parts in them together.
     """
 
     version: Literal[1] = 1
@@ -160,10 +164,10 @@ class Carried(Record):
 
 @dataclass(frozen=True, eq=False)
 class Program:
-    """One run of one robot; all times [s] since its floor was ready.
+    """The program of one robot in one run; all times are [s] since the scene was ready.
 
-    joints (n, k) [rad]: the arm's targets at at_s (n,), with the gripper closed (n,) or not; seen (m, 7): where the finger
-    tips were in physics at seen_at_s (m,): x, y, z [m] and their frame's quaternion xyzw, x out of the gripper, y across it.
+    joints (n, k) [rad]: the arm's targets at times at_s (n,), and whether the gripper was closed (n,). seen (m, 7): the
+    finger tips' pose in physics at times seen_at_s (m,): x, y, z [m] and quaternion xyzw, x out of the gripper, y across it.
     """
 
     carried: Carried
@@ -184,14 +188,14 @@ class Program:
         return [action for action in self.carried.actions if isinstance(action, Motion)]
 
     def tools(self, first: int, last: int) -> Array:
-        """The tool poses x, y, z [m], yaw [rad] (n, 4) that these rows of joints hold; the yaw goes on without jumps."""
+        """The tool poses (n, 4), x, y, z [m] and unwrapped yaw [rad], of the rows `first` to `last` of the joints."""
         poses = self.arm.tools(self.joints[first:last])
         poses[:, 2] += self.arm.base_up_m
         poses[:, 3] = np.unwrap(poses[:, 3])
         return poses
 
     def save(self, folder: Path) -> None:
-        """Write its two files into a folder that is there. Raises OSError."""
+        """Write the two files into an existing folder. Raises OSError."""
         text = self.carried.model_dump_json(indent=1)
         (folder / PROGRAM).write_text(f"{text}\n", encoding="utf-8")
         joints, seen = np.asarray(self.joints, np.float32), np.asarray(self.seen, np.float32)
@@ -201,7 +205,7 @@ class Program:
 
     @classmethod
     def load(cls, folder: Path) -> "Program":
-        """What a run left in its folder. BadInput says what is missing or damaged."""
+        """The program in a run's folder. BadInput says what is missing or damaged."""
         paths = [folder / name for name in (PROGRAM, TRAJECTORY)]
         for path in paths:
             if not path.is_file():
@@ -225,7 +229,7 @@ def _arrays(path: Path) -> list[Any]:
         _check_sizes(content)
         with np.load(BytesIO(content), allow_pickle=False) as stored:
             found = {name: np.asarray(stored[name], bool if name == "closed" else float) for name in _ARRAYS}
-    except Exception as error:  # whatever the readers of zip files and arrays come to over a stranger's file
+    except Exception as error:  # any error of the readers of zip files and arrays, for a file of unknown origin
         raise BadInput(f"'{path}': not a run's trajectory: {error}") from None
     for name, dimensions in _ARRAYS.items():
         if found[name].ndim != dimensions or not np.isfinite(found[name]).all():
@@ -234,7 +238,7 @@ def _arrays(path: Path) -> list[Any]:
 
 
 def _check_sizes(content: bytes) -> None:
-    """ValueError unless the arrays, unpacked, are as large as they say, and no larger than a run's: nothing is unpacked."""
+    """Raise ValueError, before unpacking, unless the arrays' sizes match their headers and are within MAX_BYTES."""
     with ZipFile(BytesIO(content)) as archive:
         entries = archive.infolist()
         if (total := sum(entry.file_size for entry in entries)) > MAX_BYTES:
@@ -252,7 +256,7 @@ def _check_sizes(content: bytes) -> None:
 
 
 def _check_rows(program: Program, path: Path) -> None:
-    """BadInput unless all rows that the motions count by are there, and the arm has so many joints."""
+    """Raise BadInput unless the arrays have all rows that the motions refer to, and a column for each joint of the arm."""
     rows, seen, axes = len(program.joints), len(program.seen), len(program.arm.joints)
     if program.joints.shape[1] != axes or program.seen.shape[1] != 7:
         raise BadInput(f"'{path}': its trajectory is not of the arm '{program.arm.name}' with {axes} joints")

@@ -1,4 +1,4 @@
-"""Writes down what a robot carries out, as it does, to be exported afterwards."""
+"""The recorder of a robot's motions, gripper outputs and rests during a run, for a later export."""
 
 from collections.abc import Callable, Sequence
 
@@ -12,19 +12,19 @@ from lab.sim.arms.robot import NAME, Robot, Trajectory
 from lab.sim.world import TIME_STEP
 from lab.tasks.task import Task
 
-SEEN_EVERY = 2  # physics steps: the tool is looked at 120 times a simulated second
+SEEN_EVERY = 2  # physics steps between two records of the tool: 120 a simulated second
 
 
 class MotionRecorder:
-    """A `MotionListener`: joint targets of each physics step in which the arm moves, and where physics has the tool."""
+    """A `MotionListener` that records the joint targets of each physics step of a motion, and the tool's real poses."""
 
     def __init__(self, robot: Robot) -> None:
-        """Its times begin now; the robot tells it from now on."""
+        """Start recording: times begin at 0 now, and the robot reports to this listener from now on."""
         self._robot, self._zero = robot, robot.world.steps
         self._actions: list[Action] = []
         self._rows: list[Array] = []  # joints (n, k) and times (n,) [steps] of each motion
         self._times: list[Array] = []
-        self._seen: list[tuple[int, Array]] = []  # when [steps], and the tool link's pose (7,)
+        self._seen: list[tuple[int, Array]] = []  # time [steps], and the tool link's pose (7,)
         self._open: tuple[Sequence[ToolPose], float, Trajectory, Array, int, int] | None = None
         self._driven = 0
         robot.listener = self
@@ -34,13 +34,13 @@ class MotionRecorder:
         return self._robot.world.steps - self._zero
 
     def began(self, poses: Sequence[ToolPose], blend: float, way: Trajectory, before: Array) -> None:
-        """A motion; one that was under way has been broken off."""
+        """A motion begins; one that was under way is recorded as aborted."""
         self._close(complete=False)
         self._open = poses, blend, way, before, self._steps, len(self._seen)
         self._driven = 0
 
     def drives(self, row: int) -> None:
-        """Count it, and look at the tool now and then; it is where the row before has led it."""
+        """A row of the trajectory becomes the target; every SEEN_EVERY rows, record the pose that the row before led to."""
         assert self._open is not None
         rows = len(self._open[2].positions)
         self._driven = min(row + 1, rows)
@@ -48,17 +48,17 @@ class MotionRecorder:
             self._see()
 
     def ended(self) -> None:
-        """The motion is complete."""
+        """The motion is complete: record it."""
         self._see()
         self._close(complete=True)
 
     def pressed(self, closed: bool) -> None:
-        """A gripper output."""
+        """Record a gripper output."""
         self._close(complete=False)
         self._actions.append(Press(at_s=self._steps * TIME_STEP, closed=closed))
 
     def rested(self, steps: int) -> None:
-        """A rest."""
+        """Record a rest."""
         self._close(complete=False)
         self._actions.append(Rest(at_s=self._steps * TIME_STEP, seconds=steps * TIME_STEP))
 
@@ -67,17 +67,17 @@ class MotionRecorder:
         self._seen.append((self._steps, np.concatenate([position, turn])))
 
     def _close(self, *, complete: bool) -> None:
-        """Write down the motion that is under way, as far as it was driven."""
+        """Record the motion that is under way, up to the row that was driven."""
         if self._open is None:
             return
         poses, blend, way, before, begun, seen = self._open
         self._open = None
-        self._driven = min(self._driven, self._steps - begun)  # a target that was set in the step of a stop is none
+        self._driven = min(self._driven, self._steps - begun)  # a target set in the step of a stop was not driven
         if not self._driven:
             return
         first = sum(map(len, self._rows))
         rows, times = [before, *way.positions[: self._driven]], [*range(begun, begun + self._driven + 1)]
-        if not complete:  # it ends where the arm has come to a stop
+        if not complete:  # it ends where the arm came to a stop
             self._see()
             rows.append(self._robot.world.joints(NAME, self._robot.arm.joints))
             times.append(self._steps)
@@ -97,7 +97,7 @@ class MotionRecorder:
         )
 
     def program(self, task: Task, seed: int, moves: Sequence[Move], name: Callable[[int], str]) -> Program:
-        """What was written down so far; `moves`: the transfers that were made, `name`: of a part."""
+        """The program recorded so far; `moves`: the transfers that were made; `name`: gives a part's name."""
         self._close(complete=False)
         arm = self._robot.arm
         machines = tuple(station.name for station in task.stations if station.kind == "machine")
@@ -119,7 +119,7 @@ class MotionRecorder:
 
 
 def tips(links: Array, tip: Array) -> Array:
-    """Where the finger tips are (n, 7), x, y, z [m] and quaternion xyzw, for poses (n, 7) of the link that `tip` (4, 4) is in."""
+    """The finger tips' poses (n, 7), x, y, z [m] and quaternion xyzw, for poses (n, 7) of the link in which `tip` (4, 4) is."""
     from scipy.spatial.transform import Rotation
 
     if not len(links):
@@ -129,14 +129,14 @@ def tips(links: Array, tip: Array) -> Array:
 
 
 def closed_at(actions: Sequence[Action], at_s: Array) -> NDArray[np.bool_]:
-    """Whether the gripper was closed (n,) at times (n,) [s]; it begins open."""
+    """Whether the gripper was closed (n,) at times `at_s` (n,) [s]; it is open at first."""
     presses = [action for action in actions if isinstance(action, Press)]
     states = np.array([False, *(press.closed for press in presses)])
     return np.asarray(states[np.searchsorted([press.at_s for press in presses], at_s, side="right")])
 
 
 def _mass_kg(task: Task, part: str, *, on_pallet: bool) -> float:
-    """The mass of a part, named by its kind and number, and of the pallet that it is on; 0 for what the task does not know."""
+    """The mass [kg] of a part, named by kind and number, and of its pallet; 0 for a part that the task does not contain."""
     masses = {one.name: one.mass_kg for one in task.parts}
     own = next((one for one in task.parts if one.name == part.rpartition(" ")[0]), None)
     if own is None:

@@ -1,4 +1,4 @@
-"""A run as points in time: joints, tool, gripper, and which machine's input is waited for."""
+"""A run as timed points: joints, tool, gripper, and the machine whose input the robot waits for."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -9,13 +9,13 @@ from lab.export.commands import thinned
 from lab.export.program import Array, Motion, Press, Program
 from lab.export.recorder import closed_at
 
-WITHIN_RAD = 1e-4  # of the joints driven, where straight lines between the points are
-DIGITS = 6  # of a written number, seconds, metres or radians
+WITHIN_RAD = 1e-4  # largest deviation of the joints when interpolated linearly between the points
+DIGITS = 6  # decimals of a written number: seconds, metres or radians
 
 
 @dataclass(frozen=True)
 class Point:
-    """At t_s [s]: the joints (k,) [rad] and the tool x, y, z [m], yaw [rad] that they hold, the gripper, the job's number.
+    """The state at t_s [s]: joints (k,) [rad], their tool pose x, y, z [m], yaw [rad], the gripper, the number of the job.
 
     waits_for: the machine whose input the robot waits for from now on; "": none.
     """
@@ -30,14 +30,14 @@ class Point:
 
 @dataclass(frozen=True)
 class TimedPoints:
-    """Points by time, of an arm's joints by name; between them the joints move in straight lines."""
+    """Points by time, and the names of the arm's joints; between the points the joints are interpolated linearly."""
 
     joints: tuple[str, ...]
     points: tuple[Point, ...]
 
 
 def timed(program: Program) -> TimedPoints:
-    """The points of a run, as few as keep within WITHIN_RAD; numbers are rounded as they are written."""
+    """The points of a run, as few as stay within WITHIN_RAD of its joints; numbers are rounded to DIGITS decimals."""
     drops = [transfer.drop_s for transfer in program.carried.transfers]
     found: list[Point] = []
     for t_s, joints, waits_for in _rows(program):
@@ -54,7 +54,7 @@ def _rounded(number: float) -> float:
 
 
 def _rows(program: Program) -> Iterator[tuple[float, Array, str]]:
-    """Times, joints and what is waited for, in order."""
+    """Times, joints and the machine waited for, of each action in order."""
     waits = [(one.reach_s, one.waits_for) for one in program.carried.transfers if one.waits_for is not None]
     joints = program.joints[0] if len(program.joints) else None
     for action in program.carried.actions:

@@ -1,4 +1,4 @@
-"""A run's points in time as a table for spreadsheets, and such a table read again."""
+"""A run's timed points as a CSV table, written and read."""
 
 import csv
 from collections.abc import Mapping, Sequence
@@ -15,12 +15,12 @@ _LAST = ("gripper_closed", "waits_for", "job")
 
 
 def write(program: Program, options: Options) -> dict[str, str]:
-    """One file, `trajectory.csv`."""
+    """The text of the only file, `trajectory.csv`, by its name."""
     return {"trajectory.csv": text_of(timed(program))}
 
 
 def text_of(trajectory: TimedPoints) -> str:
-    """The table: a column a joint [rad], the tool's pose that they hold, the gripper, the machine waited for, the job."""
+    """The table's text: time, a column for each joint [rad], the tool's pose, gripper, machine waited for, and job."""
     text = StringIO()
     rows = csv.writer(text, lineterminator="\n")
     rows.writerow(_header(trajectory.joints))
@@ -35,7 +35,7 @@ def _header(joints: Sequence[str]) -> list[str]:
 
 
 def read(files: Mapping[str, str], arm: Arm) -> TimedPoints:
-    """The points of the one file, for this arm. BadInput names the line that is wrong."""
+    """The points of the only file, for this arm. BadInput names the line that is wrong."""
     if len(files) != 1:
         raise BadInput(f"wanted one table, found {', '.join(files) or 'none'}")
     ((name, text),) = files.items()

@@ -1,4 +1,4 @@
-"""A run's points in time as one JSON document, and such a document read again."""
+"""A run's timed points as a JSON document, written and read."""
 
 import json
 from collections.abc import Mapping
@@ -27,7 +27,7 @@ class PointFields(Record):
 
 
 class TrajectoryDocument(Record):
-    """The document; between its points the joints move in straight lines. base_up_m: the arm's foot above the world's zero."""
+    """The document; joints are interpolated linearly between points. base_up_m: height of the arm's foot above z = 0 [m]."""
 
     format: Literal["lab trajectory"] = "lab trajectory"
     version: Literal[1] = 1
@@ -39,13 +39,13 @@ class TrajectoryDocument(Record):
 
 
 def write(program: Program, options: Options) -> dict[str, str]:
-    """One file, `trajectory.json`."""
+    """The text of the only file, `trajectory.json`, by its name."""
     arm = program.arm
     return {"trajectory.json": text_of(timed(program), program.carried.task, arm.name, arm.base_up_m)}
 
 
 def text_of(trajectory: TimedPoints, task: str, arm: str, base_up_m: float) -> str:
-    """The document, a point a line."""
+    """The document's text, one point per line."""
     head = {"format": "lab trajectory", "version": 1, "task": task, "arm": arm, "base_up_m": base_up_m}
     lines = ",\n".join(json.dumps(_fields(point), allow_nan=False) for point in trajectory.points)
     opened = json.dumps(head | {"joints": list(trajectory.joints)}, allow_nan=False)[:-1]
@@ -64,7 +64,7 @@ def _fields(point: Point) -> dict[str, object]:
 
 
 def read(files: Mapping[str, str], arm: Arm) -> TimedPoints:
-    """The points of the one file, for this arm. BadInput names the field that is wrong."""
+    """The points of the only file, for this arm. BadInput names the field that is wrong."""
     if len(files) != 1:
         raise BadInput(f"wanted one document, found {', '.join(files) or 'none'}")
     ((name, text),) = files.items()

@@ -1,8 +1,9 @@
-"""A run as a URScript program of movej, movel, set_digital_out, sleep and waits on get_digital_in, and such text as commands.
+"""A run as a URScript program of movej, movel, set_digital_out, sleep and waits on get_digital_in; and the way back.
 
-Poses p[x, y, z, rx, ry, rz] [m], axis times angle [rad], are the finger tips' in the arm's base, z out of the gripper, as
-`set_tcp` says. Source: Universal Robots' script manual (movej, movel, set_digital_out, get_digital_in, sleep, sync, set_tcp).
-No controller has run what is written here; the lab has no arm of that family, so a UR reaches these poses with other joints.
+Poses p[x, y, z, rx, ry, rz] [m], rotation vector [rad], are those of the finger tips in the arm's base frame, z out of the
+gripper, as set by `set_tcp`. Source: Universal Robots' script manual (movej, movel, set_digital_out, get_digital_in, sleep,
+sync, set_tcp). The programs have not been tested on a controller; the lab has no arm of that family, so a UR reaches these
+poses with other joints.
 """
 
 import re
@@ -33,8 +34,8 @@ from lab.sim.arms.tool_path import ROUNDINGS_M, YAW_ARM
 
 AXES = 6
 MAKER, NAMES = "Universal Robots", r"ur\d+e?([_-].*)?"
-MOST_SHARE = 0.49  # of the shorter line: blends must not meet
-JOINT_SPEED, JOINT_ACCELERATION = 0.3, 1.0  # [rad/s], [rad/s2] to where a transfer begins
+MOST_SHARE = 0.49  # largest blend, as a share of the shorter line, so that blends do not overlap
+JOINT_SPEED, JOINT_ACCELERATION = 0.3, 1.0  # [rad/s], [rad/s2] of the move to a transfer's start
 _NUMBER = r"-?\d+\.\d+"
 _POSE = rf"p\[({_NUMBER}(?:, {_NUMBER}){{5}})\]"
 _JOINTS = rf"\[({_NUMBER}(?:, {_NUMBER}){{5}})\]"
@@ -53,7 +54,7 @@ def warnings(program: Program) -> list[str]:
 
 
 def write(program: Program, options: Options) -> dict[str, str]:
-    """One file. BadInput for an arm that has not six axes."""
+    """The text of the only file, by its name. BadInput for an arm that does not have six axes."""
     arm = program.arm
     if len(arm.joints) != AXES:
         raise BadInput(
@@ -75,7 +76,7 @@ def write(program: Program, options: Options) -> dict[str, str]:
 
 @dataclass
 class _Writer:
-    """Writes commands down, and knows where the tool is meanwhile."""
+    """Writes commands as text, and keeps the tool's pose along the way."""
 
     arm: Arm
     acceleration: float
@@ -132,31 +133,31 @@ def _pose_text(place: tuple[float, ...], turn: tuple[float, ...]) -> str:
 
 
 def _down(yaw: float) -> tuple[float, float, float]:
-    """Axis times angle of a tool that points straight down, turned by `yaw`: half a turn about an axis that lies flat."""
+    """The rotation vector [rad] of a tool that points straight down with a yaw [rad]: half a turn about a horizontal axis."""
     yaw = (yaw + pi) % (2 * pi) - pi
     return (pi * cos(yaw / 2), pi * sin(yaw / 2), 0.0)
 
 
 def _tool_speed(step: Array, way_m_s: float) -> float:
-    """v of one straight piece (4,): of a mere turn, which movel times by its angle [rad/s], else of the tool [m/s]."""
+    """The `v` of movel for one straight line (4,): [rad/s] for a pure turn, else the tool's speed [m/s]."""
     far, turn = hypot(*step[:3]), abs(step[3])
     return way_m_s / YAW_ARM if far < 1e-6 else way_m_s * far / hypot(far, YAW_ARM * turn)
 
 
 def _nearest_rounding(radius_m: float) -> float:
-    """Of a blend radius, which MOST_SHARE may have cut a little: the one of ROUNDINGS_M that is meant; others as they are."""
+    """The rounding of ROUNDINGS_M that a blend radius stands for, as MOST_SHARE may have reduced it; others unchanged."""
     nearest = min(ROUNDINGS_M, key=lambda cut: abs(cut - radius_m))
     return nearest if abs(nearest - radius_m) < 0.03 * nearest else radius_m
 
 
 def _way_speed(step: Array, v: float) -> float:
-    """The speed of the way [m/s] that `_tool_speed` was told."""
+    """The path speed [m/s]: the inverse of `_tool_speed`."""
     far, turn = hypot(*step[:3]), abs(step[3])
     return v * YAW_ARM if far < 1e-6 else v * hypot(far, YAW_ARM * turn) / far
 
 
 def read(files: Mapping[str, str], arm: Arm) -> list[Command]:
-    """The commands of the one file. BadInput names the line that is no part of this dialect."""
+    """The commands of the only file. BadInput names a line that is not part of this dialect."""
     if len(files) != 1:
         raise BadInput(f"wanted one URScript file, found {', '.join(files) or 'none'}")
     ((name, text),) = files.items()
@@ -165,7 +166,7 @@ def read(files: Mapping[str, str], arm: Arm) -> list[Command]:
 
 @dataclass
 class _Reader:
-    """Reads line by line, and knows where the tool is meanwhile."""
+    """Reads line by line, and keeps the tool's pose along the way."""
 
     arm: Arm
     where: str
@@ -181,7 +182,7 @@ class _Reader:
         head = re.fullmatch(r"def (\w+)\(\):", lines[0]) if lines else None
         if head is None or lines[-2:] != ["end", f"{head[1]}()"]:
             raise BadInput(f"{self.where}: wanted one program, from 'def NAME():' to 'end' and 'NAME()'")
-        block = ""  # what has begun and has no end yet
+        block = ""  # the block that has begun and not ended
         for self.number, line in enumerate(lines[1:-2], start=2):
             if block and (line == "end" or re.fullmatch(_WITHIN[block], line)):
                 block = "" if line == "end" else block
@@ -198,7 +199,7 @@ class _Reader:
         return BadInput(f"{self.where}, line {self.number}: {what}")
 
     def _line(self, line: str) -> str:
-        """Read one line; the word that begins a block, or ""."""
+        """The word that begins a block in this line, or ""; reads the line."""
         word = re.split(r"[ (]", line, maxsplit=1)[0]
         if word not in _LINES:
             raise unknown("instruction", word, _LINES, f"{self.where}, line {self.number}")
@@ -256,7 +257,7 @@ class _Reader:
 
 
 _Act = Callable[[_Reader, "re.Match[str]"], None]
-_LINES: dict[str, list[tuple[str, _Act]]] = {  # first word -> the forms of the whole line, and what each means
+_LINES: dict[str, list[tuple[str, _Act]]] = {  # first word -> patterns of the whole line, and what each does
     "set_tcp": [(rf"set_tcp\({_POSE}\)", lambda reader, match: None)],
     "movej": [
         (rf"movej\({_POSE}, a=({_NUMBER}), v=({_NUMBER})\)", _Reader.joint_pose),
@@ -279,4 +280,7 @@ _LINES: dict[str, list[tuple[str, _Act]]] = {  # first word -> the forms of the 
         (r"while \(get_digital_in\((\d{1,2})\) == True\):", lambda reader, match: None),
     ],
 }
-_WITHIN = {"while": r"sync\(\)", "if": r'popup\(".*", error=True, blocking=True\)|halt'}  # the lines of a block
+_WITHIN = {
+    "while": r"sync\(\)",
+    "if": r'popup\(".*", error=True, blocking=True\)|halt',
+}  # pattern of the lines inside a block

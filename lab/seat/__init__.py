@@ -1,1 +1,1 @@
-"""Where a person answers: a terminal, a page, and the stage that shows where the learner asks."""
+"""Where a person answers: at a terminal or on a page, with a live scene of the state in which the learner asks."""

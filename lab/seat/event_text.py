@@ -1,4 +1,4 @@
-"""What happens in lessons and runs, in words: the same for the terminal, the page and the progress lines."""
+"""The events of lessons and runs in words, which terminal, page and progress lines share."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -52,17 +52,17 @@ ENDED = {
     "budget spent": "all the help that may be asked for has been given; the learner goes on alone",
     "misled by what was remembered": "what was said led round in circles or into obstacles; the learner asks no more",
 }
-PARTS_DONE = (SkillReady, MoveTimed, SequenceFound, MoveMade)  # each tells that one part of a phase is done
-_FOUND = {"reused": "by", "adapted": "from"}  # the policy of another problem
+PARTS_DONE = (SkillReady, MoveTimed, SequenceFound, MoveMade)  # each reports that one item of a phase is done
+_FOUND = {"reused": "by", "adapted": "from"}  # preposition before the policy of another problem
 _SHOWN_MOVES = 24
-_LEAST_WAIT_S = 0.05  # that is worth a word
+_LEAST_WAIT_S = 0.05  # shortest wait that is mentioned
 
 Tone = Literal["", "ask", "note", "good", "bad", "lost"]
 
 
 @dataclass(frozen=True)
 class Told:
-    """What is said of an event, and whether that is good news for who advises."""
+    """The text for an event, and whether it is good news for the advisor."""
 
     text: str
     tone: Tone = ""
@@ -74,9 +74,9 @@ def _label(mdp: TabularMDP, action: int) -> str:
 
 @dataclass
 class SessionText:
-    """Words for the events of sessions, one after the other; an episode is held against the mean told when it asked.
+    """The texts for the events of sessions, in order; an episode is compared with the mean at the time of the question.
 
-    named: what a move of a problem is called; kind: "steps", or "order", whose steps are costs.
+    named: gives the name of a problem's move; kind: "steps", or "order", in which steps are costs.
     """
 
     named: Callable[[TabularMDP, int], str] = _label
@@ -84,7 +84,7 @@ class SessionText:
     _mean_before: float | None = None
 
     def told(self, event: SessionEvent, mdp: TabularMDP | None = None, skill: str = "") -> Told | None:
-        """What is said of an event of this problem, None for nothing; skill: what is taught, where that has to be said."""
+        """The text for an event of this problem, None for none; skill: the name of the skill, if the text has to contain it."""
         match event:
             case AdviceRequested():
                 self._mean_before = event.current_mean
@@ -109,7 +109,7 @@ class SessionText:
         return None
 
     def _episode(self, event: EpisodeEnded) -> Told:
-        """One line on an episode with advice: its steps beside the mean before it."""
+        """One line on an episode with advice: its steps, compared with the mean before it."""
         good, judged = verdict(event, self._mean_before)
         outcome = (
             f"{'reached the goal in' if event.reached else 'did not reach the goal:'} {counted(event.steps, 'step')}"
@@ -123,7 +123,7 @@ class SessionText:
         return f"cost {steps:.1f}" if self.kind == "order" else f"counted {counted(steps, 'step')}"
 
     def _disagreed(self, event: AdvisorsDisagreed, mdp: TabularMDP | None) -> Told:
-        """Who said what, and whom the learner follows."""
+        """The answers of advisors who disagree, and whom the learner follows."""
         where = f"state {event.state}" if mdp is None else mdp.state_label(event.state)
 
         def named(action: int) -> str:
@@ -136,7 +136,7 @@ class SessionText:
 
 
 def lesson_parts(lesson: Lesson, first_asked: int | None = None, rejected: AdviceRejected | None = None) -> list[str]:
-    """What came of a lesson, beginning with the steps of the learned way and the fewest; where known, when it asked."""
+    """The results of a lesson: the steps of the learned path and the fewest possible; if known, when the learner asked."""
     result = lesson.result
     reached, fewest = lesson.steps
     parts = [f"{'?' if reached is None else reached}/{fewest or '?'} steps"]
@@ -157,18 +157,18 @@ def lesson_parts(lesson: Lesson, first_asked: int | None = None, rejected: Advic
 
 
 def saved_text(episodes: int, helped_steps: int) -> str:
-    """What a skill that was found has saved, "" for nothing."""
+    """The episodes and advised steps that a skill from the toolbox has saved, in words; "" for none."""
     counts = ((episodes, "episode"), (helped_steps, "helped step"))
     saved = [counted(number, what) for number, what in counts if number > 0]
     return f"saved {', '.join(saved)}" if saved else ""
 
 
 def sequence_parts(event: SequenceFound) -> tuple[str, str]:
-    """An order of the parts, and what it costs beside what no order can beat."""
+    """The order of the parts, and its cost compared with the bound."""
     best, known = event.result, event.reference
     order = " ".join(str(part_of(decision, event.parts)) for decision in best.sequence[:_SHOWN_MOVES])
     more = f" and {len(best.sequence) - _SHOWN_MOVES} more" if len(best.sequence) > _SHOWN_MOVES else ""
-    shown, reference = f"{best.cost:.1f} s", "its luckiest drawn episode"  # there is nothing to compare it with
+    shown, reference = f"{best.cost:.1f} s", "its luckiest drawn episode"  # there is no bound to compare it with
     if known is not None:
         gap = known.gap(best.cost)
         shown, bound = beside(best.cost, known.bound, known.unit, 1)
@@ -183,7 +183,7 @@ def sequence_parts(event: SequenceFound) -> tuple[str, str]:
 
 
 def stands_text(event: SequencingStands) -> str:
-    """The best order so far, and what no order can cost less than."""
+    """The incumbent's cost, and the bound."""
     known = event.reference
     if event.cost == inf:
         return f"no order yet, bound {known.bound:.1f}{known.unit}"
@@ -193,7 +193,7 @@ def stands_text(event: SequencingStands) -> str:
 
 
 def chosen_text(event: OrderChosen) -> str:
-    """Which order is used, and what each that was found costs."""
+    """The order that is used, and the cost of each order that was found."""
     unit = " s" if event.objective == MAKESPAN else ""
     whose = BESIDE_METHODS | {"exact": "the exact search"}
     worth = [f"{whose.get(by, f'{by} alone')} {cost:.1f}{unit}" for by, cost in event.costs.items()]
@@ -201,7 +201,7 @@ def chosen_text(event: OrderChosen) -> str:
 
 
 def move_text(made: MoveMade) -> str:
-    """What a move brought where."""
+    """A move in words: the part, its origin and its target."""
     move = made.move
     waited_s = move.pick_s - move.reach_s
     wait = f", waited {waited_s:.1f} s" if waited_s > _LEAST_WAIT_S else ""
@@ -210,7 +210,7 @@ def move_text(made: MoveMade) -> str:
 
 
 def run_text(event: Event) -> str:
-    """What happens in a run as one line; "" for what is not told."""
+    """An event of a run as one line; "" for events without a text."""
     match event:
         case PhaseBegan():
             return PHASES.get(event.name, event.name)

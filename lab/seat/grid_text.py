@@ -1,4 +1,4 @@
-"""The picture of where a learner is: a grid, slices of a space, or an environment's own drawing, cut to what fits."""
+"""The learner's position as text: a grid, slices or views of a space, or an environment's own drawing, cut to fit."""
 
 import re
 from dataclasses import dataclass, replace
@@ -25,7 +25,7 @@ STYLES = {"R": "bold cyan", "r": "cyan", "G": "bold green", "g": "green", "#": "
     f"*{ARROWS}{ASCII_ARROWS}", "bold magenta"
 )
 GAP = 3  # columns between two slices
-FEWEST_COLUMNS = 9  # cells of a slice that is cut so that its neighbours can be seen beside it
+FEWEST_COLUMNS = 9  # least width, in cells, of a slice that is cut to make room for its neighbours
 _SGR = re.compile(r"\x1b\[[0-9;]*m")
 _ESCAPE = re.compile(  # a colour; another sequence, a string up to its end or to that of the text; a lone escape
     r"(\x1b\[[0-9;]*m)|(?:\x1b\[|\x9b)[0-?]*[ -/]*[@-~]?|(?:\x1b[]P^_X]|[\x90\x98\x9d-\x9f]).*?(?:\x1b\\|[\x07\x9c]|\Z)"
@@ -36,7 +36,7 @@ _ESCAPE = re.compile(  # a colour; another sequence, a string up to its end or t
 
 @dataclass(frozen=True)
 class Marks:
-    """The characters of a picture, for a console that can or cannot show Unicode; and whether it shows colours."""
+    """The characters of a picture, for consoles with or without Unicode; and whether the console shows colours."""
 
     arrows: str = ARROWS
     free: str = "·"
@@ -46,22 +46,22 @@ class Marks:
 
     @classmethod
     def of(cls, console: Console) -> "Marks":
-        """Those that the console's encoding holds."""
+        """The marks that the console's encoding can represent."""
         marks = cls() if console.encoding.lower().startswith("utf") else cls(ASCII_ARROWS, ".", ">", "=")
         return replace(marks, coloured=console.color_system is not None and not console.no_color)
 
     def named(self, mdp: TabularMDP, action: int) -> str:
-        """An action by its label, with the arrow that it follows in the picture."""
+        """An action's label, with the arrow of its direction in the picture."""
         direction = direction_of(mdp, action)
         arrow = "" if direction is None else f"{self.arrows[direction]} "
         return f"{arrow}{mdp.action_labels[action]}"
 
 
 def direction_of(mdp: TabularMDP, action: int) -> int | None:
-    """Where an action points in the picture, an index into DIRECTIONS; None when it leaves the picture's plane.
+    """An action's direction in the picture, an index into DIRECTIONS; None when it leaves the picture's plane.
 
     Axis 0 runs down and axis 1 to the right (a grid of one axis runs to the right); on a map, axis 0 runs to the right
-    and axis 1 up. Actions that bear the names of all four directions point where they say.
+    and axis 1 up. If the actions have the names of all four directions, the names decide.
     """
     axes = len(mdp.coverage_shape or mdp.shape)
     if points_by_name(mdp):
@@ -74,22 +74,22 @@ def direction_of(mdp: TabularMDP, action: int) -> int | None:
 
 
 def points_by_name(mdp: TabularMDP) -> bool:
-    """Whether the actions are called after the four directions of a picture, or of the sky, in whatever order."""
+    """Whether the actions are named after the four directions of a picture, or of the compass, in any order."""
     known = {NAMES.get(label.lower()) for label in mdp.action_labels}
     return len(mdp.coverage_shape or mdp.shape) <= 2 and known >= {0, 1, 2, 3}
 
 
 def nearest_goal(mdp: TabularMDP, cell: tuple[int, ...]) -> tuple[int, ...] | None:
-    """The goal's cell with the fewest steps along the axes from a cell; None when there is no goal."""
+    """The goal cell nearest to a cell, in steps along the axes; None when there is no goal."""
     goals = [mdp.state_cell(int(state)) for state in np.flatnonzero(mdp.goal)]
     return min(goals, key=lambda goal: sum(abs(a - b) for a, b in zip(goal, cell, strict=True)), default=None)
 
 
 @dataclass(frozen=True)
 class Picture:
-    """Lines of text, what the marks in them mean, and the ranges of cells shown where not all are: (axis, low, high).
+    """A picture as lines of text, its legend, and the range of cells on each axis that is cut: (axis, low, high).
 
-    is_fixed: an environment's own drawing, which comes in one height.
+    is_fixed: an environment's own drawing, whose height cannot be changed.
     """
 
     lines: list[Text]
@@ -100,14 +100,14 @@ class Picture:
 
     @property
     def width(self) -> int:
-        """The columns of a terminal that it takes."""
+        """The picture's width in terminal columns."""
         return max((line.cell_len for line in self.lines), default=0)
 
 
 def picture_of(request: AdviceRequest, marks: Marks, width: int, height: int) -> Picture | None:
-    """The environment's own drawing, or the grid around the robot, in so many columns and lines; None without either.
+    """The environment's own drawing, or the grid around the robot, in `width` columns and `height` lines; None without either.
 
-    A drawing of its own is cut in width only. Slices of a space run along axis 2, the robot's own between its neighbours.
+    An environment's drawing is cut in width only. Slices of a space run along axis 2, the robot's slice in the middle.
     """
     own = request.picture
     if own.strip():
@@ -122,14 +122,14 @@ def picture_of(request: AdviceRequest, marks: Marks, width: int, height: int) ->
 
 
 def safe_ansi(drawing: str) -> Text:
-    """Text with the colours of an ANSI drawing; every other escape sequence and control character is left out."""
+    """The text of an ANSI drawing with its colours; all other escape sequences and control characters are removed."""
     kept = _ESCAPE.sub(lambda found: found[1] or "", drawing.replace("\r\n", "\n").expandtabs().strip("\n"))
     parts = zip(_SGR.split(kept), [*_SGR.findall(kept), ""], strict=True)
     return Text.from_ansi("".join(_printable(part) + code for part, code in parts))
 
 
 def bracketed(drawing: Text) -> Text:
-    """A drawing whose coloured backgrounds, such as an agent's place, are brackets instead."""
+    """A drawing in which brackets replace coloured backgrounds, such as that of the agent's cell."""
     plain, ends = drawing.plain, dict[int, str]()
     for span in drawing.spans:
         if not isinstance(span.style, str) and span.style.bgcolor is not None:
@@ -142,17 +142,17 @@ def _printable(text: str) -> str:
 
 
 def window(at: int, size: int, room: int) -> range:
-    """So many of `size` places as there is room for, with `at` in their middle where the ends allow it."""
+    """A range of at most `room` of `size` places, centred on `at` as far as the ends allow it."""
     room = max(1, min(room, size))
     low = min(max(at - room // 2, 0), size - room)
     return range(low, low + room)
 
 
 class _GridDrawing:
-    """The grid of one request as planes of axes 0 and 1, layer by layer of axis 2.
+    """The grid of one request as planes of axes 0 and 1, one for each layer of axis 2.
 
-    R robot, G goal, # obstacle, x covered; a goal in another plane casts a small g into this one. An arrow stands in the
-    cell that the learner itself would enter.
+    R robot, G goal, # obstacle, x covered; g is the projection of a goal in another plane. An arrow marks the cell that
+    the learner itself would enter.
     """
 
     def __init__(self, request: AdviceRequest, marks: Marks):
@@ -167,7 +167,7 @@ class _GridDrawing:
         self.rows, self.columns, self._place = self.grid.rows, self.grid.columns, self.grid.place
 
     def plane(self, layer: int) -> Plane:
-        """The marks of one layer, row by row as they are shown."""
+        """The marks of one layer, row by row as shown."""
         mdp, free, here = self.mdp, self.marks.free, self._place(self.cell)
         if mdp.coverage_shape:
             plane = np.where(mdp.covered(self.request.state), "x", free)
@@ -186,7 +186,7 @@ class _GridDrawing:
         return plane
 
     def _mark_choice(self, plane: Plane, layer: int) -> None:
-        """An arrow in the cell that the learner itself would enter, a star where it comes from another layer."""
+        """Mark the cell that the learner itself would enter: an arrow, or a star if the move comes from another layer."""
         request, entered = self.request, self.entered
         if entered == self.cell or entered[3:] != self.cell[3:] or entered[2:3] not in ((), (layer,)):
             return
@@ -196,7 +196,7 @@ class _GridDrawing:
             plane[there] = "*" if direction is None else self.marks.arrows[direction]
 
     def _room(self, width: int) -> tuple[range, int]:
-        """Which layers are shown, and how many columns of each: many whole ones, or else three that are cut."""
+        """The layers to show, and the columns of each: as many whole layers as fit, else three that are cut."""
         title = len(f" [level {self.layers}]") if self.layers > 1 else 0
         whole = min((width + GAP) // (max(2 * self.columns, title) + GAP), self.layers)
         third = (width - 2 * GAP) // 3
@@ -204,11 +204,11 @@ class _GridDrawing:
         if self.layers > 1 and whole < min(3, self.layers) and third >= fewest:
             return window(self.layer, self.layers, 3), third // 2
         if whole % 2 == 0 and whole < self.layers:
-            whole -= 1  # as many below as above
+            whole -= 1  # an odd number: as many layers below as above
         return window(self.layer, self.layers, whole), min(self.columns, width // 2)
 
     def fitting(self, width: int, height: int) -> Picture:
-        """The slices that so many columns and lines hold."""
+        """The picture with the slices that fit into `width` columns and `height` lines."""
         layers, room = self._room(width)
         titled = self.layers > 1
         row, column = self._place(self.cell)
@@ -239,7 +239,7 @@ class _GridDrawing:
         return ", ".join([*named, f"{own}: the learner's own choice"] if own else named)
 
     def _shown(self, rows: range, columns: range, layers: range | None) -> tuple[tuple[int, int, int], ...]:
-        """The axes of which a part is shown, with the first and the last cell."""
+        """The axes that are cut, each with its first and last shown cell."""
         if self.grid.flips:
             ranges = {0: columns, 1: range(self.rows - rows.stop, self.rows - rows.start)}
         else:
@@ -249,18 +249,18 @@ class _GridDrawing:
         return tuple((a, r.start, r.stop - 1) for a, r in ranges.items() if len(r) < self.shape[a])
 
 
-# ---- grid views -------------------------------------------------------------------------------------------------------
+# ---- a space from above and from the front, side by side ----------------------------------------------------------------
 
 
 class StateWords(Protocol):
-    """What says in words where a state is, and how far each action goes; a `Skill` does."""
+    """Describes in words a state's position and the length of each action; a `Skill` does."""
 
     def in_words(self, state: int) -> str: ...
     def moves_in_words(self) -> tuple[str, ...]: ...
 
 
 class View(NamedTuple):
-    """Which axis runs across and which upright in a view; mirrored: the first cell across is to the right."""
+    """A view: which axis runs across and which up; mirrored: whether the first cell across is on the right."""
 
     title: str
     across: int
@@ -269,7 +269,7 @@ class View(NamedTuple):
 
 
 def views_of(mdp: TabularMDP) -> tuple[View, ...]:
-    """From above and from the front, by what the moves are called; () for what is no such space."""
+    """The views from above and from the front, chosen by the names of the moves; () for other problems."""
     pairs = [mdp.action_labels[n : n + 2] for n in range(0, 6, 2)] if len(mdp.shape) > 2 else []
     if pairs == [("left", "right"), ("backward", "forward"), ("down", "up")]:
         return View("from above", 0, 1), View("from the front", 0, 2)
@@ -279,7 +279,7 @@ def views_of(mdp: TabularMDP) -> tuple[View, ...]:
 
 
 def both_views(request: AdviceRequest, marks: Marks, width: int, height: int) -> Picture | None:
-    """The views side by side in so many columns and lines; None where there are none."""
+    """The views side by side in `width` columns and `height` lines; None when there are none."""
     views = views_of(request.mdp)
     if not views:
         return None
@@ -295,7 +295,7 @@ def both_views(request: AdviceRequest, marks: Marks, width: int, height: int) ->
 
 
 class _Drawing:
-    """One view: its lines, the marks that are seen in it, and the axes of which a part is shown."""
+    """One view: its lines, the marks in it, and the axes that are cut."""
 
     def __init__(self, request: AdviceRequest, marks: Marks, view: View, width: int, height: int) -> None:
         mdp, axes = request.mdp, (view.across, view.upright)
@@ -323,7 +323,7 @@ class _Drawing:
         self._width = max(line.cell_len for line in self.lines)
 
     def line(self, row: int) -> Text:
-        """A line in the view's whole width; those below its last one are empty."""
+        """A line of the view, padded to its width; lines below the last one are empty."""
         line = self.lines[row].copy() if row < len(self.lines) else Text()
         line.pad_right(self._width - line.cell_len)
         return line
@@ -338,7 +338,7 @@ def _entered(request: AdviceRequest) -> tuple[int, ...]:
 
 
 def _choice(request: AdviceRequest, marks: Marks, view: View) -> str:
-    """An arrow where the learner's own move runs in the view, else a star."""
+    """The mark of the learner's own move: an arrow if it lies in the view's plane, else a star."""
     axis, is_further = request.own // 2, request.own % 2
     if axis == view.upright:
         return marks.arrows[0 if is_further else 1]

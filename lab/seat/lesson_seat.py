@@ -1,4 +1,4 @@
-"""Who hears of lessons and is asked in them: the person at the terminal or the page, and the progress lines."""
+"""The seat of a lesson: passes its events to progress lines, terminal and page, and its questions to the person there."""
 
 import time
 from collections.abc import Mapping
@@ -22,34 +22,34 @@ if TYPE_CHECKING:
     from lab.seat.page.teaching_page import SeatPage
     from lab.skills import Skill
 
-WORTH_S = 2.0  # the shortest time between two receipts of one lesson
-PAGE_S = 30.0  # how long a replay waits for a browser
-SEEN_S = 0.05  # the shortest time between two pictures of a lesson that nobody at the page is asked in
+WORTH_S = 2.0  # least time between two receipts of one lesson
+PAGE_S = 30.0  # time that a replay waits for a browser
+SEEN_S = 0.05  # least time between two pictures of a lesson whose questions go elsewhere
 
 
 class LessonSeat:
-    """Tells progress, prompt and page what happens, and asks the person at one of them.
+    """Passes events to progress, prompt and page, and asks the person at one of them.
 
-    The page shows the scene as well: the robot stands where the learner asks. `prompt` and `page`: None when not there.
+    The page also shows the scene, with the robot in the state of the question. `prompt`, `page`: None for a seat without.
     """
 
     def __init__(self, progress: RunProgress, prompt: TeachingPrompt | None, page: "SeatPage | None") -> None:
         self.progress, self._prompt, self.page = progress, prompt, page
         self._scene: LessonScene | None = None
         self._scene_of: Problem | None = None
-        self._place: Any = None  # where lessons take place, a prepared task or another
+        self._place: Any = None  # the prepared task or the world of the lessons
         self._pace: ReplayPace | None = None  # of a replay
-        self._asked_here = False  # the last question was put to somebody here, and was shown
-        self._shown_s = 0.0  # when the page was last shown a question that is not put to it
+        self._asked_here = False  # whether the last question went to somebody here, and was shown
+        self._shown_s = 0.0  # when the page last showed a question that goes elsewhere
         self._lesson: LessonBegan | None = None
         self._panel: Panel | None = None
         self._values: tuple[object, FloatArray | None] = (None, None)  # a problem and its optimal values
-        self._worth_s = -WORTH_S  # when the receipt was made last
+        self._worth_s = -WORTH_S  # when the receipt was last computed
 
-    # ---- what happens
+    # ---- events
 
     def hear(self, event: Event) -> None:
-        """Tell everybody who is here what happened; what is told again is news to the page alone, or in a replay."""
+        """Pass an event to progress, prompt and page; repeated events go to the page only, except in a replay."""
         if self.page is not None and not isinstance(event, QuestionAnswered):
             self.page.hear(event)
         match event:
@@ -69,7 +69,7 @@ class LessonSeat:
                 self.progress.hear(event)
 
     def _about(self, problem: Problem) -> None:
-        """What is learned now: who asks says it in the words of its skill, where there is one; another's scene goes."""
+        """Take over the problem being learned: questions use the words of its skill, and another problem's scene is removed."""
         if self._scene_of not in (None, problem):
             self.clear_scene()
         skillset = getattr(self._place, "skillset", None)
@@ -91,7 +91,7 @@ class LessonSeat:
                 self._show_worth(self.page)
 
     def _show_worth(self, page: "SeatPage") -> None:
-        """The receipt so far; of people's answers only, which come slowly enough for it."""
+        """Show the receipt so far; only for people's answers, which are slow enough for it."""
         lesson = self._lesson
         if lesson is None or time.monotonic() - self._worth_s < WORTH_S:
             return
@@ -104,7 +104,7 @@ class LessonSeat:
         page.receipt(worth.to_json() | {"lines": worth.lines()})
 
     def _show_answer(self, request: Request, action: int | None) -> None:
-        """Show on the page where somebody else is asked, not oftener than it can be seen; in a replay show all."""
+        """Show on the page a question that goes to somebody else, at most every SEEN_S; in a replay, show all."""
         asked_here, self._asked_here = self._asked_here, False
         if self._pace is not None:
             self._replay(request, action, self._pace)
@@ -127,15 +127,15 @@ class LessonSeat:
         pace.wait()
 
     def lesson_over(self, document: Mapping[str, Any]) -> None:
-        """The lesson, or its replay, is over: the page shows what the advice was worth."""
+        """The lesson, or its replay, is over: show the final receipt on the page."""
         if self.page is not None:
             self.page.receipt(document["receipt"])
             self.page.finished("The lesson is over.")
 
-    # ---- who is asked
+    # ---- questions
 
     def people(self) -> Mapping[str, Ask]:
-        """Who can be asked, by name."""
+        """The functions that ask people, by the name of the advisor."""
         people: dict[str, Ask] = {}
         if self._prompt is not None:
             people["terminal"] = self._ask_terminal
@@ -144,7 +144,7 @@ class LessonSeat:
         return people
 
     def _ask_terminal(self, request: Request) -> int | None:
-        """Asks at the terminal; a page shows the question, too, and may answer it there."""
+        """The answer from the terminal; a page shows the question as well, and can answer it."""
         assert self._prompt is not None
         self._asked_here = True
         self._set_scene(request)
@@ -168,12 +168,12 @@ class LessonSeat:
     # ---- the scene
 
     def _show_state(self, request: Request) -> None:
-        """Moves the robot of the page's scene to where the learner asks."""
+        """Move the robot of the page's scene to the state of the question."""
         if self.page is not None and self._scene is not None:
             self.page.update(self._scene.frame(request.state))
 
     def _set_scene(self, request: Request) -> None:
-        """In a run, the scene of a lesson is set up when somebody is first asked in it; a question on the order needs none."""
+        """Set up the scene of a lesson at its first question in a run; questions on the order have no scene."""
         if not isinstance(request, AdviceRequest):
             self.clear_scene()
         elif self._scene is None and self._lesson is not None and self._place is not None:
@@ -190,16 +190,16 @@ class LessonSeat:
             self.page.show(self._scene.bodies, self._scene.camera)
 
     def clear_scene(self) -> None:
-        """The scene is taken down."""
+        """Remove the scene."""
         if self._scene is not None:
             with suppress(Exception):
                 self._scene.close()
             self._scene = self._scene_of = None
 
-    # ---- a replay
+    # ---- replays
 
     def replaying(self, pause_s: float) -> ReplayPace:
-        """A session is shown again: everything is told, `pause_s` between two answers, until it is told otherwise."""
+        """The pace of a replay that begins now: all events are shown, `pause_s` [s] between two answers unless changed."""
         self._pace = ReplayPace(pause_s)
         if self.page is not None:
             self.page.paced(self._pace)
@@ -207,6 +207,6 @@ class LessonSeat:
         return self._pace
 
     def stay(self) -> None:
-        """Keeps serving the page until Ctrl-C; returns at once when there is none."""
+        """Keep serving the page until Ctrl-C; returns at once when there is none."""
         while self.page is not None:
             time.sleep(3600)

@@ -1,4 +1,4 @@
-"""What a learner of the order shows when it asks, in words and numbers: for the terminal and for the page."""
+"""A question on the order of transfers in words and numbers, for the terminal and for the page."""
 
 from dataclasses import dataclass
 
@@ -9,7 +9,7 @@ from lab.sequencing.search import SequenceRequest
 
 @dataclass(frozen=True)
 class OrderMove:
-    """A move that may be made next, in words; wait_s: the time until it can begin [s]."""
+    """An allowed next move, in words; wait_s: the time until it can begin [s]."""
 
     decision: int
     name: str
@@ -19,7 +19,7 @@ class OrderMove:
 
     @property
     def ready(self) -> str:
-        """When it can begin: "now" or "60 s"."""
+        """The time until it can begin: "now" or "60 s"."""
         return "now" if self.wait_s == 0.0 else f"{self.wait_s:.0f} s"
 
     def __str__(self) -> str:
@@ -38,13 +38,13 @@ def move_of(request: SequenceRequest, decision: int) -> OrderMove:
 
 
 def title(request: SequenceRequest) -> str:
-    """When it asks, and where the robot is."""
+    """The time of the question, and the robot's station."""
     run = request.run
     return f"Episode {request.episode}, {run.now_s:.0f} s: the robot is at {run.cell.names[run.robot]}"
 
 
 def progress(request: SequenceRequest) -> str:
-    """Why it asks, and how dear its last episodes were."""
+    """The reason for the question, and the cost of the last episodes."""
     known = request.improvement
     if known is None:
         return f"It asks because {request.reason}."
@@ -53,7 +53,7 @@ def progress(request: SequenceRequest) -> str:
 
 
 def reasons(request: SequenceRequest) -> list[str]:
-    """Why it asks, what it would do, and how advice is judged."""
+    """The reason for the question, the learner's own choice, and the rule by which advice is judged."""
     own = move_of(request, request.own)
     return [
         progress(request),

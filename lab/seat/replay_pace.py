@@ -1,4 +1,4 @@
-"""How fast a replay goes from one answer to the next, and whether it waits: told by keys and buttons, from any thread."""
+"""The pace of a replay: its speed from one answer to the next, and pauses; set by keys and buttons, from any thread."""
 
 import threading
 import time
@@ -12,15 +12,15 @@ KEYS = {
     "+": "faster",
     "=": "faster",
     "-": "slower",
-}  # a pause that is under way ends by a space, too
-FASTEST, SLOWEST = 16.0, 1 / 8  # times the pace that was asked for
-LISTEN_S = 0.2  # the longest stretch of waiting, so that Ctrl-C is heard
+}  # the space bar also ends a pause
+FASTEST, SLOWEST = 16.0, 1 / 8  # times the requested pace
+LISTEN_S = 0.2  # longest uninterrupted wait, so that Ctrl-C is noticed
 
 
 class ReplayPace:
-    """`wait` between two answers: `pause_s` over the speed, or while it is paused until it goes on, or makes a step.
+    """The pace: `wait` takes `pause_s` / speed [s] between two answers, or until a paused replay continues or makes a step.
 
-    on_change: called in whatever thread changes it, with what pages are told of it.
+    on_change: called with `now()` after each change, in the thread that made it.
     """
 
     def __init__(self, pause_s: float, on_change: Callable[[dict[str, Any]], object] = lambda now: None) -> None:
@@ -33,7 +33,7 @@ class ReplayPace:
         return {"paused": self._paused, "speed": self._speed}
 
     def do(self, word: str) -> None:
-        """What a key or a button says: one of WORDS; "pause" of a paused replay goes on."""
+        """Carry out a key or a button: one of WORDS; "pause" continues a paused replay."""
         with self._lock:
             match word:
                 case "pause":
@@ -50,7 +50,7 @@ class ReplayPace:
         self.on_change(self.now())
 
     def wait(self) -> None:
-        """Until the next answer is to be shown."""
+        """Wait until the next answer is to be shown."""
         began_s = time.monotonic()
         with self._lock:
             while True:

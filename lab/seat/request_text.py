@@ -1,4 +1,4 @@
-"""What a learner shows when it asks, in lines and in plain sentences: its preference, its progress, how advice stands."""
+"""A learner's question in lines and in plain sentences: its preferences, its progress, and the standing of advice."""
 
 from collections.abc import Iterable, Sequence
 
@@ -15,24 +15,24 @@ from lab.seat.grid_text import Marks, Picture, StateWords, nearest_goal, points_
 from lab.view.value_levels import is_map
 
 GOAL, OBSTACLE, DEAD_END, NOWHERE = "to the goal", "into an obstacle", "to an end that is no goal", "nowhere"
-ALIKE = 1e-9  # chances that differ by less are the same
+ALIKE = 1e-9  # probabilities that differ by less are equal
 BAR = 10  # characters of the longest bar
 
 
 def percent(share: float) -> str:
-    """A share in whole percents; what is neither nothing nor all does not look like it."""
+    """A share in whole percent; only exact 0 and 1 look like 0 % and 100 %."""
     if 0.0 < share < 0.005:
         return "<1%"
     return ">99%" if 0.995 <= share < 1.0 else f"{share:.0%}"
 
 
 def is_known(mdp: TabularMDP) -> bool:
-    """Whether the table says where moves lead: that of an environment without a model has no goal."""
+    """Whether the outcomes of moves are known; an environment without a model has no goal in its table."""
     return bool(mdp.goal.any())
 
 
 def outcome(request: AdviceRequest, action: int) -> str:
-    """Where an action leads when that is out of the ordinary: GOAL, OBSTACLE, DEAD_END or NOWHERE, else ""."""
+    """The outcome of an action if it is unusual: GOAL, OBSTACLE, DEAD_END or NOWHERE, else ""."""
     mdp, entered = request.mdp, int(request.mdp.successor[request.state, action])
     if not is_known(mdp):
         return ""
@@ -45,20 +45,20 @@ def outcome(request: AdviceRequest, action: int) -> str:
 
 
 def is_foreign(request: AdviceRequest) -> bool:
-    """Whether the learner acts elsewhere than in its table, which holds the likeliest step then."""
+    """Whether the learner acts in an environment instead of its table, which then holds only the likeliest step."""
     return request.environment is not None and not isinstance(request.environment, TableEnvironment)
 
 
 def leads(request: AdviceRequest, action: int) -> str:
-    """ "leads nowhere", "most likely leads to the goal"; "" where nothing is out of the ordinary."""
+    """The outcome in words, such as "leads nowhere" or "most likely leads to the goal"; "" for the usual one."""
     where = outcome(request, action)
     return f"{'most likely ' if is_foreign(request) else ''}leads {where}" if where else ""
 
 
 def choice(request: AdviceRequest, marks: Marks, brief: bool = False) -> str:
-    """What the learner drew for this step, and which move it rates best.
+    """The move that the learner drew for this step, and the move that it rates best.
 
-    brief: only where that leads, "" when that is nothing special; the rest stands in the list of moves.
+    brief: only an unusual outcome of the drawn move, else ""; the rest is in the list of moves.
     """
     chances, own = request.chances, request.own
     best = max(range(len(chances)), key=chances.__getitem__)
@@ -76,7 +76,7 @@ def choice(request: AdviceRequest, marks: Marks, brief: bool = False) -> str:
 
 
 def moves(request: AdviceRequest, marks: Marks) -> list[Text]:
-    """Each move with its chance, the learner's own choice in brackets."""
+    """Each move with its probability, the learner's own choice in brackets."""
     parts = []
     for action, chance in enumerate(request.chances):
         text = f"{marks.named(request.mdp, action)} {percent(chance)}"
@@ -86,7 +86,7 @@ def moves(request: AdviceRequest, marks: Marks) -> list[Text]:
 
 
 def bars(request: AdviceRequest, marks: Marks, sizes: Sequence[str] = ()) -> list[Text]:
-    """A line for each move: its chance as a bar and in percent, the learner's own choice marked; sizes: how far each goes."""
+    """A line for each move: its probability as a bar and in percent, the learner's choice marked; sizes: lengths of moves."""
     names = [marks.named(request.mdp, action) for action in range(request.mdp.n_actions)]
     names = [f"{name} {size}" for name, size in zip(names, sizes, strict=True)] if sizes else names
     widest = max(map(len, names))
@@ -101,13 +101,13 @@ def bars(request: AdviceRequest, marks: Marks, sizes: Sequence[str] = ()) -> lis
 
 
 def _bar(share: float, parts: str) -> str:
-    """A bar for a share; what is above nothing can be seen."""
+    """A bar for a share; it is visible for any share above 0."""
     length = max(round(share * BAR * len(parts)), share > 0.0)
     return parts[-1] * (length // len(parts)) + (parts[length % len(parts) - 1] if length % len(parts) else "")
 
 
 def progress(request: AdviceRequest, brief: bool = False) -> list[str]:
-    """Why it asks, and the moving averages beside the threshold; brief: the averages alone, in one line."""
+    """The reason for the question, the moving averages and the threshold; brief: the averages alone, in one line."""
     known = request.improvement
     least = request.standing.lambda_threshold
     reason = [f"It asks because {request.reason}."] if request.reason and not brief else []
@@ -126,7 +126,7 @@ def progress(request: AdviceRequest, brief: bool = False) -> list[str]:
 
 
 def standing(request: AdviceRequest, brief: bool = False) -> str:
-    """How much advice was used of what is allowed, and how many episodes it misled of those tolerated."""
+    """The advice used and the budget; the episodes misled and the number tolerated."""
     now = request.standing
     allowed = f" of {now.budget}" if now.budget < GateSettings.budget else ""
     said = f"{now.helped_steps}{allowed} moves" if allowed else counted(now.helped_steps, "move")
@@ -135,11 +135,11 @@ def standing(request: AdviceRequest, brief: bool = False) -> str:
     return f"Advised so far: {said}; episodes misled: {now.misleads}, tolerated: {now.omega}."
 
 
-# ---- where things lie -----------------------------------------------------------------------------------------------
+# ---- axes, goal and hidden cells in words ---------------------------------------------------------------------------
 
 
 def axis_name(mdp: TabularMDP, axis: int) -> str:
-    """What the cells along an axis are called."""
+    """The name of the cells along an axis."""
     if axis == 2:
         return "level"
     if axis > 2:
@@ -150,7 +150,7 @@ def axis_name(mdp: TabularMDP, axis: int) -> str:
 
 
 def _ways(mdp: TabularMDP, axis: int) -> tuple[str, str]:
-    """The words for going down and up along an axis."""
+    """The names of the moves down and up an axis."""
     axes = len(mdp.coverage_shape or mdp.shape)
     if points_by_name(mdp):
         return (("up", "down"), ("left", "right"))[axis + 2 - axes]
@@ -160,7 +160,7 @@ def _ways(mdp: TabularMDP, axis: int) -> tuple[str, str]:
 
 
 def way_to_goal(request: AdviceRequest) -> str:
-    """Where the nearest goal lies, such as "8 right, 2 backward and 2 up"; "" where there is none on a grid."""
+    """The moves to the nearest goal, such as "8 right, 2 backward and 2 up"; "" when there is none on a grid."""
     mdp = request.mdp
     cell = mdp.state_cell(request.state)
     goal = nearest_goal(mdp, cell) if mdp.shape and not mdp.coverage_shape else None
@@ -176,7 +176,7 @@ def _listed(parts: Sequence[str]) -> str:
 
 
 def beyond(request: AdviceRequest, picture: Picture, brief: bool = False) -> str:
-    """What the picture does not show: the cells beyond it, the axes that are not drawn, where a hidden goal lies."""
+    """What the picture does not show: cells outside it, axes that are not drawn, and the direction of a hidden goal."""
     mdp = request.mdp
     cell = mdp.state_cell(request.state)
     shown = shown_in_words(request, picture, brief)
@@ -189,7 +189,7 @@ def beyond(request: AdviceRequest, picture: Picture, brief: bool = False) -> str
 
 
 def shown_in_words(request: AdviceRequest, picture: Picture, brief: bool = False) -> str:
-    """Which cells the picture shows, "" where it shows all."""
+    """The ranges of cells that the picture shows; "" when it shows all."""
     mdp = request.mdp
     said = [f"{_range(axis_name(mdp, a), low, high)} {_of(mdp, a, brief)}" for a, low, high in picture.shown]
     return f"{'' if brief else 'Shown: '}{', '.join(said)}" if said else ""
@@ -207,7 +207,7 @@ def _range(name: str, low: int, high: int) -> str:
 
 
 def sentences(request: AdviceRequest, known: StateWords | None = None) -> list[str]:
-    """All that the picture and the numbers show, one fact a line, without a drawing; known: what says where it is."""
+    """The content of picture and numbers as sentences, one fact per line; known: describes states in words."""
     mdp = request.mdp
     cell = mdp.state_cell(request.state)
     lines = [f"Episode {request.episode}, step {request.step}."]
@@ -242,7 +242,7 @@ WORDS_ONLY = _WordsOnly()
 
 
 def _next(request: AdviceRequest, action: int) -> str:
-    """What lies where an action leads."""
+    """The content of the cell to which an action leads."""
     mdp, entered = request.mdp, int(request.mdp.successor[request.state, action])
     on_grid = bool(mdp.shape or mdp.coverage_shape) and not is_foreign(request)
     if not is_known(mdp):
@@ -258,11 +258,11 @@ def _next(request: AdviceRequest, action: int) -> str:
     return "free" if on_grid else f"{likely}leads to {mdp.state_label(entered)}"
 
 
-# ---- why ------------------------------------------------------------------------------------------------------------
+# ---- why it asks, and how an episode with advice is judged ----------------------------------------------------------
 
 
 def reasons(request: AdviceRequest, marks: Marks, guided: int) -> list[str]:
-    """Why it asks, with all its numbers, in plain words; guided: the episodes that were given advice until now."""
+    """The reason for the question with all its numbers, in plain words; guided: the number of episodes with advice so far."""
     mdp, now = request.mdp, request.standing
     lines = [f"It asks because {request.reason}." if request.reason else "It asks about every step."]
     known = request.improvement
@@ -304,37 +304,37 @@ VERDICTS = {"better": "better than before", "best": "as good as the best so far"
 
 
 def verdict(event: EpisodeEnded, mean_before: float | None) -> tuple[bool | None, str]:
-    """Whether an episode with advice was a good one, and in words; mean_before: of the plain step counts before it.
+    """Whether an episode with advice was good, and the judgement in words; mean_before: mean steps of episodes before it.
 
-    What the gate says counts; where none judges, the mean does. (None, ""): there is nothing to compare it with.
+    The gate's verdict counts; without one, the mean decides. (None, "") when there is nothing to compare it with.
     """
     if mean_before is None:
         return (None, "") if not event.verdict else (event.verdict != "misled", VERDICTS[event.verdict])
     shorter = event.steps < mean_before
     good = event.verdict != "misled" if event.verdict else shorter
-    if event.verdict == "best" or good != shorter:  # the plain mean does not show it: other episodes began elsewhere
+    if event.verdict == "best" or good != shorter:  # the mean does not show it, because other episodes began elsewhere
         return good, VERDICTS[event.verdict]
     return good, f"{'better' if good else 'no better'} than the {mean_before:.1f} before"
 
 
 def misled(misleads: int, guided: int, whose: str = "Your advice") -> str:
-    """ "Your advice did not help in 3 of 4 episodes"; of how many is left out where that is not known."""
+    """A sentence such as "Your advice did not help in 3 of 4 episodes"; the total is left out if it is not known."""
     of = f"{misleads} of {counted(guided, 'episode')}" if guided >= misleads else counted(misleads, "episode")
     return f"{whose} did not help in {of}"
 
 
-# ---- path ahead -------------------------------------------------------------------------------------------------------
+# ---- a path that answers several questions ------------------------------------------------------------------------------
 
 
 class PathAhead:
-    """Moves that were typed or drawn at once, given one by one at the next questions of the episode, where they lead."""
+    """A path that was typed or drawn at once; its moves answer the next questions of the episode, along the path."""
 
     def __init__(self, request: AdviceRequest | None = None, moves: Iterable[int] = ()) -> None:
         self.request, self.left = request, list(moves)
         self._state, self._step = (-1, 0) if request is None else (request.state, request.step)
 
     def goes_on(self, request: Request) -> bool:
-        """Whether this question comes where the path leads; where no table says that, whether it is the next one."""
+        """Whether this question is in the state to which the path leads; without a model, whether it is the next question."""
         begun = self.request
         if not self.left or begun is None or not isinstance(request, AdviceRequest):
             return False

@@ -1,4 +1,4 @@
-"""How a run goes on, written to a console: phases, each skill's learning curve, when it asked and what came of it."""
+"""The progress of a run on a console: phases, each skill's learning curve, when it asked, and the results."""
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -39,8 +39,8 @@ ALL_FREE = "their ways are free here, and none is longer than one learned anew"
 class RunProgress:
     """Writes lines to `console`, which is not stdout, and on a terminal a progress bar below them.
 
-    Use it as a context manager for the bar; the lines come without it, too. What a search stands at is shown before the bar, one
-    after the other in the same place; the last becomes a line, unless the order that was found is told.
+    The bar needs the context manager; the lines do not. The state of a search is shown in front of the bar and updated in
+    place; the last state becomes a line, unless the found order is reported.
     """
 
     def __init__(self, console: Console) -> None:
@@ -48,7 +48,7 @@ class RunProgress:
         self._progress, self._bars = progress_bar(console), bars_for(console)
         self._running = False
         self._task: TaskID | None = None
-        self._stands = ""  # what is shown before the bar instead of the phase
+        self._stands = ""  # shown in front of the bar instead of the phase
         self._first_asked: dict[str, int] = {}  # skill -> episode
         self._rejected: dict[str, AdviceRejected] = {}
         self._reused: list[tuple[str, Lesson]] = []  # by skill
@@ -66,7 +66,7 @@ class RunProgress:
 
     @contextmanager
     def paused(self) -> Iterator[None]:
-        """Leave the terminal to somebody else, such as the teaching prompt."""
+        """Release the terminal, as for the teaching prompt."""
         if not self._running:
             yield
             return
@@ -77,7 +77,7 @@ class RunProgress:
             self._progress.start()
 
     def hear(self, event: Event) -> None:
-        """Write what happened; what a learner does is told in the line of its lesson."""
+        """Write an event; a learner's own events are summarized in the line of its lesson."""
         match event:
             case LessonEvent(lesson=name, event=AdviceRequested() as asked):
                 self._first_asked.setdefault(name, asked.episode)
@@ -94,7 +94,7 @@ class RunProgress:
             case MoveTimed():
                 self._say(f"  {event.name:{_NAME}} {event.seconds:6.2f} s")
             case SequenceFound():
-                self._stands = ""  # which this tells, too
+                self._stands = ""  # which this line contains
                 order, found = sequence_parts(event)
                 self._pack([Text(f"  {order}"), Text(found)], gap=" ")
             case OrderChosen():
@@ -118,7 +118,7 @@ class RunProgress:
         self._task = self._progress.add_task(title, total=parts)
 
     def _tell_stands(self) -> None:
-        """The last of what a search stood at, if no order has been told of since."""
+        """Write the last state of a search, if no order has been reported since."""
         if self._stands:
             self._say(f"  {self._stands}")
         self._stands = ""
@@ -133,7 +133,7 @@ class RunProgress:
         self._pack([head, *map(Text, [f"{curve} {steps:>11}", *rest])])
 
     def _tell_reused(self) -> None:
-        """In few lines, all skills that were there already, those of another problem apart."""
+        """Write all reused skills in few lines, those of another problem separately."""
         reused, self._reused = self._reused, []
         elsewhere = [one for one in reused if one[1].fitness is not None]
         self._tell_found([one for one in reused if one[1].fitness is None])
@@ -159,7 +159,7 @@ class RunProgress:
         self.console.print(Text.assemble(*parts), soft_wrap=True)
 
     def _pack(self, parts: Sequence[Text], gap: str = "  ") -> None:
-        """Write parts side by side; one that does not fit begins another line. What is no terminal has no width."""
+        """Write parts side by side, wrapped to the terminal's width; without a terminal there is no wrapping."""
         width = self.console.width if self.console.is_terminal else _UNLIMITED
         line = parts[0]
         for part in parts[1:]:

@@ -1,4 +1,4 @@
-"""The sub-tasks: one file a skill, all with the same life."""
+"""The skills that solve sub-tasks: one file each, all with the same life cycle (`lab.skills.skill.Skill`)."""
 
 from typing import Any
 
@@ -10,7 +10,7 @@ from lab.skills.place import Place
 from lab.skills.skill import Skill
 from lab.skills.transfer import Transfer
 
-# in the order in which they bring a part on, and then what machines do
+# in the order in which they handle a part, followed by what machines do
 _SHIPPED: dict[str, type[Skill]] = {skill.subtask: skill for skill in (Grasp, Transfer, Insert, Place, Cover)}
 
 

@@ -1,4 +1,4 @@
-"""What grasp and place share: the tool's poses around one part, from anywhere above it down to where fingers close or open."""
+"""What grasp and place share: a grid of tool poses around one part, from any start above it down to where the fingers act."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -11,7 +11,7 @@ from lab.learning.problem import Problem
 from lab.mdp import NoPath, TabularMDP, grid
 from lab.sim.arms.kinematics import ToolPose
 from lab.sim.scene.blocked_cells import OUT_OF_REACH, Survey, in_the_way
-from lab.skills.skill import Bench, Skill, learned_path, no_way
+from lab.skills.skill import Bench, Skill, learned_path, no_path_error
 from lab.skills.surveys import NEAR_SHAPE, NEAR_STEP_M, NEAR_YAW_STEP, NEAR_YAWS, SurveyName, Surveys, near_pose
 from lab.tasks.task import Task
 
@@ -19,12 +19,17 @@ if TYPE_CHECKING:
     from lab.toolbox.policy import Policy
 
 SLOW = 0.6
-SIDEWAYS = {"left": "lower", "right": "higher", "down": "in", "up": "out"}  # the moves where parts come from the side
+SIDEWAYS = {
+    "left": "lower",
+    "right": "higher",
+    "down": "in",
+    "up": "out",
+}  # move names at a station entered from the side
 _BLEND_M = 0.008
 
 
 class AroundPart(Skill):
-    """At one station: the table holds the tool's pose relative to the part (x, y, z, and yaw where it may turn)."""
+    """A skill at one station whose states are tool poses relative to the part: x, y, z, and yaw where the tool may turn."""
 
     near: ClassVar[bool] = True
     looks_from: ClassVar[tuple[float, float]] = (-60.0, 28.0)
@@ -37,11 +42,11 @@ class AroundPart(Skill):
 
     @property
     def needs(self) -> tuple[SurveyName, ...]:
-        """Around the part."""
+        """The survey of the poses around the part."""
         return (("around", self.station, self.kind, self.carries),)
 
     def setup(self, surveys: Surveys) -> Problem:
-        """The poses around a part with parts beside it; episodes begin anywhere above it."""
+        """The problem over the poses around a part with neighbours beside it; episodes begin in any free cell above it."""
         self.surveys = surveys
         survey = surveys.around(self.station, self.kind, self.carries)
         rewards = surveys.task.subtask(self.subtask).rewards
@@ -52,25 +57,26 @@ class AroundPart(Skill):
             )
             mdp = grid(survey.causes.shape, survey.blocked, start, self.goal, rewards, actions)
         except NoPath as error:
-            raise no_way(self.name, error, survey.names(error.enclosing)) from None
+            raise no_path_error(self.name, error, survey.names(error.enclosing)) from None
         self.problem = Problem(self.name, self.subtask, from_above(mdp))
         return self.problem
 
     def goal_pose(self) -> ToolPose:
-        """The tool pose of the goal's cell, for a part that stands, or is to stand, on its spot."""
+        """The tool pose of the goal cell, for the spot on which the part stands or is to be set down."""
         return self.own_kind.held_at(self.stands_on())
 
     def pose(self, state: int, goal: ToolPose | None = None) -> ToolPose:
-        """Around `goal`, by default where the part is by the task."""
+        """The tool pose of a state, relative to `goal`: by default to the part's place according to the task."""
         return near_pose(goal or self.goal_pose(), self.problem.mdp.state_cell(state), self.surveys.into(self.station))
 
     def begins_at(self) -> ToolPose:
-        """The approach of the station."""
+        """The approach pose of the station."""
         return self.surveys.approach(self.station)
 
     def down(self, bench: Bench, policy: "Policy", goal: ToolPose) -> Iterator[None]:
-        """Above the part, or ahead of it where it is taken from the side, and to the tool pose `goal`
-        as the learned cells lead, straight where that is free.
+        """Move above the part (or in front of it, at a station entered from the side), then along the learned path to `goal`.
+
+        Path corners are cut where the straight line is free.
         """
         robot, mdp = bench.scene.robot, self.problem.mdp
         entry = entry_cell(goal, robot.tool(), self.surveys.into(self.station) is not None)[: len(mdp.shape)]
@@ -85,7 +91,7 @@ class AroundPart(Skill):
 
 
 def free_above(what: str, survey: Survey, goal: tuple[int, ...], station: str) -> tuple[int, ...]:
-    """The first free cell of the highest level at a station; BadInput names what blocks them all, or the goal."""
+    """The first free cell of the highest level at a station. BadInput names what blocks that whole level, or the goal."""
     top = [cell for cell in np.ndindex(*survey.causes.shape) if cell[2] == NEAR_SHAPE[2] - 1]
     free = [cell for cell in top if not survey.blocked[cell]]
     if survey.blocked[goal] or not free:
@@ -99,19 +105,19 @@ def free_above(what: str, survey: Survey, goal: tuple[int, ...], station: str) -
 
 
 def from_above(mdp: TabularMDP) -> TabularMDP:
-    """The same problem with episodes that begin in any free cell of the highest level."""
+    """The same problem, with every free cell of the highest level as a start state."""
     levels = np.indices(mdp.shape)[2].ravel()
     starts = np.flatnonzero((levels == NEAR_SHAPE[2] - 1) & ~mdp.terminal)
     return replace(mdp, starts=tuple(int(s) for s in starts))
 
 
 def nearest_start(mdp: TabularMDP, cell: tuple[int, ...]) -> int:
-    """The state nearest to a cell, in steps of the grid, of those that episodes begin in: others are blocked."""
+    """The start state that is the fewest grid steps from a cell; the cell itself may be blocked."""
     return min(mdp.starts, key=lambda state: np.abs(np.subtract(mdp.state_cell(state), cell)).sum())
 
 
 def entry_cell(goal: ToolPose, tool: ToolPose, from_the_side: bool = False) -> tuple[int, int, int, int]:
-    """The cell of the highest level that is nearest to where the tool is, seen from the part; from the side: straight ahead."""
+    """The cell (x, y, z, yaw) of the highest level nearest to the tool, in the part's frame; from the side, the middle one."""
     c, s = np.cos(goal.yaw), np.sin(goal.yaw)
     dx, dy = tool.x - goal.x, tool.y - goal.y
     along, across = c * dx + s * dy, -s * dx + c * dy

@@ -1,4 +1,4 @@
-"""A grid that the overhead camera looks at, before one station and for one kind of part: its picture, view and survey."""
+"""Grids that the overhead camera looks at, one a station and kind of part: picture, view and survey, each made once (`once`)."""
 
 from collections.abc import Callable, Hashable
 from functools import wraps
@@ -29,7 +29,7 @@ Result = TypeVar("Result")
 
 
 class Holder(Protocol):
-    """What keeps the results of its own methods."""
+    """An object that keeps the results of its own methods in `made`."""
 
     made: Made
 
@@ -40,9 +40,9 @@ Self = TypeVar("Self", bound=Holder)
 def once(
     method: Callable[Concatenate[Self, Arguments], Result],
 ) -> Callable[Concatenate[Self, Arguments], Result]:
-    """The method, whose result is kept in the object's `made` for each set of positional arguments.
+    """The method, memoized in the object's `made` by its positional arguments.
 
-    Unlike `functools.cache` it holds no object alive, and an object with results can be pickled.
+    Unlike `functools.cache` it keeps no object alive, and an object with results can be pickled.
     """
 
     def made_once(self: Self, /, *args: Arguments.args, **kwargs: Arguments.kwargs) -> Result:
@@ -57,19 +57,21 @@ def once(
     return wraps(method)(made_once)
 
 
-# ---- camera grids -----------------------------------------------------------------------------------------------------
+# ---- a station's grid under the overhead camera ------------------------------------------------------------------------
 
 
-RELEASE_ABOVE = 0.002  # [m] a part is let go this high above its foot
+RELEASE_ABOVE = 0.002  # [m] height above its spot at which a part is released
 TOUCH_CLEARANCE = {True: 0.0012, False: 0.004}  # [m] near a station, by whether a part is carried
 OUT_OF_SIGHT = "out of the camera's sight"
 _MARGIN = 0.005  # [m] beyond half a cell: a move between free cells then touches nothing
-_WAITING_WITHIN = 0.25  # [m] of the grid: no part farther off can meet the carried one
-_MARKER = models.MARKER_RADIUS + 0.003  # [m] half of what the camera must see around the gripper's marker
+_WAITING_WITHIN = 0.25  # [m] of the grid: a part farther off cannot collide with the carried one
+_MARKER = (
+    models.MARKER_RADIUS + 0.003
+)  # [m] half the side of the square around the gripper's marker that must be visible
 
 
 class SurveyedGrid:
-    """The camera's grid before a station, as a carried part of one kind finds it; each survey is made once."""
+    """The camera's grid in front of a station, for a carried part of one kind; each survey is made once."""
 
     def __init__(self, task: Task, layout: Layout, places: Places, station: str, kind: str, parts: int) -> None:
         self.task, self.layout, self.places, self.station, self.kind, self.parts = (
@@ -84,15 +86,15 @@ class SurveyedGrid:
         self.made: Made = {}
 
     def camera(self, pixels: int | None = None) -> Camera:
-        """The overhead camera, with `pixels` a side if given."""
+        """The overhead camera, its picture `pixels` wide and high if given."""
         return overhead_camera(self.task, pixels)
 
     def view(self, pixels: int | None = None) -> View:
-        """How the overhead picture maps to this grid."""
+        """The mapping from the overhead picture to this grid."""
         return camera_view(self.task, self.station, pixels, self.layout)
 
     def pose(self, cell: tuple[int, ...]) -> ToolPose:
-        """The tool pose on the way through the grid, over the middle of a cell."""
+        """The tool pose over the middle of a cell, at the grid's height."""
         grid = self.settings
         x, y = ((o + (i + 0.5) * grid.cell_m) for o, i in zip(grid.origin_m, cell, strict=True))
         return ToolPose(x, y, grid.height_m, 0.0)
@@ -120,7 +122,7 @@ class SurveyedGrid:
 
     @once
     def survey(self, seen: frozenset[str]) -> Survey:
-        """The cells that a carried part or the arm cannot be in, whatever the camera has `seen` left out."""
+        """The cells that a carried part or the arm cannot enter; obstacles that the camera has `seen` are ignored."""
         with World() as world:
             scene = Scene(world, self.task, (), self.layout)
             for name, (kind, spot) in self._waiting().items():
@@ -144,7 +146,7 @@ class SurveyedGrid:
         return bool(pixels.min() >= 0.0 and pixels.max() <= camera.width - 1)
 
     def _waiting(self) -> dict[str, tuple[str, Spot]]:
-        """Parts that may stand near while another is carried through the grid: the kind and spot of each, by name."""
+        """Kind and spot, by name, of each part that may stand nearby while another is carried through the grid."""
         waiting = {}
         for station in self.task.stations:
             tallest = max(self.places.kinds_at(station.name), key=lambda kind: kind.height_m, default=None)
@@ -157,14 +159,14 @@ class SurveyedGrid:
 
 
 def settings_of(station: Station) -> CameraGrid:
-    """The grid of a station that is approached through one; BadInput for another."""
+    """The grid through which a station is approached; BadInput for a station without one."""
     if station.grid is None:
         raise BadInput(f"station '{station.name}' is approached from {station.approach}, not through the camera's grid")
     return station.grid
 
 
 def overhead_camera(task: Task, pixels: int | None = None) -> Camera:
-    """The task's overhead camera, with `pixels` a side if given; BadInput when it has none."""
+    """The task's overhead camera, its picture `pixels` wide and high if given; BadInput when the task has none."""
     if task.camera is None:
         raise BadInput(f"task '{task.name}' has no [camera]")
     own = task.camera
@@ -177,9 +179,9 @@ def overhead_camera(task: Task, pixels: int | None = None) -> Camera:
 
 
 def camera_view(task: Task, station: str, pixels: int | None = None, layout: Layout | None = None) -> View:
-    """How the overhead picture maps to a station's grid: projection, grid, the markers' heights and offsets [m].
+    """The mapping from the overhead picture to a station's grid: projection, grid, heights and offsets of markers [m].
 
-    Without a layout the obstacles are taken to stand where the task file has them.
+    Without a layout, obstacles are assumed to be where the task file puts them.
     """
     place = task.station(station)
     grid, upper = settings_of(place), models.MARKER_THICK / 2
@@ -207,6 +209,6 @@ def camera_view(task: Task, station: str, pixels: int | None = None, layout: Lay
 
 
 def _far_from(grid: CameraGrid, spot: Spot) -> float:
-    """How far a spot is from the grid [m], 0 within it."""
+    """The distance of a spot from the grid [m]; 0 inside it."""
     sides = zip((spot.x, spot.y), grid.origin_m, grid.shape, strict=True)
     return hypot(*(max(low - at, at - (low + count * grid.cell_m), 0.0) for at, low, count in sides))

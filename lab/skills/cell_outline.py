@@ -1,4 +1,4 @@
-"""A task's cell seen from above, as far as it can be laid out and surveyed: also of a task that a check refuses."""
+"""The ground plan of a task's cell, as far as it can be laid out and surveyed, even if a check rejects the task."""
 
 import re
 from contextlib import suppress
@@ -31,22 +31,23 @@ from lab.skills.surveys import Surveys, way_to
 from lab.tasks.task import Order, Task
 from lab.tasks.task_fields import Station
 
-UNKNOWN_M = 0.1  # [m] so wide is a station drawn of which only the pose is known
+UNKNOWN_M = 0.1  # [m] width at which a station is drawn when only its pose is known
 
 
 def outline(task: Task, toasts: int | None, seed: int, fault: str = "") -> GroundPlan:
-    """The cell as a seed lays it out, for so many parts of the first kind, None: for the file's own order.
+    """The ground plan of the cell laid out with `seed`.
 
-    `fault` is what a check says of it, and what that names is marked.
+    toasts: how many parts of the first kind; None: the order in the file. fault: the message of a check; whatever it
+    names is marked.
     """
     order = _order(task, toasts)
     arm: Arm | None = None
     places: Places | None = None
-    with suppress(BadInput):  # the check tells why; all else is drawn
+    with suppress(BadInput):  # the check reports the reason; everything else is still drawn
         arm = arm_of(task.robot, task.folder)
         places = places_of(task)
     layout = Layout(tuple(obstacle.position_m for obstacle in task.obstacles), ())
-    with suppress(BadInput):  # an obstacle finds no place: all stand where the file has them
+    with suppress(BadInput):  # an obstacle cannot be placed: all are drawn where the file puts them
         layout = lay_out(task, order, seed)
     low = task.workspace.lower_m[2] + task.workspace.cell_m[2] / 2
     surveys = None if places is None else Surveys(task, order, layout)
@@ -67,7 +68,7 @@ def outline(task: Task, toasts: int | None, seed: int, fault: str = "") -> Groun
 
 
 def _order(task: Task, toasts: int | None) -> Order:
-    """The order, or one part of each kind where that cannot be."""
+    """The order; one part of each kind if that order is not possible."""
     try:
         return task.order(toasts)
     except BadInput:
@@ -118,7 +119,7 @@ def _obstacles(task: Task, layout: Layout) -> list[PlannedObstacle]:
 
 
 def _blocked(surveys: Surveys) -> BlockedCells:
-    """What blocks the lowest level for whatever part is carried."""
+    """The cells of the lowest level that are blocked for some carried part."""
     grid, causes = surveys.task.workspace, None
     for part in surveys.task.made:
         found = surveys.workspace(comes_as(part)).causes[:, :, 0]
@@ -133,7 +134,7 @@ def _cameras(task: Task) -> list[CameraCells]:
 
 
 def _approaches(surveys: Surveys) -> list[Approach]:
-    """Those of every place with every kind that is carried there; of a place that one kind cannot come to, that one."""
+    """The approaches of each place with each kind carried there; if a kind cannot reach a place, only that approach."""
     task, found = surveys.task, []
     for station in task.stations:
         carried = [comes_as(part) for part in task.kinds_at(station.name)]

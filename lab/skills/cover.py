@@ -1,4 +1,4 @@
-"""Cover: a surface is covered cell by cell, by the shortest learned path: with butter, glue or paint, or by vacuuming."""
+"""Cover: treat a surface cell by cell along the shortest learned path, as with butter, glue or paint, or by vacuuming."""
 
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, ClassVar
@@ -24,15 +24,15 @@ from lab.tasks.task_fields import Process, Stage
 if TYPE_CHECKING:
     from lab.toolbox.policy import Policy
 
-REST = (0.0, 0.0)  # where a machine's head waits, low, out of the gripper's way
-HEAD_BEHIND_M = 0.03  # the head's frame behind the nozzle's plane
-PATCH_M = 0.0024  # thickness of what is seen on the part
+REST = (0.0, 0.0)  # joints of a machine's head while it waits, low and clear of the gripper
+HEAD_BEHIND_M = 0.03  # distance of the head's frame behind the nozzle's plane
+PATCH_M = 0.0024  # thickness of the patches drawn on the part
 OVER_M = 0.004  # [m] a tool this near to the middle of a cell covers it
 _RAY_M = 0.2
 
 
 class Cover(Skill):
-    """Cover a surface; `covered` are the cells that were met, in order. A head does it on a part, or the robot at a station."""
+    """Cover a surface, by a machine's head on a part or by the robot at a station; `covered`: the cells covered, in order."""
 
     subtask: ClassVar[str] = "cover"
     help: ClassVar[str] = "a surface is covered cell by cell, as with butter or by vacuuming"
@@ -57,14 +57,14 @@ class Cover(Skill):
         return None if stage.service is None else CoverPlace(task, stage.service, stage.station, "")
 
     def setup(self, surveys: Surveys) -> Problem:
-        """Which cell the tool is at and which are covered: the shortest complete coverage."""
+        """The problem of shortest complete coverage; a state is the tool's cell and the set of covered cells."""
         self.surveys = surveys
         mdp = coverage(self.shape, surveys.task.subtask(self.subtask).rewards)
         self.problem = Problem(self.name, self.subtask, mdp)
         return self.problem
 
     def in_words(self, state: int) -> str:
-        """Over which cell the tool is, and how much is covered."""
+        """The tool's cell and the number of covered cells, as a sentence."""
         mdp, (rows, columns) = self.problem.mdp, self.shape
         row, column = mdp.state_cell(state)
         what = f"{plain(self.kind)} in {plain(self.station)}" if self.kind else plain(self.station)
@@ -74,11 +74,11 @@ class Cover(Skill):
         )
 
     def moves_in_words(self) -> tuple[str, ...]:
-        """A cell each."""
+        """One cell for each action."""
         return ("1 cell",) * self.problem.mdp.n_actions
 
     def _complete(self) -> None:
-        """SkillFailed when a cell was missed."""
+        """Raise SkillFailed when a cell was missed."""
         missed = sorted(set(np.ndindex(*self.shape)) - set(self.covered))
         if missed:
             cells = f"{len(missed)} of {self.shape[0] * self.shape[1]} cells"
@@ -86,14 +86,14 @@ class Cover(Skill):
 
 
 class CoverPart(Cover):
-    """A machine's own head covers the side of the part that stands in it: the side towards its negative y axis."""
+    """A machine's head covers one side of the part that stands in it: the side that faces the part's negative y axis."""
 
     near: ClassVar[bool] = True
     moves_arm: ClassVar[bool] = False
     looks_from: ClassVar[tuple[float, float]] = (-42.0, 28.0)  # the head stands before the part
 
     def setup(self, surveys: Surveys) -> Problem:
-        """The shortest complete coverage. BadInput for cells of a part that the head does not meet, with what it meets."""
+        """The problem of shortest complete coverage. BadInput names cells out of the head's reach, and what blocks them."""
         problem = super().setup(surveys)
         for part in surveys.task.kinds_at(self.station):
             missed = self._missed(surveys.kinds[part.name])
@@ -107,7 +107,7 @@ class CoverPart(Cover):
         return problem
 
     def _missed(self, kind: Kind) -> dict[tuple[int, ...], str]:
-        """The cells of a part on its spot that the head does not meet, and what it meets there."""
+        """By cell of a part on its spot that the head's ray does not hit: the name of what it hits instead."""
         task, places, missed = self.surveys.task, self.surveys.places, dict[tuple[int, ...], str]()
         with World() as world:
             scene = Scene(world, task, (), self.surveys.layout)
@@ -127,16 +127,16 @@ class CoverPart(Cover):
         return float(high[2] - low[2]) / self.shape[0], float(high[0] - low[0]) / self.shape[1]
 
     def head(self, state: int, kind: Kind | None = None) -> tuple[float, float]:
-        """The head's joints in a state [m]: across from the part's middle, and up from the machine's floor."""
+        """The head's joints in a state [m]: sideways from the part's middle, and height above the machine's floor."""
         return self.head_at(self.problem.mdp.state_cell(state), kind)
 
     def head_at(self, cell: Sequence[int], kind: Kind | None = None) -> tuple[float, float]:
-        """The head's joints [m] before a cell: its row from the top, and its column."""
+        """The head's joints [m] in front of a cell, given by its row from the top and its column."""
         (row, column), (high, wide) = cell, self.cell_m(kind)
         return ((column - (self.shape[1] - 1) / 2) * wide, (self.shape[0] - 1 - row + 0.5) * high)
 
     def pose(self, state: int) -> ToolPose:
-        """Where the machine's head is; the arm has no part in this."""
+        """The pose of the machine's head; the arm does not move in this skill."""
         x, y, yaw = self.surveys.task.station(self.station).pose
         across, up = self.head(state)
         floor = self.surveys.places.floor(self.surveys.task.station(self.station))
@@ -148,7 +148,7 @@ class CoverPart(Cover):
         return True
 
     def on_part(self, name: str, kind: Kind) -> tuple[Body, ...]:
-        """A patch on each cell of the part's side of its negative y axis."""
+        """A patch for each cell of the covered side of the part."""
         high, wide = self.cell_m(kind)
         low, top = kind.shape.low, kind.shape.high
         patches = []
@@ -161,22 +161,24 @@ class CoverPart(Cover):
         return tuple(patches)
 
     def _patch(self, name: str, row: int, column: int) -> str:
-        """What a covered cell of a part is called."""
+        """The body name of a covered cell of a part."""
         return f"{self.name.partition(' at ')[0]} on {name} {row}{column}"
 
     def shown(self) -> list[str]:
-        """The patches that were covered in this motion."""
+        """The names of the patches that this motion has covered."""
         return [self._patch(self.part, *cell) for cell in self.covered]
 
     def shown_in(self, state: int, name: str) -> dict[str, bool]:
-        """What is covered in `state`."""
+        """By patch name: whether its cell is covered in `state`."""
         covered = np.ndenumerate(self.problem.mdp.covered(state))
         return {self._patch(name, row, column): bool(on) for (row, column), on in covered}
 
     def motion(self, bench: Bench, policy: "Policy") -> Iterator[None]:
-        """Move the head along the learned cells, stay on each, note where its ray meets the part, and go to rest."""
+        """Move the head along the learned path, dwell on each cell, record where its ray hits the part, and return to rest."""
         mdp, process = self.problem.mdp, self.process
-        kind = bench.scene.kind_of.get(self.part, self.own_kind)  # others than the first may come to this machine
+        kind = bench.scene.kind_of.get(
+            self.part, self.own_kind
+        )  # parts of another kind than the first may come to this machine
         self.covered = []
         for state in learned_path(policy, mdp, mdp.start):
             yield from self._slide(bench, self.head(state, kind), process.speed_m_s)
@@ -185,7 +187,7 @@ class CoverPart(Cover):
             met = self._met(bench, kind)
             if met is not None and met not in self.covered:
                 self.covered.append(met)
-        yield from self._slide(bench, REST, process.speed_m_s)  # so that every part takes the same time
+        yield from self._slide(bench, REST, process.speed_m_s)  # so that the time is the same for every part
         self._complete()
 
     def _slide(self, bench: Bench, target: tuple[float, float], speed: float) -> Iterator[None]:
@@ -199,7 +201,7 @@ class CoverPart(Cover):
         world.drive(self.station, HEAD_JOINTS, target, force=300.0)
 
     def _met(self, bench: Bench, kind: Kind) -> tuple[int, int] | None:
-        """The cell of the part that the nozzle's ray meets."""
+        """The cell of the part that the nozzle's ray hits; None when it hits none."""
         hit = self._ray(bench.scene.world)
         return (
             self._cell_of(bench.scene.world, self.part, kind, hit[1])
@@ -208,7 +210,7 @@ class CoverPart(Cover):
         )
 
     def _ray(self, world: World) -> tuple[str, Array] | None:
-        """The body that the nozzle's ray meets, and where."""
+        """The name of the body that the nozzle's ray hits, and the point; None when it hits nothing."""
         nozzle, _ = world.pose(self.station, HEAD_LINK)
         yaw = self.surveys.task.station(self.station).pose[2]
         ahead = np.array([-np.sin(yaw), np.cos(yaw), 0.0])
@@ -224,14 +226,14 @@ class CoverPart(Cover):
 
 
 class CoverPlace(Cover):
-    """The robot's empty tool covers a surface at a station, before it takes the part out, as when a mill is vacuumed."""
+    """The robot's empty tool covers a surface at a station before it takes the part out, as when it vacuums a mill."""
 
     def pose(self, state: int) -> ToolPose:
-        """Over the middle of the state's cell."""
+        """The tool pose over the middle of the state's cell."""
         return self.over(self.problem.mdp.state_cell(state))
 
     def over(self, cell: tuple[int, ...]) -> ToolPose:
-        """Over the middle of a cell."""
+        """The tool pose over the middle of a cell."""
         (row, column), process = cell, self.process
         assert process.area_m is not None
         x, y, yaw = self.surveys.task.station(self.station).pose
@@ -241,7 +243,7 @@ class CoverPlace(Cover):
         return ToolPose(x, y, high, yaw).local(dx + across, dy + along)
 
     def setup(self, surveys: Surveys) -> Problem:
-        """As for any surface, where the tool can be over all of its cells."""
+        """The problem of shortest complete coverage. BadInput when the tool cannot reach a cell of the area."""
         problem = super().setup(surveys)
         area_m, off_m, name = self.process.area_m, self.process.off_m, self.name.partition(" at ")[0]
         where = f"processes.{name}.area_m = {list(area_m or ())}, off_m = {list(off_m)} at '{self.station}'"
@@ -249,11 +251,11 @@ class CoverPlace(Cover):
         return problem
 
     def begins_at(self) -> ToolPose:
-        """The approach of the station."""
+        """The approach pose of the station."""
         return self.surveys.approach(self.station)
 
     def motion(self, bench: Bench, policy: "Policy") -> Iterator[None]:
-        """Down to the first cell, along the learned ones, staying on each, and up to the approach again."""
+        """Move down to the first cell, along the learned path with a dwell on each cell, and back up to the approach."""
         robot, mdp, process = bench.scene.robot, self.problem.mdp, self.process
         approach = self.surveys.approach(self.station)
         slow = min(1.0, process.speed_m_s / robot.speed)
@@ -272,7 +274,7 @@ class CoverPlace(Cover):
         self._complete()
 
     def _under(self, tool: ToolPose) -> tuple[int, int] | None:
-        """The cell that the tool is over, by where its tips are."""
+        """The cell below the finger tips; None outside the area."""
         for cell in np.ndindex(*self.shape):
             over = self.over(cell)
             if abs(tool.x - over.x) < OVER_M and abs(tool.y - over.y) < OVER_M and abs(tool.z - over.z) < OVER_M:

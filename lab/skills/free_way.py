@@ -1,4 +1,4 @@
-"""From wherever the tool is to a pose, without a learned way: up, through cells of the workspace that are free, and down."""
+"""Moves without a learned path: to a pose by way of free cells of the workspace, and above a part to look at it."""
 
 from collections import deque
 from collections.abc import Iterator
@@ -18,9 +18,10 @@ _BLEND_M = 0.10
 
 
 def by_free_cells(bench: Bench, surveys: Surveys, end: ToolPose, carried: str = "") -> Iterator[None]:
-    """Bring the tool to `end`; carried: the kind of part in the gripper, "" for none.
+    """Bring the tool to `end` from anywhere, as before a second attempt: up, through free cells, and down.
 
-    As when something is tried again. Where the free cells do not hang together: straight across, as high as they go.
+    carried: the kind of part in the gripper, "" for none. If no free cells connect both ends, the tool crosses in a
+    straight line at the highest level.
     """
     robot, tool = bench.scene.robot, bench.scene.robot.tool()
     survey = surveys.workspace(carried)
@@ -46,7 +47,7 @@ def _nearest(surveys: Surveys, survey: Survey, pose: ToolPose) -> Cell:
 
 
 def shortest(survey: Survey, first: Cell, last: Cell) -> list[Cell]:
-    """The cells of a shortest way between two free ones, from neighbour to neighbour; none where no way leads there."""
+    """The cells of a shortest path between two free cells, neighbour by neighbour; [] when there is no path."""
     blocked, before = survey.blocked, dict[Cell, Cell]({first: first})
     pending = deque([first])
     while pending and last not in before:
@@ -66,15 +67,18 @@ def shortest(survey: Survey, first: Cell, last: Cell) -> list[Cell]:
     return way[::-1]
 
 
-# ---- looking ----------------------------------------------------------------------------------------------------------
+# ---- looking at a part with the camera in the hand ----------------------------------------------------------------------
 
 
-FAR_M = 0.2  # [m] a tool farther from the station's approach, as when trying again, comes over everything
+FAR_M = 0.2  # [m] a tool farther from the station's approach, as before a second attempt, first moves above everything
 SLOW = 0.6
 
 
 def look_at(bench: Bench, surveys: Surveys, station: str, body: str, spot: Spot) -> Iterator[None]:
-    """See where a part is that should stand at `spot`; nothing is done where the task does not look. Raises SkillFailed."""
+    """Locate, with the camera in the hand, a part expected at `spot`; does nothing in a task without such a camera.
+
+    Raises SkillFailed when the part is not seen.
+    """
     if bench.sight is None:
         return
     robot, approach = bench.scene.robot, surveys.approach(station)
@@ -89,7 +93,7 @@ def look_at(bench: Bench, surveys: Surveys, station: str, body: str, spot: Spot)
 
 
 def _over(bench: Bench, surveys: Surveys, station: str, body: str, spot: Spot) -> ToolPose:
-    """Above the part, where the arm reaches that; else, and where parts are taken from the side, the station's approach."""
+    """The pose above the part if the arm reaches it and the station is entered from above, else the station's approach."""
     approach = surveys.approach(station)
     if surveys.into(station) is not None:
         return approach

@@ -17,11 +17,13 @@ if TYPE_CHECKING:
 
 ACTIONS = ("left", "right", "backward", "forward", "down", "up", "turn right", "turn left")  # of the part's axes
 GOAL = (2, 2, 0, 2)
-ASTRAY_M = 0.15  # [m] a part farther from all spots of the station is taken up over everything
+ASTRAY_M = (
+    0.15  # [m] a part farther from every spot of the station counts as astray, and is approached above everything
+)
 
 
 class Grasp(AroundPart):
-    """Take a part at one station: the table holds the tool's pose relative to the part (x, y, z, yaw)."""
+    """Grasp a part at one station; a state is the tool's pose relative to the part (x, y, z, yaw)."""
 
     subtask: ClassVar[str] = "grasp"
     help: ClassVar[str] = "the gripper comes to a part, closes and lifts it"
@@ -32,15 +34,15 @@ class Grasp(AroundPart):
 
     @classmethod
     def at_pick(cls, task: Task, kind: str, station: str) -> "Grasp":
-        """It takes parts up everywhere."""
+        """The skill that grasps a part of a kind at a station: any station has one."""
         return cls(task, kind, station)
 
     def way_in_words(self) -> tuple[str, str]:
-        """The fingers come to the part."""
+        """The open fingers, and the place where they close on the part."""
         return "The open fingers are", f"where they close on {plain(self.kind)}"
 
     def motion(self, bench: Bench, policy: "Policy") -> Iterator[None]:
-        """Open, go above the part, follow the learned cells down, close, lift, and see that the part came along."""
+        """Open, move above the part, follow the learned path down, close, lift, and check that the part is held."""
         robot, body = bench.scene.robot, bench.scene.body_of(self.part, self.kind)
         if robot.closed:
             yield from robot.release()
@@ -61,13 +63,13 @@ class Grasp(AroundPart):
         if astray:
             yield from by_free_cells(bench, self.surveys, approach, self.kind)
         else:
-            for pose in self.surveys.way_out(self.station, goal):
+            for pose in self.surveys.exit_path(self.station, goal):
                 yield from robot.follow([pose], slow=SLOW)
         if not bench.holds(body):
             bench.held = None
             raise SkillFailed(f"{body} is not in the gripper after grasping at '{self.station}'")
 
     def _is_astray(self, goal: ToolPose) -> bool:
-        """Whether the part stands at none of the station's spots, but somewhere in the cell."""
+        """Whether the part stands farther than ASTRAY_M from every spot of the station."""
         spots = self.surveys.places.spots(self.surveys.task.station(self.station))
         return all(hypot(goal.x - spot.x, goal.y - spot.y) > ASTRAY_M for spot in spots)

@@ -1,4 +1,4 @@
-"""Insert: by the overhead camera's picture through a grid to a machine, and down into its slot (thesis ch. 8)."""
+"""Insert: carry a part through a grid seen by the overhead camera to a machine, and down into its slot (thesis ch. 8)."""
 
 from collections.abc import Iterator
 from contextlib import suppress
@@ -17,7 +17,7 @@ from lab.sim.parts.kinds import Spot
 from lab.skills.free_way import by_free_cells, look_at
 from lab.skills.place import let_go, release_pose
 from lab.skills.sight import SkillFailed
-from lab.skills.skill import Bench, Photo, Skill, learned_path, no_way, plain
+from lab.skills.skill import Bench, Photo, Skill, learned_path, no_path_error, plain
 from lab.skills.surveys import SurveyName, Surveys
 from lab.tasks.task import Task
 from lab.tasks.task_fields import Obstacle
@@ -27,20 +27,18 @@ if TYPE_CHECKING:
     from lab.toolbox.policy import Policy
 
 ACTIONS = ("left", "right", "backward", "forward")  # -x, +x, -y, +y: as the camera's picture shows them
-CLEARANCE_M = 0.006  # between a carried part and an obstacle in its way
-_GRIPPER_HALF_M = 0.055  # as high as the fingers, the gripper is wider than a slice
-SEEN_WITHIN_M = 0.008  # the camera must see the gripper this near to where the grid says it is
-CHECK_PIXELS = 320  # a side of the pictures taken on the way
-CORRECTED_M = (
-    0.002  # from here on the tool is moved by what the camera sees it off, where parts are located by the camera
-)
-STRAYED_M = 0.03  # and up to here
+CLEARANCE_M = 0.006  # between a carried part and an obstacle
+_GRIPPER_HALF_M = 0.055  # half the gripper's width at the fingers' height, where it is wider than a slice
+SEEN_WITHIN_M = 0.008  # largest deviation of the gripper, as the camera sees it, from its cell's middle
+CHECK_PIXELS = 320  # width and height of the pictures taken along the path
+CORRECTED_M = 0.002  # with `perception = "camera"`, a larger deviation is corrected
+STRAYED_M = 0.03  # and one larger than this is a failure
 IN_SLOT_M = 0.008
 _SLOW = 0.6
 
 
 class Insert(Skill):
-    """Carry the part in the gripper from the grid's start to the machine's slot and let it go there."""
+    """Carry the part in the gripper from the grid's start to the machine's slot and release it there."""
 
     subtask: ClassVar[str] = "insert"
     help: ClassVar[str] = "by the overhead camera's picture to a machine, and down into its slot"
@@ -51,20 +49,23 @@ class Insert(Skill):
     def __init__(self, task: Task, kind: str, station: str) -> None:
         super().__init__(f"insert{task.called(kind)} at {station}", kind)
         self.station = station
-        self._off = (0.0, 0.0)  # [m] so far is the tool sent beside where it is to be seen
+        self._off = (0.0, 0.0)  # [m] correction that is added to each tool target
 
     @classmethod
     def on_carry(cls, task: Task, kind: str, origin: str, target: str) -> "Insert | None":
-        """The skill that inserts the part where the target is entered through a camera's grid; None elsewhere."""
+        """The skill that inserts the part if the target is entered through a camera's grid, else None."""
         return cls(task, kind, target) if task.station(target).grid is not None else None
 
     @property
     def needs(self) -> tuple[SurveyName, ...]:
-        """The camera's grid."""
+        """The survey of the camera's grid."""
         return (("camera_grid", self.station, self.kind),)
 
     def setup(self, surveys: Surveys) -> Problem:
-        """Take the overhead picture, find the markers, and block the cells in which the part would meet an obstacle."""
+        """The problem read from the overhead picture; cells where the part would touch an obstacle are blocked.
+
+        BadInput when start or goal is blocked, or no path leads to the goal.
+        """
         self.surveys, self.grid = surveys, surveys.camera_grid(self.station, self.kind)
         self.picture = self.grid.picture()
         machine = surveys.task.station(self.station).pose[:2]
@@ -80,31 +81,31 @@ class Insert(Skill):
             mdp = grid(blocked.shape, blocked, self.seen.start, self.seen.goal, rewards, ACTIONS)
         except NoPath as error:
             enclosing = {part for cell in error.enclosing for part in names[cell].split(", ")}
-            raise no_way(self.name, error, sorted(enclosing)) from None
+            raise no_path_error(self.name, error, sorted(enclosing)) from None
         self.problem = Problem(self.name, self.subtask, mdp)
         return self.problem
 
     def _blocked(self, task: Task) -> tuple[NDArray[np.bool_], dict[tuple[int, ...], str]]:
-        """Cells in which the part would touch an obstacle that the camera sees, or cannot be for another reason; and why."""
+        """The blocked cells, and the causes of each by cell: obstacles that the camera sees, or what the survey found."""
         shape = self.grid.settings.shape
         causes: dict[tuple[int, ...], list[str]] = {cell: [] for cell in np.ndindex(*shape)}
         seen = {self._named(task, marker): marker.world_m for marker in self.seen.markers if marker.kind == "obstacle"}
         for name, place in seen.items():
             reach = self._reach(next(o for o in task.obstacles if o.name == name))
-            for cell, found in causes.items():
+            for cell, names in causes.items():
                 middle = self.seen.view.centre((cell[0], cell[1]))
                 if all(abs(m - p) < r for m, p, r in zip(middle, place, reach, strict=True)):
-                    found.append(name)
+                    names.append(name)
         unseen = self.grid.survey(frozenset(seen)).causes
         for cell in zip(*np.nonzero(unseen != ""), strict=True):
             causes[tuple(map(int, cell))].append(str(unseen[cell]))
         blocked = np.zeros(shape, bool)
-        for cell, found in causes.items():
-            blocked[cell] = bool(found)
-        return blocked, {cell: ", ".join(found) for cell, found in causes.items() if found}
+        for cell, names in causes.items():
+            blocked[cell] = bool(names)
+        return blocked, {cell: ", ".join(names) for cell, names in causes.items() if names}
 
     def _reach(self, obstacle: Obstacle) -> tuple[float, float]:
-        """How near along x and y [m] the tool may come to the middle of an obstacle with the part in its fingers."""
+        """The least distance along x and along y [m] from the tool with its part to the middle of an obstacle."""
         length, width, tall = obstacle.size
         high, half = self.grid.settings.height_m, self.own_kind.carried_half_m()
         if tall < high - self.own_kind.grip.up_m - CLEARANCE_M:
@@ -115,13 +116,13 @@ class Insert(Skill):
         return (x, y)
 
     def _named(self, task: Task, marker: Marker) -> str:
-        """The name of the obstacle that a marker lies on."""
+        """The name of the obstacle nearest to a marker."""
         x, y = marker.world_m
         places = zip(task.obstacles, self.surveys.layout.obstacles, strict=True)
         return min(places, key=lambda place: hypot(place[1][0] - x, place[1][1] - y))[0].name
 
     def photo(self) -> Photo:
-        """The overhead picture."""
+        """The overhead picture, and the grid seen in it."""
         return Photo(self.picture, self.seen)
 
     def begins_at(self) -> ToolPose:
@@ -129,16 +130,16 @@ class Insert(Skill):
         return ToolPose(*self.grid.settings.start_m, self.grid.settings.height_m, 0.0)
 
     def pose(self, state: int) -> ToolPose:
-        """Over the middle of the grid's cell."""
+        """The tool pose over the middle of the state's cell."""
         i, j = self.problem.mdp.state_cell(state)
         return ToolPose(*self.seen.view.centre((i, j)), self.grid.settings.height_m, 0.0)
 
     def way_in_words(self) -> tuple[str, str]:
-        """The part comes to the machine, seen from above."""
+        """The part in the fingers, and the machine's slot."""
         return f"{plain(self.kind).capitalize()} in the fingers is", f"the slot of {plain(self.station)}"
 
     def motion(self, bench: Bench, policy: "Policy") -> Iterator[None]:
-        """Cell by cell, each time seen by the camera; then above the slot, down, let go, and see that the part is in it."""
+        """Follow the learned cells, each checked by the camera, then move above the slot, down, release, and check the part."""
         robot, mdp, body = bench.scene.robot, self.problem.mdp, bench.held
         if body is None:
             raise SkillFailed(f"nothing in the gripper to insert at '{self.station}'")
@@ -155,26 +156,26 @@ class Insert(Skill):
         goal = release_pose(bench, body, spot).shifted(*self._off)
         yield from robot.follow([ToolPose(goal.x, goal.y, self.grid.settings.height_m, goal.yaw)], slow=_SLOW)
         yield from robot.follow([goal], slow=_SLOW)
-        yield from let_go(bench, self.surveys.way_out(self.station, goal))
+        yield from let_go(bench, self.surveys.exit_path(self.station, goal))
         yield from look_at(bench, self.surveys, self.station, body, spot)
         if not bench.stands(body, spot, IN_SLOT_M):
             raise SkillFailed(f"{body} is not in the slot of '{self.station}'")
 
     def _slot(self) -> Spot:
-        """The slot where the camera saw the machine: as far off it as the spot is off the station."""
+        """The slot's position, computed from where the camera saw the machine and the spot's offset from the station."""
         place, seen, spot = self.surveys.task.station(self.station), self.seen.goal_marker.world_m, self.stands_on()
         return replace(spot, x=spot.x + seen[0] - place.pose[0], y=spot.y + seen[1] - place.pose[1])
 
     def _to_start(self, bench: Bench) -> Iterator[None]:
-        """Where the tool is not at the grid's start, as when trying again: over everything and down to it."""
+        """Bring a tool that is not at the grid's start, as before a second attempt, above everything and down to it."""
         start, tool = self.pose(self.problem.mdp.start), bench.scene.robot.tool()
         if hypot(tool.x - start.x, tool.y - start.y, tool.z - start.z) >= self.grid.settings.cell_m:
             yield from by_free_cells(bench, self.surveys, start, self.kind)
 
     def _same_picture(self, bench: Bench) -> None:
-        """A new snapshot must show the obstacles and the machine where they were learned around, and no others.
+        """Raise SkillFailed unless a new picture shows machine and obstacles where they were in training, and no others.
 
-        A marker that is where it was belongs to nothing else: what is gone has not moved to another thing's place.
+        A marker that is still in its place is matched to itself first, so it is never taken for one that has moved.
         """
         view = self.grid.view(CHECK_PIXELS)
         now = [*find_markers(self.grid.camera(CHECK_PIXELS).picture(bench.scene.world), view)[0]]
@@ -202,7 +203,7 @@ class Insert(Skill):
             raise SkillFailed(f"the camera sees {known + new} obstacles, '{self.name}' was learned with {known}")
 
     def _corrected(self, bench: Bench, pose: ToolPose) -> Iterator[None]:
-        """Move the tool by what the camera sees it off its cell, and see that it is there then; kept for all that comes."""
+        """Add the deviation that the camera sees to all further targets, move the tool, and check it again. SkillFailed."""
         self._off = (self._off[0] + self._deviation[0], self._off[1] + self._deviation[1])
         yield from bench.scene.robot.follow([pose.shifted(*self._off)], slow=_SLOW)
         self._check_camera(bench, pose.x, pose.y)
@@ -212,7 +213,7 @@ class Insert(Skill):
             )
 
     def _check_camera(self, bench: Bench, x: float, y: float) -> None:
-        """Compare where the camera sees the gripper with where the grid has it."""
+        """Record how far the gripper is off its cell in the camera's picture. SkillFailed when that is too far."""
         seen = self._gripper_seen(bench, x, y)
         self._deviation = (x - seen[0], y - seen[1])
         self.deviations_m.append(hypot(*self._deviation))
@@ -220,7 +221,7 @@ class Insert(Skill):
             raise SkillFailed(f"the camera sees the gripper {self.deviations_m[-1]:.3f} m off its cell")
 
     def _gripper_seen(self, bench: Bench, x: float, y: float) -> tuple[float, float]:
-        """Where the camera sees the gripper [m]: most often near where it should be, so only that is rendered first."""
+        """The gripper's position in the camera's picture [m]; the window around its target is rendered first, to save time."""
         camera, view = self.grid.camera(CHECK_PIXELS), self.grid.view(CHECK_PIXELS)
         window = camera.in_picture(view.window((x, y), "gripper", STRAYED_M))
         with suppress(BadInput):
@@ -232,5 +233,5 @@ class Insert(Skill):
 
 
 def _far(one: Marker, other: Marker) -> float:
-    """How far one marker lies from another [m]."""
+    """The distance between two markers [m]."""
     return hypot(one.world_m[0] - other.world_m[0], one.world_m[1] - other.world_m[1])

@@ -1,4 +1,4 @@
-"""Pictures as a real overhead camera would take them, with known truth beside them; and how many are read back exactly."""
+"""Synthetic pictures as a real overhead camera would take them, each with its ground truth in a file beside it."""
 
 import json
 from collections.abc import Callable
@@ -27,21 +27,21 @@ from lab.vision.calibration import PRINTED, Mat
 from lab.vision.lens import drawn_lens, hide, spoiled
 
 MOST_PICTURES = 100_000
-MATS = 6  # pictures of the mat: one where it lies, the others tilted
+MATS = 6  # pictures of the mat: the first of it flat on the table, the others of it tilted
 MAT_TILT = 0.5  # [rad] about each axis, at the most
-WITHIN_M = 0.018  # of its cell's middle is what is put there: a millimetre from a border, nobody can tell the cell
-CUBES = (1, 6)  # stacks, at least and at most
+WITHIN_M = 0.018  # largest offset from a cell's middle: a millimetre from a border, nobody can tell the cell
+CUBES = (1, 6)  # least and largest number of stacks
 APART_M = 0.10  # between the middles of stacks, and of the gripper
 MACHINE_APART_M = 0.17  # from the machine's middle
-OFF_M, OFF_RAD = 0.008, 0.02  # standard deviation of where the camera really hangs, and how it is turned
-COVER_REACH = 4.8  # times a marker's radius in the picture, from its middle, are free of other markers
+OFF_M, OFF_RAD = 0.008, 0.02  # standard deviations of the camera's real position and rotation
+COVER_REACH = 4.8  # distance from a marker to the next, in its radii: a cover over one then leaves the other alone
 DRAWS = 400
 INDEX = "pictures.json"
 
 
 @dataclass(frozen=True)
 class Placed:
-    """What a picture shows: the task with its machine and stacks where they were put, and where the gripper is [m]."""
+    """The content of a picture: the task with its machine and stacks as placed, and the gripper's position [m]."""
 
     task: Task
     layout: Layout
@@ -57,9 +57,9 @@ def make_pictures(
     *,
     tell: Callable[[int], None] = lambda n: None,
 ) -> dict[str, Any]:
-    """Make `count` pictures of a task's grid and some of the mat in a new folder; the record that is kept in its index.
+    """Write `count` pictures of a task's grid, and some of the mat, into a new folder; returns the record in its index.
 
-    One camera takes them all: its lens and place are drawn from the seed. BadInput for a folder that is there already.
+    One camera takes them all; its lens and pose are drawn from the seed. BadInput when the folder exists already.
     """
     if not 1 <= count <= MOST_PICTURES:
         raise BadInput(f"{count} pictures (--make): allowed are 1 to {MOST_PICTURES}")
@@ -96,8 +96,9 @@ def make_pictures(
 def one_picture(
     task: Task, station: str, camera: Camera, lens: Lens, rng: np.random.Generator, strength: float
 ) -> tuple[Image, dict[str, Any]]:
-    """A picture (H, W, 3) of machine, stacks and gripper somewhere in the grid, and what it shows; a marker that something
-    stands before is drawn anew, for nothing of it is seen.
+    """A picture (H, W, 3) of machine, stacks and gripper somewhere in the grid, and its ground truth.
+
+    Placements in which something hides a marker from the camera are drawn again. WorkFailed after DRAWS attempts.
     """
     for _ in range(DRAWS):
         placed = _drawn(task, station, rng)
@@ -133,7 +134,7 @@ def one_picture(
     return spoiled(image, rng, strength), truth
 
 
-# ---- the camera and its mat ----------------------------------------------------------------------------------------
+# ---- the camera and its calibration mat ------------------------------------------------------------------------------
 
 
 def grid_station(task: Task) -> str:
@@ -144,7 +145,7 @@ def grid_station(task: Task) -> str:
 
 
 def _hung(task: Task, rng: np.random.Generator) -> Camera:
-    """The task's overhead camera as somebody hung it up: not quite there, and not quite straight down."""
+    """The task's overhead camera with the errors of a real mount: slightly displaced and not exactly vertical."""
     assert task.camera is not None
     x, y, z = task.camera.position_m
     off, tilt, turn = rng.normal(0, OFF_M, 3), rng.normal(0, OFF_RAD / 2, 2) * z, float(rng.normal(0, OFF_RAD))
@@ -156,7 +157,7 @@ def _hung(task: Task, rng: np.random.Generator) -> Camera:
 
 
 def mat_of(task: Task) -> Mat:
-    """The mat that fills most of the task's overhead picture, its middle beneath the camera."""
+    """The mat that fills most of the task's overhead picture, centred below the camera."""
     assert task.camera is not None
     x, y, z = task.camera.position_m
     side = 2 * z * float(np.tan(task.camera.field_of_view_rad / 2)) * 0.85
@@ -166,7 +167,7 @@ def mat_of(task: Task) -> Mat:
 
 
 def _mat_picture(mat: Mat, camera: Camera, lens: Lens, number: int, rng: np.random.Generator) -> Image:
-    """The mat on the table (number 0), or held up tilted, as the camera sees it."""
+    """The camera's picture of the mat, flat on the table (number 0) or tilted."""
     from scipy.spatial.transform import Rotation
 
     turn, shift = camera.turn_and_shift()
@@ -177,11 +178,11 @@ def _mat_picture(mat: Mat, camera: Camera, lens: Lens, number: int, rng: np.rand
     return mat.photographed(lens, turn, shift)
 
 
-# ---- one scene -----------------------------------------------------------------------------------------------------
+# ---- the scene of one picture ----------------------------------------------------------------------------------------
 
 
 def _drawn(task: Task, station: str, rng: np.random.Generator) -> Placed:
-    """The machine, stacks of cubes and the gripper, each near the middle of a cell of its own, and apart."""
+    """A random placement of machine, stacks of cubes and gripper: each near the middle of its own cell, well apart."""
     place = task.station(station)
     grid = settings_of(place)
 
@@ -218,7 +219,7 @@ def _drawn(task: Task, station: str, rng: np.random.Generator) -> Placed:
 
 
 def _markers(placed: Placed, station: str, grid: CameraGrid) -> list[tuple[str, tuple[float, float, float]]]:
-    """Kind and middle of the upper side of each marker [m]."""
+    """Each marker's kind and the centre of its upper side (x, y, z) [m]."""
     upper = models.MARKER_THICK / 2
     x, y, z = marker_of(placed.task.station(station), grid)
     gx, gy = placed.gripper
@@ -231,7 +232,7 @@ def _markers(placed: Placed, station: str, grid: CameraGrid) -> list[tuple[str, 
 
 
 def _in_sight(world: World, camera: Camera, lens: Lens, at: tuple[float, float, float]) -> bool:
-    """Whether nothing stands between the camera and a marker, and it lies wholly in the picture."""
+    """Whether a marker lies wholly in the picture and nothing hides it from the camera."""
     r = models.MARKER_RADIUS
     points = [(at[0] + dx, at[1] + dy, at[2] + 0.002) for dx, dy in ((0, 0), (r, 0), (-r, 0), (0, r), (0, -r))]
     x, y, radius = _disc(camera, lens, at)
@@ -240,12 +241,12 @@ def _in_sight(world: World, camera: Camera, lens: Lens, at: tuple[float, float, 
 
 
 def _apart(discs: list[tuple[float, float, float]]) -> bool:
-    """Whether what covers a part of one marker leaves the others alone."""
+    """Whether the markers are so far apart that a cover over one leaves the others alone."""
     return all(hypot(x - u, y - v) > COVER_REACH * max(r, s) for (x, y, r), (u, v, s) in combinations(discs, 2))
 
 
 def _disc(camera: Camera, lens: Lens, at: tuple[float, float, float]) -> tuple[float, float, float]:
-    """Where the lens shows a marker, and how large [pixels]."""
+    """A marker's centre x, y and radius in the picture [pixels]."""
     rim = np.array([at, (at[0] + models.MARKER_RADIUS, *at[1:])])
     (x, y), (u, v) = lens.projected(rim, *camera.turn_and_shift())
     return float(x), float(y), float(np.hypot(u - x, v - y))

@@ -1,4 +1,4 @@
-"""A new task whose cell is laid out around its arm and checked, before it is a file."""
+"""New tasks: the cell is laid out around its arm and every sub-task is checked before the file is written."""
 
 import re
 from dataclasses import replace
@@ -19,17 +19,17 @@ from lab.tasks.robot_fields import RobotSettings
 from lab.tasks.task import Task
 from lab.tasks.task_file import task_of_text
 
-FINGERS_M = 0.016  # that the fingers open beyond the widest part
-ROOM_M = 0.08  # between parts, where what stations have by themselves is not enough for the gripper
-MOST_TRIES = 4  # layouts of which every sub-task is surveyed
-NOT_HELD = "is not held"  # what a trial says of a part that slips, turns or falls over
-OTHER_MASSES = (0.5, 0.2, 0.1, 0.05, 2, 5, 10)  # times its own, tried for such a part
+FINGERS_M = 0.016  # by which the fingers open wider than the widest part
+ROOM_M = 0.08  # between parts, where the stations' own spacing leaves the gripper too little room
+MOST_TRIES = 4  # layouts whose sub-tasks are surveyed, for each spacing
+NOT_HELD = "is not held"  # in the message about a part that slips, turns or falls over in a trial
+OTHER_MASSES = (0.5, 0.2, 0.1, 0.05, 2, 5, 10)  # factors of its own mass that are tried for such a part
 
 
 def new_cell(new: NewTask, path: Path) -> tuple[str, Task]:
-    """The text of a task file for `path`, and its task, whose every sub-task has a way.
+    """The text of a task file for `path`, and its task; every sub-task of it has a solution.
 
-    BadInput for what cannot be; of parts that are not held, it says which mass would do, if one does.
+    BadInput when no layout works. For parts that slip, it names a mass with which they would be held, if there is one.
     """
     try:
         return _laid_out(new, path)
@@ -41,7 +41,7 @@ def new_cell(new: NewTask, path: Path) -> tuple[str, Task]:
 
 
 def _what_holds(new: NewTask, path: Path) -> str:
-    """Which masses of its parts would do."""
+    """The masses with which all parts would be held, as command line options."""
     for times in OTHER_MASSES:
         parts = [
             replace(part, given_kg=min(max(round(times * part.mass_kg, 3), LIGHTEST_KG), HEAVIEST_KG))
@@ -58,7 +58,7 @@ def _what_holds(new: NewTask, path: Path) -> str:
 def _laid_out(new: NewTask, path: Path) -> tuple[str, Task]:
     arm = arm_of(RobotSettings(model=new.arm, start="input"))
     widest = max(_grip_width(part, arm, path.parent) for part in new.parts)
-    opening = round(widest + FINGERS_M, 4)  # wide open, fingers would need more room between parts
+    opening = round(widest + FINGERS_M, 4)  # fully open fingers would need more room between parts
     around = _around(new, arm)
     refused: BadInput = does_not_fit(new, around)
     closer, wider = (islice(layouts(new, around, between), MOST_TRIES) for between in (None, ROOM_M))
@@ -75,13 +75,13 @@ def _laid_out(new: NewTask, path: Path) -> tuple[str, Task]:
 
 
 def _grip_width(part: NewPart, arm: Arm, folder: Path) -> float:
-    """How far apart the fingers are that hold a part [m]; BadInput when they cannot."""
+    """The distance between the fingers that hold a part [m]; BadInput when they cannot hold it."""
     fields = PartFields(name=part.name, shape=part.shape, size_m=part.size_m, mass_kg=part.mass_kg)  # type: ignore[arg-type]
     return grip_of(shape_of(fields, folder), arm.gripper, part.friction).width_m
 
 
 def _around(new: NewTask, arm: Arm) -> Around:
-    """Where the arm reaches both what stands at a station and the way above it."""
+    """The region in which the arm reaches both the parts at a station and the path above them."""
     rings = [ring_of(arm.inverse, height, arm.nearest_m) for height in heights_m(new)]
     found = [ring for ring in rings if ring is not None]
     if len(found) < len(rings):

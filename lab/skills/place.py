@@ -1,4 +1,4 @@
-"""Place: set a part down on a plate, a buffer, a pallet or in a machine's groove, and let go."""
+"""Place: set a part down on a plate, a buffer, a pallet or in a machine's groove, and release it."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -21,11 +21,11 @@ if TYPE_CHECKING:
 
 ACTIONS = ("left", "right", "backward", "forward", "down", "up")  # of the spot's axes
 GOAL = (2, 2, 0)
-NEAR_M = 0.012  # a part this near to its spot stands on it
+NEAR_M = 0.012  # largest distance from its spot at which a part counts as standing on it
 
 
 class Place(AroundPart):
-    """Set a part down at one station: the table holds the tool's position relative to the spot (x, y, z)."""
+    """Set a part down at one station; a state is the tool's position relative to the spot (x, y, z)."""
 
     subtask: ClassVar[str] = "place"
     help: ClassVar[str] = "a part is set down at a station and let go"
@@ -36,19 +36,19 @@ class Place(AroundPart):
 
     @classmethod
     def on_carry(cls, task: Task, kind: str, origin: str, target: str) -> "Place | None":
-        """At the end, where the camera's grid does not lead."""
+        """The skill that sets the part down at the target; None for a target with a camera's grid (see `Insert`)."""
         return None if task.station(target).grid is not None else cls(task, kind, target)
 
     def goal_pose(self) -> ToolPose:
-        """Where the tool lets go of a part held as it is to be held."""
+        """The tool pose at which a correctly held part is released."""
         return super().goal_pose().shifted(dz=RELEASE_ABOVE)
 
     def way_in_words(self) -> tuple[str, str]:
-        """The part comes to its spot."""
+        """The part in the fingers, and its place at the station."""
         return f"{plain(self.kind).capitalize()} in the fingers is", f"its place at {plain(self.station)}"
 
     def motion(self, bench: Bench, policy: "Policy") -> Iterator[None]:
-        """Go above the spot, follow the learned cells down, let go, rise, and see that the part stands."""
+        """Move above the spot, follow the learned path down, release, rise, and check that the part stands."""
         body, spot = bench.held, self.stands_on()
         if body is None:
             raise SkillFailed(f"nothing in the gripper to place at '{self.station}'")
@@ -58,7 +58,7 @@ class Place(AroundPart):
             spot = replace(spot, x=foot.x, y=foot.y)  # where the pallet was really set down
         goal = release_pose(bench, body, spot)
         yield from self.down(bench, policy, goal)
-        yield from let_go(bench, self.surveys.way_out(self.station, goal))
+        yield from let_go(bench, self.surveys.exit_path(self.station, goal))
         yield from look_at(bench, self.surveys, self.station, body, spot)
         if bench.sight is not None:
             bench.sight.stands(self.part, self.kind, bench.sight.where[body])
@@ -69,8 +69,10 @@ class Place(AroundPart):
 
 
 def release_pose(bench: Bench, body: str, spot: Spot) -> ToolPose:
-    """Where the tool lets go so that the part, as it hangs in the fingers, stands on the spot. SkillFailed when it hangs there
-    no more."""
+    """The tool pose at which to release, so that the part, as it is actually held, stands on the spot.
+
+    Raises SkillFailed when the fingers no longer hold the part.
+    """
     if not bench.holds(body):
         raise SkillFailed(f"{body} is not in the gripper any more")
     tool, wanted = bench.scene.robot.tool(), bench.scene.kind_of[body].held_at(spot)
@@ -80,10 +82,10 @@ def release_pose(bench: Bench, body: str, spot: Spot) -> ToolPose:
     return wanted.local(-along, 0.0, tool.z - hangs.z + RELEASE_ABOVE)
 
 
-def let_go(bench: Bench, way_out: Sequence[ToolPose]) -> Iterator[None]:
-    """Open the fingers, and go the way out of the station."""
+def let_go(bench: Bench, exit_path: Sequence[ToolPose]) -> Iterator[None]:
+    """Open the fingers, and leave the station through the poses `exit_path`."""
     robot = bench.scene.robot
     yield from robot.release()
     bench.held = None
-    for pose in way_out:
+    for pose in exit_path:
         yield from robot.follow([pose], slow=SLOW)

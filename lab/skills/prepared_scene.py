@@ -1,4 +1,7 @@
-"""A task whose scene is laid out and surveyed: what there is to learn, before anything is learned."""
+"""A task ready for learning: `prepare` lays its scene out and surveys every problem; `check_task` checks a file that way.
+
+`precedences` derives which parts must wait for which, from layers of parts and from the file's [[after]].
+"""
 
 import time
 from collections.abc import Iterator
@@ -22,26 +25,26 @@ from lab.workers import Workers
 
 
 def precedences(task: Task, order: Order) -> tuple[Precedence, ...]:
-    """Those of an order, parts by their numbers: from places with a height, and from the file's [[after]].
+    """The precedences of an order, parts by number: from spots on top of parts, and from the file's [[after]].
 
-    BadInput, with the file and the line, where parts would wait for more than there are.
+    BadInput, with file and line, when parts would wait for more parts than the order has.
     """
     with task.in_its_file():
         layered = [station for station in task.stations if station.is_layered]
         places = places_of(task) if layered else None
         derived = [
-            one
+            precedence
             for station in layered
             if places
-            for one in (*_put_on(places, station, order), *_taken_off(places, station, order))
+            for precedence in (*_put_on(places, station, order), *_taken_off(places, station, order))
         ]
-        return (*derived, *_said(task, order))
+        return (*derived, *_from_file(task, order))
 
 
 def _put_on(places: Places, station: Station, order: Order) -> Iterator[Precedence]:
-    """Where routes end: as many parts of a kind are there as it takes until a part of another kind stands on them.
+    """The precedences where routes end: a part waits until the parts that it stands on are there.
 
-    The places of a kind are filled from the first on, so the n-th part that comes stands on the n-th of them.
+    The spots of a kind are filled in order, so the n-th part to arrive stands on the n-th spot.
     """
     task, groups = places.task, dict[tuple[Spot, ...], list[str]]()
     for part in task.made:
@@ -73,7 +76,7 @@ def _put_on(places: Places, station: Station, order: Order) -> Iterator[Preceden
 
 
 def _taken_off(places: Places, station: Station, order: Order) -> Iterator[Precedence]:
-    """Where routes begin: a layer is taken away, as far as parts carry it, before any part of the layer below it."""
+    """The precedences where routes begin: parts of a layer are taken before the parts of the layer below that carry them."""
     begins = enumerate(places.begins(order), 1)
     stand = {part: spot for part, spot in begins if places.task.starts(order[part - 1]) == station.name}
     below = {part: [under.z for _, under in places.below(station, spot)] for part, spot in stand.items()}
@@ -84,19 +87,22 @@ def _taken_off(places: Places, station: Station, order: Order) -> Iterator[Prece
             yield Precedence(parts, Step(station.name, leaves=True), of, Step(station.name, leaves=True))
 
 
-def _said(task: Task, order: Order) -> Iterator[Precedence]:
-    """What the file says; nothing of kinds that the order has none of."""
-    for number, one in enumerate(task.after, 1):
-        parts, of = _numbers(order, [one.part]), _numbers(order, [one.of])
-        if not parts or (not of and one.count == "all"):
+def _from_file(task: Task, order: Order) -> Iterator[Precedence]:
+    """The precedences of the file's [[after]]; those of kinds that the order does not contain are left out."""
+    for number, rule in enumerate(task.after, 1):
+        parts, of = _numbers(order, [rule.part]), _numbers(order, [rule.of])
+        if not parts or (not of and rule.count == "all"):
             continue
-        if one.count == "each" and len(of) < len(parts):
+        if rule.count == "each" and len(of) < len(parts):
             raise BadInput(
-                f"after {number}: {counted(len(parts), one.part)} would wait for as many of '{one.of}', and the order has "
-                f"{len(of)}: wanted count = 'all', more of '{one.of}', or fewer of '{one.part}'"
+                f"after {number}: {counted(len(parts), rule.part)} would wait for as many of '{rule.of}', and the order has "
+                f"{len(of)}: wanted count = 'all', more of '{rule.of}', or fewer of '{rule.part}'"
             )
-        needs = tuple(range(1, len(parts) + 1)) if one.count == "each" else ()
-        steps = Step(one.station, one.step == "leaves"), Step(one.of_station or one.station, one.of_step == "leaves")
+        needs = tuple(range(1, len(parts) + 1)) if rule.count == "each" else ()
+        steps = (
+            Step(rule.station, rule.step == "leaves"),
+            Step(rule.of_station or rule.station, rule.of_step == "leaves"),
+        )
         yield Precedence(parts, steps[0], of, steps[1], needs)
 
 
@@ -104,12 +110,12 @@ def _numbers(order: Order, kinds: list[str]) -> tuple[int, ...]:
     return tuple(number for number, kind in enumerate(order, 1) if kind in kinds)
 
 
-# ---- prepared scene ---------------------------------------------------------------------------------------------------
+# ---- a scene laid out and surveyed --------------------------------------------------------------------------------------
 
 
 @dataclass
 class Prepared:
-    """A task whose scene is surveyed, which took `wall_s`: nothing is learned yet, and nothing is written."""
+    """A task whose scene is surveyed, which took `wall_s` [s]; nothing has been learned or written yet."""
 
     task: Task
     order: Order
@@ -122,19 +128,20 @@ class Prepared:
 
     @property
     def words(self) -> str:
-        """What is made, such as "3 slices"."""
+        """The order in words, such as "3 slices"."""
         return in_words(self.order)
 
 
 def lay_out(task: Task, order: Order, seed: int) -> Layout:
-    """The scene as the seed lays it out; BadInput for what cannot be."""
+    """The layout drawn with `seed`; BadInput when an obstacle cannot be placed."""
     return places_of(task).draw(order, np.random.default_rng([seed, 1]))
 
 
 def prepare(task: Task, order: Order, seed: int, only: str | None = None, workers: Workers | None = None) -> Prepared:
-    """Lay the scene out as the seed says and survey every problem of it, or `only` one skill's.
+    """The scene laid out with `seed` and surveyed, with every problem of it, or `only` that of one skill.
 
-    workers: who shares in the surveys, None: nobody. BadInput for whatever cannot be; writes nothing.
+    workers: processes that share the surveys; None: this one makes them all. Nothing is written.
+    Raises BadInput for a scene or a problem without a solution.
     """
     began = time.perf_counter()
     with task.in_its_file():
@@ -156,18 +163,18 @@ def prepare(task: Task, order: Order, seed: int, only: str | None = None, worker
 
 
 def scene_in_words(task: Task, order: Order, layout: Layout) -> str:
-    """A scene as a policy's card tells of it: how many parts there are, and where the obstacles stand [m]."""
+    """The scene as a policy's card describes it: the number of parts, and the obstacles' positions [m]."""
     places = zip(task.obstacles, layout.obstacles, strict=True)
     stand = [f"{obstacle.name} at ({x:.3f}, {y:.3f})" for obstacle, (x, y) in places]
     return ", ".join([in_words(order), *stand])
 
 
 def check_task(file: str, toasts: int | None, seed: int) -> tuple[list[str], list[str]]:
-    """What is wrong with a task file, its scene and its problems, or with a cell or a world; and warnings.
+    """The faults and the warnings of a task file with its scene and problems, or of a cell or a world.
 
-    toasts: how many parts of the first kind; None: a task or a cell for its own order. A warning is of what
-    can be learned, but hardly by a learner that nobody helps.
-    Raises BadInput for a file that is not there, and for a number that this kind of file never takes.
+    toasts: how many parts of the first kind; None: the order in the file. A warning is about a problem that can be
+    learned, but hardly without advice.
+    Raises BadInput for a missing file, and for a number of parts that this kind of file never takes.
     """
     if not file.startswith(RANDOM):
         find(file)

@@ -1,4 +1,4 @@
-"""Pictures read back: how many grids of those that `made_pictures` made are exact; parts in an overhead picture."""
+"""Scores of picture reading: how many of the pictures from `made_pictures` are read exactly; and parts in a picture."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -22,13 +22,13 @@ from lab.vision import Image, View, read_picture, see
 from lab.vision.calibration import Calibration, calibrate
 from lab.vision.part_outline import Outlined, find_part
 
-MOST_BYTES = 10_000_000  # of what is told of a picture
+MOST_BYTES = 10_000_000  # of a picture's ground truth file
 Cell = tuple[int, ...]
 Kept = TypeVar("Kept", bound=Record)
 
 
 class TruthOfMarker(Record):
-    """A marker in the scene: its kind, where it is [m], its pixel, and how much of it is hidden."""
+    """A marker's ground truth: its kind, position [m], pixel, and the share of it that is hidden, 0 to 1."""
 
     kind: str
     world_m: tuple[float, float, float]
@@ -37,7 +37,7 @@ class TruthOfMarker(Record):
 
 
 class Truth(Record):
-    """What a picture shows, as `made_pictures` writes it."""
+    """A picture's ground truth, as `made_pictures` writes it."""
 
     shape: Cell
     start: Cell
@@ -47,7 +47,7 @@ class Truth(Record):
 
 
 class PicturesIndex(Record):
-    """What a folder of pictures holds, as `made_pictures` writes it."""
+    """The index of a folder of pictures, as `made_pictures` writes it."""
 
     task: str
     station: str
@@ -57,21 +57,22 @@ class PicturesIndex(Record):
     strength: float
 
 
-PART_REACH_M, PART_REACH_RAD = 0.03, 0.2  # around a station's spots
+PART_REACH_M, PART_REACH_RAD = 0.03, 0.2  # search range around a station's spots
 
 
 def calibrated_view(task: Task, station: str, calibration: Calibration) -> View:
-    """How a calibrated camera's straightened picture maps to a station's grid."""
+    """The mapping from a calibrated camera's undistorted picture to a station's grid."""
     return replace(camera_view(task, station), pixel_from_world=calibration.pixel_from_world)
 
 
 def score_pictures(
     folder: Path, calibration: Calibration | None = None, *, tell: Callable[[int], None] = lambda n: None
 ) -> dict[str, Any]:
-    """Read every picture of a folder that `make_pictures` made, and compare with what each shows.
+    """The scores of reading every picture of a folder that `make_pictures` made, against its ground truth.
 
     The camera is calibrated with the folder's pictures of the mat unless a calibration is given. A grid is exact when
-    start, goal and obstacles are all right and nothing else is seen. BadInput for a folder without an index.
+    start, goal and obstacles are all right and nothing else is seen. Marker errors are in metres, the calibration's
+    residual in pixels. Raises BadInput for a folder without an index.
     """
     index = _read(PicturesIndex, folder / INDEX)
     task, count = load(index.task), index.pictures
@@ -107,7 +108,7 @@ def _kept(folder: Path, count: int) -> Iterator[tuple[int, Image, Truth]]:
 
 
 def _read(kind: type[Kept], path: Path) -> Kept:
-    """What `lab see --make` told in a file. BadInput."""
+    """The record of a file that `lab see --make` wrote. Raises BadInput when it cannot be read or is another file."""
     try:
         return kind.model_validate_json(read_limited(path, MOST_BYTES))
     except OSError as error:
@@ -121,7 +122,7 @@ def _read(kind: type[Kept], path: Path) -> Kept:
 
 
 def _compared(straight: Image, view: View, truth: Truth) -> tuple[str, list[float]]:
-    """Why what is read differs from the truth, "" when it does not; and how far off each marker was seen [m]."""
+    """The difference between the grid read and the truth, "" for none; and the error of each marker [m]."""
     try:
         seen = see(straight, view)
     except LabError as error:
@@ -140,7 +141,10 @@ def _compared(straight: Image, view: View, truth: Truth) -> tuple[str, list[floa
 
 
 def parts_seen(task: Task, image: Image, view: View) -> list[dict[str, Any]]:
-    """The parts that stand on stations' spots in a straightened overhead picture: kind, station, place [m], yaw, outline."""
+    """The parts seen on stations' spots in an undistorted overhead picture.
+
+    Each is a record of `kind`, `station`, `world_m` [m], `yaw_rad` [rad] and `outline_px` [pixels].
+    """
     places, found = places_of(task), []
     height, width = image.shape[:2]
     for station in task.stations:

@@ -1,4 +1,4 @@
-"""Where parts stand as the camera in the hand has seen it: what a robot at a real table knows of them."""
+"""The parts' positions as seen by the camera in the hand: all that a robot at a real table knows of them."""
 
 from dataclasses import replace
 
@@ -14,18 +14,18 @@ from lab.vision import Image
 from lab.vision.lens import spoiled
 from lab.vision.part_outline import Outlined, PartSeen, find_part
 
-ABOVE_M = 0.16  # from the grasp up to where the tool looks from, at least
-REACHES = ((0.03, 0.2), (0.07, 0.4))  # [m], [rad] around where a part should be; the second when it is not in the first
+ABOVE_M = 0.16  # least height above the grasp from which the camera looks
+REACHES = ((0.03, 0.2), (0.07, 0.4))  # [m], [rad] search ranges around a part's expected pose, tried in this order
 
 
 class SkillFailed(Exception):
-    """A skill noticed that it did not do what it is for; the text says why."""
+    """Raised by a skill that did not reach its aim; the text says why."""
 
 
 class Sight:
-    """Where the foot of each part was seen or set down last; at the beginning, where the task says that it stands.
+    """The foot of each part, where it was last seen or set down; at first, where the task places it.
 
-    The pictures have a room's uneven light, blur and noise, drawn from the physics step in which they are taken.
+    The pictures have a room's uneven light, blur and noise, seeded by the physics step in which they are taken.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -36,13 +36,16 @@ class Sight:
             self.stands(name, kind, spot)
 
     def stands(self, name: str, kind: str, spot: Spot) -> None:
-        """Take it that a part stands on a spot, with what it rides on or carries."""
+        """Record that a part stands on a spot, together with the bodies stacked below and above it."""
         for body, own in zip(self.scene.bodies_of(name, kind), self.scene.kinds[kind].stack(), strict=True):
             self.where[body] = spot
             spot = spot.raised(own.shape.height_m)
 
     def pose(self, body: str, like: float, held: str | None) -> ToolPose:
-        """The tool pose that holds a part where it is known to be; what is in the gripper is where the gripper is."""
+        """The tool pose that would hold a part at its known place; for the `held` part, the tool's own pose.
+
+        like: yaw [rad] that the part's yaw is to be closest to, within its symmetry. WorkFailed for a part never seen.
+        """
         kind = self.scene.kind_of[body]
         if body == held:
             return self.scene.robot.tool()
@@ -52,7 +55,7 @@ class Sight:
         return replace(pose, yaw=kind.turned_like(pose.yaw, like))
 
     def look(self, body: str, spot: Spot) -> PartSeen | None:
-        """Take a picture with the camera in the hand, and find the part in it that should stand at `spot`; None: not seen."""
+        """The part expected at `spot`, found in a new picture of the camera in the hand; None when it is not seen."""
         part, image = self.looked_for(body, spot), self.picture()
         for reach_m, reach_rad in REACHES:
             if seen := find_part(image, part, (spot.x, spot.y, spot.yaw), reach_m, reach_rad):
@@ -62,12 +65,12 @@ class Sight:
         return None
 
     def picture(self) -> Image:
-        """What the camera in the hand sees now (H, W, 3)."""
+        """The picture (H, W, 3) of the camera in the hand now."""
         world = self.scene.world
         return spoiled(hand_camera(self.scene.robot.tool()).picture(world), np.random.default_rng([world.steps]))
 
     def looked_for(self, body: str, spot: Spot) -> Outlined:
-        """What the part looks like from where the camera is now."""
+        """The outline that the part is expected to show from the camera's current pose."""
         kind = self.scene.kind_of[body]
         camera, shape = hand_camera(self.scene.robot.tool()), kind.shape
         colours = np.array([look.rgba[:3] for look in shape.looks])

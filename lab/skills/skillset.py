@@ -1,4 +1,4 @@
-"""A task's skills: which it needs, where each of them is used, and the policies that they follow."""
+"""The set of skills that a task needs, where each of them is used, and the policies that they follow."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -17,12 +17,12 @@ from lab.toolbox.policy import Policy
 
 Pair = tuple[str, str]  # origin and target, by name
 Skills = tuple[Skill, ...]
-WINDOW_MARGIN_S = 1.0  # that is left free of a window when it is planned with
+WINDOW_MARGIN_S = 1.0  # by which a planned window is shorter than the task's
 NO_SERVICE: Mapping[tuple[str, str], float] = {}
 
 
 class Carried(NamedTuple):
-    """A way on which the robot carries something: from one station to another, and as what (see `Scene.kinds`)."""
+    """A transport by the robot: from one station to another, and the kind that it carries (see `Scene.kinds`)."""
 
     origin: str
     target: str
@@ -31,12 +31,12 @@ class Carried(NamedTuple):
 
 @dataclass
 class SkillSet:
-    """All skills that a task needs, by name, in the order in which they are learned; one for each place and way.
+    """All skills that a task needs, by name, in the order in which they are learned; one for each place and transport.
 
-    legs: what brings a part from one station to another, in order. travels: what takes the empty gripper there. picks:
-    what takes a part up, by kind and station. processes: what a machine does with its part, once it is learned.
-    services: what the robot does before it takes a part out, by the part's kind and the station. blocked: why skills cannot
-    be carried out in a scene that has changed, by name.
+    legs: the skills that carry a part from one station to another, in order. travels: those that move the empty gripper.
+    picks: those that take a part, by kind and station. processes: those of machines, once learned. services: those of the
+    robot before it takes a part out, by kind and station. blocked: why a skill cannot be carried out in a changed scene,
+    by name.
     """
 
     task: Task
@@ -52,9 +52,9 @@ class SkillSet:
 
     @classmethod
     def of(cls, task: Task, order: Order) -> "SkillSet":
-        """What a run with such an order may need; BadInput when the task names an unknown sub-task.
+        """The skills that a run with such an order may need. BadInput when the task names an unknown sub-task.
 
-        What is set down at the last station may have to be taken up again there, when setting it down failed.
+        Parts are also grasped at the last station, because a part that was set down badly there has to be taken again.
         """
         check_names(task)
         wanted = [part for part in task.made if part.name in order]
@@ -85,49 +85,49 @@ class SkillSet:
         )
 
     def _pick(self, carried: str, station: str) -> Skills:
-        found = self._own(kind.at_pick(self.task, carried, station) for kind in SKILLS.values())
-        self.picks[carried, station] = found
-        return found
+        picking = self._own(kind.at_pick(self.task, carried, station) for kind in SKILLS.values())
+        self.picks[carried, station] = picking
+        return picking
 
-    def _own(self, found: Iterable[Skill | None]) -> Skills:
-        """The skills found, each the one of its name."""
-        return tuple(self.skills.setdefault(skill.name, skill) for skill in found if skill is not None)
+    def _own(self, needed: Iterable[Skill | None]) -> Skills:
+        """The needed skills; a skill whose name is known already is replaced by the known one."""
+        return tuple(self.skills.setdefault(skill.name, skill) for skill in needed if skill is not None)
 
 
 def check_names(task: Task) -> None:
-    """BadInput unless all sub-tasks that a task names are skills."""
+    """Raise BadInput unless every sub-task that a task names is a skill."""
     for name in task.subtasks:
         if name not in SKILLS:
             raise unknown("sub-task", name, SKILLS, f"task '{task.name}': subtasks")
 
 
 def ways_of(part: Part) -> dict[Carried, None]:
-    """Every way on which a part of a kind, or its pallet, is carried along its routes, through buffers, too; in their order."""
-    found: dict[Carried, None] = {}
+    """Every transport of a part of a kind, or of its pallet, along its routes and through buffers, in that order."""
+    transports: dict[Carried, None] = {}
     for route in part.routes:
         for before, stage, after in zip(route, route[1:], [*route[2:], None], strict=False):
             kind = part.name if stage.pallet or before.pallet else comes_as(part)
             for origin, target in _legs(before, stage):
-                found[Carried(origin, target, kind)] = None
+                transports[Carried(origin, target, kind)] = None
             if stage.pallet and after is not None:
-                found[Carried(before.station, after.station, str(part.pallet))] = None
-    return found
+                transports[Carried(before.station, after.station, str(part.pallet))] = None
+    return transports
 
 
 def _legs(before: TaskStage, stage: TaskStage) -> list[Pair]:
-    """From a stage to the next, directly and through the next one's buffer."""
+    """The transports from a stage to the next: directly, and by way of the next one's buffer."""
     if stage.buffer is None:
         return [(before.station, stage.station)]
     return [(before.station, stage.station), (before.station, stage.buffer), (stage.buffer, stage.station)]
 
 
 def planned(at_most_s: float | None) -> float | None:
-    """The window that is planned with, where a part may stay in its machine for so long [s]: moves are not timed to the last."""
+    """The window used in planning for a part that may stay in its machine for `at_most_s` [s]: shorter, since moves vary."""
     return None if at_most_s is None else at_most_s - min(WINDOW_MARGIN_S, at_most_s / 2)
 
 
 def stations(task: Task, process_s: Mapping[str, float]) -> tuple[Station, ...]:
-    """The task's stations as the sequencer knows them, with the machines' times [s] (0 where not measured yet)."""
+    """The task's stations as records of the sequencer, with the machines' times [s] (0 if not measured yet)."""
     times = {
         s.name: s.processing_s if s.processing_s is not None else process_s.get(s.name, 0.0) for s in task.stations
     }
@@ -138,7 +138,7 @@ def stations(task: Task, process_s: Mapping[str, float]) -> tuple[Station, ...]:
 
 
 def products(parts: Iterable[Part], service_s: Mapping[Pair, float] = NO_SERVICE) -> tuple[Product, ...]:
-    """The kinds of parts and their routes as the sequencer knows them; service_s: by kind and station [s]."""
+    """The kinds of parts and their routes as records of the sequencer; service_s: times [s] by kind and station."""
 
     def route(part: Part, stages: Iterable[TaskStage]) -> Route:
         return tuple(

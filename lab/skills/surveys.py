@@ -1,4 +1,7 @@
-"""What the sub-tasks survey of one scene, each survey made once: the workspace, the surroundings of a station, the grids."""
+"""The surveys of one scene, each made once: the workspace, the space around a station's part, the camera's grids.
+
+`corners` shortens a path to straight lines through free space.
+"""
 
 from collections.abc import Callable, Hashable, Iterable, Sequence
 from contextlib import ExitStack
@@ -27,30 +30,31 @@ Free = Callable[[Sequence[ToolPose]], bool]  # whether the tool can be at all of
 
 
 def corners(path: Sequence[ToolPose], step_m: float, free: Free) -> tuple[int, ...]:
-    """Which poses of a path are left, both ends included: those of the fewest free lines, and of as few of the shortest.
+    """The indices of the poses that remain when a path is cut to the fewest free lines, among these the shortest.
 
-    Lines are asked about at poses at most `step_m` apart, a turn counted as way; those of the path itself are free.
+    Both ends remain. A line is checked at poses at most `step_m` apart, turns counted as length; the lines of the path
+    itself are taken as free.
     """
     points = np.array([[p.x, p.y, p.z, p.yaw] for p in path])
     rows = bending(points * COUNTED)
-    best: list[tuple[int, float, tuple[int, ...]]] = [(0, 0.0, (rows[0],))]  # lines, way [m] and poses, to each corner
+    best: list[tuple[int, float, tuple[int, ...]]] = [(0, 0.0, (rows[0],))]  # to each corner: lines, length [m], poses
     for at, row in enumerate(rows[1:], 1):
-        ways = []
-        for before, (lines, way, kept) in enumerate(best):
-            long = float(way_of(points[[rows[before], row]])[-1])
-            if before == at - 1 or free(_straight(points[rows[before]], points[row], step_m, long)):
-                ways.append((lines + 1, way + long, (*kept, row)))
-        best.append(min(ways))
+        candidates = []
+        for before, (lines, length, kept) in enumerate(best):
+            line_m = float(way_of(points[[rows[before], row]])[-1])
+            if before == at - 1 or free(_straight(points[rows[before]], points[row], step_m, line_m)):
+                candidates.append((lines + 1, length + line_m, (*kept, row)))
+        best.append(min(candidates))
     return best[-1][2]
 
 
-def _straight(one: np.ndarray, other: np.ndarray, step_m: float, long: float) -> list[ToolPose]:
-    """The poses on a line, both ends included."""
-    shares = np.linspace(0.0, 1.0, ceil(long / step_m) + 1)
-    return [ToolPose(*map(float, one + share * (other - one))) for share in shares]
+def _straight(start: np.ndarray, end: np.ndarray, step_m: float, line_m: float) -> list[ToolPose]:
+    """The poses on a line of length `line_m`, at most `step_m` apart, both ends included."""
+    shares = np.linspace(0.0, 1.0, ceil(line_m / step_m) + 1)
+    return [ToolPose(*map(float, start + share * (end - start))) for share in shares]
 
 
-# ---- surveys ----------------------------------------------------------------------------------------------------------
+# ---- the surveys of one scene -------------------------------------------------------------------------------------------
 
 
 Cell = tuple[int, ...]
@@ -60,15 +64,13 @@ NEAR_SHAPE = (5, 5, 6)  # x, y, z around a part; z from the grasp upwards
 NEAR_STEP_M = (0.012, 0.012, 0.030)
 NEAR_YAWS = 5
 NEAR_YAW_STEP = 0.06  # [rad]
-OUT_M = NEAR_STEP_M[2] * (
-    NEAR_SHAPE[2] - 1
-)  # the approach of a station is so far ahead of it whose parts come from the side
-LIFT_M = 0.006  # a part is lifted so high before it is taken out to the side
+OUT_M = NEAR_STEP_M[2] * (NEAR_SHAPE[2] - 1)  # distance of the approach in front of a station entered from the side
+LIFT_M = 0.006  # by which a part is lifted before it is taken out sideways
 _TRAVEL_MARGIN = 0.01  # [m] beyond half a cell: a move between free cells then touches nothing
 _DOCK_CLEARANCE = 0.012  # [m]
-_NEAR_STEP_M = 0.003  # lines around a part are looked at so often
-FINGER_SHARE = 0.6  # of the room between an open finger and a wide part: as near may the finger come
-INSERT = "insert"  # the start of a camera's grid, as a place that transfers lead to
+_NEAR_STEP_M = 0.003  # distance between the checked poses of a line around a part
+FINGER_SHARE = 0.6  # clearance around a wide part, as a share of the gap between it and an open finger
+INSERT = "insert"  # the name of a camera grid's start as the target of a transfer
 
 
 def grid_of(task: Task, place: str) -> CameraGrid | None:
@@ -77,7 +79,7 @@ def grid_of(task: Task, place: str) -> CameraGrid | None:
 
 
 def way_to(task: Task, station: str) -> str:
-    """The place to which a transfer brings a part for a station: itself, or where the camera's grid begins."""
+    """The place at which a transfer to a station ends: the station itself, or the start of its camera grid."""
     return station if task.station(station).grid is None else _start_of(task, station)
 
 
@@ -89,17 +91,17 @@ def _start_of(task: Task, station: str) -> str:
 def near_pose(goal: ToolPose, cell: Cell, into: float | None = None) -> ToolPose:
     """The tool pose of a cell of the grid around a part; `goal` is the pose of the goal cell (2, 2, 0[, 2]).
 
-    The levels of the third axis lead upwards; where parts are brought in from the side, along the yaw `into` [rad], they lead
-    out again, and the first axis upwards.
+    The third axis points upwards. At a station entered from the side, along the yaw `into` [rad], the third axis points
+    back out of the station and the first axis points upwards.
     """
-    one, across, out = (
+    first, across, out = (
         (cell[k] - middle) * step for k, (middle, step) in enumerate(zip((2, 2, 0), NEAR_STEP_M, strict=True))
     )
     turn = (cell[3] - NEAR_YAWS // 2) * NEAR_YAW_STEP if len(cell) > 3 else 0.0
     if into is None:
-        return goal.local(one, across, out, turn)
+        return goal.local(first, across, out, turn)
     x, y = beside((goal.x, goal.y), into, (-out, across))
-    return ToolPose(x, y, goal.z + one, goal.yaw + turn)
+    return ToolPose(x, y, goal.z + first, goal.yaw + turn)
 
 
 class Surveys:
@@ -112,12 +114,12 @@ class Surveys:
         self.made: Made = {}
 
     def make(self, names: Iterable[SurveyName], workers: Workers) -> None:
-        """Make surveys, each once, side by side; one that cannot be made is left to whoever asks for it, who hears why."""
+        """Make surveys in parallel, each once; one that fails is skipped, and raises its error when it is asked for."""
         missing = [name for name in dict.fromkeys(names) if name not in self.made]
         made = zip(missing, workers.each(partial(_survey, self), missing), strict=True)
-        self.made |= {name: found for name, found in made if found is not None}
+        self.made |= {name: survey for name, survey in made if survey is not None}
 
-    # ---- transfer: the whole workspace --------------------------------------------------------------------------
+    # ---- for transfers: the whole workspace -------------------------------------------------------------------------
 
     def cell_pose(self, cell: Cell) -> ToolPose:
         """The tool pose in the middle of a cell of the workspace."""
@@ -137,23 +139,23 @@ class Surveys:
 
     @once
     def travel_corners(self, carried: str, path: tuple[ToolPose, ...]) -> tuple[int, ...]:
-        """Which poses of a path through the workspace are left when the tool goes straight where that is as free as cells are."""
+        """The indices of the poses that remain when a path through the workspace is cut where straight lines are free."""
         with World() as world:
             surveyor, step_m = self._traveller(world, carried), min(self.task.workspace.cell_m) / 2
             return corners(path, step_m, lambda line: not any(map(self._is_behind, line)) and surveyor.free(line))
 
     def _traveller(self, world: World, carried: str) -> Surveyor:
-        """It wants as much room around the tool that moves between free cells touch nothing."""
+        """A surveyor with so much clearance that moves between free cells touch nothing."""
         clearance = max(self.task.workspace.cell_m) / 2 + _TRAVEL_MARGIN
         return Surveyor(self._cell(world), carried or None, clearance=clearance)
 
     def _is_behind(self, pose: ToolPose) -> bool:
-        """Whether it is behind the arm, where none turns through, from one side of itself to the other."""
+        """Whether a pose is directly behind the arm, through which no arm turns from one side to the other."""
         return pose.x < 0 and abs(pose.y) <= self.task.workspace.cell_m[1] / 2 + 1e-9
 
     @once
     def dock(self, place: str, carried: str) -> Cell:
-        """The workspace cell from which the tool goes straight to the approach of `place`; BadInput names what blocks it."""
+        """The workspace cell from which a straight move to the approach of `place` is free. BadInput names what blocks it."""
         near, approach = self.cells_near(place), self.approach(place)
         survey = self.workspace(carried)
         with World() as world:
@@ -168,7 +170,7 @@ class Surveys:
         raise BadInput(f"station '{place}' cannot be approached{f' with {carried}' if carried else ''}: {why}")
 
     def _cell(self, world: World) -> Scene:
-        """The cell without parts; for a level tool, whose wrist is low, with the highest that comes there on each spot in use."""
+        """The scene without parts; for a level tool, whose wrist is low, with the highest part on each spot in use."""
         scene = Scene(world, self.task, (), self.layout)
         for station in self.task.stations if self.task.robot.tool == "level" else ():
             kind = max(self.places.kinds_at(station.name), key=lambda kind: kind.height_m, default=None)
@@ -178,14 +180,14 @@ class Surveys:
         return scene
 
     def _turned(self, approach: ToolPose) -> list[ToolPose]:
-        """The poses at an approach through which a level tool turns from the workspace's yaw; a hanging one takes no room."""
+        """The poses through which a level tool turns from the workspace's yaw at an approach; [] for a hanging tool."""
         if self.task.robot.tool != "level":
             return [approach]
         yaw = (approach.yaw + pi) % (2 * pi) - pi
         return [replace(approach, yaw=share * yaw) for share in (1.0, 0.75, 0.5, 0.25, 0.0)]
 
     def cells_near(self, place: str) -> list[Cell]:
-        """The workspace's cells of the lowest level within 1.6 cells of a place's approach, nearest first; BadInput for none."""
+        """The cells of the workspace's lowest level within 1.6 cells of an approach, nearest first. BadInput for none."""
         grid, approach = self.task.workspace, self.approach(place)
         reach = 1.6 * max(grid.cell_m[:2])
         at = {cell: self.cell_pose(cell) for cell in np.ndindex(*grid.shape[:2], 1)}
@@ -201,7 +203,7 @@ class Surveys:
         )
 
     def approach(self, place: str) -> ToolPose:
-        """Where a transfer to or from `place` ends: above a station, or above the start of a camera's grid."""
+        """The pose at which a transfer to or from `place` ends: above a station, or above the start of a camera's grid."""
         grid, settings = self.task.workspace, grid_of(self.task, place)
         low = grid.lower_m[2] + grid.cell_m[2] / 2
         if settings is not None:
@@ -211,12 +213,12 @@ class Surveys:
         return ToolPose(*beside((x, y), yaw, (-ahead, 0.0)), low, yaw)
 
     def into(self, place: str) -> float | None:
-        """The yaw along which parts are brought into a station from the side; None: from above."""
+        """The yaw [rad] along which parts enter a station from the side; None for a station entered from above."""
         station = self.task.station(place)
         return station.pose[2] if station.approach == "side" else None
 
-    def way_out(self, station: str, pose: ToolPose) -> list[ToolPose]:
-        """From where the fingers closed or opened at a station to its approach: up, or out to the side and up."""
+    def exit_path(self, station: str, pose: ToolPose) -> list[ToolPose]:
+        """The poses from the grasp or release pose at a station to its approach: up, or out sideways and up."""
         into, approach = self.into(station), self.approach(station)
         if into is None:
             return [ToolPose(pose.x, pose.y, approach.z, pose.yaw), approach]
@@ -224,13 +226,13 @@ class Surveys:
         x, y = beside((lifted.x, lifted.y), into, (-OUT_M, 0.0))
         return [lifted, ToolPose(x, y, lifted.z, pose.yaw), ToolPose(x, y, approach.z, pose.yaw), approach]
 
-    # ---- grasp and place: around one part ------------------------------------------------------------------------
+    # ---- for grasp and place: around one part ------------------------------------------------------------------------
 
     @once
     def around(self, station_name: str, kind: str, loaded: bool) -> Survey:
-        """Around the part that stands (or, loaded, is to stand) at a station, with neighbours on all sides.
+        """The survey around the part that stands (or, loaded, is to be set down) at a station, with neighbours beside it.
 
-        Free is what is free on each spot that the order uses. BadInput names what is in the way to one of them.
+        A cell is free if it is free on every spot that the order uses. BadInput names what blocks the path above a spot.
         """
         station, into = self.task.station(station_name), self.into(station_name)
         shape = NEAR_SHAPE if loaded else (*NEAR_SHAPE, NEAR_YAWS)
@@ -238,23 +240,23 @@ class Surveys:
         for spot in self.spots_in_use(station, kind, loaded):
             with World() as world:
                 surveyor, goal = self._around(world, station, kind, loaded, spot)
-                way = [] if into is not None else _between(self.approach(station.name), goal)
-                if cause := next(filter(None, map(surveyor.cause, way)), ""):
+                line = [] if into is not None else _between(self.approach(station.name), goal)
+                if cause := next(filter(None, map(surveyor.cause, line)), ""):
                     raise BadInput(
                         f"station '{station.name}': the tool cannot go over its spot at ({spot.x:.2f}, {spot.y:.2f}) m: "
                         f"{in_the_way([cause], station.name)}"
                     )
                 surveyed.append(surveyor.grid(shape, partial(near_pose, goal, into=into)).causes)
-        return Survey(reduce(lambda one, other: np.where(one == "", other, one), surveyed))
+        return Survey(reduce(lambda first, second: np.where(first == "", second, first), surveyed))
 
     def _may_stand(self, station: Station, kind: str, spot: Spot, own: str, loaded: bool) -> bool:
-        """Whether one of a kind may stand on a spot beside a part of another kind while this is taken up or, `loaded`, set down.
+        """Whether a part of `kind` may stand on a spot while its neighbour of the kind `own` is grasped or, `loaded`, placed.
 
-        The widest may anywhere. Others may where they begin, while parts that begin there are taken, and wherever parts come on
-        their ways; where its route ends a part is only taken up again after a fault.
+        The widest kind may stand on any spot. Other kinds count on the spots where they begin, while parts that begin there
+        are grasped, and at every station along a route; at the end of its route a part is grasped again only after a fault.
         """
         made = self.task.made_as(own)
-        if kind == max(self.places.kinds_at(station.name), key=lambda one: one.footprint_m()).name:
+        if kind == max(self.places.kinds_at(station.name), key=lambda candidate: candidate.footprint_m()).name:
             return True
         if loaded or self.task.starts(made.name) != station.name:
             return loaded or all(route[-1].station != station.name for route in made.routes)
@@ -263,9 +265,9 @@ class Surveys:
         return any(hypot(at.x - spot.x, at.y - spot.y) < NEAR_STEP_M[0] for at in stand)
 
     def spots_in_use(self, station: Station, kind: str, loaded: bool) -> tuple[Spot, ...]:
-        """The spots on which parts of the order of a kind are taken up at a station or, loaded, set down; the first if none.
+        """The spots of a station where the order's parts of a kind are grasped or, loaded, placed; the first if none.
 
-        A station is filled from its first spot on, and a buffer where parts wait for a station only while another one is there.
+        A station is filled from its first spot on. In a buffer, parts wait only while another part is at the station.
         """
         task, made = self.task, self.task.made_as(kind).name
         first, *others = self.places.spots(station, kind)
@@ -283,7 +285,7 @@ class Surveys:
 
     @once
     def around_corners(self, station_name: str, kind: str, loaded: bool, cells: tuple[Cell, ...]) -> tuple[int, ...]:
-        """Which of the cells of a path around a part are left when the tool goes straight where that is as free as cells are."""
+        """The indices of the cells that remain when a path around a part is cut where straight lines are free."""
         station, into = self.task.station(station_name), self.into(station_name)
         with ExitStack() as worlds:
             around = [
@@ -302,7 +304,7 @@ class Surveys:
             return corners([near_pose(first, cell, into) for cell in cells], _NEAR_STEP_M, free)
 
     def _around(self, world: World, station: Station, kind: str, loaded: bool, spot: Spot) -> tuple[Surveyor, ToolPose]:
-        """What surveys around a part on a spot, and where the tool closes or opens."""
+        """The surveyor for the space around a part on a spot, and the tool pose at which the fingers act."""
         own, scene = self.kinds[kind], Scene(world, self.task, (), self.layout)
         for name, (neighbour, other) in self.places.neighbours(station, spot).items():
             if self._may_stand(station, neighbour, other, kind, loaded):
@@ -320,7 +322,7 @@ class Surveys:
         return Surveyor(scene, kind if loaded else None, clearance=clearance), goal
 
     def check_free(self, what: str, poses: Sequence[ToolPose]) -> None:
-        """BadInput when the empty tool cannot be at one of these poses, naming what is in the way."""
+        """Raise BadInput, naming what is in the way, when the empty tool cannot be at one of these poses."""
         with World() as world:
             surveyor = Surveyor(Scene(world, self.task, (), self.layout), None, clearance=TOUCH_CLEARANCE[False])
             for pose in poses:
@@ -329,20 +331,20 @@ class Surveys:
                     raise BadInput(f"{what}: at ({pose.x:.2f}, {pose.y:.2f}, {pose.z:.2f}) m {why}")
 
     def _stand(self, scene: Scene, name: str, kind: str, spot: Spot) -> None:
-        """Stand a part in the scene that nothing may touch."""
+        """Add a part to the scene that nothing may touch."""
         scene.add(name, kind, spot)
         scene.solid += scene.bodies_of(name, kind)
 
     @once
     def camera_grid(self, station: str, kind: str) -> SurveyedGrid:
-        """The camera's grid before a station, for a part of a kind, with its picture."""
+        """The camera's grid in front of a station, for a part of a kind, with its picture taken."""
         grid = SurveyedGrid(self.task, self.layout, self.places, station, kind, self.parts)
         grid.picture()
         return grid
 
 
 def _survey(surveys: Surveys, name: SurveyName) -> object:
-    """What a survey finds; None when it cannot be made."""
+    """The result of a survey, given by its name; None when it cannot be made."""
     method, *arguments = name
     try:
         return getattr(surveys, str(method))(*arguments)
@@ -350,12 +352,14 @@ def _survey(surveys: Surveys, name: SurveyName) -> object:
         return None
 
 
-def _between(one: ToolPose, other: ToolPose) -> list[ToolPose]:
-    parts = np.linspace(0.0, 1.0, 8)
-    return [ToolPose(one.x + t * (other.x - one.x), one.y + t * (other.y - one.y), one.z, one.yaw) for t in parts]
+def _between(start: ToolPose, end: ToolPose) -> list[ToolPose]:
+    """Eight poses on the level line from `start` to the point above or below `end`."""
+    shares = np.linspace(0.0, 1.0, 8)
+    x, y = end.x - start.x, end.y - start.y
+    return [ToolPose(start.x + share * x, start.y + share * y, start.z, start.yaw) for share in shares]
 
 
-def _as_at(pose: ToolPose, one: ToolPose, other: ToolPose, turn: float) -> ToolPose:
-    """A pose beside one goal, as it is beside another one that is turned by so much [rad]."""
-    x, y = beside((other.x, other.y), turn, (pose.x - one.x, pose.y - one.y))
-    return ToolPose(x, y, pose.z - one.z + other.z, pose.yaw - one.yaw + other.yaw)
+def _as_at(pose: ToolPose, goal: ToolPose, other: ToolPose, turn: float) -> ToolPose:
+    """The pose relative to `other` that `pose` is relative to `goal`; `other` is turned by `turn` [rad]."""
+    x, y = beside((other.x, other.y), turn, (pose.x - goal.x, pose.y - goal.y))
+    return ToolPose(x, y, pose.z - goal.z + other.z, pose.yaw - goal.yaw + other.yaw)

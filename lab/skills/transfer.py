@@ -1,4 +1,4 @@
-"""Transfer: the tool's way through the workspace between two approaches, with or without a part in the fingers."""
+"""Transfer: move the tool through the workspace from one approach to another, with or without a part in the fingers."""
 
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, ClassVar
@@ -8,7 +8,7 @@ from lab.learning.problem import Problem
 from lab.mdp import NoPath, grid
 from lab.sim.arms.kinematics import ToolPose
 from lab.skills.sight import SkillFailed
-from lab.skills.skill import Bench, Skill, learned_path, no_way, plain
+from lab.skills.skill import Bench, Skill, learned_path, no_path_error, plain
 from lab.skills.surveys import SurveyName, Surveys, grid_of, way_to
 from lab.tasks.task import Task
 
@@ -20,7 +20,7 @@ _BLEND_M = 0.10
 
 
 class Transfer(Skill):
-    """From one approach to another; a place is a station or the start of a camera's grid."""
+    """Move from one approach to another; a place is a station or the start of a camera's grid."""
 
     subtask: ClassVar[str] = "transfer"
     help: ClassVar[str] = "the tool's way through the workspace from one station to another"
@@ -28,28 +28,28 @@ class Transfer(Skill):
     doing: ClassVar[str] = "carries {part}"
 
     def __init__(self, origin: str, target: str, kind: str = "") -> None:
-        """kind: what is carried; "": nothing."""
+        """kind: of the part that is carried; "": the gripper is empty."""
         super().__init__(f"transfer {origin} to {target}{f' with {kind}' if kind else ''}", kind)
         self.origin, self.target = origin, target
         self.carries = bool(kind)
 
     @classmethod
     def on_carry(cls, task: Task, kind: str, origin: str, target: str) -> "Transfer":
-        """First of all, to where the part is set down, or on through the camera's grid."""
+        """The transfer to the approach of the target, or to the start of its camera's grid."""
         return cls(origin, way_to(task, target), kind)
 
     @classmethod
     def on_travel(cls, task: Task, origin: str, target: str) -> "Transfer":
-        """All of it."""
+        """The transfer with an empty gripper, which is the whole travel."""
         return cls(origin, target)
 
     @property
     def needs(self) -> tuple[SurveyName, ...]:
-        """The workspace, and where it is left at both ends."""
+        """The survey of the workspace, and those of the docks at both ends."""
         return ("workspace", self.kind), ("dock", self.origin, self.kind), ("dock", self.target, self.kind)
 
     def setup(self, surveys: Surveys) -> Problem:
-        """The workspace as a 3D grid: cells that are out of reach or too near to something are blocked."""
+        """The problem on the workspace as a 3D grid; cells out of reach or too close to a body are blocked."""
         self.surveys = surveys
         for place in (self.origin, self.target):
             surveys.cells_near(place)  # before the workspace is surveyed, which may take long
@@ -65,7 +65,7 @@ class Transfer(Skill):
                 survey.causes.shape, survey.blocked, start, goal, surveys.task.subtask("transfer").rewards, ACTIONS
             )
         except NoPath as error:
-            raise no_way(self.name, error, survey.names(error.enclosing)) from None
+            raise no_path_error(self.name, error, survey.names(error.enclosing)) from None
         self.problem = Problem(self.name, self.subtask, mdp)
         return self.problem
 
@@ -74,21 +74,21 @@ class Transfer(Skill):
         return self.surveys.cell_pose(self.problem.mdp.state_cell(state))
 
     def does(self, name: str) -> str:
-        """Carries the part to where it is set down, or goes there."""
+        """A predicate: the robot carries the part from origin to target, or moves there empty."""
         return f"{self.doing.format(part=name) if self.carries else 'goes'} from '{self.origin}' to '{self.target}'"
 
     def begins_at(self) -> ToolPose:
-        """The approach of the origin."""
+        """The approach pose of the origin."""
         return self.surveys.approach(self.origin)
 
     def way_in_words(self) -> tuple[str, str]:
-        """The gripper goes on to where the next skill begins."""
+        """The gripper, and the place where the next skill begins."""
         what = f"The gripper with {plain(self.kind)} is" if self.carries else "The empty gripper is"
         camera = grid_of(self.surveys.task, self.target) is not None
         return what, f"the end of its way{', where the camera takes over' if camera else f' over {plain(self.target)}'}"
 
     def motion(self, bench: Bench, policy: "Policy") -> Iterator[None]:
-        """From where the tool is to the target's approach, as the learned cells lead, straight where that is free."""
+        """Follow the learned path from the tool's pose to the target's approach; its corners are cut where that is free."""
         mdp, robot = self.problem.mdp, bench.scene.robot
         poses = [self.pose(state) for state in learned_path(policy, mdp, mdp.start)]
         begin, end = self.surveys.approach(self.origin), self.surveys.approach(self.target)
@@ -107,5 +107,5 @@ class Transfer(Skill):
 
 
 def _still(tool: ToolPose, first: ToolPose) -> ToolPose:
-    """Where the tool is, already at the path's yaw: it turns on the spot, not on the way."""
+    """The tool's position with the yaw of the path's first pose, so that the tool turns before it moves."""
     return ToolPose(tool.x, tool.y, tool.z, first.yaw)

@@ -1,4 +1,4 @@
-"""A learned skill is tried in physics before it is kept."""
+"""Trials in physics: a learned skill is carried out once before it is kept in the toolbox."""
 
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
@@ -12,7 +12,7 @@ from lab.toolbox.policy import Policy
 
 
 def trial_of(prepared: Prepared) -> Callable[[Problem, Policy], str | None]:
-    """What tries a skill of a prepared scene: a grasp must lift its part; most skills are not tried."""
+    """A function that tries a skill of a prepared scene and returns why it failed, or None; most skills are not tried."""
 
     def trial(problem: Problem, policy: Policy) -> str | None:
         skill = prepared.skillset.skills[problem.name]
@@ -22,19 +22,19 @@ def trial_of(prepared: Prepared) -> Callable[[Problem, Policy], str | None]:
 
 
 class Trial(NamedTuple):
-    """What came of a skill that was carried out once: why it failed, None when it did not; how long it took in physics [s]."""
+    """The outcome of carrying a skill out once: why it failed (None: it succeeded), and its simulated duration [s]."""
 
     failure: str | None
     sim_s: float
 
 
 def try_out(prepared: Prepared, skill: Skill, policy: Policy) -> str | None:
-    """Carry a skill out once in physics; None when it did what it is for, else why it did not."""
+    """Why a skill fails when it is carried out once in physics; None when it succeeds."""
     return carry_out(prepared, skill, policy).failure
 
 
 def carry_out(prepared: Prepared, skill: Skill, policy: Policy, off: Sequence[float] = NOT_OFF) -> Trial:
-    """Carry a skill out once in physics; `off`: as `Skill.begin` has it."""
+    """The outcome of carrying a skill out once in physics; `off`: displacement of the part, see `Skill.begin`."""
     with World() as world:
         bench = Bench(Scene(world, prepared.task, (), prepared.surveys.layout))
         for _ in range(SETTLE_STEPS):

@@ -1,1 +1,1 @@
-"""What a person looks at: frames (plain records), the meshcat page and replay, plots, the terminal."""
+"""What a person looks at: the 3D page and replay in meshcat's viewer, movies, plots, charts, and summaries in the terminal."""

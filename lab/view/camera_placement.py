@@ -1,4 +1,4 @@
-"""Where a camera stands so that all of a scene is in its picture."""
+"""Placement of a camera so that its picture contains a whole scene."""
 
 from itertools import product
 from math import cos, radians, sin, tan
@@ -10,15 +10,15 @@ from lab.mdp import FloatArray
 from lab.sim.frames import Vector, Viewpoint
 
 _HALF_VIEW = radians(19.0)  # half of the page's field of view, from bottom to top
-_WIDE = 1.2  # the narrowest picture, width to height, in which all is to be seen
+_WIDE = 1.2  # least aspect ratio, width to height, at which the whole scene is visible
 _MARGIN = 1.06
 
 
 def camera_for(points: ArrayLike, azimuth: float, elevation: float, wide: float = _WIDE) -> Viewpoint:
-    """The nearest camera on one side of the `points` (n, 3) [m] that has them all in its picture.
+    """The nearest camera in a given direction whose picture contains all `points` (n, 3) [m].
 
     `azimuth` [rad] from the x axis, counter-clockwise as seen from above; `elevation` [rad] above the horizon. wide: the
-    picture's width to its height, at least.
+    least aspect ratio of the picture, width to height.
     """
     seen = np.asarray(points, dtype=np.float64)
     target = (seen.min(axis=0) + seen.max(axis=0)) / 2
@@ -36,6 +36,6 @@ def corners(low: ArrayLike, high: ArrayLike) -> FloatArray:
 
 
 def vector(values: FloatArray) -> Vector:
-    """Three plain numbers."""
+    """The three values as a tuple of plain floats."""
     x, y, z = (float(value) for value in values)
     return (x, y, z)

@@ -1,4 +1,4 @@
-"""What all plots share: a palette, a style, and a figure that becomes a PNG or SVG file.
+"""The base of all plots: palette, style, and a figure that is written as a PNG or SVG file.
 
 matplotlib is imported where it is used: it takes half a second. The same data gives the same bytes.
 """
@@ -40,24 +40,24 @@ STYLE: dict[str, Any] = {
     "figure.dpi": 130,
 }
 SVG_STYLE: dict[str, Any] = {"svg.hashsalt": "lab", "svg.fonttype": "none"}  # text stays text: it can be searched
-_TIP = "tip: "  # how the id of a group begins whose rest is what a tooltip says
+_TIP = "tip: "  # prefix of the id of a group; the rest of the id is the tooltip's text
 
 
 def check_png(path: Path) -> None:
-    """Raise BadInput unless `path` ends in .png, its folder is there, and it is no folder itself."""
+    """Raise BadInput unless `path` ends in .png, its folder exists, and it is not a folder itself."""
     _check_file(path, ("png",))
 
 
 def check_picture(path: Path) -> None:
-    """Raise BadInput unless `path` ends in .png or .svg, its folder is there, and it is no folder itself."""
+    """Raise BadInput unless `path` ends in .png or .svg, its folder exists, and it is not a folder itself."""
     _check_file(path, FORMS)
 
 
 @contextmanager
 def picture_file(path: Path, width_inch: float, height_inch: float, *, solved: bool = True) -> Iterator["Figure"]:
-    """A figure in the lab's style, written to `path` (PNG or SVG by its suffix) when the block ends well.
+    """A figure in the lab's style, written to `path` (PNG or SVG by its suffix) when the block ends without an error.
 
-    solved: its layout is solved for; a figure with many plots sets its own margins, which takes a tenth of the time.
+    solved: whether matplotlib's layout solver runs; figures with many plots set their own margins, in a tenth of the time.
 
     Raises BadInput as `check_picture` does, and when the path cannot be written.
     """
@@ -72,7 +72,7 @@ def picture_file(path: Path, width_inch: float, height_inch: float, *, solved: b
 
 
 def picture_bytes(draw: Callable[["Figure"], None], width_inch: float, height_inch: float) -> bytes:
-    """What `draw` puts on a figure in the lab's style, as SVG bytes."""
+    """The SVG bytes of a figure in the lab's style on which `draw` has drawn."""
     drawn = BytesIO()
     with _figure(drawn, "svg", (width_inch, height_inch)) as figure:
         draw(figure)
@@ -80,18 +80,18 @@ def picture_bytes(draw: Callable[["Figure"], None], width_inch: float, height_in
 
 
 def tip(artist: "Artist", text: str) -> None:
-    """What a browser says when the pointer rests on this in an SVG picture; a PNG picture has no such thing."""
+    """Give an artist a tooltip, which browsers show in SVG pictures; PNG pictures have none."""
     artist.set_gid(_TIP + text.replace('"', "'"))
 
 
 def seconds(value: float) -> str:
-    """Seconds for reading: "12.3 s", "12 s"."""
+    """A time for reading, such as "12.3 s" or "12 s"."""
     return f"{value:.1f} s".replace(".0 s", " s")
 
 
 @contextmanager
 def _figure(out: BytesIO, form: str, size_inch: tuple[float, float], solved: bool = True) -> Iterator["Figure"]:
-    """A figure whose bytes are in `out` when the block ends well: no date, no random names."""
+    """A figure whose bytes are in `out` when the block ends without an error; reproducible, without dates or random ids."""
     import matplotlib.style
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -109,7 +109,7 @@ def _figure(out: BytesIO, form: str, size_inch: tuple[float, float], solved: boo
 
 
 def _with_tips(svg: str) -> str:
-    """Each group whose id is a tip gets it as its title, which is what browsers show."""
+    """The SVG in which each group whose id is a tip has the tip as its title element, which browsers show."""
     return re.sub(f'<g id="{_TIP}([^"]*)">', r"<g><title>\1</title>", svg)
 
 

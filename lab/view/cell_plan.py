@@ -1,4 +1,4 @@
-"""A cell from above as a picture: what stands where, what the arm reaches, which cells of its workspace are blocked by what."""
+"""The ground plan of a cell as a picture: stations, obstacles, the arm's reach, and the workspace's blocked cells by cause."""
 
 from collections.abc import Iterator
 from itertools import cycle
@@ -28,18 +28,18 @@ Look = dict[str, Any]
 FAULT = "#B00020"
 WOOD = "#B98A55"
 BODIES = {"storage": "#FFFFFF", "buffer": "#C9CED6", "machine": "#F6D9A8"}
-CAUSES = (PURPLE, YELLOW, GREEN, SKY, ORANGE, RED, BLUE)  # in turn; what is out of the arm's reach is hatched
+CAUSES = (PURPLE, YELLOW, GREEN, SKY, ORANGE, RED, BLUE)  # colours of causes, in turn; cells out of reach are hatched
 OUT_OF_REACH = "out of reach"
 LEGEND_INCH = 3.3
-FAULT_WIDTH = 125  # characters of a line of what is wrong
+FAULT_WIDTH = 125  # characters per line of the fault's message
 _AROUND_M = 0.06
 
 
 def draw_cell(plan: GroundPlan, path: Path) -> None:
     """Draw the cell from above, as far as the plan knows it, into a PNG or SVG file.
 
-    What is at fault has a thick red edge and a red name, and what is wrong stands below. Raises BadInput for a path that
-    cannot be written.
+    Stations and obstacles at fault have a thick red edge and a red name; the message stands below. Raises BadInput for a
+    path that cannot be written.
     """
     (low_x, low_y), (high_x, high_y) = _extent(plan)
     tall = (high_y - low_y) / (high_x - low_x)
@@ -68,7 +68,7 @@ def draw_cell(plan: GroundPlan, path: Path) -> None:
 
 
 def _extent(plan: GroundPlan) -> tuple[list[float], list[float]]:
-    """The corners of all that is drawn."""
+    """The x and the y coordinates [m] of the corners of everything that is drawn."""
     blocks = [plan.table, *(station.body for station in plan.stations), *(o.stays_in for o in plan.obstacles)]
     blocks += [spot.block for station in plan.stations for spot in station.spots]
     corners = [block.corners() for block in blocks]
@@ -87,7 +87,7 @@ def _add(axes: Axes, block: Block, **look: object) -> Patch:
 
 
 def _draw_blocked(axes: Axes, blocked: BlockedCells) -> "Iterator[Patch]":
-    """The workspace's lines and its blocked cells; the legend's rows, by how many cells a cause blocks."""
+    """Draw the workspace's grid and its blocked cells; yields the legend's rows, by the number of cells that a cause blocks."""
     (x, y), (wide, high), (columns, rows) = blocked.origin, blocked.cell, blocked.causes.shape
     lines: Look = {"color": "#D5D8DC", "linewidth": 0.5, "zorder": 0.5}
     axes.vlines(x + wide * np.arange(columns + 1), y, y + high * rows, **lines)
@@ -156,7 +156,7 @@ def _name(axes: Axes, name: str, x: float, y: float, at_fault: bool, size: float
 
 
 def _draw_approaches(axes: Axes, plan: GroundPlan) -> None:
-    """Arrows from the cell that a transfer comes from to where it ends; a cross where there is no such cell."""
+    """Draw an arrow from the last cell of a transfer to its end; a cross where there is no such cell."""
     for approach in plan.approaches:
         if approach.dock is None:
             axes.plot(*approach.at, marker="X", markersize=11, color=FAULT, markeredgecolor="white", zorder=8)
@@ -174,7 +174,7 @@ def _draw_approaches(axes: Axes, plan: GroundPlan) -> None:
 
 
 def _kinds(plan: GroundPlan) -> "Iterator[object]":
-    """The legend's rows of what has a shape of its own."""
+    """The legend's rows for the symbols that occur in the plan."""
     for kind in dict.fromkeys(station.kind for station in plan.stations):
         yield Patch(facecolor=BODIES[kind], edgecolor=INK, label=kind)
     spots = [spot for station in plan.stations for spot in station.spots]

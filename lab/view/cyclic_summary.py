@@ -1,4 +1,4 @@
-"""What `lab sequence --cyclic` shows when it is done, and the line on it of `lab run`, from plain data."""
+"""The result of `lab sequence --cyclic` as text, and the line on it in `lab run`, from plain data."""
 
 from collections import Counter
 from collections.abc import Mapping
@@ -9,11 +9,11 @@ from rich.text import Text
 
 from lab.errors import counted
 
-SAME_S = 0.005  # what is less is not seen
+SAME_S = 0.005  # times that differ by less look the same when printed
 
 
 def cyclic_summary(found: Mapping[str, Any]) -> RenderableType:
-    """The end of `lab sequence --cyclic`, from its JSON document."""
+    """The text at the end of `lab sequence --cyclic`, from its JSON document."""
     mix = ", ".join(counted(count, name) for name, count in Counter(found["mix"]).items())
     each = "" if found["parts_a_cycle"] == 1 else f", {found['per_part_s']:.2f} s a part"
     lines = [
@@ -27,7 +27,7 @@ def cyclic_summary(found: Mapping[str, Any]) -> RenderableType:
 
 
 def _tried(found: Mapping[str, Any]) -> list[str]:
-    """What is proven of the time a part, and what each number of parts a cycle came to."""
+    """The lines on what is proven about the time per part, and on the result for each number of parts per cycle."""
     of, least_s = found["proven_of"], found["least_per_part_s"]
     lines = [f"proven: of {of} none needs less a part"]
     if not found["proven"]:
@@ -49,7 +49,7 @@ def _one_tried(tried: Mapping[str, Any]) -> str:
 
 
 def period_in_words(cyclic: Mapping[str, Any]) -> str:
-    """The measured period of a run beside the planned one."""
+    """The planned and the measured period of a run, in words."""
     planned_s, measured_s = cyclic["period_s"], cyclic["measured_period_s"]
     if measured_s is None:
         return f"{planned_s:.2f} s planned; too few parts were delivered to measure it"
@@ -57,7 +57,7 @@ def period_in_words(cyclic: Mapping[str, Any]) -> str:
 
 
 def _move(move: Mapping[str, Any], parts: int) -> str:
-    """One line of the cycle."""
+    """One move of the cycle as a line."""
     number = f" {move['part']}" if parts > 1 else ""
     pallet = "'s pallet" if move["carries"] == "pallet" else ""
     entered = "" if not move["periods"] else f"  (entered {counted(move['periods'], 'period')} before)"
@@ -65,7 +65,7 @@ def _move(move: Mapping[str, Any], parts: int) -> str:
 
 
 def _finite(finite: Mapping[str, Any]) -> list[str]:
-    """The order of a number of parts beside it."""
+    """The lines that compare the cycle with the order of a finite number of parts."""
     parts, lines = finite["parts"], list[str]()
     if finite["cyclic_makespan_s"] is not None:
         waits = ", with waits on purpose" if finite["waits_on_purpose"] else ""

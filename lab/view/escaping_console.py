@@ -1,4 +1,4 @@
-"""The terminal, as safe as plain text: what comes from a file cannot move its cursor, colour it or name its window."""
+"""A terminal console that is safe against control codes: text from a file cannot move the cursor or change the terminal."""
 
 from collections.abc import Iterable
 
@@ -9,10 +9,10 @@ from lab.errors import escaped
 
 
 class EscapingConsole(Console):
-    """A console of rich that shows as escapes whatever cannot be printed; only rich's own control codes reach the terminal."""
+    """A rich console that prints unprintable characters as escapes; only rich's own control codes reach the terminal."""
 
     def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
-        """What all that is shown becomes on its way out."""
+        """The segments of a renderable, with unprintable characters escaped."""
         for segment in super().render(renderable, options):
             if segment.control is None and not segment.text.isprintable():
                 yield Segment(escaped(segment.text), segment.style)

@@ -1,4 +1,4 @@
-// A Gantt chart that grows: what was done as bars, the plan in outline behind them, a line at the time now.
+// A growing Gantt chart: activities as bars, the plan in outline behind them, and a line at the current time.
 "use strict";
 
 const labGantt = (() => {
@@ -13,7 +13,7 @@ const labGantt = (() => {
     return made;
   }
 
-  // The robot's row first, then machines as they are first used
+  // The robot's row first, then machines in the order of first use
   function rowsOf(activities, robot = "robot") {
     const names = [...new Set([...activities].sort((a, b) => a.start_s - b.start_s).map((one) => one.resource))];
     return [...names.filter((name) => name === robot), ...names.filter((name) => name !== robot)];
@@ -47,7 +47,7 @@ const labGantt = (() => {
     return [made, node("text", { x: (x(one.start_s) + x(one.end_s)) / 2, y: top + 10, "text-anchor": "middle", class: one.color ? "" : `on-${one.kind}` }, text)];
   }
 
-  // chart: { rows, measured, planned, marks, end_s }; gives back how to move the line of time, and which time a place is
+  // chart: { rows, measured, planned, marks, end_s }; returns functions that move the time line, and give the time at a position
   function draw(svg, { rows, measured, planned, marks, end_s }) {
     const wide = svg.clientWidth || 600, left = leftOf(svg), last = Math.max(end_s, 1), foot = TOP + rows.length * ROW;
     const room = wide - left - RIGHT, x = (seconds) => left + (room * Math.min(Math.max(seconds, 0), last)) / last;
@@ -59,7 +59,7 @@ const labGantt = (() => {
     }
     const kept = (one) => rows.includes(one.resource), bars = (all, outline) => all.filter(kept).flatMap((one) => bar(one, rows.indexOf(one.resource), x, outline));
     parts.push(...bars(planned, true));
-    if (measured.some((one) => one.color)) { // a schedule that is known from the beginning: what is to come is pale
+    if (measured.some((one) => one.color)) { // a schedule that is known in advance: future activities are pale
       const all = node("g", { opacity: 0.3 });
       all.append(...bars(measured, false));
       parts.push(all);

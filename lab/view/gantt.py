@@ -20,21 +20,21 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
-MANY_ROWS = 12  # from here on, the times and names stand on both sides of the chart
-FAR_PIXELS = 100  # as close to the row's name, the name of a part is not repeated
-BAND = "#F5F5F5"  # every other row's background
-FONT_SIZES = 7.5, 6.0  # of what stands on bars, in points: the larger where it fits
+MANY_ROWS = 12  # from this number on, times and names stand on both sides of the chart
+FAR_PIXELS = 100  # closer to the row's name than this, a part's name is not repeated
+BAND = "#F5F5F5"  # background of every other row
+FONT_SIZES = 7.5, 6.0  # of the text on bars [pt]; the first that fits is used
 
 
 def gantt(
     schedule: Schedule, path: Path, predicted: Schedule | None = None, due_s: Sequence[float] | None = None
 ) -> None:
-    """Parts, machines and robot over time [s], the makespan marked; `predicted` as a thin strip under each row.
+    """Draw parts, machines and robots over time [s], with the makespan; `predicted` as a thin strip under each row.
 
-    Until when parts are to be fetched from a machine is marked there, and on their own rows when they are due [s]. PNG or
-    SVG by the path's suffix; in an SVG each bar says what it is when pointed at. The page grows with the number of moves and
-    rows; the colour tells products apart. Raises BadInput for a schedule without activities and as all plots here do: for a
-    path that is no picture or cannot be written. Source: thesis fig. IV.1.
+    Marks show, on a machine's row, until when a part must be fetched, and on a part's row its due date [s]. The file is PNG
+    or SVG by the path's suffix; in SVG each bar has a tooltip. The page grows with the number of moves and rows; colours
+    stand for products. Raises BadInput for a schedule without activities, for a path with another suffix, and for one that
+    cannot be written. Source: thesis fig. IV.1.
     """
     draw, size_inch = _drawing(Chart(schedule), predicted, due_s=due_s)
     with picture_file(path, *size_inch) as figure:
@@ -42,7 +42,7 @@ def gantt(
 
 
 def cycle_gantt(shown: Steady, path: Path) -> None:
-    """Stations and robot over a few periods [s] of what repeats, the periods' ends marked. Files and errors as `gantt`."""
+    """Draw stations and robot over a few periods [s] of a cycle, the periods' ends marked. Files and errors: see `gantt`."""
     period_s, named = shown.cycle.period_s, "the period"
     ends = [(n * period_s, "-", named if n == 1 else "") for n in range(1, shown.periods + 1)]
     draw, size_inch = _drawing(CycleChart(shown.schedule, shown), None, ends)
@@ -51,7 +51,7 @@ def cycle_gantt(shown: Steady, path: Path) -> None:
 
 
 def gantt_picture(schedule: Schedule) -> bytes:
-    """The same as SVG bytes; BadInput for a schedule without activities."""
+    """The Gantt chart of a schedule as SVG bytes. BadInput for a schedule without activities."""
     draw, size_inch = _drawing(Chart(schedule), None)
     return picture_bytes(draw, *size_inch)
 
@@ -62,9 +62,9 @@ def _drawing(
     ends: list[tuple[float, str, str]] | None = None,
     due_s: Sequence[float] | None = None,
 ) -> tuple[Callable[["Figure"], None], tuple[float, float]]:
-    """What draws the chart on a figure, and the figure's width and height [inch].
+    """The function that draws the chart on a figure, and the figure's width and height [inch].
 
-    ends: what is marked by a line: when [s], its dashes and its name, "" for none; None: the makespan.
+    ends: vertical lines, each with its time [s], dashes and name ("" for none); None: one line at the makespan.
     """
     schedule = chart.schedule
     if not (schedule.robot or schedule.machines):
@@ -107,7 +107,7 @@ def _draw_bar(axes: "Axes", bar: Bar, chart: Chart) -> None:
 
 
 def _dress(axes: "Axes", chart: Chart, last_s: float, width_inch: float) -> None:
-    """Names of the rows, bands to follow them by, and the axis of time."""
+    """Draw the rows' names, the bands behind them, and the time axis."""
     from matplotlib.ticker import MaxNLocator
 
     rows, parts = chart.rows, len({activity.resource for activity in chart.schedule.parts})
@@ -125,13 +125,13 @@ def _dress(axes: "Axes", chart: Chart, last_s: float, width_inch: float) -> None
 
 
 def _draw_end(axes: "Axes", end_s: float, dashes: str, name: str) -> "Line2D":
-    """The makespan's line, behind the bars."""
+    """A vertical line at a time, such as the makespan, behind the bars."""
     look: dict[str, Any] = {"color": RED, "linestyle": dashes, "linewidth": 1.4, "zorder": 0.9}
     return axes.axvline(end_s, label=f"{name}: {seconds(end_s)}", **look)
 
 
 def _draw_arrivals(axes: "Axes", chart: Chart) -> list["Line2D"]:
-    """A mark where a part arrives; nothing for those that are there from the start."""
+    """Marks at the arrivals of parts; none for parts that are there from the start."""
     came_s = {activity.resource: activity.start_s for activity in reversed(chart.schedule.parts)}
     late = [(at_s, chart.rows.index(row)) for row, at_s in came_s.items() if at_s > 0]
     look: dict[str, Any] = {"marker": 5, "color": INK, "linestyle": "none", "markersize": 6}  # 5: the tip is the place
@@ -139,7 +139,7 @@ def _draw_arrivals(axes: "Axes", chart: Chart) -> list["Line2D"]:
 
 
 def _draw_limits(axes: "Axes", chart: Chart) -> list["Line2D"]:
-    """A mark on the machine's row until when a part is to be fetched; nothing where there is no such limit."""
+    """Marks on the machines' rows at the latest times for fetching a part; none without such a limit."""
     limits, rows = chart.schedule.fetch_by, chart.rows
     until = [(limit.until_s, rows.index(limit.station)) for limit in limits if limit.station in rows]
     look: dict[str, Any] = {"marker": "|", "color": RED, "linestyle": "none", "markersize": 14, "markeredgewidth": 2}
@@ -147,7 +147,7 @@ def _draw_limits(axes: "Axes", chart: Chart) -> list["Line2D"]:
 
 
 def _draw_due(axes: "Axes", chart: Chart, due_s: Sequence[float]) -> list["Line2D"]:
-    """A mark on each part's row when it is due; another colour where it is finished later."""
+    """Marks on the parts' rows at their due dates, in another colour for parts that are late."""
     drawn = []
     for late, colour, label in ((False, INK, "due"), (True, RED, "due, and late")):
         marks = [
@@ -161,7 +161,7 @@ def _draw_due(axes: "Axes", chart: Chart, due_s: Sequence[float]) -> list["Line2
 
 
 def _write(axes: "Axes", bars: Sequence[Bar], chart: Chart) -> None:
-    """On each bar the first of its texts that fits; nothing when none does."""
+    """Write on each bar the first of its texts that fits, or nothing."""
     from matplotlib.font_manager import FontProperties
 
     renderer = axes.figure.canvas.get_renderer()  # type: ignore[attr-defined]
@@ -176,7 +176,7 @@ def _write(axes: "Axes", bars: Sequence[Bar], chart: Chart) -> None:
     second, row = np.abs(corners[1] - corners[0])
     for bar in bars:
         across, tall = second * (bar.activity.end_s - bar.activity.start_s), row * bar.height
-        if bar.look == "outside":  # the line goes on beside the text; the row's own name must not be close
+        if bar.look == "outside":  # the line continues beside the text, and the row's name must not be close
             across, tall = min(across - 12, second * bar.activity.end_s - FAR_PIXELS), inf
         for text, size in product(chart.texts(bar), FONT_SIZES):
             wide, high = extent(text, size)
@@ -186,7 +186,7 @@ def _write(axes: "Axes", bars: Sequence[Bar], chart: Chart) -> None:
 
 
 def _write_text(axes: "Axes", bar: Bar, text: str, size: float, colour: str) -> None:
-    """A text in the middle of its bar; beside the part's own bars when it has not begun or is finished."""
+    """Write a text in the middle of its bar; beside the part's bars when it has not begun or is finished."""
     start_s, end_s = bar.activity.start_s, bar.activity.end_s
     at_s, align, points = (start_s + end_s) / 2, "center", 0
     if bar.look == "outside":

@@ -1,4 +1,4 @@
-"""What a Gantt chart consists of: rows, bars and their words and colours. `lab/view/gantt.py` draws it."""
+"""The content of a Gantt chart: rows, bars, their texts and colours. `lab/view/gantt.py` draws it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,15 +9,15 @@ from lab.sequencing.cell.schedule import Activity, Schedule
 from lab.sequencing.cyclic.unrolled import Steady
 from lab.view.canvas import BLUE, GREEN, INK, ORANGE, PALE_GREY, PURPLE, RED, SKY, YELLOW, seconds
 
-TOUCHING_S = 1e-3  # measured activities that overlap by less follow one another
-PRODUCTS = (ORANGE, GREEN, PURPLE, YELLOW, RED)  # one colour a product; a sixth begins again
+TOUCHING_S = 1e-3  # measured activities that overlap by less are consecutive
+PRODUCTS = (ORANGE, GREEN, PURPLE, YELLOW, RED)  # one colour per product; the sixth product has the first again
 DARK_GREY = "#5F5F5F"
 NARROWEST_INCH, WIDEST_INCH, MOVE_INCH = 12.0, 60.0, 0.36
 
 
 @dataclass(frozen=True)
 class Look:
-    """How a kind of activity is drawn: the legend's words, colour (None: the product's, mixed with white), hatch, ink."""
+    """The look of a kind of activity: text in the legend, colour (None: the product's, mixed with white), hatch, text colour."""
 
     says: str
     colour: str | None
@@ -42,7 +42,7 @@ LOOKS: dict[str, Look] = {
 
 @dataclass(frozen=True)
 class Bar:
-    """An activity and where it is drawn: the row's number from the top, and the part of the row's height."""
+    """An activity and its place: the row's number from the top, and the share of the row's height."""
 
     activity: Activity
     look: str
@@ -52,26 +52,26 @@ class Bar:
 
     @property
     def middle(self) -> float:
-        """Height of its middle, in rows from the top."""
+        """The height of its middle, in rows from the top."""
         return self.top + self.height / 2
 
 
 @dataclass(frozen=True)
 class Chart:
-    """What a schedule's chart needs to know of it: its rows, what its parts are called, and their colours."""
+    """The chart of a schedule: its rows, and the names and colours of its parts."""
 
     schedule: Schedule
 
     @cached_property
     def rows(self) -> tuple[str, ...]:
-        """Names of the rows from the top: parts by number, machines by first use, the robot."""
+        """The names of the rows from the top: parts by number, machines by first use, robots."""
         parts = sorted((activity.part or 0, activity.resource) for activity in self.schedule.parts)
         names = [name for _, name in parts] + [activity.resource for activity in self.schedule.machines]
         return tuple(dict.fromkeys([*names, *(activity.resource for activity in self.schedule.robot)]))
 
     @cached_property
     def robots(self) -> frozenset[str]:
-        """What the robots are called."""
+        """The names of the robots."""
         return frozenset(activity.resource for activity in self.schedule.robot)
 
     @cached_property
@@ -101,32 +101,32 @@ class Chart:
 
     @property
     def steps(self) -> tuple[int, str]:
-        """How often a robot carries something; without robots, how often a machine works; and what that is called."""
+        """The number of transports by robots (without robots: of operations by machines), and their name."""
         if self.schedule.robot:
             return sum(activity.kind in ("carry", "pallet") for activity in self.schedule.robot), "move"
         return sum(activity.kind == "process" for activity in self.schedule.machines), "operation"
 
     def product(self, part: int | None) -> str:
-        """The name of a part's product: what it is called, without its number."""
+        """The name of a part's product: the part's name without its number."""
         return self.name(part).rpartition(" ")[0]
 
     def name(self, part: int | None) -> str:
-        """What a part is called."""
+        """The name of a part."""
         return self.names.get(part or 0, f"part {part}")
 
     def title(self) -> str:
-        """How many of what, and how long it takes."""
+        """The title: the number of each product, and the makespan."""
         products = [self.product(part) for part in self.names]
         counts = [f"{products.count(name)} × {name}" for name in self.products if name]
         return f"{', '.join([*counts, counted(*self.steps)])}: {seconds(self.schedule.makespan_s)}"
 
     def page_inch(self, strips: bool) -> tuple[float, float]:
-        """Width and height of the page [inch]: rows become lower when there are many."""
+        """The width and height of the page [inch]; rows are lower when there are many."""
         row_inch = max(0.25, 0.42 - 0.17 * max(0, len(self.rows) - 8) / 16) * (1.2 if strips else 1.0)
         return min(max(NARROWEST_INCH, MOVE_INCH * self.steps[0]), WIDEST_INCH), 1.5 + row_inch * len(self.rows)
 
     def bars(self, schedule: Schedule, top: float, height: float) -> list[Bar]:
-        """The bars of a schedule in this one's rows, from `top` of each row's middle on, `height` in rows."""
+        """The bars of a schedule in this chart's rows; `top`: offset from each row's middle, `height`: both in rows."""
         ends = _ends(schedule.parts)
         rows: dict[str, list[Activity]] = {}
         for activity in (*schedule.parts, *schedule.machines, *schedule.robot):
@@ -149,7 +149,7 @@ class Chart:
         return look.colour or mixed(self.products.get(self.product(bar.activity.part), ORANGE), look.strength)
 
     def texts(self, bar: Bar) -> tuple[str, ...]:
-        """What may be written on a bar, the longest first."""
+        """The texts that may be written on a bar, the longest first."""
         activity, name = bar.activity, self.name(bar.activity.part)
         number, to = f"{activity.part}", f"\N{RIGHTWARDS ARROW} {activity.target}"
         if bar.look == "outside":
@@ -168,7 +168,7 @@ class Chart:
         return (name, number)
 
     def tip(self, activity: Activity) -> str:
-        """A bar in words."""
+        """The text of a bar's tooltip."""
         span = f"{activity.start_s:g} to {activity.end_s:g} s ({activity.end_s - activity.start_s:g} s)"
         name, moves = self.name(activity.part), f"from {activity.origin} to {activity.target}"
         own = "" if activity.resource in (name, *self.robots) else f" {name}"
@@ -187,7 +187,7 @@ class Chart:
 
 @dataclass(frozen=True)
 class CycleChart(Chart):
-    """The chart of a few periods of a cycle: no rows for parts, only names."""
+    """The chart of a few periods of a cycle, without rows for parts."""
 
     shown: Steady
 
@@ -197,7 +197,7 @@ class CycleChart(Chart):
         return self.shown.names
 
     def title(self) -> str:
-        """What repeats, and in which period."""
+        """The title: what the cycle makes, and its period."""
         cycle = self.shown.cycle
         mix = [cycle.product(move) for move in {move.slot: move for move in cycle.line.moves}.values()]
         counts = [f"{mix.count(name)} × {name}" for name in dict.fromkeys(mix)]
@@ -205,7 +205,7 @@ class CycleChart(Chart):
         return f"{what}, {counted(self.shown.periods, 'period')} of what repeats for ever"
 
     def page_inch(self, strips: bool) -> tuple[float, float]:
-        """Width and height of the page [inch]."""
+        """The width and height of the page [inch]."""
         return super().page_inch(strips)[0], 1.7 + 0.42 * len(self.rows)
 
 
@@ -220,7 +220,7 @@ def _ends(parts: Sequence[Activity]) -> set[Activity]:
 
 
 def _lanes(row: Sequence[Activity]) -> list[tuple[Activity, int]]:
-    """The activities of a row and the lane of each: side by side where a machine holds several parts.
+    """The activities of a row with the lane of each; parts that a machine holds at the same time have their own lanes.
 
     A part keeps its lane of a machine until it is fetched.
     """
@@ -240,6 +240,6 @@ def _lanes(row: Sequence[Activity]) -> list[tuple[Activity, int]]:
 
 
 def mixed(colour: str, strength: float) -> str:
-    """The colour mixed with white."""
+    """The colour mixed with white; `strength` 1 is the pure colour."""
     parts = [int(colour[start : start + 2], 16) for start in (1, 3, 5)]
     return "#" + "".join(f"{round(255 + strength * (part - 255)):02X}" for part in parts)

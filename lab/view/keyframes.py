@@ -1,4 +1,4 @@
-"""From the frames of a recording to few keyframes: what linear interpolation reproduces is left out.
+"""Keyframes of a recording: frames that interpolation reproduces are dropped.
 
 Numpy only. Positions are interpolated linearly, quaternions (xyzw) by slerp, as three.js does in the page.
 """
@@ -29,7 +29,7 @@ class Track:
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """What one body does over time; a property that never changes has None (positions, turns) or no steps."""
+    """The motion of one body; properties that never change are None (position, rotation) or empty (steps)."""
 
     start: tuple[float, ...]
     position: Track | None
@@ -39,13 +39,13 @@ class Motion:
 
 
 def motions(recording: Recording) -> dict[str, Motion]:
-    """The motion of every body, as few keys as keep within 0.2 mm and 0.2 degrees of every frame."""
+    """The motion of every body, with as few keys as stay within 0.2 mm and 0.2 degrees of every frame."""
     times, last = _times(recording)
     return {body.name: _motion(recording, body.name, times, last) for body in recording.bodies}
 
 
 def _times(recording: Recording) -> tuple[Floats, list[int]]:
-    """Seconds since the first frame, and each frame's row; frames of one time share a row."""
+    """The distinct times [s] since the first frame, and each frame's row; frames with equal times share a row."""
     stamps = [frame.time_s for frame in recording.frames]
     unique, rows = np.unique(stamps, return_inverse=True)
     return unique - unique[:1], rows.tolist()
@@ -74,7 +74,7 @@ def _motion(recording: Recording, name: str, times: Floats, rows: list[int]) -> 
 
 
 def _held(poses: Floats) -> Floats:
-    """Rows without a pose (NaN) filled from the last row that has one; before the first, with that first."""
+    """The poses with missing rows (NaN) filled from the row before, leading ones from the first pose."""
     given = ~np.isnan(poses[:, 0])
     if not given.any():
         return np.tile(np.array(IDENTITY), (len(poses), 1))
@@ -83,14 +83,17 @@ def _held(poses: Floats) -> Floats:
 
 
 def continuous(quaternions: Floats) -> Floats:
-    """Unit quaternions (n, 4) with signs such that neighbours lie in one half-space: q and -q are the same turn."""
+    """The unit quaternions (n, 4) with signs chosen so that neighbours are close; q and -q are the same rotation."""
     units = quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True)
     flips = np.where((units[1:] * units[:-1]).sum(axis=1) < 0, -1.0, 1.0)
     return np.asarray(units * np.concatenate(([1.0], np.cumprod(flips)))[:, None])
 
 
 def _track(times: Floats, values: Floats, between: Between, apart: Apart, tolerance: float) -> Track | None:
-    """The keys that `between` needs to stay within `tolerance` of all values by `apart`; None when nothing moves."""
+    """The keys from which the interpolation `between` stays within `tolerance` of all values, measured by `apart`.
+
+    None when nothing moves.
+    """
 
     def off(first: int, last: int) -> Floats:
         share = (times[first + 1 : last] - times[first]) / (times[last] - times[first])
@@ -103,9 +106,9 @@ def _track(times: Floats, values: Floats, between: Between, apart: Apart, tolera
 
 
 def sparse(count: int, off: Callable[[int, int], Floats], tolerance: float) -> list[int]:
-    """Rows to keep (Ramer-Douglas-Peucker over time): first, last, and where `off` leaves the tolerance.
+    """The rows to keep (Ramer-Douglas-Peucker over time): first, last, and those where `off` exceeds the tolerance.
 
-    `off(i, j)` gives how far each row strictly between i and j is from the interpolation between those two.
+    `off(i, j)`: the deviations of the rows strictly between i and j from the interpolation between i and j.
     """
     kept = {0, count - 1} if count else set()
     pending = [(0, count - 1)]
@@ -123,22 +126,22 @@ def sparse(count: int, off: Callable[[int, int], Floats], tolerance: float) -> l
 
 
 def distance(one: Floats, other: Floats) -> Floats:
-    """Distances (n,) [m] between places (n, 3)."""
+    """The distances (n,) [m] between positions (n, 3)."""
     return np.asarray(np.linalg.norm(one - other, axis=1))
 
 
 def angle(one: Floats, other: Floats) -> Floats:
-    """Angles (n,) [rad] between turns (n, 4)."""
+    """The angles (n,) [rad] between unit quaternions (n, 4)."""
     return np.asarray(2 * np.arccos(np.clip(np.abs((one * other).sum(axis=1)), 0, 1)))
 
 
 def lerp(one: Floats, other: Floats, share: Floats) -> Floats:
-    """Places (n, 3) at `share` (n, 1) of the line from one (3,) to other (3,)."""
+    """The positions (n, 3) at `share` (n, 1) of the line from `one` (3,) to `other` (3,)."""
     return one + share * (other - one)
 
 
 def slerp(one: Floats, other: Floats, share: Floats) -> Floats:
-    """Quaternions (n, 4) at `share` (n, 1) of the shorter way from one (4,) to other (4,)."""
+    """The quaternions (n, 4) at `share` (n, 1) of the shorter rotation from `one` (4,) to `other` (4,)."""
     cosine = float(one @ other)
     if cosine < 0:
         other, cosine = -other, -cosine

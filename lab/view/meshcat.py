@@ -1,7 +1,7 @@
 """The cell in meshcat's viewer: a live page on this computer, and a replay in one HTML file that needs no network.
 
-Of meshcat the viewer itself is used, its script for browsers; scene and frames reach it as plain JSON (page.js),
-because meshcat's own server listens on every interface and packs every transform by itself.
+Only meshcat's viewer script for browsers is used. Scene and frames reach it as plain JSON (page.js), because meshcat's own
+server listens on every interface and sends every transform as a message of its own.
 """
 
 import html
@@ -20,16 +20,16 @@ from typing import TYPE_CHECKING, Any, Self
 from lab import files
 from lab.errors import BadInput, WorkFailed, unknown
 from lab.sim.frames import Body, Frame, Recording, Viewpoint
+from lab.view.keyframes import Motion, Track, motions
+from lab.view.scene_data import Json, Story, describe, pack
 
-if TYPE_CHECKING:
-    from lab.view.keyframes import Motion, Track
-    from lab.view.scene_data import Json, Story
+if TYPE_CHECKING:  # the server loads starlette and uvicorn, which only a served page needs
     from lab.view.server import File, Server
     from lab.view.server_page import Panel
 
 HERE = Path(__file__).parent
 GANTT_SCRIPT = HERE / "gantt.js"
-# meshcat's viewer, and dat.gui in it, bring their styles as elements of their own: nothing else may be inline when served
+# meshcat's viewer, and dat.gui in it, insert style elements; nothing else may be inline when served
 SERVED = (
     "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src data: blob:; "
     "connect-src 'self' ws://127.0.0.1:* ws://localhost:*; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
@@ -39,12 +39,12 @@ OFFLINE = f'<meta http-equiv="Content-Security-Policy" content="{RULES}">'
 
 
 class LiveView:
-    """A page on 127.0.0.1 that shows what happens while it happens; a context manager.
+    """A page on 127.0.0.1 that shows the scene live; a context manager.
 
     `port` 0 takes any free one. `replay`: serve this file of `replay_html` instead of a live page. Entering raises
-    BadInput for a port it cannot have and a replay that cannot be read. Only who knows `url`, with the token in it, gets
-    the page. Nothing that a page does reaches the run: a slow page skips frames, what it sends is dropped unless there is
-    a panel to hear it, and leaving the context never waits longer than about 3 s.
+    BadInput for a port that is taken or not allowed, and for a replay that cannot be read. The page is served only to
+    requests with the token in `url`. A page cannot slow the run down: a slow page skips frames, messages from it are
+    dropped unless there is a panel, and leaving the context never takes longer than about 3 s.
     """
 
     _panel: "Panel | None" = None
@@ -73,7 +73,7 @@ class LiveView:
         self.close()
 
     def _files(self) -> "dict[str, File]":
-        """The page and what it loads, each by an address with the token in it."""
+        """The page and the files that it loads, by their addresses, which contain the token."""
         from lab.view.server import File
 
         brought = () if self._panel is None else self._panel.files
@@ -94,17 +94,17 @@ class LiveView:
 
     @property
     def port(self) -> int:
-        """The port that it listens on."""
+        """The port on which the server listens."""
         return self._running().port
 
     @property
     def url(self) -> str:
-        """The page's address on this computer, with the token that it wants."""
+        """The page's address on this computer, including the token."""
         return f"http://127.0.0.1:{self.port}/?token={self._token}"
 
     @property
     def hint(self) -> str:
-        """The command that makes `url` work on another computer, one line."""
+        """The command (one line) that makes `url` work on another computer."""
         try:
             user = getuser()
         except (ImportError, KeyError, OSError):  # an account without a name, as in some containers
@@ -112,11 +112,10 @@ class LiveView:
         return f"ssh -L {self.port}:127.0.0.1:{self.port} {user}@{gethostname()}"
 
     def show(self, bodies: Sequence[Body], camera: Viewpoint | None = None) -> None:
-        """Show these bodies, at the origin until a frame places them; replaces what was shown.
+        """Show these bodies in place of the earlier ones; they are at the origin until a frame places them.
 
         Raises BadInput for a mesh that cannot be read and for two bodies of one name.
         """
-        from lab.view.scene_data import describe
         from lab.view.server_page import News
 
         scene = describe(bodies, camera or Viewpoint())
@@ -124,9 +123,9 @@ class LiveView:
         self._running().send(News(scene=scene))
 
     def update(self, frame: Frame) -> None:
-        """Show a frame: what moved since the last one goes out as one message.
+        """Show a frame; everything that moved since the last one is sent as one message.
 
-        Returns at once; after `close` it does nothing. Raises BadInput when it names a body that was not shown.
+        Returns at once, and does nothing after `close`. Raises BadInput when the frame names a body that is not shown.
         """
         from lab.view.server_page import News
 
@@ -143,7 +142,7 @@ class LiveView:
         self._server.send(News(None, float(frame.time_s), moved, colors, visible))
 
     def wait_for_page(self, timeout_s: float) -> bool:
-        """Whether a browser has the page open, waiting for one up to `timeout_s` [s]."""
+        """Whether a browser has opened the page; waits for one up to `timeout_s` [s]."""
         return self._running().connected.wait(timeout_s)
 
     def close(self) -> None:
@@ -167,15 +166,13 @@ def replay_html(
     scene: "Json | None" = None,
     tracks: "Mapping[str, Motion] | None" = None,
 ) -> Path:
-    """Write the recording as one HTML file that plays from disk without a network, with keys and buttons to move in it.
+    """Write the recording as one HTML file, a player that needs no network; returns `path`.
 
-    `speed` is how many times faster than real time it begins; `story`: what is told beside the picture. scene: as `describe`
-    gives it for this recording, None: it is described now. tracks: how each body moves, None: as the frames say. Returns `path`,
-    written whole or not at all; its folder is made when it is missing. Raises BadInput for a speed that is not above 0, a
-    recording that contradicts itself, an unreadable mesh and a path that cannot be written.
+    speed: of playback at the beginning, relative to real time. story: the schedule and captions beside the picture. scene:
+    the result of `describe` for this recording; None: computed here. tracks: the motion of each body; None: computed from
+    the frames. The file is written atomically, and its folder is created if missing. Raises BadInput for a speed that is
+    not above 0, an inconsistent recording, an unreadable mesh, and a path that cannot be written.
     """
-    from lab.view.keyframes import motions
-    from lab.view.scene_data import describe
 
     if not (math.isfinite(speed) and speed > 0):
         raise BadInput(f"replay speed {speed}: must be finite and above 0 (1 is real time)")
@@ -203,7 +200,6 @@ def replay_html(
 
 
 def _motion(motion: "Motion") -> dict[str, Any]:
-    from lab.view.scene_data import pack
 
     def packed(track: "Track | None") -> dict[str, str] | None:
         return None if track is None else {"times": pack(track.times_s), "values": pack(track.values)}
@@ -230,9 +226,9 @@ def viewer_script() -> Path:
 
 
 def _page(title: str, data: Mapping[str, Any], **parts: str) -> str:
-    """page.html with its places filled (styles, scripts, panel, policy, licences; what is not given stays empty).
+    """The text of page.html with its placeholders filled: styles, scripts, panel, policy, licences (empty if not given).
 
-    The title is text, and data cannot end the script element that holds it.
+    The title is escaped as text, and data cannot close the script element that holds it.
     """
     parts |= {"title": html.escape(title), "data": json.dumps(data, allow_nan=False).replace("<", "\\u003c")}
     text = (HERE / "page.html").read_text(encoding="utf-8")

@@ -1,4 +1,4 @@
-"""A moving picture of a replay, GIF or WebP: drawn from the page that a run left, without a display or a browser."""
+"""A movie of a replay as GIF or WebP, drawn from a run's replay page without a display or a browser."""
 
 import os
 from collections.abc import Callable, Iterator
@@ -18,11 +18,11 @@ if TYPE_CHECKING:
     from PIL.Image import Image
 
 FORMATS = {".gif": "GIF", ".webp": "WEBP"}
-WIDTH, HEIGHT, STRIP = 560, 350, 34  # pixels of the picture, and of the strip with words below it
+WIDTH, HEIGHT, STRIP = 560, 350, 34  # pixels: size of the picture, and height of the strip with text below it
 FRAMES_PER_S = 10
-STAYS_S = 1.0  # [s] of the movie: the last picture stays for so long
-READABLE_S = 0.8  # [s] of the movie: what is told for less is not shown
-SAME_S = 0.01  # times that are nearer are the same
+STAYS_S = 1.0  # [s] of the movie for which the last picture stays
+READABLE_S = 0.8  # [s] of the movie; captions shown for less are dropped
+SAME_S = 0.01  # times that differ by less are the same
 COLOURS = 256  # of a GIF
 PAPER, INK, PALE, ACCENT = (255, 255, 255), (38, 50, 66), (120, 132, 146), (31, 97, 141)
 
@@ -30,16 +30,16 @@ PAPER, INK, PALE, ACCENT = (255, 255, 255), (38, 50, 66), (120, 132, 146), (31, 
 def write_movie(
     page: Path, out: Path, seconds: float = 15.0, tell: Callable[[int, int], None] = lambda done, total: None
 ) -> dict[str, Any]:
-    """Write the replay in `page` as a moving picture of so many seconds; its file, frames, size and speed.
+    """Write the replay in `page` as a movie of `seconds` [s]; returns its file, number of frames, size and speed.
 
-    `tell(done, total)` is told after each frame. The file is written whole or not at all. Raises BadInput for a page that is
-    no replay, a name that ends neither in .gif nor in .webp, and a path that cannot be written.
+    `tell(done, total)` is called after each frame. The file is written atomically. Raises BadInput for a page that is not
+    a replay, a name that ends neither in .gif nor in .webp, and a path that cannot be written.
     """
     if out.suffix.lower() not in FORMATS:
         raise BadInput(f"movie '{out}': its name must end in {' or '.join(FORMATS)}")
     try:
         fits = not out.is_dir() and os.access(nearest(out.parent), os.W_OK | os.X_OK)
-    except OSError:  # a name that cannot be
+    except OSError:  # an impossible name
         fits = False
     if not fits:
         raise BadInput(f"movie '{str(out)[:100]}' cannot be written: it is a folder, or its folder is not writable")
@@ -61,7 +61,7 @@ def write_movie(
 
 
 def _pictures(replay: Replay, times_s: Floats, speed: float) -> "Iterator[Image]":
-    from matplotlib import get_data_path  # of the fonts that it brings, one knows the letters of many languages
+    from matplotlib import get_data_path  # it ships a font with the letters of many languages
     from PIL import Image, ImageDraw, ImageFont
 
     moments = replay.at(times_s)
@@ -83,7 +83,7 @@ def _pictures(replay: Replay, times_s: Floats, speed: float) -> "Iterator[Image]
         middle = HEIGHT + STRIP / 2 + 1
         clock = f"{int(time_s) // 60}:{int(time_s) % 60:02d}   {speed:.0f} ×"
         pen.text((10, middle), told[-1] if told else "", INK, words_font, anchor="lm")
-        free = WIDTH - 20 - pen.textlength(clock, words_font)  # the end of words that are too long is not seen
+        free = WIDTH - 20 - pen.textlength(clock, words_font)  # text that is too long is cut off
         pen.rectangle((free, HEIGHT, WIDTH, HEIGHT + STRIP), PAPER)
         pen.text((WIDTH - 10, middle), clock, PALE, words_font, anchor="rm")
         pen.rectangle((0, HEIGHT, WIDTH, HEIGHT + 2), paper)
@@ -92,7 +92,7 @@ def _pictures(replay: Replay, times_s: Floats, speed: float) -> "Iterator[Image]
 
 
 def _around(replay: Replay, moments: Moments) -> Floats:
-    """The corners (n, 3) [m] of all boxes around bodies, at all times, without the largest: the ground they stand on."""
+    """The corners (n, 3) [m] of the boxes around all bodies at all times, except the largest, which is the ground."""
     boxes = []
     for meshes in replay.bodies:
         corners = np.concatenate([mesh.positions for mesh in meshes]) if meshes else np.zeros((1, 3))
@@ -104,7 +104,7 @@ def _around(replay: Replay, moments: Moments) -> Floats:
 
 
 def readable(replay: Replay, speed: float) -> list[tuple[float, str]]:
-    """What is told for long enough to be read at this speed, from when on; in between, what was told when the move began."""
+    """The captions (start [s], text) shown long enough to be read at this speed; in between, that of the current move."""
     ends = [at_s for at_s, _ in replay.captions[1:]] + [replay.duration_s]
     begun, move = -1.0, ""
     kept = []
@@ -124,7 +124,7 @@ def _told(pictures: "Iterator[Image]", tell: Callable[[int, int], None], count: 
 
 
 class _Film:
-    """Pictures to come as one image of so many frames: Pillow puts several images of a WebP in a list, but seeks in one."""
+    """A lazy sequence of pictures as one image with frames: Pillow would put several images in a list, but seeks in one."""
 
     def __init__(self, pictures: "Iterator[Image]", count: int) -> None:
         self._pictures, self.n_frames = pictures, count
@@ -137,13 +137,13 @@ class _Film:
 
 
 def _encoded(pictures: "Iterator[Image]", count: int, form: str, samples: "list[Image]") -> bytes:
-    """The pictures as a file of this form; each is held only until the next one is drawn. samples: what a GIF's palette is of."""
+    """The pictures as a file in this format; only one is held in memory. samples: pictures from which a GIF's palette is made."""
     from PIL import Image
 
     buffer = BytesIO()
     durations = [round(1000 / FRAMES_PER_S)] * (count - 1) + [round(1000 * STAYS_S)]
     how: dict[str, Any] = {"save_all": True, "duration": durations, "loop": 0}
-    if form == "GIF":  # one palette for all, without dithering: what does not change costs nothing
+    if form == "GIF":  # one palette for all, without dithering, so that unchanged areas cost nothing
         together = Image.new("RGB", (samples[0].width, sum(one.height for one in samples)))
         for row, one in enumerate(samples):
             together.paste(one, (0, row * one.height))

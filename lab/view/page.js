@@ -7,7 +7,7 @@ const THREE = MeshCat.THREE;
 const LAB = "lab";
 const panel = typeof seat === "undefined" ? null : seat; // teaching_question.js, on pages with a teaching seat
 var viewer; // a global by this name, as on meshcat's own pages
-const SLOW_MS = 40; // a picture that takes longer is made plainer
+const SLOW_MS = 40; // a picture that takes longer is simplified
 const PLAINER = [
   () => {
     viewer.renderer.shadowMap.type = THREE.BasicShadowMap;
@@ -61,12 +61,12 @@ function furnish() {
   Object.assign(lamp.shadow.camera, { left: -2.4, right: 2.4, top: 2.4, bottom: -2.4, near: 0.5, far: 9 });
 }
 
-// A floor that shows shadows and faint lines only, under the lowest thing
+// A floor that shows only shadows and faint lines, below the lowest body
 function layFloor() {
   const box = new THREE.Box3().setFromObject(viewer.scene_tree.find([LAB]).object);
   if (box.isEmpty()) return;
   const reach = Math.max(1, box.getSize(new THREE.Vector3()).length() / 5), lamp = viewer.scene_tree.find(["Lights", "Lamp", "<object>"]).object;
-  if (reach > 1) { // a larger scene than a cell: its lamp is farther away, for all of it has a shadow
+  if (reach > 1) { // in a scene larger than a cell the lamp is farther away, so that everything has a shadow
     lamp.position.multiplyScalar(reach);
     const { camera } = lamp.shadow;
     for (const side of ["left", "right", "top", "bottom", "near", "far"]) camera[side] *= reach;
@@ -88,7 +88,7 @@ function lookFrom(camera) {
   viewer.controls.update();
 }
 
-// A word that always faces the camera
+// A label that always faces the camera
 function labelOf({ size: [height], text }, rgba) {
   const canvas = document.createElement("canvas"), pen = canvas.getContext("2d"), font = "600 96px system-ui, sans-serif";
   pen.font = font;
@@ -153,7 +153,7 @@ function showScene(scene) {
       place([LAB, body.name, String(number)], shape.pose);
     });
   }
-  if (lookedFrom !== JSON.stringify(scene.camera)) lookFrom(scene.camera); // after a reconnection: where it was turned to
+  if (lookedFrom !== JSON.stringify(scene.camera)) lookFrom(scene.camera); // after a reconnection the person's view is kept
   lookedFrom = JSON.stringify(scene.camera);
   floorPending = true;
   viewer.set_dirty();
@@ -169,20 +169,20 @@ function showFrame(frame) {
   viewer.set_dirty();
 }
 
-// Milliseconds for a picture that is really drawn
+// Milliseconds for drawing a picture
 function drawingTime() {
   const gl = viewer.renderer.getContext(), pixel = new Uint8Array(4);
   const draw = () => {
     viewer.render();
     gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
   };
-  draw(); // shaders are compiled first
+  draw(); // the first picture also compiles the shaders
   const began = performance.now();
   draw();
   return performance.now() - began;
 }
 
-// Without a GPU pictures take long: on a page that is answered, plainer ones follow the robot in time
+// Without a GPU pictures take long: on a page with questions, simplified ones follow the robot in time
 function keepUp(steps) {
   if (!steps.length || drawingTime() < SLOW_MS) return;
   steps[0]();
@@ -224,7 +224,7 @@ function follow(pause = 300) {
   };
 }
 
-// The picture fills its pane, whatever the pane does; meshcat's own way takes the window's height
+// The picture fills its pane at any size; meshcat itself would take the window's height
 function fitPane(pane) {
   const fit = viewer.set_3d_pane_size.bind(viewer);
   viewer.set_3d_pane_size = () => fit(pane.clientWidth || 1, pane.clientHeight || 1);

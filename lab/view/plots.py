@@ -1,4 +1,4 @@
-"""Pictures of what was learned: learning curves (PNG or SVG), value map (PNG)."""
+"""Plots of learning results: learning curves (PNG or SVG) and value maps (PNG)."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class Places(NamedTuple):
-    """What stands in the cells (row, column) of a map: the greedy path, what is blocked (rows, columns) bool, both ends."""
+    """The content of a map's cells (row, column): the greedy path, blocked cells (rows, columns) bool, start and goal."""
 
     route: Sequence[tuple[int, int]] = ()
     blocked: ArrayLike | None = None
@@ -30,7 +30,7 @@ NOTHING = Places()
 
 
 class Curve(Protocol):
-    """What `learning_curves` reads of a policy: steps of each episode, which were guided, and the fewest possible."""
+    """The attributes of a policy that `learning_curves` reads: steps per episode, guided episodes, the fewest possible steps."""
 
     @property
     def subtask(self) -> str: ...
@@ -43,7 +43,7 @@ class Curve(Protocol):
 
 
 def learning_curves(policies: Mapping[str, Curve], path: Path) -> None:
-    """Steps of each episode, one small plot a policy: guided episodes marked, the fewest possible steps as a line.
+    """Plot the steps of each episode, one small plot per policy: guided episodes marked, the fewest possible steps as a line.
 
     Raises BadInput without policies. Source: the curves of thesis ch. 8 and 9.
     """
@@ -79,11 +79,11 @@ def value_map(
     corners: ArrayLike | None = None,
     places: Places = NOTHING,
 ) -> None:
-    """Values (rows, columns) of grid cells, such as max_a Q, half-transparent over a picture (H, W, 3) RGB, or alone.
+    """Plot values (rows, columns) of grid cells, such as max_a Q, half-transparent over a picture (H, W, 3) RGB, or alone.
 
-    `corners` (rows + 1, columns + 1, 2): pixel (x, y) of the grid lines' crossings, see `cell_corners`; without: row
-    down, column right. The goal has no value, an episode ends there. Raises BadInput when the shapes do not fit, and
-    for a path that is no PNG file.
+    `corners` (rows + 1, columns + 1, 2): pixel (x, y) of the grid lines' crossings, see `cell_corners`; without them rows
+    run down and columns to the right. The goal has no value, because an episode ends there. Raises BadInput when the
+    shapes do not fit, and for a path that is no PNG file.
     """
     check_png(path)
     table = np.array(values, dtype=np.float64)
@@ -113,7 +113,7 @@ def value_map(
 
 
 def grid_values(q: FloatArray, mdp: TabularMDP, path: Path) -> None:
-    """The values (S, A) of a grid problem with two axes, and the greedy way through it; see `value_map`."""
+    """Plot the values (S, A) of a grid problem with two axes, and the greedy path through it; see `value_map`."""
     (goal, *_), (rows, columns) = np.flatnonzero(mdp.goal).tolist(), mdp.shape
     states, _, _ = greedy_path(q, mdp, mdp.n_states)
     route = [divmod(state, columns) for state in states]
@@ -141,7 +141,7 @@ def _fitting(
 
 
 def values_seen(q: FloatArray, mdp: TabularMDP, picture: NDArray[np.uint8], seen: "GridView", path: Path) -> None:
-    """The values (states, actions) of a problem over the picture (H, W, 3) that it was read from, with the learned way."""
+    """Plot the values (S, A) of a problem over the picture (H, W, 3) from which it was read, with the learned path."""
     cells = [mdp.state_cell(state) for state in greedy_path(q, mdp, mdp.n_states)[0]]
     value_map(
         q.max(axis=1).reshape(mdp.shape),
@@ -158,7 +158,7 @@ def values_seen(q: FloatArray, mdp: TabularMDP, picture: NDArray[np.uint8], seen
 
 
 def cell_corners(view: "View") -> NDArray[np.float64]:
-    """Pixels (rows + 1, columns + 1, 2) of the crossings of an overhead view's grid lines."""
+    """The pixels (rows + 1, columns + 1, 2) of the crossings of an overhead view's grid lines."""
     along_x, along_y = (
         start + view.cell_m * np.arange(count + 1) for start, count in zip(view.origin_m, view.shape, strict=True)
     )
@@ -167,7 +167,7 @@ def cell_corners(view: "View") -> NDArray[np.float64]:
 
 
 def _draw_curve(axes: "Axes", policy: Curve) -> None:
-    """One policy's small plot; its lines come in the order of the legend."""
+    """Draw one policy's small plot, its lines in the order of the legend."""
     from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator, ScalarFormatter
 
     episodes, steps = np.arange(1, len(policy.curve) + 1), np.asarray(policy.curve)
@@ -191,7 +191,7 @@ def _draw_curve(axes: "Axes", policy: Curve) -> None:
 
 
 def _draw_places(axes: "Axes", crossings: NDArray[np.float64], walls: NDArray[np.bool_], places: Places) -> None:
-    """Blocked cells, the greedy path, start and goal on a value map."""
+    """Draw blocked cells, the greedy path, start and goal on a value map."""
     from matplotlib.collections import PolyCollection
 
     middles = (crossings[:-1, :-1] + crossings[1:, 1:]) / 2
@@ -214,7 +214,7 @@ def _draw_places(axes: "Axes", crossings: NDArray[np.float64], walls: NDArray[np
 
 
 def _muted(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """The picture (H, W, 3) paler and with less colour of its own, so that a tint on it still reads."""
+    """The picture (H, W, 3), paler and less saturated, so that a tint on it remains visible."""
     grey = picture.mean(axis=2, keepdims=True)
     muted: NDArray[np.uint8] = (90 + 0.65 * (0.45 * picture + 0.55 * grey)).clip(0, 255).astype(np.uint8)
     return muted

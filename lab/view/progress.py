@@ -1,4 +1,4 @@
-"""How far something is, and how it went, in the width of a line: a bar, a learning curve of a few characters."""
+"""Progress in one line of text: a progress bar, and a learning curve of a few characters."""
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -14,14 +14,14 @@ CURVE = 10  # characters
 
 
 def progress_bar(console: Console) -> Progress:
-    """A bar with its counts and the time, shown on a terminal alone."""
+    """A progress bar with counts and time, shown only on a terminal."""
     columns = (TextColumn("{task.description}"), BarColumn(30), MofNCompleteColumn(), TimeElapsedColumn())
     return Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
 
 
 @contextmanager
 def counting(console: Console, what: str) -> Iterator[Callable[[int, int], None]]:
-    """A progress bar on a terminal, nothing elsewhere; yields what is told (done, total)."""
+    """A progress bar on a terminal, nothing elsewhere; yields the function to call with (done, total)."""
     with progress_bar(console) as bar:
         task = bar.add_task(what, total=None)
         yield lambda done, total: bar.update(task, completed=done, total=total)
@@ -33,7 +33,7 @@ def bars_for(console: Console) -> str:
 
 
 def sparkline(steps: Sequence[int], width: int = CURVE, bars: str = BARS) -> str:
-    """A learning curve as `width` characters: the mean steps of equal stretches of episodes, full height for the largest."""
+    """A learning curve as `width` characters: mean steps of equally long blocks of episodes, relative to the largest."""
     if not steps:
         return " " * width
     edges = [i * len(steps) // width for i in range(width + 1)]

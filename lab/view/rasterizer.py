@@ -1,6 +1,6 @@
-"""Pictures of bodies without a display or a browser: triangles, the nearest of each pixel, one lamp that casts shadows.
+"""A software rasterizer: pictures of bodies without a display or a browser, with a depth buffer and a lamp's shadows.
 
-Each corner is projected to homogeneous pixels (x w, y w, w), and nothing is clipped: of the inverse of a face's three
+Each corner is projected to homogeneous pixels (x w, y w, w), and nothing is clipped: with the inverse of a face's three
 corners, a pixel's three weights are all positive where the face covers it, and their sum is 1 / w. Source: Olano and Greer,
 Triangle Scan Conversion using 2D Homogeneous Coordinates, 1997.
 """
@@ -23,15 +23,15 @@ class Still:
         self.recording = Recording(())
 
     def show(self, bodies: Sequence[Body]) -> None:
-        """Begin anew with these bodies."""
+        """Keep these bodies, and forget earlier ones and their frames."""
         self.recording = Recording(tuple(bodies))
 
     def update(self, frame: Frame) -> None:
-        """Keep a frame, too."""
+        """Keep a frame as well."""
         self.recording.frames.append(frame)
 
 
-# ---- rasterizer -------------------------------------------------------------------------------------------------------
+# ---- drawing meshes ---------------------------------------------------------------------------------------------------
 
 
 Floats = NDArray[np.float64]
@@ -39,20 +39,23 @@ Whole = NDArray[np.int64]
 
 FIELD_OF_VIEW_RAD = radians(38.0)  # from bottom to top, as on the page
 BACKGROUND = (0.945, 0.955, 0.965)  # sRGB
-LAMP: Vector = (2.2, -1.6, 4.0)  # where the lamp stands, seen from what is looked at
-LAMP_M, LAMP_REACH_M = 12.0, 2.4  # [m] how far away it is, and how far around what is looked at its shadows go
-LAMP_PIXELS = 1536  # a side of its picture, from which the shadows are read
-SKY, SUN, WINDOW = 0.50, 0.56, 0.16  # how much light each gives; as on the page
-GROUND_LIGHT = (0.62, 0.58, 0.51)  # what comes back from below, of the sky's
+LAMP: Vector = (2.2, -1.6, 4.0)  # direction of the lamp from the camera's target
+LAMP_M, LAMP_REACH_M = (
+    12.0,
+    2.4,
+)  # [m] the lamp's distance, and the radius around the target within which it casts shadows
+LAMP_PIXELS = 1536  # width and height of the shadow map
+SKY, SUN, WINDOW = 0.50, 0.56, 0.16  # strength of each light, as on the page
+GROUND_LIGHT = (0.62, 0.58, 0.51)  # share of the sky's light that the ground reflects
 FROM_WINDOW: Vector = (-0.48, 0.73, 0.48)
-FINER = 2  # a side of each pixel is drawn in so many parts, and their mean is shown
-MARGIN = 0.04  # of the picture's sides stay free around what fills it
+FINER = 2  # subpixels along each side of a pixel, whose mean is shown
+MARGIN = 0.04  # share of the picture's sides that stays free
 LEAST_AREA = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """Triangles of one colour in their body's frame: positions and normals (n, 3) [m], faces (m, 3), rgba in sRGB."""
+    """Triangles of one colour in their body's frame: positions [m] and normals (n, 3), faces (m, 3), rgba in sRGB."""
 
     positions: Floats
     normals: Floats
@@ -61,12 +64,12 @@ class Mesh:
 
 
 class Rasterizer:
-    """Draws bodies, each made of meshes, as one camera sees them; what never changes is worked out once."""
+    """Draws bodies, each made of meshes, from one camera; whatever never changes is computed once."""
 
     def __init__(
         self, bodies: Sequence[Sequence[Mesh]], camera: Viewpoint, width: int, height: int, around: Floats | None = None
     ) -> None:
-        """around (n, 3): points [m] that fill the picture; without them it is the whole view of the camera."""
+        """around (n, 3): points [m] that fill the picture; without them, the picture is the camera's whole view."""
         meshes = [(number, mesh) for number, body in enumerate(bodies) for mesh in body]
         sizes = [len(mesh.positions) for _, mesh in meshes]
         firsts = np.cumsum([0, *sizes[:-1]])
@@ -89,9 +92,9 @@ class Rasterizer:
         self._lamp = _projection(lamp_at, target, LAMP_REACH_M / LAMP_M, LAMP_PIXELS, LAMP_PIXELS)
 
     def picture(self, places: Floats, turns: Floats, shown: NDArray[np.bool_], rgba: Floats) -> NDArray[np.uint8]:
-        """The picture (height, width, 3) uint8 with bodies at places (bodies, 3) [m], turned by matrices (bodies, 3, 3).
+        """The picture (height, width, 3) uint8 of bodies at places (bodies, 3) [m], rotated by matrices (bodies, 3, 3).
 
-        shown (bodies,): whether a body is seen; rgba (bodies, 4): the colour of all its shapes, NaN: their own.
+        shown (bodies,): whether a body is visible; rgba (bodies, 4): the colour of all its shapes, NaN: their own.
         """
         turn = turns[self._body_of_corner]
         at = np.einsum("nij,nj->ni", turn, self._positions) + places[self._body_of_corner]
@@ -103,7 +106,7 @@ class Rasterizer:
         *_, shadows = self._nearest(at, np.flatnonzero(seen & (alpha > 0.5)), self._lamp, LAMP_PIXELS, LAMP_PIXELS)
         drawn = np.tile(_linear(np.array(BACKGROUND)), (*self._size, 1))
         near = np.zeros(self._size)
-        for chosen in (seen & (alpha >= 1.0), seen & (alpha < 1.0)):  # what is behind glass first
+        for chosen in (seen & (alpha >= 1.0), seen & (alpha < 1.0)):  # opaque faces first, then transparent ones
             faces = np.flatnonzero(chosen)
             if len(faces):
                 weights, face_at, near = self._nearest(at, faces, self._camera, *self._size, behind=near)
@@ -129,9 +132,9 @@ class Rasterizer:
     def _nearest(
         self, at: Floats, faces: Whole, projection: Floats, height: int, width: int, behind: Floats | None = None
     ) -> tuple[Floats, Whole, Floats]:
-        """The weights (faces, 3, 3) of pixels; for each pixel (height, width) the nearest face, -1 for none, and its 1 / w.
+        """The faces' weights (faces, 3, 3); for each pixel (height, width) the nearest face, -1 for none, and its 1 / w.
 
-        behind: what was drawn before, as near as it is; a face that is farther away is not seen.
+        behind: the 1 / w of what is drawn already; faces behind it are hidden.
         """
         corners = (at @ projection[:, :3].T + projection[:, 3])[self._faces[faces]]
         first, second, third = corners[:, 0], corners[:, 1], corners[:, 2]
@@ -141,7 +144,7 @@ class Rasterizer:
         weights = crosses / np.where(fine, volumes, np.inf)[:, None, None]
         ahead = corners[:, :, 2:] > 0
         pixels = np.nan_to_num(corners[:, :, :2] / np.where(ahead, corners[:, :, 2:], 1.0))
-        whole = ~ahead.all(axis=(1, 2))[:, None]  # a face that reaches behind the camera may be anywhere
+        whole = ~ahead.all(axis=(1, 2))[:, None]  # a face that reaches behind the camera may cover any pixel
         lows = np.where(whole, 0, np.clip(np.floor(pixels.min(axis=1)), 0, (width, height)))
         highs = np.where(whole, (width, height), np.clip(np.ceil(pixels.max(axis=1)), 0, (width, height)))
         highs[~fine | ~ahead.any(axis=(1, 2))] = 0
@@ -152,7 +155,7 @@ class Rasterizer:
 
 
 def _projection(eye: Floats, target: Floats, slope: float, height: int, width: int) -> Floats:
-    """(3, 4): homogeneous pixels of a world point; `slope` is the tangent of half the angle from bottom to top."""
+    """The projection (3, 4) of world points to homogeneous pixels; `slope`: tangent of half the vertical field of view."""
     ahead = (target - eye) / np.linalg.norm(target - eye)
     right = np.cross(ahead, (0.0, 0.0, 1.0) if abs(ahead[2]) < 0.999 else (0.0, 1.0, 0.0))
     right /= np.linalg.norm(right)
@@ -168,7 +171,7 @@ def _projection(eye: Floats, target: Floats, slope: float, height: int, width: i
 
 
 def _filled_by(points: Floats, projection: Floats, height: int, width: int) -> Floats:
-    """The projection (3, 4) enlarged and shifted so that those of the points (n, 3) that lie ahead fill the picture."""
+    """The projection (3, 4), scaled and shifted so that the points (n, 3) in front of the camera fill the picture."""
     seen = points @ projection[:, :3].T + projection[:, 3]
     pixels = seen[seen[:, 2] > 0, :2] / seen[seen[:, 2] > 0, 2:]
     if not len(pixels):
@@ -181,18 +184,21 @@ def _filled_by(points: Floats, projection: Floats, height: int, width: int) -> F
 
 
 def _linear(colours: Floats) -> Floats:
-    """sRGB to light."""
+    """The linear light of sRGB colours."""
     return np.where(colours <= 0.04045, colours / 12.92, ((colours + 0.055) / 1.055) ** 2.4)
 
 
 def _encoded(light: Floats) -> Floats:
-    """Light to sRGB, within 0..1."""
+    """The sRGB colours of linear light, clipped to 0..1."""
     light = np.clip(light, 0.0, 1.0)
     return np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
 
 
 def fill(weights: Floats, boxes: Whole, face_at: Whole, near: Floats) -> None:
-    """For each pixel, the nearest of the faces that cover it. boxes (faces, 4): from x, y up to x, y."""
+    """Write into `face_at` and `near`, for each pixel, the nearest face that covers it, and its 1 / w.
+
+    boxes (faces, 4): bounds of each face in pixels, from x, y up to x, y.
+    """
     for face in range(len(weights)):
         for y in range(boxes[face, 1], boxes[face, 3]):
             for x in range(boxes[face, 0], boxes[face, 2]):
@@ -218,9 +224,9 @@ def shade(
     shadows: Floats,
     drawn: Floats,
 ) -> None:
-    """The light that each pixel gets, blended over what is drawn. places, normals (faces, 3, 3); colours (faces, 4), linear.
+    """Blend each pixel's shaded colour into `drawn`. places, normals (faces, 3, 3); colours (faces, 4), linear.
 
-    lights (3, 3): the way to the lamp, the way to the window, what comes back from below.
+    lights (3, 3): the direction of the lamp, the direction of the window, and the light reflected from the ground.
     """
     for y in range(len(near)):
         for x in range(near.shape[1]):
@@ -239,7 +245,7 @@ def shade(
                 nz += share * normals[face, corner, 2]
             length = (nx * nx + ny * ny + nz * nz) ** 0.5
             if nx * (eye[0] - px) + ny * (eye[1] - py) + nz * (eye[2] - pz) < 0.0:
-                length = -length  # the inner side of a face that is open
+                length = -length  # the back of a face of an open mesh
             if length != 0.0:
                 nx, ny, nz = nx / length, ny / length, nz / length
             sun = max(0.0, nx * lights[0, 0] + ny * lights[0, 1] + nz * lights[0, 2])

@@ -1,16 +1,16 @@
-// A recording as a replay: its tracks in the viewer, and the player that moves through them, with the run's story beside.
+// A replay: a recording's tracks in the viewer, the player that moves through them, and the run's story beside it.
 "use strict";
 
 const SPEEDS = [0.5, 1, 2, 4, 8, 16];
 const LEAP_S = 1, LONG_LEAP_S = 10; // of an arrow key, without and with Shift
-const MOST_ROWS = 8; // of a chart below the picture; with more it stands beside it where the page is wide
-const LATE_MS = 1000; // a picture that comes later is not caught up with
+const MOST_ROWS = 8; // of a chart below the picture; a larger chart stands beside it on a wide page
+const LATE_MS = 1000; // delays longer than this are not made up for
 
 function smoothTrack(name, type, { times, values }) {
   return { name, type, times: unpack(times, Float32Array), values: unpack(values, Float32Array) };
 }
 
-// Steps [[time, value], ...] hold until the next; before the first, what the body had from the beginning
+// The value at a time of steps [[time, value], ...]; before the first step, the body's initial value
 function stepTrack(name, type, steps, before, values) {
   const all = steps[0][0] > 0 ? [[0, before], ...steps] : steps;
   const times = all.map(([time]) => time);
@@ -52,12 +52,12 @@ function replay({ scene, speed, start_s, duration_s, story }) {
   if (!animations.length) return;
   const animator = viewer.animator;
   animator.load(animations, { play: false, repetitions: Infinity });
-  for (const action of animator.actions) action.play(); // so that they can be put to any time
+  for (const action of animator.actions) action.play(); // so that they can be set to any time
   animator.seek(0);
   player.begin((time_s) => animator.seek(time_s), { speed, start_s, duration_s, story });
 }
 
-// Keeps the time of the replay, counted from its first picture [s]; keys, buttons, slider and chart move it
+// The clock of the replay, counted from its first picture [s]; keys, buttons, slider and chart set it
 const player = (() => {
   const el = (id) => document.getElementById(id);
   const still = { measured: [], planned: [], captions: [], marks: [], begins_s: [] };
@@ -98,7 +98,7 @@ const player = (() => {
     el("next").onclick = () => stepTo(1);
     el("speed").onchange = (event) => {
       pace(Number(event.target.value));
-      event.target.blur(); // so that the keys are the player's again
+      event.target.blur(); // so that keys go to the player again
     };
     el("seek").oninput = () => move(Number(el("seek").value));
     const drag = (event) => chart && event.buttons && move(chart.timeAt(event.clientX) - start);
@@ -123,7 +123,7 @@ const player = (() => {
     chart.grow(start + time);
   }
 
-  // ---- what moves it
+  // ---- controls
 
   function move(to) {
     time = Math.min(Math.max(to, 0), length);
@@ -160,7 +160,7 @@ const player = (() => {
     move(time + (late / 1000) * speed);
   }
 
-  // To the beginning of the next move, or of this one, or of the one before
+  // Go to the beginning of the next move, of this one, or of the one before
   function stepTo(way) {
     const begins = story.begins_s.map((at) => at - start), near = Math.min(0.5, speed * 0.5);
     const next = begins.find((at) => at > time + 0.01), last = begins.filter((at) => at < time - near);
@@ -178,12 +178,12 @@ const player = (() => {
   function pressed(event) {
     const does = KEYS[event.key] || KEYS[event.key.toLowerCase()];
     if (!does || event.ctrlKey || event.altKey || event.metaKey || event.target.matches("select")) return;
-    if (event.key === " " && event.target.matches("button")) return; // that button's own
+    if (event.key === " " && event.target.matches("button")) return; // the button handles this key
     event.preventDefault();
     does(event);
   }
 
-  // ---- what is seen of it
+  // ---- display
 
   function show() {
     const now = start + time;

@@ -1,4 +1,4 @@
-"""A replay read back from its page: bodies as triangles, where each is at any time, and what is told beside it."""
+"""A replay read back from its page: bodies as triangles, their poses at any time, and the captions."""
 
 import base64
 import re
@@ -17,16 +17,18 @@ from lab.sim.frames import Shape, Viewpoint
 from lab.view.rasterizer import Floats, Mesh
 from lab.view.scene_data import corners_of
 
-MOST_NUMBERS = 20_000_000  # in all arrays of a replay; three toasts have half a million
-LARGEST = 1e9  # of a number: metres and seconds of what cannot be drawn
+MOST_NUMBERS = 20_000_000  # in all arrays of a replay; one of three toasts has half a million
+LARGEST = 1e9  # [m] or [s]: larger numbers cannot be drawn
 _DATA = re.compile(r'<script id="lab-data" type="application/json">(.*?)</script>', re.DOTALL)
 _TITLE = re.compile(r"<title>(.*?)</title>", re.DOTALL)
 
 
 @dataclass(frozen=True, eq=False)
 class Moments:
-    """Bodies at some times: places (times, bodies, 3) [m], turns as matrices (times, bodies, 3, 3), shown (times, bodies),
-    rgba (times, bodies, 4), NaN where a body has the colours of its shapes.
+    """The bodies at some times.
+
+    places (times, bodies, 3) [m], turns: rotation matrices (times, bodies, 3, 3), shown (times, bodies), rgba (times,
+    bodies, 4), NaN where a body has the colours of its shapes.
     """
 
     places: Floats
@@ -37,9 +39,9 @@ class Moments:
 
 @dataclass(frozen=True, eq=False)
 class Replay:
-    """What a page of `replay_html` holds. Times count from the first picture [s].
+    """The content of a page of `replay_html`. Times count from the first picture [s].
 
-    captions: from when on which words say what happens; begins_s: when each move began.
+    captions: start and text of each; begins_s: the start of each move.
     """
 
     title: str
@@ -51,7 +53,7 @@ class Replay:
     _motions: tuple[dict[str, Any], ...]
 
     def at(self, times_s: ArrayLike) -> Moments:
-        """Where all bodies are at each of these times."""
+        """The poses, visibility and colours of all bodies at each of these times [s]."""
         from scipy.spatial.transform import Rotation, Slerp
 
         times, bodies = np.asarray(times_s, dtype=np.float64), len(self.bodies)
@@ -75,7 +77,7 @@ class Replay:
 
 
 def read_replay(path: Path) -> Replay:
-    """The replay in a page that `replay_html` wrote. Raises BadInput for a file that cannot be read or is none."""
+    """The replay in a page that `replay_html` wrote. Raises BadInput for a file that cannot be read or is no replay."""
     try:
         text = read_limited(path).decode()
     except (OSError, UnicodeDecodeError) as reason:
@@ -92,7 +94,7 @@ def read_replay(path: Path) -> Replay:
 
 
 class _Reading:
-    """One reading: it counts the numbers, so that no file can ask for more memory than it should."""
+    """A reader of one replay, which counts the numbers to limit the memory that a file can demand."""
 
     def __init__(self) -> None:
         self._numbers = 0
@@ -114,7 +116,7 @@ class _Reading:
         return Replay(title, camera, bodies, duration_s, captions, begins_s, motions)
 
     def _geometry(self, spec: Any) -> tuple[Floats, Floats, NDArray[np.int64]] | None:
-        """Positions, normals, faces; None for a label, which is not drawn."""
+        """The positions, normals and faces of a geometry; None for a label, which is not drawn."""
         if spec["kind"] == "label":
             return None
         if spec["kind"] != "mesh":

@@ -1,4 +1,4 @@
-"""Bodies as the page wants them: plain JSON data, each geometry once, meshes read and shaded."""
+"""A scene and a schedule as JSON data for the page: bodies with each geometry once, meshes, activities and captions."""
 
 import base64
 from collections.abc import Mapping, Sequence
@@ -22,7 +22,7 @@ MARKS: tuple[MarkKind, ...] = get_args(MarkKind)
 
 @dataclass(frozen=True)
 class Mark:
-    """Something on the timeline, at this time [s], in words. Raises BadInput for a kind that is not of MARKS."""
+    """An event on the timeline: its time [s] and its text. Raises BadInput for a kind that is not in MARKS."""
 
     at_s: float
     kind: MarkKind
@@ -35,10 +35,10 @@ class Mark:
 
 @dataclass(frozen=True)
 class Story:
-    """A run beside its recording, on the same clock [s].
+    """The schedule and captions of a run, on the same clock [s] as its recording.
 
-    captions: from when on which words say what happens. begins_s: when each move began. looks: what parts are called, and
-    their colours, by number; without it bars have the colours of what is done.
+    captions: start and text of each. begins_s: the start of each move. looks: name and colour of each part, by number;
+    without it, bars have the colours of their kinds of activity.
     """
 
     measured: Schedule
@@ -49,7 +49,7 @@ class Story:
     looks: Mapping[int, tuple[str, str]] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, Any]:
-        """For the page: rows of robot and machines, activities as in `Schedule.to_json`, the rest in the order of time."""
+        """The page's data: rows of robot and machines, activities as in `Schedule.to_json`, the rest sorted by time."""
         return {
             "measured": self._rows(self.measured),
             "planned": [] if self.planned is None else self._rows(self.planned),
@@ -68,7 +68,7 @@ class Story:
         return asdict(activity) | times | ({"name": name} if name else {}) | look
 
 
-# ---- scene data -------------------------------------------------------------------------------------------------------
+# ---- bodies and meshes ------------------------------------------------------------------------------------------------
 
 
 CREASE_RAD = 0.6  # faces that meet at a larger angle keep a sharp edge
@@ -79,8 +79,8 @@ Json = dict[str, Any]
 def describe(bodies: Sequence[Body], camera: Viewpoint) -> Json:
     """The scene of `page.js`: {"camera", "geometries": [...], "bodies": [{"name", "shapes": [...]}]}.
 
-    Shapes name their geometry by its place in the list. Raises BadInput for a mesh file that is missing or unreadable
-    and for two bodies of one name.
+    Shapes refer to their geometry by its index in the list. Raises BadInput for a mesh file that is missing or unreadable,
+    and for two bodies with the same name.
     """
     unique_names(bodies)
     geometries: dict[tuple[object, ...], int] = {}
@@ -120,24 +120,26 @@ def _geometry(shape: Shape) -> Json:
 
 @lru_cache(maxsize=256)
 def read_mesh(path: Path, changed_ns: int) -> Json:
-    """The triangles of an OBJ or STL file, edges sharper than 34 degrees kept sharp; read again only when it changed.
+    """The triangles of an OBJ or STL file: base64 of "positions" and "normals" (n * 3, float32), "faces" (m * 3, uint32).
 
-    Returns base64 of "positions" and "normals" (n * 3, float32) and "faces" (m * 3, uint32). Raises BadInput when the
-    file holds no mesh.
+    Edges sharper than 34 degrees stay sharp. The file is read again only when it has changed. Raises BadInput when it
+    holds no mesh.
     """
     import trimesh
 
     try:
         mesh: Any = trimesh.load(BytesIO(readable(path)), path.suffix.lower().removeprefix("."), force="mesh")
         assert isinstance(mesh, trimesh.Trimesh)
-        mesh.merge_vertices(merge_tex=True, merge_norm=True)  # files split vertices; what is sharp is decided here
+        mesh.merge_vertices(
+            merge_tex=True, merge_norm=True
+        )  # files split vertices; CREASE_RAD decides which edges are sharp
         mesh = trimesh.Trimesh(
             mesh.vertices, mesh.faces, process=False
         )  # a picture on it would be packed for every piece
         shaded = trimesh.graph.smooth_shade(mesh, angle=CREASE_RAD)
         if not len(shaded.faces) or not np.isfinite(shaded.vertices).all():
             raise ValueError("no triangles in it, or coordinates that are not finite")
-    except Exception as reason:  # whatever a broken file does to the reader
+    except Exception as reason:  # any error of the reader for a damaged file
         raise BadInput(
             f"mesh file '{path}': {str(reason) or type(reason).__name__}: an OBJ or STL mesh is wanted"
         ) from None
@@ -150,7 +152,7 @@ def read_mesh(path: Path, changed_ns: int) -> Json:
 
 
 def corners_of(shape: Shape) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
-    """Positions (n, 3) [m], normals (n, 3) and faces (m, 3) of a box, a cylinder or a sphere. Raises BadInput for another."""
+    """The positions (n, 3) [m], normals (n, 3) and faces (m, 3) of a box, a cylinder or a sphere. BadInput for another shape."""
     from trimesh import creation, graph
 
     if shape.kind == "box":
@@ -166,5 +168,5 @@ def corners_of(shape: Shape) -> tuple[NDArray[np.float64], NDArray[np.float64], 
 
 
 def pack(array: NDArray[Any], kind: str = "<f4") -> str:
-    """An array's values in C order as base64, as `kind` (little-endian: what browsers run on)."""
+    """The base64 of an array's values in C order, as `kind` (little-endian, as in browsers)."""
     return base64.b64encode(np.ascontiguousarray(array, dtype=kind).tobytes()).decode("ascii")

@@ -1,4 +1,4 @@
-"""A floor for any schedule: where stations stand, what they look like, and the ways of what carries parts between them."""
+"""A floor for any schedule: positions and looks of stations, and the paths of vehicles or an arm between them."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -10,14 +10,14 @@ import numpy as np
 from lab.mdp import FloatArray
 from lab.sim.frames import Body, Pose, Rgba, Shape, Vector
 
-PART_M, PITCH_M = 0.13, 0.16  # [m] a part's edge, and from one place of a part to the next
+PART_M, PITCH_M = 0.13, 0.16  # [m] a part's edge, and the distance between places of parts
 WIDE_M, DEEP_M, HIGH_M = 0.72, 0.56, 0.34  # [m] a station's table
-ACROSS_M, DOWN_M = 1.25, 1.5  # [m] from one station to the next in a row, and from row to row
-COLUMNS = 4  # of parts that wait at a station's front edge; more stand on one another
+ACROSS_M, DOWN_M = 1.25, 1.5  # [m] distance between stations in a row, and between rows
+COLUMNS = 4  # of parts that wait at a station's front edge; further parts are stacked
 TILE_M = 0.02
-CARRIER_M = 0.26  # [m] so high is a vehicle
-OPENING = radians(80.0)  # of the ring of stations around an arm, towards who looks
-HAND_M, LIFT_M = 1.05, 0.22  # [m] the arm's links are so high above the floor, and it lifts parts so much
+CARRIER_M = 0.26  # [m] height of a vehicle
+OPENING = radians(80.0)  # of the ring of stations around an arm, towards the viewer
+HAND_M, LIFT_M = 1.05, 0.22  # [m] height of the arm's links, and by how much it lifts parts
 PAPER: Rgba = (0.91, 0.92, 0.93, 1.0)
 STEEL: Rgba = (0.62, 0.66, 0.71, 1.0)
 PANEL: Rgba = (0.74, 0.78, 0.83, 1.0)
@@ -30,9 +30,9 @@ INK: Rgba = (0.20, 0.24, 0.29, 1.0)
 
 @dataclass(frozen=True)
 class Spot:
-    """A station: its middle on the floor [m], which way it is turned [rad], 0 with its front towards who looks (-y), its kind.
+    """A station: its middle on the floor [m], its rotation [rad] (0: its front faces the viewer at -y), and its kind.
 
-    kind: "machine", "store" (a table), or "tile" (a place on the floor for `parts` of them).
+    kind: "machine", "store" (a table), or "tile" (a place on the floor for `parts` parts).
     """
 
     name: str
@@ -44,22 +44,22 @@ class Spot:
 
     @property
     def columns(self) -> int:
-        """How many parts stand side by side on a tile."""
+        """The number of parts side by side on a tile."""
         return max(2, ceil(sqrt(self.parts)))
 
     @property
     def edges(self) -> tuple[float, float]:
-        """How wide and deep it is [m]."""
+        """Its width and depth [m]."""
         edge = self.columns * PITCH_M + 0.08
         return (edge, edge) if self.kind == "tile" else (WIDE_M, DEEP_M)
 
     def at(self, x: float, y: float, z: float) -> Vector:
-        """A point of the station's own frame on the floor."""
+        """The floor's coordinates [m] of a point in the station's frame."""
         c, s = cos(self.turn), sin(self.turn)
         return (self.x + c * x - s * y, self.y + s * x + c * y, z)
 
     def place(self, number: int, works: bool) -> Vector:
-        """Where the middle of a part is: where it is worked on, side by side, or where it waits, at the front."""
+        """The middle [m] of the `number`th place for parts: in the row where they are processed, or in front, where they wait."""
         if self.kind == "tile":
             row, column = divmod(number, self.columns)
             middle = (self.columns - 1) / 2
@@ -72,7 +72,7 @@ class Spot:
         return self.at((column - (COLUMNS - 1) / 2) * PITCH_M, -0.19, HIGH_M + PART_M * (level + 0.5))
 
     def bodies(self, number: int) -> tuple[Body, ...]:
-        """What is seen of it, in its own frame, and a machine's lamp."""
+        """The visible bodies in the station's frame, a machine's lamp among them."""
         wide, deep = self.edges
         if self.kind == "tile":
             tile = Shape("box", (wide, deep, TILE_M), None, PAPER, (0.0, 0.0, TILE_M / 2))
@@ -87,7 +87,7 @@ class Spot:
         if panel:
             shapes.append(Shape("box", (wide, 0.08, panel), None, PANEL, (0.0, back, HIGH_M + panel / 2)))
         high = HIGH_M + panel + 0.17
-        below = (-0.58 * sin(self.turn), -0.58 * cos(self.turn), 0.06)  # on the floor, towards who looks
+        below = (-0.58 * sin(self.turn), -0.58 * cos(self.turn), 0.06)  # on the floor, towards the viewer
         over = (0.0, back, high)
         shapes.append(Shape("label", (0.15,), None, INK, over if cos(self.turn) > 0 else below, text=self.name))
         station = Body(f"station {number}", tuple(shapes))
@@ -98,17 +98,17 @@ class Spot:
 
     @property
     def pose(self) -> Pose:
-        """Where its bodies are."""
+        """The pose of its bodies."""
         return (self.x, self.y, 0.0, 0.0, 0.0, sin(self.turn / 2), cos(self.turn / 2))
 
 
 def laid_out(
     kinds: Mapping[str, str], places_m: Mapping[str, tuple[float, float]], parts: int, around: bool, wide: float
 ) -> dict[str, Spot]:
-    """A spot for each station by its name: where it is said to stand, on a ring around an arm, or in rows from the back.
+    """A spot for each station, by name: at its given place, on a ring around an arm, or in rows from the back.
 
-    places_m are brought closer or apart, so that no two stations overlap; a station without a place stands in a row in front.
-    parts: how many there are. wide: how wide the floor is to how deep, about.
+    places_m are scaled so that no two stations overlap; stations without a place stand in a row in front. parts: their
+    number. wide: approximate ratio of the floor's width to its depth.
     """
     names = [name for name, kind in kinds.items() if kind != "tile"]
     said = {name: places_m[name] for name in names if name in places_m}
@@ -144,33 +144,33 @@ def laid_out(
 
 
 class Carrier(Protocol):
-    """What carries parts: its bodies, and how it goes from one place to another."""
+    """A carrier of parts: its bodies, and its path from one stop to another."""
 
     bodies: tuple[Body, ...]
-    handling: float  # the share of a carry's time for taking a part up, and as much for setting it down
+    handling: float  # share of a transport's time for grasping a part; setting it down takes as long
 
     def way(self, start: "Stop", end: "Stop") -> FloatArray:
-        """Points (n, 4) of its hand: the share of the time, from 0 to 1, and where that is [m]."""
+        """The points (n, 4) of its hand: the share of the time, 0 to 1, and x, y, z [m]."""
 
     def poses(self, hands: FloatArray) -> dict[str, FloatArray]:
-        """Poses (n, 7) of its bodies, by name, for points (n, 3) of its hand."""
+        """The poses (n, 7) of its bodies, by name, for points (n, 3) of its hand."""
 
 
 @dataclass(frozen=True)
 class Stop:
-    """Where a carrier is: at a station, with its hand at the middle of a part."""
+    """A stop of a carrier: the station, and the point of its hand, the middle of a part [m]."""
 
     spot: Spot
     hand: Vector
 
 
 class Vehicle:
-    """A vehicle on the floor, in the aisles in front of stations; its hand is the middle of a part on it."""
+    """A vehicle that drives in the aisles in front of stations; its hand is the middle of the part on it."""
 
     handling = 0.12
 
     def __init__(self, number: int, name: str, of: int, straight: bool) -> None:
-        """The `number`th of so many; straight: there are no aisles to keep to."""
+        """The `number`th of `of` vehicles; straight: it drives directly, without aisles."""
         self.name, self._straight = f"vehicle {number}", straight
         self._aside = (number - (of - 1) / 2) * min(0.48, 1.2 / of)
         wheel = Shape("box", (0.07, 0.05, 0.07), None, DARK)
@@ -180,12 +180,12 @@ class Vehicle:
         self.bodies: tuple[Body, ...] = (Body(self.name, (deck, *wheels, label)),)
 
     def dock(self, spot: Spot) -> Vector:
-        """Where a part is on the vehicle when that stands in front of a station."""
+        """The middle [m] of a part on the vehicle when it stands in front of a station."""
         front = -spot.edges[1] / 2 - 0.28
         return spot.at(self._aside, front, CARRIER_M + PART_M / 2)
 
     def way(self, start: Stop, end: Stop) -> FloatArray:
-        """Along the aisle, across between two stations, and along the other aisle."""
+        """The path along the aisle, across between two stations, and along the other aisle; see `Carrier.way`."""
         one, other = np.array(self.dock(start.spot)), np.array(self.dock(end.spot))
         points = [one, other]
         if not self._straight and abs(one[1] - other[1]) > 0.3:
@@ -194,14 +194,14 @@ class Vehicle:
         return _paced(points)
 
     def poses(self, hands: FloatArray) -> dict[str, FloatArray]:
-        """The vehicle below the part."""
+        """The vehicle's poses (n, 7), below the part."""
         poses = np.zeros((len(hands), 7))
         poses[:, :2], poses[:, 6] = hands[:, :2], 1.0
         return {self.name: poses}
 
 
 class Arm:
-    """An arm with two links that turn in a plane, and a tool that goes up and down, in the middle of the floor."""
+    """An arm in the middle of the floor: two links that turn in a plane, and a tool that moves up and down."""
 
     handling = 0.0
 
@@ -230,7 +230,7 @@ class Arm:
         )
 
     def way(self, start: Stop, end: Stop) -> FloatArray:
-        """Up, around the middle, down."""
+        """The path up, around the middle, and down; see `Carrier.way`."""
         share = np.linspace(0.0, 1.0, 25)
         over = np.clip((share - 0.12) / 0.76, 0.0, 1.0)
         over = over * over * (3 - 2 * over)
@@ -244,7 +244,7 @@ class Arm:
         return np.stack([share, radius * np.cos(angle), radius * np.sin(angle), z], axis=1)
 
     def poses(self, hands: FloatArray) -> dict[str, FloatArray]:
-        """Both links bent so that the tool is above the hand."""
+        """The links' and the tool's poses (n, 7), with the tool above the hand."""
         radius = np.hypot(hands[:, 0], hands[:, 1])
         bend = np.arccos(np.clip(radius / (2 * self._link), -1.0, 1.0))
         towards = np.arctan2(hands[:, 1], hands[:, 0])
@@ -258,7 +258,7 @@ class Arm:
 
 
 def _paced(points: Sequence[FloatArray]) -> FloatArray:
-    """The corners of a way with the share of the time at each, at one speed."""
+    """The corners (n, 4) of a path at constant speed: the share of the time, and the point."""
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     share = np.concatenate([[0.0], np.cumsum(steps)])
     share = share / share[-1] if share[-1] > 0 else np.linspace(0.0, 1.0, len(points))

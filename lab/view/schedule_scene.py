@@ -1,4 +1,4 @@
-"""Any schedule as a replay in 3D: parts stand in stations while they are worked on, and go, or are carried, between them."""
+"""Any schedule as a replay in 3D: parts stand in stations while they are processed, and move between them or are carried."""
 
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
@@ -26,17 +26,17 @@ START, FINISHED = (
     "finished",
 )  # tiles on the floor, where the schedule does not say where parts come from or go to
 SHADES = 1.0, 0.6, 0.35  # of each colour, before the first begins again
-WATCHED_S = 40.0  # a page takes about so long to play
-QUICK = 1 / 110  # of the whole: so long a part takes to go by itself
-MOST_LABELS = 40  # parts with their names above them
-MOST_ROWS = 8  # of a chart below the picture; with more it stands beside it (replay.js)
+WATCHED_S = 40.0  # approximate playing time of a page
+QUICK = 1 / 110  # share of the makespan that a part needs to move by itself
+MOST_LABELS = 40  # parts up to which each has its name above it
+MOST_ROWS = 8  # of a chart below the picture; a larger chart stands beside it (replay.js)
 MOVES = ("carry", "pallet", "empty")
 _CLOSE_S = 1e-9
 Keys = list[tuple[float, Vector]]
 
 
 class Scene(NamedTuple):
-    """What `replay_html` takes: bodies, their motions, what is told beside them, and how fast it begins."""
+    """The arguments of `replay_html`: bodies, their motions, the story beside them, and the initial speed."""
 
     title: str
     recording: Recording
@@ -47,7 +47,7 @@ class Scene(NamedTuple):
 
 @dataclass
 class _Stay:
-    """A part in a station until it leaves; by: what it was carried there by, None: it came by itself."""
+    """A part's stay in a station; by: the vehicle that brought it, None: it came by itself."""
 
     part: str
     station: str
@@ -59,7 +59,7 @@ class _Stay:
 
 
 class _Move(NamedTuple):
-    """A vehicle goes from station to station; row: what it carries, None: nothing."""
+    """A vehicle's drive from station to station; row: its transport, None: it is empty."""
 
     begin_s: float
     end_s: float
@@ -69,7 +69,7 @@ class _Move(NamedTuple):
 
 
 def scene_of(table: ScheduleTable, name: str) -> Scene:
-    """The scene of a schedule that is called so."""
+    """The scene of a schedule with this name."""
     rows = _whole(table.rows)
     last_s = max(row.end_s for row in rows)
     parts = list(dict.fromkeys(row.part for row in rows if row.part))
@@ -129,7 +129,7 @@ def scene_of(table: ScheduleTable, name: str) -> Scene:
 
 
 def _whole(rows: Sequence[TimedRow]) -> list[TimedRow]:
-    """The rows, with from where and to where parts are carried: what they do not say is where the part is, and is next."""
+    """The rows with the missing origins and targets of transports filled in, from where the part is and where it is next."""
     found, here = list[TimedRow](), dict[str, str]()
     later = defaultdict[str, list[TimedRow]](list)
     for row in rows:
@@ -156,15 +156,15 @@ def _by_vehicle(rows: Iterable[TimedRow]) -> dict[str, list[TimedRow]]:
 
 
 def _moves(rows: Sequence[TimedRow], quick_s: float) -> list[_Move]:
-    """What a vehicle does: what its rows say, and its ways to where the next part is."""
+    """The drives of a vehicle: its transports, and empty drives to the next part."""
     moves, here, free_s = list[_Move](), rows[0].origin or "", 0.0
     for row in rows:
         begin_s, origin = max(row.start_s, free_s), row.origin or ""
-        end_s = max(row.end_s, begin_s)  # of rows that overlap the later one is carried out at once
+        end_s = max(row.end_s, begin_s)  # of overlapping rows, the later one takes no time
         if origin != here and row.kind != "empty":
             if begin_s - free_s > _CLOSE_S:
                 moves.append(_Move(max(free_s, begin_s - 3 * quick_s), begin_s, here, origin, None))
-            else:  # no time is left for it: it is a part of the carry
+            else:  # there is no time for it: it becomes a part of the transport
                 until_s = begin_s + (end_s - begin_s) / 3
                 moves.append(_Move(begin_s, until_s, here, origin, None))
                 begin_s = until_s
@@ -175,7 +175,7 @@ def _moves(rows: Sequence[TimedRow], quick_s: float) -> list[_Move]:
 
 
 def _stays(part: str, rows: Sequence[TimedRow], quick_s: float, departs: Mapping[int, float]) -> list[_Stay]:
-    """Where a part is, one after the other; between two it goes by itself or is carried."""
+    """The stays of a part in order; between two stays it moves by itself or is carried."""
     chain = [row for row in rows if (row.vehicle is None and row.kind != "blocked") or row.kind == "carry"]
     stays = [_Stay(part, (chain[0].origin or START) if chain and chain[0].vehicle else START, 0.0)]
     free_s = 0.0
@@ -192,7 +192,7 @@ def _stays(part: str, rows: Sequence[TimedRow], quick_s: float, departs: Mapping
             if here.station != origin:
                 go(origin, free_s, min(free_s + quick_s, depart_s))
             go(row.target or FINISHED, depart_s, row.end_s, by=row)
-        elif (row.start_s, row.end_s) not in spans:  # of several at once, such as a machine and a person, the first
+        elif (row.start_s, row.end_s) not in spans:  # of simultaneous ones, such as a machine and a person, the first
             spans.add((row.start_s, row.end_s))
             brief_s = min(quick_s, (row.end_s - row.start_s) / 2)
             if here.station == origin and (here.works or here.begin_s >= row.start_s - quick_s / 100):
@@ -214,7 +214,7 @@ def _stays(part: str, rows: Sequence[TimedRow], quick_s: float, departs: Mapping
 
 
 def _kinds(rows: Sequence[TimedRow], stays: Sequence[_Stay]) -> dict[str, str]:
-    """Each station by its name, in the order of first use, and what it is: "machine", "store" or "tile"."""
+    """The kind of each station ("machine", "store" or "tile"), by name, in the order of first use."""
     works = {row.origin for row in rows if row.vehicle is None and row.kind != "store"}
     said = {name for row in rows for name in (row.origin, row.target) if row.vehicle is None or row.kind != "carry"}
     names = [name for row in rows for name in (row.origin, row.target) if name]
@@ -232,7 +232,7 @@ def _by_place(stays: Iterable[Sequence[_Stay]]) -> dict[tuple[str, bool], list[_
 
 
 def _place(stays: Sequence[_Stay], floor: Mapping[str, Spot]) -> None:
-    """Gives each stay the first place of its station that is free."""
+    """Assign to each stay the first free place of its station."""
     until_s = list[float]()
     for stay in sorted(stays, key=lambda one: one.begin_s):
         free = next((k for k, end_s in enumerate(until_s) if end_s <= stay.begin_s + _CLOSE_S), len(until_s))
@@ -240,7 +240,7 @@ def _place(stays: Sequence[_Stay], floor: Mapping[str, Spot]) -> None:
         stay.at = floor[stay.station].place(free, stay.works)
 
 
-# ---- motions
+# ---- motions of carriers, parts and lamps
 
 
 def _carrier_tracks(
@@ -262,7 +262,7 @@ def _carrier_tracks(
 def _carried(
     carrier: Carrier, begin_s: float, end_s: float, way: FloatArray, loaded: bool
 ) -> tuple[FloatArray, FloatArray]:
-    """When the carrier is at each point of its way, and those points."""
+    """The times at which the carrier is at each point of its path, and those points."""
     margin = carrier.handling if loaded else 0.0
     return begin_s + (margin + way[:, 0] * (1 - 2 * margin)) * (end_s - begin_s), way[:, 1:]
 
@@ -270,7 +270,7 @@ def _carried(
 def _stops(
     move: _Move, following: Sequence[_Move], stays: Mapping[str, Sequence[_Stay]], floor: Mapping[str, Spot]
 ) -> tuple[Stop, Stop]:
-    """From where to where the hand goes: to the part that is carried next, if that is there."""
+    """The stops between which the hand moves; an empty carrier moves to the next part, if it is there already."""
     if move.row is not None:
         before, after = _around(move.row, stays)
         return Stop(floor[before.station], before.at), Stop(floor[after.station], after.at)
@@ -282,14 +282,14 @@ def _stops(
 
 
 def _around(row: TimedRow, stays: Mapping[str, Sequence[_Stay]]) -> tuple[_Stay, _Stay]:
-    """The stays of a part before and after it is carried."""
+    """The stays of a part before and after a transport."""
     own = stays[row.part or ""]
     number = next(k for k, stay in enumerate(own) if stay.by is row)
     return own[number - 1], own[number]
 
 
 def _part_keys(stays: Sequence[_Stay], carriers: Mapping[str, Carrier], floor: Mapping[str, Spot]) -> Keys:
-    """Where a part is when."""
+    """The positions of a part by time."""
     keys: Keys = [(0.0, stays[0].at)]
     for before, after in pairwise(stays):
         begin_s, end_s = before.end_s, after.begin_s
@@ -315,7 +315,7 @@ def _motion(keys: Keys) -> Motion:
 
 
 def _motion_of(times: Sequence[float], places: FloatArray, turns: FloatArray) -> Motion:
-    """The motion through these points; of times that a page cannot tell apart, the last counts."""
+    """The motion through these points; of times that a page cannot distinguish, the last one counts."""
     at_s = np.asarray(times, dtype=np.float32).astype(np.float64)
     last = np.append(np.diff(at_s) > 0, True)
     at_s, places, turns = at_s[last], places[last], turns[last]
@@ -325,7 +325,7 @@ def _motion_of(times: Sequence[float], places: FloatArray, turns: FloatArray) ->
 
 
 def _steps(rows: Sequence[TimedRow]) -> tuple[tuple[float, Rgba], ...]:
-    """A lamp's colours: lit as long as something is done."""
+    """A lamp's colours over time: lit while the machine works."""
     steps, until_s = list[tuple[float, Rgba]](), -inf
     for row in rows:
         if row.start_s > until_s + _CLOSE_S:
@@ -334,7 +334,7 @@ def _steps(rows: Sequence[TimedRow]) -> tuple[tuple[float, Rgba], ...]:
     return (*steps, (until_s, IDLE)) if steps else ()
 
 
-# ---- what is seen and told
+# ---- looks, chart, captions and camera
 
 
 def _part_body(number: int, name: str, colour: str, *, labelled: bool) -> Body:
@@ -345,13 +345,13 @@ def _part_body(number: int, name: str, colour: str, *, labelled: bool) -> Body:
 
 
 def _colour(number: int) -> str:
-    """A colour for each part, in three shades before the first begins again."""
+    """The colour of a part, in three shades before the colours repeat."""
     shade, colour = divmod(number - 1, len(PRODUCTS))
     return mixed(PRODUCTS[colour], SHADES[shade % len(SHADES)])
 
 
 def _schedule(rows: Sequence[TimedRow], numbers: Mapping[str, int]) -> Schedule:
-    """The rows as a chart has them."""
+    """The rows as the schedule of a chart."""
 
     def activity(row: TimedRow) -> Activity:
         resource = row.vehicle or row.origin or ""
@@ -365,7 +365,7 @@ def _schedule(rows: Sequence[TimedRow], numbers: Mapping[str, int]) -> Schedule:
 
 
 def _captions(rows: Sequence[TimedRow]) -> Iterable[tuple[float, str]]:
-    """What begins when, in words."""
+    """The captions: for each start [s], what begins then."""
     begins = defaultdict[float, dict[str, list[str]]](dict)
     for row in rows:
         if row.part and row.kind == "carry":
@@ -379,7 +379,7 @@ def _captions(rows: Sequence[TimedRow]) -> Iterable[tuple[float, str]]:
 
 
 def _seen(spots: Iterable[Spot]) -> FloatArray:
-    """Points (n, 3) that are to be in the picture: stations, their names, and vehicles in front of them."""
+    """The points (n, 3) [m] that the picture must contain: stations, their names, and vehicles in front of them."""
     ends = [(spot, spot.edges[0] / 2 + 0.1) for spot in spots]
     return np.array(
         [

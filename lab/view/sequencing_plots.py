@@ -1,4 +1,4 @@
-"""Pictures of how sequences were found: one session or many."""
+"""Plots of the episode costs of sequencing sessions, one or many."""
 
 from collections.abc import Mapping, Sequence
 from itertools import cycle
@@ -32,13 +32,12 @@ def sequence_plot(
     title: str = "",
     beside: Mapping[str, float] = NOTHING,
 ) -> None:
-    """Cost of each sequencing episode, the best so far, and the proven optimum; PNG or SVG by the path's suffix.
+    """Plot the cost of each sequencing episode, the incumbent, and the proven optimum; PNG or SVG by the path's suffix.
 
-    Several sessions (a list of lists): the best so far of each as a pale line, their mean, and the mean cost of an
-    episode. deadlock: the cost of episodes that ended in one (`stuck_cost`), drawn as marks at the upper edge; they
-    count in no mean. proven: `optimal` is the optimum, not only a bound. beside: other costs to
-    compare with, by what they are called. Raises BadInput without episodes, and as all plots here do.
-    Source: thesis fig. 7.3.
+    Of several sessions (a list of lists): each incumbent as a pale line, their mean, and the mean cost of an episode.
+    deadlock: the cost of episodes that ended in a deadlock (`stuck_cost`), drawn as marks at the upper edge and excluded
+    from all means. proven: whether `optimal` is the optimum, not only a bound. beside: other costs for comparison, by
+    name. Raises BadInput without episodes, and for a path that cannot be written. Source: thesis fig. 7.3.
     """
     from matplotlib.ticker import MaxNLocator
 
@@ -70,13 +69,13 @@ def sequence_plot(
 
 
 def _sessions(costs: Sequence[float] | Sequence[Sequence[float]]) -> list[Sequence[float]]:
-    """One list of costs, or several, as several."""
+    """The costs as a list of sessions, also when only one is given."""
     one = [cost for cost in costs if isinstance(cost, int | float | np.number)]
     return [one] if one else [session for session in costs if not isinstance(session, int | float)]
 
 
 def _draw_session(axes: "Axes", costs: FloatArray, unit: str) -> None:
-    """Costs (1, n) of one session."""
+    """Draw the costs (1, n) of one session."""
     (session,) = costs
     episodes = np.arange(1, len(session) + 1)
     dots: dict[str, Any] = {"color": GREY, "marker": ".", "markersize": 4.5, "linewidth": 0.4, "alpha": 0.9}
@@ -90,7 +89,7 @@ def _draw_session(axes: "Axes", costs: FloatArray, unit: str) -> None:
 
 
 def _draw_sessions(axes: "Axes", costs: FloatArray, unit: str) -> None:
-    """Costs (sessions, episodes) of several sessions."""
+    """Draw the costs (sessions, episodes) of several sessions."""
     episodes = np.arange(1, costs.shape[1] + 1)
     best = _best_so_far(costs)
     for number, session in enumerate(best, 1):
@@ -105,7 +104,7 @@ def _draw_sessions(axes: "Axes", costs: FloatArray, unit: str) -> None:
 
 
 def _draw_stuck(axes: "Axes", stuck: NDArray[np.bool_]) -> None:
-    """A mark at the upper edge for each episode in which a session, of (sessions, episodes), ended in a deadlock."""
+    """Draw a mark at the upper edge for each episode with a deadlock in `stuck` (sessions, episodes)."""
     where = np.flatnonzero(stuck.any(axis=0))
     if len(where):
         look: dict[str, Any] = {"linestyle": "none", "marker": "x", "color": INK, "markersize": 4, "clip_on": False}
@@ -114,18 +113,18 @@ def _draw_stuck(axes: "Axes", stuck: NDArray[np.bool_]) -> None:
 
 
 def _best_so_far(costs: FloatArray) -> FloatArray:
-    """The lowest cost up to each episode, along the last axis; NaN until there is one."""
+    """The incumbent's cost at each episode, along the last axis; NaN until there is one."""
     best: FloatArray = np.fmin.accumulate(costs, axis=1)
     return best
 
 
 def _mean(costs: FloatArray) -> FloatArray:
-    """The mean over sessions (sessions, episodes) that have a cost, NaN where none has."""
+    """The mean (episodes,) over the sessions that have a cost; NaN where none has."""
     there = np.isfinite(costs)
     count = there.sum(axis=0)
     return np.where(count > 0, np.where(there, costs, 0).sum(axis=0) / np.maximum(1, count), np.nan)
 
 
 def _number(value: float, unit: str) -> str:
-    """A cost for reading: seconds as such, else without needless digits."""
+    """A cost for reading: seconds with their unit, others without needless digits."""
     return seconds(value) if unit else f"{value:.4g}"

@@ -1,7 +1,7 @@
 """The live page's server: HTTP and a websocket for each page on 127.0.0.1, in a thread of its own.
 
-A page gets what changed since it was last sent something, at most 60 times a second: a slow page skips frames, it
-neither holds up the run nor lets messages pile up. What a page sends goes to the panel, if there is one.
+A page receives the changes since its last message, at most 60 times a second: a slow page skips frames, and neither
+delays the run nor lets messages pile up. Messages from a page go to the panel, if there is one.
 """
 
 import asyncio
@@ -29,10 +29,10 @@ from lab.operating_system import keep_port
 from lab.view.server_page import BACKLOG, PAUSE_S, LimitedConnection, LimitedSocket, News, Page, Panel, quiet_when_full
 
 ADDRESS = "127.0.0.1"
-HOSTS = ("127.0.0.1", "localhost")  # also through a forwarded port; no other name may lead here
+HOSTS = ("127.0.0.1", "localhost")  # also through a forwarded port; requests to other host names are rejected
 FLUSH_S, GRACE_S, STOP_S = 0.5, 1, 3.0
-POLL_S = 0.2  # how often the panel is asked whether there is something new
-READ_S = 0.005  # between two messages from a page: one that floods is heard slowly
+POLL_S = 0.2  # interval at which the panel is asked for news
+READ_S = 0.005  # least interval between two messages from a page, against flooding
 MAX_PAGES = 32
 MAX_MESSAGE = 1 << 16  # bytes; a longer one ends the connection
 NO_TOKEN = "This page needs the token of its address: open the whole link that the lab printed.\n"
@@ -46,7 +46,7 @@ HEADERS = {
 
 @dataclass(frozen=True)
 class File:
-    """What is served under a name: its bytes, its media type, and the rules that the browser enforces on it."""
+    """A served file: its bytes, its media type, and its content security policy."""
 
     content: bytes
     kind: str
@@ -54,9 +54,9 @@ class File:
 
 
 class Server:
-    """Serves `files`, "" being the page, to who has the token; `send` and `wake` may be called from any thread.
+    """Serves `files` ("" is the page) to requests with the token; `send` and `wake` may be called from any thread.
 
-    Raises BadInput for a port that it cannot have.
+    Raises BadInput for a port that is taken or not allowed.
     """
 
     def __init__(self, port: int, files: Mapping[str, File], token: str, panel: Panel | None = None) -> None:
@@ -73,21 +73,21 @@ class Server:
         self._stopped: asyncio.Event
 
     def start(self) -> None:
-        """Begin to serve; raises WorkFailed when the thread does not come up."""
+        """Begin to serve; raises WorkFailed when the thread does not start in time."""
         self._thread.start()
         if not self._ready.wait(STOP_S):
             raise WorkFailed(f"live view: the server on port {self.port} did not start within {STOP_S} s")
 
     def send(self, news: News) -> None:
-        """Have every page told, now or when it connects; returns at once."""
+        """Send news to every page, now or when it connects; returns at once."""
         self._call(self._publish, news)
 
     def wake(self) -> None:
-        """Have every page told at once what the panel has that is new."""
+        """Send the panel's news to every page immediately."""
         self._call(self._wake)
 
     def stop(self) -> None:
-        """Give pages half a second to take the last frame, then close all; at most about 3 s, whatever pages do."""
+        """Close all pages after half a second for their last frame; takes at most about 3 s, whatever pages do."""
         if self._loop is None:
             self._socket.close()
             return
@@ -98,7 +98,7 @@ class Server:
         if self._loop is not None and not self._loop.is_closed():
             try:
                 self._loop.call_soon_threadsafe(function, *arguments)
-            except RuntimeError:  # closed between the question and the call: nobody is left to be told
+            except RuntimeError:  # closed between the check and the call: no page is left
                 return
 
     def _publish(self, news: News) -> None:
@@ -126,7 +126,7 @@ class Server:
             await asyncio.wait([page.sending for page in self._pages], timeout=FLUSH_S)
         server.should_exit = True
         await serving
-        for connection in list(server.server_state.connections):  # one that does not answer is cut off
+        for connection in list(server.server_state.connections):  # cut off a connection that does not answer
             connection.transport.abort()
         await asyncio.sleep(0)
 
@@ -165,14 +165,14 @@ class Server:
         return Response(file.content, headers={"Content-Security-Policy": file.policy}, media_type=file.kind)
 
     async def _poll(self) -> None:
-        """Look for what nobody was in a hurry to tell."""
+        """Poll the panel for news that nobody announced with `wake`."""
         while True:
             await asyncio.sleep(POLL_S)
             if self._pages and self._panel is not None and self._panel.stirred():
                 self._wake()
 
     async def _page(self, socket: WebSocket) -> None:
-        """One open page, from its first message to its last."""
+        """Serve one open page, from its first message to its last."""
         if len(self._pages) >= MAX_PAGES:
             await socket.send_denial_response(PlainTextResponse(f"{MAX_PAGES} pages are open: close one.\n", 503))
             return
@@ -185,7 +185,7 @@ class Server:
         self._pages.add(page)
         page.sending = asyncio.create_task(page.send())
         self.connected.set()
-        self._wake()  # the others see that there is one more
+        self._wake()  # the other pages show that one more is open
         try:
             await self._hear(page)
         finally:
@@ -204,12 +204,12 @@ class Server:
                 return
             if self._panel is not None:
                 self._panel.said(page.number, heard.get("text") or heard.get("bytes") or "")
-                asyncio.get_running_loop().call_later(PAUSE_S, self._wake)  # what the run says to it goes first
+                asyncio.get_running_loop().call_later(PAUSE_S, self._wake)  # the run's messages to it come first
             await asyncio.sleep(READ_S)
 
 
 class _Guard:
-    """Lets nobody in without the token, and no websocket that another site's page has opened."""
+    """Rejects requests without the token, and websockets that another site's page has opened."""
 
     def __init__(self, app: ASGIApp, token: str) -> None:
         self._app, self._token = app, token.encode()
@@ -226,7 +226,7 @@ class _Guard:
 
 
 def _from_here(asked: HTTPConnection) -> bool:
-    """Whether a page of this server opens the websocket, or what is no browser."""
+    """Whether the websocket was opened by a page of this server, or by a program that is no browser."""
     origin = asked.headers.get("origin")
     return origin is None or urlsplit(origin)[:2] == ("http", asked.headers.get("host", ""))
 

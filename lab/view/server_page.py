@@ -1,4 +1,4 @@
-"""What one page has to be told: what is where in the scene, and what the panel has that is new; sent as it can take it."""
+"""One open page: the news for it from scene and panel, sent as fast as it can take them; and limits on connections."""
 
 import asyncio
 import json
@@ -15,27 +15,27 @@ from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIO
 
 from lab.operating_system import most_descriptors
 
-MOST = 128  # connections; a quarter of the descriptors at the most
-IDLE_S = 10.0  # for a request to come
-BACKLOG = 16  # connections that are accepted in one go
-MOST_UNREAD = 1 << 22  # bytes of answers to pings that wait for a page
+MOST = 128  # connections, and at most a quarter of the file descriptors
+IDLE_S = 10.0  # time within which a request must arrive
+BACKLOG = 16  # connections accepted at once
+MOST_UNREAD = 1 << 22  # bytes of unread answers to a page's pings
 _NUMBERS = count()
 
 
 def most_connections() -> int:
-    """How many connections there may be."""
+    """The largest number of connections."""
     descriptors = most_descriptors()
     return MOST if descriptors is None else max(4, min(MOST, descriptors // 4))
 
 
 class LimitedConnection(H11Protocol):
-    """A connection on which nothing but HTTP was spoken so far."""
+    """A connection that has used only HTTP so far, with limits on number and idle time."""
 
     _asked_before: object = None
     _cut = False
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        """Makes room for itself."""
+        """Close an idle connection if there are too many."""
         super().connection_made(transport)
         self._number = next(_NUMBERS)
         self._look = self.loop.call_later(IDLE_S, self._still_there)
@@ -45,22 +45,22 @@ class LimitedConnection(H11Protocol):
             min(waiting, key=lambda one: one._number, default=self).cut()
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """It is over."""
+        """Forget the closed connection."""
         self._look.cancel()
         super().connection_lost(exc)
 
     @property
     def waits(self) -> bool:
-        """Whether nothing that it asked for is being answered."""
+        """Whether the connection is idle: no request of it is being answered."""
         return self.cycle is None or self.cycle.response_complete
 
     def cut(self) -> None:
-        """End it at once."""
+        """Close the connection immediately."""
         self._cut = True
         self.transport.abort()
 
     def _still_there(self) -> None:
-        """Ends it where it has not asked for anything since the last look; a page has another protocol by then."""
+        """Close the connection if it has sent no request since the last check; pages have switched to a websocket by then."""
         if self not in self.connections:
             return
         if self.waits and self.cycle is self._asked_before:
@@ -122,31 +122,31 @@ class News:
 
 
 class Panel(Protocol):
-    """What pages show and say beside the scene; all of it is called in the server's thread.
+    """The content of a page beside the scene, and the receiver of its messages; called only in the server's thread.
 
-    files: what a page loads for it: HTML that is put into the page, style sheets, and scripts in the order they are run.
+    files: HTML that is inserted into the page, style sheets, and scripts in the order in which they run.
     """
 
     files: Sequence[Path]
 
     def joined(self, page: int) -> None:
-        """A browser has opened the page; each one has a number of its own."""
+        """A browser has opened a page; each page has its own number."""
 
     def left(self, page: int) -> None:
         """A browser has left."""
 
     def said(self, page: int, message: str | bytes) -> None:
-        """What a page sends, whatever that is."""
+        """A page has sent a message, which may be anything."""
 
     def stirred(self) -> bool:
-        """Whether there is something new since this was asked last."""
+        """Whether there is news since the last call."""
 
     def news(self, page: int) -> str:
-        """The JSON members that this page does not know yet; "" when it knows all."""
+        """The JSON members that this page has not received yet; "" for none."""
 
 
 class Page:
-    """What waits for one page, and the task that sends it; `last`: then the connection is closed."""
+    """The pending news of one page, and the task that sends them; `last`: the connection is closed after them."""
 
     def __init__(self, number: int, socket: WebSocket, panel: Panel | None) -> None:
         self.number, self.socket, self._panel = number, socket, panel
@@ -155,13 +155,13 @@ class Page:
         self._waiting: News | None = None
 
     def offer(self, news: News) -> None:
-        """Send `news` as soon as the page can take it, together with what waits already."""
+        """Send `news` as soon as the page can take them, merged with those that are pending."""
         self._waiting = self._waiting or News()
         self._waiting.merge(news)
         self.wake.set()
 
     async def send(self) -> None:
-        """Send what waits whenever there is something, until the page has left, or was sent the last."""
+        """Send pending news until the page has left or received the last ones."""
         try:
             while True:
                 self.wake.clear()

@@ -1,4 +1,4 @@
-"""What commands show when they are done: short rich tables and lines from plain data."""
+"""The results of commands as text: short rich tables and lines, from the commands' JSON documents."""
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
@@ -20,7 +20,7 @@ SHOWN_MOVES = 60
 
 
 def run_summary(report: Mapping[str, Any]) -> RenderableType:
-    """The end of `lab run`, from its JSON document."""
+    """The text at the end of `lab run`, from its JSON document."""
     skills = report["skills"]
     helped = sum(row["helped_steps"] for row in skills)
     table = Table.grid(padding=(0, 2))
@@ -76,7 +76,7 @@ def run_summary(report: Mapping[str, Any]) -> RenderableType:
 
 
 def _worth(receipts: Mapping[str, Any]) -> Iterator[tuple[str, list[str]]]:
-    """What advice was worth: of each skill that people were asked about, and of the order, beside what other orders cost."""
+    """The lines on what advice gained: for each skill with questions, and for the order, compared with other orders."""
     for name, worth in receipts.get("skills", {}).items():
         yield f"advice on {name}", worth["receipt"]["lines"]
     order = receipts.get("order")
@@ -92,7 +92,7 @@ def _worth(receipts: Mapping[str, Any]) -> Iterator[tuple[str, list[str]]]:
 
 
 def delivered_in_words(delivered: int, parts: Mapping[str, int]) -> str:
-    """How many parts of an order arrived: "2 of 3 slices delivered", "2 of 3 parts delivered (2 slices, 1 cup)"."""
+    """The delivered parts of an order: "2 of 3 slices delivered", "2 of 3 parts delivered (2 slices, 1 cup)"."""
     if len(parts) == 1:
         (kind, count), *_ = parts.items()
         return f"{delivered} of {counted(count, kind)} delivered"
@@ -101,11 +101,11 @@ def delivered_in_words(delivered: int, parts: Mapping[str, int]) -> str:
 
 
 def lesson_summary(lesson: Mapping[str, Any]) -> RenderableType:
-    """The end of `lab teach`, from its JSON document."""
+    """The text at the end of `lab teach`, from its JSON document."""
     lines = [
         f"{lesson['skill']}: {counted(lesson['episodes'], 'episode')}   {sparkline(lesson['steps_per_episode'], 40)}",
         f"learned way: {_way(lesson)}: {_verdict(lesson)}",
-        *([_advice(lesson)] if lesson["requests"] else []),  # else the receipt says that it asked nobody
+        *([_advice(lesson)] if lesson["requests"] else []),  # otherwise the receipt says that nobody was asked
         *(["it went on from what was left unfinished"] if lesson["source"] == "continued" else []),
         *lesson["receipt"]["lines"],
         f"saved as '{lesson['saved_as']}' (seed {lesson['seed']})",
@@ -116,7 +116,7 @@ def lesson_summary(lesson: Mapping[str, Any]) -> RenderableType:
 
 
 def replay_summary(replay: Mapping[str, Any]) -> RenderableType:
-    """The end of `lab replay`, from its JSON document."""
+    """The text at the end of `lab replay`, from its JSON document."""
     closed = replay["closed"]
     of_order = "method" in replay["words"]
     over = f"it is not over: lab {'sequence' if of_order else 'teach'} --resume goes on with it"
@@ -157,12 +157,12 @@ def audit_summary(document: Mapping[str, Any]) -> RenderableType:
     ]
     claimed, delivered = len(document["claimed"]), len(document["delivered"])
     lines = [Text(f"{one['part']}: {one['words']}") for one in document["findings"]]
-    said = f"delivered: {delivered} of the {counted(claimed, 'part')} that the run calls so"
+    said = f"delivered: {delivered} of the {counted(claimed, 'part')} that the run claims"
     return Group(table_of(rows, ("part", "station", "from_s", "to_s", "stood_s")), *lines, Text(said))
 
 
 def _event_text(event: Mapping[str, Any]) -> str:
-    """One line of a run's journal in words; "" for what is told otherwise."""
+    """An entry of a run's journal in words; "" for entries that are shown elsewhere."""
     match event["kind"]:
         case "moved":
             return f"{event['part']}: {event['origin']} to {event['target']}"
@@ -180,7 +180,7 @@ def _event_text(event: Mapping[str, Any]) -> str:
 
 
 def _found(skills: Sequence[Mapping[str, Any]], task: str) -> str:
-    """How many skills are reused, adapted and learned; of these, how many come from other tasks."""
+    """The numbers of skills that are reused, adapted and learned, and of those that come from other tasks."""
     found = []
     for kind in ("reused", "adapted"):
         rows = [row for row in skills if row["source"] == kind]
@@ -194,11 +194,11 @@ def _found(skills: Sequence[Mapping[str, Any]], task: str) -> str:
 
 
 def _way(lesson: Mapping[str, Any]) -> str:
-    """The steps of the learned way beside the fewest; where starts or steps are drawn, both are means of the ways there."""
+    """The steps of the learned path and the fewest possible; both are means if starts or transitions are random."""
     final, best, drawn = lesson["final_steps"], lesson["optimal_steps"], lesson["steps_are_means"]
-    found = "does not reach the goal" if final is None else counted(final, "step")
-    found += " on average, where it reaches the goal" if drawn and final is not None else ""
-    return found if best is None else f"{found}, the {'best way' if drawn else 'shortest'} takes {best}"
+    learned = "does not reach the goal" if final is None else counted(final, "step")
+    learned += " on average, where it reaches the goal" if drawn and final is not None else ""
+    return learned if best is None else f"{learned}, the {'best way' if drawn else 'shortest'} takes {best}"
 
 
 def _verdict(lesson: Mapping[str, Any]) -> str:
@@ -213,7 +213,7 @@ def _verdict(lesson: Mapping[str, Any]) -> str:
             "not solved" if lesson["optimal_steps"] is None else "not solved, its mean return is below the best way's"
         )
     longer = lesson["optimal_steps"] is not None and lesson["final_steps"] > lesson["optimal_steps"]
-    return "not solved, it is longer" if longer else "not solved, it is not there from every start"
+    return "not solved, it is longer" if longer else "not solved, it does not reach the goal from every start"
 
 
 def _advice(lesson: Mapping[str, Any]) -> str:
@@ -224,14 +224,18 @@ def _advice(lesson: Mapping[str, Any]) -> str:
     return text if episode is None else f"{text}: rejected its advisor in episode {episode}"
 
 
-MOST_PRODUCTS = 3  # of which an order of one each is told product by product
+MOST_PRODUCTS = 3  # up to which an order of one part each names every product
 
 
-STOPPED = {"Ctrl-C": "stopped by Ctrl-C", "seconds": "the time is over (--seconds)", "gap": "near enough (--gap)"}
+STOPPED = {
+    "Ctrl-C": "stopped by Ctrl-C",
+    "seconds": "the time is over (--seconds)",
+    "gap": "the gap is reached (--gap)",
+}
 
 
 def sequence_summary(found: Mapping[str, Any]) -> RenderableType:
-    """The end of `lab sequence`, from its JSON document."""
+    """The text at the end of `lab sequence`, from its JSON document."""
     what, unit = _measured(found["objective"])
     proven = "proven optimum" if found["optimum_proven"] else "proven bound"
     best, bound = beside(found["best_cost"], found["bound_cost"], unit, 2)
@@ -265,14 +269,14 @@ def sequence_summary(found: Mapping[str, Any]) -> RenderableType:
 
 
 def _gap(value: float, found: Mapping[str, Any]) -> str:
-    """How much more a cost is than the bound, in words; nothing where it is as much, or the bound is 0."""
+    """The gap between a cost and the bound, in words; "" when they are equal or the bound is 0."""
     bound = found["bound_cost"]
     share = value / bound - 1 if bound > 0 else 0.0
     return f", gap {gap_of(share, 2)}" if share > SAME else ""
 
 
 def _order_of_transfers(found: Mapping[str, Any]) -> list[str]:
-    """The best order, or its beginning when it is long: parts by number, in words where a part has several ways on."""
+    """The best order, or the beginning of a long one: part numbers, or words if a part can continue in several ways."""
     sequence, words = found["best_sequence"], found["best_moves"]
     more = len(sequence) - SHOWN_MOVES
     rest = f" and {more} more (--json has all)" if more > 0 else ""
@@ -286,14 +290,14 @@ def _order_of_transfers(found: Mapping[str, Any]) -> list[str]:
 
 
 def _measured(objective: str) -> tuple[str, str]:
-    """What stands before and after a cost."""
+    """The words before and after a cost of this objective."""
     if objective == "makespan":
         return "", " s"
     return f"{objective.replace('-', ' ')} ", "" if objective == "tardy-parts" else " s"
 
 
 def _ordered(order: Sequence[str]) -> str:
-    """An order in words: how many of each product, or in all, where each of many is another one."""
+    """An order in words: the number of each product, or the total if each of many parts is another product."""
     counts = Counter(order)
     if len(counts) == len(order) > MOST_PRODUCTS:
         return counted(len(order), "part")
@@ -301,7 +305,7 @@ def _ordered(order: Sequence[str]) -> str:
 
 
 def _drawn(stochastic: Mapping[str, Any], unit: str) -> list[str]:
-    """What a list and a policy come to where times are drawn."""
+    """The lines on the costs of a fixed list and of a policy when times are drawn."""
 
     def mean(name: str) -> str:
         low, high = stochastic[name]["ci95"]
@@ -317,7 +321,7 @@ def _drawn(stochastic: Mapping[str, Any], unit: str) -> list[str]:
 
 
 def table_of(rows: Sequence[Mapping[str, Any]], columns: Sequence[str], whole: str = "") -> Table:
-    """Rows as a table with these columns; what stands in the column `whole` is never broken: the others get narrower."""
+    """The rows as a table with these columns; texts in the column `whole` are never wrapped, other columns get narrower."""
     table = Table(box=None, header_style="bold", pad_edge=False)
     for column in columns:
         table.add_column(column.replace("_", " "), overflow="fold", no_wrap=column == whole)
@@ -327,7 +331,7 @@ def table_of(rows: Sequence[Mapping[str, Any]], columns: Sequence[str], whole: s
 
 
 def study_summary(study: Mapping[str, Any]) -> RenderableType:
-    """What `lab study run` shows, from its JSON document: up to 30 rows; the report has all."""
+    """The text at the end of `lab study run`, from its JSON document: up to 30 rows; the report has all of them."""
     shown = ("measure", "value", "ci95", "thesis", "within", "within_errors", "used", "easy", "lab_version")
     settings = list(dict.fromkeys(key for row in study["rows"] for key in row if key not in shown))
     first = study["rows"][:_STUDY_ROWS]
@@ -353,7 +357,7 @@ def study_summary(study: Mapping[str, Any]) -> RenderableType:
 
 
 def grid_summary(seen: Mapping[str, Any]) -> RenderableType:
-    """The end of `lab see`: the grid seen from above, y upwards, as the overhead camera shows it."""
+    """The text at the end of `lab see`: the grid from above, y upwards, as the overhead camera shows it."""
     marks = {".": "·", "S": "S", "G": "G", "#": "█"}
     rows = ["".join(row) for row in seen["grid"]]
     turned = ["  ".join(marks[rows[i][j]] for i in range(len(rows))) for j in reversed(range(len(rows[0])))]
@@ -364,7 +368,7 @@ def grid_summary(seen: Mapping[str, Any]) -> RenderableType:
 
 
 def pictures_summary(record: Mapping[str, Any]) -> RenderableType:
-    """The end of `lab see --calibrate`, `--make` and `--score`: one line a figure."""
+    """The text at the end of `lab see --calibrate`, `--make` and `--score`: one line per result."""
     if "lens" in record:
         lens, (x, y, z) = record["lens"], record["eye_m"]
         bends = ", ".join(f"{name} {value:+.4f}" for name, value in lens["distortion"].items())

@@ -1,4 +1,4 @@
-"""What `lab toolbox` shows: tables and lines from its JSON documents."""
+"""The results of `lab toolbox` as text: tables and lines from its JSON documents."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -15,7 +15,7 @@ _SHOWN_EVENTS = 10
 
 
 def toolbox_summary(box: Mapping[str, Any]) -> RenderableType:
-    """What `lab toolbox list` shows, from its JSON document."""
+    """The text of `lab toolbox list`, from its JSON document."""
     if not box["policies"]:
         return Text(f"nothing in {box['folder']}")
     columns = ("name", "subtask", "task", "solved", "version", "signature", "created")
@@ -32,7 +32,7 @@ def toolbox_summary(box: Mapping[str, Any]) -> RenderableType:
 
 
 def policy_summary(policy: Mapping[str, Any]) -> RenderableType:
-    """What `lab toolbox show` shows, from its JSON document."""
+    """The text of `lab toolbox show`, from its JSON document."""
     curve = policy["curve"] or [0]
     guided = [str(n) for n, was_guided in enumerate(policy["guided"], start=1) if was_guided]
     apart = ("lineage", "kept_versions", "kept_bytes", "events")
@@ -51,7 +51,7 @@ def policy_summary(policy: Mapping[str, Any]) -> RenderableType:
 
 
 def _lineage(policy: Mapping[str, Any]) -> list[str]:
-    """Where it comes from, an ancestor a line, the nearest first."""
+    """The policy's ancestors, one per line, the nearest first."""
     lines = []
     for ancestor in policy["lineage"]:
         where = f", learned in {ancestor['scene']}" if ancestor["scene"] else ""
@@ -61,7 +61,7 @@ def _lineage(policy: Mapping[str, Any]) -> list[str]:
 
 
 def _kept(policy: Mapping[str, Any]) -> list[str]:
-    """The versions that are kept, and what happened last."""
+    """The lines on kept versions and on the latest events."""
     versions, events = policy["kept_versions"], policy["events"]
     lines = [f"{counted(len(versions), 'version')} kept, {policy['kept_bytes'] / 1e6:.2f} MB"] if versions else []
     for row in versions[-_SHOWN_VERSIONS:]:
@@ -72,7 +72,7 @@ def _kept(policy: Mapping[str, Any]) -> list[str]:
 
 
 def log_summary(log: Mapping[str, Any]) -> RenderableType:
-    """What `lab toolbox log` shows, from its JSON document: a line for each event."""
+    """The text of `lab toolbox log`, from its JSON document: a line for each event."""
     return (
         Group(*(Text(_happened(event)) for event in log["events"])) if log["events"] else Text("nothing happened yet")
     )
@@ -97,7 +97,7 @@ def _minute(time: str) -> str:
 
 
 def verify_summary(report: Mapping[str, Any]) -> RenderableType:
-    """What `lab toolbox verify` shows, from its JSON document: the damaged files, and how many are sound."""
+    """The text of `lab toolbox verify`, from its JSON document: the damaged files, and the number of sound ones."""
     files, damaged = report["files"], [row for row in report["files"] if not row["ok"]]
     left = [Text(f"removed {name}, which was left half written") for name in report.get("removed", ())]
     if not files:

@@ -1,4 +1,7 @@
-"""What a policy has learned in every cell of a grid of any dimension, as one picture: a small map for each of its levels."""
+"""The values and best moves of a policy on a grid of any dimension, as one picture: a small map for each level.
+
+Also `Planes`, the layers of a grid as rows and columns, which other views of a grid use.
+"""
 
 from collections.abc import Sequence
 from math import prod
@@ -21,7 +24,7 @@ if TYPE_CHECKING:
 
 
 class Grid(Protocol):
-    """What `is_map` reads of a problem, or of a policy: the lengths of its axes, and what its moves are called."""
+    """The attributes of a problem or a policy that `is_map` reads: the lengths of its axes, and the names of its moves."""
 
     @property
     def shape(self) -> tuple[int, ...]: ...
@@ -30,7 +33,7 @@ class Grid(Protocol):
 
 
 def is_map(grid: Grid) -> bool:
-    """Whether axes 0 and 1 are the x and y of a map seen from above: the moves along axis 0 are called left and right."""
+    """Whether axes 0 and 1 are x and y of a map seen from above, which is so if axis 0 has the moves left and right."""
     return len(grid.shape) >= 2 and grid.action_labels[:2] == ("left", "right")
 
 
@@ -47,7 +50,7 @@ class Planes:
         self.layers = prod(self._shape[2:])
 
     def place(self, cell: tuple[int, ...]) -> tuple[int, int]:
-        """Row and column of a cell."""
+        """The row and column of a cell."""
         first, second = (0, *cell) if len(cell) < 2 else cell[:2]
         return (self.rows - 1 - second, first) if self.flips else (first, second)
 
@@ -56,37 +59,37 @@ class Planes:
         return int(np.ravel_multi_index(cell[2:], self._shape[2:])) if len(cell) > 2 else 0
 
     def plane(self, values: ArrayLike, layer: int = 0) -> NDArray[Any]:
-        """What one layer (rows, columns) has of a value a cell, given in the order of states."""
+        """One layer (rows, columns) of `values`, which holds one value per cell in the order of states."""
         plane = np.reshape(values, (*self._shape[:2], -1))[:, :, layer]
         return plane.T[::-1] if self.flips else plane
 
 
 class GridPlanes(Planes):
-    """The planes of a problem's grid; of a coverage problem it is the grid to cover."""
+    """The planes of a problem's grid; for a coverage problem, those of the grid to cover."""
 
     def __init__(self, mdp: TabularMDP):
         super().__init__(mdp.coverage_shape or mdp.shape, is_map(mdp))
         self.mdp = mdp
 
     def marks(self, layer: int, free: str = ".") -> NDArray[np.str_]:
-        """One layer (rows, columns): G goal, # obstacle, else `free`."""
+        """The marks of one layer (rows, columns): G goal, # obstacle, otherwise `free`."""
         return self.plane(np.where(self.mdp.goal, "G", np.where(self.mdp.terminal, "#", free)), layer)
 
 
-# ---- value levels -----------------------------------------------------------------------------------------------------
+# ---- the picture of a policy's levels -----------------------------------------------------------------------------------
 
 
-MAX_LEVELS = 40  # of more, those with the start and the goal and the most visited ones
+MAX_LEVELS = 40  # drawn; of more, those with start or goal and the most visited ones
 MAX_CELLS = 10_000  # of a level
 _IN_A_ROW = 5  # levels, unless a fourth axis says how many
-_LEAST_SIDE = 6.0  # [pt] of a cell with a sign: in a smaller one it would be a speck
-# where moves lead in the picture, by what they are called: x to the right, y downwards
+_LEAST_SIDE = 6.0  # [pt] of a cell with a sign; in a smaller cell it would not be legible
+# direction of a move in the picture, by its name: x to the right, y downwards
 _ARROWS = {"left": (-1, 0), "right": (1, 0), "up": (0, -1), "down": (0, 1), "forward": (0, -1), "backward": (0, 1)}
 _SIGNS = {"down": r"$\otimes$", "up": r"$\odot$", "turn right": "$↻$", "turn left": "$↺$"}  # where forward is up
 
 
 class Learned(NamedTuple):
-    """What is drawn of each state (S,): value and index of its best action, whether it was visited, what ends there."""
+    """The drawn properties of each state (S,): value and index of its best action, whether it was visited or is terminal."""
 
     values: FloatArray
     best: NDArray[np.int64]
@@ -95,15 +98,15 @@ class Learned(NamedTuple):
 
 
 def can_be_drawn(policy: Policy) -> bool:
-    """Whether the policy's states are a grid whose levels fit into a picture."""
+    """Whether the policy's states form a grid whose levels fit into a picture."""
     return bool(policy.shape) and int(np.prod(policy.shape[:2])) <= MAX_CELLS
 
 
 def value_levels(policy: Policy, path: Path) -> None:
-    """The values and the best moves of a policy's cells, a map a level, written as PNG.
+    """Draw the values and the best moves of a policy's cells, one map per level, into a PNG file.
 
-    Moves have a sign by what they are called; others have none. Raises BadInput when the states are no grid or a too large
-    one, and for a path that is no PNG file.
+    Moves with known names have a sign. Raises BadInput when the states are not a grid or the grid is too large, and for a
+    path that is no PNG file.
     """
     check_png(path)
     if not can_be_drawn(policy):
@@ -136,7 +139,7 @@ def value_levels(policy: Policy, path: Path) -> None:
 
 
 def _chosen(planes: Planes, learned: Learned, first: int) -> list[int]:
-    """The levels that are drawn, in order: that of the start, those with a goal, and then the most visited."""
+    """The levels to draw, in order: that of the start, those with a goal, then the most visited ones."""
     visits = np.array([planes.plane(learned.visited, level).sum() for level in range(planes.layers)])
     goals = np.array([(planes.plane(learned.ends, level) == GOAL).any() for level in range(planes.layers)])
     order: list[int] = np.lexsort((-visits, ~goals, np.arange(planes.layers) != first)).tolist()
@@ -144,14 +147,14 @@ def _chosen(planes: Planes, learned: Learned, first: int) -> list[int]:
 
 
 def _level_name(shape: tuple[int, ...], level: int) -> str:
-    """Which level it is: its place along the third axis and those beyond."""
+    """The name of a level: its index along the third and each further axis."""
     cell = np.unravel_index(level, shape[2:]) if len(shape) > 2 else ()
     names = ("level", "turn") if len(cell) <= 2 else tuple(f"axis {axis}" for axis in range(2, len(shape)))
     return ", ".join(f"{name} {int(at)}" for name, at in zip(names, cell, strict=False))
 
 
 class Pen(NamedTuple):
-    """How levels are drawn: a cell's side in points, where cells stand, the names of moves, the least and largest value."""
+    """The drawing settings of levels: a cell's side [pt], the planes, the names of moves, the least and largest value."""
 
     side: float
     planes: Planes
@@ -159,7 +162,7 @@ class Pen(NamedTuple):
     scale: tuple[float, float]
 
     def draw_level(self, axes: "Axes", learned: Learned, level: int) -> "QuadMesh":
-        """One level's colours and signs; the mesh of its colours."""
+        """Draw one level's colours and signs; returns the mesh of its colours."""
         values, best, visited, ends = (self.planes.plane(table, level) for table in learned)
         seen = visited & (ends == ON)
         colours = np.ma.masked_where(~seen, values)
@@ -173,13 +176,13 @@ class Pen(NamedTuple):
         return tint
 
     def draw_start(self, axes: "Axes", place: tuple[int, int]) -> None:
-        """A ring around the cell in which the way begins."""
+        """Draw a ring around the start cell."""
         at = np.zeros((self.planes.rows, self.planes.columns), bool)
         at[place] = True
         self._mark(axes, at, "o", 0.8, "none", RED)
 
     def _draw_moves(self, axes: "Axes", best: NDArray[np.int64]) -> None:
-        """An arrow for what leads to a cell beside it, a sign for other moves."""
+        """Draw an arrow for moves to a neighbouring cell, and a sign for other moves."""
         signs = _signs(self.labels)
         length: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "scale": 1.0}
         look: dict[str, Any] = {
@@ -201,7 +204,7 @@ class Pen(NamedTuple):
     def _mark(
         self, axes: "Axes", where: NDArray[np.bool_], marker: str, size: float, face: str, edge: str = INK
     ) -> None:
-        """A marker in some cells, `size` of a cell's side."""
+        """Draw a marker in some cells; `size`: as a share of a cell's side."""
         rows, columns = np.nonzero(where)
         axes.scatter(
             columns + 0.5, rows + 0.5, (size * self.side) ** 2, face, marker=marker, edgecolors=edge, linewidths=0.5
@@ -215,7 +218,7 @@ def _one_colour(colour: str) -> "ListedColormap":
 
 
 def _legend(policy: Policy, learned: Learned) -> list["Line2D"]:
-    """What the signs mean that are not plain arrows."""
+    """The legend of the signs that are not plain arrows."""
     from matplotlib.lines import Line2D
 
     def sign(name: str, marker: str, face: str, edge: str = INK) -> Line2D:
@@ -230,5 +233,5 @@ def _legend(policy: Policy, learned: Learned) -> list["Line2D"]:
 
 
 def _signs(labels: Sequence[str]) -> dict[str, str]:
-    """The signs of the moves that lead out of the plane: up and down only do where forward is what is up in the picture."""
+    """The signs of the moves out of the plane; up and down are such moves only where forward points up in the picture."""
     return {name: _SIGNS[name] for name in labels if name in _SIGNS and "forward" in labels}

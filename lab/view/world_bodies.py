@@ -1,4 +1,4 @@
-"""A grid world as bodies: a board (two axes) or a room (three) with obstacles, start, goal, a way and the axes' names."""
+"""A grid world as bodies: a board (two axes) or a room (three) with obstacles, start, goal, a path and the axes' names."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -14,12 +14,12 @@ from lab.sim.frames import IDENTITY, Body, Frame, Quaternion, Recording, Rgba, S
 from lab.tasks.grid_world import GridWorld
 from lab.view.camera_placement import camera_for, corners, vector
 
-WORLD_M = 2.0  # [m] the longest side of a drawn world
-MOST_BOXES = 400  # obstacles drawn one by one, more of them as one mesh
-MOST_OBSTACLES = {2: 6000, 3: 1500}  # that are drawn at all, by the world's axes
+WORLD_M = 2.0  # [m] longest side of a drawn world
+MOST_BOXES = 400  # obstacles up to which each is a box of its own; more become one mesh
+MOST_OBSTACLES = {2: 6000, 3: 1500}  # largest number drawn, by the world's number of axes
 MOST_LINES = 25  # on the ground along one side
-BALL_M = 0.03  # [m] radius at least: in a world of many cells the robot is larger than its cell
-FLAT = 0.04  # of a cell's edge: so thick are lines and marks on the ground
+BALL_M = 0.03  # [m] least radius of the robot, which is larger than its cell in a world of many cells
+FLAT = 0.04  # thickness of lines and marks on the ground, as a share of a cell's edge
 BLUE: Rgba = (0.16, 0.38, 0.78, 1.0)
 GREEN: Rgba = (0.16, 0.62, 0.30, 0.5)
 GREY: Rgba = (0.45, 0.50, 0.58, 0.5)
@@ -27,14 +27,14 @@ GROUND: Rgba = (0.93, 0.93, 0.92, 1.0)
 LINE: Rgba = (0.76, 0.77, 0.79, 1.0)
 EDGE: Rgba = (0.50, 0.53, 0.58, 0.45)
 WOOD: Rgba = (0.72, 0.53, 0.33, 1.0)
-GLASS: Rgba = (0.72, 0.53, 0.33, 0.62)  # in a room, obstacles must not hide the robot
-HAZE: Rgba = (0.72, 0.53, 0.33, 0.25)  # many of them neither
+GLASS: Rgba = (0.72, 0.53, 0.33, 0.62)  # of obstacles in a room, which must not hide the robot
+HAZE: Rgba = (0.72, 0.53, 0.33, 0.25)  # of many obstacles
 VIEW: Rgba = (0.95, 0.75, 0.20, 0.14)
 INK: Rgba = (0.25, 0.29, 0.34, 1.0)
-_FULL = 0.9  # of a cell's edge: so wide is a box that fills it
-_LOW = 0.5  # of that: so high it is on a board
-_TUBE, _TUBE_M = 0.14, 0.008  # radius of a way: of a cell's edge, and [m] at least
-_LETTER, _LETTER_M = 0.6, 0.12  # height of an axis's name: of a cell's edge, and [m] at least
+_FULL = 0.9  # width of a box that fills a cell, as a share of the cell's edge
+_LOW = 0.5  # its height on a board, as a share of its width
+_TUBE, _TUBE_M = 0.14, 0.008  # radius of a path: as a share of a cell's edge, and at least [m]
+_LETTER, _LETTER_M = 0.6, 0.12  # height of an axis's name: as a share of a cell's edge, and at least [m]
 _SIGNS = ((-1, -1), (-1, 1), (1, -1), (1, 1))
 _HALF = 0.5**0.5
 _ALONG: tuple[Quaternion, ...] = (
@@ -45,10 +45,10 @@ _ALONG: tuple[Quaternion, ...] = (
 
 
 class WorldBodies:
-    """A world that stands on z = 0 around the origin, its longest side WORLD_M; to be closed, for its mesh is a file."""
+    """A world around the origin on z = 0, with WORLD_M as its longest side; it must be closed, because its mesh is a file."""
 
     def __init__(self, world: GridWorld) -> None:
-        """Of more than MOST_OBSTACLES those nearest to the shortest ways are drawn: `drawn` says how many."""
+        """Of more than MOST_OBSTACLES obstacles, those nearest to the shortest paths are drawn; `drawn`: their number."""
         self._world = world
         self.size = WORLD_M / max(world.shape)
         self.flat = len(world.shape) == 2
@@ -57,7 +57,7 @@ class WorldBodies:
         self.bodies = (*self._ground(), *self._room(), *self._obstacles(), *self._ends())
 
     def centres(self, cells: ArrayLike) -> FloatArray:
-        """The middles (n, 3) [m] of cells (n, axes)."""
+        """The centres (n, 3) [m] of cells (n, axes)."""
         at = np.asarray(cells, dtype=np.float64).reshape(-1, len(self._world.shape))
         at = at - (np.array(self._world.shape) - 1) / 2
         if self.flat:  # rows run down, columns to the right
@@ -67,19 +67,19 @@ class WorldBodies:
         return np.asarray((at + np.array([0.0, 0.0, 0.5])) * self.size)
 
     def camera(self, around_m: float = 0.0) -> Viewpoint:
-        """From the front, with so much around the world in the picture: steeply onto a board, from the right into a room."""
+        """A camera in front of the world with `around_m` [m] of margin: steeply above a board, from the right into a room."""
         x, y, z = self._extent
         seen = corners((-x / 2 - around_m, -y / 2 - around_m, 0.0), (x / 2 + around_m, y / 2 + around_m, z))
         return camera_for(seen, -radians(90.0 if self.flat else 75.0), radians(62.0 if self.flat else 30.0))
 
     def still(self, way: Sequence[tuple[int, ...]]) -> Recording:
-        """The world to be looked at, with a way through it, the cells that an advisor may see, and the axes' names."""
+        """A still recording of the world, with a path through it, the region that an advisor sees, and the axes' names."""
         bodies = (*self.bodies, *self._way(way), *self._region(), *self._axes())
         frame = Frame(0.0, {body.name: IDENTITY for body in bodies})
         return Recording(bodies, [frame], self.camera(1.5 * self._letter))
 
     def _way(self, cells: Sequence[tuple[int, ...]]) -> tuple[Body, ...]:
-        """A tube through the middles of cells, each beside the one before; no body for less than two cells."""
+        """A tube through the centres of consecutive cells; no body for fewer than two cells."""
         if len(cells) < 2:
             return ()
         radius = max(_TUBE * self.size, _TUBE_M)
@@ -95,7 +95,7 @@ class WorldBodies:
         return (Body("shortest way", tuple(shapes)),)
 
     def _region(self) -> tuple[Body, ...]:
-        """The cells in which an advisor with a limited view sees the robot, as a glassy box; no body without such a view."""
+        """A transparent box around the region in which an advisor with a limited view sees the robot; no body without one."""
         if self._world.view is None:
             return ()
         ends = self.centres([self._world.view.lower, self._world.view.upper])
@@ -103,7 +103,7 @@ class WorldBodies:
         return (Body("limited view", (Shape("box", edges, None, VIEW, vector(ends.mean(axis=0))),)),)
 
     def _axes(self) -> tuple[Body, ...]:
-        """The axes' names, each beside the far end of an edge that runs along its axis."""
+        """The axes' names, each at the far end of an edge along its axis."""
         x, y, z = self._extent
         high, low = self._letter, self._letter / 2
         ends: dict[str, Vector] = {"x": (x / 2, -y / 2 - high, low), "y": (x / 2 + high, y / 2, low)}
@@ -115,19 +115,19 @@ class WorldBodies:
 
     @property
     def _extent(self) -> Vector:
-        """The world's edges along x, y, z [m]."""
+        """The world's lengths along x, y, z [m]."""
         shape = self._world.shape
         return vector(np.array([shape[1], shape[0], 1] if self.flat else shape) * self.size)
 
     @property
     def _box(self) -> Vector:
-        """The edges of what fills a cell [m]; low on a board, where it must not hide what is behind it."""
+        """The edges [m] of a box that fills a cell; low on a board, where it must not hide what is behind it."""
         edge = _FULL * self.size
         return (edge, edge, edge * (_LOW if self.flat else 1.0))
 
     @property
     def _letter(self) -> float:
-        """How high the axes' names are [m]."""
+        """The height of the axes' names [m]."""
         return max(_LETTER * self.size, _LETTER_M)
 
     def _ground(self) -> tuple[Body, ...]:
@@ -146,7 +146,7 @@ class WorldBodies:
         return (Body("ground", tuple(shapes)),)
 
     def _room(self) -> tuple[Body, ...]:
-        """The other edges of a room: it is clear then how far up its obstacles are."""
+        """The other edges of a room, by which the heights of its obstacles are judged."""
         if self.flat:
             return ()
         (x, y, z), wide = self._extent, FLAT * self.size
@@ -172,7 +172,7 @@ class WorldBodies:
         return (Body("obstacles", tuple(Shape("box", self._box, None, rgba, vector(at)) for at in centres)),)
 
     def _mesh(self, centres: FloatArray) -> Path:
-        """A file of boxes: thousands of bodies, each drawn by itself, would make the page slow."""
+        """A mesh file with all boxes, because thousands of separate bodies would make the page slow."""
         from trimesh.voxel.ops import multibox
 
         path = Path(self._folder.name) / "obstacles.stl"
@@ -182,7 +182,7 @@ class WorldBodies:
         return path
 
     def _ends(self) -> tuple[Body, ...]:
-        """A tile at the start, a glassy box at the goal."""
+        """A tile at the start, and a transparent box at the goal."""
         start, goal = self.centres([self._world.start, self._world.goal])
         edge, flat = max(_FULL * self.size, 2 * BALL_M), FLAT * self.size
         start[2] += (flat - self.size) / 2

@@ -1,4 +1,4 @@
-"""Pictures to grids and parts: calibration, the markers in a picture, the grid that they make, and picture files."""
+"""From pictures to grids and parts: camera calibration, markers in a picture, the grid they define, and picture files."""
 
 from lab.vision.grid_view import GridView, Marker, View, plain_view
 from lab.vision.lens import Lens

@@ -1,4 +1,4 @@
-"""Calibration: a camera's lens and place, found from pictures of a mat with ArUco markers, or from four corners."""
+"""Calibration: a camera's lens and pose, computed from pictures of a mat with ArUco markers, or from four corners."""
 
 import json
 from collections.abc import Sequence
@@ -19,20 +19,20 @@ from lab.vision.picture_files import Image, check_picture
 Array = NDArray[np.float64]
 
 DICTIONARY = "DICT_4X4_50"
-LEAST_MARKERS = 4  # of the mat, to be seen in each picture
-FEW = 3  # pictures: from fewer the focal length is taken as given, and neither middle nor p1 p2 are looked for
-UNSURE = 0.05  # of the focal length: a larger standard deviation tells nothing
+LEAST_MARKERS = 4  # of the mat that each picture must show
+FEW = 3  # pictures: with fewer the focal length must be given, and the principal point and p1, p2 are not estimated
+UNSURE = 0.05  # of the focal length: a result with a larger standard deviation is rejected
 MAX_BYTES = 100_000
-PRINTED = 2000.0  # pixels a metre of a mat that is photographed
+PRINTED = 2000.0  # pixels per metre of the mat's image from which photographs are rendered
 TABLE_RGB = (219, 217, 212)
 
 
 @dataclass(frozen=True)
 class Mat:
-    """A mat with `columns` x `rows` ArUco markers (dictionary 4x4_50), 0 at the upper left, then to the right.
+    """A mat with `columns` x `rows` ArUco markers (dictionary 4x4_50), numbered row by row from the upper left.
 
-    A marker is `marker_m` [m] wide and `gap_m` from the next. The mat's middle lies at `middle_m` (x, y) on z = 0, its upper
-    edge towards the world's y.
+    A marker is `marker_m` [m] wide and `gap_m` from the next. The mat's middle lies at `middle_m` (x, y) on z = 0; its
+    upper edge points along the world's y axis.
     """
 
     middle_m: tuple[float, float] = (0.0, 0.0)
@@ -43,7 +43,7 @@ class Mat:
 
     @property
     def board(self) -> Any:
-        """The mat as OpenCV has it: from the upper left corner, y downwards."""
+        """The mat as an OpenCV board, whose origin is the upper left corner, y downwards."""
         dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, DICTIONARY))
         return cv2.aruco.GridBoard((self.columns, self.rows), self.marker_m, self.gap_m, dictionary)
 
@@ -60,13 +60,13 @@ class Mat:
         return np.asarray(cv2.cvtColor(grey, cv2.COLOR_GRAY2RGB), dtype=np.uint8)
 
     def world(self, on_board: Array) -> Array:
-        """World points (n, 3) [m] of points on the board (n, 3)."""
+        """The world coordinates (n, 3) [m] of points on the board (n, 3)."""
         length, width = self.size_m
         x, y = self.middle_m[0] - length / 2, self.middle_m[1] + width / 2
         return np.column_stack([x + on_board[:, 0], y - on_board[:, 1], np.zeros(len(on_board))])
 
     def photographed(self, lens: Lens, turn: Array, shift: Array) -> Image:
-        """What a lens shows of the mat, which lies where it should; `turn` (3, 3), `shift` (3,) [m]: world to camera."""
+        """The picture that a lens takes of the mat in its place; `turn` (3, 3) and `shift` (3,) [m]: world to camera."""
         side, ahead = round(1.4 * max(lens.size)), lens.focal
         pinhole = np.array([[ahead[0], 0, side / 2], [0, ahead[1], side / 2], [0, 0, 1.0]])
         (length, width), step = self.size_m, 1 / PRINTED
@@ -78,7 +78,7 @@ class Mat:
         )
         return lens.bent(np.asarray(wide, dtype=np.uint8), pinhole)
 
-    def found(self, image: Image, where: str = "picture") -> tuple[Array, Array]:
+    def corners(self, image: Image, where: str = "picture") -> tuple[Array, Array]:
         """World points (n, 3) [m] and pixels (n, 2) of the markers' corners; BadInput names how many markers were seen."""
         check_picture(image, where)
         settings = cv2.aruco.DetectorParameters()
@@ -98,9 +98,9 @@ class Mat:
 
 @dataclass(frozen=True)
 class Calibration:
-    """A camera's lens, and its place: `turn` (3, 3) and `shift` (3,) [m] take world points to the camera's (z ahead).
+    """A camera's lens and pose: `turn` (3, 3) and `shift` (3,) [m] map world points to the camera's frame (z ahead).
 
-    residual_px: root mean square of what the points miss their pixels by. method: what it was found from.
+    residual_px: root mean square reprojection error [pixels]. method: what the result was computed from.
     """
 
     lens: Lens
@@ -112,17 +112,17 @@ class Calibration:
 
     @property
     def pixel_from_world(self) -> Array:
-        """(3, 4): homogeneous pixels of the straightened picture from homogeneous world points [m]."""
+        """The projection (3, 4) from homogeneous world points [m] to homogeneous pixels of the undistorted picture."""
         return np.asarray(self.lens.matrix @ np.column_stack([self.turn, self.shift]))
 
     @property
     def eye_m(self) -> tuple[float, float, float]:
-        """Where the camera is [m]."""
+        """The camera's position (x, y, z) [m]."""
         x, y, z = (float(one) for one in -np.array(self.turn).T @ np.array(self.shift))
         return x, y, z
 
     def to_json(self) -> dict[str, Any]:
-        """The record as it is kept."""
+        """The record as written to a calibration file."""
         record = asdict(self)
         lens = record.pop("lens")
         lens["distortion"] = dict(zip(TERMS, lens["distortion"], strict=True))
@@ -130,14 +130,15 @@ class Calibration:
 
 
 def calibrate(pictures: Sequence[tuple[str, Image]], mat: Mat, angle_rad: float | None = None) -> Calibration:
-    """Find the lens from named pictures of the mat (Zhang 2000), and the camera's place from the first.
+    """The calibration from named pictures of the mat: the lens from all of them, the camera's pose from the first.
 
-    In the first picture the mat lies where `mat` says; the others show it tilted, anywhere. angle_rad: the field of view across
-    the picture's height, as its maker states; needed with fewer than 3 pictures: then focal length and middle are not
-    looked for, only k1 and k2. k3 is left 0: k2 covers for it within a field of view of about 1 rad.
-    Raises BadInput for too few pictures, without the mat, or of unlike sizes, WorkFailed where the focal length cannot be told.
+    In the first picture the mat lies where `mat` says; the others show it tilted, anywhere. angle_rad: the field of view
+    across the picture's height [rad], as the maker states it. It is needed with fewer than 3 pictures: then focal length
+    and principal point are not estimated, only k1 and k2. k3 stays 0: up to a field of view of about 1 rad, k2 covers it.
+    Raises BadInput for too few pictures, pictures without the mat or of different sizes, and WorkFailed when the focal
+    length cannot be determined. Source: Z. Zhang, 2000.
     """
-    found = [mat.found(image, name) for name, image in pictures]
+    found = [mat.corners(image, name) for name, image in pictures]
     sizes = {(image.shape[1], image.shape[0]) for _, image in pictures}
     if len(sizes) > 1:
         raise BadInput(f"pictures of {len(sizes)} sizes: {sorted(sizes)}: wanted one camera's")
@@ -172,9 +173,9 @@ def calibrate(pictures: Sequence[tuple[str, Image]], mat: Mat, angle_rad: float 
 def from_corners(
     lens: Lens, pixels: Sequence[tuple[float, float]], corners_m: Sequence[tuple[float, float]]
 ) -> Calibration:
-    """The place of a camera with a known lens, from the pixels of four corners (x, y) [m] of a rectangle on the table.
+    """The calibration of a camera with a known lens, from the pixels of four corners (x, y) [m] of a rectangle on the table.
 
-    BadInput for other numbers of corners, and for corners on one line.
+    Raises BadInput unless there are four corners, no three of them on one line.
     """
     seen = np.asarray(pixels, dtype=np.float64)
     if len(seen) != 4 or len(corners_m) != 4:
@@ -194,7 +195,7 @@ def from_corners(
 
 
 def pinhole(size: tuple[int, int], angle_rad: float) -> Lens:
-    """A lens without distortion of pictures (width, height), its field of view across the height [rad]."""
+    """A lens without distortion, for pictures of `size` (width, height) and a field of view across the height [rad]."""
     focal = size[1] / 2 / float(np.tan(angle_rad / 2))
     return Lens(size, (focal, focal), ((size[0] - 1) / 2, (size[1] - 1) / 2))
 
@@ -212,7 +213,7 @@ def _placed(lens: Lens, turn: Array, shift: Array, residual: float, points: int,
 
 
 def drawn(image: Image, calibration: Calibration, mat: Mat | None = None) -> Image:
-    """A copy of a picture with where the calibration has the mat's corners (green), the lens's middle."""
+    """A copy of a picture with the mat's corners according to the calibration (green) and the principal point."""
     canvas = np.array(image)
     lens = calibration.lens
     if mat is not None:
@@ -224,16 +225,16 @@ def drawn(image: Image, calibration: Calibration, mat: Mat | None = None) -> Ima
     return np.asarray(canvas, dtype=np.uint8)
 
 
-# ---- files ---------------------------------------------------------------------------------------------------------
+# ---- calibration files -----------------------------------------------------------------------------------------------
 
 
 def write_calibration(path: Path, calibration: Calibration) -> None:
-    """Keep a calibration in a JSON file, written whole."""
+    """Write a calibration to a JSON file, atomically."""
     write_whole(path, (json.dumps(calibration.to_json(), indent=1) + "\n").encode())
 
 
 def read_calibration(path: Path) -> Calibration:
-    """A calibration that was kept; BadInput, naming the file, for anything else."""
+    """The calibration in a file. BadInput, naming the file, when it is missing or holds no calibration."""
     try:
         data = read_limited(path, MAX_BYTES)
     except OSError as error:

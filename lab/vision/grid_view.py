@@ -1,8 +1,8 @@
-"""What an overhead picture shows: the camera's view of a grid, the markers in it and the grid that they make.
+"""Records of an overhead picture: the camera's view of a grid, the markers in it and the grid that they define.
 
-Plain records between the camera (`lab/sim`), the reader of pictures (`markers.py`) and whoever learns in the grid.
-A marker's pixel goes back along its ray to the plane at the marker's own height, so a tall obstacle is not seen beside
-its place. Pixels are (x, y) from the centre of the top left pixel, to the right and down.
+They connect the camera (`lab/sim`), the picture reader (`markers.py`) and the learner. A marker's pixel is projected along
+its ray onto the plane at the marker's own height, so that a tall obstacle is not located beside its true place. Pixels
+are (x, y) from the centre of the top left pixel, to the right and down.
 """
 
 from collections.abc import Mapping
@@ -22,14 +22,14 @@ Window = tuple[int, int, int]  # a square part of a picture: its left column, to
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """How a picture shows the grid.
+    """The mapping between a picture and the grid.
 
-    `pixel_from_world` (3, 4) takes homogeneous world points [m] to homogeneous pixels, with all of the camera's pixel
-    offsets in it (`lab/sim/camera.py`). The grid has `shape` cells of `cell_m` from the corner `origin_m` on, i along x
-    and j along y. By kind of marker: `heights_m` above the world's z = 0, `offsets_m` (dx, dy) from the marker to the
-    thing it stands for; 0 where a kind is missing. `radius_m`: of every marker, so that one that is partly hidden can be found;
+    `pixel_from_world` (3, 4) maps homogeneous world points [m] to homogeneous pixels, the camera's pixel offsets included
+    (`lab/sim/camera.py`). The grid has `shape` cells of `cell_m` [m] from the corner `origin_m` on, i along x and j along
+    y. By kind of marker: `heights_m` above the world's z = 0, `offsets_m` (dx, dy) from the marker to the object that it
+    stands for; 0 for a kind that is missing. `radius_m`: radius of every marker, with which partly hidden ones are found;
     0: unknown.
-    Raises BadInput when the matrix is not finite, of another shape or flat, or when the grid is empty.
+    Raises BadInput when the matrix is not finite, of another shape or of lower rank, or when the grid is empty.
     """
 
     pixel_from_world: NDArray[np.float64]
@@ -57,7 +57,7 @@ class View:
         return pixels
 
     def window(self, place_m: tuple[float, float], kind: str, reach_m: float) -> Window:
-        """The part of the picture that shows the marker of a thing which is at most `reach_m` off `place_m` along x and y."""
+        """The window of the picture that shows the marker of an object at most `reach_m` from `place_m` along x and y."""
         (x, y), (dx, dy) = place_m, self.offsets_m.get(kind, (0.0, 0.0))
         at = np.array([x - dx, y - dy, self.heights_m.get(kind, 0.0)])
         far = reach_m + self.radius_m
@@ -67,12 +67,12 @@ class View:
         return int(low[0]), int(low[1]), side
 
     def within(self, window: Window) -> "View":
-        """The view of that part of the picture."""
+        """The same view for a picture that is cropped to `window`."""
         shift = np.array([[1.0, 0.0, -window[0]], [0.0, 1.0, -window[1]], [0.0, 0.0, 1.0]])
         return replace(self, pixel_from_world=shift @ self.pixel_from_world)
 
     def place(self, pixel: ArrayLike, kind: str) -> tuple[float, float]:
-        """The world (x, y) [m] of the thing whose marker of `kind` is at `pixel`: its ray meets the marker's height."""
+        """The world (x, y) [m] of the object whose marker of `kind` is at `pixel`, from the ray at the marker's height."""
         camera = self.pixel_from_world
         pixel_from_plane = camera[:, [0, 1, 3]].copy()  # at z = height a point is (x, y, 1)
         pixel_from_plane[:, 2] += camera[:, 2] * self.heights_m.get(kind, 0.0)
@@ -81,7 +81,7 @@ class View:
         return float(x / w) + dx, float(y / w) + dy
 
     def radius_px(self, pixel: ArrayLike, kind: str) -> float:
-        """How large a whole marker of `kind` around `pixel` would be seen [pixels], on the mean of both axes."""
+        """The radius of a whole marker of `kind` at `pixel` in the picture [pixels], the mean of both axes."""
         dx, dy = self.offsets_m.get(kind, (0.0, 0.0))
         x, y = self.place(pixel, kind)
         r, at = self.radius_m, np.array([x - dx, y - dy, self.heights_m.get(kind, 0.0)])
@@ -113,7 +113,7 @@ class View:
 
 @dataclass(frozen=True)
 class Marker:
-    """A round marker found: its sub-pixel centre, and the place [m] and cell of the thing that it stands for."""
+    """A round marker in a picture: its sub-pixel centre, and the position [m] and cell of the object it stands for."""
 
     kind: str
     pixel: tuple[float, float]
@@ -123,7 +123,7 @@ class Marker:
 
 @dataclass(frozen=True, eq=False)
 class GridView:
-    """What a picture shows: start (gripper), goal (toaster) and blocked cells of a grid of `shape`."""
+    """The grid read from a picture: start (gripper), goal (toaster) and blocked cells of a grid of `shape`."""
 
     shape: Cell
     start: Cell
@@ -158,9 +158,9 @@ class GridView:
 
 
 def plain_view(picture: tuple[int, int], shape: Cell) -> View:
-    """The view of a picture of (height, width) pixels that is the grid itself: row i downwards, column j to the right.
+    """The view of a picture of (height, width) pixels that is itself the grid: row i downwards, column j to the right.
 
-    Nothing is known about lengths there: a cell counts as 1 m.
+    Such a picture has no scale: a cell counts as 1 m.
     """
     down, right = (pixels / max(cells, 1) for pixels, cells in zip(picture, shape, strict=True))
     return View(

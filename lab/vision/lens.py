@@ -1,4 +1,7 @@
-"""A camera's lens: focal length, middle and distortion; pictures and points made straight, and a straight picture bent."""
+"""A camera's lens: focal length, principal point and distortion, which it removes from pictures and adds to them.
+
+The second half makes rendered pictures look like photographs: a real lens, uneven light, blur, noise, covered markers.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,10 +22,10 @@ TERMS = ("k1", "k2", "p1", "p2", "k3")
 
 @dataclass(frozen=True)
 class Lens:
-    """Focal lengths and principal point [pixels] of pictures of (width, height), and Brown's distortion k1 k2 p1 p2 k3.
+    """Focal lengths and principal point (`middle`) [pixels] for pictures of `size`, and Brown's distortion k1 k2 p1 p2 k3.
 
-    Pixels are (x, y) from the centre of the top left pixel. Terms as in OpenCV's calibration; all 0: a pinhole.
-    Raises BadInput for what is no lens.
+    Pixels are (x, y) from the centre of the top left pixel. The terms are those of OpenCV; with all 0 it is a pinhole.
+    Raises BadInput for numbers that are not finite, and for sizes or focal lengths that are not above 0.
     """
 
     size: tuple[int, int]
@@ -58,20 +61,20 @@ class Lens:
         return np.asarray(seen, dtype=np.float64).reshape(-1, 2)
 
     def straight_points(self, pixels: ArrayLike) -> Array:
-        """Where pixels (n, 2) of a picture are in the straightened one."""
+        """The pixels (n, 2) in the undistorted picture of `pixels` (n, 2) in the original."""
         return self._onto(np.asarray(pixels, dtype=np.float64), self.matrix)
 
     def straightened(self, image: Image) -> Image:
-        """The picture (H, W, 3) as a pinhole with the same matrix would have taken it."""
+        """The undistorted picture (H, W, 3), as a pinhole with the same matrix would have taken it."""
         self._check(image)
         if not any(self.distortion):
             return image
         return np.asarray(cv2.undistort(image, self.matrix, np.array(self.distortion)), dtype=np.uint8)
 
     def bent(self, wide: Image, pinhole: Array) -> Image:
-        """What this lens shows of a scene of which a pinhole with the matrix `pinhole` (3, 3) took the picture `wide`.
+        """The distorted picture that this lens takes of the scene in `wide`, the picture of a pinhole with matrix `pinhole`.
 
-        `wide` (H, W, 3) should reach farther on all sides than this lens sees; beyond it the edge's pixels are taken again.
+        `wide` (H, W, 3) should cover more than this lens sees; outside it, the pixels of its edge are repeated.
         """
         check_picture(wide)
         width, height = self.size
@@ -93,22 +96,22 @@ class Lens:
             )
 
 
-# ---- photo effects ----------------------------------------------------------------------------------------------------
+# ---- effects that make a rendered picture look like a photograph --------------------------------------------------------
 
 
-CORNER_SHIFT = (0.02, 0.05)  # of the way from the middle to a corner: how far the lens draws it in
-MIDDLE_OFF = 0.01  # of the picture's width: how far the lens sits off the sensor's middle, at the most
-LEAST_LIGHT = 0.45  # in the darkest corner, against the brightest
-CAST = 0.12  # how much warmer or colder the light is, red against blue, at the most
-LAMP = 0.35  # how much brighter a lamp makes the table beneath it, at the most
-BLUR = (0.5, 1.1)  # pixels, standard deviation
-NOISE = (2.0, 6.0)  # of 255, standard deviation of the sensor's noise, at mid grey
-HIDDEN = 0.40  # of a marker, at the most
-COVERS = ((40, 40, 45), (225, 225, 220), (205, 160, 135), (120, 85, 50))  # a cable, paper, a finger, tape
+CORNER_SHIFT = (0.02, 0.05)  # shift of a corner towards the middle by barrel distortion, as a share of their distance
+MIDDLE_OFF = 0.01  # largest offset of the principal point, as a share of the picture's width
+LEAST_LIGHT = 0.45  # lightness of the darkest corner, relative to the brightest
+CAST = 0.12  # largest colour cast, red against blue
+LAMP = 0.35  # largest gain of brightness below a lamp
+BLUR = (0.5, 1.1)  # standard deviation of the blur [pixels]
+NOISE = (2.0, 6.0)  # standard deviation of the sensor's noise at mid grey, of 255
+HIDDEN = 0.40  # largest covered share of a marker
+COVERS = ((40, 40, 45), (225, 225, 220), (205, 160, 135), (120, 85, 50))  # RGB of a cable, paper, a finger, tape
 
 
 def drawn_lens(rng: np.random.Generator, straight: Lens) -> Lens:
-    """A lens like `straight` as one is bought: barrel distortion, a little out of the middle and out of true."""
+    """A random real lens in place of `straight`: with barrel distortion, slightly off centre and slightly tilted."""
     width, height = straight.size
     across = float(np.hypot(width, height)) / 2 / straight.focal[0]  # a corner, in focal lengths from the middle
     k1 = -rng.uniform(*CORNER_SHIFT) / across**2
@@ -121,9 +124,9 @@ def drawn_lens(rng: np.random.Generator, straight: Lens) -> Lens:
 
 
 def spoiled(image: Image, rng: np.random.Generator, strength: float = 1.0) -> Image:
-    """The picture (H, W, 3) in a room's uneven light, through a lens that is not quite sharp, with a sensor's noise.
+    """The picture (H, W, 3) with a room's uneven light, blur and sensor noise.
 
-    strength: 0 leaves it as it is, 1 draws from all that the constants above allow.
+    strength: 0 leaves the picture unchanged; 1 draws from the full ranges of the constants above.
     """
     check_picture(image)
     if strength <= 0.0:
@@ -136,7 +139,7 @@ def spoiled(image: Image, rng: np.random.Generator, strength: float = 1.0) -> Im
 
 
 def _light(shape: tuple[int, ...], rng: np.random.Generator, strength: float) -> Array:
-    """How much light each pixel gets (H, W, 3): a slope from a window, a lamp, dark corners, and a colour."""
+    """The light factor of each pixel (H, W, 3): a gradient from a window, a lamp, dark corners and a colour cast."""
     rows, columns = shape[:2]
     y, x = np.meshgrid(np.linspace(-1, 1, rows), np.linspace(-1, 1, columns), indexing="ij")
     way, lamp = rng.uniform(0, 2 * pi), rng.uniform(-1, 1, 2)
@@ -153,7 +156,7 @@ def _light(shape: tuple[int, ...], rng: np.random.Generator, strength: float) ->
 def hide(
     image: Image, discs: Sequence[tuple[float, float, float]], rng: np.random.Generator
 ) -> tuple[Image, list[float]]:
-    """A copy with each disc (x, y, radius) [pixels] partly covered by something's straight edge, and how much of each."""
+    """A copy in which a straight edge covers part of each disc (x, y, radius) [pixels], and the covered shares."""
     canvas, shares = np.array(image), []
     for x, y, radius in discs:
         share, way = rng.uniform(0, HIDDEN), rng.uniform(0, 2 * pi)
@@ -169,7 +172,7 @@ def hide(
 
 
 def _edge_of(share: float) -> float:
-    """How far from the middle of a disc of radius 1 a straight edge lies that cuts `share` of it off."""
+    """The distance from the middle of a unit disc of a straight edge that cuts `share` of its area off."""
     edges = np.linspace(-1, 1, 2001)
     cut = (np.arccos(edges) - edges * np.sqrt(1 - edges**2)) / pi  # falls from 1 to 0
     return float(np.interp(-share, -cut, edges))

@@ -1,7 +1,7 @@
-"""Round coloured markers in a picture, and the grid that they make (thesis ch. 8.3, step 3).
+"""Round coloured markers in a picture, partly hidden ones among them, and the grid that they define (thesis ch. 8.3, step 3).
 
-Round coloured markers are told apart by hue and saturation, never by brightness: a renderer shades flat discs like
-balls, and a room has shadows.
+Markers are classified by hue and saturation, never by brightness: a renderer shades flat discs like balls, and a room
+has shadows.
 """
 
 from collections.abc import Sequence
@@ -20,23 +20,25 @@ from lab.vision.picture_files import Image, check_picture
 
 Array = NDArray[np.float64]
 
-WHOLE = 0.95  # of the area that it should have: a spot with more is taken for a whole disc
-LARGER = 1.6  # times the area that it should have: such a spot is no disc
-LEAST_ARC = 0.42  # of the circle that must be seen
-ON_ARC_PX = 0.9  # from the circle: points of the outline that are its rim
-OUT_PX = 1.6  # beyond the circle: an outline that reaches farther is another thing's
-OUTSIDE = 0.04  # of the outline that may do so all the same
-SAMPLES = 28  # points of the outline of which every two give circles to try
-NOISY = 1.5  # of 255, standard deviation: a picture with more noise is smoothed
+WHOLE = 0.95  # share of the expected area above which a spot counts as a whole disc
+LARGER = 1.6  # multiple of the expected area above which a spot is no disc
+LEAST_ARC = 0.42  # share of the circle that must be visible
+ON_ARC_PX = 0.9  # largest distance from the circle of outline points that belong to its rim
+OUT_PX = 1.6  # an outline that extends farther beyond the circle belongs to another object
+OUTSIDE = 0.04  # share of the outline for which that is tolerated
+SAMPLES = 28  # points of the outline; every pair of them gives candidate circles
+NOISY = 1.5  # standard deviation, of 255, above which a picture is smoothed
 SMOOTH_PX = 1.0
-RIM_IN_PX = 0.1  # the outline runs that much within the rim
+RIM_IN_PX = 0.1  # by which the outline lies inside the rim
 
 
 def calmed(image: Image) -> Image:
-    """The picture (H, W, 3), smoothed where it is noisy; a renderer's clean one as it is."""
+    """The picture (H, W, 3), smoothed if it is noisy; a clean rendered picture is returned unchanged."""
     second = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], dtype=np.float64)
     grey = cv2.cvtColor(image, cv2.COLOR_RGB2GRAY)
-    rough: Any = np.abs(cv2.filter2D(grey, cv2.CV_64F, second))  # Immerkaer 1996; the median leaves edges out
+    rough: Any = np.abs(
+        cv2.filter2D(grey, cv2.CV_64F, second)
+    )  # noise estimate, J. Immerkaer, 1996; the median ignores edges
     noise = float(np.median(rough)) / 0.6745 / 6.0
     if noise <= NOISY:
         return image
@@ -44,16 +46,16 @@ def calmed(image: Image) -> Image:
 
 
 def hidden_part(outline: NDArray[np.int32], area: float, view: View, kind: str) -> bool:
-    """Whether a spot with this outline (n, 2) and area [pixels] is smaller than a whole marker of known size would be."""
+    """Whether a spot with this outline (n, 2) and area [pixels] is smaller than a whole marker of known size."""
     if view.radius_m <= 0.0:
         return False
     return bool(area < WHOLE * np.pi * _rim(outline, view, kind) ** 2)
 
 
 def behind_cover(outline: NDArray[np.int32], view: View, kind: str) -> tuple[float, float] | None:
-    """The middle [pixels] of the marker of which the spot with this outline (n, 2) is what can be seen; None: of none.
+    """The centre [pixels] of a partly hidden marker, from the outline (n, 2) of its visible part; None: no marker fits.
 
-    Every two points of the outline give two circles of the known radius; the one with most of the outline on its rim counts.
+    Every pair of outline points gives two circles of the known radius; the circle with most outline points on its rim wins.
     """
     points = outline.astype(np.float64)
     radius = _rim(outline, view, kind)
@@ -78,12 +80,12 @@ def behind_cover(outline: NDArray[np.int32], view: View, kind: str) -> tuple[flo
 
 
 def _rim(outline: NDArray[np.int32], view: View, kind: str) -> float:
-    """The radius of a whole marker's outline, which runs through the middles of its outermost pixels."""
+    """The radius of a whole marker's outline [pixels]; the outline passes through the centres of its outermost pixels."""
     return max(view.radius_px(outline.mean(axis=0), kind) - RIM_IN_PX, 1.0)
 
 
 def _circles(points: Array, radius: float) -> Array:
-    """The middles (n, 2) of the circles with this radius through every two of the points that lie well apart."""
+    """The centres (n, 2) of the circles with this radius through each pair of points that are far enough apart."""
     one, other = (np.array(side) for side in zip(*combinations(points, 2), strict=True))
     way = other - one
     length = np.linalg.norm(way, axis=1)
@@ -95,7 +97,7 @@ def _circles(points: Array, radius: float) -> Array:
 
 
 def _refined(points: Array, centre: Array, radius: float) -> Array:
-    """The middle that fits best, by least squares, to the points near the circle (Gauss-Newton)."""
+    """The centre that fits the points near the circle best, by least squares (Gauss-Newton)."""
     for _ in range(8):
         out = points - centre
         far = np.linalg.norm(out, axis=1)
@@ -107,21 +109,21 @@ def _refined(points: Array, centre: Array, radius: float) -> Array:
     return centre
 
 
-# ---- markers ----------------------------------------------------------------------------------------------------------
+# ---- markers and the grid that they define ------------------------------------------------------------------------------
 
 
 SATURATION = 100  # of 255; wood, bread, steel and skin stay below it or have another hue
 CHROMA = 12  # of 255, largest minus smallest channel: on black, sensor noise has every hue and full saturation
 MIN_PIXELS = 8.0  # a smaller spot is noise
-RIM = 1.0  # pixels from the spot's hull: the outline's points that are its edge and not a highlight's
-MAX_CELLS = 2.0  # a larger spot is no marker
-ROUNDNESS = 0.72  # of the spot's smallest circle that it fills: a disc near 1, a square 0.64
-MAX_MARKERS = 10_000  # in a picture: a grid of 100 x 100 cells; fitting an ellipse to each of more takes too long
+RIM = 1.0  # pixels: outline points this close to the spot's hull belong to its edge, others to a highlight
+MAX_CELLS = 2.0  # cell areas: a larger spot is no marker
+ROUNDNESS = 0.72  # least share of its enclosing circle that a spot fills: a disc near 1, a square 0.64
+MAX_MARKERS = 10_000  # in a picture, enough for 100 x 100 cells; fitting ellipses to more would take too long
 
 
 @dataclass(frozen=True)
 class Hue:
-    """A marker's colour: OpenCV `hue` (0..179) within `tolerance`, its name, and the RGB (0..255) to paint it with."""
+    """A marker's colour: OpenCV `hue` (0..179) within `tolerance`, its name, and its RGB (0..255) for drawing."""
 
     hue: int
     colour: str
@@ -137,9 +139,9 @@ MARKERS = {
 
 
 def find_markers(image: Image, view: View) -> tuple[tuple[Marker, ...], int]:
-    """All markers in a picture (H, W, 3), by kind, then cell, and how many spots of their hues were no round marker.
+    """All markers in a picture (H, W, 3), sorted by kind, then cell; and the number of spots rejected as not round.
 
-    Cells may lie outside the grid. Raises BadInput for a picture of another shape or dtype, or of too many markers.
+    Cells may lie outside the grid. Raises BadInput for a picture of another shape or dtype, or with too many spots.
     """
     check_picture(image)
     image = calmed(image)
@@ -183,8 +185,8 @@ def see(
 ) -> GridView:
     """The grid that a picture (H, W, 3) shows; without a view the picture itself is a grid of `shape`.
 
-    goal_near_m: about where the goal's machine is (x, y) [m], in a cell with several: of theirs the nearest marker counts,
-    and what lies outside the view's grid belongs to another one.
+    goal_near_m: approximate position (x, y) [m] of the goal's machine, for a cell with several machines: the nearest of
+    their markers is the goal, and markers outside the view's grid are ignored.
 
     Raises BadInput, naming `where`: no markers, not exactly one gripper or one toaster, a marker outside the grid, the
     start or the goal on an obstacle, a picture of another shape or dtype. Thesis ch. 8.3, fig. 8.2.
@@ -219,7 +221,7 @@ def _of_this_grid(markers: tuple[Marker, ...], view: View, goal_near_m: Sequence
 
 
 def locate(image: Image, view: View, kind: str) -> Marker:
-    """The one marker of `kind` in a picture (H, W, 3), to compare where the gripper is with where it should be.
+    """The only marker of `kind` in a picture (H, W, 3), as when the gripper's position is checked.
 
     Raises BadInput when there is none or more than one, or for a picture of another shape or dtype.
     """
@@ -251,9 +253,9 @@ def _outside(marker: Marker, view: View) -> str:
 
 
 def draw(image: Image, grid: GridView, outlines: Sequence[Sequence[Sequence[float]]] = ()) -> Image:
-    """A copy of the picture (H, W, 3) with the grid's lines, start, goal, obstacles and the markers' centres on it.
+    """A copy of the picture (H, W, 3) with the grid's lines, start, goal, obstacles and the markers' centres drawn on it.
 
-    outlines: of parts, each (n, 2) pixels, drawn in orange.
+    outlines: outlines of parts, each (n, 2) [pixels], drawn in orange.
     """
     check_picture(image)
     view = grid.view

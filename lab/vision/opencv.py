@@ -1,4 +1,4 @@
-"""OpenCV, which takes a while to load: `cv2` here is loaded when one of its names is touched."""
+"""OpenCV, which loads slowly: `cv2` of this module loads the library when an attribute is first used."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -7,7 +7,7 @@ if TYPE_CHECKING:
 else:
 
     class _Later:
-        """Has the names of the library."""
+        """Stands for the library and forwards to its attributes."""
 
         def __getattr__(self, name: str) -> Any:
             import cv2

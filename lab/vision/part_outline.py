@@ -1,7 +1,8 @@
-"""Where a part of known shape stands, found in a picture by its outline: where the picture's edges run along it best.
+"""The pose of a part of known shape, found in a picture by shape-based matching.
 
-Shape-based matching: the outline that the part's corners would show is tried on a grid of places and yaws, then ever finer around
-the best. What counts is how the picture's gradient runs across the outline, not how strong it is: light and colour may vary.
+The outline that the part's corners would show is compared with the picture's edges on a grid of positions and yaws, then
+on ever finer grids around the best. The score uses the gradient's direction across the outline, not its strength, so light
+and colour may vary.
 """
 
 from dataclasses import dataclass
@@ -17,18 +18,18 @@ from lab.vision.picture_files import Image, check_picture
 Array = NDArray[np.float64]
 
 OUTLINE_POINTS = 72
-COARSE_PX, FINE_PX = 2.0, 1.2  # standard deviations that the picture is smoothed by
-COARSE_M, COARSE_RAD = 0.004, 0.05  # between the places and yaws that are tried first
-FINEST = 7  # so often are they halved
-KEPT = 5  # of the places tried first are followed further
-FAINT = 2.5  # of 255 a pixel: a gradient like this counts half
-SEEN = 0.56  # of the outline must be an edge of the picture, on the mean
-LIKE_RAD = 0.11  # between the colour within the outline and one of the part's, as ways in RGB, at the most
+COARSE_PX, FINE_PX = 2.0, 1.2  # standard deviations of the smoothing in the coarse and the fine search
+COARSE_M, COARSE_RAD = 0.004, 0.05  # steps of position and yaw in the coarse search
+FINEST = 7  # how often these steps are halved
+KEPT = 5  # candidates of the coarse search that are refined
+FAINT = 2.5  # gradient, of 255 per pixel, that counts half
+SEEN = 0.56  # least mean share of the outline that must be an edge of the picture
+LIKE_RAD = 0.11  # largest angle between the RGB vectors of the colour inside the outline and of the part
 
 
 @dataclass(frozen=True, eq=False)
 class PartSeen:
-    """A part's foot (x, y) [m] and yaw [rad] as seen; `share`: how much of its outline (n, 2) [pixels] is an edge, 0 to 1."""
+    """A part's seen foot (x, y) [m] and yaw [rad]; `share`: the share of its outline (n, 2) [pixels] that is an edge, 0 to 1."""
 
     x: float
     y: float
@@ -39,9 +40,9 @@ class PartSeen:
 
 @dataclass(frozen=True, eq=False)
 class Outlined:
-    """What is looked for: corners (n, 3) [m] of the part's hull from its foot, how high the foot is, and whether it is round.
+    """The part to find: corners (n, 3) [m] of its hull relative to its foot, the foot's height [m], and whether it is round.
 
-    A round part shows no yaw. `pixel_from_world` (3, 4) is the camera's. colours (c, 3): RGB of what is seen of the part.
+    A round part shows no yaw. `pixel_from_world` (3, 4): the camera's projection. colours (c, 3): RGB of the part's surfaces.
     """
 
     corners: Array
@@ -51,7 +52,7 @@ class Outlined:
     colours: Array
 
     def outlines(self, poses: Array) -> Array:
-        """The outlines (k, OUTLINE_POINTS, 4) of the part at `poses` (k, 3) x, y [m], yaw: pixels, and the way across it."""
+        """The outlines (k, OUTLINE_POINTS, 4) of the part at `poses` (k, 3) x, y [m], yaw: pixel and unit normal each."""
         c, s = np.cos(poses[:, 2])[:, None], np.sin(poses[:, 2])[:, None]
         x = poses[:, :1] + c * self.corners[:, 0] - s * self.corners[:, 1]
         y = poses[:, 1:2] + s * self.corners[:, 0] + c * self.corners[:, 1]
@@ -62,7 +63,7 @@ class Outlined:
 
 
 def find_part(image: Image, part: Outlined, near: ArrayLike, reach_m: float, reach_rad: float) -> PartSeen | None:
-    """The part in a straightened picture (H, W, 3), within reach of the pose `near` (x, y [m], yaw [rad]); None: not seen."""
+    """The part in an undistorted picture (H, W, 3), within reach of the pose `near` (x, y [m], yaw [rad]); None: not seen."""
     check_picture(image)
     at = np.asarray(near, dtype=np.float64)
     coarse = _edges(image, COARSE_PX)
@@ -82,7 +83,7 @@ def find_part(image: Image, part: Outlined, near: ArrayLike, reach_m: float, rea
 
 
 def _coloured(image: Image, outline: Array, colours: Array) -> bool:
-    """Whether most of what lies within an outline has one of the colours, brighter or darker."""
+    """Whether most pixels inside an outline have one of the colours, at any brightness."""
     within = np.zeros(image.shape[:2], np.uint8)
     cv2.fillPoly(within, [np.rint(outline).astype(np.int32)], 1)
     pixels = calmed(image)[within > 0].astype(np.float64) + 1.0
@@ -97,7 +98,7 @@ def _steps(reach: float, step: float) -> Array:
 
 
 def _finer(edges: Array, part: Outlined, pose: Array, last: int) -> Array:
-    """The pose, moved to where the outline fits best, by steps that are halved until the level `last`."""
+    """The pose at which the outline fits best, searched with steps that are halved up to the level `last`."""
     turns = (0.0,) if part.round else (-1.0, 0.0, 1.0)
     ways = np.stack(np.meshgrid([-1.0, 0.0, 1.0], [-1.0, 0.0, 1.0], turns), axis=-1).reshape(-1, 3)
     for level in range(1, last):
@@ -112,7 +113,7 @@ def _finer(edges: Array, part: Outlined, pose: Array, last: int) -> Array:
 
 
 def _edges(image: Image, smooth_px: float) -> Array:
-    """(H, W, 2): the gradient of the channel with the strongest one, its length from 0 (none) to 1 (strong)."""
+    """The gradient (H, W, 2) of the channel where it is strongest, with a length from 0 (none) to 1 (strong)."""
     soft = cv2.GaussianBlur(calmed(image), (0, 0), smooth_px).astype(np.float64)
     dy, dx = np.gradient(soft, axis=(0, 1))
     strong = np.hypot(dx, dy) * smooth_px
@@ -123,7 +124,7 @@ def _edges(image: Image, smooth_px: float) -> Array:
 
 
 def _shares(edges: Array, outlines: Array) -> Array:
-    """How much of each outline (k, n, 4) runs along an edge, (k,): 0 none, 1 all; beyond the picture is none."""
+    """The share (k,) of each outline (k, n, 4) that lies along an edge, 0 to 1; outside the picture there are no edges."""
     x, y = outlines[..., 0].astype(np.float32), outlines[..., 1].astype(np.float32)
     there: Any = cv2.remap(edges.astype(np.float32), x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT)
     across = np.abs((there * outlines[..., 2:]).sum(axis=-1))
@@ -131,7 +132,7 @@ def _shares(edges: Array, outlines: Array) -> Array:
 
 
 def _evenly(polygon: Array) -> Array:
-    """OUTLINE_POINTS points (n, 4) evenly along a closed polygon (m, 2): pixels, and the unit way across it there."""
+    """OUTLINE_POINTS points (n, 4) spaced evenly along a closed polygon (m, 2): pixel and unit normal of each."""
     ends = np.roll(polygon, -1, axis=0)
     sides = ends - polygon
     lengths = np.maximum(np.linalg.norm(sides, axis=1), 1e-9)

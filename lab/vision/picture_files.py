@@ -1,4 +1,4 @@
-"""Picture files: PNG and JPEG, read as RGB arrays only when they are whole and small enough, and written."""
+"""Picture files, PNG and JPEG: written from RGB arrays, and read as such if they are complete and small enough."""
 
 import zlib
 from pathlib import Path
@@ -18,7 +18,7 @@ MAX_PIXELS = 40_000_000
 
 
 def check_picture(image: Image, where: str = "picture") -> None:
-    """BadInput, naming `where`, unless it is an RGB picture: (H, W, 3), uint8."""
+    """Raise BadInput, naming `where`, unless `image` is an RGB picture: (H, W, 3), uint8."""
     array = np.asarray(image)
     if array.dtype != np.uint8 or array.ndim != 3 or array.shape[2] != 3 or min(array.shape) < 1:
         raise BadInput(f"{where}: an array of shape {array.shape} and {array.dtype}: wanted (H, W, 3), RGB, uint8")
@@ -44,7 +44,7 @@ def read_picture(path: Path) -> Image:
 
 
 def _size(data: bytes, path: Path) -> tuple[int, int]:
-    """Width and height from the header of a complete PNG or JPEG file."""
+    """The width and height in the header of a PNG or JPEG file. BadInput when the file is neither, or is incomplete."""
     if data.startswith(PNG):
         _check_chunks(data, path)
         return int.from_bytes(data[16:20], "big"), int.from_bytes(data[20:24], "big")
@@ -64,7 +64,7 @@ def _size(data: bytes, path: Path) -> tuple[int, int]:
 
 
 def _check_chunks(data: bytes, path: Path) -> None:
-    """Walk a PNG file's chunks to its end mark: libpng would write to stderr about a broken one by itself."""
+    """Raise BadInput unless a PNG file's chunks are intact up to its end mark; libpng would print its own message."""
     at, kind = len(PNG), b""
     while kind != b"IEND":
         length, kind = int.from_bytes(data[at : at + 4], "big"), data[at + 4 : at + 8]
@@ -77,7 +77,7 @@ def _check_chunks(data: bytes, path: Path) -> None:
 
 
 def write_picture(path: Path, image: Image) -> None:
-    """Write an RGB array (H, W, 3) as the PNG or JPEG file that the name says; raises BadInput when that cannot be."""
+    """Write an RGB array (H, W, 3) as a PNG or JPEG file, by the name's ending. BadInput for another ending, or no write."""
     check_picture(image, str(path))
     if path.suffix.lower() not in (".png", ".jpg", ".jpeg"):
         raise BadInput(f"{path}: pictures are written as .png, .jpg or .jpeg")

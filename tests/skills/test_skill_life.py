@@ -19,7 +19,7 @@ from lab.sim.scene.places import Layout
 from lab.skills import SKILLS, Skill
 from lab.skills.prepared_scene import Prepared
 from lab.skills.sight import SkillFailed
-from lab.skills.skill import Bench, Status, learned_path, no_way
+from lab.skills.skill import Bench, Status, learned_path, no_path_error
 from lab.skills.skillset import SkillSet
 from lab.skills.surveys import Surveys
 from lab.tasks.task import Task
@@ -219,10 +219,10 @@ def test_a_learned_path_ends_at_the_goal_or_says_where_it_got_lost(
 
 def test_no_way_names_what_encloses_or_the_border() -> None:
     error = NoPath("no path", ((1, 2),), "start")
-    assert str(no_way("insert", error, ["cubes A", "cubes B"])) == (
+    assert str(no_path_error("insert", error, ["cubes A", "cubes B"])) == (
         "insert: no path reaches the goal; the start is enclosed by: cubes A, cubes B"
     )
-    assert str(no_way("insert", error, [])).endswith("the start is enclosed by: the border")
+    assert str(no_path_error("insert", error, [])).endswith("the start is enclosed by: the border")
 
 
 def test_a_bench_tells_standing_leaning_and_held_slices_apart(

@@ -230,13 +230,13 @@ def test_the_way_out_of_a_station_is_up_or_lifted_out_to_the_side_and_up(task: T
     assert side.into("toaster_buffer") == np.pi / 2
     assert side.into("plate") is None
     at = ToolPose(x, y, 0.1, np.pi / 2)
-    lifted, out, up, end = side.way_out("toaster_buffer", at)
+    lifted, out, up, end = side.exit_path("toaster_buffer", at)
     assert (lifted.x, lifted.y, lifted.z) == pytest.approx((x, y, 0.106))
     assert (out.x, out.y, out.z) == pytest.approx((x, y - 0.15, 0.106))
     assert (up.x, up.y, up.z) == pytest.approx((out.x, out.y, end.z))
     assert end == side.approach("toaster_buffer")
     assert (end.x, end.y) == pytest.approx((x, y - 0.15))
-    risen, end = side.way_out("plate", at)
+    risen, end = side.exit_path("plate", at)
     assert (risen.x, risen.y, risen.z) == (at.x, at.y, end.z)
 
 

@@ -1,7 +1,7 @@
-"""The live scene of a lesson: where the learner is, state by state, for the page that a person teaches in.
+"""The live scene of a lesson for the teaching page: it shows the learner's state.
 
-Nothing is simulated: a state is put up at once. The cameras look so that the actions' words are true in the picture:
-right is to the right, forward is away from the viewer.
+Nothing is simulated: bodies jump to a state. The cameras are placed so that the actions' names hold in the picture: right
+is to the right, forward is away from the viewer.
 """
 
 from typing import TYPE_CHECKING, Protocol
@@ -17,16 +17,16 @@ if TYPE_CHECKING:
 
 
 class LessonScene(Protocol):
-    """What a page shows of a lesson: all bodies, and a camera that has all cells in sight; it belongs to one thread."""
+    """A lesson's scene: all bodies, and a camera that sees all cells. It must be used in one thread only."""
 
     bodies: tuple[Body, ...]
     camera: Viewpoint
 
     def frame(self, state: int) -> Frame:
-        """What has moved now that the learner is in `state`; the first frame places everything, times count up."""
+        """The frame with the changes since the last one, for the learner in `state`; the first frame places everything."""
 
     def close(self) -> None:
-        """Free what the scene holds; safe to call again."""
+        """Free the scene's resources; safe to call again."""
 
 
 def lesson_scene_of(where: "Prepared | GridWorld | None", problem: Problem) -> LessonScene | None:

@@ -1,4 +1,4 @@
-"""What is drawn of the episode in a lesson's scene: where the learner has been, and what it ran into."""
+"""The episode in a lesson's scene: marks at the cells that the learner visited, and at the obstacle that it ran into."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -6,20 +6,20 @@ from dataclasses import dataclass
 from lab.mdp import TabularMDP
 from lab.sim.frames import Body, Pose, Rgba, Shape, Vector
 
-STEP_S = 0.1  # [s] between two frames: nothing is simulated, the times only count up
-TRAIL = 48  # cells of the episode that stay marked
+STEP_S = 0.1  # [s] between two frames; nothing is simulated, times only have to increase
+TRAIL = 48  # number of latest cells of the episode that are marked
 RED: Rgba = (0.86, 0.16, 0.14, 0.6)
 FAINT: Rgba = (0.16, 0.38, 0.78, 0.35)
 
-Changes = tuple[dict[str, Pose], dict[str, bool]]  # the poses and the visibility that a frame is to hold
+Changes = tuple[dict[str, Pose], dict[str, bool]]  # poses and visibility, by body, for a frame
 
 
 @dataclass
 class EpisodeTrail:
-    """Balls at the cells of the episode so far and at a blocked cell that was entered.
+    """Balls at the cells of the episode so far, and at a blocked cell that was entered.
 
-    `place` gives the middle of a state [m]; the radii [m] of both kinds of balls. A new episode begins after a terminal
-    state, and when the learner is suddenly elsewhere.
+    `place` gives the centre of a state's cell [m]; the radii [m] are those of both kinds of balls. A new episode begins
+    after a terminal state, and when the state is not a neighbour of the last one.
     """
 
     mdp: TabularMDP
@@ -30,13 +30,13 @@ class EpisodeTrail:
     _count: int = 0
 
     def bodies(self) -> tuple[Body, ...]:
-        """The balls, in the origin."""
+        """The balls, at the origin."""
         step = Shape("sphere", (self.trail_m,), None, FAINT)
         collision = Shape("sphere", (self.collision_m,), None, RED)
         return (*(Body(f"trail {number}", (step,)) for number in range(TRAIL)), Body("collision", (collision,)))
 
     def at(self, state: int) -> Changes:
-        """What changes when the learner comes to `state`."""
+        """The changes when the learner comes to `state`."""
         last, self._last = self._last, state
         poses: dict[str, Pose] = {}
         visible: dict[str, bool] = {}
@@ -53,5 +53,5 @@ class EpisodeTrail:
 
 
 def upright(at: Vector) -> Pose:
-    """The pose at a place, not turned."""
+    """The pose at a place, without rotation."""
     return (*at, 0.0, 0.0, 0.0, 1.0)

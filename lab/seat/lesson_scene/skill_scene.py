@@ -1,4 +1,4 @@
-"""The scene of a skill: the cell with the arm, or a machine's head, where the state has it."""
+"""The scene of a skill: the cell, with the arm or a machine's head in the pose of the state."""
 
 from dataclasses import dataclass
 from math import hypot, radians
@@ -19,24 +19,24 @@ from lab.view.camera_placement import camera_for, corners, vector
 from lab.view.world_bodies import GREEN
 
 GHOST: Rgba = (0.80, 0.68, 0.48, 0.3)
-TRAIL_M, COLLISION_M = 0.004, 0.045  # [m] at least: the gripper must not hide them
-_ROOM = np.array([0.09, 0.09, 0.10])  # [m] of a part and the gripper around the places of the tool
+TRAIL_M, COLLISION_M = 0.004, 0.045  # [m] least radii of the trail's balls, which the gripper must not hide
+_ROOM = np.array([0.09, 0.09, 0.10])  # [m] space for a part and the gripper around the tool's positions
 
 
 @dataclass
 class OnPart:
-    """What a skill has made to be seen on its part in the states of its problem."""
+    """The bodies that a skill makes visible on its part, state by state."""
 
     skill: Skill
     world: World
     name: str
 
     def bodies(self) -> tuple[Body, ...]:
-        """All of it, as a run's replay has it."""
+        """All of these bodies, as in a run's replay."""
         return self.skill.on_part(self.name, self.skill.own_kind)
 
     def at(self, state: int) -> Changes:
-        """What there is in `state`, where the part is."""
+        """The poses (on the part) and visibility of the bodies in `state`."""
         seen = self.skill.shown_in(state, self.name)
         position, (i, j, k, w) = self.world.pose(self.name)
         pose = (*vector(position), float(i), float(j), float(k), float(w))
@@ -44,7 +44,7 @@ class OnPart:
 
 
 class SkillScene:
-    """A skill's scene with a part in the gripper, or before it on its spot."""
+    """A skill's scene with a part in the gripper, or in front of it on its spot."""
 
     def __init__(self, task: Task, order: Order, layout: Layout, skill: Skill) -> None:
         """Build the scene; `skill` is set up. A state out of reach leaves the arm where it was."""
@@ -62,9 +62,9 @@ class SkillScene:
             raise
 
     def _set_up(self, task: Task) -> dict[str, Rgba]:
-        """The part into the gripper or onto its spot; the colours of the parts that are not really there.
+        """Put the part into the gripper or onto its spot; returns the colours of the ghosts.
 
-        These are the ones that the survey reckons with beside the spot, and the part as it is to be set down.
+        Ghosts are the neighbours that the survey assumes beside the spot, and the part in its target place.
         """
         bench, skill, scene = self._bench, self._skill, self._bench.scene
         kind = task.made_as(skill.kind).name if skill.kind else ""
@@ -104,21 +104,21 @@ class SkillScene:
         return EpisodeTrail(self._mdp, self._place, max(0.11 * size, TRAIL_M), max(0.6 * size, COLLISION_M))
 
     def _size(self) -> float:
-        """How far apart neighbouring states are, at least [m]."""
+        """The least distance between neighbouring states [m]."""
         start = self._mdp.start
         ways = np.array([self._place(int(state)) for state in self._mdp.successor[start]]) - self._place(start)
         lengths = np.linalg.norm(ways, axis=1)
         return float(lengths[lengths > 0].min())
 
     def _goal(self) -> tuple[Body, ...]:
-        """A ball where the tool is to go through the cell; at a station the part says so."""
+        """A ball at the goal of a motion through the workspace; at a station the part marks the goal."""
         if self._skill.near:
             return ()
         at = self._place(int(np.flatnonzero(self._mdp.goal)[0]))
         return (Body("goal", (Shape("sphere", (0.35 * self._size(),), None, GREEN, at),)),)
 
     def _camera(self) -> Viewpoint:
-        """From the front, of the part or of the whole cell; a little from the right, so that nothing hides the rest."""
+        """A camera in front of the part or the whole cell, slightly to the right so that less is hidden."""
         free = np.flatnonzero(~self._mdp.terminal | self._mdp.goal)
         places = np.array([self._place(int(state)) for state in free])
         azimuth, elevation = (radians(angle) for angle in self._skill.looks_from)
@@ -131,7 +131,7 @@ class SkillScene:
         return camera_for(seen, yaw + azimuth, elevation)
 
     def frame(self, state: int) -> Frame:
-        """Everything where it is in `state`."""
+        """The frame of the whole scene in `state`."""
         self._skill.show(self._bench, state)
         poses, visible = self._extra.at(state)
         colors = {} if self._frames else self._ghosts

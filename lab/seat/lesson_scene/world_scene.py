@@ -23,18 +23,18 @@ class WorldScene:
         self.camera = self._drawn.camera()
 
     def place(self, state: int) -> Vector:
-        """The middle of a state's cell [m]."""
+        """The centre of a state's cell [m]."""
         return vector(self._drawn.centres([self._mdp.state_cell(state)])[0])
 
     def _robot(self) -> tuple[Body, ...]:
-        """A ball, and in a room a disc on the ground below it, which tells how far back it is."""
+        """A ball, and in a room a disc on the ground below it, which shows its depth."""
         ball = Body("robot", (Shape("sphere", (self._ball,), None, BLUE),))
         if self._drawn.flat:
             return (ball,)
         return (ball, Body("below", (Shape("cylinder", (self._ball, FLAT * self._drawn.size), None, SHADE),)))
 
     def frame(self, state: int) -> Frame:
-        """The robot in the cell of `state`."""
+        """The frame with the robot in the cell of `state`."""
         poses, visible = self._marks.at(state)
         x, y, z = self.place(state)
         poses["robot"] = upright((x, y, z))

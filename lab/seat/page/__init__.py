@@ -1,1 +1,1 @@
-"""A person at a page in the browser: scene, grid, answers and receipt."""
+"""The page on which a person teaches or operates in the browser: scene, grid, answers, receipt and console."""

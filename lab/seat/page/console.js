@@ -1,4 +1,4 @@
-// The operator's console beside the scene: where the run stands, what stops it, and buttons and keys that say commands.
+// The operator's console beside the scene: the run's status, what holds it, and buttons and keys for commands.
 "use strict";
 
 const seatConsole = (() => {
@@ -11,7 +11,7 @@ const seatConsole = (() => {
   const BY = { operator: "by the operator", robot: "by the robot", onlooker: "by somebody who only watches" };
   const LIGHTS = { idle: "○", busy: "▶", done: "✔", failed: "✖" };
   const STATES = { waiting: "○", carried: "➜", "in machine": "▶", done: "✔", lost: "✖" };
-  // Where, key, its name on the button, what is said, label, what it does
+  // Group, key, the key's name on the button, command, label, explanation
   const BUTTONS = [
     ["drive", " ", "space", "pause", "❚❚ Pause", "stop when the move under way has ended"],
     ["drive", "s", "s", "step", "▸| Step", "carry one move out, then pause"],
@@ -28,7 +28,7 @@ const seatConsole = (() => {
     ["hand", "h", "h", "home", "Home", "bring the arm home, over everything"],
     ["hand", "g", "g", "grasp", "Grasp nearest", "take up the part that is nearest to the gripper, wherever that is"],
   ];
-  // Key, its name on the button, what is said before the number that is chosen, where it is chosen, label, what it does, place
+  // Key, its name on the button, command before the chosen number, input with the number, label, explanation, place
   const JOGS = [
     ["ArrowUp", "↑", "jog +y", "run-mm", "+y", "move the tool along +y", "1 / 2"],
     ["ArrowLeft", "←", "jog -x", "run-mm", "-x", "move the tool along -x", "2 / 1"],
@@ -50,7 +50,7 @@ const seatConsole = (() => {
   const mine = () => Boolean(send && state.you && state.you.seat);
   const takes = (words) => here() && state.run.commands.includes(words.split(" ")[0]);
 
-  // ---- what is said
+  // ---- commands
 
   function say(words) {
     if (!send) return;
@@ -58,7 +58,7 @@ const seatConsole = (() => {
     send({ command: words });
   }
 
-  // An emergency stop is asked for by anybody, in any state; only what is shown here waits for the answer
+  // Any page may request an emergency stop in any state; only the display waits for the answer
   function stop() {
     if (!here() || !send) return;
     send({ command: "stop" });
@@ -74,7 +74,7 @@ const seatConsole = (() => {
     } else arm(true);
   }
 
-  // To leave wants a second press
+  // Leaving needs a second press
   function arm(on) {
     clearTimeout(armed);
     armed = on ? setTimeout(arm, SURE_MS, false) : 0;
@@ -83,7 +83,7 @@ const seatConsole = (() => {
     made.querySelector("span").textContent = on ? "Sure? Once more" : label;
   }
 
-  // Whether a key was one of the console's; busy: a question waits, whose keys they are then; drawn: a way waits to be sent
+  // Whether the console handled a key; busy: a pending question takes the keys; drawn: a path is waiting to be sent
   function pressed(event, { busy, drawn }) {
     if (!here() || event.ctrlKey || event.altKey || event.metaKey) return false;
     if (event.key === "Escape" && !drawn) {
@@ -92,7 +92,7 @@ const seatConsole = (() => {
       return true;
     }
     if (busy || event.target.matches("input, select, textarea")) return false;
-    if (event.target.matches("button, summary") && [" ", "Enter"].includes(event.key)) return false; // that button's own
+    if (event.target.matches("button, summary") && [" ", "Enter"].includes(event.key)) return false; // the button handles this key
     if (FIELDS[event.key] && takes(FIELDS[event.key])) {
       event.preventDefault();
       el(event.key === "k" ? "run-parts-text" : `run-${FIELDS[event.key]}`).focus();
@@ -102,13 +102,13 @@ const seatConsole = (() => {
     const found = buttons.filter((one) => one.key === key && !one.made.hidden);
     if (!found.length) return false;
     event.preventDefault();
-    const able = found.find((one) => !one.made.disabled) || (mine() && found.length === 1 ? found[0] : null); // else the run says why not
+    const able = found.find((one) => !one.made.disabled) || (mine() && found.length === 1 ? found[0] : null); // otherwise the run says why not
     if (!able && !mine()) refused(state.you.free ? "Nobody operates yet: press 'Operate here' first." : "Another page operates: here only the emergency stop works.");
     if (able && !event.repeat) press(able);
     return true;
   }
 
-  // ---- what is shown
+  // ---- display
 
   const SHOWN = [
     [["run", "held", "you", "question"], showDriving],
@@ -154,7 +154,7 @@ const seatConsole = (() => {
     }
     const byHand = takes("jog +x");
     for (const id of ["run-make", "run-jog-box", "run-hand", "run-fields"]) el(id).hidden = !byHand;
-    const room = el(byHand ? "run-state" : "run-console"); // where there is more room
+    const room = el(byHand ? "run-state" : "run-console"); // the panel with more room
     if (el("run-lists").parentElement !== room) room.insertBefore(el("run-lists"), el(byHand ? "run-trouble" : "run-help"));
     el("run-stop").disabled = !send;
     el("run-keys").textContent = keysInWords();
@@ -213,7 +213,7 @@ const seatConsole = (() => {
 
   const toldOf = (one) => (one.refused ? `refused: ${one.refused}` : one.failed || one.said || "done");
 
-  // The names that may follow a command, offered while it is typed
+  // Suggestions while a command is typed: the names that may follow it
   function offer() {
     const text = JSON.stringify(state.run.names);
     if (text === names) return;
@@ -225,14 +225,14 @@ const seatConsole = (() => {
     if (kind) el("run-parts-field").querySelector("input").placeholder = `${kind}=2`;
   }
 
-  // ---- the chart, and the time
+  // ---- the chart and the clock
 
   function chartSoon() {
     clearTimeout(later);
     later = setTimeout(drawChart, Math.max(0, drawnAt + DRAW_MS - performance.now()));
   }
 
-  // What machines and the robot are doing now, to be cut off at the time now
+  // Current activities of machines and robot, cut off at the current time
   function underWay(end_s) {
     const { run, measured } = state, bars = [];
     for (const one of run.machines) {
@@ -278,13 +278,13 @@ const seatConsole = (() => {
     else if (chart) chart.grow(now);
   }
 
-  // A frame says which time it is
+  // A frame sets the time
   function clock(time_s) {
     now = time_s;
     if (here()) tick();
   }
 
-  // ---- what the page itself does
+  // ---- events of the page
 
   function add({ where, key, shown, says, label, help, name }) {
     const made = make("button");
@@ -294,7 +294,7 @@ const seatConsole = (() => {
     made.append(make("span", label), make("kbd", shown));
     buttons.push({ where, key, shown, says, label, name, made });
     made.onclick = (event) => {
-      if (event.detail) made.blur(); // after a click, keys mean the console again
+      if (event.detail) made.blur(); // after a click, keys go to the console again
       press(buttons.find((one) => one.made === made));
     };
     el(`run-${where}`).append(made);

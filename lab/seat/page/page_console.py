@@ -1,4 +1,4 @@
-"""The operator's console on the page: what it steers, and the documents that say where the run stands."""
+"""The operator's console on the page: its interface to a run, and the JSON documents of questions, work and status."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
@@ -20,7 +20,7 @@ Json = dict[str, Any]
 
 
 def order_of(request: SequenceRequest) -> Json:
-    """Where the work stands, which moves are allowed, and what it would do."""
+    """The page's document of a question on the order: state of the work, allowed moves, and the learner's own choice."""
     own = move_of(request, request.own)
     return {
         "kind": "order",
@@ -45,7 +45,7 @@ def _allowed(move: OrderMove) -> Json:
 
 
 def made_until(request: SequenceRequest) -> list[Move]:
-    """The moves of the episode that is asked about, until now."""
+    """The moves of the current episode up to the question."""
     run = Run(request.run.cell, request.run.times)
     for decision in request.made:
         run.move(decision)
@@ -53,9 +53,9 @@ def made_until(request: SequenceRequest) -> list[Move]:
 
 
 def bars_of(moves: Sequence[Move], now_s: float | None = None) -> Json:
-    """The work as the rows of a chart and its activities: of the robot, and of each machine that was given work.
+    """A chart's rows and activities for these moves: of the robot, and of each machine that has received work.
 
-    now_s: when the last move was made, by default when it ended.
+    now_s: the current time [s]; by default the end of the last move.
     """
     bars: list[Json] = []
     rows = [ROBOT]
@@ -70,7 +70,7 @@ def bars_of(moves: Sequence[Move], now_s: float | None = None) -> Json:
 
 
 def _machine_bars(moves: Sequence[Move], number: int) -> list[Json]:
-    """What a machine does with the part that a move has brought: it works, and it is blocked until the part is fetched."""
+    """The activities of the machine to which a move brought a part: processing, then blocked until the part is fetched."""
     brought = moves[number]
     done_s = brought.drop_s + brought.process_s
     fetched = next((m for m in moves[number + 1 :] if m.part == brought.part and m.origin == brought.target), None)
@@ -82,24 +82,24 @@ def _machine_bars(moves: Sequence[Move], number: int) -> list[Json]:
 
 
 def chart_row(one: Activity) -> Json:
-    """An activity as the page's chart takes it."""
+    """An activity as a record of the page's chart."""
     return asdict(one) | {"start_s": round(one.start_s, 2), "end_s": round(one.end_s, 2)}
 
 
-# ---- page console -----------------------------------------------------------------------------------------------------
+# ---- the console of a run ---------------------------------------------------------------------------------------------
 
 
-MOST_DONE = 20  # commands that are shown with what came of them
-ONLOOKER = "onlooker"  # who stops in an emergency without having the seat
+MOST_DONE = 20  # latest commands that are shown with their results
+ONLOOKER = "onlooker"  # recorded as the author of an emergency stop from a page without the seat
 PARTS = ("run", "plan", "measured")
 STOP = "stop"
 
 
 class Console(Protocol):
-    """What a page steers: all but `hear` is called in the server's thread.
+    """The interface through which a page steers a run; all but `hear` is called in the server's thread.
 
-    words: the commands that are taken; names: what may follow some of them. busy: the command under way, "" for none.
-    done: what came of all that was said.
+    words: the accepted commands; names: the names that may follow some of them. busy: the command under way, "" for none.
+    done: all commands with their results.
     """
 
     @property
@@ -114,16 +114,16 @@ class Console(Protocol):
     def busy(self) -> str: ...
 
     def now(self) -> RunStatus:
-        """Where the run stands."""
+        """The status of the run."""
 
     def say(self, line: str, by: str) -> Done | None:
-        """Take a command; returns at once."""
+        """Accept a command; returns at once, with its result if that is known already."""
 
     def watched(self, pages: int) -> None:
-        """So many pages are open."""
+        """Take note of the number of open pages."""
 
     def hear(self, event: Event) -> None:
-        """What happens, in the session's thread."""
+        """Take over an event, in the session's thread."""
 
 
 def changed_by(event: Event) -> tuple[str, ...]:
@@ -137,7 +137,7 @@ def changed_by(event: Event) -> tuple[str, ...]:
 
 
 def run_of(console: Console | None) -> Json | None:
-    """Where the run stands, and what may be said; without what has an own part."""
+    """The status of the run and the accepted commands, without what other parts of the document hold."""
     if console is None:
         return None
     status, done = console.now(), console.done
@@ -178,12 +178,12 @@ def plan_of(console: Console | None) -> Json | None:
 
 
 def measured_of(console: Console | None) -> list[Json]:
-    """What was done so far, without what machines are doing now."""
+    """The activities so far, without those that machines are carrying out now."""
     return [] if console is None else [chart_row(one) for one in console.now().measured]
 
 
 def held_of(console: Console) -> Json:
-    """What stops the run now, what may be said next ("": nothing has to be), and the pace."""
+    """What holds the run now, the command that is required next ("" for none), and the pace."""
     controls = console.controls
     held = controls.held
     if held is None:

@@ -1,4 +1,4 @@
-"""What pages may say, and who of those that watch has the seat. Whatever a page sends ends as a message or a refusal."""
+"""The messages that pages may send, and which page has the seat. Whatever a page sends becomes a message or is refused."""
 
 import json
 from dataclasses import dataclass, field
@@ -12,7 +12,7 @@ WORDS = ("skip", "auto", "undo", "quit")
 
 
 class Refused(Exception):
-    """What a page said is ignored; the text says why."""
+    """Raised for a page's message that is ignored; the text says why."""
 
 
 @dataclass(frozen=True)
@@ -27,28 +27,28 @@ class Answer:
 
 @dataclass(frozen=True)
 class Wish:
-    """The page wants the seat, or gives it away."""
+    """The page requests the seat, or gives it up."""
 
     wish: Literal["take", "give"]
 
 
 @dataclass(frozen=True)
 class Layer:
-    """The page wants to see a layer of the grid; None: the robot's."""
+    """The page requests a layer of the grid; None: the robot's."""
 
     layer: int | None
 
 
 @dataclass(frozen=True)
 class Pace:
-    """The page wants a session that is shown again to pause, to go on and so on: a word of `replay_pace.WORDS`."""
+    """The page changes the pace of a replay (pause, continue and so on): a word of `replay_pace.WORDS`."""
 
     word: str
 
 
 @dataclass(frozen=True)
 class Command:
-    """The page gives the run a command, in words of `lab.production.operation.commands`."""
+    """The page gives the run a command, in the language of `lab.production.operation.commands`."""
 
     words: str
 
@@ -57,7 +57,7 @@ Message = Answer | Wish | Layer | Pace | Command
 
 
 def understood(message: str | bytes) -> Message:
-    """What a page says. Raises Refused for anything else."""
+    """The message in a page's data. Raises Refused for anything else."""
     if isinstance(message, bytes) or len(message) > MAX_CHARS:
         raise Refused(f"That was no message of this page: text of at most {MAX_CHARS} characters is wanted.")
     try:
@@ -87,26 +87,26 @@ def understood(message: str | bytes) -> Message:
 
 @dataclass
 class Chair:
-    """One seat for many pages: the first to come has it; once it is free, whoever comes, or takes it."""
+    """The one seat for many pages: the first page has it; a free seat goes to the next page that joins or requests it."""
 
     pages: list[int] = field(default_factory=list)
     holder: int | None = None
 
     def joined(self, page: int) -> None:
-        """A page has come."""
+        """A page has been opened."""
         self.pages.append(page)
         if self.holder is None:
             self.holder = page
 
     def left(self, page: int) -> None:
-        """A page has gone, and the seat is free if it was its own."""
+        """A page has been closed; the seat is free if the page had it."""
         if page in self.pages:
             self.pages.remove(page)
         if self.holder == page:
             self.holder = None
 
     def wish(self, page: int, wanted: Wish) -> None:
-        """Give the seat away, or take it. Raises Refused when it is not free, or not the page's own."""
+        """Give the seat up, or take it. Raises Refused when the page does not have it, or it is not free."""
         if wanted.wish == "give":
             if self.holder != page:
                 raise Refused("This page does not answer: there is nothing to hand over.")
@@ -117,5 +117,5 @@ class Chair:
             self.holder = page
 
     def view(self, page: int) -> dict[str, Any]:
-        """What a page is told of the seat."""
+        """The state of the seat, for this page."""
         return {"seat": self.holder == page, "free": self.holder is None, "pages": len(self.pages)}

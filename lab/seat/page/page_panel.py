@@ -1,4 +1,4 @@
-"""The panel of the teaching page between two threads: the session's, which asks, and the server's, which shows and hears."""
+"""The panel of the teaching page, shared by two threads: the session's, which asks, and the server's, which serves pages."""
 
 import json
 import threading
@@ -18,16 +18,16 @@ from lab.seat.page.page_messages import Answer, Chair, Command, Layer, Message, 
 from lab.seat.page.page_state import PARTS, Known, Pending, layer_of
 from lab.view.meshcat import GANTT_SCRIPT
 
-SLICE_EVERY_S = 0.1  # a layer's values are sent at most ten times a second,
-RUN_EVERY_S = 0.1  # and where a run stands, too
-SLICE_SHARE = 30  # and working them out takes at most this part of the time
+SLICE_EVERY_S = 0.1  # least time between two messages with a layer's values
+RUN_EVERY_S = 0.1  # least time between two messages with the status of a run
+SLICE_SHARE = 30  # computing a layer's values takes at most one part in so many of the time
 CLOSED = Answer(0, None, "closed")
-LISTEN_S = 0.2  # the longest stretch of waiting, so that Ctrl-C is heard
+LISTEN_S = 0.2  # longest uninterrupted wait, so that Ctrl-C is noticed
 
 
 @dataclass
 class _Seen:
-    """What one page knows: versions of the parts, its seat, its layer; and what it has to be told beside."""
+    """What one page has received: versions of the parts, its seat, its layer; and a refusal that is still to be sent."""
 
     versions: dict[str, int] = field(default_factory=dict)
     you: str = ""
@@ -40,11 +40,11 @@ class _Seen:
 
 
 class SeatPanel:
-    """What is known, who has the seat, the question that waits, and its answer; `lock` guards all of it.
+    """The known state, the seat, the pending question and its answer; `lock` guards all of it.
 
-    on_word: told, in the server's thread, in a word of the terminal what was answered to a question that nobody waits
-    for here. on_pace: told in a word how a session that is shown again is to go on. on_quit: told that the run's console
-    is to be left.
+    on_word: called in the server's thread with the answer, as a word of the terminal, to a question that somebody else
+    waits for. on_pace: called with a word that changes the pace of a replay. on_quit: called when the run's console is to
+    be left.
     """
 
     files: Sequence[Path] = (
@@ -60,7 +60,7 @@ class SeatPanel:
 
     def __init__(self, title: str) -> None:
         self.guard = threading.RLock()
-        self.lock = threading.Condition(self.guard)  # the same lock, to wait with
+        self.lock = threading.Condition(self.guard)  # a condition on the same lock, for waiting
         self.known = Known(title)
         self.chair = Chair()
         self.on_word: Callable[[str], None] | None = None
@@ -71,13 +71,13 @@ class SeatPanel:
         self._pages: dict[int, _Seen] = {}
         self._texts: dict[str, tuple[int, str]] = {}  # part, or layer -> its version and its JSON
         self._stirred = 0
-        self._late = False  # something was held back
-        self._busy = ""  # the console's command under way when it was looked at last
+        self._late = False  # whether news were held back
+        self._busy = ""  # the console's command under way at the last check
 
     # ---- called by the session's thread
 
     def pose(self, pending: Pending) -> Pending:
-        """A new question, with a number of its own; nobody answers the one before any more."""
+        """The new question with its number; answers to the question before are refused from now on."""
         with self.lock:
             self.known.questions += 1
             self._answer = None
@@ -86,7 +86,7 @@ class SeatPanel:
             return self.known.pending
 
     def close(self) -> bool:
-        """The question waits no more; whether one did."""
+        """Withdraw the question; returns whether there was one."""
         with self.lock:
             waited = self.known.pending is not None
             if waited:
@@ -95,7 +95,7 @@ class SeatPanel:
             return waited
 
     def wait(self, pending: Pending) -> Answer | None:
-        """The answer, CLOSED when no page can come any more; None when the time is over."""
+        """The answer to a question, or CLOSED after the server has ended; None after the question's time."""
         with self.lock:
             while self._answer is None:
                 if self._ended:
@@ -107,7 +107,7 @@ class SeatPanel:
             return self._answer
 
     def end(self) -> None:
-        """No page can come any more."""
+        """The server has ended: wake whoever waits for an answer."""
         with self.lock:
             self._ended = True
             self.lock.notify_all()
@@ -122,7 +122,7 @@ class SeatPanel:
             self._count()
 
     def left(self, page: int) -> None:
-        """A browser has left; what waits goes on waiting."""
+        """A browser has left; a pending question remains pending."""
         with self.lock:
             self._pages.pop(page, None)
             self.chair.left(page)
@@ -133,7 +133,7 @@ class SeatPanel:
             self.known.console.watched(len(self.chair.pages))
 
     def stirred(self) -> bool:
-        """Whether there is something new since this was asked last."""
+        """Whether there is news since the last call."""
         with self.lock:
             busy = "" if self.known.console is None else self.known.console.busy
             if busy != self._busy:
@@ -145,7 +145,7 @@ class SeatPanel:
             return new
 
     def said(self, page: int, message: str | bytes) -> None:
-        """Do what a page says, or refuse it in a line on that page. An emergency stop waits for nothing and nobody."""
+        """Act on a page's message, or refuse it with a line on that page. An emergency stop is passed on without the lock."""
         word = ""
         try:
             meant = understood(message)
@@ -161,11 +161,11 @@ class SeatPanel:
             self.on_word(word)
 
     def _command(self, page: int, meant: Command) -> None:
-        """Say it to the run, without the lock: who hears what comes of it takes it, too."""
+        """Pass a command to the run, without the lock, which the receiver of the result takes as well."""
         console, first = self.known.console, meant.words.split()[0].lower()
         if console is None:
             raise Refused("Nothing is carried out here that takes commands.")
-        has_seat = self.chair.holder == page  # only this thread changes it
+        has_seat = self.chair.holder == page  # only this thread changes the holder
         if first == STOP:
             console.say(STOP, OPERATOR if has_seat else ONLOOKER)
         elif not has_seat:
@@ -181,7 +181,7 @@ class SeatPanel:
             console.say(meant.words, OPERATOR)
 
     def _do(self, page: int, meant: Message) -> str:
-        """The terminal's word for the answer to a question that was only offered, "" for everything else."""
+        """The terminal's word for the answer to a question that somebody else waits for; "" for all other messages."""
         if isinstance(meant, Layer):
             self._pages[page].layer, self._pages[page].layer_version = meant.layer, 0
             return ""
@@ -202,7 +202,7 @@ class SeatPanel:
         return word_of(pending.request, meant) if pending.offered else ""
 
     def _checked(self, page: int, answer: Answer) -> Pending:
-        """The question that is answered. Raises Refused when it may not be answered so, or not by this page."""
+        """The question that an answer belongs to. Raises Refused for a wrong answer, or a page that may not answer."""
         pending = self.known.pending
         if self.chair.holder != page:
             raise Refused(
@@ -223,7 +223,7 @@ class SeatPanel:
         return pending
 
     def news(self, page: int) -> str:
-        """The JSON members "seat" and "refusal" with what this page does not know yet; "" when it knows all."""
+        """The JSON members that this page has not received yet, "seat" and "refusal" among them; "" for none."""
         with self.lock:
             seen, now_s = self._pages.get(page), time.monotonic()
             if seen is None:
@@ -245,7 +245,7 @@ class SeatPanel:
         return ", ".join(members + [f'"refusal": {json.dumps(refusal)}'] * bool(refusal))
 
     def _due(self, seen: _Seen, now_s: float) -> list[str]:
-        """The parts that have changed; where a run stands is held back when it was told just now."""
+        """The parts that have changed; the status of a run is held back for RUN_EVERY_S after the last one."""
         new = self.known.since(seen.versions)
         if self.known.console is None or not {*new} & {*RUN_PARTS}:
             return new
@@ -257,13 +257,13 @@ class SeatPanel:
 
     def _text(self, part: str, now_s: float) -> str:
         version, text = self._texts.get(part, (-1, ""))
-        if version != self.known.versions.get(part, 1) or part == "question":  # the time left runs
+        if version != self.known.versions.get(part, 1) or part == "question":  # the remaining time changes
             text = plain_json(PARTS[part](self.known, now_s))
             self._texts[part] = (self.known.versions.get(part, 1), text)
         return text
 
     def _layer(self, seen: _Seen, now_s: float) -> str | None:
-        """The layer that a page looks at, when it has changed and it is time to work it out."""
+        """The JSON of the layer that a page shows, when it has changed and SLICE_EVERY_S has passed; else None."""
         version = self.known.versions.get("slice", 1)
         if seen.layer_version == version:
             return None
@@ -275,13 +275,13 @@ class SeatPanel:
             self._texts[key] = (version, plain_json(layer_of(self.known, seen.layer)))
         seen.layer_version = version
         text = self._texts[key][1]
-        if text != "null":  # to find out that there is no grid takes no time, and soon there may be one
+        if text != "null":  # "no grid" is found out fast, and there may be a grid soon
             seen.layer_due_s = now_s + max(SLICE_EVERY_S, SLICE_SHARE * (time.monotonic() - now_s))
         return text
 
 
 def plain_json(value: Any) -> str:
-    """JSON that a browser reads: null where a number is not finite."""
+    """The JSON of a value for browsers, with null for numbers that are not finite."""
     try:
         return json.dumps(value, allow_nan=False)
     except ValueError:
@@ -297,7 +297,7 @@ def _finite(value: Any) -> Any:
 
 
 def word_of(request: Request, answer: Answer) -> str:
-    """An answer as a terminal understands it: the label of an action, the number of a move, the word itself, or a path."""
+    """An answer as typed at a terminal: the label of an action, the number of a move, the word itself, or a path."""
     if answer.word or answer.action is None:
         return answer.word
     if len(answer.path) > 1 and isinstance(request, AdviceRequest):

@@ -1,4 +1,4 @@
-"""What the learner asks, as the teaching page shows it: plain data of one step of a lesson."""
+"""The learner's question as plain data for the teaching page: the grid, the state, the moves, and the reason."""
 
 from collections.abc import Sequence
 from functools import lru_cache
@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 
 Json = dict[str, Any]
 LOWER, HIGHER = 4, 5  # directions along the third axis, after those in the picture: up, down, left, right
-MOST_ARROWS = 1600  # cells of a layer beyond which arrows cannot be seen, and are left out
-MOST_CELLS = 1 << 14  # of a layer; a page draws no more
+MOST_ARROWS = 1600  # cells of a layer; with more, arrows would be too small and are left out
+MOST_CELLS = 1 << 14  # largest number of a layer's cells that a page draws
 MOST_GOALS = 20
 
 
@@ -37,9 +37,9 @@ def _planes(mdp: TabularMDP) -> GridPlanes:
 
 @lru_cache(maxsize=8)
 def place_of(mdp: TabularMDP) -> Json | None:
-    """What stays of a problem's grid: rows, columns and layers, where goals are; None when its states are no grid.
+    """The constant properties of a problem's grid: rows, columns, layers and goals; None when its states are no grid.
 
-    Not to be changed: it is kept.
+    The result is cached and must not be changed.
     """
     shape = mdp.coverage_shape or mdp.shape
     if not shape or (planes := _planes(mdp)).rows * planes.columns > MOST_CELLS:
@@ -50,13 +50,13 @@ def place_of(mdp: TabularMDP) -> Json | None:
 
 
 def spot(mdp: TabularMDP, state: int) -> list[int]:
-    """[row, column, layer] of a state as the page draws it; [] when the states are no grid."""
+    """The [row, column, layer] of a state as the page draws it; [] when the states are no grid."""
     cell = mdp.state_cell(state)
     return [*_planes(mdp).place(cell), _planes(mdp).layer(cell)] if cell else []
 
 
 def directions(mdp: TabularMDP) -> list[int | None]:
-    """Where each action points: up, down, left, right in the picture, a layer lower, a layer higher; None: nowhere."""
+    """The direction of each action: up, down, left, right in the picture, LOWER, HIGHER; None: none of these."""
     pointing = [direction_of(mdp, action) for action in range(mdp.n_actions)]
     if len(mdp.shape) == 3 and mdp.n_actions == 6:
         pointing[4:6] = [LOWER, HIGHER]
@@ -64,11 +64,11 @@ def directions(mdp: TabularMDP) -> list[int | None]:
 
 
 def slice_of(mdp: TabularMDP, state: int, layer: int, q: Table | None, selection: str, temperature: float) -> Json:
-    """One layer: what stands in each cell, its value and what the learner would rather do there.
+    """One layer: the mark, the value and the preferred action of each cell.
 
-    "marks": a character a cell, row by row: "." free, "#" obstacle, "G" goal, "x" covered. "values": max_a Q(s, a) of each
-    cell that the learner has an opinion of, None elsewhere. "prefers": [cell, action, its chance] of these. In a problem of
-    covering, a cell is worth what the head there would be, all else as in `state`.
+    "marks": one character per cell, row by row: "." free, "#" obstacle, "G" goal, "x" covered. "values": max_a Q(s, a) of
+    each cell about which the learner has learned something, None elsewhere. "prefers": [cell, action, its probability] of
+    these. In a coverage problem, a cell has the value of the state with the head there, all else as in `state`.
     """
     states = _states(mdp, state, layer)
     seen = np.where(mdp.covered(state), "x", ".") if mdp.coverage_shape else _planes(mdp).marks(layer)
@@ -91,7 +91,7 @@ def slice_of(mdp: TabularMDP, state: int, layer: int, q: Table | None, selection
 
 
 def _states(mdp: TabularMDP, state: int, layer: int) -> NDArray[np.int64]:
-    """The states of a layer's cells, row by row as they are drawn."""
+    """The states of a layer's cells, row by row as drawn."""
     if mdp.coverage_shape:
         heads = np.arange(prod(mdp.coverage_shape))
         mask = state & ((1 << len(heads)) - 1)
@@ -99,11 +99,11 @@ def _states(mdp: TabularMDP, state: int, layer: int) -> NDArray[np.int64]:
     return _planes(mdp).plane(np.arange(mdp.n_states), layer).ravel()
 
 
-# ---- page question ----------------------------------------------------------------------------------------------------
+# ---- the question and its moves -----------------------------------------------------------------------------------------
 
 
 def question_of(request: Request, known: StateWords | None = None) -> Json:
-    """Where the learner is, what may be done, what it would do, and why it asks; known: what says the first in words."""
+    """The question: the learner's position, the moves, its own choice, and the reason; known: describes states in words."""
     if isinstance(request, AdviceRequest):
         shown = step_of(request, known)
     else:
@@ -120,7 +120,7 @@ def question_of(request: Request, known: StateWords | None = None) -> Json:
 
 
 def step_of(request: AdviceRequest, known: StateWords | None = None) -> Json:
-    """Where in the table the learner is, what it may do, and how sure it is."""
+    """The step of a tabular lesson: the learner's state, its allowed actions, and how certain it is."""
     mdp, state = request.mdp, request.state
     return {
         "kind": "step",
@@ -138,7 +138,7 @@ def step_of(request: AdviceRequest, known: StateWords | None = None) -> Json:
 
 
 def said_of(request: Request, action: int | None) -> str:
-    """What was answered to a request, and what came of it where that is out of the ordinary; None: nothing was said."""
+    """The answer to a request in words, and its outcome if that is unusual; None: the step was left to the learner."""
     if isinstance(request, AdviceRequest):
         marks, done = Marks(), request.own if action is None else action
         where = leads(request, done)
@@ -149,7 +149,7 @@ def said_of(request: Request, action: int | None) -> str:
 
 
 def moves_of(request: AdviceRequest, sizes: Sequence[str] = ()) -> list[Json]:
-    """Each action: its label, how far it goes, where it points, the learner's chance and value of it, where it leads to."""
+    """The record of each action: label, length, direction, the learner's probability and value of it, and its outcome."""
     mdp, state = request.mdp, request.state
     rows = zip(mdp.action_labels, directions(mdp), request.chances, request.q[state], strict=True)
     return [
@@ -177,7 +177,7 @@ def picture_of(drawing: str) -> list[list[list[str]]]:
 
 
 def _runs(line: "Text") -> list[list[str]]:
-    """A line of text as stretches of one style."""
+    """A line of text as runs of equal style."""
     edges = {0, len(line.plain)} | {edge for span in line.spans for edge in (span.start, span.end)}
     return [[line.plain[start:end], _classes(line, start)] for start, end in pairwise(sorted(edges))]
 

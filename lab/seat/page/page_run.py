@@ -1,4 +1,4 @@
-"""A whole run, or a sequencer's sessions, in the panel of the teaching page: phases, skills, times, the order, the moves."""
+"""Events of a run, or of a sequencer's sessions, in the panel of the teaching page: phases, skills, times, order, moves."""
 
 from dataclasses import replace
 
@@ -18,7 +18,7 @@ from lab.teaching.events import (
 
 
 def hear_run(known: Known, event: Event) -> None:
-    """Take over what happens in a run: a line in the panel, the moves so far, the costs of a sequencer's episodes."""
+    """Take over an event of a run: as a line in the panel, a move, or the cost of a sequencer's episode."""
     if known.console is not None:
         known.console.hear(event)
         known.changed(*changed_by(event))
@@ -38,14 +38,14 @@ def hear_run(known: Known, event: Event) -> None:
             known.learning.learned = lines
             known.changed("lesson")
         case EpisodeSequenced():
-            if known.learning.gate is None:  # else the session itself tells of it, and whether it was guided
+            if known.learning.gate is None:  # otherwise the session reports the episode, and whether it was guided
                 known.learning.curve.add(event.cost, False)
                 known.changed("curve")
         case MoveMade():
             known.moves.append(event.move)
             known.work = bars_of(known.moves)
             known.changed("work")
-    if text and not isinstance(event, LessonContinued):  # that is no part of a run
+    if text and not isinstance(event, LessonContinued):  # which is not part of a run
         done = before.done + isinstance(event, PARTS_DONE)
         known.progress = replace(before, done=done, lines=(*before.lines[1 - MOST_LINES :], text))
         known.changed("progress")

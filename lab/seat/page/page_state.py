@@ -1,6 +1,7 @@
-"""All that the teaching page shows, as one plain document: what is known, and the functions that write it down.
+"""The state of the teaching page, and the functions that write it as one JSON document in parts.
 
-Nothing here waits, sends or draws. PARTS say all; `Known.since` finds what has changed.
+Nothing here waits, sends or draws. PARTS lists the document's parts; `Known.since` finds those that have changed. Events
+of a lesson are taken over at the end of the file.
 """
 
 from collections import deque
@@ -30,14 +31,14 @@ from lab.seat.page.page_console import Console, measured_of, plan_of, run_of
 from lab.seat.page.page_question import place_of, question_of, slice_of, spot
 from lab.sequencing.cell.schedule import Move
 
-MOST = 400  # stretches that a page draws
+MOST = 400  # blocks of episodes that a page draws
 
 
 @dataclass
 class Curve:
-    """What episodes cost, in stretches of `per` episodes: the mean of each, its least, and how many of them were guided.
+    """The costs of episodes in blocks of `per`: of each block the mean, the least, and the number of guided episodes.
 
-    best: the least cost of all, and the episode that first had it, from 1; None before the first.
+    best: the least cost of all, and the first episode with it, counted from 1; None before the first episode.
     """
 
     per: int = 1
@@ -48,7 +49,7 @@ class Curve:
     best: tuple[float, int] | None = None
 
     def add(self, cost: float, guided: bool) -> None:
-        """One more episode; stretches become twice as long when there would be too many."""
+        """Add an episode; blocks become twice as long when there would be too many."""
         if self.count == self.per * MOST:
             self.sums = [a + b for a, b in zip(self.sums[::2], self.sums[1::2], strict=True)]
             self.lows = [*map(min, self.lows[::2], self.lows[1::2])]
@@ -66,7 +67,7 @@ class Curve:
             self.best = cost, self.count
 
     def document(self) -> dict[str, Any]:
-        """The curve as the page draws it."""
+        """The curve as a JSON document for the page."""
         last = self.count - self.per * (len(self.sums) - 1)
         sizes = [self.per] * (len(self.sums) - 1) + [last] * bool(self.sums)
         means = [float(f"{total / size:.5g}") for total, size in zip(self.sums, sizes, strict=True)]
@@ -75,7 +76,7 @@ class Curve:
         return known | {"bests": bests, "best": None if self.best is None else [*self.best]}
 
 
-# ---- page state -------------------------------------------------------------------------------------------------------
+# ---- the state and its document -----------------------------------------------------------------------------------------
 
 
 Json = dict[str, Any]
@@ -85,9 +86,9 @@ MOST_LINES = 80
 
 @dataclass(frozen=True)
 class Pending:
-    """A question that waits: what is asked, and until when [s of the clock], None: for ever; its number.
+    """A pending question: its request, its deadline ([s] of the clock, None: never), and its number.
 
-    offered: the answer is told to somebody else who waits for it, if anybody does.
+    offered: somebody else waits for the answer, if anybody does.
     """
 
     request: Request
@@ -98,18 +99,18 @@ class Pending:
 
     @property
     def words(self) -> tuple[str, ...]:
-        """What may be said beside the moves."""
+        """The accepted words besides the moves."""
         return ("skip", "auto", "quit", *["undo"] * self.request.undoable)
 
     @property
     def moves(self) -> Sequence[int]:
-        """The moves that may be said."""
+        """The accepted moves."""
         return self.request.allowed
 
 
 @dataclass
 class Notice:
-    """What is said about a lesson, and how often at once; tone: see `Told`."""
+    """A message about a lesson, and how often it came in a row; tone: see `Told`."""
 
     text: str
     tone: str = ""
@@ -118,7 +119,7 @@ class Notice:
 
 @dataclass
 class ShownLesson:
-    """One lesson, or the sessions of a sequencer: how it goes, and what the learner has said about it."""
+    """One lesson, or the sessions of a sequencer: its progress, and the learner's messages."""
 
     title: str = ""
     kind: str = "steps"  # or "order"
@@ -126,7 +127,7 @@ class ShownLesson:
     gate: GateSettings | None = None
     episodes: int = 0
     optimal: float | None = None
-    proven: bool = True  # else no cost is below it, and perhaps none is as low
+    proven: bool = True  # whether `optimal` is the optimum, not only a bound
     method: str = ""  # of a sequencer
     learned: tuple[str, ...] = ()  # how the order was learned, in words
     curve: Curve = field(default_factory=Curve)
@@ -139,21 +140,21 @@ class ShownLesson:
     remembered: int = 0  # steps made from memory
     misleads: int = 0
     rate: float | None = None
-    means: tuple[float | None, float | None] = (None, None)  # as it was told when it asked last
-    lately: deque[float] = field(default_factory=deque)  # what the last episodes cost, as many as two windows hold
-    verdict: str = ""  # "rejected", "converged" or "left": it asks no more
+    means: tuple[float | None, float | None] = (None, None)  # the means at the time of the last question
+    lately: deque[float] = field(default_factory=deque)  # costs of the latest episodes, as many as two windows hold
+    verdict: str = ""  # "rejected", "converged" or "left", after which it asks no more
     q: Table | None = None
     selection: str = "softmax"
     temperature: float = 1.0
-    state: int | None = None  # where it was seen last
-    known: StateWords | None = None  # what says in words where that is
+    state: int | None = None  # the last known state
+    known: StateWords | None = None  # describes that state in words
 
     def __post_init__(self) -> None:
         self.text.kind = self.kind
         self.lately = deque(maxlen=2 * self.gate.window if self.gate is not None else 0)
 
     def notice(self, told: Told) -> None:
-        """Something that the advisor should read. What is said again at once is counted."""
+        """Add a message for the advisor; a message that repeats the last one is counted."""
         last = self.notices[-1] if self.notices else None
         if last is not None and last.text == told.text:
             last.times += 1
@@ -163,7 +164,7 @@ class ShownLesson:
 
 @dataclass(frozen=True)
 class Progress:
-    """How a whole run goes: the phase under way, how many of its parts are done, and what has been told."""
+    """The progress of a whole run: the current phase, how many of its items are done, and the lines so far."""
 
     phase: str = ""
     parts: int = 0
@@ -173,7 +174,7 @@ class Progress:
 
 @dataclass
 class Known:
-    """All that the page may have to show. `changed` says what is new; versions are counted, so that nothing is sent twice."""
+    """Everything that the page may show. `changed` marks parts as changed; versions ensure that nothing is sent twice."""
 
     title: str
     learning: ShownLesson = field(default_factory=ShownLesson)
@@ -184,16 +185,16 @@ class Known:
     members: list[Json] = field(default_factory=list)
     receipt: Json | None = None
     ended: str = ""
-    asks: bool = True  # somebody who teaches may be asked here
-    console: Console | None = None  # of a run that is steered here
-    replay: Json | None = None  # of a session that is shown again: its pace, and what was answered last
+    asks: bool = True  # whether questions of a lesson may be answered here
+    console: Console | None = None  # of a run that is operated here
+    replay: Json | None = None  # of a replay: its pace, and the last answer
     questions: int = 0
     version: int = 1
     versions: dict[str, int] = field(default_factory=dict)
     touched: set[str] = field(default_factory=set)
 
     def changed(self, *parts: str) -> None:
-        """These parts of the document are not what they were."""
+        """Mark these parts of the document as changed."""
         self.touched.update(parts)
 
     def begin(self, learning: ShownLesson) -> None:
@@ -202,7 +203,7 @@ class Known:
         self.changed("lesson", "place", "robot", "curve", "standing", "notices", "slice")
 
     def settle(self) -> int:
-        """Give what has changed a new version; the version of the whole."""
+        """The version of the whole document, after giving changed parts a new version."""
         if self.touched:
             self.version += 1
             self.versions |= dict.fromkeys(self.touched, self.version)
@@ -210,7 +211,7 @@ class Known:
         return self.version
 
     def since(self, seen: Mapping[str, int]) -> list[str]:
-        """The parts that have changed since these versions of them."""
+        """The parts that have changed since these versions, by part."""
         return [part for part in PARTS if self.versions.get(part, 1) > seen.get(part, 0)]
 
 
@@ -296,7 +297,7 @@ PARTS: dict[str, Callable[[Known, float], Any]] = {
 
 
 def layer_of(known: Known, layer: int | None = None) -> Json | None:
-    """What stands in a layer's cells and what they are worth, by default the robot's; None when there is no grid."""
+    """The marks and values of a layer's cells, by default of the robot's layer; None when there is no grid."""
     learning, mdp = known.learning, known.learning.mdp
     place = None if mdp is None else place_of(mdp)
     if mdp is None or place is None:
@@ -308,14 +309,14 @@ def layer_of(known: Known, layer: int | None = None) -> Json | None:
 
 
 def standing_of(learning: ShownLesson, standing: Standing) -> None:
-    """Take over how advice stands with the learner; what has become worse is said."""
+    """Take over the learner's standing of advice; a message says what has become worse."""
     if standing.misleads > learning.misleads:
         text = f"The last lesson did not help: {standing.misleads} so far, {standing.omega} are tolerated."
         learning.notice(Told(text, "bad"))
     learning.misleads, learning.helped_steps = standing.misleads, standing.helped_steps
 
 
-# ---- page events ------------------------------------------------------------------------------------------------------
+# ---- events of a lesson -------------------------------------------------------------------------------------------------
 
 
 STEP = ("standing", "robot", "slice")
@@ -323,7 +324,7 @@ EPISODE = ("standing", "curve", "slice", "notices")
 
 
 def hear(learning: ShownLesson, event: Event) -> tuple[str, ...]:
-    """Take an event over; the parts of the document that it has changed. Called for every answer, so it does little."""
+    """Take an event over; returns the changed parts of the document. Called for every answer, so it must be fast."""
     kind = type(event)
     if kind is AdviceGiven:
         return _given(learning, event)  # type: ignore[arg-type]

@@ -1,4 +1,4 @@
-// What the teaching seat draws: the grid with values and preferences, the learning curve, bars. Data in, pictures out.
+// Drawing functions of the teaching seat: the grid with values and preferences, the learning curve, bars.
 "use strict";
 
 const seatDraw = (() => {
@@ -6,7 +6,7 @@ const seatDraw = (() => {
   const WALL = "#3f464d", FREE = "#f3f4f5", GOAL = "#009e73", ROBOT = "#e69f00", OWN = "#a3447a", INK = "#222222";
   const TURN = [-Math.PI / 2, Math.PI / 2, Math.PI, 0]; // up, down, left, right
 
-  // A value's colour, 0 lowest and 1 highest: viridis, lightened so that marks are seen on it
+  // The colour of a value, 0 lowest and 1 highest: viridis, lightened so that marks are visible on it
   function tint(share) {
     const at = Math.min(Math.max(share, 0), 1) * (VIRIDIS.length - 1), low = Math.min(Math.floor(at), VIRIDIS.length - 2);
     const part = (text, k) => parseInt(text.slice(2 * k, 2 * k + 2), 16);
@@ -69,7 +69,7 @@ const seatDraw = (() => {
     return size;
   }
 
-  // A way that is drawn but not sent: a line with a head, light below so that it is seen on every colour
+  // A path that is drawn but not sent: a line with a head, on a light line that makes it visible on every colour
   function way(pen, cells, size) {
     const at = ([row, column]) => [(column + 0.5) * size, (row + 0.5) * size];
     pen.save();
@@ -119,7 +119,7 @@ const seatDraw = (() => {
     }
   }
 
-  // Where a goal lies in another layer, a dashed frame
+  // A dashed frame in the cell above or below a goal in another layer
   function goalsElsewhere(pen, { place, slice }, size) {
     pen.save();
     Object.assign(pen, { strokeStyle: GOAL, fillStyle: "#00795a", lineWidth: Math.max(1, size / 14) });
@@ -188,13 +188,13 @@ const seatDraw = (() => {
 
   const nice = (value) => (Math.abs(value) >= 100 ? Math.round(value) : Number(value.toPrecision(3)));
 
-  // How many episodes the axis holds: all of them, or a round number while few have been
+  // The number of episodes on the axis: all of them, or a round number while there are few
   function reach(count, episodes) {
     const round = [20, 50, 100, 200, 500].find((one) => one >= 1.2 * count) || 1.2 * count;
     return Math.max(count, episodes ? Math.min(round, episodes) : Math.round(round));
   }
 
-  // Means as a line, of orders the best so far as steps, guided stretches as dots, what cannot be beaten as a dashed line
+  // Means as a line, the best order so far as steps, blocks with advice as dots, the bound as a dashed line
   function curve(svg, { per, count, means, guided, bests, best }, { optimal, proven, unit, episodes }) {
     const wide = svg.clientWidth || 400, tall = svg.clientHeight || 170, left = 46, right = 10, top = 10, bottom = 22;
     const last = reach(Math.max(count, per), episodes);
@@ -225,7 +225,7 @@ const seatDraw = (() => {
     svg.setAttribute("aria-label", `${seatStatus.count(count, "episode")}${now}, ${guided.filter(Boolean).length} ${per > 1 ? "stretches" : "episodes"} guided`);
   }
 
-  // The improvement rate as a bar from 0, the threshold as a mark: left of it the learner asks
+  // The improvement rate as a bar from 0, the threshold as a mark; below it the learner asks
   function rate(svg, value, threshold) {
     const wide = svg.clientWidth || 300, most = 0.5, x = (part) => 8 + ((wide - 16) * (Math.min(Math.max(part, -most), most) + most)) / (2 * most);
     const parts = [node("rect", { x: 8, y: 6, width: wide - 16, height: 10, rx: 3, fill: "#ededed" })];
@@ -240,7 +240,7 @@ const seatDraw = (() => {
     svg.replaceChildren(...parts);
   }
 
-  // How far an advisor is trusted, 0 to 1, with the interval that is 95 % sure
+  // The trust in an advisor, 0 to 1, with its 95 % interval
   function trust({ trust: at, low, high, dropped }) {
     const svg = node("svg", { viewBox: "0 0 100 14", preserveAspectRatio: "none", role: "img", "aria-label": `trust ${Math.round(100 * at)} %, from ${Math.round(100 * low)} to ${Math.round(100 * high)} %` });
     svg.append(node("rect", { x: 0, y: 5, width: 100, height: 4, fill: "#ededed" }));

@@ -1,4 +1,4 @@
-// The map of the teaching seat: one layer of the grid, or the environment's own drawing; looked at, clicked, drawn a way on.
+// The map of the teaching seat: one layer of the grid, or the environment's own drawing; for viewing, clicking, drawing a path.
 "use strict";
 
 const seatMap = (() => {
@@ -6,7 +6,7 @@ const seatMap = (() => {
   const HINT = "colours: worth; arrows: what it prefers; drag from R to draw a way";
   const el = (id) => document.getElementById(id);
   let place = null, slice = null, asked = null, cell = 0, layer = null, told = { go() {}, look() {}, can: () => false };
-  let way = [], view = null, pen = null; // the cells of the way that is drawn, the robot's first; the pointer that draws
+  let way = [], view = null, pen = null; // the cells of the drawn path, the robot's first; the current view; the pointer that draws
 
   function show(state, shown) {
     ({ place, slice } = state);
@@ -44,7 +44,7 @@ const seatMap = (() => {
     el("layer-robot").hidden = layer === null;
   }
 
-  // The layer to look at, null for the robot's
+  // The layer to show, null for the robot's
   function look(wanted) {
     layer = wanted;
     el("layer-robot").hidden = layer === null;
@@ -66,14 +66,14 @@ const seatMap = (() => {
     el("readout").textContent = `row ${there[0] + 1}, column ${there[1] + 1}: ${worth}`;
   }
 
-  // ---- a way drawn from the robot on, by mouse, finger or Shift and the arrow keys
+  // ---- a path drawn from the robot by mouse, finger, or Shift and the arrow keys
 
   const same = (one, other) => one.length === other.length && one.every((value, k) => value === other[k]);
   const drawable = () => Boolean(asked && asked.kind === "step" && asked.at.length && slice && slice.layer === asked.at[2] && told.can());
   const end = () => way[way.length - 1];
   const mark = ([row, column]) => slice.marks[row * place.columns + column];
 
-  // One cell on, or back where the way came from; false where the grid or the way ends, or something stands
+  // Extend the path by a cell, or take its last cell back; false at the grid's edge, an obstacle, or a path's end
   function step(direction) {
     if (!drawable()) return false;
     if (!way.length) way = [asked.at];
@@ -86,7 +86,7 @@ const seatMap = (() => {
     return true;
   }
 
-  // Cell by cell until the way ends under the pointer, as far as nothing stands there
+  // Extend the path cell by cell to the pointer, up to the first obstacle
   function toward(there) {
     for (let left = place.rows + place.columns; left > 0 && !(end()[0] === there[0] && end()[1] === there[1]); left -= 1) {
       const down = there[0] - end()[0], right = there[1] - end()[1], upright = down < 0 ? 0 : 1, across = right < 0 ? 2 : 3;
@@ -104,7 +104,7 @@ const seatMap = (() => {
 
   const beside = (there, from) => Math.abs(there[0] - from[0]) + Math.abs(there[1] - from[1]) <= 1;
 
-  // A way begins at the robot, or goes on at its end; elsewhere a finger scrolls the page
+  // A path begins at the robot, or continues at its end; elsewhere a finger scrolls the page
   function begins(event) {
     const there = drawable() ? under(event) : null;
     return there && (beside(there, asked.at) || (way.length > 1 && beside(there, end()))) ? there : null;
@@ -126,7 +126,7 @@ const seatMap = (() => {
     toward(there);
   }
 
-  // A press beside the robot that was not drawn on is the move there
+  // A press on a cell next to the robot, without drawing, is the move to it
   function released(event) {
     if (!pen || pen.id !== event.pointerId) return;
     const { from, moved: drew } = pen;
@@ -153,7 +153,7 @@ const seatMap = (() => {
   }
 
   function picture(shown) {
-    if (!shown) return; // the last drawing stays
+    if (!shown) return; // the last drawing remains
     drawn(shown.shapes);
     el("picture").hidden = !shown.picture.length || shown.shapes.length > 0;
     const lines = shown.picture.flatMap((line) => [...line.map(([text, kind]) => seatStatus.make("span", text, kind)), "\n"]);
@@ -176,9 +176,9 @@ const seatMap = (() => {
     picture,
     step,
     drop,
-    // the directions of the way that is drawn
+    // the directions of the drawn path
     drawn: () => way.slice(1).map(([row, column], k) => STEPS.findIndex(([down, right]) => row - way[k][0] === down && column - way[k][1] === right)),
-    // whom to tell of a click and of a layer, and after a reconnection once more of the layer
+    // the functions to call for a click and for a layer; after a reconnection the layer is reported again
     tell(listener) {
       told = listener;
       if (layer !== null) told.look(layer);

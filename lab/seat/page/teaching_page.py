@@ -1,7 +1,7 @@
-"""The teaching seat: a page on which a person watches a learner, is asked by it, and answers by keys and buttons.
+"""The teaching seat: a page on which a person watches a learner, and answers its questions by keys and buttons.
 
-The session's thread asks and waits; the server's thread shows and hears. A page may come, go and come again meanwhile:
-the question waits. Several pages may watch, one of them has the seat.
+The session's thread asks and waits; the server's thread sends and receives. A page may be closed and opened again while
+a question is pending. Several pages may watch; one of them has the seat.
 """
 
 import time
@@ -32,14 +32,14 @@ from lab.teaching.lesson_plan import LessonPlan
 from lab.view.meshcat import LiveView
 
 TITLE = "Teaching lab"
-MOST_STATES = 50_000  # of problems whose shortest way is looked for
+MOST_STATES = 50_000  # of problems whose shortest path is computed
 
 
 class SeatPage(LiveView):
     """The live page with a seat for one advisor; a context manager, like every live view.
 
-    wait_s: how long a question waits for an answer [s], counted anew for each; None: for ever. All methods are called by
-    the session's thread. Entering raises BadInput for a port that it cannot have, and for a `wait_s` that is no time.
+    wait_s: the time limit [s] for each answer; None: no limit. All methods are called by the session's thread. Entering
+    raises BadInput for a port that is taken or not allowed, and for a `wait_s` that is not finite and above 0.
     """
 
     def __init__(self, port: int = 0, *, wait_s: float | None = None) -> None:
@@ -51,17 +51,17 @@ class SeatPage(LiveView):
         self._path = PathAhead()
 
     def close(self) -> None:
-        """Stop serving; who waits for an answer learns that there is nobody any more. Safe to call again."""
+        """Stop serving; whoever waits for an answer is told that the page was closed. Safe to call again."""
         self._panel.end()
         super().close()
 
     # ---- questions
 
     def ask(self, request: Request) -> int | None:
-        """What the page's advisor says: one of `allowed`, None for "skip". Waits until somebody answers, or the time is over.
+        """The answer of the page's advisor: one of `allowed`, None for "skip". Waits for it, at most `wait_s`.
 
-        Raises AdvisorLeft for "auto", after the time and when the page is closed, Undo when an answer is taken back, and
-        KeyboardInterrupt for "quit".
+        Raises AdvisorLeft for "auto", after the time limit and when the page is closed, Undo when an answer is taken back,
+        and KeyboardInterrupt for "quit".
         """
         if self._path.goes_on(request):
             self.look(request)
@@ -78,7 +78,7 @@ class SeatPage(LiveView):
         return _said(pending, answer)
 
     def _drop_path(self) -> None:
-        """What is left of a drawn way leads elsewhere than the learner went: that is said."""
+        """Drop the rest of a drawn path, because the learner has gone elsewhere, with a message."""
         if left := len(self._path.left):
             with self._panel.lock:
                 text = f"The rest of your way is dropped ({counted(left, 'move')}): the learner is elsewhere now."
@@ -87,21 +87,21 @@ class SeatPage(LiveView):
         self._path = PathAhead()
 
     def offer(self, request: Request, on_word: Callable[[str], None] | None = None) -> None:
-        """Show a question that is answered elsewhere, too; returns at once.
+        """Show a question that is also asked elsewhere; returns at once.
 
-        on_word: called from the server's thread with the answer on the page, as a word that the terminal knows.
+        on_word: called from the server's thread with the page's answer, as a word of the terminal.
         """
         self._panel.on_word = on_word
         self._pose(request, offered=True)
 
     def look(self, request: Request) -> None:
-        """Show where the learner is and what it thinks, without a question: somebody else is asked."""
+        """Show the learner's state and preferences without a question, because somebody else is asked."""
         with self._panel.lock:
             self._see(request)
         self._wake()
 
     def paced(self, pace: ReplayPace) -> None:
-        """A session is shown again: pages pause it, step through it and change its speed."""
+        """A replay begins: pages pause it, step through it and change its speed."""
 
         def changed(now: Mapping[str, Any]) -> None:
             with self._panel.lock:
@@ -113,7 +113,7 @@ class SeatPage(LiveView):
         changed(pace.now())
 
     def steer(self, console: Console, on_quit: Callable[[], None] | None = None) -> None:
-        """Pages steer this run: they show where it stands and give its commands; on_quit: it can be left."""
+        """Pages operate this run: they show its status and give its commands; on_quit: called to leave it, if possible."""
         self._panel.on_quit = on_quit
         with self._panel.lock:
             self._panel.known.console = console
@@ -122,19 +122,19 @@ class SeatPage(LiveView):
         self.ran()
 
     def ran(self) -> None:
-        """Something came of a command to the run: pages look again."""
+        """A command to the run has a result: pages show it."""
         with self._panel.lock:
             self._panel.known.changed(*RUN_PARTS)
         self._wake()
 
     def asks_nobody(self) -> None:
-        """Nobody who looks at this page is asked anything."""
+        """This page only shows; no question goes to it."""
         with self._panel.lock:
             self._panel.known.asks = False
             self._panel.known.changed("lesson")
 
     def replayed(self, request: Request, action: int | None) -> None:
-        """Show a question of a session that is shown again, with what was answered; None: it was left to the learner."""
+        """Show a question of a replay with its answer; None: the step was left to the learner."""
         known = self._panel.known
         with self._panel.lock:
             known.replay = {**(known.replay or {}), "action": action, "said": said_of(request, action)}
@@ -143,7 +143,7 @@ class SeatPage(LiveView):
 
     def withdraw(self) -> None:
         """The question was answered elsewhere."""
-        if self._panel.close():  # an answer on the page has closed it already, and what comes of it is told next
+        if self._panel.close():  # otherwise an answer on the page has closed it, and its result follows
             self._wake()
 
     def _pose(self, request: Request, offered: bool = False) -> Pending:
@@ -157,7 +157,7 @@ class SeatPage(LiveView):
         return pending
 
     def _see(self, request: Request) -> None:
-        """What a request shows of the learner beside the question."""
+        """Take over the learner's state from a request, as shown beside the question."""
         if isinstance(request, SequenceRequest):
             self._see_order(request)
         elif isinstance(request, AdviceRequest):
@@ -185,14 +185,14 @@ class SeatPage(LiveView):
         known.work = bars_of(made_until(request), request.run.now_s)
         known.changed("work", "standing")
 
-    # ---- what happens
+    # ---- events
 
     def hear(self, event: Event) -> None:
-        """Show what happens in a lesson or a run, of a lesson in as little time as can be."""
+        """Show an event of a lesson or a run; for a lesson this must be fast."""
         known = self._panel.known
         if type(event) is LessonEvent:
-            with self._panel.guard:  # quicker than the condition's own way
-                if event.lesson != known.learning.title:  # one of another skill begins a new curve
+            with self._panel.guard:  # faster than through the condition
+                if event.lesson != known.learning.title:  # a lesson of another skill begins a new curve
                     known.begin(ShownLesson(event.lesson))
                 known.touched.update(hear(known.learning, event.event))
             return
@@ -200,27 +200,27 @@ class SeatPage(LiveView):
         with self._panel.lock:
             if made is None:
                 hear_run(known, event)
-            else:  # anew, too, because an answer was taken back
+            else:  # also when the episode restarts because an answer was taken back
                 known.receipt, known.ended = None, ""
                 known.begin(made)
 
     def about(self, known: StateWords | None) -> None:
-        """What says in words where the learner is in the lesson that begins, None where nothing does."""
+        """Take over the object that describes the new lesson's states in words; None for none."""
         with self._panel.lock:
             self._panel.known.learning.known = known
 
-    # ---- what is shown beside
+    # ---- receipt, advisors, end
 
     def receipt(self, document: Mapping[str, Any]) -> None:
-        """What the advice was worth so far."""
+        """Show the receipt of the advice so far."""
         self._show("receipt", dict(document))
 
     def members(self, members: Iterable[Any]) -> None:
-        """Several advisors: records with `name`, `trust`, `low`, `high` and `dropped`."""
+        """Show several advisors: records with `name`, `trust`, `low`, `high` and `dropped`."""
         self._show("members", [asdict(member) for member in members])
 
     def finished(self, text: str) -> None:
-        """The lesson is over: nothing is asked any more."""
+        """The lesson is over: show `text`, and ask nothing more."""
         self._panel.close()
         self._show("ended", text)
         self._wake()
@@ -236,7 +236,7 @@ class SeatPage(LiveView):
 
 
 def _said(pending: Pending, answer: Answer | None) -> int | None:
-    """What an answer means to who asked; see `SeatPage.ask`."""
+    """The action of an answer; raises AdvisorLeft, Undo or KeyboardInterrupt, see `SeatPage.ask`."""
     if answer is None:
         raise AdvisorLeft(f"no answer within {pending.wait_s:g} s")
     if answer.word == "auto":
@@ -251,7 +251,7 @@ def _said(pending: Pending, answer: Answer | None) -> int | None:
 
 
 def _lesson(plan: LessonPlan) -> ShownLesson:
-    """A lesson that begins, beside the fewest steps of a certain problem, counted as the learner counts, where they are known."""
+    """A lesson that begins; for a deterministic problem that is small enough, with its fewest steps, as the learner counts."""
     mdp, learner = plan.problem.mdp, plan.learner
     made = ShownLesson(plan.problem.name, mdp=mdp, gate=plan.gate, episodes=learner.episodes)
     if mdp.n_states <= MOST_STATES and (mdp.shape or mdp.coverage_shape):

@@ -1,4 +1,4 @@
-// The teaching seat's panel: shows the document that the server keeps, and sends the advisor's keys and buttons.
+// The teaching seat's panel: shows the server's document, and sends the advisor's answers by keys and buttons.
 "use strict";
 
 const seat = (() => {
@@ -18,7 +18,7 @@ const seat = (() => {
     renew(...Object.keys(parts));
   }
 
-  // Parts are drawn once a picture, however often they change; where pictures are dear, those that nobody waits for seldom
+  // Parts are drawn at most once per picture; where pictures are slow, parts that nobody waits for are drawn rarely
   function renew(...parts) {
     if (!("lesson" in state)) return;
     for (const part of parts) dirty.add(part);
@@ -69,8 +69,8 @@ const seat = (() => {
     el("detail").textContent = shown ? detail() : "";
     el("words").hidden = !shown || Boolean(state.replay);
     el("because").hidden = !(shown && whyOpen);
-    if (!shown && (state.ended || state.standing.verdict)) el("moves").hidden = true; // nothing is asked any more
-    el(state.ended ? "ask" : "learning").append(el("receipt")); // at the end it is what matters
+    if (!shown && (state.ended || state.standing.verdict)) el("moves").hidden = true; // no more questions come
+    el(state.ended ? "ask" : "learning").append(el("receipt")); // at the end the receipt matters most
     if (shown) showReasons();
     countDown();
   }
@@ -92,7 +92,7 @@ const seat = (() => {
     if (left !== null) el("countdown").textContent = `It waits ${left} s more, then it goes on alone.`;
   }
 
-  // A session that is shown again: what was answered, and how it goes on
+  // A replay: its last answer and its pace
   function showReplay() {
     const { replay } = state;
     el("replay").hidden = !replay || Boolean(state.ended);
@@ -126,7 +126,7 @@ const seat = (() => {
     const moves = shown ? shown.moves : [];
     const kind = !shown ? "" : shown.kind === "order" ? "order" : moves.filter((move) => move.direction !== null && move.direction < 4).length < 4 ? "list" : moves.some((move) => move.direction > 3) ? "pad deep" : "pad";
     const box = el("moves"), names = moves.map((move) => `${move.action} ${move.label}`).join();
-    if (!shown) return; // the buttons stay, disabled: the next question is likely to need the same ones
+    if (!shown) return; // the buttons stay, disabled, because the next question probably needs the same ones
     box.hidden = false;
     if (box.dataset.names !== names || box.className !== kind) {
       box.className = kind;
@@ -196,7 +196,7 @@ const seat = (() => {
     answer({ action }, event);
   }
 
-  // The whole way that is drawn on the map, as the moves that lead along it
+  // The moves of the whole path that is drawn on the map
   function sendWay() {
     const path = seatMap.drawn().map((direction) => shown.moves.find((one) => one.direction === direction)).filter(Boolean).map((move) => move.action);
     seatMap.drop();
@@ -227,7 +227,7 @@ const seat = (() => {
     else refused("Nothing of this episode can be taken back.");
   }
 
-  // What cannot be taken back wants a second press
+  // An action that cannot be undone needs a second press
   function arm(word) {
     clearTimeout(disarm);
     armed = word;
@@ -249,7 +249,7 @@ const seat = (() => {
     if (shown) enable();
   }
 
-  // Shift and an arrow key draw on, Enter sends what is drawn
+  // Shift and an arrow key extend the path, Enter sends it
   function draws(event) {
     const direction = ARROW_KEYS.indexOf(event.key);
     if (event.shiftKey && direction >= 0 && direction < 4) return seatMap.step(direction) || true;
@@ -269,7 +269,7 @@ const seat = (() => {
       return paced(pace);
     }
     if (event.ctrlKey || event.altKey || event.metaKey || !shown || state.replay || event.target.matches("input, select, textarea")) return;
-    if (event.key === "Enter" && event.target.matches("button")) return; // that button's own
+    if (event.key === "Enter" && event.target.matches("button")) return; // the button handles this key
     if (draws(event)) return event.preventDefault();
     const direction = ARROW_KEYS.indexOf(event.key), digit = Number.parseInt(event.key, 10) - 1;
     const word = LETTERS[event.key] || LETTERS[event.key.toLowerCase()];
@@ -283,7 +283,7 @@ const seat = (() => {
     else refused("There is no such move here.");
   }
 
-  // ---- what the page itself does
+  // ---- events of the page
 
   function redraw() {
     renew("slice", "curve", "standing", "work");

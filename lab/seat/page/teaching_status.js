@@ -1,4 +1,4 @@
-// Beside the question: the learning curve, how advice stands, what the learner says, the work, the receipt, a run's progress.
+// The panels beside the question: learning curve, standing of advice, messages, the work, the receipt, a run's progress.
 "use strict";
 
 const seatStatus = (() => {
@@ -23,7 +23,7 @@ const seatStatus = (() => {
     [["progress"], showProgress],
   ];
 
-  // Draw what has changed of the document
+  // Draw the changed parts of the document
   function show(state, parts) {
     for (const [names, draw] of SHOWN) if (names.some((name) => parts.has(name))) draw(state);
   }
@@ -110,7 +110,7 @@ const seatStatus = (() => {
     box.querySelector("ol").replaceChildren(...[...progress.lines].reverse().map((line) => make("li", line)));
   }
 
-  // Who answers, or, where nobody is asked, who operates; live: the page hears the run
+  // Who answers or, without questions, who operates; live: whether the page is connected to the run
   function chair({ you = {}, lesson: { asks }, run, replay }, live) {
     if (live && replay) return "";
     if (!live) return "connection lost: trying again";

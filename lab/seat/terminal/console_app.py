@@ -32,10 +32,10 @@ if TYPE_CHECKING:
     from prompt_toolkit.output import Output
 
 STEP_MM, TURN_DEGREES = 10, 15
-ESCAPE_S = 0.025  # after Esc, until it is no arrow key's beginning
+ESCAPE_S = 0.025  # after Esc, until it cannot be the beginning of an arrow key's sequence
 REFRESH_S = 0.2
 MOST_LOG, LOG_LINES = 200, 6
-STOPS = ("escape", "c-x")  # whatever is typed
+STOPS = ("escape", "c-x")  # keys that stop the run at any time
 KEYS = {  # on an empty line
     " ": "pause, go on",
     "s": "step",
@@ -57,16 +57,16 @@ HINTS = (
     "Esc ^X stop | space pause, go | s step | r reset | a command, or help | ^C leave",
     f"arrows PgUp PgDn jog {STEP_MM} mm | [ ] turn | o open | c close | h home | g grasp",
 )
-LETTER_S = 0.4  # a letter that nothing follows for so long is a key, else a command's first letter
+LETTER_S = 0.4  # a letter followed by nothing for this time is a key, otherwise the first letter of a command
 
 
 class OperatorConsole:
-    """Runs until the operator leaves; the simulation goes on in a thread of its own. `run` gives back how it ended."""
+    """The console: `run` returns when the operator leaves; the simulation runs in a thread of its own."""
 
     def __init__(self, desk: Desk, keys: "Input | None" = None, screen: "Output | None" = None) -> None:
         self._desk = desk
         self._log: list[tuple[str, str]] = []
-        self._answer = 0  # lines of the log that the last command was answered with
+        self._answer = 0  # number of log lines in the answer to the last command
         self._error: BaseException | None = None
         desk.operation.on_done.append(self._done)
         self._app = self._made(keys, screen)
@@ -86,7 +86,7 @@ class OperatorConsole:
     def _simulate(self) -> None:
         try:
             self._desk.serve()
-        except Exception as error:  # it is raised again in the thread of the console
+        except Exception as error:  # raised again in the thread of the console
             self._error = error
         finally:
             loop = self._app.loop
@@ -97,10 +97,10 @@ class OperatorConsole:
         if self._app.is_running and not self._app.is_done:
             self._app.exit()
 
-    # ---- what is said ------------------------------------------------------------------------------------------------
+    # ---- commands and their results ----------------------------------------------------------------------------------
 
     def say(self, line: str) -> None:
-        """Take a typed line, or the words of a key."""
+        """Carry out a typed line, or the command of a key."""
         word = line.split()[0].lower() if line.split() else ""
         before = len(self._log)
         match word:
@@ -118,7 +118,7 @@ class OperatorConsole:
         del self._log[:-MOST_LOG]
 
     def _done(self, done: Done) -> None:
-        """Say what came of a command, in any thread."""
+        """Show the result of a command; called in any thread."""
         if done.refused:
             self._log.append((f"{done.words}: refused: {done.refused}", "yellow"))
         elif done.failed:
@@ -130,7 +130,7 @@ class OperatorConsole:
             with suppress(RuntimeError):  # it has just ended
                 loop.call_soon_threadsafe(self._app.invalidate)
 
-    # ---- the screen --------------------------------------------------------------------------------------------------
+    # ---- the screen and its keys -------------------------------------------------------------------------------------
 
     def _made(self, keys: "Input | None", screen: "Output | None") -> "Application[None]":
         def entered(buffer: "Buffer") -> bool:
@@ -198,7 +198,7 @@ class OperatorConsole:
         return bindings
 
     def _pause(self) -> None:
-        """The space bar: pause, or go on."""
+        """The space bar: pause, or continue."""
         self._desk.say("pause" if self._desk.operation.controls.held is None else "go")
 
     def _drawn(self) -> str:
@@ -215,12 +215,12 @@ class OperatorConsole:
         return _ansi([*lines, *told, *hints], width)
 
     def _log_room(self, height: int) -> int:
-        """Lines for what came of the last commands: all of a long answer until something else is said."""
+        """The number of lines for results of commands: a long answer is shown whole until the next command."""
         return max(LOG_LINES, min(self._answer, height - len(HINTS)))
 
 
 def _ansi(lines: list[Text], width: int) -> str:
-    """Lines with their colours as escape codes."""
+    """The lines as text with escape codes for their colours."""
     out = StringIO()
     console = EscapingConsole(file=out, force_terminal=True, color_system="standard", width=width, legacy_windows=False)
     for number, line in enumerate(lines):

@@ -1,4 +1,7 @@
-"""Where a run stands, as lines of a terminal: lights in words and signs as well as colours, and the Gantt chart in text."""
+"""The status of a run as lines of a terminal, with lamps in words and colours and a Gantt chart in text; and a plain console.
+
+`PlainConsole` reads commands from a pipe, or for a screen reader, and writes sentences.
+"""
 
 from collections.abc import Callable, Iterable, Sequence
 from threading import Thread
@@ -19,7 +22,7 @@ HELDS = {
     "emergency": ("EMERGENCY STOP", "bold white on red"),
 }
 AFTER = {"pause": "go goes on", "protective": "go goes on", "emergency": "reset, then go"}
-SIGNS = {  # in the chart, an activity's kind
+SIGNS = {  # character of each kind of activity in the chart
     "carry": "#",
     "pallet": "#",
     "empty": "-",
@@ -36,7 +39,7 @@ TROUBLES, LEAST_CHART = 3, 20
 
 
 def view(status: RunStatus, busy: str, width: int, height: int) -> list[Text]:
-    """The panel in so many columns and lines, what matters most first; busy: the command under way, "" for none."""
+    """The panel in `width` columns and `height` lines, the most important first; busy: the command under way, "" for none."""
     lines = [*_head(status), *_robot(status, busy), *_machines(status, width), *_parts(status.parts, width)]
     lines += _troubles(status, width)
     chart = _chart(status, width)
@@ -107,7 +110,7 @@ def _troubles(status: RunStatus, width: int) -> list[Text]:
 
 
 def _chart(status: RunStatus, width: int) -> list[Text]:
-    """Plan beside measured: of the robot and each machine a row of signs for either."""
+    """The planned and the measured schedule: a row of signs each, for the robot and every machine."""
     planned = [] if status.plan is None else status.plan.rows
     measured = status.so_far()
     end_s = max((a.end_s for a in (*planned, *measured)), default=0.0)
@@ -133,7 +136,7 @@ def _chart(status: RunStatus, width: int) -> list[Text]:
 
 
 def row_of(activities: Iterable[Activity], room: int, end_s: float) -> str:
-    """Activities as signs in so many columns, which last `end_s` [s] in all; a part's number where there is room for it."""
+    """Activities as signs in `room` columns, which represent `end_s` [s]; with a part's number if there is room for it."""
     row = [" "] * room
     for activity in activities:
         first = min(int(activity.start_s / end_s * room), room - 1)
@@ -147,33 +150,33 @@ def row_of(activities: Iterable[Activity], room: int, end_s: float) -> str:
 
 
 def plain_lines(status: RunStatus) -> list[str]:
-    """Where a run stands in sentences, for a pipe and for screen readers."""
+    """The status of a run in sentences, for a pipe and for screen readers."""
     lines = [*(line.plain.strip() for line in _head(status)), *(line.plain.strip() for line in _robot(status, ""))]
     lines += [f"machine {m.station}: {m.light}{_with(m, status)}" for m in status.machines]
     lines += [f"part {part.name}: {part.state}{_where(part)}" for part in status.parts]
     return lines + [line.plain.strip() for line in _troubles(status, 200)[1:]]
 
 
-# ---- console plain ----------------------------------------------------------------------------------------------------
+# ---- the console without a screen ---------------------------------------------------------------------------------------
 
 
 Write = Callable[[str], None]
 
 
 def told(done: Done) -> str:
-    """What came of a command, in one line."""
+    """The result of a command in one line."""
     if done.refused:
         return f"{done.words}: refused: {done.refused}"
     return f"{done.words}: {done.failed or done.said or 'done'}"
 
 
 class PlainConsole:
-    """Reads a line when the one before is done, or waits in a pause. It goes on after a refusal, and ends at the first failure.
+    """Reads a line when the command before is done or waits in a pause. It continues after a refusal, and ends at a failure.
 
-    What failed has left the cell otherwise than the next line takes for granted. Beside a page, where more may be said, nothing
-    ends it but `quit`.
+    It ends there because the cell is not in the state that the next line assumes. Beside a page, on which further commands
+    may be given, only `quit` ends it.
 
-    write: where the lines go that tell what came of it.
+    write: called with the lines on results.
     """
 
     def __init__(self, desk: Desk, write: Write) -> None:
@@ -184,9 +187,9 @@ class PlainConsole:
         desk.operation.on_done.append(self._done)
 
     def run(self, lines: Iterable[str], *, stay: bool = False) -> Done | None:
-        """The command that failed, else the first that was refused, None when all went well. Raises what the simulation raised.
+        """The command that failed, else the first that was refused; None when all succeeded. Raises the simulation's error.
 
-        stay: until somebody leaves, whatever becomes of the lines.
+        stay: whether it runs until somebody leaves, whatever the results of the lines.
         """
         self._stays = stay
         worker = Thread(target=self._simulate, name="simulation", daemon=True)
@@ -221,7 +224,7 @@ class PlainConsole:
             self._error = error
 
     def _said(self, line: str) -> bool:
-        """Take a line; whether there is more to come."""
+        """Carry out a line; returns whether to read the next one."""
         match line.split()[0].lower() if line else "":
             case "quit":
                 return False

@@ -1,4 +1,4 @@
-"""How a line is read from a person: at a terminal with arrow keys, from plain lines, or from outside while one waits."""
+"""Readers of a person's lines: at a terminal with arrow keys, from a plain stream, or from another thread meanwhile."""
 
 import os
 import sys
@@ -22,12 +22,12 @@ if TYPE_CHECKING:
     from prompt_toolkit.output import Output
 
 ReadLine = Callable[[str], str]
-LOOK_S = 0.5  # for how long Ctrl-C may go unheard on Windows, where nothing interrupts a wait
+LOOK_S = 0.5  # longest delay of Ctrl-C on Windows, where nothing interrupts a wait
 OTHER_KEYS = ("tab", "pageup", "pagedown", "insert", *(f"f{n}" for n in range(1, 13)))
 
 
 class Outside:
-    """Words that come from another thread, such as a page's, for the question that waits; safe to use from any thread."""
+    """Answers from another thread, such as a page's, to the pending question; safe to use from any thread."""
 
     def __init__(self) -> None:
         self._lock = Lock()
@@ -37,7 +37,7 @@ class Outside:
 
     @contextmanager
     def question(self) -> Iterator[None]:
-        """While a question waits; what comes before it or after it has no effect."""
+        """A context in which a question is pending; answers before and after it have no effect."""
         with self._lock:
             self._open = True
         try:
@@ -49,7 +49,7 @@ class Outside:
 
     @contextmanager
     def waking(self, wake: Callable[[], None]) -> Iterator[None]:
-        """While somebody reads: `wake` is called, from any thread, when there is a word."""
+        """A context in which `wake` is called, from any thread, when an answer arrives."""
         with self._lock:
             self._wake = wake
             if self._words:
@@ -61,7 +61,7 @@ class Outside:
                 self._wake = None
 
     def answer(self, word: str) -> None:
-        """A word for the question that waits, as if it were typed."""
+        """Answer the pending question with a word, as if it were typed."""
         with self._lock:
             if not self._open:
                 return
@@ -70,7 +70,7 @@ class Outside:
                 self._wake()
 
     def taken(self) -> str | None:
-        """The next word, once."""
+        """The word that has arrived, which is then removed; None for none."""
         with self._lock:
             return self._words.pop(0) if self._words else None
 
@@ -83,9 +83,9 @@ def default_reader(
     outside: Outside | None = None,
     moves: bool = True,
 ) -> "Reader":
-    """Reads with arrow keys at a terminal that can do it, else plain lines; `plain`: plain lines in any case.
+    """The reader with arrow keys for a terminal that supports them, else one of plain lines; `plain`: always plain lines.
 
-    `moves`: an arrow key is an answer, a move; else it only edits.
+    `moves`: whether an arrow key answers with a move; otherwise it only edits.
     """
     stream = stdin or sys.stdin
     if plain or not stream.isatty():
@@ -98,7 +98,7 @@ def default_reader(
 
 
 class Reader(Protocol):
-    """Shows a prompt and returns one line, or a word from outside; raises EOFError at the end of the input."""
+    """Shows a prompt and returns one line, or an answer from another thread; raises EOFError at the end of the input."""
 
     outside: Outside
 
@@ -107,7 +107,7 @@ class Reader(Protocol):
 
 
 class PlainReader:
-    """Reads lines of a stream, which are shown when nobody has typed them on the screen."""
+    """Reads lines of a stream, and echoes those that were not typed on the screen."""
 
     def __init__(self, console: Console, stream: TextIO, outside: Outside | None = None) -> None:
         self.outside = outside or Outside()
@@ -126,7 +126,7 @@ class PlainReader:
             self._console.print(Text(prompt), end="")
             line, typed = self._next()
         except KeyboardInterrupt:
-            self._console.print()  # what comes next begins a line
+            self._console.print()  # the next output begins a new line
             raise
         if not typed or not line:
             self._console.print(Text(printable(line.rstrip("\r\n"))), soft_wrap=True)
@@ -135,7 +135,7 @@ class PlainReader:
         return line
 
     def _next(self) -> tuple[str, bool]:
-        """A line, and whether it stands on the screen already."""
+        """The next line, and whether it is on the screen already."""
         if self._bytes is None:
             return self.outside.taken() or self._stream.readline(), False
         with self.outside.waking(self._bytes.wake):
@@ -147,9 +147,9 @@ class PlainReader:
 
 
 class _Stream:
-    """The lines of a descriptor, read by a thread, because on Windows nothing else can wait for them and for a word besides.
+    """The lines of a file descriptor, read by a thread: on Windows, only a thread can wait for a line and an answer at once.
 
-    It reads when a line is asked for. What it has read when a word comes first is there for whoever asks next.
+    It reads when a line is requested. A line that arrives after an answer from outside is kept for the next request.
     """
 
     def __init__(self, file: int) -> None:
@@ -157,7 +157,7 @@ class _Stream:
         self._arrived: SimpleQueue[bytes | None] = SimpleQueue()  # None: somebody has woken it
 
     def wake(self) -> None:
-        """Have `line` return; from any thread."""
+        """Make `line` return; called from any thread."""
         self._arrived.put(None)
 
     def line(self) -> bytes | None:
@@ -210,7 +210,9 @@ class TerminalReader:
         self.outside = outside or Outside()
         output = screen or create_output(stdout=cast(TextIO, console.file))
         if isinstance(output, Vt100_Output):
-            output.enable_cpr = False  # one line needs no cursor position, and a slow link would answer too late
+            output.enable_cpr = (
+                False  # one line needs no cursor position, and over a slow link the reply would come too late
+            )
         self._session: PromptSession[str] = PromptSession(
             input=keys, output=output, key_bindings=_keys() if moves else None
         )
@@ -221,13 +223,13 @@ class TerminalReader:
             return self._session.prompt(prompt, pre_run=lambda: self._listen(stack))
 
     def _listen(self, stack: ExitStack) -> None:
-        """From now on until the prompt ends, a word from outside ends it."""
+        """Let an answer from another thread end the prompt, until the prompt ends."""
         from asyncio import get_running_loop
 
         loop, app = get_running_loop(), self._session.app
 
         def wake() -> None:
-            with suppress(RuntimeError):  # the loop has ended: the word stays for the next line, if there is one
+            with suppress(RuntimeError):  # the loop has ended: the answer is kept for the next line, if there is one
                 loop.call_soon_threadsafe(self._deliver, app)
 
         stack.enter_context(self.outside.waking(wake))
@@ -241,7 +243,7 @@ class TerminalReader:
 
 
 def _enter(app: "Application[str]", word: str) -> None:
-    """As if the word stood on the line, and enter were pressed."""
+    """Put a word on the line and press enter."""
     app.current_buffer.text = word
     app.current_buffer.validate_and_handle()
 

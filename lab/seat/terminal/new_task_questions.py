@@ -1,4 +1,4 @@
-"""The questions of `lab new`: each is asked until its answer can be; enter takes what stands in brackets."""
+"""The questions of `lab new`: each is repeated until its answer is valid; enter takes the default in brackets."""
 
 from collections.abc import Callable
 
@@ -14,7 +14,7 @@ YES, NO = "yes", "no"
 
 
 def ask(name: str, read: ReadLine, console: Console) -> NewTask:
-    """What a person wants of a task called `name`. BadInput when the input ends before the last question."""
+    """The description of a new task `name`, from a person's answers. BadInput when the input ends too early."""
 
     def answer(question: str, default: str, check: Callable[[str], object]) -> str:
         while True:

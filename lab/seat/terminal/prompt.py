@@ -1,4 +1,4 @@
-"""Teaching at a terminal: what the learner sees as text, and the person's answer, in a table and in the order alike."""
+"""Teaching at a terminal: questions as text and a person's answers, for moves in a table and for the order of transfers."""
 
 from collections.abc import Iterable
 from difflib import get_close_matches
@@ -24,11 +24,11 @@ from lab.sequencing.search import SequenceRequest
 from lab.teaching.events import ORDER, Event, LessonEvent
 
 WORDS = ("why", "undo", "skip", "auto", "quit")
-TABLE = 56  # columns of a terminal; below, each move is a line of words
+TABLE = 56  # columns of a terminal, below which each move is a line of words instead of a table row
 
 
 class OrderQuestion:
-    """How a `SequenceRequest` is shown, and what may be typed; plain: sentences instead of a table."""
+    """The display of a `SequenceRequest`, and its possible answers; plain: sentences instead of a table."""
 
     introduction = (
         "The learner is stuck and asks you which part to move next. It does what you say, and learns from it as if the "
@@ -41,16 +41,16 @@ class OrderQuestion:
         self._episode = 0
 
     def subject(self, request: SequenceRequest) -> object:
-        """What is learned."""
+        """The subject of the question: what is learned."""
         return request.run.cell
 
     def asked(self, request: SequenceRequest) -> str:
-        """The words before the cursor."""
+        """The prompt before the cursor."""
         wide = room(self._console)[0] >= TABLE
         return f"Which move? [enter = {request.own}, ? explains] " if wide else f"Which move? [{request.own}] "
 
     def shown(self, request: SequenceRequest) -> list[RenderableType]:
-        """Where the work stands, and what may be moved; in the first question of an episode, why it asks."""
+        """The state of the work and the allowed moves; in the first question of an episode also its reason."""
         width = room(self._console)[0]
         lines: list[RenderableType] = [Text(), *folded([f"{order_text.title(request)}."], width, "bold")]
         if request.episode != self._episode:
@@ -70,7 +70,7 @@ class OrderQuestion:
         return [*lines, table]
 
     def understood(self, line: str, request: SequenceRequest) -> Understood:
-        """The decision that a number means, one of ANSWERS, or else a hint of one line."""
+        """The decision with this number, one of ANSWERS, or a hint of one line."""
         word = line.strip().lower()
         if word in map(str, request.allowed):
             return int(word)
@@ -82,15 +82,15 @@ class OrderQuestion:
         return f"'{word[:20]}' is none of the moves: {hint}type {known}"
 
     def warned(self, request: SequenceRequest, decision: int) -> str:
-        """An empty string: every decision that is allowed leads on."""
+        """An empty string, because every allowed decision leads on."""
         return ""
 
     def why(self, request: SequenceRequest, guided: int) -> list[str]:
-        """Why it asks."""
+        """The reason for the question."""
         return order_text.reasons(request)
 
     def explained(self, request: SequenceRequest) -> list[tuple[str, str]]:
-        """What can be typed, and what it does."""
+        """The possible inputs and their effects."""
         return [("a number", "of the list: that move is made next"), *explained_words()]
 
     def named(self, request: SequenceRequest, decision: int) -> str:
@@ -98,22 +98,22 @@ class OrderQuestion:
         return f"move {decision}"
 
     def briefly(self, request: SequenceRequest, decision: int) -> str:
-        """A decision as one of many."""
+        """A decision in short, for a list of many."""
         return str(decision)
 
     def where(self, request: SequenceRequest, state: int) -> str:
-        """Where the robot is."""
+        """The robot's position."""
         return f"at {request.run.cell.names[request.run.robot]}"
 
 
-# ---- table question ---------------------------------------------------------------------------------------------------
+# ---- questions on moves in a table --------------------------------------------------------------------------------------
 
 
-ROOMY = 18  # lines of a terminal; below, no empty line parts the questions
+ROOMY = 18  # lines of a terminal, below which no empty line separates the questions
 
 
 class TableQuestion:
-    """How an `AdviceRequest` is shown, and what may be typed; plain: sentences instead of a picture."""
+    """The display of an `AdviceRequest`, and its possible answers; plain: sentences instead of a picture."""
 
     introduction = (
         "The learner is stuck and asks you where to go. It does what you say, and learns from it as if the move were its "
@@ -123,19 +123,19 @@ class TableQuestion:
 
     def __init__(self, console: Console, plain: bool) -> None:
         self._console, self._plain = console, plain
-        self.known: StateWords | None = None  # what says in words where the learner is
+        self.known: StateWords | None = None  # describes the learner's state in words
         self.marks = request_text.WORDS_ONLY if plain else Marks.of(console)
 
     def subject(self, request: AdviceRequest) -> object:
-        """What is learned."""
+        """The subject of the question: what is learned."""
         return request.mdp
 
     def asked(self, request: AdviceRequest) -> str:
-        """The words before the cursor."""
+        """The prompt before the cursor."""
         return question(request, self.marks, room(self._console)[0])
 
     def shown(self, request: AdviceRequest) -> list[RenderableType]:
-        """Where the learner is, what it would do, and how it has been doing."""
+        """The learner's state, its own choice, and its progress."""
         width, height = room(self._console)
         if self._plain:
             return [Text(), *folded(request_text.sentences(request, self.known), width)]
@@ -144,11 +144,11 @@ class TableQuestion:
         return [*gap, *screen(request, self.marks, width, left, self.known)]
 
     def understood(self, line: str, request: AdviceRequest) -> Understood:
-        """What a line means; see `understand`."""
+        """The meaning of a line; see `understand`."""
         return understand(line, request.mdp)
 
     def warned(self, request: AdviceRequest, action: int) -> str:
-        """What is said of an action that leads nowhere, "" for any other."""
+        """The warning about an action that leads nowhere, "" for any other."""
         if request_text.outcome(request, action) not in (
             request_text.NOWHERE,
             request_text.OBSTACLE,
@@ -158,11 +158,11 @@ class TableQuestion:
         return f"{self.named(request, action)}: that {request_text.leads(request, action)}: given all the same."
 
     def why(self, request: AdviceRequest, guided: int) -> list[str]:
-        """Why it asks, with all its numbers; guided: the episodes that were given advice until now."""
+        """The reason for the question with all its numbers; guided: the number of episodes with advice so far."""
         return request_text.reasons(request, self.marks, guided)
 
     def explained(self, request: AdviceRequest) -> list[tuple[str, str]]:
-        """What can be typed, and what it does."""
+        """The possible inputs and their effects."""
         return explained(request.mdp)
 
     def named(self, request: AdviceRequest, action: int) -> str:
@@ -170,15 +170,15 @@ class TableQuestion:
         return self.marks.named(request.mdp, action)
 
     def briefly(self, request: AdviceRequest, action: int) -> str:
-        """An action as one of many."""
+        """An action in short, for a list of many."""
         return request.mdp.action_labels[action] if self._plain else self.named(request, action).split()[0]
 
     def where(self, request: AdviceRequest, state: int) -> str:
-        """Where a state is, shortly; where that takes many words, the question has them."""
+        """A state's position in short; a position that takes many words is left to the question."""
         return f"at {request.mdp.state_label(state)}" if self.known is None else "elsewhere"
 
 
-# ---- prompt -----------------------------------------------------------------------------------------------------------
+# ---- the prompt -------------------------------------------------------------------------------------------------------
 
 
 STYLES = {"": "", "ask": "bold", "note": "yellow", "good": "green", "bad": "yellow", "lost": "bold red"}
@@ -200,14 +200,14 @@ class TeachingPrompt:
         self._outside: Outside = getattr(read_line, "outside", None) or Outside()
         self._done = False
         self._path = PathAhead()
-        self._wall: tuple[int, int, int] | None = None  # that was said of last: episode, state, action
+        self._wall: tuple[int, int, int] | None = None  # last warned about: episode, state, action
         self._table, self._order = TableQuestion(console, plain), OrderQuestion(console, plain)
-        self._last: Request | None = None  # what was asked last
+        self._last: Request | None = None  # the last question
         self._text, self._order_text = SessionText(self._table.marks.named), SessionText(kind="order")
         self._guided = self._misleads = 0
 
     def __call__(self, request: Request) -> int | None:
-        """Shows where the learner is and returns what the person says."""
+        """The person's answer, after showing the learner's state."""
         if self._done:
             raise AdvisorLeft
         self._meet(request)
@@ -221,27 +221,27 @@ class TeachingPrompt:
             return self._answer(request, self._read_line)
 
     def answer_from_outside(self, word: str) -> None:
-        """Ends the question that waits with a word as if it were typed, from any thread; no effect when nothing waits."""
+        """Answer the pending question with a word as if it were typed, from any thread; no effect when none is pending."""
         self._outside.answer(word)
 
     def about(self, known: StateWords | None) -> None:
-        """What is learned next: its states in words, None for what has none."""
+        """Take over the object that describes the next lesson's states in words; None for none."""
         self._table.known = known
 
     def show(self, request: Request) -> None:
-        """Shows where the learner is, what it would do, and how it has been doing."""
+        """Show the learner's state, its own choice, and its progress."""
         self._last = request
         self._print(self._way(request).shown(request))
 
     def told(self, request: Request, action: int | None) -> None:
-        """Says what was answered to a request, such as "Answer: right"; None: the step was left to the learner."""
+        """Show the answer to a request, such as "Answer: right"; None: the step was left to the learner."""
         self._say(f"Answer: {'skip' if action is None else self._way(request).named(request, action)}", "bold")
 
     def _way(self, request: Request | None) -> Any:
         """How such a question is shown."""
         return self._order if isinstance(request, SequenceRequest) else self._table
 
-    # ---- what the person says ---------------------------------------------------------------------------------------
+    # ---- answers ------------------------------------------------------------------------------------------------------
 
     def _answer(self, request: Request, read_line: ReadLine) -> int | None:
         way = self._way(request)
@@ -267,7 +267,7 @@ class TeachingPrompt:
                     self._command(answer, request)
 
     def _command(self, word: str, request: Request) -> None:
-        """Does what a word asks for that gives no advice; what is no such word is a hint, and said."""
+        """Carry out a command word that gives no advice; any other word is a hint, which is shown."""
         match word:
             case "auto":
                 raise AdvisorLeft
@@ -291,16 +291,16 @@ class TeachingPrompt:
                 self._say(word, "yellow")
 
     def _give(self, request: Request, action: int) -> int:
-        """An action as the person said it; when it leads nowhere, that is said, and it counts all the same."""
+        """The action that the person gave; an action that leads nowhere counts as well, after a warning."""
         wall = (request.episode, request.state, action)
         if warned := self._way(request).warned(request, action):
-            if wall != self._wall:  # said once, however often a path runs against it
+            if wall != self._wall:  # warned once, however often a path runs against the wall
                 self._say(warned, "yellow")
             self._wall = wall if self._path.left else None
         return action
 
     def _drawn(self, request: Request, actions: Iterable[int]) -> str:
-        """Moves one after the other, as arrows where they have one; many of one kind are counted."""
+        """A path in text: arrows for moves that have one; many equal moves are counted."""
         parts = []
         for action, run in groupby(actions):
             word = self._way(request).briefly(request, action)
@@ -315,7 +315,7 @@ class TeachingPrompt:
             self._say(f"The rest of your path is dropped ({self._drawn(request, left)}): {why}.", "yellow")
 
     def _meet(self, request: Request) -> None:
-        """Before a question: how advice stands, when an episode with it did not help."""
+        """Before a question, show the standing of advice if an episode with it did not help."""
         now = request.standing
         before, self._last = self._last, request
         is_same = before is not None and self._way(before).subject(before) is self._way(request).subject(request)
@@ -338,10 +338,10 @@ class TeachingPrompt:
         self._print(folded([way.introduction], width))
         self._console.print(rows, width=width)
 
-    # ---- what happens in the session --------------------------------------------------------------------------------
+    # ---- events of the session ----------------------------------------------------------------------------------------
 
     def hear(self, event: Event) -> None:
-        """Tells the person when a learner starts asking, what came of it, and why it stops."""
+        """Tell the person when a learner starts asking, the results, and why it stops."""
         if self._done or not isinstance(event, LessonEvent):
             return
         if isinstance(event.event, EpisodeEnded):

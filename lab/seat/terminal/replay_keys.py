@@ -1,4 +1,4 @@
-"""The keys of a replay at the terminal: space pauses and goes on, n makes a step, + and - change the speed, q ends it."""
+"""The keys of a replay at the terminal: space pauses and continues, n makes a step, + and - change the speed, q ends it."""
 
 import signal
 import sys
@@ -11,13 +11,13 @@ from prompt_toolkit.input import create_input
 from lab.seat.replay_pace import KEYS, ReplayPace
 
 HELP = "space: pause and go on, n: one step, + and -: faster and slower, q: end"
-LOOK_S = 0.05  # between two looks for keys
-ENDS = ("q", "c-c")  # and Ctrl-C, which is a key here
+LOOK_S = 0.05  # interval of polling for keys
+ENDS = ("q", "c-c")  # Ctrl-C is an ordinary key here
 
 
 @contextmanager
 def replay_keys(pace: ReplayPace) -> Iterator[bool]:
-    """Reads keys of the terminal, if stdin is one, until it is left; whether it is. The terminal is then as it was."""
+    """A context that reads keys of the terminal, and yields whether stdin is one. The terminal is restored at its end."""
     if not sys.stdin.isatty():
         yield False
         return
@@ -33,7 +33,7 @@ def replay_keys(pace: ReplayPace) -> Iterator[bool]:
                         return
                     if key in KEYS:
                         pace.do(KEYS[key])
-        except Exception:  # in raw mode Ctrl-C is a key like another, and nobody would hear it any more
+        except Exception:  # in raw mode Ctrl-C is an ordinary key, and would be lost
             signal.raise_signal(signal.SIGINT)
             raise
 

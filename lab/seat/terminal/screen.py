@@ -1,4 +1,4 @@
-"""One question on a screen of any size: the picture, with the numbers beside it or below it."""
+"""The layout of one question on a screen of any size: the picture, with the numbers beside it or below it."""
 
 import os
 from collections.abc import Iterable, Sequence
@@ -14,11 +14,11 @@ from lab.seat.grid_text import GAP, Marks, Picture, StateWords, both_views, pict
 from lab.seat.terminal.typed_answer import example, letters
 
 Parts = dict[str, list[Text]]
-BRIEF = 60  # columns; below, numbers come in fewer words
-PANEL = 38  # columns that the numbers take at least when they stand beside a picture
-FEWEST_ROWS = 6  # of a picture; to have as many, the least important lines are left away
+BRIEF = 60  # columns, below which numbers come with fewer words
+PANEL = 38  # least columns for the numbers beside a picture
+FEWEST_ROWS = 6  # of a picture; the least important lines are dropped to make room for them
 ROWS_WITH_LEGEND = 12
-DROPPED = ("legend", "choice", "standing", "progress", "moves")  # in this order, when there is too little room
+DROPPED = ("legend", "choice", "standing", "progress", "moves")  # dropped in this order when there is too little room
 
 
 def room(console: Console) -> tuple[int, int]:
@@ -26,18 +26,18 @@ def room(console: Console) -> tuple[int, int]:
     if console.is_dumb_terminal:
         try:
             return os.get_terminal_size(console.file.fileno())
-        except (OSError, ValueError):  # it is none
+        except (OSError, ValueError):  # it is no terminal
             pass
     return console.size
 
 
 def folded(lines: Iterable[str], width: int, style: str = "") -> list[Text]:
-    """Lines of text, broken between words where they are too long."""
+    """The lines of text, wrapped between words."""
     return [Text(part, style) for line in lines for part in wrap(line, max(width, 8)) or [""]]
 
 
 def packed(parts: Sequence[Text], width: int, gap: str = "  ") -> list[Text]:
-    """Parts side by side; one that does not fit begins another line."""
+    """The parts side by side; a part that does not fit begins a new line."""
     lines = [parts[0]]
     for part in parts[1:]:
         if lines[-1].cell_len + len(gap) + part.cell_len > width:
@@ -48,7 +48,7 @@ def packed(parts: Sequence[Text], width: int, gap: str = "  ") -> list[Text]:
 
 
 def question(request: AdviceRequest, marks: Marks, width: int) -> str:
-    """The words before the cursor, as many as leave room to type."""
+    """The prompt before the cursor, the longest one that leaves room to type."""
     own = marks.named(request.mdp, request.own)
     forms = (f"Which way? [enter = {own}, ? explains] ", f"Which way? [enter = {own}] ", f"Which way? [{own}] ")
     return next((form for form in forms if len(form) + 12 <= width), "Which way? ")
@@ -57,9 +57,9 @@ def question(request: AdviceRequest, marks: Marks, width: int) -> str:
 def screen(
     request: AdviceRequest, marks: Marks, width: int, height: int, known: StateWords | None = None
 ) -> list[Text]:
-    """What the learner shows, in so many columns, and lines unless the picture is the environment's own.
+    """The lines of a question, in `width` columns and `height` lines (more if the picture is the environment's own).
 
-    known: what says in words where it is.
+    known: describes states in words.
     """
     head = _head(request, width, known)
     left = height - len(head)
@@ -78,7 +78,7 @@ def screen(
 
 
 def _head(request: AdviceRequest, width: int, known: StateWords | None) -> list[Text]:
-    """Which step it is, and where the learner is."""
+    """The lines with the number of the step and the learner's position."""
     if known is not None:
         step = f"Episode {request.episode}, step {request.step}"
         return folded([step], width, "bold") + folded([known.in_words(request.state)], width)
@@ -88,7 +88,7 @@ def _head(request: AdviceRequest, width: int, known: StateWords | None) -> list[
 
 
 def _beside_views(request: AdviceRequest, marks: Marks, views: Picture, known: StateWords, width: int) -> list[Text]:
-    """The moves to the right of the views where there is room, else below them; what the learner says under both."""
+    """The views with the moves on their right if there is room, else below; the learner's lines below both."""
     panel = width - views.width - GAP
     keys = {action: letter for letter, action in letters(request.mdp).items()}
     moves = [
@@ -107,7 +107,7 @@ def _beside_views(request: AdviceRequest, marks: Marks, views: Picture, known: S
 
 
 def _joined(pictured: Sequence[Text], numbers: Sequence[Text], column: int) -> list[Text]:
-    """Lines of a picture, and other lines to the right of them that begin in a column."""
+    """The lines of a picture joined with other lines, which begin at `column`."""
     lines = []
     for drawn, number in zip_longest(pictured, numbers):
         left = drawn.copy() if drawn is not None else Text()
@@ -119,7 +119,7 @@ def _joined(pictured: Sequence[Text], numbers: Sequence[Text], column: int) -> l
 
 
 def _beside(request: AdviceRequest, marks: Marks, whole: Picture, width: int, height: int) -> list[Text]:
-    """The numbers to the right of the picture, what the picture means below it."""
+    """The picture with the numbers on its right and its legend below it."""
     panel = width - whole.width - GAP
     texts = [request_text.choice(request, marks), "", *request_text.progress(request), request_text.standing(request)]
     numbers = [*request_text.bars(request, marks), Text(), *folded(texts, panel)]
@@ -131,7 +131,7 @@ def _beside(request: AdviceRequest, marks: Marks, whole: Picture, width: int, he
 
 
 def _below(request: AdviceRequest, marks: Marks, whole: Picture | None, width: int, height: int) -> list[Text]:
-    """The numbers under the picture, fewer of them where the picture would have too few rows."""
+    """The picture with the numbers below it; numbers are dropped if the picture would have too few rows."""
     brief = width < BRIEF
     parts: Parts = {
         "legend": folded([whole.legend] if whole and whole.legend else [], width, "dim"),
@@ -163,7 +163,7 @@ def _all(parts: Parts) -> list[Text]:
 def _under_its_note(
     request: AdviceRequest, marks: Marks, whole: Picture, parts: Parts, width: int, height: int
 ) -> Picture:
-    """The picture in the room that the numbers leave, and its note among them: the less it shows, the longer that is."""
+    """The picture that fits beside the numbers and its own note, which is the longer the less the picture shows."""
     picture, parts["note"] = whole, []
     for _ in range(4):
         picture = picture_of(request, marks, width, height - len(_all(parts))) or whole

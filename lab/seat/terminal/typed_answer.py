@@ -1,4 +1,4 @@
-"""What a person types at the teaching prompt: a move, a whole path, or a word of the prompt's own."""
+"""The parser of answers typed at the teaching prompt: a move, a whole path, or a command word."""
 
 import re
 from difflib import get_close_matches
@@ -7,7 +7,7 @@ from lab.mdp import TabularMDP
 from lab.seat.grid_text import ARROWS, ASCII_ARROWS, DIRECTIONS, NAMES, direction_of
 
 Understood = int | tuple[int, ...] | str
-COMMANDS = {  # what is typed -> what it is called, what it does; "path" begins with the word and goes on
+COMMANDS = {  # typed word -> answer, explanation; after "path" the moves follow
     "": ("own", "agree with the learner: take the move it would make itself"),
     "path": (
         "path",
@@ -30,10 +30,10 @@ _PIECE = re.compile(r"([0-9]*)\s*([^\W\d_]+|[^\s\d,;])|([0-9]+)")
 
 
 def understand(line: str, mdp: TabularMDP) -> Understood:
-    """The action that a typed line names, the actions of a path, one of ANSWERS, or else a hint of one line.
+    """The action that a typed line names, the actions of a path, one of ANSWERS, or a hint of one line.
 
-    An exact label comes first, then the beginning of exactly one label, then an arrow or the (beginning of the) word
-    for a direction in the picture, and then a path: each of its letters is a move that it would be alone.
+    Tried in this order: an exact label, the beginning of exactly one label, an arrow or the (beginning of the) word for a
+    direction in the picture, and a path, in which each letter is the move that it means alone.
     """
     word = line.strip(" \t\r\n").lower()
     for keys, arrow in _TYPED_ARROWS.items():
@@ -52,7 +52,7 @@ def understand(line: str, mdp: TabularMDP) -> Understood:
 
 
 def _move(word: str, mdp: TabularMDP) -> tuple[int | None, list[int]]:
-    """The action that a word names, or else None and the actions whose labels begin with it."""
+    """The action that a word names; if it names none, None and the actions whose labels begin with it."""
     labels = [label.lower() for label in mdp.action_labels]
     if word in labels:
         return labels.index(word), []
@@ -69,7 +69,7 @@ def _move(word: str, mdp: TabularMDP) -> tuple[int | None, list[int]]:
 
 
 def letters(mdp: TabularMDP) -> dict[str, int]:
-    """A letter for each move that has one, in their order: the first of its label, or else of its direction."""
+    """The action of each letter, in the order of actions: the first letter of its label, or else of its direction."""
     firsts = [*(label[:1].lower() for label in mdp.action_labels), *(name[0] for name in DIRECTIONS)]
     known: dict[int, str] = {}
     for letter in firsts:
@@ -80,7 +80,7 @@ def letters(mdp: TabularMDP) -> dict[str, int]:
 
 
 def _path(text: str, mdp: TabularMDP, asked: bool = False) -> tuple[int, ...] | str:
-    """The moves of a path; a hint when it is none, "" where nobody asked for one and the text does not look like it."""
+    """The moves of a path; a hint if it is not valid, or "" if "path" was not typed and the text does not look like a path."""
     known = letters(mdp)
     moves: list[int] = []
     for count, run, lonely in _PIECE.findall(text):
@@ -100,7 +100,7 @@ def _path(text: str, mdp: TabularMDP, asked: bool = False) -> tuple[int, ...] | 
 
 
 def _looks_like_one(text: str, known: dict[str, int]) -> bool:
-    """Whether more than half of a word that nobody understands are letters of a path."""
+    """Whether more than half of an unknown word's letters are moves."""
     return 2 * sum(c in known or c in ARROWS or c.isdigit() or c.isspace() for c in text) > len(text)
 
 
@@ -115,7 +115,7 @@ def _known_letters(known: dict[str, int], mdp: TabularMDP) -> str:
 
 
 def example(mdp: TabularMDP) -> str:
-    """A path as it may be typed."""
+    """An example of a path as typed."""
     known = list(letters(mdp))
     return "".join((known[-1], known[-1], known[0])) if known else f"{ARROWS[3] * 2}{ARROWS[0]}"
 
@@ -128,7 +128,7 @@ def _unknown(word: str, mdp: TabularMDP) -> str:
 
 
 def explained(mdp: TabularMDP) -> list[tuple[str, str]]:
-    """What can be typed, and what it does, one row each."""
+    """The possible inputs and their effects, one row each."""
     known = letters(mdp)
     move = "a word from the list of moves, or its beginning; arrow keys follow the picture"
     if known:
@@ -137,7 +137,7 @@ def explained(mdp: TabularMDP) -> list[tuple[str, str]]:
 
 
 def explained_words(**examples: str) -> list[tuple[str, str]]:
-    """The prompt's own words, and what they do; that for a path only with examples of one."""
+    """The command words and their effects; "path" only with an example."""
     return [
         (typed or "enter", text.format(**examples))
         for typed, (_, text) in COMMANDS.items()
