@@ -21,8 +21,10 @@ Find = Callable[["Cell", "Search", "np.random.Generator"], "SequenceResult"]
 
 
 class Reaction(NamedTuple):
-    """A policy for times that are drawn, and what it does in words; replans: by which method it plans at every decision, in its
-    time; None: it does not."""
+    """A policy for times that are drawn, and what it does in words.
+
+    replans: the method by which it plans at every decision, while the work waits; None: it does not plan.
+    """
 
     policy: "Policy"
     words: str
@@ -57,12 +59,12 @@ def _asked(name: str, cell: "Cell", objective: str, seed: int, planned: Sequence
 
 @dataclass(frozen=True)
 class Sequencer:
-    """A method; called with a cell, a search and a generator it finds a sequence.
+    """A sequencing method: called with a cell, a search and a generator, it returns a sequence.
 
-    load: gives its function, which is imported then: numba and OR-Tools take their time. help: what it is, in one line.
-    drawn: where chance is asked for it looks in drawn times; else with the means. react: the policy in its manner, for a cell,
-    an objective, a seed and the planned list. alone: nobody looks for a proof beside it unless that is asked for: it answers at
-    once, as a rule does, or proves what can be proven itself.
+    load: returns its function, and imports it only then, because numba and OR-Tools are slow to import. help: one line. drawn:
+    whether, where chance is asked for, it searches with drawn times instead of the means. react: makes the method's policy from a
+    cell, an objective, a seed and the planned list. alone: whether no bound is searched beside it unless asked for, since it
+    answers at once, as a rule does, or proves its result itself.
     """
 
     load: Callable[[], Find]
@@ -133,7 +135,7 @@ _SHIPPED: dict[str, Sequencer] = {
 SEQUENCERS = Family("sequencers", _SHIPPED, _adopted)
 
 
-BESIDE_METHODS = {  # by what an order may be that no method found alone
+BESIDE_METHODS = {  # other origins of an order, in words
     "advised": "srl with advice",
     "unadvised": "srl that was never advised",
     "given": "the given order",
@@ -142,14 +144,14 @@ BESIDE_METHODS = {  # by what an order may be that no method found alone
 
 
 def method_in_words(name: str) -> str:
-    """By what an order was found, such as "fifo (first in, first out: a queue of tasks)"."""
+    """The method that found an order, in words, such as "fifo (first in, first out: a queue of tasks)"."""
     if name in BESIDE_METHODS:
         return BESIDE_METHODS[name]
     return f"{name} ({SEQUENCERS[name].help})" if name in SEQUENCERS else name
 
 
 def check_method(name: str) -> None:
-    """BadInput for an unknown method."""
+    """Raises BadInput for an unknown method."""
     if name not in SEQUENCERS:
         raise unknown("method", name, SEQUENCERS, "--method")
 

@@ -1,4 +1,4 @@
-"""The methods, each loaded when it is touched: numba and OR-Tools take their time."""
+"""The sequencing methods by name, each imported on first use, because numba and OR-Tools are slow to import."""
 
 from typing import TYPE_CHECKING
 

@@ -18,8 +18,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SequenceRequest(Request):
-    """A request about which part to move next; the means of its improvement are costs. run: where the work stands; made: the
-    decisions of the episode until now.
+    """A request for advice on which part to move next; the means of its improvement are costs.
+
+    run: the present state of the work. made: the decisions of the episode so far.
     """
 
     run: Run
@@ -27,14 +28,14 @@ class SequenceRequest(Request):
 
 
 def state_of(run: Run) -> int:
-    """A number for where robot and parts are, whatever the time; as long as it takes."""
+    """A number, without a limit of size, for the positions of robot and parts, whatever the time."""
     number = run.robot
     for location in run.locations:
         number = number * len(run.cell.positions) + location
     return number
 
 
-# ---- search -----------------------------------------------------------------------------------------------------------
+# ---- The search, its settings and its result --------------------------------------------------------------------------
 
 
 FACTORS = ("A", "B")
@@ -45,7 +46,7 @@ SAME = 1e-6  # costs nearer than this are equal
 
 @dataclass(frozen=True)
 class EpisodeSequenced:
-    """One sequence tried: number from 1, its cost (see `SequenceResult`) and the best one so far, empty: there is none."""
+    """One sequence tried: its number from 1, its cost (see `SequenceResult`), and the best sequence so far; empty: none."""
 
     episode: int
     cost: float
@@ -55,9 +56,9 @@ class EpisodeSequenced:
 
 @dataclass(frozen=True)
 class SequenceResult:
-    """What every sequencer returns: the best sequence found, its cost, and the cost of each sequence tried.
+    """The result of every sequencer: the best sequence found, its cost, and the cost of each sequence tried.
 
-    The cost is the value of the objective asked for: the makespan [s] unless it was another one.
+    The cost is the value of the objective, by default the makespan [s].
     """
 
     sequence: tuple[int, ...]
@@ -67,7 +68,7 @@ class SequenceResult:
 
 @dataclass(frozen=True)
 class LearnedSequence(SequenceResult):
-    """What a learning sequencer returns beside: the cost of its greedy policy at the end."""
+    """The result of a learning sequencer, with the cost of its final greedy policy."""
 
     final_cost: float
 
@@ -79,8 +80,8 @@ OnEpisode = Callable[[EpisodeSequenced], None]
 class SrlSettings:
     """The parameters of SRL and of Monte Carlo: alpha, discount, beta (epsilon = n ** -beta), the reward factor's type.
 
-    values: "pairs", Q(s,a) as fig. 5.1; "states", a value per next state, as the listings have it. state: "parts", where
-    each part is, or "stations", what stands at each station (thesis App. III). Raises BadInput for what is out of range.
+    values: "pairs", Q(s,a) as in fig. 5.1; "states", a value per next state as in the listings. state: "parts", where each part
+    is, or "stations", what stands at each station (thesis App. III). Raises BadInput for a value out of range.
     """
 
     alpha: float = 0.05
@@ -102,19 +103,19 @@ class SrlSettings:
 
 
 class Watched(Protocol):
-    """What is known while a search runs, and whether it goes on: a `methods.shared.Shared`."""
+    """The limits that a search checks while it runs; implemented by `methods.shared.Shared`."""
 
     def look(self) -> None:
-        """Ends the search at a limit, by an error; every method calls it, often."""
+        """Raises an error at a limit; every method calls it often."""
 
 
 @dataclass(frozen=True)
 class Search:
-    """How long to look, for what, in which environment, and whom to tell. BadInput for fewer than 1 episode.
+    """The request to a sequencer: episodes, objective, chance, settings, and the listener. Raises BadInput for episodes below 1.
 
-    chance: what the processing times and arrivals are drawn from while it learns. settings: those of SRL and Monte
-    Carlo; the others have none. policy: of the method `carried`; None: the one that ships. shared: where a method that has no
-    episodes tells what it finds and proves, and looks whether to go on.
+    chance: the distributions of processing times and arrivals while it learns. settings: those of SRL and Monte Carlo; other
+    methods have none. policy: of the method `carried`; None: the policy that ships. shared: where a method without episodes
+    reports incumbents and bounds and checks whether to go on.
     """
 
     episodes: int = 400
@@ -130,7 +131,7 @@ class Search:
             raise BadInput(f"episodes = {self.episodes}: allowed are whole numbers from 1")
 
     def check(self, cell: Cell) -> None:
-        """BadInput when the cell does not have what the objective needs."""
+        """Raises BadInput when the cell lacks the data that the objective needs."""
         check_objective(self.objective, cell)
 
     def look(self) -> None:
@@ -140,9 +141,9 @@ class Search:
 
 
 def gap(cost: float, bound: float) -> float:
-    """How much more a cost is than what no cost is below, as a fraction; inf where the bound is 0 and the cost is not.
+    """The gap of a cost to a lower bound, as a fraction of the bound; inf where the bound is 0 and the cost is not.
 
-    What lies below the bound, or less than SAME above it, is due to rounding, and is 0.
+    It is 0 for a cost that is below the bound or less than SAME above it, which is due to rounding.
     """
     if bound <= SAME:
         return 0.0 if cost <= bound + SAME else inf
@@ -152,9 +153,9 @@ def gap(cost: float, bound: float) -> float:
 
 @dataclass(frozen=True)
 class Reference:
-    """What no sequence can beat: `bound`, in the objective's unit; `proven`: some sequence reaches it.
+    """A lower bound of every sequence's cost, in the objective's unit; proven: whether some sequence reaches it.
 
-    sequence: the best one that was found, without pointless hops, and by which method; empty: none.
+    sequence: the best one found, without needless stopovers, with the method that found it; empty: none.
     """
 
     bound: float
@@ -172,7 +173,7 @@ class Reference:
 
 @dataclass
 class Log:
-    """The sequences tried so far: the cost of each, and the best one. `note` keeps them and tells the search's listener."""
+    """The costs of the sequences tried so far, and the best one; `note` adds one and tells the search's listener."""
 
     search: Search
     costs: list[float] = field(default_factory=list)
@@ -180,7 +181,7 @@ class Log:
     best_cost: float = inf
 
     def note(self, sequence: tuple[int, ...], cost: float, complete: bool) -> None:
-        """One episode; what ended in a deadlock is not complete, and never the best."""
+        """Adds one episode; an incomplete one ended in a deadlock and is never the best."""
         self.costs.append(cost)
         if complete and cost < self.best_cost:
             self.best, self.best_cost = sequence, cost
@@ -188,7 +189,7 @@ class Log:
             self.search.on_episode(EpisodeSequenced(len(self.costs), cost, self.best_cost, self.best))
 
     def found(self, cell: Cell) -> tuple[tuple[int, ...], float, tuple[float, ...]]:
-        """The fields of a `SequenceResult`; WorkFailed when no sequence came to its end."""
+        """The fields of a `SequenceResult`; raises WorkFailed when every sequence ended in a deadlock."""
         if not self.best:
             why = "deadlocks" + (", or parts that would be picked too late" if cell.has_windows else "")
             raise WorkFailed(
@@ -198,7 +199,7 @@ class Log:
 
 
 def not_in_time(cell: Cell, who: str, bound: float) -> WorkFailed:
-    """The error of a search that was cut off before it had any sequence: there may be one."""
+    """The error of a search that was cut off before it found any sequence; one may exist."""
     least = f"; none costs less than {bound:.1f}" if 0.0 < bound < inf else ""
     return WorkFailed(
         f"no sequence for {counted(cell.parts, 'part')} was found in time by {who}, which does not show that there is none"
@@ -209,7 +210,7 @@ def not_in_time(cell: Cell, who: str, bound: float) -> WorkFailed:
 def only_one(
     cell: Cell, search: Search, sequence: tuple[int, ...], cost: float, complete: bool = True
 ) -> SequenceResult:
-    """The result of a method that has one sequence; WorkFailed when that is not complete, which is a deadlock."""
+    """The result of a method that makes a single sequence; raises WorkFailed when that ends in a deadlock."""
     log = Log(search)
     log.note(sequence, cost, complete)
     return SequenceResult(*log.found(cell))

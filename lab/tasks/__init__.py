@@ -1,1 +1,1 @@
-"""Files to checked frozen models: tasks, cells, worlds; the only place where raw text is checked."""
+"""Task, cell and world files as checked, frozen records; raw text is checked only here."""

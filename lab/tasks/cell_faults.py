@@ -1,4 +1,4 @@
-"""What is wrong with a cell file, and where in it."""
+"""The faults of a cell file, each with its place in the file."""
 
 import re
 from collections.abc import Iterator
@@ -13,20 +13,20 @@ from lab.sequencing.cell.track import check_track
 from lab.tasks.cell_fields import CellFields, CellRobot
 from lab.tasks.toml_text import Loc
 
-MAX_STAGES = 400  # of all routes together: the time to find the moves that one robot needs grows with the square
-MAX_SERVED = 5000  # where machines have servers, or robots are several
-SHOWN = 3  # missing moves in one message
+MAX_STAGES = 400  # stages of all routes together: the time to find one robot's moves grows with their square
+MAX_SERVED = 5000  # the same limit in cells with servers or several robots
+SHOWN = 3  # missing moves that one message names
 
 
 class Fault(NamedTuple):
-    """The way to what is wrong in the file, and what is wrong."""
+    """A fault: the path to the value in the file, and the message."""
 
     loc: Loc
     message: str
 
 
 def file_faults(cell: CellFields) -> Iterator[Fault]:
-    """Faults of all but stations, routes and times: the order, the robot's start, due times, names of methods."""
+    """The faults of everything except stations, routes and times: order, robots' starts, due times, names of methods."""
     yield from _order_faults(cell)
     yield from _robot_faults(cell)
     yield from _track_faults(cell)
@@ -86,7 +86,7 @@ def _order_faults(cell: CellFields) -> Iterator[Fault]:
 
 
 def layout_faults(cell: CellFields) -> Iterator[Fault]:
-    """Stations and routes that cannot be, machines without a time, stations that no route leads to."""
+    """The faults of stations and routes: inconsistent ones, machines without a time, stations on no route."""
     stages = list(cell.stages())
     served = len(cell.built_robots) != 1 or any(station.servers is not None for station in cell.stations)
     most = MAX_SERVED if served else MAX_STAGES
@@ -109,7 +109,7 @@ def layout_faults(cell: CellFields) -> Iterator[Fault]:
 
 
 def travel_faults(cell: CellFields) -> Iterator[Fault]:
-    """Names in the tables of times that no station has, and times for staying."""
+    """The faults of the tables of times: unknown stations, and times for staying."""
     names = cell.station_names
     for field, table in (("travel", cell.travel), ("loaded", cell.loaded)):
         for origin, row in table.items():
@@ -124,9 +124,9 @@ def travel_faults(cell: CellFields) -> Iterator[Fault]:
 
 
 def missing_times(cell: CellFields, parts: int) -> Iterator[Fault]:
-    """Moves that a sequence for so many parts may need and that have no time; when none leads to a station, that.
+    """The moves without a time that a sequence of `parts` parts may need, or a station that no time leads to.
 
-    For a cell without the faults above.
+    The cell must be free of the faults above.
     """
     needed = needed_moves(cell.built_stations, cell.built_products, cell.built_robots, parts, cell.buffers)
     given = {(origin, target) for origin, row in cell.times.items() for target in row}
@@ -151,9 +151,9 @@ def missing_times(cell: CellFields, parts: int) -> Iterator[Fault]:
 
 
 def loc_of(cell: CellFields, message: str) -> Loc:
-    """Where the sequencer's complaint about a station, a product or due times belongs in the file; () when nowhere."""
+    """The path in the file to the station, product or due time that a sequencer's message is about; () when unknown."""
     for field, members in (("stations", cell.stations), ("products", cell.products)):
-        for number in reversed(range(len(members))):  # of two of one name the second is one too many
+        for number in reversed(range(len(members))):  # of two with the same name, the second one is at fault
             if message.startswith(f"{field[:-1]} '{members[number].name}'"):
                 return (field, number, "name")
     if found := re.match(r"due_s of part (\d+) ", message):
@@ -162,7 +162,7 @@ def loc_of(cell: CellFields, message: str) -> Loc:
 
 
 def _bad_stage(cell: CellFields) -> Loc:
-    """The first route that cannot be even alone, and its stage that the complaint is about."""
+    """The path to the first route that is invalid by itself, and to the stage that the message names."""
     for i, product in enumerate(cell.built_products):
         for j, route in enumerate(product.routes):
             try:

@@ -1,4 +1,4 @@
-"""What cell files are made of: robot, stations, products, arrivals, chance, and how a sequence is looked for."""
+"""The records of a cell file: robots, stations, products, arrivals, chance, and the search for a sequence."""
 
 from collections.abc import Callable, Collection, Iterator
 from typing import Annotated, Literal
@@ -20,7 +20,7 @@ Times = dict[str, dict[str, Seconds]]  # from -> to -> seconds
 
 
 def _known(label: str, names: Collection[str], where: str) -> BeforeValidator:
-    """Refuses a name that is none of these, and says which one it may have been meant for."""
+    """A validator that refuses a name that is not among `names`, and suggests a similar one."""
 
     def check(value: object) -> object:
         if isinstance(value, str) and value not in names:
@@ -31,12 +31,12 @@ def _known(label: str, names: Collection[str], where: str) -> BeforeValidator:
 
 
 def _as_stage(value: object) -> object:
-    """A stage that is a station's name and nothing else may be written as the name."""
+    """The raw stage as a table; a stage without other fields may be written as its station's name."""
     return {"station": value} if isinstance(value, str) else value
 
 
 def _unlimited(value: object, checked: Callable[[object], int]) -> int:
-    """A capacity, or the word for one that is never reached."""
+    """A checked capacity; the word "unlimited" means one that is never reached."""
     return UNLIMITED if value == "unlimited" else checked(value)
 
 
@@ -260,7 +260,7 @@ class CellFields(Record):
 
     @property
     def times(self) -> Times:
-        """Seconds from a station to another: as given, or those of the ways on the track."""
+        """The seconds from each station to each other: the travel table, or the durations of the paths on the track."""
         if self.track is None:
             return self.travel
         names, found = self.station_names, Times()
@@ -270,22 +270,22 @@ class CellFields(Record):
 
     @property
     def built_stations(self) -> tuple[Station, ...]:
-        """The stations as the sequencer has them."""
+        """The stations as records of the sequencer."""
         return tuple(station.built() for station in self.stations)
 
     @property
     def built_robots(self) -> tuple[Robot, ...]:
-        """The robots as the sequencer has them."""
+        """The robots as records of the sequencer."""
         given = self.robots if self.robots is not None else (self.robot,) if self.robot is not None else ()
         return tuple(robot.built() for robot in given)
 
     @property
     def built_products(self) -> tuple[Product, ...]:
-        """The products as the sequencer has them."""
+        """The products as records of the sequencer."""
         return tuple(product.built() for product in self.products)
 
     def stages(self) -> Iterator[tuple[Loc, CellStage]]:
-        """Every stage of every route, after the way to it in the file."""
+        """Every stage of every route, each with the path to it in the file."""
         for i, product in enumerate(self.products):
             for j, route in enumerate(product.routes):
                 for k, stage in enumerate(route):

@@ -1,4 +1,4 @@
-"""Cell files: a cell for the sequencer alone, without physics, and the words that ask for an order of its parts."""
+"""Cell files: cells for the sequencer, without physics; orders of their parts from words; and the text of such a file."""
 
 import json
 import re
@@ -31,7 +31,7 @@ class CellFile(CellFields):
 
     @classmethod
     def checked(cls, toml: TomlText) -> Self:
-        """The cell that a file's text describes; BadInput, with file and line, when its own order cannot be made."""
+        """The cell file of a text; raises BadInput, with file and line, when its own order is invalid."""
         try:
             found = cls.model_validate(toml.raw)
         except ValidationError as error:
@@ -41,9 +41,9 @@ class CellFile(CellFields):
         return found
 
     def cell(self, order: Sequence[str] | int | None = None) -> Cell:
-        """The cell for an order: a product for each part, or a number of parts of the only one; None: the file's own.
+        """The cell for an order: a product for each part, or a number of parts of the only product; None: the file's own.
 
-        Raises BadInput, with file and line when it was read from a file, for what cannot be a cell.
+        Raises BadInput for an invalid cell, with file and line when it was read from a file.
         """
         built = self._cell_or_fault(order)
         if isinstance(built, Cell):
@@ -51,20 +51,20 @@ class CellFile(CellFields):
         raise BadInput(built.message) if self._toml is None else self._toml.refusal(built.loc, built.message)
 
     def chance(self) -> Chance:
-        """What --stochastic draws from."""
+        """The distributions from which --stochastic draws."""
         return self.stochastic.built()
 
     def work_s(self, product: str) -> float:
-        """The least that a part of a product takes alone: moves, processing and service on its quickest route [s].
+        """The least time of a single part of a product: moves, processing and service on its quickest route [s].
 
-        BadInput for an unknown product. For a file without faults.
+        The file must be free of faults. Raises BadInput for an unknown product.
         """
         if product not in self.names:
             raise unknown("product", product, self.names, f"cell '{self.name}'")
         return min(self._route_s(route) for route in self.products[self.names.index(product)].routes)
 
     def ordered(self, order: Sequence[str] | int | None = None) -> tuple[str, ...]:
-        """A product for each part of an order as `cell` takes it; BadInput for one that this cell cannot be given."""
+        """The product of each part of an order as `cell` takes it; raises BadInput for an order that does not fit the cell."""
         if order is None:
             return self.order if self.order is not None else (self.names[0],) * (self.parts or 0)
         count = order if isinstance(order, int) else len(order)
@@ -80,19 +80,19 @@ class CellFile(CellFields):
         return parts
 
     def with_robots(self, count: int) -> Self:
-        """The same with so many robots like its first one; BadInput for a cell without a robot, and for missing times."""
+        """The file with `count` robots like its first one; raises BadInput for a cell without a robot, and for missing times."""
         first = self.robot or next(iter(self.robots or ()), None)
         if first is None:
             raise BadInput(f"--robots {count}: cell '{self.name}' has none: its parts go on by themselves")
         named = tuple(first.model_copy(update={"name": f"{ROBOT} {n}"}) for n in range(1, count + 1))
         several = {"robot": None, "robots": named}
-        alone = {"robot": first, "robots": None, "track": None, "travel": self.times}  # which is never in its own way
+        alone = {"robot": first, "robots": None, "track": None, "travel": self.times}  # a single robot needs no track
         found = self.model_copy(update=several if count > 1 else alone)
         found.cell()
         return found
 
     def _cell_or_fault(self, order: Sequence[str] | int | None) -> Cell | Fault:
-        """The cell, or the first fault; each kind of fault is looked for once there are none of those before it."""
+        """The cell, or the first fault; each kind of fault is searched only when all kinds before it are absent."""
         for faults in (file_faults, layout_faults, travel_faults):
             if (fault := next(faults(self), None)) is not None:
                 return fault
@@ -124,7 +124,7 @@ class CellFile(CellFields):
         )
 
     def _begins(self, parts: tuple[str, ...], release_s: tuple[float, ...]) -> tuple[Begins, ...]:
-        """All parts at their first stations, each there from its time on."""
+        """The state of all parts at time 0: at their first stations, each ready at its release time."""
         if len(release_s) != len(parts):
             raise BadInput(f"release_s has {len(release_s)} times; {len(parts)} parts need {len(parts)}")
         places = positions_of(self.built_stations, self.built_products, self.buffers, self.built_robots)
@@ -134,7 +134,7 @@ class CellFile(CellFields):
         )
 
     def _table(self, *tables: Times) -> NDArray[np.float64]:
-        """Seconds (n, n) from station row to station column, NaN where there is no time; what a later table says counts."""
+        """The seconds (n, n) from station row to station column, NaN where there is no time; later tables override earlier."""
         names = self.station_names
         seconds = np.full((len(names), len(names)), np.nan)
         for table in tables:
@@ -144,7 +144,7 @@ class CellFile(CellFields):
         return seconds
 
     def _route_s(self, route: tuple[CellStage, ...]) -> float:
-        """The least that one part takes along a route when it never waits, its pallets' moves included [s]."""
+        """The least time of one part along a route without waits, moves of its pallet included [s]."""
         own_s = {station.name: station.processing_s or 0.0 for station in self.stations}
 
         def carried_s(origin: str, target: str) -> float:
@@ -163,7 +163,7 @@ class CellFile(CellFields):
 
 
 def toast_case(word: str) -> str:
-    """The name of the cell file of a case of the thesis's toast cell: I, II or III, or 1, 2 or 3. BadInput for others."""
+    """The name of the cell file of a case of the thesis's toast cell: I, II or III, or 1, 2 or 3; raises BadInput for others."""
     for number, (case, name) in enumerate(TOAST_CASES.items(), 1):
         if word.strip().upper() in (case, str(number)):
             return name
@@ -171,7 +171,7 @@ def toast_case(word: str) -> str:
 
 
 def order_from_word(cellfile: CellFile, word: str) -> tuple[str, ...]:
-    """The order that a word means: products by their initials, "RSR", or in full, "rook,sign,rook". BadInput for others."""
+    """The order that a word stands for: products by initials, "RSR", or names, "rook,sign,rook"; raises BadInput for others."""
     if "," in word or word in cellfile.names:
         return cellfile.ordered([name.strip() for name in word.split(",")])
     meant: dict[str, list[str]] = {}
@@ -190,12 +190,12 @@ def order_from_word(cellfile: CellFile, word: str) -> tuple[str, ...]:
 
 
 def _example(names: Sequence[str]) -> str:
-    """An order to show, in the shortest words that `order_from_word` takes."""
+    """An example of an order, in the shortest form that `order_from_word` takes."""
     letters = [name[0].upper() for name in names]
     return "".join([*letters, letters[0]]) if len(set(letters)) == len(letters) else ",".join([*names, names[0]])
 
 
-# ---- cell toml --------------------------------------------------------------------------------------------------------
+# ---- The text of a cell file ------------------------------------------------------------------------------------------
 
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
@@ -203,7 +203,7 @@ _TABLES = ("robot", "products", "robots", "track", "travel", "loaded", "arrivals
 
 
 def toml_of(file: CellFile) -> str:
-    """The text of a cell file; fields that are as they are without being said are left out."""
+    """The text of a cell file, without the fields that have their default values."""
     raw = {"name": file.name, "kind": file.kind} | file.model_dump(exclude_defaults=True)
     lines = [f"{_key(key)} = {_value(value)}" for key, value in raw.items() if key not in (*_TABLES, "stations")]
     if raw.get("robots") == ():
@@ -232,7 +232,7 @@ def _pairs(table: Mapping[str, Any]) -> list[str]:
 
 
 def _stage(stage: Mapping[str, Any]) -> Any:
-    """A stage that is a station's name and nothing else, as its name."""
+    """A stage as its station's name where it has no other field, else as a table."""
     return stage["station"] if len(stage) == 1 else stage
 
 

@@ -1,4 +1,4 @@
-"""What a task file says of a fault: what goes wrong in a run, when, and with what."""
+"""The record of a fault in a task file: what goes wrong in a run, when, and with which part, station or obstacle."""
 
 from typing import Annotated, Any, Literal, Self
 
@@ -34,7 +34,7 @@ Edges = Annotated[
     BeforeValidator(as_tuple),
 ]
 
-NEEDS: dict[str, tuple[str, ...]] = {  # the fields that a kind of fault cannot do without
+NEEDS: dict[str, tuple[str, ...]] = {  # the fields that each kind of fault requires
     "machine slow": ("station",),
     "machine fails": ("station",),
     "obstacle put": ("at_m",),
@@ -43,7 +43,7 @@ NEEDS: dict[str, tuple[str, ...]] = {  # the fields that a kind of fault cannot 
     "station moved": ("station",),
     "station full": ("station",),
 }
-TAKES: dict[str, tuple[str, ...]] = {  # and those that it may have beside them
+TAKES: dict[str, tuple[str, ...]] = {  # the optional fields of each kind of fault
     "part moved": ("part", "when", "by_m", "at_m", "turn_rad"),
     "part gone": ("part", "when"),
     "part fallen": ("part",),
@@ -66,7 +66,7 @@ def allowed(what: str) -> list[str]:
 
 
 def _by_kind(schema: dict[str, Any]) -> None:
-    """Adds to a schema which fields each kind of fault needs, and may have."""
+    """Adds to a schema the required and the optional fields of each kind of fault."""
     schema["allOf"] = [
         {
             "if": {"properties": {"what": {"const": what}}, "required": ["what"]},

@@ -16,7 +16,7 @@ from lab.errors import BadInput, counted
 from lab.mdp import BoolArray, NoPath, TabularMDP, grid, shortest_steps
 from lab.tasks.record import Learned, Name, Record, as_tuple, read_text, walking, write_whole
 
-MAX_AXIS = {2: 1200, 3: 112}  # cells by the number of axes: in all about 1.4 million
+MAX_AXIS = {2: 1200, 3: 112}  # the most cells along an axis by the number of axes, about 1.4 million in all
 _ALLOWED = " or ".join(f"{axes} axes of 1 to {most} cells" for axes, most in MAX_AXIS.items())
 MAX_DENSITY = 0.6
 RANDOM = "random:"
@@ -28,11 +28,11 @@ _AXES = """\
 Drawn at random. Cells are counted from 0; with two axes they are [row, column], row 0 on top, with three [x, y, z], y
 away from you and z up.
 """
-_TRIES = 10  # at scattering obstacles that leave a way
+_TRIES = 10  # draws of obstacles before a path is kept free
 _ALONE: dict[str, Any] = {"learner": "afterstate", "beta": 1.0, "episodes": 500}
-_FAR = 300  # moves: nobody finds a goal as far away by chance, and with the usual discount it is worth nothing
+_FAR = 300  # moves to a goal that no learner finds by chance, and that the usual discount makes worthless
 _SHOWN: dict[str, Any] = {"learner": "monte-carlo", "alpha": 1.0, "beta": 3.0, "episodes": 60}
-_ROOM = 4  # an episode of a drawn world may take so many times the shortest way
+_ROOM = 4  # the step limit of a drawn world, in lengths of the shortest path
 _WANTED = "wanted random:SHAPE:DENSITY:SEED, such as random:10x10x10:0.06:7"
 
 Ints = NDArray[np.int_]
@@ -105,7 +105,7 @@ class GridWorld(Learned):
             yield from (("view.lower", self.view.lower), ("view.upper", self.view.upper))
 
     def blocked(self) -> BoolArray:
-        """Where obstacles are; bool of `shape`."""
+        """A mask of the obstacles; bool of `shape`."""
         return _marked(self.obstacles, self.shape)
 
     def region(self) -> BoolArray:
@@ -117,24 +117,24 @@ class GridWorld(Learned):
         return seen.ravel()
 
     def mdp(self) -> TabularMDP:
-        """The decision problem of the world, `lab.mdp.grid`; raises NoPath when obstacles part start and goal."""
+        """The decision problem of the world, from `lab.mdp.grid`; raises NoPath when obstacles separate start and goal."""
         try:
             return grid(self.shape, self.blocked(), self.start, self.goal, self.rewards, ACTIONS[len(self.shape)])
         except NoPath as error:
             raise NoPath(f"world '{self.name}': {error}", error.enclosing, error.around) from None
 
     def worth(self, moves: int, end: float) -> float:
-        """What so many moves are worth at their start when the last one gives `end` and the others cost a step each."""
+        """The discounted return of `moves` moves when the last one gives `end` and each other one the step reward."""
         discount = self.learner.discount
         last = discount ** (moves - 1)
         before = moves - 1 if discount == 1.0 else (1.0 - last) / (1.0 - discount)
         return self.rewards.step * before + last * end
 
     def check(self) -> TabularMDP:
-        """The decision problem, when it can be learned: raises NoPath, and BadInput when the best a learner can do is no way.
+        """The decision problem, if it can be learned; raises NoPath, and BadInput when the best policy does not reach the goal.
 
-        That is so when the shortest way takes more steps than an episode has, and when the rewards make it better to
-        run into the nearest obstacle.
+        That is the case when the shortest path has more steps than an episode, or when the rewards make it better to run into the
+        nearest obstacle.
         """
         mdp, collision, most = self.mdp(), self.rewards.collision, self.learner.max_steps
         moves = shortest_steps(mdp)
@@ -157,7 +157,7 @@ class GridWorld(Learned):
         return mdp
 
     def to_toml(self, comment: str = "") -> str:
-        """The text of a task file that holds this world, after a comment of any lines."""
+        """The text of a task file with this world, below a comment of any number of lines."""
         head = ("name", "kind", "title", "shape", "start", "goal")
         lines = [f"# {line}" for line in comment.splitlines()]
         lines += [f"{key} = {json.dumps(getattr(self, key))}" for key in head]
@@ -194,7 +194,7 @@ def _words(shape: Coordinates) -> str:
 
 
 def parse_shape(text: str, where: str) -> Coordinates:
-    """The numbers of "10x10x10"; raises BadInput for what is no shape of a world."""
+    """The shape in a text such as "10x10x10"; raises BadInput when it is not the shape of a world."""
     if not re.fullmatch(r"[0-9]{1,9}(x[0-9]{1,9})*", text):
         raise BadInput(f"{where}: shape '{text}': wanted {_ALLOWED}, such as 10x10x10")
     shape = tuple(map(int, text.split("x")))
@@ -203,15 +203,15 @@ def parse_shape(text: str, where: str) -> Coordinates:
 
 
 def from_text(path: Path) -> GridWorld:
-    """The world of a text grid in a file: see `from_rows`."""
+    """The world of a text grid in a file, see `from_rows`."""
     name = re.sub(r"[^A-Za-z0-9 _-]", "-", path.stem).lstrip(" _-")[:40] or "world"
     return from_rows(read_text(path), name, str(path))
 
 
 def from_rows(text: str, name: str, where: str) -> GridWorld:
-    """The world of a text grid: rows of one length of '.' free, '#' obstacle, one 'S' start and one 'G' goal.
+    """The world of a text grid: rows of equal length with '.' free, '#' obstacle, one 'S' start and one 'G' goal.
 
-    These are the rows that `lab see --json` calls "grid". Raises BadInput with where it stands, line and column, and NoPath.
+    `lab see --json` writes such rows as "grid". Raises BadInput with the place, line and column, and NoPath.
     """
     rows = [row.removesuffix("\r") for row in text.rstrip("\r\n").split("\n")]
     if rows == [""]:
@@ -240,7 +240,7 @@ def from_rows(text: str, name: str, where: str) -> GridWorld:
 
 
 def from_words(word: str) -> GridWorld:
-    """The random world that "random:10x10x10:0.06:7" means: shape, density, seed. Raises BadInput."""
+    """The random world of a word such as "random:10x10x10:0.06:7": shape, density, seed. Raises BadInput."""
     match = re.fullmatch(r"random:([^:]*):([0-9.eE+-]{1,20}):([0-9]{1,18})", word)
     try:
         density = float(match[2]) if match else None
@@ -252,11 +252,11 @@ def from_words(word: str) -> GridWorld:
 
 
 def random_world(shape: Sequence[int], density: float, seed: int) -> GridWorld:
-    """A world whose share `density` of cells, 0 to 0.6, are obstacles; a way always leads from start to goal.
+    """A random world with the share `density` of obstacles, 0 to 0.6, and always a path from start to goal.
 
-    Start and goal are at least half as many moves apart as opposite corners. Obstacles lie anywhere, as long as they
-    leave a way; if several draws do not, one way is kept free. Raises BadInput for values outside their range, and
-    when fewer cells are left free than the way needs.
+    Start and goal are at least half as many moves apart as opposite corners. Obstacles are drawn uniformly until they leave a
+    path; after several failed draws one path is kept free. Raises BadInput for values outside their range, and when fewer cells
+    are free than the path needs.
     """
     shape = tuple(int(n) for n in shape)
     where = f"random world {_words(shape)}"
@@ -291,11 +291,11 @@ def random_world(shape: Sequence[int], density: float, seed: int) -> GridWorld:
 
 
 def _obstacles(shape: Coordinates, count: int, start: Ints, goal: Ints, rng: np.random.Generator) -> BoolArray:
-    """So many obstacles anywhere that leave a way from start to goal; bool of `shape`."""
+    """A mask of `count` random obstacles that leave a path from start to goal; bool of `shape`."""
     from scipy.ndimage import label
 
     def scattered(kept: Ints) -> BoolArray:
-        """Obstacles outside the kept cells (n, axes)."""
+        """A mask of random obstacles outside the kept cells (n, axes)."""
         wall = np.zeros(prod(shape), bool)
         others = np.setdiff1d(np.arange(wall.size), np.ravel_multi_index(tuple(kept.T), shape))
         wall[rng.choice(others, count, replace=False)] = True
@@ -310,7 +310,7 @@ def _obstacles(shape: Coordinates, count: int, start: Ints, goal: Ints, rng: np.
 
 
 def _staircase(start: Ints, goal: Ints, rng: np.random.Generator) -> Ints:
-    """The cells (n, axes) of a shortest way from start to goal, its moves in any order."""
+    """The cells (n, axes) of a shortest path from start to goal, its moves in random order."""
     order = rng.permutation(np.repeat(np.arange(len(start)), np.abs(goal - start)))
     moves = (np.eye(len(start), dtype=np.int_) * np.sign(goal - start))[order]
     way: Ints = start + np.vstack([np.zeros_like(start), np.cumsum(moves, axis=0)])
@@ -318,7 +318,7 @@ def _staircase(start: Ints, goal: Ints, rng: np.random.Generator) -> Ints:
 
 
 def _fitted(world: GridWorld) -> GridWorld:
-    """The world with a learner that mostly finds a way alone, or, where that is far, learns the one that it is shown."""
+    """The world with settings of its learner that fit: to find a path alone or, to a far goal, to learn a path it is shown."""
     moves, learner = shortest_steps(world.mdp()), world.learner
     room = max(learner.max_steps, _ROOM * moves)
     if moves > _FAR:
@@ -327,7 +327,7 @@ def _fitted(world: GridWorld) -> GridWorld:
         learner, collision = (
             replace(learner, start_value=lost),
             lost - world.rewards.goal,
-        )  # what is not shown is not tried
+        )  # pessimistic: exploits advice
         gate, rewards = replace(world.gate, window=2, first_episode=4), replace(world.rewards, collision=collision)
         return world.model_copy(update={"learner": learner, "gate": gate, "rewards": rewards})
     learner = replace(learner, **_ALONE, max_steps=room)
@@ -335,7 +335,7 @@ def _fitted(world: GridWorld) -> GridWorld:
 
 
 def write_random(shape: str, density: float, seed: int, out: Path) -> dict[str, Any]:
-    """Writes a random world as a task file, which must not be there yet; the document of `lab task random --json`."""
+    """Writes a random world as a new task file; returns the document of `lab task random --json`."""
     if out.suffix != ".toml":
         raise BadInput(f"task file '{out}' (--out): its name must end in .toml")
     world = random_world(parse_shape(shape, "SHAPE"), density, seed)

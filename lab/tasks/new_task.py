@@ -1,4 +1,4 @@
-"""A new task file from a few words: an arm, parts, machines. The stations are laid out around the arm."""
+"""A new task from a few words (an arm, parts, machines), and the layout of its stations around the arm."""
 
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -12,31 +12,31 @@ from lab.errors import BadInput, counted, unknown
 from lab.tasks.robot_fields import MODELS
 from lab.tasks.task_fields import MAX_PARTS
 
-PART, MACHINE = "box:0.06x0.03x0.08:3", "press:30"  # where nothing is said
+PART, MACHINE = "box:0.06x0.03x0.08:3", "press:30"  # the defaults
 SIZES = {"box": ("XxYxZ", 3), "cylinder": ("DIAMETERxHEIGHT", 2)}
 PART_WORDS = "SHAPE:SIZE:COUNT, in metres, such as box:0.12x0.015x0.12:2 or cup=cylinder:0.035x0.1:1"
 MACHINE_WORDS = "NAME:SECONDS, such as oven:60"
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9 _-]{0,30}")
 LARGEST_M, SMALLEST_M, LONGEST_S = 0.5, 0.005, 86_400
-KG_M3 = 400.0  # of a part: wood, about
-HEAVIEST_KG, LIGHTEST_KG = 3.0, 0.02  # of wood: what is lighter falls over as the fingers leave it
+KG_M3 = 400.0  # the default density of a part, about that of wood
+HEAVIEST_KG, LIGHTEST_KG = 3.0, 0.02  # limits of the default mass: a lighter part falls over when it is released
 FRICTION = 0.8
-MACHINE_HIGH_M, AROUND_PART_M = 0.05, 0.06  # of a machine's box; its length and width beyond the part's
-COLUMNS, BUFFER_ROOM = 4, 2  # of a storage; parts that a buffer holds
-BETWEEN_M, GRIPPER_M = 0.04, 0.045  # at least: between parts of a station; of the open gripper beside a part
-OVER_M, CELL_M, LEVELS = 0.08, 0.12, 3  # under a carried part; cells of the workspace, and how many above one another
-GAPS_M = (0.15, 0.10, 0.06, 0.03)  # between stations, the widest that fits
+MACHINE_HIGH_M, AROUND_PART_M = 0.05, 0.06  # height of a machine's box; its length and width beyond the part's
+COLUMNS, BUFFER_ROOM = 4, 2  # columns of spots in a storage; capacity of a buffer
+BETWEEN_M, GRIPPER_M = 0.04, 0.045  # least gap between parts of a station; width of the open gripper beside a part
+OVER_M, CELL_M, LEVELS = 0.08, 0.12, 3  # clearance under a carried part; edge of a workspace cell; levels of cells
+GAPS_M = (0.15, 0.10, 0.06, 0.03)  # gaps between stations, of which the widest that fits is taken
 TURNS = (90, 75, 105, 60)  # [degrees] from ahead to the first and to the last station
 # of the way from the nearest to the farthest place that is reached
 SHARES = (0.44, 0.52, 0.36, 0.6, 0.68, 0.76, 0.84, 0.92)
-EDGE_M = 0.03  # of the reach that is left alone
+EDGE_M = 0.03  # margin at both edges of the reach
 
 
 @dataclass(frozen=True)
 class NewPart:
-    """A kind of part: a box [x, y, z] or a cylinder [diameter, height] [m], and how many.
+    """A kind of part and its count; size_m: [x, y, z] of a box or [diameter, height] of a cylinder [m].
 
-    given_kg: what it weighs; None: as much as wood.
+    given_kg: its mass; None: that of wood.
     """
 
     name: str
@@ -53,7 +53,7 @@ class NewPart:
 
     @property
     def mass_kg(self) -> float:
-        """What it weighs."""
+        """The mass of one part [kg]."""
         if self.given_kg is not None:
             return self.given_kg
         share = 1.0 if self.shape == "box" else pi / 4
@@ -63,7 +63,7 @@ class NewPart:
 
 @dataclass(frozen=True)
 class NewMachine:
-    """A machine, and how long it works on a part [s]."""
+    """A machine and its processing time [s]."""
 
     name: str
     processing_s: float
@@ -71,10 +71,10 @@ class NewMachine:
 
 @dataclass(frozen=True)
 class NewTask:
-    """Parts that an arm brings from an input through all machines, in their order, to an output; buffers before machines.
+    """A task in which an arm carries parts from an input through all machines, in order, to an output.
 
-    capacities: of stations that hold more or fewer parts than they do by default, by name. batches: machines that work on all
-    parts in them together.
+    buffers: whether each machine has a buffer before it. capacities: by name, of stations that differ from the default. batches:
+    the machines that work on all parts in them together.
     """
 
     name: str
@@ -98,7 +98,7 @@ class NewTask:
 
     @property
     def count(self) -> int:
-        """How many parts there are."""
+        """The number of parts."""
         return sum(part.count for part in self.parts)
 
     @property
@@ -108,7 +108,7 @@ class NewTask:
 
 
 class Around(NamedTuple):
-    """Where an arm reaches: from nearest to farthest from its axis [m], turned so far from ahead to both sides [rad]."""
+    """The reach of an arm: nearest and farthest distance from its axis [m], and its turn from ahead to either side [rad]."""
 
     nearest_m: float
     farthest_m: float
@@ -116,9 +116,9 @@ class Around(NamedTuple):
 
 
 class Placed(NamedTuple):
-    """A station where it is laid out: its middle x, y [m], and its parts' spots off that [m].
+    """A station in a layout: its middle x, y [m], and its parts' spots relative to that [m].
 
-    `said`: the file says the spots; else they are the rows that a station has by itself, a little closer to one another.
+    lists_spots: whether the file lists the spots; else the station has its default rows, a little closer together than these.
     """
 
     name: str
@@ -127,20 +127,20 @@ class Placed(NamedTuple):
     x: float
     y: float
     spots: tuple[tuple[float, float], ...]
-    said: bool
+    lists_spots: bool
 
     def half_m(self, foot: tuple[float, float]) -> tuple[float, float]:
-        """How far parts with such a foot, and the gripper around them, reach from its middle at most."""
+        """How far parts with such a foot, and the gripper around them, reach from its middle at most, along x and y [m]."""
         along, across = (max(abs(spot[axis]) for spot in self.spots) + foot[axis] / 2 + GRIPPER_M for axis in (0, 1))
         return along, across
 
 
-# ---- from words ---------------------------------------------------------------------------------------------------
+# ---- The task that words describe ---------------------------------------------------------------------------------
 
 
 def file_of(word: str) -> tuple[Path, str]:
-    """The file to be written and the task's name of NAME, with or without .toml; BadInput when it cannot be, or is
-    there.
+    """The file to be written and the task's name, from NAME with or without .toml; raises BadInput for an invalid name, and
+    for a file that exists.
     """
     path = Path(word if word.endswith(".toml") else f"{word}.toml")
     if not NAME.fullmatch(path.stem):
@@ -155,14 +155,14 @@ def file_of(word: str) -> tuple[Path, str]:
 
 
 def arm_of_word(word: str) -> str:
-    """An arm that ships."""
+    """The name of an arm that ships; raises BadInput for any other."""
     if word not in MODELS:
         raise unknown("arm", word, MODELS, "--arm")
     return word
 
 
 def part_of_word(word: str, taken: Collection[str] = ()) -> NewPart:
-    """The kind of part that "cup=cylinder:0.035x0.1:1" means; without a name it has its shape's. Raises BadInput."""
+    """The kind of part of a word such as "cup=cylinder:0.035x0.1:1"; the default name is its shape's. Raises BadInput."""
     where = f"part '{word}' (--part)"
     found = re.fullmatch(r"(?:([^=:]*)=)?([^=:]*):([^=:]*):([^=:]*)", word)
     if found is None:
@@ -183,7 +183,7 @@ def part_of_word(word: str, taken: Collection[str] = ()) -> NewPart:
 
 
 def machine_of_word(word: str, taken: Collection[str] = ()) -> NewMachine:
-    """The machine that "oven:60" means. Raises BadInput."""
+    """The machine of a word such as "oven:60". Raises BadInput."""
     where = f"machine '{word}' (--machine)"
     name, colon, time = word.rpartition(":")
     if not colon:
@@ -206,9 +206,10 @@ def new_task(
     capacities: Sequence[str] = (),
     batches: Sequence[str] = (),
 ) -> NewTask:
-    """What options, or answers, ask for. Raises BadInput.
+    """The new task that options, or answers, describe. Raises BadInput.
 
-    masses [kg], frictions: of kinds of parts, "pin=0.05"; capacities: of stations, "oven=2". batches: names of machines.
+    masses [kg], frictions: of kinds of parts, such as "pin=0.05". capacities: of stations, such as "oven=2". batches: names of
+    machines.
     """
     kinds: list[NewPart] = []
     for word in parts or (PART,):
@@ -237,7 +238,7 @@ def new_task(
 def _by_name(
     words: Sequence[str], option: str, label: str, names: Collection[str], allowed: tuple[float, float], example: str
 ) -> dict[str, float]:
-    """The numbers of an option such as --mass pin=0.05, by name. Raises BadInput."""
+    """The numbers of an option such as --mass pin=0.05 by name. Raises BadInput."""
     found: dict[str, float] = {}
     for word in words:
         name, equals, number = word.rpartition("=")
@@ -264,7 +265,7 @@ def _capacities(new: NewTask, words: Sequence[str]) -> dict[str, int]:
 
 
 def _number(text: str, none: float = -1.0) -> float:
-    """A number, `none` for what is none."""
+    """The number in a text; `none` when it holds none."""
     try:
         value = float(text)
     except ValueError:
@@ -279,19 +280,19 @@ def _check_name(name: str, where: str, taken: Collection[str]) -> None:
         raise BadInput(f"{where}: the name '{name}' is taken: {', '.join(taken)}")
 
 
-# ---- where it stands ----------------------------------------------------------------------------------------------
+# ---- The layout of its stations -----------------------------------------------------------------------------------
 
 
 def heights_m(new: NewTask) -> tuple[float, float]:
-    """The lowest height at which the tool takes a part, about, and that at which it carries one from station to station."""
+    """The approximate lowest height at which the tool grips a part, and the height at which it carries parts [m]."""
     tallest = max(part.size_m[-1] for part in new.parts)
     return SMALLEST_M, round(MACHINE_HIGH_M + 2 * tallest + OVER_M, 3)
 
 
 def layouts(new: NewTask, around: Around, between_m: float | None = None) -> Iterator[tuple[Placed, ...]]:
-    """The stations on an arc around the arm, in the order of the route; the widest apart first, none when they do not fit.
+    """Layouts of the stations on an arc around the arm, in the order of the route, the widest first; empty when none fits.
 
-    `between_m` [m]: between the parts of a station, None: as stations have them by themselves.
+    between_m: the gap between parts of a station [m]; None: the default of stations.
     """
     stations = _stations(new, between_m)
     for gap, turn, share in product(GAPS_M, TURNS, SHARES):
@@ -316,7 +317,7 @@ def does_not_fit(new: NewTask, around: Around) -> BadInput:
 
 
 def _stations(new: NewTask, between_m: float | None = None) -> list[Placed]:
-    """The stations in the order of the route, all at the arm's foot."""
+    """The stations in the order of the route, before they are laid out: all at the arm's foot."""
     pitch = [foot + (between_m or BETWEEN_M) for foot in new.foot_m]
 
     def placed(name: str, kind: str, capacity: int) -> Placed:
@@ -326,8 +327,8 @@ def _stations(new: NewTask, between_m: float | None = None) -> list[Placed]:
         first = (rows - 1) / 2 if kind == "machine" else (rows - 1) // 2  # a machine's body lies around its middle
         spots = [((c - (columns - 1) / 2) * pitch[0], (r - first) * pitch[1]) for c, r in at]
         spots = sorted(spots, key=lambda spot: (round(hypot(*spot), 6), spot))[:capacity]
-        said = capacity > 1 and (between_m is not None or kind == "machine")
-        return Placed(name, kind, capacity, 0.0, 0.0, tuple(spots), said)
+        lists_spots = capacity > 1 and (between_m is not None or kind == "machine")
+        return Placed(name, kind, capacity, 0.0, 0.0, tuple(spots), lists_spots)
 
     return [placed(name, kind, capacity) for name, (kind, capacity) in new.stations.items()]
 
@@ -343,6 +344,3 @@ def _apart(placed: Sequence[Placed], foot: tuple[float, float], gap: float) -> b
         if abs(one.x - other.x) < along + length + gap and abs(one.y - other.y) < across + width + gap:
             return False
     return True
-
-
-# ---- its text -----------------------------------------------------------------------------------------------------

@@ -105,7 +105,7 @@ def _station(new: NewTask, one: Placed) -> str:
     ]
     if one.name in new.batches:
         lines.append("batch = true                # all parts in it begin and end together")
-    if one.said:
+    if one.lists_spots:
         lines.append("spots = [                   # where parts stand: x, y, yaw off the pose")
         lines += [f"  {_list((*spot, 0.0))}," for spot in one.spots]
         lines.append("]")

@@ -1,4 +1,4 @@
-"""What a task file says of a kind of part: shape, mass, friction, how it stands, how it looks, where it is gripped."""
+"""The record of a kind of part in a task file: shape, mass, friction, pose, looks, and grip."""
 
 from pathlib import PurePosixPath
 from typing import Annotated, Literal, Self, get_args
@@ -10,12 +10,15 @@ from lab.tasks.record import Name, Record, as_tuple
 
 ShapeName = Literal["box", "cylinder", "mesh"]
 Edge = Annotated[float, Field(ge=0.001, le=10)]  # [m]
-Angle = Annotated[float, Field(ge=-7, le=7)]  # [rad], a full turn and a bit
+Angle = Annotated[float, Field(ge=-7, le=7)]  # [rad], a little more than a full turn
 Off = Annotated[float, Field(ge=0, le=10)]
 Share = Annotated[float, Field(ge=0, le=1)]
 
 MESH_FILES = (".obj", ".stl")
-SIZES = {"box": ("[x, y, z]", 3), "cylinder": ("[diameter, height]", 2)}  # what size_m holds, by shape
+SIZES = {
+    "box": ("[x, y, z]", 3),
+    "cylinder": ("[diameter, height]", 2),
+}  # the numbers of size_m and their count, by shape
 
 
 class GripFields(Record):

@@ -1,4 +1,4 @@
-"""What task files are made of: frozen records of checked fields, names, and how a problem is learned."""
+"""The base of all file records: frozen, checked fields; names; settings of learning; and reading and writing of texts."""
 
 from dataclasses import asdict, replace
 from math import inf, isfinite
@@ -10,12 +10,15 @@ from pydantic_core import CoreSchema
 
 from lab import files
 from lab.errors import BadInput, counted, unknown
+from lab.learning.gates import GATES
+from lab.learning.session_result import check_members
 from lab.learning.settings import SETTINGS, GateSettings, LearnerSettings
+from lab.learning.updates import UPDATES
 from lab.mdp import Rewards
 
-MAX_FILE_BYTES = 10_000_000  # of a text file: a world of 100 x 100 x 100 cells has its obstacles in it
-MAX_SHORT_BYTES = 1_000_000  # of one that holds no world: reading a longer one takes seconds
-MAX_REWARD = 1_000_000  # sums of larger ones lose the small ones, and of much larger ones overflow
+MAX_FILE_BYTES = 10_000_000  # of a text file: enough for the obstacles of a world of 100 x 100 x 100 cells
+MAX_SHORT_BYTES = 1_000_000  # of a file without a world: reading a longer one takes seconds
+MAX_REWARD = 1_000_000  # in sums with larger rewards, small ones are lost; much larger ones overflow
 
 NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9 _-]{0,39}$"
 Name = Annotated[str, Field(pattern=NAME_PATTERN)]
@@ -50,9 +53,7 @@ FROM_TABLE = _FromTable()
 
 
 def walking(step: float, learner: LearnerSettings) -> float:
-    """What walking as long as can be is worth, for ever or, without discount, through an episode; `step`: a move's
-    reward.
-    """
+    """The return of the longest walk: for ever or, without discount, through a whole episode; step: the reward of a move."""
     for_ever = inf if learner.discount == 1.0 else 1.0 / (1.0 - learner.discount)
     return step * min(for_ever, learner.max_steps)
 
@@ -84,7 +85,7 @@ class Learned(Record):
             or goal <= 0
             or step > 0
         ):
-            return rewards  # which is refused
+            return rewards  # the field's own validation refuses it
         return rewards | {"collision": round(walking(step, others.data["learner"]) - goal, 6)}
 
     @field_validator("gate", mode="before")
@@ -116,19 +117,14 @@ class Learned(Record):
 
     def check_members(self, where: str = "") -> None:
         """Raises BadInput for an unknown learner, selection or gate; `where` comes before the names of the tables."""
-        from lab.learning.session_result import check_members
-
         check_members(self.learner, self.gate, (f"{where}learner", f"{where}gate"))
 
     def changed(self, where: str = "--", **given: object) -> Self:
-        """With other settings of the learner and the gate, each by its name, or a class for these two; None: left as it is.
+        """The record with other settings of learner and gate, each by its name, or a class for these two; None: unchanged.
 
         Raises BadInput for a name that neither has, a value outside its range, and an unknown learner or gate; `where`
         comes before the names of the tables.
         """
-        from lab.learning.gates import GATES
-        from lab.learning.updates import UPDATES
-
         named: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
         if "learner" in named:
             named["learner"] = UPDATES.named(named["learner"])
@@ -145,7 +141,7 @@ class Learned(Record):
 
 
 def read_text(path: Path) -> str:
-    """A file's text; raises BadInput when it cannot be read, is no UTF-8 or is longer than MAX_FILE_BYTES."""
+    """The text of a file; raises BadInput when it cannot be read, is not UTF-8, or is longer than MAX_FILE_BYTES."""
     try:
         return files.read_limited(path, MAX_FILE_BYTES).decode("utf-8").replace("\r\n", "\n").replace("\r", "\n")
     except OSError as error:

@@ -1,4 +1,4 @@
-"""The robot's fields of a task file: which arm, how it is mounted, how fast and firm it works."""
+"""The record of the robot in a task file: the arm, its mounting, its speeds and forces."""
 
 from pathlib import PurePosixPath
 from typing import Annotated, Literal, Self
@@ -9,7 +9,7 @@ from lab.errors import unknown
 from lab.tasks.record import Name, Record, as_tuple
 
 MODELS = ("up6", "panda", "iiwa", "xarm6")  # the arms that ship, by name: rows of `lab.sim.arms.arm_models.ARMS`
-STRONGEST_N = 200.0  # of a grip
+STRONGEST_N = 200.0  # the largest grip force of a finger
 Part = Annotated[str, Field(min_length=1, max_length=100)]
 
 
@@ -57,7 +57,7 @@ class RobotSettings(Record):
 
     @property
     def is_file(self) -> bool:
-        """Whether the arm is a URDF of the task's own."""
+        """Whether the arm is a URDF file of the task."""
         return PurePosixPath(self.model).suffix.lower() == ".urdf"
 
     @field_validator("model")

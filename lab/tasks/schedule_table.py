@@ -1,4 +1,4 @@
-"""A schedule as others write it: rows of who is worked on where, or carried by whom, from when to when, read from CSV or JSON."""
+"""Schedules in files of other programs, CSV or JSON: rows of parts that are processed at stations or carried by vehicles."""
 
 import csv
 import re
@@ -18,9 +18,9 @@ from lab.tasks.instances.source import Source, json_line
 
 MOST_BYTES = 32 << 20
 MOST = {"row": 20_000, "part": 1000, "station": 200, "vehicle": 100}
-MOST_DEEP = 50  # of what is nested in a JSON document
+MOST_DEEP = 50  # the deepest nesting of a JSON document
 MOST_TIME_S = 1e8  # three years
-WORDS: Mapping[str, tuple[str, ...]] = {  # what a column, or a key, may be called: the first that is there counts
+WORDS: Mapping[str, tuple[str, ...]] = {  # field -> names of its column or key, of which the first one present counts
     "part": ("part", "job", "workpiece", "item", "lot", "order", "task"),
     "station": ("station", "machine", "workstation", "workcenter", "workcentre", "resource", "id"),
     "start": ("start", "begin"),
@@ -43,10 +43,10 @@ _ARMS = ("robot", "arm")
 
 @dataclass(frozen=True)
 class TimedRow:
-    """A part in a station, or with a vehicle, from `start_s` to `end_s`; part None: without one, such as an upkeep.
+    """A part in a station, or with a vehicle, from `start_s` to `end_s`; part: None for a row without one, such as maintenance.
 
-    origin, target: from where to where a vehicle goes, None where the row does not say it. vehicle None: in the station
-    `origin`, which is `target`, too.
+    vehicle: None: the part is in the station `origin`, which equals `target`. origin, target: from where to where a vehicle
+    drives; None where the row does not say it.
     """
 
     part: str | None
@@ -60,9 +60,9 @@ class TimedRow:
 
 @dataclass(frozen=True)
 class ScheduleTable:
-    """What files say: rows by start, rows that were planned where others were measured, and where stations stand, if said.
+    """The content of schedule files: rows by start, the planned rows where others were measured, and positions of stations.
 
-    has_arm: what carries is called a robot or an arm, and it is one.
+    has_arm: whether there is a single carrier and it is called a robot or an arm.
     """
 
     rows: tuple[TimedRow, ...]
@@ -73,24 +73,24 @@ class ScheduleTable:
 
 @dataclass(frozen=True)
 class _Record:
-    """Values by the word of their column or key, with the units of times, and where they stand."""
+    """One record of a file: values by the word of their column or key, the units of times, and the place in the file."""
 
     source: Source
     values: Mapping[str, Any]
     units: Mapping[str, float]
-    way: tuple[str | int, ...] | int  # through a JSON document, or the line
+    way: tuple[str | int, ...] | int  # the path in a JSON document, or the line
 
     def word(self, name: str) -> str | None:
-        """Under which word there is a value for this field."""
+        """The word under which the record has a value for a field; None: it has none."""
         return next((word for word in WORDS[name] if self.values.get(word) not in (None, "")), None)
 
     def refusal(self, wanted: str, got: object = None) -> BadInput:
-        """The error for what is not as it is wanted, with file and line."""
+        """The error for a value that is not as expected, with file and line."""
         line = self.way if isinstance(self.way, int) else json_line(self.source.text, self.way)
         return self.source.refusal(line, wanted, None if got is None else printable(str(got)))
 
     def names(self, name: str) -> list[str]:
-        """What is meant by a field: a bare number with the word before it, such as "machine 3"."""
+        """The names in a field; a bare number gets the field's word before it, such as "machine 3"."""
         word = self.word(name)
         if word is None:
             return []
@@ -102,7 +102,7 @@ class _Record:
         return next(iter(self.names(field_name)), None)
 
     def number(self, name: str, least: float = 0.0) -> float | None:
-        """A number from `least` in the field's unit, or seconds since 1970 for a date."""
+        """The value of a field: a number from `least` converted from its unit, or seconds since 1970 for a date."""
         word = self.word(name)
         if word is None:
             return None
@@ -122,7 +122,7 @@ class _Record:
 
     @property
     def dated(self) -> bool:
-        """Whether it begins at a date."""
+        """Whether the record's start is a date."""
         value = self.values.get(self.word("start") or "")
         return isinstance(value, str) and bool(re.match(r"\s*\d{4}-?\d\d-?\d\d", value)) and not _is_number(value)
 
@@ -132,10 +132,10 @@ class _Record:
 
 
 def read_schedule(paths: Sequence[Path]) -> ScheduleTable:
-    """The schedule in the first file, with what others say beside it: where stations stand, or PyJobShop's problem.
+    """The schedule in the first file, with positions of stations or PyJobShop's problem from the other files.
 
-    Times are seconds; dates count from the first. Raises BadInput, with file and line, for a file that cannot be read, a column
-    that is missing, a value that is none, and more than MOST of anything.
+    Times are seconds; dates count from the first one. Raises BadInput, with file and line, for a file that cannot be read, a
+    missing column, an invalid value, and more rows, parts or stations than MOST allows.
     """
     records, problems = list[_Record](), list[Any]()
     for path in paths:
@@ -190,7 +190,7 @@ def _check_count(kind: str, found: Any, path: Path) -> None:
 
 
 def _nothing(source: Source, timed: Sequence[_Record]) -> BadInput:
-    """The error for a file in which no row says where and when."""
+    """The error for a file in which no row has both a station or vehicle and times."""
     words = sorted({word for one in timed for word in one.values})
     what = "a machine" if timed else "a start and an end"
     there = f", not only {', '.join(words)}" if words else ""
@@ -212,7 +212,7 @@ def _place(record: _Record) -> Iterator[tuple[str, tuple[float, float]]]:
 
 
 def _rows(record: _Record, problem: "Mapping[str, Any] | None") -> Iterator[tuple[str, TimedRow]]:
-    """The rows of a record, one for each of its stations, each with when: "planned", "measured" or ""."""
+    """The rows of a record, one for each of its stations, each with its kind: "planned", "measured" or ""."""
     start_s, end_s, lasts_s = record.number("start"), record.number("end"), record.number("duration")
     if start_s is None and end_s is not None and lasts_s is not None:
         start_s = end_s - lasts_s
@@ -242,7 +242,7 @@ def _rows(record: _Record, problem: "Mapping[str, Any] | None") -> Iterator[tupl
 
 
 def _of_problem(problem: Mapping[str, Any], record: _Record) -> tuple[str | None, list[str]]:
-    """The job and the resources of a task of a solution, as PyJobShop's problem calls them."""
+    """The names of the job and the resources of a task in a solution, from PyJobShop's problem."""
 
     def called(what: str, number: Any) -> str:
         known = problem[what]
@@ -260,7 +260,7 @@ def _of_problem(problem: Mapping[str, Any], record: _Record) -> tuple[str | None
     return task if job is None else called("jobs", job), [called("resources", one) for one in resources]
 
 
-# ---- the two kinds of files
+# ---- Records of CSV files and of JSON files ---------------------------------------------------------------------------
 
 
 def _of_csv(source: Source) -> list[_Record]:
@@ -291,7 +291,7 @@ def _of_csv(source: Source) -> list[_Record]:
 
 
 def _check_columns(source: Source, line: int, columns: Sequence[str], there: set[str]) -> None:
-    """BadInput, with the nearest word, where a column is missing that every schedule has."""
+    """Raises BadInput, with the most similar word, when a required column is missing."""
     for group in (("start",), ("end", "duration"), ("station", "vehicle")):
         known = [word for name in group for word in WORDS[name]]
         if there & set(known):
@@ -317,9 +317,9 @@ def _of_json(source: Source, problems: list[Any]) -> list[_Record]:
 def _walk(
     source: Source, value: Any, way: tuple[str | int, ...], around: Mapping[str, Any], problems: list[Any]
 ) -> Iterator[_Record]:
-    """Every mapping with times, or with a place, in the order of the document.
+    """Every mapping with times, or with a position, in the order of the document.
 
-    around: what it stands in is called, by its word: what stands below "jobs" is of the job that is called so.
+    around: values that a mapping inherits from those around it, by word: a mapping below "jobs" belongs to the job named there.
     """
     if len(way) > MOST_DEEP:
         raise source.refusal(None, f"JSON in which nothing is more than {MOST_DEEP} deep")
@@ -349,7 +349,7 @@ def _walk(
         for record in _walk(source, one, (*way, key), _inside(way, key, around), problems)
     ]
     if len(way) > 1 and _word(str(way[-2]))[0] in _KNOWN and isinstance(way[-1], int):
-        values.pop("id", None)  # it says which part, machine or vehicle of the list this is, see `around`
+        values.pop("id", None)  # the name of a part, machine or vehicle in its list, see `around`
     own = _Record(source, values, units, way)
     if (own.timed and not any(one.timed for one in found)) or (own.word("x") and own.word("y")):
         yield own
@@ -357,13 +357,13 @@ def _walk(
 
 
 def _inside(way: tuple[str | int, ...], key: str, around: Mapping[str, Any]) -> Mapping[str, Any]:
-    """What stands below "machines": {"M1": ...} is of the machine M1."""
+    """The inherited values below a key: below "machines": {"M1": ...} they hold the machine M1."""
     word = _word(str(way[-1]))[0] if way and isinstance(way[-1], str) else ""
     return {**around, word: key} if word in _KNOWN else around
 
 
 def _word(column: str) -> tuple[str, float | None]:
-    """The word that a column or key stands for, and the unit in its name: "Start time [min]" is "start", 60."""
+    """The word of a column or key, and the unit in its name [s]: "Start time [min]" gives "start" and 60."""
     text = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", column.strip()).lower()
     unit = _UNIT.search(text)
     plain = re.sub(r"[\W_]", "", text[: unit.start()] if unit else text)

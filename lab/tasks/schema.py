@@ -1,4 +1,4 @@
-"""The keys of task, cell and world files: as a JSON Schema, which editors complete with, and as a page; made from the records."""
+"""The keys of task, cell and world files, generated from the records: a JSON Schema for editors, and a reference page."""
 
 import ast
 import json
@@ -28,9 +28,9 @@ from lab.tasks.record import NAME_PATTERN, Record
 from lab.tasks.robot_fields import MODELS
 from lab.tasks.task import Task
 
-DRAFT = "http://json-schema.org/draft-07/schema#"  # which the editors' extensions for TOML know
+DRAFT = "http://json-schema.org/draft-07/schema#"  # the draft that editors' extensions for TOML support
 TABLES = "definitions"
-STAGES = ("Stage", "CellStage")  # which may be written as their stations
+STAGES = ("Stage", "CellStage")  # records that may be written as the names of their stations
 UNIT = re.compile(r" \[([^\]]+)\]")
 EXAMPLES = re.compile(r",? such as (`[^`]*`(?:(?:, | or )`[^`]*`)*)")
 QUOTED = re.compile(r"`[^`]*`")
@@ -46,10 +46,10 @@ KINDS = ("task", "cell", "world")  # of files
 
 
 def schema_of(kind: str) -> Schema:
-    """The JSON Schema (draft 7) of a kind of file; BadInput for an unknown one.
+    """The JSON Schema (draft 7) of a kind of file; raises BadInput for an unknown kind.
 
-    It holds what can be said of each key by itself: names, types, ranges, choices, lengths. What one key demands of another,
-    `lab task check` says.
+    It covers each key by itself: names, types, ranges, choices, lengths. Conditions between keys are checked by
+    `lab task check`.
     """
     if kind not in KINDS:
         raise unknown("kind", kind, KINDS, "of file")
@@ -75,9 +75,9 @@ def schema_of(kind: str) -> Schema:
 
 
 def _describe(raw: Schema, whole: type[Record]) -> None:
-    """Give a schema and its tables the texts below the fields of their records.
+    """Adds to a schema and its tables the texts below the fields of their records.
 
-    Pydantic can do it as it makes the classes, and then reads their sources in each command that reads a file.
+    Pydantic could add them when it makes the classes, but would then read their sources in each command that reads a file.
     """
     tables = raw["$defs"] | {whole.__name__: raw}
     for record in _below(Record):
@@ -87,14 +87,14 @@ def _describe(raw: Schema, whole: type[Record]) -> None:
 
 
 def _below(record: type[Record]) -> Iterator[type[Record]]:
-    """All records that are made of one."""
+    """All subclasses of a record."""
     for below in record.__subclasses__():
         yield below
         yield from _below(below)
 
 
 def field_texts(record: type[Record]) -> dict[str, str]:
-    """The text below each field of a record, its parents' fields among them; a field may have none."""
+    """The text below each field of a record, inherited fields included; a field may have none."""
     found: dict[str, str] = {}
     for kind in reversed(record.__mro__):
         if issubclass(kind, Record):
@@ -108,7 +108,7 @@ def field_texts(record: type[Record]) -> dict[str, str]:
 
 
 def _from_dataclasses() -> dict[str, dict[str, str]]:
-    """The descriptions of records that are no pydantic models, and of their fields: by record, and by field, "" its own."""
+    """The descriptions of dataclasses and of their fields, by class and field; "" holds the description of the class."""
     found: dict[str, dict[str, str]] = {}
     for kind in (LearnerSettings, GateSettings, Rewards):
         hints = get_type_hints(kind, include_extras=True)
@@ -120,7 +120,7 @@ def _from_dataclasses() -> dict[str, dict[str, str]]:
 
 
 def _names() -> dict[tuple[str, str], tuple[list[str], Schema | None]]:
-    """The names that a key may hold, by record and key; and what else it may hold: a plug-in's name, or a file's."""
+    """The names that a key may hold, by record and key; and the schema of other values, such as a plug-in's or a file's name."""
     plugged: Schema = {"type": "string"}
     urdf: Schema = {"type": "string", "pattern": r"\.[uU][rR][dD][fF]$"}
     return {
@@ -136,7 +136,7 @@ def _names() -> dict[tuple[str, str], tuple[list[str], Schema | None]]:
 
 
 def _plain(schema: Schema) -> Schema:
-    """A schema in words that draft 7 and TOML have: no null, arrays with items, references without neighbours, examples."""
+    """A schema adapted to draft 7 and TOML: without null, arrays with items, references without siblings, with examples."""
     found = {key: value for key, value in schema.items() if key != "title"}
     if "properties" in found:
         found["properties"] = {key: _plain(value) for key, value in found["properties"].items()}
@@ -170,7 +170,7 @@ def _plain(schema: Schema) -> Schema:
 
 
 def examples_of(description: str) -> list[Any]:
-    """The values that a description shows after "such as", as TOML has them."""
+    """The example values in a description, after "such as", parsed as TOML."""
     found = EXAMPLES.search(description)
     return (
         [] if found is None else [tomllib.loads(f"value = {word[1:-1]}")["value"] for word in QUOTED.findall(found[1])]
@@ -178,12 +178,12 @@ def examples_of(description: str) -> list[Any]:
 
 
 def unit_of(description: str) -> str:
-    """The unit that stands in brackets in a description; "-": a bare number; empty: there is none."""
+    """The unit in brackets in a description; "-": a bare number; empty: there is none."""
     found = UNIT.search(QUOTED.sub("", description))
     return "" if found is None else found[1]
 
 
-# ---- the page -----------------------------------------------------------------------------------------------------
+# ---- The reference page -------------------------------------------------------------------------------------------
 
 HEADS = {
     "task": (
@@ -202,14 +202,14 @@ HEADS = {
 
 
 class Table(NamedTuple):
-    """A table of a file: what its heading is, and its schema."""
+    """A table of a file: its heading on the page, and its schema."""
 
     heading: str
     schema: Schema
 
 
 def page_of(kind: str) -> str:
-    """The reference of a kind of file, as Markdown: every key of every table. BadInput for an unknown kind."""
+    """The reference page of a kind of file as Markdown: every key of every table. Raises BadInput for an unknown kind."""
     schema = schema_of(kind)
     title, first = HEADS[kind]
     lines = [
@@ -256,7 +256,7 @@ def tables_of(schema: Schema) -> list[Table]:
 
 
 def _held(field: Schema, many: str = "") -> Iterator[tuple[str, str]]:
-    """The records that a field holds, and how: "" one, "[]" a list of them, "[][]" lists of lists, "{}" by name."""
+    """The records in a field and their nesting: "" one, "[]" a list, "[][]" a list of lists, "{}" a table by name."""
     for one in (field, *field.get("allOf", []), *field.get("anyOf", [])):
         if "$ref" in one:
             yield one["$ref"].rpartition("/")[2], many
@@ -266,7 +266,7 @@ def _held(field: Schema, many: str = "") -> Iterator[tuple[str, str]]:
 
 
 def _allowed(field: Schema, schema: Schema) -> str:
-    """What a field may hold, in words."""
+    """The values that a field allows, in words."""
     if "anyOf" in field:
         return ", or ".join(_allowed(one, schema) for one in field["anyOf"])
     if (held := next(_held(field), None)) and field.get("type") != "array":
@@ -314,7 +314,7 @@ def _code(value: Any) -> str:
 
 
 def toml_value(value: Any) -> str:
-    """A value as TOML has it, on one line."""
+    """A value as TOML, on one line."""
     if isinstance(value, dict):
         return "{ " + ", ".join(f"{key} = {toml_value(inner)}" for key, inner in value.items()) + " }"
     if isinstance(value, list):

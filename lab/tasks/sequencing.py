@@ -1,4 +1,4 @@
-"""How a file wants the order of the robot's transfers to be found, and the search that it asks for."""
+"""The settings of sequencing in a file, the search that they describe, and files of carried-over policies."""
 
 import json
 from collections.abc import Iterator
@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 from pydantic import Field, ValidationError
 
 from lab.errors import BadInput, unknown
+from lab.sequencing import SEQUENCERS
 from lab.sequencing.cell.chance import NO_CHANCE, Chance
 from lab.sequencing.cell.objectives import MAKESPAN, OBJECTIVES, WITH_DUE_TIMES
 from lab.sequencing.methods.carried_over_policy import CarriedPolicy
@@ -18,7 +19,7 @@ FORMAT: Literal["carried-policy-1"] = "carried-policy-1"
 
 
 class _Held(Record):
-    """What such a file holds."""
+    """The content of a policy file."""
 
     format: Literal["carried-policy-1"]
     weights: dict[str, float]
@@ -27,13 +28,13 @@ class _Held(Record):
 
 
 def write_policy(path: Path, policy: CarriedPolicy) -> None:
-    """Writes a policy whole or not at all: the same one always gives the same bytes. BadInput when it cannot be written."""
+    """Writes a policy to a file, whole or not at all, equal policies with equal bytes; raises BadInput when it cannot."""
     held = _Held(format=FORMAT, weights=dict(policy.weights), objective=policy.objective, learned_on=policy.learned_on)
     write_whole(path, json.dumps(held.model_dump(), indent=1) + "\n")
 
 
 def read_policy(path: Path, where: str = "--policy") -> CarriedPolicy:
-    """The policy of a file; BadInput, in one line that names it, for one that cannot be read or is damaged."""
+    """The policy in a file; raises BadInput, in one line that names the file, when it cannot be read or is damaged."""
     text = read_text(path)
     try:
         held = _Held.model_validate_json(text)
@@ -49,7 +50,7 @@ def read_policy(path: Path, where: str = "--policy") -> CarriedPolicy:
         raise BadInput(f"policy {path} ({where}): {error}") from None
 
 
-# ---- sequencing -------------------------------------------------------------------------------------------------------
+# ---- The settings of sequencing ---------------------------------------------------------------------------------------
 
 
 class Sequencing(Record):
@@ -79,9 +80,7 @@ class Sequencing(Record):
         return SrlSettings(self.alpha, self.discount, self.beta, self.reward_factor, self.values, self.state)
 
     def faults(self, due: bool) -> Iterator[tuple[str, BadInput]]:
-        """Fields with a name that no table holds, or that ask for due times when there are none (`due` False), and why."""
-        from lab.sequencing import SEQUENCERS
-
+        """The fields with an unknown name, or with an objective that needs due times without `due`; each with its error."""
         if self.method not in SEQUENCERS:
             yield "method", unknown("method", self.method, SEQUENCERS, "sequencing.method")
         if self.objective not in OBJECTIVES:
@@ -93,5 +92,5 @@ class Sequencing(Record):
 def search_for(
     settings: Sequencing, *, episodes: int | None = None, objective: str | None = None, chance: Chance = NO_CHANCE
 ) -> Search:
-    """What a file's settings ask of a sequencer, changed where something else is given."""
+    """The search that a file's settings describe; arguments that are given override them."""
     return Search(episodes or settings.episodes, objective or settings.objective, chance, settings.settings())

@@ -1,4 +1,4 @@
-"""A task: a cell in physics, the kinds of parts that are made in it, and how its sub-tasks are learned."""
+"""The task: a cell in physics, the kinds of parts made in it, and the settings with which its sub-tasks are learned."""
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
@@ -30,9 +30,9 @@ from lab.tasks.task_fields import (
 )
 from lab.tasks.toml_text import TomlText
 
-RESERVED = ("robot", "table", "insert", "the part", "carried part")  # names of other things in the cell
+RESERVED = ("robot", "table", "insert", "the part", "carried part")  # names that other things in the cell have
 RESERVED_ENDS = (" marker", " column", " head")
-TAUGHT_WITH = 2  # parts of the first kind in the scene of a lesson, where there is room
+TAUGHT_WITH = 2  # parts of the first kind in the scene of a lesson, if there is room
 _COUNT = re.compile(r"\s*([^=,]+?)\s*=\s*(\d{1,6})\s*")
 
 Order = tuple[str, ...]  # the kind of each part, part 1 first
@@ -78,12 +78,12 @@ class Task(Record):
 
     @property
     def folder(self) -> Path:
-        """Where the meshes and URDFs lie that the file names, unless the lab's own assets have them."""
+        """The folder of the meshes and URDFs that the file names and that are not among the lab's assets."""
         return self._folder or assets_folder()
 
     @contextmanager
     def in_its_file(self) -> Iterator[None]:
-        """Lets a BadInput from within say the file that the task was read from, and the line that it is about."""
+        """Adds to a BadInput from within the file that the task was read from, and the line that it is about."""
         try:
             yield
         except BadInput as error:
@@ -98,50 +98,51 @@ class Task(Record):
         return other
 
     def station(self, name: str) -> Station:
-        """The station called `name`; BadInput lists the known ones."""
+        """The station called `name`; raises BadInput, which lists the known ones."""
         for station in self.stations:
             if station.name == name:
                 return station
         raise unknown("station", name, [s.name for s in self.stations], f"task '{self.name}'")
 
     def part(self, kind: str) -> Part:
-        """The kind of part called so; BadInput lists the known ones."""
+        """The kind of part with this name; raises BadInput, which lists the known ones."""
         for part in self.parts:
             if part.name == kind:
                 return part
         raise unknown("part", kind, [part.name for part in self.parts], f"task '{self.name}'")
 
     def subtask(self, name: str) -> Subtask:
-        """The learning settings of a sub-task (the defaults when the file has none)."""
+        """The learning settings of a sub-task, or the defaults when the file has none."""
         return self.subtasks.get(name, Subtask())
 
     @property
     def made(self) -> tuple[Part, ...]:
-        """The kinds with routes: those that are no other kind's pallet."""
+        """The kinds with routes, without those that serve as pallets."""
         return tuple(part for part in self.parts if part.routes)
 
     def called(self, kind: str) -> str:
-        """What comes after a sub-task's name to say which kind it is about: nothing where there is only one."""
+        """The suffix of a sub-task's name that tells its kind; empty when the task has only one kind."""
         return f" {kind}" if len(self.parts) > 1 else ""
 
     def made_as(self, kind: str) -> Part:
-        """The kind with routes that a part is of, whether it is named alone, on its pallet, or by its pallet."""
+        """The kind with routes that a name stands for: the kind alone, on its pallet, or its pallet."""
         return next(part for part in self.made if kind in (part.name, part.pallet, f"{part.name} on {part.pallet}"))
 
     def starts(self, kind: str) -> str:
-        """The station at which parts of a kind stand at the start."""
+        """The station where parts of a kind stand at the start."""
         return self.part(kind).routes[0][0].station
 
     def kinds_at(self, station: str) -> tuple[Part, ...]:
         """The kinds of parts whose routes lead to a station."""
         return tuple(part for part in self.made if station in part.places)
 
-    # ---- how many parts ------------------------------------------------------------------------------------------
+    # ---- Orders --------------------------------------------------------------------------------------------------
 
     def order(self, first: int | None = None, counts: Mapping[str, int] | None = None) -> Order:
-        """The kind of each part: as many as the file says, or `first` of its first kind, or `counts` of the kinds named.
+        """The kind of each part: the file's counts, or `first` parts of the first kind, or `counts` by kind.
 
-        BadInput for an unknown kind, for no part or more than 50, and where more begin or end at a station than it holds.
+        Raises BadInput for an unknown kind, for no part or more than 50, and when more parts begin or end at a station than it
+        holds.
         """
         wanted = {part.name: part.count for part in self.made}
         if first is not None:
@@ -162,13 +163,13 @@ class Task(Record):
         return found
 
     def ordered(self, toasts: int | None = None, parts: str | None = None) -> Order:
-        """An order as --toasts, how many of the first kind, or --parts, how many of each, has it; BadInput for both."""
+        """The order of --toasts (parts of the first kind) or of --parts (parts of each kind); raises BadInput for both."""
         if toasts is not None and parts is not None:
             raise BadInput(f"--toasts {toasts} and --parts {parts}: an order is one or the other")
         return self.order(toasts, None if parts is None else counts_from_word(parts))
 
     def fitting(self, first: int) -> Order:
-        """An order with so many parts of the first kind, or as many as there is room for."""
+        """An order with `first` parts of the first kind, or with as many as there is room for."""
         own, *others = self.made
         room = [
             self.station(end).room_for(own.name)
@@ -178,7 +179,7 @@ class Task(Record):
         return self.order(max(1, min(first, *room)))
 
     def share_places(self, station: str, one: str, other: str) -> bool:
-        """Whether two kinds stand on the same places of a station."""
+        """Whether two kinds use the same places of a station."""
         place = self.station(station)
         return place.nests(one) == place.nests(other)
 
@@ -199,7 +200,7 @@ class Task(Record):
                     else f"station '{end}': {room_word} = {room}: {words} ({asked}) begin or end there, wanted at least {most}"
                 )
 
-    # ---- what must be known, once, and have a time ---------------------------------------------------------------
+    # ---- Checks between the fields of a file ---------------------------------------------------------------------
 
     @model_validator(mode="after")
     def _names_apart(self) -> Self:
@@ -221,7 +222,7 @@ class Task(Record):
 
     @model_validator(mode="after")
     def _tool_is_level(self) -> Self:
-        """Where the file does not say how the tool is held: level where parts are brought in from the side."""
+        """Fills in how the tool is held where the file does not say it: level if a station is approached from the side."""
         sides = any(station.approach == "side" for station in self.stations)
         if self.robot.tool is None and sides:
             object.__setattr__(self, "robot", self.robot.model_copy(update={"tool": "level"}))
@@ -373,18 +374,18 @@ def stages_of(part: Part) -> Iterator[Stage]:
 
 
 def in_words(order: Iterable[str]) -> str:
-    """An order as a person says it: "2 slices and 1 cup"."""
+    """An order in words, such as "2 slices and 1 cup"."""
     kinds = list(order)
     return " and ".join(counted(kinds.count(kind), kind) for kind in dict.fromkeys(kinds))
 
 
 def part_name(order: Order, number: int) -> str:
-    """What part `number`, from 1, is called in physics, as in schedules (see `Cell.part_name`)."""
+    """The name of part `number`, from 1, in physics and in schedules (see `Cell.part_name`)."""
     return f"{order[number - 1]} {number}"
 
 
 def counts_from_word(word: str) -> dict[str, int]:
-    """How many of each kind: "slice=2,cup=1"; BadInput for anything else."""
+    """The counts by kind in a word such as "slice=2,cup=1"; raises BadInput for anything else."""
     counts: dict[str, int] = {}
     for piece in word.split(","):
         match = _COUNT.fullmatch(piece)
@@ -395,6 +396,6 @@ def counts_from_word(word: str) -> dict[str, int]:
 
 
 def check_number(parts: int) -> None:
-    """BadInput unless 1 <= parts <= 50."""
+    """Raises BadInput unless 1 <= parts <= 50."""
     if not 1 <= parts <= MAX_PARTS:
         raise BadInput(f"{parts} toasts (--toasts): allowed are 1 to {MAX_PARTS}")

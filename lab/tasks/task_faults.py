@@ -1,4 +1,4 @@
-"""Where in a task file the thing stands that a fault is about, and which fields each of its tables may have."""
+"""The place in a task file that an error message is about, and the fields that each table may have."""
 
 import re
 from collections.abc import Iterator
@@ -10,26 +10,26 @@ from pydantic import BaseModel
 from lab.errors import BadInput
 from lab.tasks.toml_text import Loc, TomlText
 
-# the table of the file, by the word in a message
+# the file's table by the word that messages use for its members
 MEMBERS = {"part": "parts", "product": "parts", "station": "stations", "machine": "stations", "obstacle": "obstacles"}
 _THING = re.compile(rf"\b({'|'.join(MEMBERS)})s? '([^']*)'")
 _DOTTED = re.compile(r"\b(robot|workspace|camera|processes|subtasks|sequencing)((?:\.[\w-]+)+)")
 _STAGE = re.compile(r"(?:stage (\d+) of )?(?:the route|route (\d+))\b(?: of '([^']*)')?(?= has|:| \()")
 _NUMBERED = re.compile(r"\b(fault|after) (\d+)\b")
 _QUOTED = re.compile(r"'([^']*)'")
-_SIZE = ("size_m", "file")  # say how wide and how high something is
+_SIZE = ("size_m", "file")  # the fields that determine a width or a height
 _WORD = re.compile(r"[a-z_]+")
 
 
 def refusal(toml: TomlText, message: str) -> BadInput:
-    """The error that says in which file, and on which line of it, the thing stands that a message is about."""
+    """The error with the file, and the line of what the message is about."""
     return toml.refusal(loc_of(toml.raw, message), message)
 
 
 def loc_of(raw: dict[str, Any], message: str) -> Loc:
-    """The way to what a message about a task is about: the value that it quotes, the field that it names, or the table.
+    """The path to what a message is about: the value that it quotes, the field that it names, or the table.
 
-    () for a message that names nothing of the file.
+    The path is () for a message that names nothing in the file.
     """
     if (stage := _stage(raw, message)) is not None:
         return stage
@@ -46,9 +46,7 @@ def loc_of(raw: dict[str, Any], message: str) -> Loc:
 
 
 def within(raw: dict[str, Any], loc: Loc, message: str) -> Loc:
-    """The rest of the way, from the table to which `loc` leads: to the value that a message quotes, or the field it
-    names.
-    """
+    """The path from the table at `loc` on: to the value that a message quotes, or to the field that it names."""
     table: Any = raw
     for part in loc:
         table = table[part]
@@ -69,7 +67,7 @@ def within(raw: dict[str, Any], loc: Loc, message: str) -> Loc:
 
 
 def _stage(raw: dict[str, Any], message: str) -> Loc | None:
-    """The stage that the sequencer complains about; it names the part where there are several kinds in an order."""
+    """The path to the stage in a sequencer's message, which names the part when an order has several kinds."""
     found = _STAGE.search(message)
     if found is None:
         return None
@@ -79,7 +77,7 @@ def _stage(raw: dict[str, Any], message: str) -> Loc | None:
 
 
 def _member(raw: dict[str, Any], word: str, name: str) -> Loc:
-    """The last part, station or obstacle of a name: of two of one name that one is too many."""
+    """The path to the last part, station or obstacle with a name: of two with the same name, that one is at fault."""
     table = MEMBERS[word]
     members = raw.get(table)
     for number, member in reversed(list(enumerate(members if isinstance(members, list) else ()))):
@@ -89,7 +87,7 @@ def _member(raw: dict[str, Any], word: str, name: str) -> Loc:
 
 
 def _named(raw: dict[str, Any], message: str) -> Loc:
-    """The station or obstacle whose name is the first that a message says, or the file that it names."""
+    """The path to the station or obstacle whose name comes first in a message, or to the file that it names."""
     subtasks = raw.get("subtasks")
     if isinstance(subtasks, dict) and "subtasks" in message:
         return next((("subtasks", name) for name in _QUOTED.findall(message) if name in subtasks), ("subtasks",))
@@ -105,7 +103,7 @@ def _named(raw: dict[str, Any], message: str) -> Loc:
 
 
 def _leaves(value: Any, loc: Loc = ()) -> Iterator[tuple[Loc, Any]]:
-    """Every plain value within a value, and the way to it."""
+    """Every plain value within a value, with the path to it."""
     pairs = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else None
     if pairs is None:
         yield loc, value
@@ -115,7 +113,7 @@ def _leaves(value: Any, loc: Loc = ()) -> Iterator[tuple[Loc, Any]]:
 
 
 def fields_at(model: type[BaseModel], loc: Loc) -> list[str]:
-    """The fields that a record takes, or the one to which `loc` leads from it."""
+    """The fields of a record, or of the record at path `loc` within it."""
     records: list[type] = [model]
     for part in loc:
         inner = [_annotations(record)[part] for record in records if part in _annotations(record)]
@@ -130,7 +128,7 @@ def _annotations(record: type) -> dict[str | int, Any]:
 
 
 def _records(annotation: Any) -> list[type]:
-    """The records that a type is made of."""
+    """The records within a type annotation."""
     if isinstance(annotation, type) and (is_dataclass(annotation) or issubclass(annotation, BaseModel)):
         return [annotation]
     return [found for inner in get_args(annotation) for found in _records(inner)]

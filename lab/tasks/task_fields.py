@@ -1,4 +1,4 @@
-"""What task files are made of: parts and their routes, stations, camera, workspace, processes, obstacles."""
+"""The records of a task file: parts with their routes, stations, camera, workspace, processes, obstacles."""
 
 from math import prod
 from typing import Annotated, Literal, Self
@@ -8,7 +8,7 @@ from pydantic import BeforeValidator, Field, field_validator, model_validator
 from lab.tasks.part_fields import PartFields
 from lab.tasks.record import Count, Learned, Name, Record, as_tuple
 
-Size = Annotated[float, Field(ge=0.001, le=10)]  # the bounds keep a slip of the pen from taking all memory or all day
+Size = Annotated[float, Field(ge=0.001, le=10)]  # bounded, so that a typing error does not take all memory or hours
 Time = Annotated[float, Field(ge=0, le=86_400)]
 Number = Annotated[float, Field(ge=-10, le=10)]
 Off = Annotated[float, Field(ge=0, le=10)]
@@ -20,11 +20,11 @@ Area = Annotated[tuple[Off, Off], BeforeValidator(as_tuple)]
 Shade = Annotated[float, Field(ge=0, le=1)]
 Color = Annotated[tuple[Shade, Shade, Shade], BeforeValidator(as_tuple)]
 
-MAX_PARTS = 50  # of a run in physics
+MAX_PARTS = 50  # parts of a run in physics
 MOST_CELLS = (
     100_000  # of the workspace: each is surveyed for every way, which takes seconds and a quarter of a gigabyte
 )
-MOST_THINGS = 200  # stations, stages or obstacles: on one table is no room for more
+MOST_THINGS = 200  # stations, stages or obstacles; a table has no room for more
 
 
 class Workspace(Record):
@@ -258,26 +258,26 @@ class Station(Record):
 
     @property
     def stands_on(self) -> str:
-        """The body, also where the file says none."""
+        """The body, with the default where the file gives none."""
         return self.body or ("box" if self.kind == "machine" else "slab")
 
     @property
     def own_places(self) -> tuple[Place, ...]:
-        """The places that the file gives, also as spots, the lowest first; none where parts stand in rows."""
+        """The places in the file, given as places or as spots, the lowest first; empty where parts stand in default rows."""
         given = self.places or tuple(Place(at=spot) for spot in self.spots or ())
         return tuple(sorted(given, key=lambda place: place.height_m))
 
     @property
     def is_layered(self) -> bool:
-        """Whether parts may stand on parts."""
+        """Whether parts may stand on other parts."""
         return any(place.height_m for place in self.places or ())
 
     def nests(self, kind: str) -> str | None:
-        """The kind of the places that take a part of a kind: its own where it has some here, else None, those of any."""
+        """The kind in whose places a part stands: its own kind if that has places here, else None: places of any kind."""
         return kind if any(place.kind == kind for place in self.places or ()) else None
 
     def room_for(self, kind: str) -> int:
-        """How many parts of a kind it holds, where no other kind takes their places."""
+        """The number of parts of a kind that it holds if no other kind takes their places."""
         if self.places is None:
             return self.capacity
         return sum(place.kind == self.nests(kind) for place in self.places)
@@ -327,13 +327,13 @@ class Part(PartFields):
 
     @property
     def places(self) -> tuple[str, ...]:
-        """Every station and buffer of its routes, each once, in their order."""
+        """Every station and buffer of its routes, each once, in order."""
         stages = (stage for route in self.routes for stage in route)
         return tuple(dict.fromkeys(name for stage in stages for name in (stage.buffer, stage.station) if name))
 
     @property
     def ends(self) -> tuple[str, ...]:
-        """The stations at which its routes begin and end, each once."""
+        """The stations where its routes begin and end, each once."""
         return tuple(dict.fromkeys(route[at].station for route in self.routes for at in (0, -1)))
 
 

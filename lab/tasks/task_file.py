@@ -1,4 +1,4 @@
-"""Task files: tasks/*.toml -> validated frozen models. The only place where raw text is checked."""
+"""Loading of tasks, cells and worlds by name or file into checked, frozen records."""
 
 import os
 import re
@@ -21,14 +21,14 @@ from lab.tasks.toml_text import TomlText, explain, finding
 
 _SAYS_WORLD = re.compile(r"""^[ \t]*kind[ \t]*=[ \t]*["']world["']""", re.MULTILINE)
 
-_OF_WHOLE = ("value_error", "assertion_error")  # faults that a record finds in more than one of its fields
+_OF_WHOLE = ("value_error", "assertion_error")  # errors that concern more than one field of a record
 
-FileKind = Literal["task", "cell", "world"]  # of what a file holds
+FileKind = Literal["task", "cell", "world"]  # the kind of a file's content
 Checked = TypeVar("Checked", bound=Record)
 
 
 def shipped() -> dict[str, str]:
-    """What ships, by name, and whether it is a "task", a "cell" or a "world"."""
+    """The files that ship, by name, and their kinds: "task", "cell" or "world"."""
     return {name: _kind(_toml(path)) for name, path in _files().items()}
 
 
@@ -37,24 +37,24 @@ def _files() -> dict[str, Path]:
 
 
 def names_of(wanted: FileKind) -> list[str]:
-    """What ships of a kind, by name."""
+    """The names of the files of a kind that ship."""
     return [name for name, kind in shipped().items() if kind == wanted]
 
 
 def names_file(word: str) -> bool:
-    """Whether a word means a world, a cell or a task, by path, by name or by chance, and no sub-task."""
+    """Whether a word stands for a world, cell or task (a path, a name, or a random world) and not for a sub-task."""
     return word.startswith(RANDOM) or is_path(word) or word in _files()
 
 
 def is_path(task: str) -> bool:
-    """Whether a word for a task, a cell or a world is the path of a file, which may not be there."""
+    """Whether a word for a task, cell or world is a path; the file need not exist."""
     return Path(task).suffix in (".toml", ".txt", *SUFFIXES) or not {"/", os.sep}.isdisjoint(task)
 
 
 def find(task: str) -> Path:
-    """The file of a task, cell or world given by name or path; BadInput when there is none."""
+    """The file of a task, cell or world given by name or path; raises BadInput when there is none."""
     files = _files()
-    there = isfile(task)  # False, too, for a name that is too long for any file
+    there = isfile(task)  # also False for a name that is too long for any file
     if is_path(task) or (task not in files and there):  # many instances have no ending
         if there:
             return Path(task)
@@ -68,29 +68,30 @@ def find(task: str) -> Path:
 
 
 def load(task: str) -> Task:
-    """Read and check a task given by name or path; BadInput names the file, the line or field, the value and what is
-    allowed.
-    """
+    """The checked task of a name or path; raises BadInput with the file, the line or field, the value and what is allowed."""
     return cast(Task, load_any(task, "task"))
 
 
 def task_of_text(path: Path, text: str) -> Task:
-    """As `load`, from the text of a file that may not be written yet."""
+    """The checked task of a text, whose file need not exist yet; raises BadInput as `load` does."""
     return _task(TomlText.parsed(path, text))
 
 
 def load_cell(cell: str) -> CellFile:
-    """As `load`: a cell for the sequencer alone, by name or by file; BadInput names file and line."""
+    """The checked cell of a name or file, without physics; raises BadInput with file and line."""
     return cast(CellFile, load_any(cell, "cell"))
 
 
 def load_world(world: str) -> GridWorld:
-    """As `load`: a world by name, by file (.toml, or .txt with a text grid) or by chance ("random:10x10x10:0.06:7")."""
+    """The checked world of a name, of a file (.toml, or .txt with a text grid), or a random one ("random:10x10x10:0.06:7")."""
     return cast(GridWorld, load_any(world, "world"))
 
 
 def load_any(word: str, wanted: FileKind | None = None) -> Task | CellFile | GridWorld:
-    """A task, a cell or a world, as `load`, `load_cell` and `load_world` read it; BadInput also when another is wanted."""
+    """The task, cell or world of a name or file, as `load`, `load_cell` and `load_world` read it.
+
+    wanted: the expected kind; raises BadInput for another one.
+    """
     drawn = word.startswith(RANDOM)
     path = Path(word) if drawn else find(word)
     if not drawn and is_instance(path):
@@ -111,9 +112,9 @@ def load_any(word: str, wanted: FileKind | None = None) -> Task | CellFile | Gri
 
 
 def load_beside(word: str, asked: Asked) -> tuple[Task | CellFile | GridWorld, str | None]:
-    """As `load_any`, with what is asked for beside the file; and the --case that is left to name an order, None: none.
+    """The task, cell or world of a word with the given options, and the --case if it names an order; else None.
 
-    A layout is for instance files, robots for these and for cells. BadInput for anything else.
+    A layout fits instance files only; robots fit these and cells. Raises BadInput for other combinations.
     """
     path = None if word.startswith(RANDOM) else find(word)
     if path is not None and is_instance(path):
@@ -131,7 +132,7 @@ def load_beside(word: str, asked: Asked) -> tuple[Task | CellFile | GridWorld, s
 
 
 def load_cell_beside(word: str, asked: Asked) -> CellFile:
-    """As `load_beside`: a cell; BadInput for anything else, and for a --case that names no instance."""
+    """The cell of a word with the given options; raises BadInput for anything else, and for a --case that names no instance."""
     found, case = load_beside(word, asked)
     if not isinstance(found, CellFile):
         raise BadInput(f"{word}: wanted an instance file or a cell")
@@ -141,7 +142,7 @@ def load_cell_beside(word: str, asked: Asked) -> CellFile:
 
 
 def describe(word: str) -> tuple[str, dict[str, Any]]:
-    """The text of a task, a cell or a world, and the document of `lab task show --json`; a drawn world has no "file"."""
+    """The text of a task, cell or world, and the document of `lab task show --json`; a random world has no "file"."""
     found = load_any(word)
     if isinstance(found, GridWorld) and word.startswith(RANDOM):
         return found.to_toml(), {"file": None, **found.model_dump(mode="json")}
@@ -169,7 +170,7 @@ def _kind(toml: TomlText) -> FileKind:
 
 def _toml(path: Path) -> TomlText:
     text = read_text(path)
-    if len(text) > MAX_SHORT_BYTES and not _SAYS_WORLD.search(text):  # before seconds are spent on its values
+    if len(text) > MAX_SHORT_BYTES and not _SAYS_WORLD.search(text):  # checked first, since parsing would take seconds
         raise BadInput(f"{path}: {len(text)} characters: a file that holds no world has up to {MAX_SHORT_BYTES}")
     return TomlText.parsed(path, text)
 

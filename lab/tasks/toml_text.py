@@ -1,4 +1,4 @@
-"""TOML text: its values, the line of the file that each of them stands on, and how a fault in one is said."""
+"""TOML text: its values, the line of each value, and the words of an error about one."""
 
 import re
 import tomllib
@@ -18,7 +18,7 @@ from lab.errors import BadInput
 if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
 
-Loc = tuple[str | int, ...]  # the way to a value: keys of tables, and numbers in arrays from 0
+Loc = tuple[str | int, ...]  # the path to a value: keys of tables, and indices in arrays
 Fields = Callable[[Loc], Sequence[str]]
 
 _NO_SUCH_KEY = ("extra_forbidden", "unexpected_keyword_argument")
@@ -29,13 +29,13 @@ _WORDS = {
     "dataclass_type": "Input should be a table",
     "string_pattern_mismatch": "wanted 1 to 40 letters, digits, spaces, - and _, a letter or a digit first",
 }
-_MOST_SHOWN = 120  # characters of a bad value
-MOST_PARTS = 100  # of a dotted key: what the TOML reader does with one grows with the square of them
-MOST_KEYS = 100_000  # and tables: of more, reading takes seconds
-MOST_VALUES = 2_500_000  # commas: a world of 100 x 100 x 100 cells has its obstacles in its file
-MOST_SCANNED = 1_000_000  # characters in which the lines of values are looked up
+_MOST_SHOWN = 120  # characters of a bad value that an error shows
+MOST_PARTS = 100  # parts of a dotted key: the TOML reader's time grows with their square
+MOST_KEYS = 100_000  # keys and tables: more take seconds to read
+MOST_VALUES = 2_500_000  # commas: enough for the obstacles of a world of 100 x 100 x 100 cells
+MOST_SCANNED = 1_000_000  # characters of a text in which lines of values are looked up
 _HEADER = re.compile(r"^[ \t]*\[[^\n]*\][ \t]*(?:#[^\n]*)?$", re.MULTILINE)
-_MANY_DIGITS = re.compile(r"[0-9A-Fa-f](?:_?[0-9A-Fa-f]){15}")  # what may be beyond 64 bits
+_MANY_DIGITS = re.compile(r"[0-9A-Fa-f](?:_?[0-9A-Fa-f]){15}")  # an integer that may be beyond 64 bits
 _LONG_KEY = re.compile(rf"""(?<![\w.-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){{{MOST_PARTS}}}""")
 _BLANK = re.compile(r"(?:[ \t\r\n]|#[^\n]*)*")
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
@@ -51,8 +51,8 @@ _STRING = re.compile(
 
 @dataclass(frozen=True)
 class TomlText:
-    """A file's text and its values; all are equal, so that records which remember where they are from compare by
-    content.
+    """A file's text and its values. All objects of this class compare equal, so that records which refer to their text
+    compare by content.
     """
 
     path: Path = field(compare=False)
@@ -61,7 +61,7 @@ class TomlText:
 
     @classmethod
     def parsed(cls, path: Path, text: str) -> "TomlText":
-        """The values of a text; BadInput, with file and line, when it is no TOML, or a key has too many parts."""
+        """The parsed text; raises BadInput, with file and line, when it is not TOML, or a key has too many parts."""
         if (keys := text.count("=") + len(_HEADER.findall(text))) > MOST_KEYS or text.count(",") > MOST_VALUES:
             raise BadInput(
                 f"{path}: {keys} keys and tables, {text.count(',')} commas: allowed are {MOST_KEYS} and {MOST_VALUES}"
@@ -71,7 +71,10 @@ class TomlText:
             raise BadInput(f"{path}: line {line}: a key of more than {MOST_PARTS} parts")
         try:
             raw = tomllib.loads(text)
-        except (ValueError, RecursionError) as error:  # beside TOMLDecodeError: numbers or nests beyond Python's limits
+        except (
+            ValueError,
+            RecursionError,
+        ) as error:  # besides TOMLDecodeError: numbers or nesting beyond Python's limits
             raise BadInput(f"{path}: not valid TOML: {error}") from None
         found = cls(path, text, raw)
         if _MANY_DIGITS.search(text) and (loc := _beyond_64_bits(raw)) is not None:
@@ -83,20 +86,20 @@ class TomlText:
         return lines_of(self.text[:MOST_SCANNED])
 
     def line(self, loc: Sequence[str | int]) -> int | None:
-        """The line, from 1, of a value, or of the nearest thing around it that the file has; None: only the file itself."""
+        """The line, from 1, of a value, or of the nearest value around it that the file has; None: there is none."""
         for end in range(len(loc), 0, -1):
             if (line := self._lines.get(tuple(loc[:end]))) is not None:
                 return line
         return None
 
     def refusal(self, loc: Sequence[str | int], message: str) -> BadInput:
-        """The error that names the file, the line of what is wrong, and what it is."""
+        """The error with the file, the line of the value at `loc`, and the message."""
         line = self.line(loc)
         return BadInput(f"{self.path}: {'' if line is None else f'line {line}: '}{message}")
 
 
 def _beyond_64_bits(raw: dict[str, Any]) -> Loc | None:
-    """The way to a whole number that TOML does not have: one that a float may not hold either."""
+    """The path to an integer beyond the 64 bits of TOML, which a float may not hold either; None: there is none."""
     pending: list[tuple[Loc, Any]] = [((), raw)]
     while pending:
         loc, value = pending.pop()
@@ -110,18 +113,18 @@ def _beyond_64_bits(raw: dict[str, Any]) -> Loc | None:
 
 
 def lines_of(text: str) -> dict[Loc, int]:
-    """The line, from 1, on which each table, key and element of an array begins, in a text that is valid TOML.
+    """The line, from 1, on which each table, key and array element of a TOML text begins.
 
-    Of a text that is not, those before its fault.
+    For an invalid text, only those before its first fault are returned.
     """
     scan = _Scan(text)
-    with suppress(ValueError, IndexError, RecursionError):  # a line that is not found is only not said
+    with suppress(ValueError, IndexError, RecursionError):  # an error then names no line
         scan.document()
     return scan.lines
 
 
 class _Scan:
-    """One pass over a text; `at` is where it is."""
+    """One pass over a text; at: the present index."""
 
     def __init__(self, text: str) -> None:
         self.text, self.at = text, 0
@@ -130,7 +133,7 @@ class _Scan:
         self._counts: dict[Loc, int] = {}  # tables in each array of tables so far
 
     def document(self) -> None:
-        """All of it: headers of tables, and pairs in the table that the last header opened."""
+        """Scans the whole text: headers of tables, and pairs in the table that the last header opened."""
         table: Loc = ()
         self._blank()
         while self.at < len(self.text):
@@ -165,7 +168,7 @@ class _Scan:
         self._value(loc)
 
     def _keys(self) -> list[str]:
-        """The parts of a dotted key; a quoted one is read by the TOML reader, for its escapes."""
+        """The parts of a dotted key; quoted parts are parsed by the TOML reader because of their escapes."""
         keys = []
         while True:
             self._blank()
@@ -200,7 +203,7 @@ class _Scan:
         self.at += 1
 
     def _blank(self) -> None:
-        """Past spaces, line breaks and comments."""
+        """Skips spaces, line breaks and comments."""
         self._take(_BLANK)
 
     def _take(self, pattern: re.Pattern[str]) -> str:
@@ -215,16 +218,16 @@ class _Scan:
 
 
 def finding(error: ValidationError) -> "ErrorDetails":
-    """The first finding of a validation: a key that there is not before all others, which may lack because of it."""
+    """The first finding of a validation; an unknown key comes before all others, which may follow from it."""
     findings = error.errors()
     return next((one for one in findings if one["type"] in _NO_SUCH_KEY), findings[0])
 
 
 def explain(error: ValidationError, fields: Fields | None = None, raw: Any = None) -> str:
-    """The first finding of a validation as one line: the field, the bad value, what is allowed; and how many more there are.
+    """The first finding of a validation in one line: the field, the bad value, what is allowed, and the number of others.
 
-    fields: those of the record to which a way leads, to say which one may have been meant; raw: the file's values, to
-    say the name of what the field is of.
+    fields: returns the fields of the record at a path, to suggest a similar one. raw: the file's values, to name the station or
+    part that the field belongs to.
     """
     findings, first = error.errors(), finding(error)
     loc, message = first["loc"], _WORDS.get(first["type"], first["msg"].removeprefix("Value error, "))
@@ -252,7 +255,7 @@ def explain(error: ValidationError, fields: Fields | None = None, raw: Any = Non
 
 
 def _whose(raw: Any, loc: Loc) -> str:
-    """The name of the innermost table of an array that a way leads through, as in " of station 'oven'"; "": it has none."""
+    """The name of the innermost table of an array on a path, as in " of station 'oven'"; "" when it has none."""
     name = ""
     for before, part, after in zip(("", *loc), loc, (*loc[1:], ""), strict=False):
         try:

@@ -1,1 +1,1 @@
-"""What is to be sequenced, and the answer: stations, routes, an order, chance, objectives, schedules."""
+"""The cell that is sequenced, and the schedule of its parts: stations, routes, orders, chance, objectives."""

@@ -1,4 +1,4 @@
-"""A cell: stations, products with their routes, an order of parts, and transfer robots. What is to be sequenced."""
+"""A cell, the problem of sequencing: stations, products with their routes, an order of parts, and transfer robots."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -37,28 +37,27 @@ from lab.sequencing.cell.stations import (
 from lab.sequencing.cell.track import Stretch, Way, check_track, travel_s, ways_on
 
 MAX_PARTS = 200
-TRACK_SLACK_S = 1e-9  # by what sums of times may differ
+TRACK_SLACK_S = 1e-9  # tolerance between sums of times
 BUFFER_USES = ("busy", "free")
 ARRIVALS_AFTER = ("clock", "pick")
 
-EVERY_PLAN = "every plan"  # of which orders are proven; cycles name theirs, see `Rhythm.proven_of`
+EVERY_PLAN = "every plan"  # the set that a proof is about; cycles name theirs, see `Rhythm.proven_of`
 
 
 @dataclass(frozen=True, eq=False)
 class Cell:
-    """What is to be sequenced: the parts of an order along the routes of their products, moved by one robot, several, or none.
+    """The problem of sequencing: the parts of an order take the routes of their products, moved by one robot, several, or none.
 
-    order: a product's name for each part. Parts are numbered from 1. empty_s and loaded_s: (n, n) seconds from station
-    row to station column, in the order of `stations`, for a robot of speed 1; NaN: no such move; staying takes 0 s. robots: they
-    hinder each other only on a `track`, on whose stretches all their ways lie (see `Run`), and whose times are then those of the
-    tables; none: parts go on by themselves, at once, and wait wherever they are. arrivals None: all parts
-    wait at their first station, and may be taken in any order; else they come, and are taken, in their order. buffers:
-    "busy", a buffer is used only when the station ahead is full; "free", the robot chooses. due_s: when each part is
-    wanted [s]. begins: where each part is at time 0, None: all at their first stations; the makespan is then the last
-    arrival of those that are not finished yet. closed: stations to which nothing may be brought, such as a machine that is
-    out of order. precedences: transfers that have to wait for others, of one robot and machines without servers.
-    `lab.sequencing.simulate.rest.rest_of` makes such a cell of a run that has come to its middle.
-    Raises BadInput for what cannot be a cell, and for a missing time that a route needs (see `needed_moves`).
+    order: a product's name for each part; parts are numbered from 1. empty_s, loaded_s: (n, n) seconds from station row to
+    station column, in the order of `stations`, for a robot of speed 1; NaN: no such move; staying takes 0 s. robots: they hinder
+    each other only on a `track`, which then carries all drives (see `Run`) and must agree with the tables; without robots, parts
+    move on by themselves, at once, and wait wherever they are. arrivals: None: all parts wait at their first station and may be
+    taken in any order; else they arrive, and are taken, in their order. buffers: "busy", a buffer is used only when the station
+    ahead is full; "free", the robot chooses. due_s: each part's due time [s]. begins: where each part is at time 0; None: all at
+    their first stations; the makespan counts the parts that are not finished then. closed: stations to which nothing may be
+    brought, such as a machine that is out of order. precedences: transfers that wait for others, in cells of one robot and
+    machines without servers. `lab.sequencing.simulate.rest.rest_of` makes the cell of the remaining work of a run.
+    Raises BadInput for an inconsistent cell, and for a missing time that a route needs (see `needed_moves`).
     Source: thesis ch. 7 (rules), tables 7.1 and 7.2 (times); App. III (pallets, arrivals, vacuuming).
     """
 
@@ -108,7 +107,7 @@ class Cell:
         robot_start: str,
         parts: int,
     ) -> "Cell":
-        """A cell of so many toasts along one route, all there at the start. BadInput as for any cell."""
+        """A cell of identical parts, called toast, along one route, all there at the start; raises BadInput as any cell."""
         check_parts(parts)
         return cls(
             stations, (Product("toast", (route,)),), ("toast",) * parts, empty_s, loaded_s, one_robot(robot_start)
@@ -116,22 +115,22 @@ class Cell:
 
     @property
     def parts(self) -> int:
-        """How many parts are ordered."""
+        """The number of parts in the order."""
         return len(self.order)
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """Station names, by index."""
+        """The names of the stations, by index."""
         return tuple(station.name for station in self.stations)
 
     @cached_property
     def capacities(self) -> tuple[int, ...]:
-        """Room for parts, by station index."""
+        """The capacity of each station, by index."""
         return tuple(station.capacity for station in self.stations)
 
     @cached_property
     def batches(self) -> frozenset[int]:
-        """The stations, by index, that work on all parts that stand in them together."""
+        """The indices of the machines that work on all parts in them together."""
         return frozenset(index for index, station in enumerate(self.stations) if station.batch)
 
     @property
@@ -146,7 +145,7 @@ class Cell:
 
     @cached_property
     def takers(self) -> tuple[frozenset[int], ...]:
-        """By station: which robots, or its servers (`SERVER`), may make room there; none where there are not several robots."""
+        """By station, the robots (by index) and servers (`SERVER`) that may free room there; empty with fewer than two robots."""
         found = [set[int]() for _ in self.stations]
         for place in self.positions if len(self.robots) > 1 else ():
             for way in place.options:
@@ -156,7 +155,7 @@ class Cell:
 
     @cached_property
     def without_windows(self) -> "Cell":
-        """The same cell in which parts may stay in a machine as long as they are left there."""
+        """The same cell without time windows: parts may stay in a machine as long as they are left there."""
         stations = tuple(replace(one, at_most_s=None) for one in self.stations)
         products = tuple(
             replace(one, routes=tuple(tuple(stage.each(_no_window) for stage in route) for route in one.routes))
@@ -166,7 +165,7 @@ class Cell:
 
     @cached_property
     def ways(self) -> Mapping[tuple[int, int], Way]:
-        """The way on the track from station to station, by their indices; none without a track."""
+        """The path on the track between two stations, by their indices; empty without a track."""
         return ways_on(self.track, self.names)
 
     @cached_property
@@ -176,21 +175,21 @@ class Cell:
 
     @cached_property
     def positions(self) -> tuple[Position, ...]:
-        """Every place on a route where a part of the order may stand between two moves."""
+        """Every position on a route where a part of the order may stand between two moves, with the options still open."""
         shut = {self.index(name) for name in self.closed}
         taken = [station for at in self._stay for station in at.holds]
-        shut |= self.batches.intersection(taken)  # what is never empty takes no new batch
+        shut |= self.batches.intersection(taken)  # a machine that is never empty takes no new batch
         shut |= {station for station in taken if taken.count(station) >= self.capacities[station]}
         return (*open_ways(self.laid_out, shut), *self._stay)
 
     @cached_property
     def laid_out(self) -> tuple[Position, ...]:
-        """The positions with all their ways, whatever is closed, and none for parts that stay where they are."""
+        """The positions with all their options, ignoring closed stations, without those of parts that stay where they are."""
         return positions_of(self.stations, [self.products[n] for n, _ in self._classes], self.buffers, self.robots)
 
     @cached_property
     def rules(self) -> tuple[Rule, ...]:
-        """The precedences by positions."""
+        """The precedences in terms of positions."""
         own = [
             [n for n, at in enumerate(self.laid_out) if at.product == number] for number in range(len(self._classes))
         ]
@@ -218,7 +217,7 @@ class Cell:
 
     @cached_property
     def begin_at(self) -> tuple[int, ...]:
-        """The position in which each part begins, part 1 first: one without options where it has nothing to do."""
+        """The position in which each part begins, part 1 first; it has no options for a part that makes no move."""
         if self.begins is None:
             return self.starts
         stay = iter(range(len(self.laid_out), len(self.laid_out) + len(self._stay)))
@@ -230,17 +229,17 @@ class Cell:
 
     @cached_property
     def begin_s(self) -> tuple[float, ...]:
-        """When each part may be picked where it begins, as far as arrivals do not say so [s]."""
+        """When each part may be picked where it begins [s]; arrivals are not included."""
         return tuple(one.ready_s for one in self.begins) if self.begins is not None else (0.0,) * self.parts
 
     @cached_property
     def coming(self) -> tuple[int, ...]:
-        """The parts that begin at the start of their routes, in the order in which they come where parts arrive."""
+        """The parts that begin at the start of their routes, in the order of their arrivals."""
         return tuple(n for n, (at, start) in enumerate(zip(self.begin_at, self.starts, strict=True), 1) if at == start)
 
     @cached_property
     def unfinished(self) -> tuple[int, ...]:
-        """The parts for which there is something to do."""
+        """The parts that still have moves to make."""
         return tuple(n for n, at in enumerate(self.begin_at, 1) if self.positions[at].options)
 
     @cached_property
@@ -256,18 +255,18 @@ class Cell:
 
     @cached_property
     def possible_moves(self) -> int:
-        """How many moves all parts may make, by all their routes."""
+        """The number of different moves that all parts may make, along all their routes."""
         ahead = {at: reached_from(self.positions, {at}) for at in set(self.begin_at)}
         return sum(len(self.positions[place].options) for at in self.begin_at for place in ahead[at])
 
     @cached_property
     def most_choices(self) -> int:
-        """How many decisions a part may stand for at the most."""
+        """The largest number of choices of a part in one position."""
         return 1 + max(option.choice for place in self.positions for option in place.options)
 
     @cached_property
     def has_windows(self) -> bool:
-        """Whether a part may be spoilt where it is picked too late."""
+        """Whether some part has a latest pick, after which it is spoilt."""
         return any(place.at_most_s is not None for place in self.positions)
 
     def at_most_s(self, part: int, station: str) -> float | None:
@@ -280,7 +279,7 @@ class Cell:
 
     @cached_property
     def longest_s(self) -> float:
-        """A time that no sequence exceeds: everything slowest, one after the other [s]."""
+        """An upper bound of every makespan [s]: all steps at their slowest, one after the other."""
         slowest_s = sum(float(np.nanmax(table, initial=0.0)) for table in (self.empty_s, self.loaded_s))
         service_s = max((option.service_s for place in self.positions for option in place.options), default=0.0)
         slowest_s /= min([robot.speed for robot in self.robots], default=1.0)
@@ -291,19 +290,19 @@ class Cell:
         return self.parts * (len(self.positions) * (slowest_s + service_s) + process_s) + come_s
 
     def index(self, name: str) -> int:
-        """Index of a station by its name; BadInput when unknown."""
+        """The index of a station by its name; raises BadInput when it is unknown."""
         try:
             return self.names.index(name)
         except ValueError:
             raise unknown("station", name, self.names, "cell") from None
 
     def part_name(self, part: int) -> str:
-        """What a part is called in pictures and schedules: its product and its number."""
+        """The name of a part in pictures and schedules: its product and its number."""
         return f"{self.order[part - 1]} {part}"
 
     @cached_property
     def _products(self) -> tuple[int, ...]:
-        """Which of the `_classes` each part is of: the `product` of its positions."""
+        """The index of each part's class in `_classes`, which is the `product` of its positions."""
         names = [product.name for product in self.products]
         signs = signatures(self.precedences, self.parts)
         return tuple(
@@ -312,7 +311,7 @@ class Cell:
 
     @cached_property
     def _classes(self) -> list[tuple[int, tuple[tuple[bool, bool], ...]]]:
-        """Parts that are alike: a product, by index, and the sides of the precedences on which they stand."""
+        """The classes of identical parts: a product (by index) and the sides of the precedences on which they stand."""
         signs = signatures(self.precedences, self.parts)
         found = []
         for number, product in enumerate(self.products):
@@ -321,18 +320,18 @@ class Cell:
         return found
 
     def _is_apart(self, one: Begins) -> bool:
-        """Whether a part has a position of its own: it stays where it is, or is nowhere where that counts."""
+        """Whether a part needs a position of its own: it stays where it is, or it is nowhere and precedences count it."""
         return (one.stays and one.position is not None) or (one.position is None and bool(self.precedences))
 
     @cached_property
     def _stays_at(self) -> tuple[tuple[int | None, int], ...]:
-        """Where each part stands that has a position of its own (None: nowhere), and what it is of."""
+        """For each part with a position of its own, where it stands (None: nowhere) and its class."""
         begins = zip(self.begins or (), self._products, strict=False)
         return tuple((one.position, product) for one, product in begins if self._is_apart(one))
 
     @cached_property
     def _stay(self) -> tuple[Position, ...]:
-        """A position for each part that stays where it is: it takes its room, and leads nowhere."""
+        """A position without options for each part that stays where it is; the part takes room there."""
         starts = {place.product: place for place in reversed(self.laid_out)}
         return tuple(
             replace(starts[product] if place is None else self.laid_out[place], processing_s=0.0, options=())
@@ -429,11 +428,11 @@ def needed_moves(
     parts: int,
     buffers: Literal["busy", "free"] = "busy",
 ) -> NeededMoves:
-    """Every move that some allowed sequence of this cell may contain: what must be measured before a Cell can be built.
+    """Every move that some allowed sequence may contain; a Cell can be built only when the times of all of them are known.
 
-    Loaded: along the routes, directly and through the buffers. Empty: from the start to the first stations, and from
-    where something was dropped to where something may be picked next. Staying is never listed. For few parts the list
-    may be longer than strictly needed. Raises BadInput as Cell does for stations and routes.
+    Loaded moves run along the routes, directly and through buffers. Empty moves run from the robot's start to the first stations,
+    and from each drop to each pick that may follow. Staying is not listed. For few parts the list may be longer than strictly
+    needed. Raises BadInput as Cell does for stations and routes.
     """
     check_layout(stations, products)
     positions = positions_of(stations, products, buffers, robots)
@@ -443,7 +442,7 @@ def needed_moves(
 
 
 def check_parts(parts: object) -> None:
-    """BadInput unless it is a whole number from 1 to MAX_PARTS."""
+    """Raises BadInput unless `parts` is an integer from 1 to MAX_PARTS."""
     if not is_count(parts) or int(parts) > MAX_PARTS:  # type: ignore[call-overload]
         raise BadInput(f"parts = {parts!r}: allowed are 1 to {MAX_PARTS}")
 
@@ -458,7 +457,7 @@ def _check_one_each(field: str, given: Sequence[float], parts: int) -> None:
 def _checked_table(
     field: str, given: ArrayLike, names: tuple[str, ...], needed: tuple[tuple[str, str], ...]
 ) -> NDArray[np.float64]:
-    """The table as a read-only copy (n, n), once every value is a time or NaN and no needed one is NaN."""
+    """The table as a read-only copy (n, n); raises BadInput unless all values are times or NaN and no needed one is NaN."""
     table = np.array(given, dtype=np.float64)
     size = len(names)
     if table.shape != (size, size):

@@ -1,9 +1,7 @@
-"""What chance does to a cell: times drawn around their means, machines and robots that break down, parts that come late.
+"""Chance in a cell: times drawn around their means, machines and robots that break down, parts that come late.
 
-Laws are compiled as they are.
-
-A draw depends on the episode's seed, the part and the position only, not on the order of events: two policies in the
-same episode meet the same times.
+A draw depends on the episode's seed, the part and the position only, not on the order of events: two policies in the same
+episode meet the same times. numba compiles the functions of the laws as they stand here.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -24,12 +22,12 @@ def constant(mean_s: float, spread: float, u: float, v: float) -> float:
 
 
 def normal(mean_s: float, spread: float, u: float, v: float) -> float:
-    """Standard deviation `spread` times the mean, never below 0. Source: Box and Muller 1958."""
+    """A normal time [s] with standard deviation `spread` times the mean, never below 0. Source: Box and Muller 1958."""
     return max(0.0, mean_s * (1.0 + spread * sqrt(-2.0 * log(1.0 - u)) * cos(2.0 * pi * v)))
 
 
 def exponential(mean_s: float, spread: float, u: float, v: float) -> float:
-    """A time [s] of the exponential distribution with that mean, by the uniform number u."""
+    """An exponential time [s] with the mean `mean_s`, from the uniform number u."""
     return -mean_s * log(1.0 - u)
 
 
@@ -39,14 +37,14 @@ LAWS: Mapping[str, Callable[[float, float, float, float], float]] = MappingProxy
 )
 
 
-MOST_BREAKS = 8  # of a machine while it works on one part
-SHORTEST_S = 1.0  # that a robot is in order on average, where it breaks down
+MOST_BREAKS = 8  # breakdowns of a machine while it works on one part
+SHORTEST_S = 1.0  # the least mean time between a robot's breakdowns
 
 
 def repairs(work_s: float, breaks_every_s: float, repair_s: float, draw: Callable[[int], float]) -> float:
-    """How long a machine that works for `work_s` is repaired meanwhile; draw: the n-th of its uniform numbers.
+    """The total repair time [s] of a machine during `work_s` of work; draw: returns the n-th uniform number.
 
-    It breaks down after so much work as is exponentially distributed, and so is the time of a repair.
+    The work between breakdowns and the times of repairs are exponentially distributed.
     Source: operation-dependent failures, Buzacott and Hanifin 1978.
     """
     worked_s, found_s = 0.0, 0.0
@@ -59,9 +57,9 @@ def repairs(work_s: float, breaks_every_s: float, repair_s: float, draw: Callabl
 
 
 def through(outages: Iterable[tuple[float, float]], start_s: float, work_s: float) -> float:
-    """When a robot has done work of so many seconds, begun at `start_s` or once it is repaired; what it began it goes on with.
+    """When a robot has done `work_s` of work that begins at `start_s`, or when it is repaired, and pauses during outages [s].
 
-    outages: from when until when it is out of order, ascending [s].
+    outages: begin and end of each outage, ascending [s].
     """
     for from_s, until_s in outages:
         if from_s > start_s and from_s >= start_s + work_s:
@@ -74,14 +72,14 @@ def through(outages: Iterable[tuple[float, float]], start_s: float, work_s: floa
 
 @dataclass(frozen=True)
 class Chance:
-    """The laws of processing times and of intervals between arrivals; `spread` of a normal one as a share of its mean.
+    """The laws of processing times and of intervals between arrivals; spread: of a normal law, as a share of the mean.
 
-    breaks_every_s: how long a machine works between two breakdowns on average (0: it never breaks down), repair_s: how long it
-    is then repaired. late_s: by how much a part that is there at first comes later than it should, exponentially distributed.
-    robot_breaks_every_s: how long a robot is in order, at work or not, between two breakdowns on average (0: it never breaks
-    down), robot_repair_s: how long it then stops where it is, with what it holds; both exponentially distributed.
-    Raises BadInput for unknown laws, for spreads that are not 0 to 1, times that are not finite and 0 or more, and robots that
-    break down more often than once in SHORTEST_S.
+    breaks_every_s: mean working time of a machine between breakdowns (0: it never breaks down), repair_s: mean time of its
+    repair. late_s: mean delay of a part that should be there at the start. robot_breaks_every_s: mean time, at work or not,
+    between a robot's breakdowns (0: it never breaks down), robot_repair_s: mean time that it then stops where it is, with what it
+    holds. All of these are exponentially distributed, in seconds.
+    Raises BadInput for unknown laws, spreads outside 0 to 1, times that are not finite and 0 or more, and robots that break down
+    more often than once in SHORTEST_S.
     Source: thesis 7.6 (normal, 10 %), App. III; time-dependent failures, Buzacott and Hanifin 1978.
     """
 
@@ -113,7 +111,7 @@ NO_CHANCE = Chance("constant", "constant")
 
 
 def check_robot_breaks(robots: int, track: bool, chance: Chance) -> None:
-    """BadInput for robots that break down where there are none, and on a track."""
+    """Raises BadInput for robots that break down in a cell without robots, and on a track."""
     if not chance.robot_breaks_every_s:
         return
     every = f"robot_breaks_every_s = {chance.robot_breaks_every_s:g}"
@@ -126,10 +124,10 @@ def check_robot_breaks(robots: int, track: bool, chance: Chance) -> None:
 
 
 def check_chance(cell: Cell, chance: Chance) -> None:
-    """BadInput for chance in a cell with batches, and for robots that break down where they cannot (`check_robot_breaks`).
+    """Raises BadInput for chance in a cell with batches, and for breakdowns of robots as `check_robot_breaks` does.
 
-    An order tells with what is brought, or taken out, next whether a machine has begun: who decides on the way would decide
-    afterwards that it had begun before.
+    A batch is closed by the order's next transfer at its machine, so a policy that decides step by step would decide afterwards
+    that a batch had already begun.
     """
     check_robot_breaks(len(cell.robots), bool(cell.track), chance)
     if cell.batches and chance != NO_CHANCE:
@@ -141,7 +139,7 @@ def check_chance(cell: Cell, chance: Chance) -> None:
 
 @dataclass(frozen=True)
 class Episode:
-    """The times that one episode meets: those of the cell when there is no chance, else drawn by the seed, 0 to 2**64 - 1."""
+    """The times of one episode: the cell's own without chance, else drawn from the seed, 0 to 2**64 - 1."""
 
     cell: Cell
     chance: Chance = NO_CHANCE
@@ -151,7 +149,7 @@ class Episode:
         check_chance(self.cell, self.chance)
 
     def processing_s(self, part: int, position: int) -> float:
-        """How long the part (from 1) is processed in that position [s]."""
+        """The processing time of a part (from 1) in a position [s]."""
         mean_s, number = self.cell.positions[position].processing_s or 0.0, part * len(self.cell.positions) + position
         work_s, every_s = self._drawn(self.chance.processing, mean_s, number), self.chance.breaks_every_s
         if not (every_s and work_s):
@@ -160,19 +158,19 @@ class Episode:
         return work_s + repairs(work_s, every_s, self.chance.repair_s, lambda n: uniform(self.seed, first + n))
 
     def lasts_s(self, part: int, position: int, begin_s: float) -> float:
-        """How long the part is processed in that position from a time on [s]."""
+        """The processing time of a part (from 1) in a position when it begins at `begin_s` [s]."""
         return self.processing_s(part, position)
 
     def comes_s(self, part: int, since_s: float) -> float:
-        """When the part (from 1) arrives, where the arrival (or pick) before it was at a time [s]."""
+        """When the part (from 1) arrives if the arrival (or pick) before it was at `since_s` [s]."""
         return since_s + self.interval_s(part)
 
     def until_s(self, robot: int, start_s: float, work_s: float) -> float:
-        """When a robot (from 0) has driven or served for so long, from a time on or once it is repaired (see `through`) [s]."""
+        """When a robot (from 0) has done `work_s` of driving or service that begins at `start_s` (see `through`) [s]."""
         return through(self.outages(robot), start_s, work_s)
 
     def outages(self, robot: int) -> Iterator[tuple[float, float]]:
-        """From when until when a robot (from 0) is out of order, ascending, without end; none where robots never break down."""
+        """Begin and end of each outage of a robot (from 0), ascending, without end; empty where robots never break down [s]."""
         every_s, repair_s = self.chance.robot_breaks_every_s, self.chance.robot_repair_s
         if not every_s:
             return
@@ -184,18 +182,19 @@ class Episode:
             n += len(self.cell.robots)
 
     def late_s(self, part: int) -> float:
-        """By how much the part (from 1) comes later than it should [s]."""
+        """The delay of a part (from 1) [s]."""
         if not self.chance.late_s:
             return 0.0
         return -self.chance.late_s * log(1.0 - uniform(self.seed, self._apart + part - 1))
 
     @property
     def _apart(self) -> int:
-        """The first number that no law draws: there lateness begins, after it breakdowns of machines, then of robots."""
+        """The first number of a draw beyond those of times; delays are numbered from there, then breakdowns of machines and
+        robots."""
         return 2 * (self.cell.parts + 1) * len(self.cell.positions)
 
     def interval_s(self, part: int) -> float:
-        """How long after the arrival (or pick) before it the part (from 1) arrives [s]."""
+        """The interval from the arrival (or pick) before it to the arrival of a part (from 1) [s]."""
         mean_s = self.cell.arrivals.interval_s[part - 1] if self.cell.arrivals else 0.0
         number = part * len(self.cell.positions) + self.cell.starts[part - 1]  # no start has a process of its own
         return self._drawn(self.chance.arrivals, mean_s, number)

@@ -1,4 +1,4 @@
-"""What a sequence is judged by: one number of a finished run, the lower the better."""
+"""Objectives of a sequence: one number of a finished run, to be minimised."""
 
 from collections.abc import Callable
 from typing import Protocol
@@ -12,7 +12,7 @@ WITH_DUE_TIMES = ("mean-tardiness", "tardy-parts")
 
 
 class Run(Protocol):
-    """What an objective looks at: `lab.sequencing.simulate.run.Run`, and whatever else knows as much."""
+    """The values of a run that objectives use; implemented by `lab.sequencing.simulate.run.Run`."""
 
     cell: Cell
     end_s: float
@@ -31,27 +31,27 @@ def _makespan(run: Run) -> float:
 
 
 def _mean_tardiness(run: Run) -> float:
-    """How much later than due the parts are finished, on average; an early part counts 0 [s]."""
+    """The mean tardiness of the parts; an early part counts 0 [s]."""
     return sum(_late_s(run)) / run.cell.parts
 
 
 def _tardy_parts(run: Run) -> float:
-    """How many parts are finished later than due."""
+    """The number of parts that are finished later than due."""
     return float(sum(late > 0 for late in _late_s(run)))
 
 
 def _robot_idle(run: Run) -> float:
-    """How long the robot waits, at machines and for parts to arrive [s]."""
+    """The total time that the robot waits, at machines and for arrivals [s]."""
     return run.waited_s
 
 
 def _machine_idle(run: Run) -> float:
-    """How long the places of the routes' machines stand without work, added up, from time 0 to the makespan [s]."""
+    """The idle time of all places of the routes' machines from time 0 to the makespan, added up [s]."""
     return machine_places(run.cell) * run.end_s - run.processed_s
 
 
 def machine_places(cell: Cell) -> int:
-    """How many parts the machines that a route leads to can process at once."""
+    """The number of parts that all machines on the routes can process at once."""
     used = {station for place in cell.positions for station in place.holds}
     used |= {way.target for place in cell.positions for way in place.options if way.robot == SERVER}
     machines = [station for number, station in enumerate(cell.stations) if station.kind == "machine" and number in used]
@@ -66,11 +66,11 @@ OBJECTIVES: dict[str, Callable[[Run], float]] = {
     "robot-idle": _robot_idle,
     "machine-idle": _machine_idle,
 }
-BUILT_IN = tuple(OBJECTIVES)  # others that are added know finished runs only
+BUILT_IN = tuple(OBJECTIVES)  # an objective that is added later is a function of finished runs only
 
 
 def check_objective(name: str, cell: Cell) -> None:
-    """BadInput for an unknown objective, and for one that needs due times when the cell has none."""
+    """Raises BadInput for an unknown objective, and for one that needs due times when the cell has none."""
     if name not in OBJECTIVES:
         raise unknown("objective", name, OBJECTIVES, "--objective")
     if name in WITH_DUE_TIMES and cell.due_s is None:
@@ -79,18 +79,18 @@ def check_objective(name: str, cell: Cell) -> None:
 
 
 def check_built_in(name: str, who: str) -> None:
-    """BadInput for an objective that was added to OBJECTIVES: what is compiled, or goes step by step, has no rule for it."""
+    """Raises BadInput for an objective that was added to OBJECTIVES, for methods that need a compiled or stepwise form."""
     if name not in BUILT_IN:
         raise BadInput(f"objective '{name}': {who} has no rule for it, only for {', '.join(BUILT_IN)}")
 
 
 def cost(run: Run, objective: str) -> float:
-    """The objective's value of a run; of one that ended in a deadlock, more than any that did not."""
+    """The objective's value of a run; for a deadlock `stuck_cost`, which is more than that of any finished run."""
     return OBJECTIVES[objective](run) if run.done else stuck_cost(run.cell, objective)
 
 
 def stuck_cost(cell: Cell, objective: str) -> float:
-    """More than the objective's value of any finished run, unless times are drawn that are ten times their means."""
+    """A cost above that of any finished run, as long as no drawn time is ten times its mean."""
     if objective == "tardy-parts":
         return cell.parts + 1.0
     return 10.0 * cell.longest_s * (machine_places(cell) if objective == "machine-idle" else 1.0) + 1.0

@@ -1,4 +1,4 @@
-"""What must have been done with some parts before it may be done with others: a part that carries another one comes first."""
+"""Precedences between transfers of different parts, such as that a part which carries another one comes first."""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from lab.sequencing.cell.routes import Option, Position, reached_from
 
 @dataclass(frozen=True)
 class Step:
-    """A transfer on a part's route: the one that brings it to a station, or, `leaves`, that takes it away from there."""
+    """A transfer on a part's route: the one that brings it to a station or, with `leaves`, the one that takes it away."""
 
     station: str
     leaves: bool = False
@@ -21,11 +21,11 @@ class Step:
 
 @dataclass(frozen=True)
 class Precedence:
-    """Of `parts` (numbers, from 1), the k-th that makes `step` may not begin it before `needs[k - 1]` of the parts `of` have
-    ended `of_step`, by whatever way.
+    """A precedence: the k-th of `parts` (numbers from 1) to make `step` waits until `needs[k - 1]` of the parts `of` have ended
+    `of_step`, on any route.
 
-    needs: whole numbers that do not fall, one for each of `parts`; left out: all of `of`. With one part on each side this is the
-    usual constraint from a finish to a start. Source: finish-to-start precedence, Brucker et al. 1999.
+    needs: non-decreasing integers, one for each of `parts`; left out: all of `of`. With one part on each side it is the usual
+    finish-to-start constraint. Source: finish-to-start precedence, Brucker et al. 1999.
     """
 
     parts: tuple[int, ...]
@@ -36,14 +36,15 @@ class Precedence:
 
     @property
     def counts(self) -> tuple[int, ...]:
-        """How many of `of` the first, second, ... of `parts` needs."""
+        """How many of `of` the first, second, ... of `parts` needs to have ended their step."""
         return self.needs or (len(self.of),) * len(self.parts)
 
 
 class Rule(NamedTuple):
-    """A precedence by positions (indices): those of `parts` that have made their step, those of `of` that have, and the counts.
+    """A precedence in terms of positions (indices).
 
-    Parts count by where they are. lost ones are nowhere: they have left, and have not come.
+    made, ended: the positions in which a part of `parts`, or of `of`, has made its step. counts: see `Precedence.counts`. A lost
+    part is nowhere: it has left every station and come to none.
     """
 
     made: frozenset[int]
@@ -51,31 +52,31 @@ class Rule(NamedTuple):
     counts: tuple[int, ...]
 
     def applies(self, place: int, option: Option) -> bool:
-        """Whether a way from a position is the step that has to wait."""
+        """Whether an option of a position is the step that waits."""
         return option.to in self.made and place not in self.made
 
     def missing(self, made: int, ended: int) -> int:
-        """How many more of `of` must have ended their step before one more part may begin its own; 0: it may."""
+        """How many more of `of` must end their step before one more part may begin its own; 0: it may."""
         return max(0, self.counts[made] - ended) if made < len(self.counts) else 0
 
 
 def allows(rules: Sequence[Rule], counted: Sequence[int], place: int, option: Option) -> bool:
-    """Whether no precedence forbids a way from a position; `counted`: how many parts stand in each position."""
+    """Whether no precedence forbids an option of a position; counted: the number of parts in each position."""
     return not any(rule.applies(place, option) and missing(rule, counted) for rule in rules)
 
 
 def missing(rule: Rule, counted: Sequence[int]) -> int:
-    """`Rule.missing`, by how many parts stand in each position."""
+    """`Rule.missing` from the number of parts in each position."""
     return rule.missing(sum(counted[n] for n in rule.made), sum(counted[n] for n in rule.ended))
 
 
 def signatures(precedences: Sequence[Precedence], parts: int) -> list[tuple[tuple[bool, bool], ...]]:
-    """Which sides of the precedences each part stands on, part 1 first: parts that differ in it are not alike."""
+    """For each part, part 1 first, on which sides of each precedence it stands; parts that differ in it are not identical."""
     return [tuple((part in one.parts, part in one.of) for one in precedences) for part in range(1, parts + 1)]
 
 
 def made_in(positions: Sequence[Position], own: Collection[int], step: Step, names: Sequence[str]) -> frozenset[int]:
-    """Of the positions of a product, those in which its part has made a step."""
+    """The positions of a product in which its part has made a step."""
     ways = [way for place in own for way in positions[place].options if way.carries == "part"]
     at = [names[way.origin] if step.leaves else names[way.target] for way in ways]
     return frozenset(
@@ -89,7 +90,7 @@ def check_precedences(
     part_names: Sequence[str],
     steps: Mapping[str, Collection[Step]],
 ) -> None:
-    """BadInput for a precedence of parts, stations or counts that cannot be; `steps`: what each product's parts all do."""
+    """Raises BadInput for a precedence with invalid parts, stations or counts; steps: those on every route of each product."""
     for one in precedences:
         where = f"precedence of {one.step} after {one.of_step}"
         for part in (*one.parts, *one.of):

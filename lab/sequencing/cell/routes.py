@@ -1,7 +1,7 @@
-"""Where a part may stand between two moves, and where it can go from there: the routes of a cell, laid out flat.
+"""The routes of a cell as a graph: positions where a part may stand between two moves, and the options to leave them.
 
-What a route says in words (a buffer when the machine is busy, a pallet that has to follow) becomes positions and the
-options to leave them. The simulations, the bound and the searches know these only.
+The rules of a route (a buffer when the machine is busy, a pallet that has to follow) become positions and options. The
+simulations, the bound and the searches use nothing else.
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -13,18 +13,17 @@ from lab.errors import BadInput
 from lab.sequencing.cell.stations import Product, Robot, Route, Stage, Station
 
 Value = TypeVar("Value")
-SERVER = -1  # who works a way that no robot does
+SERVER = -1  # in place of a robot's index: a server carries out the option
 
 
 @dataclass(frozen=True)
 class Option:
-    """One way on from a position: a robot picks at station `origin`, drops at `target`, the part is in `to` then.
+    """One option to leave a position: a robot picks at station `origin` and drops at `target`; the part is in `to` then.
 
-    robot: which one, by index; SERVER: none, a server of the station `target` takes the part, works on it and is done with it.
-
-    choice: what the decision is called when a position has several (see `entry`). needs: stations, by index, where there
-    must be room. if_full: only allowed when this station is full. service_s: the robot's work before the pick [s].
-    waits: only after the processing is finished. carries: "part" or "pallet".
+    robot: its index; SERVER: a server of the station `target` takes the part and works on it instead. choice: the number of the
+    option among a position's, see `entry`. needs: the stations (by index) that must have room. if_full: allowed only when this
+    station is full. service_s: the robot's work before the pick [s]. waits: allowed only after the processing. carries: "part" or
+    "pallet".
     """
 
     choice: int
@@ -39,8 +38,8 @@ class Option:
     robot: int = 0
 
     def possible(self, full: Sequence[bool]) -> bool:
-        """Whether there is room for it, and no more than it may find; `full`: whether each station is."""
-        for station in self.needs:  # a loop: this is asked often
+        """Whether the stations in `needs` have room and `if_full` is full; full: by station."""
+        for station in self.needs:  # a plain loop, since this is called often
             if full[station]:
                 return False
         return self.if_full is None or full[self.if_full]
@@ -48,11 +47,11 @@ class Option:
 
 @dataclass(frozen=True)
 class Position:
-    """A part at `station` (index) on a route of `product` (index); `holds`: stations where it, or its pallet, takes room.
+    """A part at `station` (index) on a route of `product` (index); holds: the stations where it, or its pallet, takes room.
 
-    processing_s: what begins when the part gets here [s]; None: nothing begins, and what was begun goes on. No options:
-    the part is finished. Ends of routes hold no room. at_most_s: how long after the processing it may be picked [s]; None:
-    at any time.
+    processing_s: the processing that begins with its arrival [s]; None: no processing begins, and one that has begun goes on.
+    Without options the part is finished; ends of routes take no room. at_most_s: how long after the processing it may be picked
+    [s]; None: at any time.
     """
 
     product: int
@@ -65,14 +64,14 @@ class Position:
 
 @dataclass(frozen=True)
 class NeededMoves:
-    """The (origin, target) station names between which the robot may have to travel empty, and carry something."""
+    """The pairs (origin, target) of station names between which the robot may have to drive empty, and to carry something."""
 
     empty: tuple[tuple[str, str], ...]
     loaded: tuple[tuple[str, str], ...]
 
 
 def entry(part: int, choice: int, parts: int) -> int:
-    """How a decision is written in a sequence: the part's number, + `parts` for the second choice it has, and so on."""
+    """The number of a decision in a sequence: the part's number, + `parts` for its second choice, and so on."""
     return part + choice * parts
 
 
@@ -89,9 +88,9 @@ def choice_of(entry: int, parts: int) -> int:
 def positions_of(
     stations: Sequence[Station], products: Sequence[Product], buffers: Literal["busy", "free"], robots: Sequence[Robot]
 ) -> tuple[Position, ...]:
-    """The positions of all products, each product's start first; routes that are sound are taken for granted.
+    """The positions of all products, each product's start first; the routes must have been checked.
 
-    BadInput where no robot serves both ends of a move.
+    Raises BadInput where no robot serves both ends of a move.
     """
     layout = _Positions(stations, buffers, robots)
     for number, product in enumerate(products):
@@ -100,7 +99,7 @@ def positions_of(
 
 
 def from_the_ends(positions: Sequence[Position], value: Callable[[int, list[Value]], Value]) -> list[Value]:
-    """The value of each position, found after those that its options lead to: value(position, theirs, in their order)."""
+    """The value of each position, computed backwards from the ends: value(position, values that its options lead to)."""
     ahead = {number: [option.to for option in place.options] for number, place in enumerate(positions)}
     found = dict[int, Value]()
     for number in TopologicalSorter(ahead).static_order():
@@ -109,9 +108,9 @@ def from_the_ends(positions: Sequence[Position], value: Callable[[int, list[Valu
 
 
 def open_ways(positions: Sequence[Position], shut: Collection[int]) -> list[Position]:
-    """The positions without the ways to stations, by index, to which nothing may be brought, nor to where these end.
+    """The positions without the options that lead into the stations `shut` (by index), or only into dead ends.
 
-    Where nothing is left to choose the part can go nowhere.
+    A part in a position that is left without options can go nowhere.
     """
     kept = [replace(at, options=tuple(way for way in at.options if way.target not in shut)) for at in positions]
     ends = [not at.options for at in positions]
@@ -120,7 +119,7 @@ def open_ways(positions: Sequence[Position], shut: Collection[int]) -> list[Posi
 
 
 def reached_from(positions: Sequence[Position], places: Collection[int]) -> set[int]:
-    """The positions that a part in one of these may come to, its own among them."""
+    """The positions that a part may reach from these, these included."""
     ahead = from_the_ends(positions, lambda place, after: {place}.union(*after))
     return set[int]().union(*(ahead[place] for place in places))
 
@@ -133,10 +132,10 @@ def moves_between(
     robots: Sequence[Robot],
     parts: int,
 ) -> NeededMoves:
-    """The moves that may follow one another, and those that carry something; staying is left out.
+    """The empty moves between consecutive transfers, and the loaded moves; staying is left out.
 
-    begins: the positions in which parts begin; first: the ways that may be taken first; parts: how many have something to do.
-    Where more than one robot works, any of its moves may follow any other one.
+    begins: the positions in which parts begin. first: the options that may be taken first. parts: how many still move. With more
+    than one robot, any transfer of a robot may follow any other one of it.
     """
     names = [station.name for station in stations]
     if not is_serial(positions, robots):
@@ -157,7 +156,7 @@ def moves_between(
 
 
 def is_serial(positions: Sequence[Position], robots: Sequence[Robot]) -> bool:
-    """Whether one robot does all the work, so that what is decided later also happens later."""
+    """Whether one robot does all the work, so that decisions are carried out in their order."""
     return len(robots) == 1 and all(way.robot != SERVER for place in positions for way in place.options)
 
 
@@ -181,7 +180,7 @@ def _named(
 
 
 class _Positions:
-    """Positions as they are added, route by route."""
+    """A builder of positions, which are added route by route."""
 
     def __init__(self, stations: Sequence[Station], buffers: str, robots: Sequence[Robot]) -> None:
         self.positions: list[Position] = []
@@ -189,7 +188,7 @@ class _Positions:
         self._index = {station.name: index for index, station in enumerate(stations)}
 
     def add(self, product: int, described: Product) -> None:
-        """All positions of a product: its start, then route by route, ends of the same name only once."""
+        """Adds all positions of a product: its start, then route by route; routes share ends of the same name."""
         start = self._position(product, described.routes[0][0].station, ())
         ends: dict[str, int] = {}
         for route in described.routes:
@@ -221,9 +220,9 @@ class _Positions:
             leaves = reached
 
     def _add_served(self, leaves: Mapping[int, float], stage: Stage, last: bool) -> int:
-        """A machine with servers: a position in its room, and one when it has been worked on; without robots only that.
+        """Adds the positions of a machine with servers, before and after the work; without robots only the latter.
 
-        What was worked on there before is in its room.
+        Finished parts take the machine's room, too. Returns the position after the work.
         """
         product, room = self.positions[next(iter(leaves))].product, (stage.station,) if self._robots else ()
         there = [leave for leave in leaves if self._names(leave) == stage.station or not self._robots]
@@ -241,7 +240,7 @@ class _Positions:
         return self._stations[self.positions[position].station].name
 
     def _link(self, leaves: Mapping[int, float], reach: int, stage: Stage) -> None:
-        """The ways from positions, with the service there, to a stage: directly, and through its buffer."""
+        """Adds the options from positions, with the service there, to a stage: directly, and through its buffer."""
         choices = {leave: self._carry(leave, reach, self._way(stage.station, s)) for leave, s in leaves.items()}
         if stage.buffer is None:
             return
@@ -251,7 +250,7 @@ class _Positions:
             if self._buffers != "busy":
                 self._carry(leave, wait, way)
                 continue
-            # One robot never may choose: the decision is the same, and the cell says where it leads.
+            # With one robot the two options exclude each other: they share a decision, and the cell says where it leads.
             for robot, choice in choices[leave].items():
                 choice = choice if len(self._robots) == 1 else -1
                 full = replace(way, choice=choice, if_full=self._index[stage.station], robot=robot)
@@ -260,7 +259,7 @@ class _Positions:
         self._carry(wait, reach, self._way(stage.station))
 
     def _carry(self, leave: int, to: int, way: Option) -> dict[int, int]:
-        """A way for each robot that serves both ends of it; the choices, by robot. BadInput when there is none."""
+        """Adds an option for each robot that serves both ends; returns the choices by robot. Raises BadInput if none does."""
         origin = self.positions[leave].station
         able = [robot for robot in range(len(self._robots)) if self._serves(robot, origin, way.target)]
         if not able:
@@ -273,7 +272,7 @@ class _Positions:
         return serves is None or all(self._stations[station].name in serves for station in stations)
 
     def _way(self, target: str, service_s: float = 0.0) -> Option:
-        """An option of which only that is known yet."""
+        """An option with only its target and service time filled in."""
         return Option(-1, -1, -1, self._index[target], (), service_s=service_s)
 
     def _position(
@@ -289,7 +288,7 @@ class _Positions:
         return len(self.positions) - 1
 
     def _join(self, leave: int, to: int, way: Option) -> int:
-        """A way from a position to another: what is said of it beside these, completed; no choice yet: a new one. The choice."""
+        """Adds an option from a position to another, completed from `way`; returns its choice, a new one if it has none yet."""
         place, there = self.positions[leave], self.positions[to]
         choice = way.choice if way.choice >= 0 else 1 + max((option.choice for option in place.options), default=-1)
         needs = tuple(station for station in there.holds if station not in place.holds)

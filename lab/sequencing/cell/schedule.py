@@ -1,4 +1,4 @@
-"""What a run of a cell comes to: timed moves, the Schedule of robot, machines and parts that they make, and results."""
+"""Schedules: timed moves, the activities of robots, machines and parts that follow from them, and their rows in files."""
 
 import csv
 import json
@@ -21,7 +21,7 @@ _ROWS = ("robot", "machines", "parts")
 
 @dataclass(frozen=True)
 class Activity:
-    """What one resource does from `start_s` to `end_s`; for a stay, `origin` and `target` are the same station.
+    """One activity of a resource from `start_s` to `end_s`; for a stay, `origin` and `target` are the same station.
 
     Robot: "carry" (a part), "pallet" (an empty one), "empty", "wait", "service". Machine: "process", "blocked"
     (finished, not fetched yet). Part: "store" (storage or buffer), "process", "blocked", "carry". `part` is None where
@@ -39,7 +39,7 @@ class Activity:
 
 @dataclass(frozen=True)
 class Move:
-    """One decision carried out: the robot leaves `start`, reaches what it picks at `origin`, and drops it at `target`.
+    """One decision as it is carried out: the robot leaves `start`, picks at `origin`, and drops at `target`.
 
     process_s: the processing that begins with the drop [s]. service_s: the robot's work that ends with the pick [s]. by: the
     robot's name; the name of `target` where a server of that machine takes the part, at `pick_s` and `drop_s` alike. held_s: how
@@ -67,13 +67,13 @@ class Move:
 
     @property
     def end_s(self) -> float:
-        """When what was decided is done: dropped, or, by a server, worked on [s]."""
+        """When the move is done: at the drop, or at the end of a server's work [s]."""
         return self.drop_s + (self.process_s if self.served else 0.0)
 
 
 @dataclass(frozen=True)
 class FetchBy:
-    """Until when a part is to be picked at a machine where it is done at `done_s`; later it is spoilt."""
+    """The latest pick of a part at a machine that finishes it at `done_s`; later it is spoilt."""
 
     part: int
     station: str
@@ -83,11 +83,11 @@ class FetchBy:
 
 @dataclass(frozen=True)
 class Schedule:
-    """A timed run, predicted or measured: activities by start for the robots, the machines and the parts; seconds.
+    """A timed run, predicted or measured: activities of robots, machines and parts, sorted by start [s].
 
-    `makespan_s` is when the last part is finished. `sequence`: the decisions (see `Run`). fetch_by: until when
-    parts are to be picked, where there is such a limit, by time; `to_json` has it only then. Raises
-    BadInput for an activity that ends before it starts, times that are not finite, or an unknown kind.
+    makespan_s: when the last part is finished. sequence: the decisions (see `Run`). fetch_by: the latest picks, by time, which
+    `to_json` has only where such limits exist. Raises BadInput for an activity that ends before it starts, times that are not
+    finite, or an unknown kind.
     Source: fig. IV.1.
     """
 
@@ -112,7 +112,7 @@ class Schedule:
     ) -> "Schedule":
         """A schedule from timed moves, simulated or measured; sequence None: the parts moved, in their order.
 
-        came_s: when each part came to its first station [s]; None: all at 0. A part that has nothing to do has no row.
+        came_s: when each part came to its first station [s]; None: all at 0. A part that makes no move has no row.
         """
         robot = [activity for move in moves for activity in robot_activities(move)]
         end_s = max((move.end_s for move in moves), default=0.0)
@@ -132,7 +132,7 @@ class Schedule:
         return cls(tuple(robot), _by_start(machines), tuple(parts), end_s, tuple(order), tuple(limits))
 
     def later(self, by_s: float) -> "Schedule":
-        """The same so much later [s]: of what was planned anew in the middle, its times counted from the beginning."""
+        """The schedule shifted by `by_s` [s], as for work that was replanned in the middle of a run."""
         rows = [
             tuple(replace(a, start_s=a.start_s + by_s, end_s=a.end_s + by_s) for a in row)
             for row in (self.robot, self.machines, self.parts)
@@ -148,7 +148,7 @@ class Schedule:
 
 
 def robot_activities(move: Move) -> list[Activity]:
-    """What the robot does in one move; what takes no time only where something is moved."""
+    """The robot's activities in one move; those without duration are included only where something is moved."""
     if move.served:
         return []
     served_s = move.pick_s - move.service_s
@@ -170,11 +170,11 @@ def _part_activities(
     end_s: float,
     together: Mapping[tuple[int, str], tuple[float, float]],
 ) -> tuple[list[Activity], list[Activity]]:
-    """Rows of one part, and of the machines that it passes, from its arrival to `end_s`."""
+    """The activities of one part and of the machines that it passes, from its arrival to `end_s`."""
     row, since_s, process_s = cell.part_name(part), came_s, cell.begin_s[part - 1]
     place = cell.names[cell.positions[cell.begin_at[part - 1]].station]
     begin_s = since_s  # when its processing there begins
-    works = False  # whether it is worked on there, be it for no time
+    works = False  # whether it is processed there, even for 0 s
     rows: list[Activity] = []
     machines: list[Activity] = []
     for move in [*moves, None]:
@@ -203,7 +203,7 @@ def _part_activities(
 
 
 def _batches(cell: Cell, moves: Sequence[Move]) -> dict[tuple[int, str], tuple[float, float]]:
-    """When, and for how long, each part is worked on in a machine with batches [s], by part and machine."""
+    """Begin and duration of each part's processing in a machine with batches [s], by part and machine."""
     found: dict[tuple[int, str], tuple[float, float]] = {}
     for name in [cell.names[station] for station in cell.batches]:
         batch: list[Move] = []
@@ -218,7 +218,7 @@ def _batches(cell: Cell, moves: Sequence[Move]) -> dict[tuple[int, str], tuple[f
 
 
 def _limits(cell: Cell, part: int, moves: Sequence[Move]) -> Iterator[FetchBy]:
-    """Until when a part is to be picked at the machines that it begins in or is brought to."""
+    """The latest picks of a part at the machines that it begins in or is brought to."""
     begins = cell.names[cell.positions[cell.begin_at[part - 1]].station], cell.begin_s[part - 1]
     served = [station.servers is not None for station in cell.stations]
     queued = {(move.target, move.drop_s) for move in moves if served[cell.index(move.target)] and not move.served}
@@ -229,7 +229,7 @@ def _limits(cell: Cell, part: int, moves: Sequence[Move]) -> Iterator[FetchBy]:
 
 
 def _lasting(activities: Iterable[Activity]) -> list[Activity]:
-    """Without waiting that takes no time; what is done stays."""
+    """The activities without waits of no duration."""
     done = ("process", "carry")
     return [activity for activity in activities if activity.end_s > activity.start_s or activity.kind in done]
 
@@ -248,7 +248,7 @@ def _check_activity(activity: Activity) -> None:
         raise BadInput(f"activity '{activity.kind}' of '{activity.resource}' {times}: it ends before it starts")
 
 
-# ---- schedule rows ----------------------------------------------------------------------------------------------------
+# ---- Rows of a schedule, and the files that hold them -----------------------------------------------------------------
 
 
 COLUMNS = ("part", "product", "operation", "station", "target", "resource", "robot", "start_s", "end_s", "when")
@@ -256,11 +256,11 @@ TABLES = (".csv", ".json")
 
 
 def rows_of(schedule: Schedule, cell: Cell, when: Literal["planned", "measured"]) -> list[dict[str, Any]]:
-    """What the robots and the machines do, by start: a row an activity, its values by COLUMNS.
+    """The activities of robots and machines by start: a row for each, with its values by COLUMNS.
 
-    operation: an `Activity`'s kind. A job-shop library reads them so: a part is a job, a resource a machine, each row of a
-    part a task from start_s to end_s. part, product: None where no part is involved. target: where a carry ends. robot: the
-    resource, where it is one.
+    operation: an `Activity`'s kind. part, product: None where no part is involved. target: where a carry ends. robot: the
+    resource, where it is a robot. A job-shop library may read a part as a job, a resource as a machine, and each row of a part as
+    a task from start_s to end_s.
     """
     names = [cell.part_name(number) for number in range(1, cell.parts + 1)]
 
@@ -284,7 +284,7 @@ def csv_of(rows: Iterable[dict[str, Any]]) -> str:
 
 
 def check_table(path: Path) -> None:
-    """BadInput unless the rows can be written there, by the ending as a table or as a JSON list."""
+    """Raises BadInput unless the file's ending is that of a table or of a JSON list, and its folder exists."""
     if path.suffix.lower() not in TABLES:
         raise BadInput(f"schedule '{path}' (--schedule): wanted a file that ends with {' or '.join(TABLES)}")
     if not path.parent.is_dir():
@@ -292,7 +292,7 @@ def check_table(path: Path) -> None:
 
 
 def write_table(rows: Sequence[dict[str, Any]], path: Path) -> None:
-    """Writes the rows whole; BadInput where that cannot be."""
+    """Writes the rows to a file, whole or not at all; raises BadInput when it cannot be written."""
     check_table(path)
     text = csv_of(rows) if path.suffix.lower() == ".csv" else json.dumps(list(rows), indent=1) + "\n"
     try:

@@ -1,4 +1,4 @@
-"""What a cell is laid out of: stations, stages, routes and products, when parts arrive; and what cannot be."""
+"""The records of a cell's layout: stations, robots, stages, routes, products and arrivals; and the checks of them."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -9,22 +9,22 @@ import numpy as np
 
 from lab.errors import BadInput, unknown
 
-MAX_S = 1e9  # one time; far above any cell, far below where sums lose their nanoseconds
+MAX_S = 1e9  # the largest time: far above any cell, and small enough for sums to keep their nanoseconds
 ROBOT = "robot"
-UNLIMITED = 10**6  # room that is never full
+UNLIMITED = 10**6  # a capacity that is never reached
 STATION_KINDS = ("storage", "buffer", "machine")
 
 
 @dataclass(frozen=True)
 class Station:
-    """A place for parts. `capacity` in parts; `processing_s` in seconds, above 0 only for machines.
+    """A place for parts. capacity: in parts. processing_s: above 0 only for machines [s].
 
-    at_most_s: how long after its processing a part may stay in a machine before it is picked, else it is spoilt [s]; None: as
-    long as you like. servers: how many parts a machine works on at once; None: all that stand in it, each from when it comes.
-    Else a part waits in the machine's room until a server takes it, in any order, leaves the server by itself and waits in the
-    room until it is fetched. setups: (product before, product, seconds) that a server takes to change over; the first product
-    takes none. batch: the machine works on all parts that stand in it together, from when the last of them is brought, for the
-    longest of their times: nothing comes in once one has been taken out, until it is empty.
+    at_most_s: how long after its processing a part may stay in a machine before it is spoilt [s]; None: without limit. servers:
+    how many parts a machine works on at once; None: all parts in it, each from its arrival. With servers, a part waits in the
+    machine's room until a server takes it, in any order, and after its processing it waits there until it is fetched. setups:
+    triples (product before, product, seconds) of a server's changeovers; the first product needs none. batch: the machine works
+    on all parts in it together, from the arrival of the last of them, for the longest of their times; once a part was taken out,
+    none is brought in until the machine is empty.
     """
 
     name: str
@@ -39,7 +39,7 @@ class Station:
 
 @dataclass(frozen=True)
 class Robot:
-    """A transfer robot, or a vehicle: where it stands at time 0, and how many times faster it is than the cell's tables say.
+    """A transfer robot or vehicle. start: its station at time 0. speed: a factor on the cell's tables of times.
 
     serves: the stations where it may pick and drop; None: all.
     """
@@ -51,18 +51,18 @@ class Robot:
 
 
 def one_robot(start: str) -> tuple[Robot, ...]:
-    """The robots of a cell that has one."""
+    """The robots of a cell with a single one, which starts at a station."""
     return (Robot(ROBOT, start),)
 
 
 @dataclass(frozen=True)
 class Stage:
-    """A step of a route: the station to reach, and the buffer before it for when it is full (None: no buffer).
+    """A stage of a route: the station, and the buffer before it that is used when it is full (None: no buffer).
 
-    processing_s: this product's time there, and at_most_s, how long after it a part may stay (None: the station's). service_s:
-    what the robot has to do there before it can take the part out, such as vacuuming a mill [s]. pallet: the part is lifted
-    off its pallet for this machine; the pallet stays at the station before, and has to be brought to the station after before
-    the part can leave. alternatives: other stages, any of which may be taken in place of this one.
+    processing_s, at_most_s: this product's values there (None: the station's). service_s: the robot's work before it can take the
+    part out, such as vacuuming a mill [s]. pallet: the part is lifted off its pallet for this machine; the pallet stays at the
+    station before, and must be brought to the station after before the part can leave. alternatives: stages that may be taken
+    instead of this one.
     """
 
     station: str
@@ -79,7 +79,7 @@ class Stage:
         return (self, *self.alternatives)
 
     def each(self, change: Callable[["Stage"], "Stage"]) -> "Stage":
-        """The stage with a change made to it and to each of its alternatives, in this order."""
+        """The stage after `change` was applied to it and to each of its alternatives, in this order."""
         return replace(change(self), alternatives=tuple(map(change, self.alternatives)))
 
 
@@ -88,10 +88,10 @@ Route = tuple[Stage, ...]
 
 @dataclass(frozen=True)
 class Product:
-    """A type of part: its name and the routes that a part of it may take.
+    """A type of part: its name and the routes that its parts may take.
 
-    All begin at the same station, and may end there, too: the part then comes back to where it was. A route may end at a machine
-    with servers: the part is finished with its processing there, and takes no room from then on.
+    All routes begin at the same station and may also end there. A route may end at a machine with servers: the part is finished
+    after its processing there and then takes no room.
     """
 
     name: str
@@ -100,7 +100,7 @@ class Product:
 
 @dataclass(frozen=True)
 class Arrivals:
-    """When parts come to the first station, in the order of the order: `interval_s` before each [s], mean or constant.
+    """The arrivals of parts at the first station, in the order of the order; interval_s: before each part, mean or constant [s].
 
     after: "clock", from the arrival before; "pick", from when the part before was taken away, as when a vehicle brings
     one at a time (thesis App. III's listing).
@@ -112,12 +112,11 @@ class Arrivals:
 
 @dataclass(frozen=True)
 class Begins:
-    """Where a part is when the work begins, for work that begins in the middle.
+    """The state of a part at time 0, for work that begins in the middle.
 
-    position: its place on its product's routes, an index of `Cell.positions`; None: it is finished or lost, takes no room,
-    and nothing is to be done with it. ready_s: when it may be picked, counted from now [s]; below 0: it is done for so long,
-    which matters where it may be picked too late. stays: it cannot be finished; it
-    stays there and takes its room.
+    position: an index of `Cell.positions`; None: the part is finished or lost, takes no room and makes no move. ready_s: when it
+    may be picked [s]; below 0: it has been ready for that long, which counts towards its time window. stays: it cannot be
+    finished, stays there and takes room.
     """
 
     position: int | None
@@ -126,7 +125,7 @@ class Begins:
 
 
 def check_layout(stations: Sequence[Station], products: Sequence[Product]) -> None:
-    """BadInput for stations and routes that cannot be."""
+    """Raises BadInput for inconsistent stations and routes."""
     _check_stations(stations)
     names: set[str] = set()
     for station in stations:
@@ -219,7 +218,7 @@ def _check_servers(station: Station, where: str) -> None:
 
 
 def check_robots(robots: Sequence[Robot], stations: Sequence[Station]) -> None:
-    """BadInput for robots that cannot be."""
+    """Raises BadInput for inconsistent robots."""
     names = [station.name for station in stations]
     for number, robot in enumerate(robots):
         if robot.start not in names:
@@ -324,11 +323,11 @@ def _check_stage(stage: Stage, station: Station, where: str) -> None:
 
 
 def check_seconds(what: str, seconds: float) -> None:
-    """BadInput unless it is a time from 0 to MAX_S."""
+    """Raises BadInput unless `seconds` is a time from 0 to MAX_S."""
     if not (isfinite(seconds) and 0 <= seconds <= MAX_S):
         raise BadInput(f"{what} = {seconds}; allowed are 0 to {MAX_S:g} s")
 
 
 def is_count(value: object) -> bool:
-    """Whether it is a whole number from 1."""
+    """Whether a value is an integer from 1."""
     return isinstance(value, int | np.integer) and not isinstance(value, bool) and int(value) >= 1

@@ -11,7 +11,7 @@ from lab.sequencing.cell.stations import check_seconds
 
 @dataclass(frozen=True)
 class Stretch:
-    """A piece of track between two stations, driven in both directions in so many seconds at speed 1."""
+    """A piece of track between two stations, driven in either direction; seconds: at speed 1."""
 
     origin: str
     target: str
@@ -19,7 +19,7 @@ class Stretch:
 
 
 class Held(NamedTuple):
-    """A stretch, by its number, on a way: from when until when it is held, after setting out, at speed 1 [s]."""
+    """A stretch (by number) on a path, and from when until when it is held after the start, at speed 1 [s]."""
 
     stretch: int
     from_s: float
@@ -30,7 +30,7 @@ Way = tuple[Held, ...]
 
 
 def check_track(track: Sequence[Stretch], names: Sequence[str]) -> None:
-    """BadInput for a stretch that leads nowhere, takes no time, or is there twice."""
+    """Raises BadInput for a stretch that does not join two stations, takes no time, or is listed twice."""
     seen = set[frozenset[str]]()
     for stretch in track:
         where = f"track '{stretch.origin}' - '{stretch.target}'"
@@ -47,8 +47,9 @@ def check_track(track: Sequence[Stretch], names: Sequence[str]) -> None:
 
 
 def ways_on(track: Sequence[Stretch], names: Sequence[str]) -> Mapping[tuple[int, int], Way]:
-    """The shortest way between every two stations that the track joins, by their indices; of ways as long, the one with fewer
-    stretches, then the one whose stretches come first.
+    """The shortest path between every two stations that the track joins, by their indices.
+
+    Ties go to the path with fewer stretches, then to the one whose stretches are listed first.
     """
     number = {name: n for n, name in enumerate(names)}
     beside: dict[int, list[tuple[int, int, float]]] = {}
@@ -74,5 +75,5 @@ def ways_on(track: Sequence[Stretch], names: Sequence[str]) -> Mapping[tuple[int
 
 
 def travel_s(way: Way) -> float:
-    """How long a way takes at speed 1 [s]."""
+    """The duration of a path at speed 1 [s]."""
     return way[-1].until_s if way else 0.0

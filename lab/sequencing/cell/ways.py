@@ -1,6 +1,6 @@
-"""The moves of a cell in whole ticks: what each takes, which may follow which, and how far stations are apart.
+"""The moves of a cell of one robot in integer ticks: their durations, which may follow which, and distances of stations.
 
-Times are those of the first robot, at its speed: what works with them is for cells of one.
+Times are those of the first robot, at its speed.
 """
 
 from collections.abc import Sequence
@@ -12,9 +12,9 @@ import numpy as np
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.routes import Option
 
-# Times are compared as whole nanoseconds: equal states then compare equal, whatever the order of additions was.
+# Times are compared as integer nanoseconds, so that equal states are equal whatever the order of additions was.
 TICKS_PER_S = 1e9
-FAR = 1 << 61  # two of it still fit an int64
+FAR = 1 << 61  # stands for infinity; the sum of two still fits an int64
 
 
 class Way(NamedTuple):
@@ -26,7 +26,7 @@ class Way(NamedTuple):
 
 
 def ticks(row: Sequence[float]) -> list[int]:
-    """Seconds to ticks; -1 for NaN, a move that is never made."""
+    """Seconds as ticks; -1 for NaN, a move that is never made."""
     return [-1 if isnan(seconds) else round(seconds * TICKS_PER_S) for seconds in row]
 
 
@@ -41,12 +41,12 @@ def ways_of(cell: Cell) -> list[Way]:
 
 
 def loaded_ticks(cell: Cell) -> list[list[int]]:
-    """Ticks of the way with a part from a station (row) to another; -1 for a move that is never made."""
+    """Ticks of a loaded move from a station (row) to another (column); -1 for a move that is never made."""
     return [ticks(row) for row in (cell.loaded_s / _speed(cell)).tolist()]
 
 
 def empty_ticks(cell: Cell) -> list[list[int]]:
-    """Ticks of the empty way from a station (row) to another; 0 to itself, -1 for a move that is never made."""
+    """Ticks of an empty move from a station (row) to another (column); 0 to itself, -1 for a move that is never made."""
     empty = [ticks(row) for row in (cell.empty_s / _speed(cell)).tolist()]
     for place in range(len(empty)):
         empty[place][place] = 0
@@ -56,7 +56,7 @@ def empty_ticks(cell: Cell) -> list[list[int]]:
 def follows(cell: Cell, done: Way, way: Way, same: bool) -> bool:
     """Whether `way` may be the next move after `done`: of the same part, or of another one."""
     if done.option.if_full is not None and done.option.if_full in way.option.needs:
-        return False  # it is full still
+        return False  # the station is still full
     if same:
         return done.option.to == way.place
     left, there = cell.positions[done.place], cell.positions[done.option.to]
@@ -67,9 +67,9 @@ def follows(cell: Cell, done: Way, way: Way, same: bool) -> bool:
 
 
 def distances(cell: Cell, per_s: float = TICKS_PER_S) -> list[list[int]]:
-    """The least time in which the robot gets from a station (row) to another, empty or loaded, by any way.
+    """The least time in which the robot gets from a station (row) to another (column), empty or loaded, by any stations.
 
-    In units, of which a second has `per_s`; FAR where it never gets.
+    Times are in units of 1 / `per_s` seconds; FAR where it cannot get.
     """
     seconds = np.fmin(cell.empty_s, cell.loaded_s) / _speed(cell)
     table = np.where(np.isnan(seconds), FAR, np.rint(seconds * per_s)).astype(np.int64)

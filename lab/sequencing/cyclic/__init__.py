@@ -1,1 +1,1 @@
-"""Cyclic orders: what the robot repeats for ever, and the shortest period in which it can."""
+"""Cyclic orders: moves that the robot repeats for ever, and the shortest period in which it can."""

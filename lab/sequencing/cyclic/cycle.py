@@ -1,4 +1,4 @@
-"""The shortest period of a repeating order of the robot's moves, and the order: the best of all the parts' ways."""
+"""The shortest period of a given cyclic order, and the cycle of shortest period over all orders and all paths of the parts."""
 
 import time
 from collections.abc import Iterator, Sequence
@@ -13,14 +13,14 @@ from lab.sequencing.cyclic.line import CycleMove, Line, at_speed, away_s, lines
 from lab.sequencing.simulate.run import SLACK_S
 from lab.sequencing.simulate.waits import Arc, earliest
 
-NEAR_S = 1e-3  # as much as slack may shorten a period that can be kept without
+NEAR_S = 1e-3  # the most by which slack may shorten a period that is also feasible without slack
 
 
 class Timed(NamedTuple):
-    """The shortest period [s], and when each move of the line begins, in that period, as early as can be after the first.
+    """The shortest period [s], and the earliest begin of each move in it, counted from the first move.
 
-    recurs: through how many cycles the demands go round that keep it from being shorter. Carried out as early as can be, the
-    moves come in the same intervals after so many cycles, not always after one: with two places alike, every other one.
+    recurs: the number of cycles that the critical circuit of constraints spans. When all moves are made as early as possible,
+    their intervals repeat after this many cycles, not always after one: with two identical places, every other cycle.
     """
 
     period_s: float
@@ -29,14 +29,16 @@ class Timed(NamedTuple):
 
 
 def arcs_of(line: Line, order: Sequence[int], wraps: Sequence[int], slack_s: float = 0.0) -> Iterator[Arc]:
-    """What a cyclic order demands. order: the line's moves, the first of the cycle first; wraps: by stay, how many
-    cycles begin between the move that brings a part and the one that takes it on, as seen from the first move's begin.
-    slack_s: so much too late is not too late."""
+    """The constraints of a cyclic order. order: the line's moves, the first of the cycle first.
+
+    wraps: by stay, how many cycles begin between the move that brings a part and the one that takes it on, counted from the
+    first move's begin. slack_s: tolerance of the latest picks.
+    """
     for one, then in zip(order, [*order[1:], order[0]], strict=True):
         last = one == order[-1]
         yield Arc(one, then, line.moves[one].work_s + line.after_s(one, then), int(last))
     over = 0
-    passed = [0]  # cycles passed until each move, along its part's way
+    passed = [0]  # cycles begun before each move, along its part's path
     stays = {stay.pick: wraps[number] for number, stay in enumerate(line.stays)}
     for number in range(1, len(line.moves)):
         over = over + stays[number] if number in stays else 0
@@ -49,9 +51,9 @@ def arcs_of(line: Line, order: Sequence[int], wraps: Sequence[int], slack_s: flo
 
 
 def shortest_period(line: Line, order: Sequence[int], wraps: Sequence[int]) -> Timed | None:
-    """The shortest period in which the order can be repeated; None: in none.
+    """The shortest period in which the order can be repeated; None when it cannot be repeated in any.
 
-    What can only just not be done in time is in time, as in the simulation (`SLACK_S`).
+    Latest picks have the same tolerance as in the simulation (`SLACK_S`).
     """
     exact, slack = (_shortest(list(arcs_of(line, order, wraps, slack_s)), order[0]) for slack_s in (0.0, SLACK_S))
     if exact is not None and slack is not None and exact.period_s - slack.period_s > NEAR_S:
@@ -60,14 +62,14 @@ def shortest_period(line: Line, order: Sequence[int], wraps: Sequence[int]) -> T
 
 
 def _shortest(arcs: Sequence[Arc], first: int) -> Timed | None:
-    """The shortest period in which these can be kept.
+    """The shortest period in which all constraints hold; None: there is none.
 
-    From too short a period upwards, each time to the ratio of a cycle of demands that it breaks (Newton's method on
-    the parametric longest path; Cochet-Terrasson et al. 1998 prove that it ends).
+    It begins with too short a period and increases it to the ratio of a violated circuit of constraints (Newton's method on the
+    parametric longest path; Cochet-Terrasson et al. 1998 prove that it ends).
     """
     moves = 1 + max(arc.then for arc in arcs)
     if any(arc.least_s != arc.least_s for arc in arcs):
-        return None  # an empty way that is never made
+        return None  # the order contains an empty move that is never made
     period_s, recurs = 0.0, 1
     while True:
         begin_s, broken = earliest(arcs, moves, first, period_s)
@@ -79,7 +81,7 @@ def _shortest(arcs: Sequence[Arc], first: int) -> Timed | None:
         period_s, recurs = least_s / periods, periods
 
 
-# ---- cycle ------------------------------------------------------------------------------------------------------------
+# ---- The best cycle ---------------------------------------------------------------------------------------------------
 
 
 TIME_LIMIT_S = 60.0
@@ -87,11 +89,11 @@ TIME_LIMIT_S = 60.0
 
 @dataclass(frozen=True)
 class Cycle:
-    """What the robot repeats: the line's moves in their order, the first at 0, and the period [s].
+    """A cycle: the order of the line's moves, the first at time 0, and the period [s].
 
-    begin_s: of each of the line's moves in the period, when the robot begins it (the service first). wraps: by stay of the line,
-    how many cycles begin while a part stays. recurs: see `Timed`. bound_s: no period of an order that repeats with as many parts
-    a cycle is shorter; proven: none is shorter than this one, to some microseconds.
+    begin_s: by move, when the robot begins it (with its service) in the period. wraps: by stay, how many cycles begin while a
+    part stays. recurs: see `Timed`. bound_s: a lower bound of the period of all cycles with as many parts; proven: whether no
+    period is shorter than this one, within some microseconds.
     """
 
     line: Line
@@ -105,12 +107,12 @@ class Cycle:
 
     @property
     def parts(self) -> int:
-        """How many parts enter, and leave, in a cycle."""
+        """The number of parts that enter, and leave, in a cycle."""
         return len(self.line.paths)
 
     @cached_property
     def passed(self) -> tuple[int, ...]:
-        """How many cycles have begun since the part entered, by move."""
+        """By move, how many cycles have begun since its part entered."""
         over, found, stays = 0, list[int](), {stay.pick: n for n, stay in enumerate(self.line.stays)}
         for number in range(len(self.line.moves)):
             over = over + self.wraps[stays[number]] if number in stays else 0
@@ -118,12 +120,12 @@ class Cycle:
         return tuple(found)
 
     def at_s(self, move: int, cycle: int = 0) -> float:
-        """When a move of a part that enters in a cycle begins, that cycle's begin counted as cycle * period."""
+        """When a move begins for the part that enters in a given cycle, which begins at cycle * period [s]."""
         return self.begin_s[move] + (self.passed[move] + cycle) * self.period_s
 
     @cached_property
     def most_in_work(self) -> int:
-        """How many parts are between their first pick and their last drop at once, at the most."""
+        """The largest number of parts that are between their first pick and their last drop at once."""
         ends = [(own[0], own[-1]) for own in self._of_slots()]
         spans = [(self.at_s(first), self.at_s(last) + self.line.moves[last].work_s) for first, last in ends]
         period_s = self.period_s
@@ -134,7 +136,7 @@ class Cycle:
         return max(there(at_s) for at_s, _ in spans)
 
     def to_json(self) -> list[dict[str, Any]]:
-        """The moves in their order: who is moved where, when in the period, and after how many periods in the cell."""
+        """The moves in order: the part's product, origin, target, begin in the period, and periods since the part entered."""
         names, moves = self.line.cell.names, self.line.moves
 
         def row(number: int) -> dict[str, Any]:
@@ -153,7 +155,7 @@ class Cycle:
         return [row(number) for number in self.order]
 
     def product(self, move: CycleMove) -> str:
-        """The name of the product that a move moves."""
+        """The name of the product of a move's part."""
         cell = self.line.cell
         return cell.products[cell.positions[move.place].product].name
 
@@ -165,10 +167,10 @@ class Cycle:
 
 
 def best_cycle(cell: Cell, mix: Sequence[str], time_limit_s: float = TIME_LIMIT_S, seed: int = 0) -> Cycle:
-    """The shortest period in which one robot can repeat its moves for ever, `mix` (products) entering in each cycle.
+    """The cycle of shortest period that one robot can repeat for ever with `mix` (products) entering in each cycle.
 
-    The cell's order gives its products only; its parts all wait at the beginning of their routes, and the robot may wait on
-    purpose. Every way that the parts can take is a line with a model of its own; what cannot beat the best so far is left out.
+    Of the cell's order only the products count; all parts wait at the start of their routes, and the robot may wait deliberately.
+    Every combination of the parts' paths is a line with a model of its own; lines that cannot beat the incumbent are skipped.
     Raises BadInput for a cell that has no such cycle (`check_cyclic`) or too large a one, WorkFailed when none was found.
     Source: Phillips and Unger 1976, AIIE Transactions 8(2) (one hoist, time windows).
     """
@@ -181,8 +183,11 @@ def best_cycle(cell: Cell, mix: Sequence[str], time_limit_s: float = TIME_LIMIT_
 
 
 class Found(NamedTuple):
-    """The shortest cycle that was found, None: none; no period of those that were looked for is below above_s, inf: there is
-    none; proven: none is shorter than the one that was found, or at all."""
+    """The result of a search for cycles. cycle: the shortest one found; None: none.
+
+    above_s: a lower bound of the periods searched [s]; inf: no cycle exists. proven: whether no cycle is shorter than the one
+    found, or none exists.
+    """
 
     cycle: Cycle | None
     above_s: float
@@ -192,9 +197,9 @@ class Found(NamedTuple):
 def shortest(
     cell: Cell, mix: Sequence[str], time_limit_s: float, seed: int, least_s: float = 0.0, below_s: float = inf
 ) -> Found:
-    """The shortest cycle of a mix, of those with a period below below_s; it is known that none is below least_s.
+    """The shortest cycle of a mix with a period below `below_s`; least_s: a known lower bound of the period.
 
-    cell: with the times of its one robot (`at_speed`).
+    cell: must have the times of its one robot (`at_speed`).
     """
     from lab.sequencing.cyclic.model import CycleModel, Units  # only here: OR-Tools takes its time
 
@@ -208,7 +213,7 @@ def shortest(
     for _, bound_s, _, line in ahead:
         units = Units.of(line)
         resolution_s = max(resolution_s, units.resolution_s)
-        # A quick look for a good cycle, a bound, and the rest of the way between the two.
+        # A quick solve for a good cycle, one for a bound, and one to close the gap between the two.
         steps = (units.coarse, False), (units.coarse, True), (units.fine, units.rounded)
         for step, (unit, loose) in enumerate(steps):
             best_s = below_s if best is None else best.period_s
@@ -229,7 +234,7 @@ def shortest(
 
 
 def check_cyclic(cell: Cell, mix: Sequence[str]) -> None:
-    """BadInput, in words, for a cell that no cyclic order is looked for in, and for a mix of products it does not make."""
+    """Raises BadInput for a cell that cyclic orders do not support, and for a mix with products that it does not make."""
     if cell.arrivals is not None:
         raise BadInput(
             "--cyclic: parts arrive one by one in this cell; a cycle takes each when it wants: leave [arrivals] away"

@@ -1,4 +1,4 @@
-"""The moves of one cycle of a cell: the ways of the parts that enter in it, and what their times have to keep to."""
+"""The moves of one cycle: the paths of the parts that enter in it, and the constraints on their times."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -13,14 +13,14 @@ from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.routes import Option, Position, from_the_ends
 from lab.sequencing.cell.ways import distances
 
-MOST_LINES = 2000  # ways that the parts of a cycle can be given to
-MOST_MOVES = 120  # in a cycle; the model grows with the square
-Path = tuple[tuple[int, Option], ...]  # the positions that a part leaves, and how
+MOST_LINES = 2000  # combinations of the paths of a cycle's parts
+MOST_MOVES = 120  # moves in a cycle; the model grows with their square
+Path = tuple[tuple[int, Option], ...]  # the positions that a part leaves, each with the option that it takes
 
 
 @dataclass(frozen=True)
 class CycleMove:
-    """One move of a cycle: the part `slot` of the cycle (from 0) leaves `place` by `option`; work_s: service and carrying."""
+    """One move of a cycle: its part `slot` (from 0) leaves position `place` by `option`; work_s: service and carrying."""
 
     slot: int
     place: int
@@ -30,9 +30,9 @@ class CycleMove:
 
 @dataclass(frozen=True)
 class Span:
-    """What lies between the drop of a move and the begin of a later one of the same part, by their numbers.
+    """The time from the drop of one move to the begin of a later move of the same part, both by number.
 
-    least_s, most_s: how long that may take, its periods in full counted.
+    least_s, most_s: the limits of that time, with all periods in between counted [s].
     """
 
     drop: int
@@ -43,10 +43,10 @@ class Span:
 
 @dataclass(frozen=True)
 class Line:
-    """A cycle without its times: which parts enter in it, and by which way each goes; all that repeats with the period.
+    """A cycle without its times: the parts that enter in it, each with its path.
 
-    moves: slot by slot, each along its way. stays: every consecutive two of a part's moves. needs: how long processing
-    takes, and until when a part is to be picked. holds: the stays that take room at each station.
+    moves: slot by slot, each along its path. stays: every two consecutive moves of a part. needs: processing times and latest
+    picks. holds: the stays that take room at each station.
     """
 
     cell: Cell
@@ -64,13 +64,13 @@ class Line:
 
     @cached_property
     def stays(self) -> tuple[Span, ...]:
-        """Where parts are between two moves, which they never leave before they came."""
+        """The stays of parts between two consecutive moves, each of 0 s or more."""
         ends = zip(self.moves[:-1], self.moves[1:], strict=True)
         return tuple(Span(n, n + 1) for n, (one, then) in enumerate(ends) if one.slot == then.slot)
 
     @cached_property
     def needs(self) -> tuple[Span, ...]:
-        """Processing that ends before a pick, and how long after it the pick may begin."""
+        """The processing times before picks, and the latest picks after them."""
         found = list[Span]()
         begun: tuple[int, float] | None = None
         for number, move in enumerate(self.moves):
@@ -96,7 +96,7 @@ class Line:
         return {station: tuple(numbers) for station, numbers in found.items()}
 
     def after_s(self, one: int, then: int) -> float:
-        """From where a move drops to where another begins, empty [s]; NaN: never one after the other."""
+        """The empty time from a move's drop to another move's begin [s]; NaN: the two never follow each other."""
         left, begun = self.moves[one].option.target, self.moves[then].option.origin
         return 0.0 if left == begun else float(self.cell.empty_s[left, begun])
 
@@ -104,7 +104,7 @@ class Line:
     def longest_s(self) -> float:
         """A period that is long enough for every order that can be repeated at all [s].
 
-        What a shortest period has to be comes from a circle of demands, which leaves no move twice.
+        A shortest period is determined by a circuit of constraints that visits each move at most once.
         """
         numbers = range(len(self.moves))
         least_s = {span.drop: span.least_s for span in self.needs}
@@ -112,9 +112,9 @@ class Line:
         return sum(self.moves[one].work_s + max(least_s.get(one, 0.0), empty_s[one]) for one in numbers)
 
     def bound_s(self, away_s: Sequence[Sequence[float]]) -> float:
-        """No period is shorter: the robot's moves and its cheapest ways between them, and what each station needs.
+        """A lower bound of the period [s]: the robot's moves with the cheapest drives between them, and each station's needs.
 
-        away_s: the least time from a station to another, by any way.
+        away_s: see the function `away_s`.
         """
         gaps = np.array(
             [[away_s[m.option.target][other.option.origin] for other in self.moves] for m in self.moves], float
@@ -130,7 +130,7 @@ class Line:
             spans = [self.stays[number] for number in numbers]
             picks = {span.pick for span in spans}
             drops = {span.drop for span in spans}
-            into, out = drops - picks, picks - drops  # a pallet that goes on may keep the same room
+            into, out = drops - picks, picks - drops  # a pallet that moves on may keep the same room
             inside_s = sum(ready_s.get((span.drop, span.pick), 0.0) for span in spans)
             between_s = sum(
                 min(
@@ -145,7 +145,7 @@ class Line:
 
 
 def lines(cell: Cell, mix: Sequence[str]) -> Iterator[Line]:
-    """Every way to give the parts of a cycle their ways; parts of one product are alike. BadInput for too many."""
+    """Every combination of paths of a cycle's parts, those of one product being identical; raises BadInput for too many."""
     counts = {name: mix.count(name) for name in dict.fromkeys(mix)}
     ways = {name: _paths(cell, name, counts[name], len(mix)) for name in counts}
     many = prod(comb(len(ways[name]) + count - 1, count) for name, count in counts.items())
@@ -162,7 +162,7 @@ def lines(cell: Cell, mix: Sequence[str]) -> Iterator[Line]:
 
 
 def _paths(cell: Cell, name: str, count: int, parts: int) -> list[Path]:
-    """All ways of a product from its start to an end."""
+    """All paths of a product from its start to an end."""
     start = cell.starts[cell.order.index(name)]
 
     def longer(path: Path, at: Position, place: int) -> Iterator[Path]:
@@ -179,7 +179,7 @@ def _paths(cell: Cell, name: str, count: int, parts: int) -> list[Path]:
 
 
 def at_speed(cell: Cell) -> Cell:
-    """The cell with the times of its one robot, whatever its speed."""
+    """The cell with its tables divided by its one robot's speed."""
     robot, *_ = cell.robots
     if robot.speed == 1.0:
         return cell
@@ -188,8 +188,8 @@ def at_speed(cell: Cell) -> Cell:
 
 
 def away_s(cell: Cell) -> list[list[float]]:
-    """The least time in which the robot gets from a station (row) to another, empty or loaded, by any way [s].
+    """The least time in which the robot gets from a station (row) to another (column), empty or loaded, by any stations [s].
 
-    Rounded down to nanoseconds; what cannot be reached is very far away.
+    Times are rounded down to nanoseconds; a station that cannot be reached gets a very large one.
     """
     return [[ticks / 1e9 for ticks in row] for row in distances(cell)]

@@ -10,18 +10,17 @@ from lab.sequencing.cyclic.line import Line, Span
 from lab.sequencing.methods.cp_sat_solver import cp_model
 
 TICKS = round(TICKS_PER_S)
-COARSE = 1000  # units of the model a second, where times are no whole numbers of so many parts of one
-FINE = (
-    10**4,
-    840,
-)  # times as many: where they are not, and where they are: fractions with a denominator up to 8 are whole, too
-NEAR = 1e-3  # of a unit: what sums of times may differ by
+COARSE = 1000  # units per second of the coarse model, where times are not integers in fewer units
+# The fine model has so many times the units of the coarse one: where times are not integers, and where they are (840 units make
+# fractions with a denominator up to 8 integers, too).
+FINE = (10**4, 840)
+NEAR = 1e-3  # tolerance of sums of times, in units
 
 
 class Answer(NamedTuple):
-    """What the solver says of a line: every period is longer than `above_s`; inf: there is none.
+    """The solver's result for a line. above_s: a lower bound of the period [s]; inf: no cycle exists.
 
-    order, wraps: of the best cycle found, as `times.arcs_of` has them; empty: none was found.
+    order, wraps: of the best cycle found, as in `cycle.arcs_of`; empty: none was found.
     """
 
     above_s: float
@@ -30,11 +29,11 @@ class Answer(NamedTuple):
 
 
 class Units(NamedTuple):
-    """How many units a model of a line has a second: first few, in which a solver is quick, then many, for the last step.
+    """The units per second of a line's models: a coarse one, in which the solver is quick, and a fine one for the last step.
 
-    rounded: whether times are rounded in them. resolution_s: a period that is longer than what is proven by less is the shortest:
-    where all times are whole it is a whole number divided by how many cycles a circle of demands goes through, and two such
-    numbers lie further apart; where they are not, it is what rounding changes.
+    rounded: whether times are rounded in these units. resolution_s: a period within this much of its bound is the shortest. Where
+    all times are integers, a shortest period is an integer divided by the number of cycles that a circuit of constraints spans,
+    and two such numbers lie further apart; where they are not, it is the effect of rounding.
     """
 
     coarse: int
@@ -44,7 +43,7 @@ class Units(NamedTuple):
 
     @classmethod
     def of(cls, line: Line) -> "Units":
-        """Those of a line."""
+        """The units of a line's models."""
         numbers = range(len(line.moves))
         times = {move.work_s for move in line.moves} | {s for span in line.needs for s in (span.least_s, span.most_s)}
         times |= {line.after_s(one, then) for one in numbers for then in numbers}
@@ -59,9 +58,9 @@ class Units(NamedTuple):
 class CycleModel:
     """The variables and constraints of a line: each move's begin in [0, period), the first move's at 0.
 
-    least_s: no period is shorter. below_s: only shorter ones are looked for. unit: how many of the model's a second has. loose:
-    times are rounded so that what is proven of the model holds of the line: what has to pass down, what may pass up, and a cycle
-    that is found may be too late for a window by some units.
+    least_s: a lower bound of the period. below_s: only shorter periods are searched. unit: units per second. loose: whether
+    times are rounded so that the model's bound holds for the line: least times down and largest times up; a cycle that is found
+    may then miss a time window by some units.
     """
 
     line: Line
@@ -95,7 +94,7 @@ class CycleModel:
         self.model.minimize(self._period)
 
     def solve(self, time_limit_s: float, seed: int) -> Answer:
-        """The best cycle that is found within the time limit [s], and what is proven of all."""
+        """The best cycle that is found within the time limit [s], and a lower bound of the period."""
         solver = cp_model.CpSolver()
         solver.parameters.max_time_in_seconds = time_limit_s
         solver.parameters.num_workers = 1
@@ -103,7 +102,7 @@ class CycleModel:
         status = solver.solve(self.model)
         if status == cp_model.INFEASIBLE:
             return Answer(inf if self._longest >= self.line.longest_s * self.unit else self._longest / self.unit)
-        # Begins that are rounded down keep to all demands of a period that is rounded up, which is longer by less than a unit.
+        # Begins rounded down satisfy all constraints with the period rounded up, which is longer by less than one unit.
         above_s = (solver.best_objective_bound - 1) / self.unit
         if status not in (cp_model.OPTIMAL, cp_model.FEASIBLE):
             return Answer(above_s)
@@ -120,7 +119,7 @@ class CycleModel:
         return self._down(self.away_s[moves[one].option.target][moves[then].option.origin])
 
     def _apart(self, one: int, then: int) -> None:
-        """One robot: of two moves one is done, and the way between them, before the other begins, this cycle and the next."""
+        """Keeps two moves of the robot apart: one ends, and the robot drives to the other, in this cycle and into the next."""
         there, back = (self._work[a] + self._away(a, b) for a, b in ((one, then), (then, one)))
         if one == 0:
             self._before[0, then], self._before[then, 0] = 1, 0
@@ -135,7 +134,7 @@ class CycleModel:
             self.model.add(self._period - ahead >= second_s).only_enforce_if(literal)
 
     def _most(self, stay: Span) -> int:
-        """How many cycles may begin while a part stays, at the most."""
+        """The largest number of cycles that may begin while a part stays."""
         cell, moves = self.line.cell, self.line.moves
         room = min(cell.capacities[station] for station in cell.positions[moves[stay.pick].place].holds)
         if any(move.option.if_full is not None for move in moves):
@@ -144,7 +143,7 @@ class CycleModel:
         return min(room, 2 + ceil(inside_s / max(self.least_s, 1e-9)))
 
     def _within(self, span: Span) -> None:
-        """Processing is done before the pick, which is not too late."""
+        """Adds the processing time before a pick, and its latest time."""
         inside = [n for n, stay in enumerate(self.line.stays) if span.drop < stay.pick <= span.pick]
         if len(inside) == 1:
             self._lasts(span, self._wraps[inside[0]], self._most_wraps[inside[0]])
@@ -161,7 +160,7 @@ class CycleModel:
             lasts = apart + times * self._period
             self.model.add(lasts >= self._down(span.least_s)).only_enforce_if(these)
             if span.most_s < inf:
-                slack = times + 1 if self.loose else 0  # the period is rounded up, the work down
+                slack = times + 1 if self.loose else 0  # since the period is rounded up and the work down
                 self.model.add(lasts <= ceil(span.most_s * self.unit - NEAR) + slack).only_enforce_if(these)
 
     def _is(self, wraps: cp_model.IntVar, times: int) -> cp_model.IntVar:
@@ -171,13 +170,13 @@ class CycleModel:
         return these
 
     def _taken(self, station: int, move: int) -> cp_model.LinearExpr:
-        """How many parts are at a station when a move is decided on."""
+        """The number of parts at a station when a move is decided."""
         held = [(self._wraps[n], self.line.stays[n]) for n in self.line.holds.get(station, ())]
         terms = [wraps + self._before[stay.drop, move] - self._before[stay.pick, move] for wraps, stay in held]
         return cp_model.LinearExpr.sum(terms)
 
     def _add_room(self, move: int) -> None:
-        """What a move needs room at, has some, and what has to be full for it, is."""
+        """Adds that the stations which a move needs have room, and that the one which must be full for it is full."""
         option, room = self.line.moves[move].option, self.line.cell.capacities
         for station in option.needs:
             self.model.add(self._taken(station, move) <= room[station] - 1)
@@ -185,7 +184,7 @@ class CycleModel:
             self.model.add(self._taken(option.if_full, move) >= room[option.if_full])
 
     def _add_tour(self) -> None:
-        """Where the way straight from one move to the next takes longer than one by somewhere else, or is none at all."""
+        """Adds a tour of the robot where the direct drive between two moves takes longer than a detour, or does not exist."""
         numbers = range(len(self.line.moves))
         straight = {(a, b): self.line.after_s(a, b) for a in numbers for b in numbers if a != b}
         if len(numbers) == 1:
@@ -206,7 +205,7 @@ class CycleModel:
         self.model.add_circuit(arcs)
 
     def _add_turns(self) -> None:
-        """Parts of the same way are alike: they begin in the order of their numbers."""
+        """Orders the begins of parts with the same path by their numbers, since such parts are identical."""
         firsts = [n for n, move in enumerate(self.line.moves) if n == 0 or self.line.moves[n - 1].slot != move.slot]
         last: dict[object, int] = {}
         for slot, first in enumerate(firsts):

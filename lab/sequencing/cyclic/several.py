@@ -1,4 +1,4 @@
-"""The least time a part of cycles with more and more parts: a mix of products enters once in a cycle, twice, and so on."""
+"""The cycle of least time per part when a mix of products enters once in a cycle, twice, and so on; and a bound for all."""
 
 import time
 from collections import Counter
@@ -14,19 +14,17 @@ from lab.sequencing.cell.ways import TICKS_PER_S, Way, follows, ways_of
 from lab.sequencing.cyclic.cycle import TIME_LIMIT_S, Cycle, check_cyclic, shortest
 from lab.sequencing.cyclic.line import at_speed, away_s, lines
 
-SOLVER_TOLERANCE_S = 1e-6  # what the program's solver may be wrong by
-Column = dict[tuple[Any, ...], float]  # what one of a kind adds to each row, by the row's name
-BUSY = (
-    "busy"  # rows of what is busy for some time of a mix, at the most for all of it; other rows add up to what is given
-)
+SOLVER_TOLERANCE_S = 1e-6  # error of the linear program's solver
+Column = dict[tuple[Any, ...], float]  # a column of the linear program: its coefficient in each row, by the row's name
+BUSY = "busy"  # begins the names of the rows of busy times, each at most the time of a mix; other rows are equalities
 
 
 def least_s(cell: Cell, mix: Sequence[str], away_s: Sequence[Sequence[float]]) -> float:
-    """No order that repeats for ever needs less time for each mix, however many of them enter in a cycle [s].
+    """A lower bound of the time per mix of every cyclic order, however many mixes enter in a cycle [s].
 
-    Over all cycles each way on from a position has a share of the parts. Each room of a station needs its time for these: to
-    work, and until the next part is there. The robot needs its moves and the empty ways between them; each move has one after
-    it and one before it. cell: with the times of its one robot (`at_speed`). away_s: see `Line.bound_s`.
+    It is a linear program over the shares of parts that take each option. Each room of a station is busy with these parts and
+    until the next one arrives; the robot is busy with the moves and the empty drives between them, and each move has one
+    predecessor and one successor. cell: must have the times of its one robot (`at_speed`). away_s: see `Line.bound_s`.
     """
     from scipy.optimize import linprog
     from scipy.sparse import coo_array
@@ -49,7 +47,7 @@ def least_s(cell: Cell, mix: Sequence[str], away_s: Sequence[Sequence[float]]) -
 
 
 def _moves(cell: Cell, ways: Sequence[Way]) -> Iterator[Column]:
-    """A part that leaves a position by each way: what the robot and the rooms that it leaves need for it."""
+    """A column for each option by which a part leaves a position: the time of the robot and of the rooms that it leaves."""
     for n, way in enumerate(ways):
         left, to, work_s = cell.positions[way.place], cell.positions[way.option.to], way.work / TICKS_PER_S
         column: Column = {(BUSY,): work_s, ("after", n): 1.0, ("before", n): 1.0, ("parts", way.place): 1.0}
@@ -65,8 +63,7 @@ def _moves(cell: Cell, ways: Sequence[Way]) -> Iterator[Column]:
 
 
 def _between_moves(cell: Cell, ways: Sequence[Way]) -> Iterator[Column]:
-    """The robot's empty way from each move to each that may come next; where that can only be one of the same part, the robot
-    waits for it."""
+    """A column for each pair of consecutive moves: the robot's empty drive, or its wait where both are of the same part."""
     for one, done in enumerate(ways):
         for then, way in enumerate(ways):
             same, other = (follows(cell, done, way, same=alike) for alike in (True, False))
@@ -78,7 +75,7 @@ def _between_moves(cell: Cell, ways: Sequence[Way]) -> Iterator[Column]:
 
 
 def _between_parts(cell: Cell, ways: Sequence[Way], away_s: Sequence[Sequence[float]]) -> Iterator[Column]:
-    """How long a room stays empty, from each move that leaves it to each that may bring the next part."""
+    """A column for each pair of a move that leaves a room and one that brings the next part: the time that it is empty."""
     for station, room in enumerate(cell.capacities):
         picks = [
             (n, way)
@@ -92,20 +89,21 @@ def _between_parts(cell: Cell, ways: Sequence[Way], away_s: Sequence[Sequence[fl
                 yield {(BUSY, station): time_s / room, ("out", station, one): -1.0, ("in", station, then): -1.0}
 
 
-# ---- several ----------------------------------------------------------------------------------------------------------
+# ---- Cycles with more and more parts ----------------------------------------------------------------------------------
 
 
-MOST_PARTS, MOST_MOVES, MOST_LINES = 4, 30, 100  # of a cycle, where nobody says how many parts may enter in it
-WORTH = 0.01  # and more are not tried where so small a share of the time is all that could be gained
-NEAR_S = 3e-6  # longer than the bound, a mix takes as long: the bound is less by what its solver may be wrong by
+MOST_PARTS, MOST_MOVES, MOST_LINES = 4, 30, 100  # default limits of a cycle, where the number of parts is not given
+WORTH = 0.01  # more parts are not tried by default when less than this share of the time could be gained
+NEAR_S = 3e-6  # tolerance within which the time of a mix equals the bound, which is lowered by its solver's error
 EVERY_CYCLE = "all cycles"
 
 
 @dataclass(frozen=True)
 class Tried:
-    """What was found with so many parts a cycle: its period; None: none that needs less time a part than fewer parts do.
+    """The result for one number of parts per cycle. period_s: None: no cycle needs less time per part than one with fewer parts.
 
-    bound_s: no period that needs less is shorter. proven: there is none that needs less than the period, or than fewer parts.
+    bound_s: a lower bound of the periods that need less. proven: whether no period is shorter than this one, or whether none
+    needs less time per part than one with fewer parts.
     """
 
     parts: int
@@ -116,10 +114,10 @@ class Tried:
 
 @dataclass(frozen=True)
 class Rhythm:
-    """The cycle that needs the least time a part, of those that were tried: with a mix of products once, twice, and so on.
+    """The cycle of least time per part among those tried, with a mix of products entering once, twice, and so on.
 
-    least_part_s: no cycle needs less time a part, however many parts enter in it. why_no_more: why more parts a cycle were not
-    tried; "": those that were wanted were, or none can need less.
+    least_part_s: a lower bound of the time per part of every cycle. why_no_more: why no more parts per cycle were tried; "": all
+    that were asked for were tried, or none can need less.
     """
 
     cycle: Cycle
@@ -131,29 +129,29 @@ class Rhythm:
 
     @property
     def per_part_s(self) -> float:
-        """How long a part takes [s]."""
+        """The time per part [s]."""
         return self.cycle.period_s / self.cycle.parts
 
     @property
     def most_parts(self) -> int:
-        """The most parts a cycle that were tried."""
+        """The largest number of parts per cycle that was tried."""
         return self.tried[-1].parts
 
     @property
     def bound_part_s(self) -> float:
-        """No cycle of those in `proven_of` needs less time a part [s]."""
+        """A lower bound of the time per part of the cycles in `proven_of` [s]."""
         if self._is_least:
             return self.per_part_s
         return min(self.per_part_s, max(self.least_part_s, min(one.bound_s / one.parts for one in self.tried)))
 
     @property
     def proven(self) -> bool:
-        """Whether no cycle of those in `proven_of` needs less time a part, to some microseconds."""
+        """Whether no cycle of those in `proven_of` needs less time per part, within some microseconds."""
         return self.bound_part_s == self.per_part_s
 
     @property
     def proven_of(self) -> str:
-        """Of which cycles something is proven: all that there are, or those that were tried."""
+        """The set of cycles that the proof is about, in words: all cycles, or those that were tried."""
         if self._is_least:
             return EVERY_CYCLE
         if self.most_parts > len(self.mix):
@@ -168,10 +166,10 @@ class Rhythm:
 def best_rhythm(
     cell: Cell, mix: Sequence[str], most_parts: int | None = None, seed: int = 0, time_limit_s: float = TIME_LIMIT_S
 ) -> Rhythm:
-    """The cycle of a mix (products) that needs the least time a part: with one mix, then two, up to so many parts a cycle.
+    """The cycle of least time per part, tried with one mix (products) per cycle, then two, up to `most_parts` parts.
 
-    most_parts: None: `usual_parts`, and no more once less than `WORTH` could be gained. More are never tried once it is proven
-    that no cycle needs less. Raises BadInput and WorkFailed as `best_cycle` does.
+    most_parts: None: `usual_parts`, or fewer once less than `WORTH` could be gained. The search ends when it is proven that no
+    cycle needs less. Raises BadInput and WorkFailed as `best_cycle` does.
     """
     began, mix = time.perf_counter(), tuple(mix)
     check_cyclic(cell, mix)
@@ -212,8 +210,8 @@ def best_rhythm(
 
 
 def usual_parts(cell: Cell, mix: Sequence[str]) -> int:
-    """How many parts a cycle has at the most where nobody says: few, of few moves and choices of ways, and no more than the cell
-    has; a mix at the least."""
+    """The default largest number of parts per cycle: at least one mix, no more parts than the cell has, and within the limits
+    MOST_PARTS, MOST_MOVES and MOST_LINES."""
     most = len(mix)
     while most + len(mix) <= min(MOST_PARTS, cell.parts):
         try:
@@ -227,5 +225,5 @@ def usual_parts(cell: Cell, mix: Sequence[str]) -> int:
 
 
 def mix_in_words(mix: Sequence[str]) -> str:
-    """What enters, such as "2 slices, 1 cup"."""
+    """A mix in words, such as "2 slices, 1 cup"."""
     return ", ".join(counted(count, name) for name, count in Counter(mix).items())

@@ -1,4 +1,4 @@
-"""A cycle carried out for so many parts: the line is filled, the cycle repeats, the line is emptied."""
+"""A cycle over time: its steady state for some periods, and the finite order that fills the line, repeats, and empties it."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -21,7 +21,7 @@ MOST_PERIODS = 20
 
 @dataclass(frozen=True)
 class Steady:
-    """So many periods of a cycle, from 0 on: its schedule without rows for parts, and what the parts in it are called."""
+    """Some periods of a cycle from time 0 on: the schedule, without rows for parts, and the names of the parts in it."""
 
     cycle: Cycle
     periods: int
@@ -30,7 +30,7 @@ class Steady:
 
 
 def steady(cycle: Cycle, periods: int) -> Steady:
-    """What happens in these periods. Parts are numbered from the first that is seen. BadInput for too many or no periods."""
+    """The steady state of a cycle. Parts are numbered from the first one seen; raises BadInput for too many or no periods."""
     if not 1 <= periods <= MOST_PERIODS:
         raise BadInput(f"periods = {periods}: allowed are 1 to {MOST_PERIODS}")
     end_s, first = periods * cycle.period_s, -max(cycle.passed) - 1
@@ -49,7 +49,7 @@ def steady(cycle: Cycle, periods: int) -> Steady:
 
 
 def _robot(cycle: Cycle, cycles: range) -> Iterator[Activity]:
-    """The robot's row, move by move in the periods that these cycles begin in."""
+    """The robot's activities, move by move, in the given cycles."""
     line, period_s = cycle.line, cycle.period_s
     names = line.cell.names
     at, left_s, before = "", -inf, 0
@@ -68,7 +68,7 @@ def _robot(cycle: Cycle, cycles: range) -> Iterator[Activity]:
 
 
 def _stays(cycle: Cycle, number: int, first: int) -> Iterator[Activity]:
-    """Where the parts that enter in a cycle stay between two moves of their own; their pallets take room, and no row."""
+    """The activities of stations for the parts that enter in a cycle, between their moves; pallets get no activities."""
     line, cell = cycle.line, cycle.line.cell
     carried = [n for n, move in enumerate(line.moves) if move.option.carries == "part"]
     for drop, pick in pairwise(carried):
@@ -86,20 +86,20 @@ def _stays(cycle: Cycle, number: int, first: int) -> Iterator[Activity]:
 
 
 def _within(activity: Activity, end_s: float) -> Activity | None:
-    """What of it lies between 0 and the end; None: nothing."""
+    """The part of an activity that lies between 0 and `end_s`; None: it lies outside."""
     start_s, until_s = max(0.0, activity.start_s), min(end_s, activity.end_s)
     return replace(activity, start_s=start_s, end_s=until_s) if until_s > start_s + 1e-9 else None
 
 
-# ---- unrolled ---------------------------------------------------------------------------------------------------------
+# ---- The finite order -------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
 class Unrolled:
     """A finite order that repeats a cycle: its cell, the decisions (see `Run`) and the schedule.
 
-    waits: the robot waits on purpose, so that no part is picked too late at the station it is brought to; else all is done as
-    early as it can be, and `simulate` gives the same schedule.
+    waits: whether the robot waits deliberately so that no part is picked too late; else every move is made as early as possible,
+    and `simulate` gives the same schedule.
     """
 
     cell: Cell
@@ -109,7 +109,7 @@ class Unrolled:
 
 
 class _Turn(NamedTuple):
-    """One move of the finite order: the part, the position that it leaves, and how."""
+    """One move of the finite order: the part, the position that it leaves, and the option that it takes."""
 
     part: int
     place: int
@@ -117,16 +117,16 @@ class _Turn(NamedTuple):
 
 
 def of_parts(cell: Cell, mix: Sequence[str], parts: int) -> Cell:
-    """The cell for so many parts, the products as they come in the cycles. BadInput as any cell of so many."""
+    """The cell with `parts` parts, their products in the order of the cycles; raises BadInput as any cell."""
     order = tuple(mix[number % len(mix)] for number in range(parts))
     return replace(cell, order=order, due_s=None)
 
 
 def period_of(schedule: Schedule, cycle: Cycle) -> float | None:
-    """The period of a schedule that repeats a cycle: the median time between the end of a part and that of the part so many
-    cycles later as come in the same intervals again, without those at the end and the beginning where there are enough.
+    """The period of a schedule that repeats a cycle; None when there are too few parts.
 
-    While the line is filled and emptied parts end in other intervals. None: there are too few parts.
+    It is the median time per cycle between the ends of two parts that are `cycle.recurs` cycles apart. Parts that end while the
+    line is filled or emptied are left out where enough others remain.
     """
     ends_s = sorted({a.part: a.end_s for a in schedule.parts if a.kind == "carry"}.values())
     apart_s = [
@@ -139,17 +139,17 @@ def period_of(schedule: Schedule, cycle: Cycle) -> float | None:
 
 
 def unrolled(cycle: Cycle, cell: Cell) -> Unrolled:
-    """The order of a cell's parts in which each does what the cycle has it do, in the cycle's order.
+    """The finite order of a cell's parts that makes the moves of a cycle, in the cycle's order.
 
-    The moves of parts before the first and after the last are left out. Where a buffer is used only when the machine ahead is
-    full, the first parts go straight on. WorkFailed when the line cannot be filled so, which buffers can lead to.
+    Moves of parts before the first and after the last are left out. The first parts skip buffers that are used only when the
+    machine ahead is full. Raises WorkFailed when the line cannot be filled this way, which buffers may cause.
     """
-    free = cell.without_windows  # the order alone counts here
+    free = cell.without_windows  # only the order matters here
     run, sequence = Run(free), list[int]()
     for turn in _turns(cycle, cell):
         here = run.locations[turn.part - 1]
         if here != turn.place and here in reached_from(cell.positions, {turn.place}):
-            continue  # it did not need the buffer
+            continue  # the part skipped the buffer
         decision = entry(turn.part, turn.option.choice, cell.parts)
         way = run.option(decision) if here == turn.place else None
         if way is None:
@@ -168,7 +168,7 @@ def unrolled(cycle: Cycle, cell: Cell) -> Unrolled:
 
 
 def _turns(cycle: Cycle, cell: Cell) -> Iterator[_Turn]:
-    """The moves of all parts, in the order in which the cycles have them."""
+    """The moves of all parts in the order of the cycles."""
     waiting = {product.name: iter(_numbers(cell, product)) for product in cell.products}
     moves, first = cycle.line.moves, {move.slot: number for number, move in reversed([*enumerate(cycle.line.moves)])}
     rank = {move: number for number, move in enumerate(cycle.order)}

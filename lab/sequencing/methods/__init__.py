@@ -1,1 +1,1 @@
-"""How a sequence is found: one file a method, and what several of them share."""
+"""The sequencing methods, a file for each, and the records and kernels that several of them share."""

@@ -1,4 +1,4 @@
-"""Simulated annealing: an order of priorities is changed a little, again and again, and worse ones are kept ever more seldom."""
+"""Simulated annealing of a list of priorities: its compiled steps, the method `anneal`, and `Annealing`, which can be resumed."""
 
 from collections.abc import Sequence
 from math import exp, inf, log
@@ -25,8 +25,11 @@ from lab.sequencing.simulate.cell_arrays import Floats, Ints
 
 
 class AnnealArrays(NamedTuple):
-    """tried: the neighbour, carried out. parts, choices (L,): the list that it is one of. best (L,): the best decisions, then
-    zeros. cost (2,): of the list, and of the best. stream (1,): the state of the random numbers."""
+    """The state of an annealing of a list of L priorities.
+
+    tried: the neighbour, carried out. parts, choices (L,): the current list. best (L,): the incumbent's decisions, then zeros.
+    cost (2,): of the current list and of the incumbent. stream (1,): the state of the random number generator.
+    """
 
     tried: OrderArrays
     parts: Ints
@@ -38,7 +41,7 @@ class AnnealArrays(NamedTuple):
 
 @inner
 def annealed(cell: Any, run: Any, work: Any, choices: int, temperature: float) -> float:
-    """One step; what the neighbour costs, or more than what is kept where it was given up."""
+    """The cost of the neighbour that one step tries; a lower bound of it where its simulation was cut off as too long."""
     copied(work.parts, work.choices, work.tried.parts, work.tried.choices)
     changed(work.tried, work.stream, choices)
     limit = work.cost[0] - temperature * np.log(1.0 - drawn(work.stream))
@@ -55,13 +58,13 @@ def annealed(cell: Any, run: Any, work: Any, choices: int, temperature: float) -
 
 @without_refcounts
 def annealed_session(cell: Any, run: Any, work: Any, costs: Any, temperature: float) -> None:
-    """As many steps as there are costs (N,), which are filled, at a temperature in the objective's unit."""
+    """Makes N steps at a temperature in the objective's unit and writes their costs into `costs` (N,)."""
     choices = most_choices(cell)
     for n in range(len(costs)):
         costs[n] = annealed(cell, run, work, choices, temperature)
 
 
-# ---- anneal -----------------------------------------------------------------------------------------------------------
+# ---- The method, and an annealing that can be resumed -----------------------------------------------------------------
 
 
 ROUND = 500  # sequences between two looks at the clock, the listener and Ctrl-C
@@ -71,11 +74,12 @@ HOT, COLD = 0.02, 0.004  # temperatures at first and in the end, as shares of th
 def anneal(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceResult:
     """The best sequence that simulated annealing finds by the mean times; every one that it tries is an episode.
 
-    It begins with the best dispatching rule's. A step moves or swaps entries of the priorities, or changes the way that
-    one takes. Of makespans, a sequence that has become too long to be kept is given up: its episode costs what it would
-    have cost at the least. It is a search and learns nothing. Raises BadInput and WorkFailed as the other methods do.
+    It begins with the sequence of the best dispatching rule. A step moves or swaps entries of the list, or changes the route
+    of one entry. When the makespan is minimised, the simulation of a neighbour stops as soon as it is too long to be
+    accepted; its episode then costs the lower bound reached. It is a search and learns nothing. Raises BadInput and
+    WorkFailed as the other methods do.
     Source: Kirkpatrick, Gelatt and Vecchi 1983; priorities as the list of an insertion neighbourhood, Dell'Amico and
-    Trubian 1993; what is given up, Dueck and Scheuer 1990, whose limit is known before a neighbour is tried.
+    Trubian 1993; cutting off neighbours, Dueck and Scheuer 1990, whose limit is known before a neighbour is tried.
     """
     search.check(cell)
     noted, annealing = Log(search), Annealing(cell, search.objective, drawn_seed(rng))
@@ -90,7 +94,8 @@ def anneal(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceResu
 
 
 class Annealing:
-    """An annealing under way. orders: what it begins with, but for a `known` order; costs: of the last round."""
+    """An annealing under way. orders: the rules' lists that it may begin with, unless an order is `known`; costs: those of
+    the last round."""
 
     def __init__(self, cell: Cell, objective: str, seed: int, known: Sequence[int] = ()) -> None:
         self.orders = orders = Orders(cell, objective, "annealing")
@@ -117,7 +122,7 @@ class Annealing:
         return float(self._work.cost[1])
 
     def advance(self, steps: int, done: float) -> tuple[int, ...]:
-        """So many more steps, a share `done` of all being behind; the best sequence so far."""
+        """The best sequence after `steps` more steps; done: the share of all steps made before, which sets the temperature."""
         temperature = self.orders.scale * HOT * exp(log(COLD / HOT) * done)
         self.costs = np.zeros(steps)
         annealed_session(self.orders.arrays, self.orders.run, self._work, self.costs, temperature)

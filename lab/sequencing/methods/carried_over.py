@@ -1,4 +1,4 @@
-"""A policy learned on small cells that orders larger ones: the decision whose features are worth most, without any search."""
+"""A policy learned on small cells and applied to larger ones: it takes the decision of highest value and does not search."""
 
 import numpy as np
 
@@ -34,7 +34,7 @@ class Decider:
     """The policy's decisions in a cell, compiled; it is made once a cell."""
 
     def __init__(self, cell: Cell, objective: str = MAKESPAN) -> None:
-        """objective: what runs are to be judged by, and whose data the features know."""
+        """objective: what runs are judged by; the features use its data, such as due times."""
         from lab.sequencing.methods import carried_over_kernels as kernels  # numba takes its time
 
         self._kernels, self._work = kernels, kernels.work_arrays(cell)
@@ -43,19 +43,19 @@ class Decider:
         self.stuck_cost = float(self._cell.stuck_cost)
 
     def sequence(self, weights: Floats) -> tuple[int, ...]:
-        """What is decided with the weights (F,), to the end or to a deadlock."""
+        """The decisions that the weights (F,) lead to, until all parts are finished or none can move."""
         made = self._kernels.decide(self._cell, self._run, self._known, self._work, weights)
         return tuple(self._work.sequence[:made].tolist())
 
     def costs(self, candidates: Floats) -> Floats:
-        """What is decided with each of the weights (N, F) costs (N,)."""
+        """The costs (N,) of the sequences that N candidate weights (N, F) lead to."""
         costs = np.zeros(len(candidates))
         self._kernels.costs_of(self._cell, self._run, self._known, self._work, candidates, costs)
         return costs
 
 
 def carried(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceResult:
-    """The one sequence of the search's policy, or of the one that ships; it draws nothing from `rng`.
+    """The sequence of the policy in `search`, or of the policy that ships with the lab; it draws nothing from `rng`.
 
     Raises BadInput for an objective that the cell has no data for, WorkFailed when it ends in a deadlock.
     """

@@ -1,6 +1,6 @@
-"""What a carried-over policy looks at: numbers of a decision that mean the same in a small cell and in a large one.
+"""The features of a decision that a carried-over policy weighs; they mean the same in a small cell and in a large one.
 
-Times are counted in a cell's mean work of a move, loads as shares of the highest, so that nothing grows with the number of
+Times are divided by the cell's mean work per move, and loads by the highest load, so that no feature grows with the number of
 parts. `features` is the readable form; `carried_over_kernels` holds the compiled one.
 """
 
@@ -17,15 +17,16 @@ from lab.sequencing.methods.rules import loads_s, machine_of, work_left_s
 from lab.sequencing.simulate.cell_arrays import Floats, Ints
 from lab.sequencing.simulate.run import Run
 
-WAITED = 10.0  # moves: what was ready longer ago counts no more
+WAITED = 10.0  # moves: a longer time since the part was ready counts as this much
 
 
 class FeatureArrays(NamedTuple):
-    """What is to come from each of a cell's P positions; of S stations, S stands for none.
+    """The work ahead of each of a cell's P positions; station index S (of S stations) means no station.
 
-    scale_s: mean seconds of work a move. left_s (P,): see `rules.work_left_s`; moves (P,): the fewest to the end. load_s
-    (P, S + 1): processing still to come at a machine, over how many parts it works on at once: places (S + 1,). machine (P,):
-    that the part stands in; following (P,): that works on it next. due: whether due times count.
+    scale_s: mean work per move [s]. left_s (P,): see `rules.work_left_s`. moves (P,): the fewest moves to the end. load_s
+    (P, S + 1): processing still to come at each station [s], divided by `places` (S + 1,), the parts that it works on at once.
+    machine (P,): the machine that the part stands in. following (P,): the machine that works on it next. due: whether due times
+    count.
     """
 
     scale_s: float
@@ -39,7 +40,7 @@ class FeatureArrays(NamedTuple):
 
 
 def feature_arrays(cell: Cell, objective: str = MAKESPAN) -> FeatureArrays:
-    """What the features of a cell are made of, for a policy that was learned for an objective."""
+    """The arrays from which a cell's features are computed, for a policy that was learned for this objective."""
     size = len(cell.stations)
     places = np.array([*(one.servers or one.capacity for one in cell.stations), 1], np.int64)
     load_s = np.zeros((len(cell.positions), size + 1))
@@ -133,11 +134,11 @@ def features(run: Run, allowed: tuple[int, ...], known: FeatureArrays) -> Floats
 
 
 class _Survey:
-    """What the features compare with.
+    """The values of a run with which the features of its decisions are compared.
 
-    tail_s: the latest end of a part if nothing stops it any more; mean_left_s: of the parts that are not finished. free_s: by
-    machine, when it is through with what it has. loads_s: by machine, from now on until it would be through with all that is
-    still to come, never standing still.
+    tail_s: the latest end of any part if none waited any more. mean_left_s: mean work left of the unfinished parts. free_s: by
+    machine, when it has finished the parts that it holds. loads_s: by machine, how long it would still work on all parts
+    that are to come if it never stood idle.
     """
 
     def __init__(self, run: Run, known: FeatureArrays) -> None:
@@ -159,7 +160,9 @@ class _Survey:
             to_come_s = sum(known.load_s[run.locations[part], station] for part in going)
             if to_come_s > 0.0:
                 free_s = run.free_s(station) if cell.stations[station].servers else self.free_s.get(station, 0.0)
-                self.loads_s[station] = max(0.0, free_s - run.now_s) + to_come_s  # what waits there is to come
+                self.loads_s[station] = (
+                    max(0.0, free_s - run.now_s) + to_come_s
+                )  # waiting parts are counted in to_come_s
 
     def share(self, station: int) -> float:
         """The load of a machine as a share of the highest one."""

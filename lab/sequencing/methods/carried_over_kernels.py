@@ -1,4 +1,4 @@
-"""Features of decisions compiled (see `carried_over_features`), and runs that always take the decision of highest value."""
+"""Compiled features of decisions (see `carried_over_features`), and compiled runs that take the decision of highest value."""
 
 from typing import Any, NamedTuple
 
@@ -38,11 +38,11 @@ from lab.sequencing.simulate.kernels import cost, list_allowed, pick_times, reac
 
 
 class WorkArrays(NamedTuple):
-    """Room for the features of D decisions of K parts at S stations, and for L decisions that were made.
+    """Buffers for the features of D decisions of K parts at S stations, and for the L decisions of a run.
 
-    begin_s, end_s (D,): of each decision. least_s (K,): the soonest end of each part's decisions. free_s, load_s (S + 1,): when a
-    machine is through with what it has, and its load. compared (4,): the latest tail, the mean work left, the highest load, the
-    first begin. features (F,): of one decision. sequence (L,).
+    begin_s, end_s (D,): when each decision begins and ends. least_s (K,): the earliest end among each part's decisions. free_s,
+    load_s (S + 1,): when each machine has finished the parts that it holds, and its load. compared (4,): the latest tail, the
+    mean work left, the highest load, the first begin. features (F,): those of one decision. sequence (L,): the decisions.
     """
 
     begin_s: Floats
@@ -56,7 +56,7 @@ class WorkArrays(NamedTuple):
 
 
 def work_arrays(cell: Cell) -> WorkArrays:
-    """Room for a run of the cell."""
+    """Empty buffers for a run of the cell."""
     decisions, size = cell.parts * cell.most_choices, len(cell.stations) + 1
     return WorkArrays(
         begin_s=np.zeros(decisions),
@@ -72,7 +72,7 @@ def work_arrays(cell: Cell) -> WorkArrays:
 
 @inner
 def _survey(cell: Any, run: Any, known: Any, work: Any) -> None:
-    """What the decisions are compared with, but for the first begin."""
+    """Fills in the values that decisions are compared with, except for the first begin."""
     last, tail_s, left_s, going = len(known.places) - 1, 0.0, 0.0, 0
     for station in range(last):
         work.load_s[station] = 0.0
@@ -98,10 +98,10 @@ def _survey(cell: Any, run: Any, known: Any, work: Any) -> None:
     highest_s = 0.0
     for station in range(last):
         if cell.first_server[station + 1] > cell.first_server[station]:
-            free_s = _first_free(cell, run, station)  # without what waits there, which is to come
+            free_s = _first_free(cell, run, station)  # parts that wait there are counted in the load
         else:
             if run.room[station] > 0 or work.free_s[station] == np.inf:
-                work.free_s[station] = 0.0  # there is room, or what takes it stays for ever
+                work.free_s[station] = 0.0  # there is room, or the part inside never leaves
             free_s = work.free_s[station]
         if work.load_s[station] > 0.0:
             work.load_s[station] += max(0.0, free_s - run.clock[0])
@@ -121,7 +121,7 @@ def _first_free(cell: Any, run: Any, station: int) -> float:
 
 @inner
 def _times(cell: Any, run: Any, work: Any, count: int) -> None:
-    """When each decision begins and ends as far as there is room, the first begin, and the soonest end of each part."""
+    """Fills in when each decision begins and ends if there is room, the first begin, and the earliest end of each part."""
     parts, first_s = len(run.locations), np.inf
     for i in range(count):
         work.least_s[(run.allowed[i] - 1) % parts] = np.inf
@@ -141,7 +141,7 @@ def _times(cell: Any, run: Any, work: Any, count: int) -> None:
 
 @inner
 def _way_on(cell: Any, run: Any, work: Any, count: int, i: int) -> float:
-    """How long after the drop of the i-th decision its robot can pick another part, at the soonest."""
+    """The least time after the drop of the i-th decision until its robot can pick another part."""
     parts, robot, at = len(run.locations), cell.robot[run.options[i]], cell.target[run.options[i]]
     part, soonest_s = (run.allowed[i] - 1) % parts, np.inf
     for j in range(count):
@@ -150,7 +150,7 @@ def _way_on(cell: Any, run: Any, work: Any, count: int, i: int) -> float:
             on_s = cell.empty_s[robot, at, cell.origin[o]]
             if cell.waits[o] and run.ready_s[other] - work.end_s[i] > on_s:
                 on_s = run.ready_s[other] - work.end_s[i]
-            if on_s < soonest_s:  # not where there is no such way (NaN)
+            if on_s < soonest_s:  # false where the robot never makes this move (NaN)
                 soonest_s = on_s
     return soonest_s if soonest_s < np.inf else 0.0
 
@@ -201,7 +201,7 @@ def _describe(cell: Any, run: Any, known: Any, work: Any, count: int, i: int) ->
 
 @without_refcounts
 def describe_all(cell: Any, run: Any, known: Any, work: Any, found: Any) -> int:
-    """`features` of a run as it stands, for all its allowed decisions, into the rows of found; how many there are."""
+    """The number of allowed decisions; their features (see `features`) are written into the rows of `found`."""
     count = list_allowed(cell, run)
     if count > 0:
         _survey(cell, run, known, work)
@@ -215,7 +215,7 @@ def describe_all(cell: Any, run: Any, known: Any, work: Any, found: Any) -> int:
 
 @inner
 def _best(cell: Any, run: Any, known: Any, work: Any, weights: Any, count: int) -> int:
-    """Which of the allowed decisions has the highest value; of several the first."""
+    """The index of the allowed decision of highest value; ties go to the first."""
     if count == 1:
         return 0
     _survey(cell, run, known, work)
@@ -233,7 +233,7 @@ def _best(cell: Any, run: Any, known: Any, work: Any, weights: Any, count: int) 
 
 @without_refcounts
 def decide(cell: Any, run: Any, known: Any, work: Any, weights: Any) -> int:
-    """A whole run with the weights (F,); how many decisions it took, which stand in work.sequence."""
+    """The number of decisions of a whole run with the weights (F,); the decisions are written into work.sequence."""
     reset(cell, run, np.uint64(0))
     parts, made = len(run.locations), 0
     while True:
@@ -248,7 +248,7 @@ def decide(cell: Any, run: Any, known: Any, work: Any, weights: Any) -> int:
 
 @without_refcounts
 def costs_of(cell: Any, run: Any, known: Any, work: Any, candidates: Any, costs: Any) -> None:
-    """What the runs with N weights (N, F) cost (N,)."""
+    """Writes the costs (N,) of runs with N candidate weights (N, F) into `costs`."""
     for n in range(len(candidates)):
         decide(cell, run, known, work, candidates[n])
         costs[n] = cost(cell, run)

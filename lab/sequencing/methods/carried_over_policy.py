@@ -1,4 +1,4 @@
-"""What a carried-over policy is: the features of a decision, and what each of them is worth."""
+"""The carried-over policy: the names of a decision's features, a weight for each, and the weights that ship with the lab."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -32,14 +32,15 @@ FEATURES: Mapping[str, str] = {
     "load-after": "load of the machine after the next, as a share of the highest, less 1",
     "queued-tail": "tail, with the wait in the queue",
 }
-MOST = 1e6  # of a weight
+MOST = 1e6  # the largest absolute value of a weight
 
 
 @dataclass(frozen=True)
 class CarriedPolicy:
-    """What a feature of a decision is worth, by its name in FEATURES; one that is left out is worth 0.
+    """The weight of each feature by its name in FEATURES; a feature that is left out has weight 0.
 
-    objective: what it was learned for. learned_on: in words. BadInput for weights that cannot be, and names that nobody has.
+    objective: the objective that it was learned for. learned_on: the training cells, in words. Raises BadInput for weights out
+    of range and for unknown names.
     """
 
     weights: Mapping[str, float]
@@ -59,7 +60,7 @@ class CarriedPolicy:
         object.__setattr__(self, "vector", vector)
 
 
-# ---- carried over weights ---------------------------------------------------------------------------------------------
+# ---- The weights that ship with the lab -------------------------------------------------------------------------------
 
 
 DEFAULT = CarriedPolicy(

@@ -23,11 +23,12 @@ from lab.sequencing.search import SAME, Search, SequenceResult, not_in_time, onl
 from lab.sequencing.simulate.follow import follow, simulate, spoils
 from lab.sequencing.simulate.run import Run
 
-LOOK = 6.0  # about so many seconds of a thread, counted in what the solver does
+LOOK = 6.0  # deterministic time of one solve, in the solver's units: about seconds of one thread
 
 
 def free_robots(shared: Shared, time_limit_s: float, seed: int, workers: int) -> None:
-    """Tells all a bound of the makespan, and the order in which such robots would work, carried out by those that there are."""
+    """Tells `shared` a bound of the makespan from a model in which robots are always at hand, and that model's order as the
+    cell's own robots carry it out."""
     begin_s, model = perf_counter(), TransportModel(shared.cell, shared.objective, (), free=True)
     solver = cp_model.CpSolver()
     solver.parameters.max_time_in_seconds = max(0.01, time_limit_s - (perf_counter() - begin_s))
@@ -40,10 +41,10 @@ def free_robots(shared: Shared, time_limit_s: float, seed: int, workers: int) ->
 
 
 def carried_out(cell: Cell, moves: Sequence[tuple[int, int, int]]) -> tuple[int, ...]:
-    """A complete order of moves, each a part from 0, its position and the next one; empty: it gets stuck.
+    """The decisions that carry out an order of moves; empty: it ends in a deadlock. moves: part from 0, position, next position.
 
-    Again and again the first move that may be made now is made, by the robot that can pick soonest; of several the one that was
-    free last, so that the others stay where they are.
+    The first move of the list that is allowed now is made, until none is left, by the robot that can pick soonest; of several
+    such robots the one that was busy last takes it, so that the others stay where they are.
     """
     run, left, found = Run(cell), list(moves), list[int]()
     while left:
@@ -57,7 +58,7 @@ def carried_out(cell: Cell, moves: Sequence[tuple[int, int, int]]) -> tuple[int,
 
 
 def _soonest(run: Run, move: tuple[int, int, int]) -> int | None:
-    """The decision that makes a move; None: it may not be made now."""
+    """The decision that makes a move with the robot that picks soonest; None: the move is not allowed now."""
     part, place, to = move
     if run.locations[part] != place:
         return None
@@ -70,25 +71,25 @@ def _soonest(run: Run, move: tuple[int, int, int]) -> int | None:
     return min(able)[-1] if able else None
 
 
-# ---- cp sat -----------------------------------------------------------------------------------------------------------
+# ---- The method `cp-sat`, alone and beside others ---------------------------------------------------------------------
 
 
 TIME_LIMIT_S = 60.0
-MOST_MOVES = 800  # that parts may make, in a model; what it takes in memory grows with the square, to a gigabyte
+MOST_MOVES = 800  # possible moves in a model: its memory grows with their square, to a gigabyte here
 
-FIRST_LOOK = 3.0  # about so many seconds of a thread, counted in what the solver does
-SHOP_LOOK = 5.0  # as such, of the model of a shop before the general one
+FIRST_LOOK = 3.0  # deterministic time of the first solve, in the solver's units (see `LOOK`)
+SHOP_LOOK = 5.0  # the same for the model of a shop, which is tried before the general one
 GROWS = 2.0
 
 
 @dataclass(frozen=True)
 class CpSatResult:
-    """What CP-SAT found: "optimal", the cost is proven; "feasible", it lies above the bound; "unknown", nothing found;
-    "impossible", proven that there is nothing.
+    """The sequence that CP-SAT found, and its status: "optimal", "feasible" (its cost lies above the bound), "unknown" (no
+    sequence was found) or "impossible" (proven infeasible).
 
-    cost: of the sequence, as the simulation has it; infinite without one. bound: no sequence costs less. rounded_s: by
-    how much a time of the model differs from the cell's at the most [s]; 0 when all are whole in the model's unit, else
-    what is proven is proven of the rounded times.
+    cost: the simulated cost of the sequence; infinite without one. bound: a lower bound of every sequence's cost. rounded_s: the
+    largest rounding error of a time in the model [s]; 0 when all times are whole in the model's unit, else the bound is proven
+    for the rounded times.
     """
 
     status: Status
@@ -110,11 +111,11 @@ def cp_sat(
 ) -> CpSatResult:
     """The best sequence that CP-SAT finds within the time limit [s], by the cell's own times.
 
-    hint: a complete sequence to begin with (None: `first_come`; empty: nothing). workers: threads; with one, the same seed gives
-    the same result, unless the time limit cuts it off; with several robots six are worth while, even on two cores. Before it
-    begins, the model takes up to half a minute to build. shared: is told what it finds and proves as it comes, and may end it
-    (see `Shared.look`). Raises BadInput for an objective that the cell has no times for, for a time limit that is not above 0,
-    for a hint that cannot be, and for more than MOST_MOVES moves.
+    hint: a complete sequence to begin with (None: `first_come`; empty: none). workers: threads; with one, the same seed gives
+    the same result unless the time limit cuts it off; with several robots six are worth while, even on two cores. Building the
+    model takes up to half a minute. shared: receives incumbents and bounds as they are found, and may end the search (see
+    `Shared.look`). Raises BadInput for an objective that the cell has no times for, a time limit that is not above 0, an
+    infeasible hint, and more than MOST_MOVES moves.
     Source: circuit and interval constraints of OR-Tools CP-SAT.
     """
     check_objective(objective, cell)
@@ -132,7 +133,7 @@ def cp_sat(
 
 
 def _checked(cell: Cell, hint: Sequence[int]) -> Sequence[int]:
-    """The hint; BadInput for one that cannot be."""
+    """The hint; BadInput when it is not a complete sequence of the cell."""
     try:
         if hint:
             simulate(cell, hint)
@@ -152,10 +153,10 @@ def check_no_batches(cell: Cell) -> None:
 
 
 def beside(shared: Shared, time_limit_s: float, seed: int, workers: int) -> None:
-    """As `cp_sat`, beside other methods: it begins with the best order of all, again where another one finds a better one.
+    """Runs `cp_sat` beside other methods: it begins with the best order in `shared`, and anew when another method improves it.
 
-    All that it finds and proves is told to the others as it comes; it ends when they are over, too. Of a cell that is too large
-    for a model it gives a bound only. The time limit holds for all of it [s].
+    Its incumbents and bounds go to `shared` as they are found; it ends when the shared search does. For a cell that is too large
+    for a model it gives a bound only. time_limit_s: of all its solves together [s].
     """
     begin_s, cell, large = perf_counter(), shared.cell, not fits(shared.cell)
     check_no_batches(cell)
@@ -169,7 +170,7 @@ def beside(shared: Shared, time_limit_s: float, seed: int, workers: int) -> None
 
 @dataclass
 class _Asked:
-    """What is asked of the solver. until_s: on the clock `perf_counter`, which begins with the first look."""
+    """One request to the solver. until_s: the deadline on the clock `perf_counter`, set when the first solve begins."""
 
     shared: Shared
     seed: int
@@ -179,16 +180,16 @@ class _Asked:
 
     @property
     def goes_on(self) -> bool:
-        """Whether there is time, and something left to prove."""
+        """Whether time is left and the optimum is not proven yet."""
         return perf_counter() < self.until_s and not self.shared.over.is_set()
 
 
 def _searched(asked: _Asked, known: tuple[int, ...]) -> CpSatResult:
-    """What the solver makes of a cell, beginning with an order; empty: with nothing.
+    """The solver's result for a cell. known: the order to begin with; empty: none.
 
-    Of a shop with robots where no part has a choice of machines the model of a shop is looked at first, then the general one.
-    Measured, on Bilge and Ulusoy's instances with two robots: it proves what is easy in a tenth to a third of the time, of set 7
-    its bounds stay far below the general model's.
+    For a shop with robots where no part may choose between machines, the model of a shop is solved first, then the general one.
+    Measured on Bilge and Ulusoy's instances with two robots: the first proves the easy ones in a tenth to a third of the time; on
+    set 7 its bounds stay far below those of the general model.
     """
     cell, objective, shared = asked.shared.cell, asked.shared.objective, asked.shared
     shop, bound = None if cell.serial else shop_of(cell, objective), 0.0
@@ -219,16 +220,16 @@ def _searched(asked: _Asked, known: tuple[int, ...]) -> CpSatResult:
 
 
 def _tell(shared: Shared, found: CpSatResult) -> None:
-    """What was found; not that there is nothing where somebody has an order, which rounded times may do."""
+    """Tells `shared` the result; "impossible" is withheld where an order is known, since rounded times may have caused it."""
     known = found.status == "impossible" and shared.sequence
     shared.tell(NAME, found.sequence, 0.0 if known else found.bound)
 
 
 def _narrowed(asked: _Asked, model: TransportModel, worth: float) -> CpSatResult:
-    """The shortest makespan: a first look, then only what is shorter than the best so far, until there is nothing.
+    """The shortest makespan: after a first solve, only makespans below the incumbent are searched, until none exists.
 
-    Measured: that there is nothing shorter is proven in a tenth of the time without linear relaxations and with ends that are
-    known; what is short is found, and bounded, better with them. So the two take turns, each time longer.
+    Measured: without linear relaxations and with a known upper bound, infeasibility is proven in a tenth of the time; with the
+    relaxations, short orders are found and bounded better. So the two settings take turns, each time with more time.
     """
     begin_s, most, shared = perf_counter(), FIRST_LOOK, asked.shared
     best = _result(asked, model, worth, {"max_deterministic_time": most})
@@ -253,7 +254,7 @@ def _narrowed(asked: _Asked, model: TransportModel, worth: float) -> CpSatResult
                 best = replace(best, status="optimal", bound=best.cost)
                 break
             best = replace(best, bound=min(best.cost, max(best.bound, found.bound)))
-            if found.status == "feasible":  # no shorter as a run: only the model lets it be
+            if found.status == "feasible":  # shorter in the model only: the simulated run is not
                 return replace(best, wall_s=perf_counter() - begin_s)
             if not asked.goes_on or shared.cost < best.cost - SAME:
                 break
@@ -266,7 +267,7 @@ def _result(
     worth: float,
     more: Mapping[str, object] = MappingProxyType({}),
 ) -> CpSatResult:
-    """What the solver makes of a model that was built with an order of this cost, with more parameters of its own."""
+    """The solver's result for a model. worth: the cost of the order that the model was built with; more: solver parameters."""
     cell, solver = asked.shared.cell, cp_model.CpSolver()
     solver.parameters.max_time_in_seconds = max(0.01, asked.until_s - perf_counter())
     solver.parameters.num_workers = asked.workers
@@ -295,14 +296,14 @@ def _result(
     value = cost(follow(cell, sequence), asked.shared.objective) if sequence else inf
     bound = inf if status == "impossible" else min(value, solver.best_objective_bound * model.worth)
     if status == "optimal" and value > bound + model.blur * model.worth + SAME:
-        status = "feasible"  # where a model lets a part have another room or server than a run does
+        status = "feasible"  # the model may give a part another room or server than a run does
     return CpSatResult(status, value, bound, sequence, solver.wall_time, model.times.rounded_s)
 
 
 def cp_sat_sequencer(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceResult:
-    """CP-SAT as a sequencer: one sequence, by the mean times; it draws nothing from `rng`. It ends after TIME_LIMIT_S.
+    """The best sequence that CP-SAT finds by the mean times within TIME_LIMIT_S; it draws nothing from `rng`.
 
-    Raises WorkFailed where it proves that there is none, and where it finds none in time.
+    Raises WorkFailed when it proves that no sequence exists, and when it finds none in time.
     """
     search.check(cell)
     shared = shared_of(cell, search)
@@ -313,5 +314,5 @@ def cp_sat_sequencer(cell: Cell, search: Search, rng: np.random.Generator) -> Se
 
 
 def fits(cell: Cell) -> bool:
-    """Whether the cell is not too large for a model."""
+    """Whether the cell is small enough for a model (MOST_MOVES)."""
     return possible_tasks(cell) <= MOST_MOVES

@@ -1,6 +1,6 @@
 """The cell as a constraint model for OR-Tools' CP-SAT: the robot's tour through the moves, and time along it.
 
-It shares the cell's positions with the simulation, and nothing else: no states, no order of events.
+It shares only the cell's positions with the simulation, neither states nor the order of events.
 """
 
 from collections.abc import Sequence
@@ -29,7 +29,8 @@ class Task(NamedTuple):
 
 
 class Visit(NamedTuple):
-    """A part's room at a station: whether it comes there, from the begin of the move that brings it to the last drop."""
+    """A part's stay in a station's room, as an optional interval: from the begin of the move that brings it to the drop of the
+    move that takes it, or to the end."""
 
     part: int
     station: int
@@ -39,10 +40,10 @@ class Visit(NamedTuple):
 
 
 class Model:
-    """The variables and constraints. worth: what a unit of the model's objective is in the cell's.
+    """The variables and constraints. Parts are numbered from 0 here.
 
-    blur: by how many units rounding may change a sequence's cost; 0 when no time is rounded. Parts are numbered from 0
-    here.
+    worth: one unit of the model's objective, in the cell's unit. blur: the units by which rounding may change a sequence's cost;
+    0 when no time is rounded.
     """
 
     def __init__(self, cell: Cell, objective: str, hint: Sequence[int]) -> None:
@@ -107,7 +108,7 @@ class Model:
         return self.model.new_int_var(0, self._longest, name)
 
     def _add_part(self, part: int) -> None:
-        """The part's way from its start to an end: one option of each position that it comes to."""
+        """Adds the part's path from its start to an end: one option of each position that it comes to."""
         reached, own = [self.cell.begin_at[part]], list[Task]()
         for place in reached:
             self._come[part, place] = self._moment(f"come {part} {place}")
@@ -129,9 +130,9 @@ class Model:
                 self.model.add(self._taken[part] == task.drop).only_enforce_if(task.done)
 
     def _task(self, part: int, way: Way) -> Task:
-        """A move that begins when what was begun before is finished; if the robot is there earlier, just then.
+        """The optional move of a part: it begins when the part is ready, or when the robot arrives if that is later.
 
-        Where a part may be picked too late it may begin later, and its part be held until it is put down.
+        In a cell with time windows it may also begin later, and the robot may hold the part before it drops it.
         """
         done, begin, waits = self.model.new_bool_var("does"), self._moment("begin"), None
         self.model.add(begin >= self._come[part, way.place]).only_enforce_if(done)
@@ -152,7 +153,7 @@ class Model:
         return Task(part, way, done, begin, drop, waits)
 
     def _ready(self, part: int, way: Way) -> cp_model.LinearExprT | None:
-        """When the part is finished, or has come; None: it always is, when the robot is there."""
+        """When the part is ready to be picked; None: it always is by the time the robot arrives."""
         place, arrivals = way.place, self.cell.arrivals
         begin, begin_s = self.cell.begin_at[part], self.cell.begin_s[part]
         if place == begin and arrivals is not None and place == self.cell.starts[part]:
@@ -189,7 +190,7 @@ class Model:
         done = self._arcs[left, then] = self.model.new_bool_var("follows")
         before, task = self._tasks[left - 1].drop if left else 0, self._tasks[then - 1]
         self.model.add(task.begin >= before + travel).only_enforce_if(done)
-        # No later either, unless it waits: else the solver would find the same tour again and again, a little later.
+        # Unless the robot waits, the move is not later either: else the solver would repeat the same tour a little later.
         at_once = [done] if task.waits is None else [done, ~task.waits]
         if not self.cell.has_windows:
             self.model.add(task.begin <= before + travel).only_enforce_if(*at_once)
@@ -198,9 +199,9 @@ class Model:
         return done
 
     def _add_room(self, station: int) -> list[Visit]:
-        """A station never holds more than it can: a part has its room from when it is begun to be brought.
+        """The visits to a station, constrained to its capacity: a part takes room from the begin of the move that brings it.
 
-        With room for one, the robot also has to get from where it took the part before to where it fetches the next.
+        With capacity 1, the robot must also have time to drive from where it took the last part to where it fetches the next.
         """
         holds, room = self._holds[station], self.cell.capacities[station]
         into = [way for way in self._ways if holds[way.option.to] and not holds[way.place]]
@@ -231,7 +232,7 @@ class Model:
     def _visit(
         self, brings: list[Task], takes: list[Task], inside: bool
     ) -> tuple[cp_model.IntVar, cp_model.IntVar, cp_model.IntVar]:
-        """A visit; `inside`: of a part that begins there, since before all moves, and stays if nothing takes it."""
+        """A visit's presence, begin and end. inside: the part is there before all moves, and stays if no move takes it."""
         here, begin, leave = self.model.new_bool_var("here"), self._moment("from"), self._moment("until")
         if inside:
             begin = self.model.new_constant(-1)
@@ -284,9 +285,9 @@ class Model:
             latest[kind] = part
 
     def _add_precedence(self, number: int) -> None:
-        """As many have ended their step as a part needs that is the so-manyth to begin its own.
+        """Adds a precedence: the k-th part to begin its step waits until as many others have ended theirs as it needs.
 
-        A part that is under way (`before` its step) has a moment at which it begins it, and one at which it has ended it.
+        A part that still has its step ahead has a variable for when it begins the step, and one for when it has ended.
         """
         rule, one, model = self.cell.rules[number], self.cell.precedences[number], self.model
         mine = {part: self._step(part - 1, rule.made) for part in one.parts if part in self.cell.unfinished}
@@ -310,7 +311,7 @@ class Model:
             model.add(ended + sum(done) >= needs)
 
     def _step(self, part: int, made: frozenset[int]) -> tuple[cp_model.IntVar, cp_model.IntVar] | None:
-        """When a part, from 0, begins the move to these positions, and when that has ended; None: it is in one of them."""
+        """When a part (from 0) begins and ends the move to one of these positions; None: it is already in one of them."""
         tasks = [t for t in self._tasks if t.part == part and t.way.option.to in made and t.way.place not in made]
         if not tasks:
             return None
@@ -321,7 +322,7 @@ class Model:
         return begin, end
 
     def _add_objective(self, objective: str) -> float:
-        """What is to be as low as possible; the worth of its unit in the cell's."""
+        """Adds the objective to be minimised; returns the worth of its unit in the cell's unit."""
         model, positions = self.model, self.cell.positions
         busy = sum(self._travels) + sum(self.times.work(task.way.option) * task.done for task in self._tasks)
         model.add(self._end >= busy + sum(self._waits))

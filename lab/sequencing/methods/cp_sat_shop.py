@@ -1,7 +1,7 @@
-"""A shop as a constraint model: an operation has one begin, whichever machine it takes; robots go from trip to trip.
+"""A constraint model of job shops: an operation has one begin, whichever machine it takes, and robots go from trip to trip.
 
-It knows cells whose machines have servers, room for all, and no setups, windows or rules: the field's job shops and flexible job
-shops, without robots or with alike ones. Where a part may take one of several machines it is much smaller than that of
+It fits cells whose machines have servers, unlimited room, and no setups, time windows or precedences: job shops and flexible job
+shops, without robots or with identical ones. Where parts may choose between machines it is much smaller than the model of
 `cp_sat_transport`, whose tasks are pairs of a place and the next one.
 """
 
@@ -21,10 +21,10 @@ from lab.sequencing.simulate.follow import follow
 
 
 class Step(NamedTuple):
-    """How a part gets from one stop to the next: by a robot, if it has to go, and by a server, if it is worked on there.
+    """A part's step from one stop to the next: a robot's trip, if the machine is another one, and a server's work there.
 
-    A stop is a position where a part begins, has been worked on, or is finished. trip: the ways of the robots, one each; none:
-    it stays where it is. work: the server's way; None: the stop is the end of a route.
+    A stop is a position where a part begins, has been worked on, or is finished. trip: one option for each robot; empty: the part
+    stays where it is. work: the server's option; None: the stop is the end of a route.
     """
 
     to: int
@@ -33,7 +33,8 @@ class Step(NamedTuple):
 
 
 class Shop(NamedTuple):
-    """What the parts of a cell may do. steps: from each stop; layers: of each part, the stops that it may come to, in turn."""
+    """The steps that the parts of a cell may take. steps: by stop; layers: for each part, the sets of stops that it may reach
+    after 0, 1, ... operations."""
 
     steps: Mapping[int, tuple[Step, ...]]
     layers: tuple[tuple[tuple[int, ...], ...], ...]
@@ -45,7 +46,7 @@ class Shop(NamedTuple):
 
 
 def shop_of(cell: Cell, objective: str) -> Shop | None:
-    """The cell as a shop; None: it is more than one, or is judged by what a shop does not know."""
+    """The cell as a shop; None: it has features that a shop has not, or the objective does not fit one."""
     alike = len(teams_of(cell)) <= 1 and len({robot.start for robot in cell.robots}) <= 1
     begun = cell.begin_at != cell.starts
     more = cell.rules or cell.has_windows or cell.track or cell.arrivals or begun or any(cell.setups)
@@ -77,7 +78,7 @@ def _rooms(cell: Cell) -> list[int]:
 
 
 def _steps(cell: Cell, stop: int) -> tuple[Step, ...] | None:
-    """The steps from a stop; None: one of its ways is none that a shop has."""
+    """The steps from a stop; None: one of its options does not occur in a shop."""
     found, trips = list[Step](), defaultdict[tuple[int, int], list[Option]](list)
     for way in cell.positions[stop].options:
         if way.if_full is not None or way.carries == "pallet":
@@ -95,7 +96,7 @@ def _steps(cell: Cell, stop: int) -> tuple[Step, ...] | None:
 
 
 class _Operation(NamedTuple):
-    """A part's way from one layer to the next. takes: whether it takes a step from a stop; at: whether it comes to a stop."""
+    """A part's operation from one layer to the next. takes: a literal by stop and step; at: a literal by the stop reached."""
 
     part: int
     takes: dict[tuple[int, Step], cp_model.IntVar]
@@ -105,14 +106,13 @@ class _Operation(NamedTuple):
     end: cp_model.IntVar
 
     def trips(self) -> dict[Step, cp_model.IntVar]:
-        """The steps for which a robot goes, each once, for a step says where it begins."""
+        """The literal of each step that needs a robot."""
         return {step: taken for (_, step), taken in self.takes.items() if step.trip}
 
 
 class ShopModel:
-    """The variables and constraints. worth: what a unit of the model's objective is in the cell's; blur: by how many units
-    rounding may change a sequence's cost. parameters: of the solver, with which it was measured to be fastest.
-    """
+    """The variables and constraints. worth, blur: as in `cp_sat_model.Model`. parameters: the solver parameters that were
+    measured to be fastest for it."""
 
     parameters = MappingProxyType({"linearization_level": 0})
 
@@ -137,7 +137,7 @@ class ShopModel:
         return self.model.new_int_var(0, self._horizon, "")
 
     def _add_part(self, part: int) -> cp_model.LinearExprT:
-        """The operations of a part, one after the other; when it is finished."""
+        """Adds the operations of a part, one after the other; returns when it is finished."""
         model, times = self.model, self.times
         layers, free = self._shop.layers[part], cp_model.LinearExpr.sum([times.whole(self.cell.begin_s[part])])
         at = {layers[0][0]: model.new_constant(1)}
@@ -216,7 +216,7 @@ class ShopModel:
         model.add(robots * self._end >= sum(spent))
 
     def _add_objective(self, objective: str, ends: Sequence[cp_model.LinearExprT]) -> float:
-        """What is to be as low as possible; the worth of its unit in the cell's."""
+        """Adds the objective to be minimised; returns the worth of its unit in the cell's unit."""
         due = [self.times.whole(due_s) for due_s in self.cell.due_s or ()]
         if objective == MAKESPAN:
             self.model.minimize(self._end)
@@ -235,7 +235,7 @@ class ShopModel:
         return 1.0 / self.times.per_s
 
     def sequence(self, solver: Solution) -> tuple[int, ...]:
-        """The decisions of the solution: the parts' own ones in their order, else those that begin earlier first."""
+        """The decisions of the solution by their begins; those of one part stay in their order."""
         robot, after = dict[int, int](), {a: b for (a, b), arc in self._arcs.items() if a and solver.boolean_value(arc)}
         firsts = [number for (a, number), arc in self._arcs.items() if not a and solver.boolean_value(arc)]
         for own, number in enumerate(firsts):

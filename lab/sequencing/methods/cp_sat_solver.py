@@ -1,4 +1,4 @@
-"""CP-SAT in a thread of its own, stopped by Ctrl-C and by what other methods find meanwhile."""
+"""OR-Tools' `cp_model`, loaded without pandas, and CP-SAT in a thread of its own that Ctrl-C and other methods can stop."""
 
 import sys
 from collections.abc import Callable
@@ -16,9 +16,10 @@ AT_ONCE = ("Index", "Series")  # what `cp_model` looks up in pandas while it is 
 
 
 class LazyPandas(ModuleType):
-    """Stands for pandas while `cp_model` is loaded, and in it from then on: what is looked up in it is looked up in pandas.
+    """A stand-in for pandas inside `cp_model`, which loads pandas when an attribute of it is first needed.
 
-    What `cp_model` looks up at once is dropped afterwards, so that a method that takes a series meets the true classes.
+    The attributes that `cp_model` looks up while it is loaded are dropped afterwards, so that a method that takes a series meets
+    the true classes.
     """
 
     def __getattr__(self, name: str) -> Any:
@@ -31,7 +32,7 @@ class LazyPandas(ModuleType):
 
 
 def _without_pandas() -> ModuleType:
-    """`cp_model`. `sys.modules` is left as if nobody had asked for pandas."""
+    """The module `cp_model`, loaded without pandas; `sys.modules` is left as if nobody had asked for pandas."""
     import numpy  # noqa: F401  # first, as the helper is, so that the stand-in is there for a moment only
     from ortools.sat.python import cp_model_helper  # noqa: F401
 
@@ -54,10 +55,10 @@ else:
     cp_model = _without_pandas()
 
 
-# ---- cp sat solver ----------------------------------------------------------------------------------------------------
+# ---- The solver in its thread -----------------------------------------------------------------------------------------
 
 
-PATIENCE_S = 5.0  # so long it looks at least before it begins again with another method's better order
+PATIENCE_S = 5.0  # the least time of a solve before it begins again with another method's better order
 WAIT_S = 0.05
 
 Status = Literal["optimal", "feasible", "unknown", "impossible"]
@@ -74,7 +75,8 @@ Solution = cp_model.CpSolver | cp_model.CpSolverSolutionCallback  # where the va
 
 
 class _Listener(cp_model.CpSolverSolutionCallback):
-    """Hands each better solution and bound on, in the solver's own thread, where an error would end the process: it is kept."""
+    """Passes each better solution and bound on. It runs in the solver's thread, where an error would end the process, so an
+    error is kept for the caller."""
 
     def __init__(self, hear: Callable[[Solution], None], hear_bound: Callable[[float], None]) -> None:
         super().__init__()
@@ -104,10 +106,10 @@ def solved(
     hear: Callable[[Solution], None],
     hear_bound: Callable[[float], None],
 ) -> Status:
-    """What the solver makes of a model that was built with an order of a known cost; it hands on what it finds and proves.
+    """The solver's status for a model. known: the cost of the order that the model was built with.
 
-    It is stopped by Ctrl-C, which it would not hear itself, when all is over or at a limit (see `Shared.look`), and when there is
-    a better order to begin with.
+    Solutions are passed to `hear` and bounds to `hear_bound`. The solver is stopped by Ctrl-C, which it would not notice itself,
+    when the shared search ends or reaches a limit (see `Shared.look`), and when another method has a better order to begin with.
     """
     listener = _Listener(hear, hear_bound)
     solver.parameters.catch_sigint_signal = False

@@ -1,4 +1,4 @@
-"""What robots and servers do with each part, as tasks of a constraint model: when each may happen, and when a part is ready."""
+"""The optional tasks of robots and servers in a constraint model, when each may begin, and the room that parts take."""
 
 from collections import defaultdict
 from collections.abc import Sequence
@@ -12,22 +12,22 @@ from lab.sequencing.methods.cp_sat_times import Times
 
 
 class Team(NamedTuple):
-    """Robots, by index, that are alike in how fast they are and what they serve; they may start in different places."""
+    """Robots (by index) of equal speed that serve the same stations; they may start at different ones."""
 
     robots: tuple[int, ...]
 
     def able(self, option: Option) -> bool:
-        """Whether it is the way of one of them."""
+        """Whether the option is one of theirs."""
         return option.robot in self.robots
 
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """What is done with a part at a position: a team's robot carries it on, or a server of a station works on it.
+    """A task with a part at a position: a robot of a team carries it on, or a server of a station works on it.
 
-    options: one for each robot of the team. begin: the service before the pick, or the server's work. left: when the part
-    leaves its place. end: when it is dropped, or finished. rank, put: the places of its begin and end in the order of all that
-    happens; None: any that fits times.
+    options: one for each robot of the team. begin: when the service before the pick, or the server's work, begins. left: when the
+    part leaves its place. end: when it is dropped, or its work is done. rank, put: the ranks of begin and end among all events;
+    None: only times order them.
     """
 
     part: int
@@ -47,10 +47,10 @@ class Task:
 
 
 class Least:
-    """The least times of a cell's positions, in units.
+    """Least times by position, in units.
 
-    stay: from when a part comes until it may go on. head: from the start of its routes until it comes; tail: from when it
-    comes until it is finished.
+    stay: from a part's arrival there until it may leave. head: from the start of its routes until it arrives. tail: from its
+    arrival until it is finished.
     """
 
     def __init__(self, cell: Cell, times: Times) -> None:
@@ -64,15 +64,15 @@ class Least:
         self._ahead = from_the_ends(cell.positions, self._from)
 
     def takes(self, option: Option) -> int:
-        """What a way takes: service and carrying, or the server's work."""
+        """The duration of an option: service and carrying, or the server's work."""
         return self._times.processing(option.to) if option.robot == SERVER else self._times.work(option)
 
     def between(self, place: int, later: int) -> int | None:
-        """From when a part comes to a place until it comes to a later one; None: it never does."""
+        """The least time from a part's arrival at a position to its arrival at a later one; None: it never gets there."""
         return self._ahead[place].get(later)
 
     def by_servers(self, place: int) -> set[int]:
-        """Where a part in a place may come to without a robot, the place among them."""
+        """The positions that a part may reach from a position without a robot, that position included."""
         found = [place]
         for at in found:
             found += [way.to for way in self._cell.positions[at].options if way.robot == SERVER]
@@ -93,7 +93,7 @@ class Least:
 
 
 def teams_of(cell: Cell) -> list[Team]:
-    """The robots, alike ones together."""
+    """The cell's robots, grouped into teams of identical ones."""
     alike = defaultdict[object, list[int]](list)
     for number, robot in enumerate(cell.robots):
         alike[robot.speed, robot.serves].append(number)
@@ -112,12 +112,12 @@ Follows = tuple[Task, Task, tuple[cp_model.LiteralT, ...]]
 
 
 class Tasks:
-    """The tasks of all parts: each part takes one way from its begin to an end, and each task begins when it may.
+    """The tasks of all parts: each part takes one path from its begin to an end, and each task begins when its part is ready.
 
-    Parts are numbered from 0 here. ranked: whether the order of what happens has to be known, not only times. blocking: stations
-    that may be full. follows: see `after`.
-    frees: a task that frees room for another one, which a list may have in either order where another robot frees it. brings: a
-    task after another one to the same room. Both if all of their literals hold.
+    Parts are numbered from 0 here. ranked: whether the order of events must be known, not only their times. blocking: the
+    stations that may be full. follows: precedences between tasks in the list of decisions, see `after`. frees: pairs of tasks of
+    which the first frees room for the second; where another robot frees it, the list may have them in either order. brings: pairs
+    of tasks that bring parts to the same room, one after the other. Each pair holds if all of its literals do.
     """
 
     def __init__(self, cell: Cell, model: cp_model.CpModel, times: Times, horizon: int) -> None:
@@ -143,9 +143,9 @@ class Tasks:
         return self.model.new_int_var(0, self.horizon, name)
 
     def after(self, task: Task, before: Task, *when: cp_model.LiteralT, begun: bool = False) -> None:
-        """A task stands after another one in the list of decisions, and begins after its end, if all of these hold.
+        """Puts a task after another one in the list of decisions, and its begin after the other's end, if all literals hold.
 
-        begun: it only begins after its begin.
+        begun: the task need only begin after the other's begin.
         """
         self.follows.append((before, task, when))
         passed = before.rank if begun else before.put
@@ -161,7 +161,7 @@ class Tasks:
         cell, start = self.cell, self.cell.begin_at[part]
         reached, into = [start], defaultdict[int, list[Task]](list)
         self._ready[part, start] = self._first_ready(part)
-        left = defaultdict[int, int](int)  # ways into a place that are not tasks yet
+        left = defaultdict[int, int](int)  # options into a position that have no task yet
         for place in self._ahead[start]:
             for way in cell.positions[place].options:
                 left[way.to] += 1
@@ -183,7 +183,7 @@ class Tasks:
                     reached.append(task.option.to)
 
     def _ready_at(self, part: int, place: int, into: Sequence[Task]) -> cp_model.LinearExprT:
-        """When a part may go on from a place that these bring it to."""
+        """When a part may leave the position that the tasks `into` bring it to."""
 
         def ready(task: Task) -> cp_model.LinearExprT:
             if self.cell.positions[place].processing_s is None:
@@ -262,14 +262,14 @@ def _same(option: Option) -> tuple[int, int]:
     return option.target, option.to
 
 
-# ---- cp sat rooms -----------------------------------------------------------------------------------------------------
+# ---- Room at stations -------------------------------------------------------------------------------------------------
 
 
 Nodes = Sequence[tuple[int, int, cp_model.LiteralT]]
 
 
 class Visit(NamedTuple):
-    """A part's room at a station: who brings it there (None: it begins there), and who may take it away."""
+    """A part's visit to a station: the task that brings it (None: it begins there) and the tasks that may take it away."""
 
     part: int
     bring: Task | None
@@ -277,18 +277,18 @@ class Visit(NamedTuple):
 
 
 def add_chains(model: cp_model.CpModel, nodes: Nodes, most: int, chains: int) -> None:
-    """Nodes 1 to `most` stand in chains from 0 to 0, so many at the most; a node with an arc to itself may be left out."""
+    """Puts the nodes 1 to `most` into at most `chains` chains from node 0 to node 0; a node with a loop may be left out."""
     if not most:
         return
     sure = model.new_constant(1)
-    # A chain through nothing: all others may be empty then.
+    # An empty chain, so that no node has to be in a chain.
     nodes = [*nodes, (0, most + 1, sure), (most + 1, 0, sure)]
     model.add_multiple_circuit(nodes)
     model.add(sum(arc for left, _, arc in nodes if not left) <= chains + 1)
 
 
 def add_rooms(tasks: Tasks) -> None:
-    """No station ever holds more than it can, and buffers are used where they may be."""
+    """Adds the capacities of stations, and the rule that a buffer is used only when the station ahead is full."""
     for station in tasks.blocking:
         _add_room(tasks, station, _visits(tasks, station))
     for task in tasks.all:
@@ -297,7 +297,7 @@ def add_rooms(tasks: Tasks) -> None:
 
 
 def _visits(tasks: Tasks, station: int) -> list[Visit]:
-    """Every visit of a part to a station, of which each has takes of its own: a route may lead to it more than once."""
+    """Every visit of a part to a station; a route may lead to it more than once, and each visit has its own leaving tasks."""
     positions, found = tasks.cell.positions, list[Visit]()
     holds = [station in place.holds for place in positions]
 
@@ -319,7 +319,7 @@ def _visits(tasks: Tasks, station: int) -> list[Visit]:
 
 
 def _add_room(tasks: Tasks, station: int, visits: Sequence[Visit]) -> None:
-    """Each place has one part after the other: the next is dropped when the one before was taken out."""
+    """Gives each place of a station to one part after the other: the next is dropped after the one before was taken out."""
     model, nodes = tasks.model, list[tuple[int, int, cp_model.LiteralT]]()
     for number, visit in enumerate(visits, 1):
         nodes += [(0, number, model.new_bool_var("first")), (number, 0, model.new_bool_var("last"))]
@@ -341,7 +341,7 @@ def _add_room(tasks: Tasks, station: int, visits: Sequence[Visit]) -> None:
 
 
 def _add_full(tasks: Tasks, task: Task, station: int) -> None:
-    """A buffer is used only when the station ahead is full, or will be by what is on its way there, where the cell says so."""
+    """Allows a task into a buffer only when the station ahead is full, counting parts that are on their way there."""
     model, inside = tasks.model, list[cp_model.IntVar]()
     for visit in _visits(tasks, station):
         if visit.part == task.part:

@@ -1,4 +1,4 @@
-"""The times of a cell as whole numbers, as CP-SAT wants them."""
+"""The times of a cell, and of a sequence of it, as integers, which CP-SAT requires."""
 
 from collections.abc import Sequence
 from itertools import accumulate
@@ -14,15 +14,15 @@ from lab.sequencing.simulate.follow import steps
 from lab.sequencing.simulate.run import Run
 
 UNITS_PER_S = (1.0, 10.0, 100.0, 1e3, 1e4, 1e5, 1e6)
-MOST_UNITS = 1e12  # no time above it, in units: sums of many then stay exact
-_SAME = 1e-12  # of the longest time: what two floats that are equal may differ by
+MOST_UNITS = 1e12  # the longest time in units, so that sums of many times stay exact
+_SAME = 1e-12  # relative tolerance, of the longest time, within which two floats count as equal
 
 
 class Times:
-    """The cell's times in whole units: the largest unit in which they all are whole, else the smallest.
+    """The cell's times in whole units: the largest unit in which all of them are integers, else the smallest unit.
 
-    shortest: what a carried move takes at the least. rounded_s: by how much a time is changed at the most [s]; 0 when all are
-    whole.
+    shortest: the least duration of a carried move, in units. rounded_s: the largest rounding error [s]; 0 when all times are
+    integers.
     """
 
     def __init__(self, cell: Cell, shortest: int = 1) -> None:
@@ -48,7 +48,7 @@ class Times:
         fine = [per_s for per_s in UNITS_PER_S if longest_s * per_s <= MOST_UNITS] or [MOST_UNITS / longest_s]
         fit = [per_s for per_s in fine if _off_s(given, per_s) <= _SAME * longest_s and least_s * per_s > 0.5]
         self.per_s = fit[0] if fit else fine[-1]
-        # A carried move that takes no time is given a unit, see `work`.
+        # A carried move that takes no time lasts one unit in the model, see `work`.
         added_s = 1.0 / self.per_s if least_s == 0 else 0.0
         self.rounded_s = 0.0 if fit else max(_off_s(given, self.per_s), added_s)
 
@@ -62,23 +62,23 @@ class Times:
         return 0 if origin == target else self.whole(float(self._cell.empty_s[origin, target]) / speed)
 
     def known(self, origin: int, target: int) -> bool:
-        """Whether there is an empty way; there is one wherever a robot may have to go."""
+        """Whether the cell has a time for the empty drive; it has one for every drive that may be needed."""
         return origin == target or not np.isnan(self._cell.empty_s[origin, target])
 
     def work(self, option: Option) -> int:
-        """Service and carrying; where the order of moves is the order of their times, at least a unit."""
+        """The duration of service and carrying, in units; the carrying takes at least `shortest`."""
         return self.whole(option.service_s) + max(self._shortest, self.whole(self._carry_s(option)))
 
     def _carry_s(self, option: Option) -> float:
         return float(self._cell.loaded_s[option.origin, option.target]) / self._cell.robots[option.robot].speed
 
     def processing(self, place: int) -> int:
-        """What begins in a position."""
+        """The processing time that begins in a position, in units."""
         return self.whole(self._cell.positions[place].processing_s or 0.0)
 
 
 class Timed(NamedTuple):
-    """A move of a sequence in units: its part from 0, its way, when it begins, its waiting over, and when it drops."""
+    """A move of a sequence: the part (from 0), its option, when it begins after any wait, and when it drops [units]."""
 
     part: int
     way: Way
@@ -87,7 +87,7 @@ class Timed(NamedTuple):
 
 
 def timed(cell: Cell, times: Times, ways: Sequence[Way], sequence: Sequence[int]) -> list[Timed]:
-    """A sequence with the model's times."""
+    """The moves of a sequence with the model's integer times."""
     run, moves, now = Run(cell), list[Timed](), 0
     ready, coming = [times.whole(seconds) for seconds in cell.begin_s], [part - 1 for part in cell.coming]
     intervals = [times.whole(seconds) for seconds in cell.arrivals.interval_s] if cell.arrivals else [0] * cell.parts
@@ -113,7 +113,7 @@ def timed(cell: Cell, times: Times, ways: Sequence[Way], sequence: Sequence[int]
 
 
 def longest(cell: Cell, times: Times, ways: Sequence[Way]) -> int:
-    """No sequence takes longer than this many units, if the robot never waits without need."""
+    """An upper bound of every makespan in units, if the robot never waits without need."""
     travel = max((times.travel(a, b) for a, b in np.argwhere(~np.isnan(cell.empty_s)).tolist()), default=0)
 
     def longest_from(place: int, ahead: list[int]) -> int:

@@ -7,10 +7,10 @@ from lab.sequencing.methods.cp_sat_tasks import Tasks
 
 
 class Track:
-    """The ways that robots may drive on a cell's track, as optional intervals on its stretches.
+    """The drives that robots may make on a cell's track, as optional intervals on its stretches.
 
-    A way may begin whenever its stretches are free: a `Run` gives them out in the order of the decisions, so that no list may
-    come to what is best here.
+    A drive may begin whenever its stretches are free. A `Run` gives stretches out in the order of the decisions, so the model's
+    optimum may be below what any sequence reaches.
     """
 
     def __init__(self, tasks: Tasks) -> None:
@@ -25,7 +25,7 @@ class Track:
         by: cp_model.LinearExprT,
         done: cp_model.LiteralT,
     ) -> None:
-        """A robot that is free from a time on drives from a station to another, to be there by a time, if that is done."""
+        """Adds a robot's drive between two stations, if `done`: it begins at `free` or later and arrives at `by` or earlier."""
         cell, times, model = self._tasks.cell, self._tasks.times, self._tasks.model
         if not cell.ways[ends]:
             return
@@ -38,6 +38,6 @@ class Track:
             self._held[held.stretch].append(span)
 
     def close(self) -> None:
-        """No two are on a stretch at a time."""
+        """Adds a no-overlap constraint for each stretch, once all drives were added."""
         for spans in self._held.values():
             self._tasks.model.add_no_overlap(spans)

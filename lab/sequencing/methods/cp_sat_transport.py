@@ -1,7 +1,6 @@
 """A cell with several robots, or machines with servers, as a constraint model: a tour for each team, a chain for each server.
 
-It shares the cell's positions with the simulation, and nothing else. The old model of one robot (`cp_sat_model`) proves more of
-the cells that it knows.
+It shares only the cell's positions with the simulation. For cells of one robot the model `cp_sat_model` proves more.
 """
 
 from collections import Counter
@@ -26,9 +25,9 @@ Arcs = dict[tuple[int, int], cp_model.IntVar]
 
 
 class Tours(NamedTuple):
-    """What a team does. arcs: from task to task, numbered from 1; 0 is the begin and the end of every tour.
+    """The tours of a team. arcs: literals from task to task, numbered from 1; 0 is the begin and the end of every tour.
 
-    firsts: by where robots start, a station's index, and the first task; empty where all of the team start in one place.
+    firsts: literals by start station (index) and first task; empty where all robots of the team start at one station.
     """
 
     team: Team
@@ -38,13 +37,13 @@ class Tours(NamedTuple):
 
 
 class TransportModel:
-    """The variables and constraints. worth: what a unit of the model's objective is in the cell's.
+    """The variables and constraints. worth, blur: as in `cp_sat_model.Model`.
 
-    below: only makespans shorter than the hint's are looked for. free: robots are wherever they are wanted, rooms are never
-    full, setups take no time: a small model, for a bound and an order to begin with. blur: by how many units rounding may
-    change a sequence's cost; 0 when no time is rounded. Every plan is one of the model's, whatever list says it:
-    where a station has room for several parts, or several servers, any of them may be taken, and robots and servers wait, and
-    hold parts, as long as they like. A `Run` takes the first: what is proven is a bound, and an optimum where a run comes to it.
+    below: only makespans shorter than the hint's are searched. free: a small relaxed model, for a bound and an order to begin
+    with, in which robots are always at hand, stations are never full, and setups take no time. The model admits more plans than
+    a `Run` does: any place or server of a station may be taken, and robots and servers may wait and hold parts as long as they
+    like, while a `Run` takes the place or server that is free first. So the solver proves a bound, and an optimum where a run
+    reaches it.
     """
 
     def __init__(
@@ -84,11 +83,11 @@ class TransportModel:
         self._suggest(known)
 
     def sequence(self, solver: Solution) -> tuple[int, ...]:
-        """The decisions of the solution: each after all that it waits for, else in the order of their begins; empty: none work.
+        """The decisions of the solution in the order of their begins, each after all that it depends on; empty: no order works.
 
-        Where several robots make room for each other, also in the order of their picks, and on a track, which a `Run` gives out
-        in the order of decisions, also in that of their ends; the cheapest. A decision that may not be taken yet, since a robot
-        holds something for longer than it has to, is taken as soon as it may.
+        On a track, whose stretches a `Run` gives out in the order of decisions, the order of their ends is tried as well; where
+        several robots make room for each other, so is the order of their picks. The cheapest order is returned. A decision that
+        is not allowed yet, because a robot holds a part longer than it must, is taken as soon as it is allowed.
         """
         value, tasks = solver.value, self.tasks
         found = [self._in_order(solver, tasks.frees, lambda task: (value(task.begin), value(task.end)))]
@@ -101,12 +100,12 @@ class TransportModel:
 
     @staticmethod
     def _picked(solver: Solution) -> Callable[[Task], tuple[int, int]]:
-        """When a part leaves its place."""
+        """The sort key of a task by when its part leaves its place."""
         value = solver.value
         return lambda task: (value(task.begin if task.option.robot == SERVER else task.left), value(task.end))
 
     def _carried_out(self, order: tuple[int, ...]) -> tuple[tuple[int, ...], float]:
-        """The decisions in an order in which they may be taken, and what they cost; endless where they get stuck."""
+        """The decisions, reordered so that each is allowed, and their cost; () and inf when they end in a deadlock."""
         run, left, found = Windowless(self.cell), list(order), list[int]()
         while left:
             tried = set[int]()
@@ -126,7 +125,7 @@ class TransportModel:
     def _in_order(
         self, solver: Solution, more: Sequence[Follows], when: Callable[[Task], tuple[int, int]]
     ) -> tuple[int, ...]:
-        """The decisions by a time, as far as they may follow one another so; empty: some would wait for one another."""
+        """The decisions sorted by `when` within the precedences `follows` and `more`; empty: these contain a cycle."""
         number = {task: n for n, task in enumerate(self.tasks.all) if solver.boolean_value(task.done)}
         robot = dict[Task, int]()
         for team, tasks, arcs, firsts in self._tours:
@@ -155,7 +154,7 @@ class TransportModel:
         return tuple(found)
 
     def moves(self, solver: Solution) -> list[tuple[int, int, int]]:
-        """The tasks that are done in the order of their times, each as its part from 0, where it is, and where to it comes."""
+        """The tasks of the solution by time, each as part (from 0), position and next position."""
         done = [task for task in self.tasks.all if solver.boolean_value(task.done)]
         done.sort(key=lambda task: (solver.value(task.begin), solver.value(task.end), task.part))
         return [(task.part, task.place, task.option.to) for task in done]
@@ -191,7 +190,7 @@ class TransportModel:
             self.model.add_hint(variable, value)
 
     def _add_team(self, team: Team, objective: str) -> None:
-        """The tours of alike robots: as many at the most as there are, through all that one of them does."""
+        """Adds the tours of a team of identical robots: at most one for each robot, through all tasks of the team."""
         tasks = [task for task in self.tasks.all if task.option.robot in team.robots]
         least, robots, alone = self.tasks.least, len(team.robots), len(self.cell.robots) == 1
         starts = Counter(self._start(robot) for robot in team.robots)
@@ -245,7 +244,7 @@ class TransportModel:
         return self.cell.index(self.cell.robots[robot].start)
 
     def _gap(self, task: Task, then: Task, alone: bool) -> int | None:
-        """What passes at least between two tasks of a robot because of the part itself; None: they cannot follow each other."""
+        """The least time between two tasks of a robot that the part itself requires; None: they cannot follow each other."""
         if task.part != then.part:
             return 0
         least, to = self.tasks.least, task.option.to
@@ -255,7 +254,7 @@ class TransportModel:
         return gap + (least.stay[then.place] if then.option.waits else 0)
 
     def _last(self, tasks: Sequence[Task], arcs: Arcs) -> list[cp_model.LinearExprT]:
-        """When each robot has done all: the end of its last task, 0 where it has none."""
+        """When each robot has done all its tasks: the end of its last one, 0 where it has none."""
         ends = list[cp_model.LinearExprT]()
         for number, task in enumerate(tasks, 1):
             if (number, 0) in arcs:
@@ -265,7 +264,7 @@ class TransportModel:
         return ends
 
     def _arc(self, arcs: Arcs, left: int, then: int, before: Task | None, task: Task, gap: int) -> cp_model.IntVar:
-        """One task after another one, or after the begin, of the same robot or server."""
+        """The literal that a robot or server does one task right after another, or as its first, at least `gap` later."""
         done = arcs[left, then] = self.model.new_bool_var("follows")
         free = gap if before is None else before.end + gap
         self.model.add(task.begin >= free).only_enforce_if(done)
@@ -274,7 +273,7 @@ class TransportModel:
         return done
 
     def _chain(self, tasks: Sequence[Task], arcs: Arcs, chains: int) -> None:
-        """Every task that is done is in one chain of these arcs; there are so many chains at the most."""
+        """Puts every task that is done into one of at most `chains` chains of these arcs."""
         nodes: list[tuple[int, int, cp_model.LiteralT]] = [(left, then, arc) for (left, then), arc in arcs.items()]
         nodes += [(number, number, ~task.done) for number, task in enumerate(tasks, 1)]
         add_chains(self.model, nodes, len(tasks), chains)
@@ -332,7 +331,7 @@ class TransportModel:
             latest[kind] = part
 
     def _add_objective(self, objective: str) -> float:
-        """What is to be as low as possible; the worth of its unit in the cell's."""
+        """Adds the objective to be minimised; returns the worth of its unit in the cell's unit."""
         if objective == MAKESPAN:
             self.model.minimize(self._end)
         elif objective == "robot-idle":
@@ -361,7 +360,7 @@ class TransportModel:
 
 
 def _routes(solver: Solution, arcs: Arcs) -> list[list[int]]:
-    """The nodes of each tour, the begin left out."""
+    """The nodes of each tour without node 0."""
     taken = [pair for pair, arc in arcs.items() if solver.boolean_value(arc)]
     after, found = {left: then for left, then in taken if left}, list[list[int]]()
     for _, node in (pair for pair in taken if not pair[0]):

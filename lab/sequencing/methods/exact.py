@@ -1,4 +1,4 @@
-"""The proven optimum of a cell: best-first search over its decision states, with alike parts merged."""
+"""The proven optimum of a cell: the values of all its states for an advisor, and best-first search with alike parts merged."""
 
 import heapq
 from dataclasses import dataclass
@@ -29,9 +29,9 @@ MOST_PARTS = 40  # each adds to the depth of the search
 
 
 class ExactValues:
-    """The least time [s] that a cell still needs after each decision, by all ways on, each state looked at once.
+    """The least time [s] that a cell still needs after each decision, by exhaustive search that visits each state once.
 
-    Raises BadInput for more than MOST_PARTS parts or MOST_STATES states: fewer parts are wanted then.
+    Raises BadInput for more than MOST_PARTS parts or MOST_STATES states.
     """
 
     def __init__(self, cell: Cell) -> None:
@@ -63,13 +63,13 @@ class ExactValues:
         return self._left[key]
 
 
-# ---- exact ------------------------------------------------------------------------------------------------------------
+# ---- Best-first search and the method `exact` -------------------------------------------------------------------------
 
 
 MAX_EXPANDED = 300_000
-ROUND = 500  # states opened between two looks at limits and the listener
-STRAIGHT = 5  # of so many states opened, one is on the way straight on to an order
-MOST_KEPT = 20_000_000  # numbers in all states that were reached, half a gigabyte; only large cells come near
+ROUND = 500  # states expanded between two checks of the limits
+STRAIGHT = 5  # one of so many expanded states is spent on a greedy descent to a complete order
+MOST_KEPT = 20_000_000  # integers in all states that were reached: half a gigabyte, which only large cells come near
 
 
 @dataclass(frozen=True)
@@ -97,12 +97,12 @@ class Optimum:
 
 
 class _Search:
-    """The states that are queued and those that were reached; `expanded`: how many were opened; `kept`: numbers in all."""
+    """The queue and the reached states. expanded: how many states were expanded; kept: how many integers all of them hold."""
 
     def __init__(self, cell: Cell) -> None:
         self.merged = WindowedCell(cell) if cell.has_windows else MergedCell(cell)
         self._least = LowerBound(self.merged)
-        # What the clock brings is no wait: it comes anyway.
+        # Arrivals by the clock are left out of the comparison: they are the same in all states.
         self._waits = len(self.merged.slots) + self.merged.one_by_one
         self.expanded = self.bound = self._serial = self.kept = self._straight = 0
         self._fronts: dict[tuple[int, int], list[tuple[int, ...]]] = {}
@@ -116,8 +116,10 @@ class _Search:
         return not self._heap
 
     def run(self, most: int, shared: Shared | None = None) -> MergedState | None:
-        """The first complete state; None: when `most` states were opened in all, or all that there are or is room for, there was
-        none. Shared: is told the bound, and orders found by going straight on from where the search stands."""
+        """The first complete state; None: none was found among `most` expanded states, among all, or within the memory limit.
+
+        shared: receives the bound, and orders found by greedy descent from the state reached.
+        """
         while self._heap:
             bound, serial, state = heapq.heappop(self._heap)
             if self._times(state) not in self._fronts[state.counts, state.robot]:
@@ -136,14 +138,14 @@ class _Search:
         return None
 
     def _report(self, shared: Shared, state: MergedState) -> None:
-        """Tell the bound, and now and then an order, and look at the limits."""
+        """Tells `shared` the bound, and now and then an order, and checks the limits."""
         if not self._greedy:
             order = self._straight_on(state) if self.expanded > STRAIGHT * self._straight else ()
             shared.tell("A*", order, self.bound / TICKS_PER_S)
         shared.look()
 
     def _straight_on(self, state: MergedState) -> tuple[int, ...]:
-        """The decisions of an order that goes on from a state by the least bound, move after move; empty: it gets stuck."""
+        """The decisions of a greedy descent from a state, each to the successor of least bound; empty: it ends in a deadlock."""
         while not self.merged.done(state):
             ahead = [(one.now + self._least.left(one), n, one) for n, one in enumerate(self.merged.successors(state))]
             self._straight += 1
@@ -153,15 +155,15 @@ class _Search:
         return self.merged.decisions(state)
 
     def hasten(self) -> None:
-        """From now on open what has the least left to do first: any end will do."""
+        """Switches to greedy best-first search by the time left alone: from now on any complete state will do."""
         self._greedy, self.most_kept = True, 2 * self.most_kept
         self._heap = [(self._least.left(state), serial, state) for _, serial, state in self._heap]
         heapq.heapify(self._heap)
 
     def _reach(self, state: MergedState) -> None:
-        """Queue a state unless one that is alike otherwise is no later anywhere; those that it beats are forgotten."""
+        """Queues a state unless another one with equal counts and robot dominates it; states that it dominates are dropped."""
         if self.merged.one_by_one:
-            # Since when a part waits to be picked does not matter either.
+            # How long a part has already waited to be picked does not matter either.
             state = state._replace(waits=(*state.waits[:-1], tuple([max(at, state.now) for at in state.waits[-1][:1]])))
         left = self._least.left(state)
         if left >= FAR:
@@ -178,7 +180,7 @@ class _Search:
         heapq.heappush(self._heap, (left if self._greedy else state.now + left, self._serial, state))
 
     def _times(self, state: MergedState) -> tuple[int, ...]:
-        """Now, all that is waited for, and rows: of states with equal counts and robot, one that is nowhere later is no worse."""
+        """The times of a state for the dominance test: with equal counts and robot, a state that is nowhere later is no worse."""
         waited = self._waits
         moments = [(state.now,), *state.waits[:waited]]
         for row in chain.from_iterable(state.rows):
@@ -187,14 +189,13 @@ class _Search:
 
 
 def optimum(cell: Cell, max_expanded: int = MAX_EXPANDED, shared: Shared | None = None) -> Optimum:
-    """The shortest makespan of the cell and a sequence that reaches it, alike parts numbered first in, first out.
+    """The shortest makespan of the cell and a sequence that reaches it; alike parts are numbered first in, first out.
 
-    Where parts may be picked too late, the robot waits on purpose where that is better (see `WindowedCell`). States are opened in
-    the order of time so far + a bound on what is still to do, so the first complete one is
-    optimal; a deadlock leads nowhere. After `max_expanded` states, or once those that were reached hold MOST_KEPT numbers, it
-    gives up and opens as many again, nearest to the end first, for the sequence it returns: `proven` False, and the bound
-    reached so far. What it finds and proves is told to `shared` as it comes, which may end it (see `Shared.look`).
-    WorkFailed where no sequence comes to its end, or none was found.
+    In a cell with time windows the robot may wait deliberately (see `WindowedCell`). States are expanded in the order of time so
+    far + lower bound of the time left, so the first complete one is optimal. After `max_expanded` states, or once the reached
+    states hold MOST_KEPT integers, the proof is given up and as many states again are expanded by the time left alone to find a
+    sequence: `proven` is then False and `bound_s` the bound reached. `shared` receives incumbents and bounds as they are found
+    and may end the search (see `Shared.look`). Raises WorkFailed when no complete sequence exists, or none was found.
     Source: uniform-cost search (Dijkstra 1959) with an admissible bound (A*, Hart et al. 1968); the pruning of later
     states that are otherwise alike is the thesis's branch and bound, App. IV.
     """
@@ -219,8 +220,8 @@ def optimum(cell: Cell, max_expanded: int = MAX_EXPANDED, shared: Shared | None 
 def exact(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceResult:
     """The proven best sequence by the mean times; it draws nothing from `rng`.
 
-    The makespan is minimised by `optimum`, of a job shop with one transport robot by `one_robot`; when these give up, and for all
-    else, by CP-SAT within its time limit, which may not prove its sequence. Raises BadInput as these do.
+    The makespan is minimised by `optimum`, or by `one_robot` for a job shop with one transport robot; when these give up, and for
+    other objectives and cells, by CP-SAT within its time limit, which may not prove its sequence. Raises BadInput as they do.
     """
     search.check(cell)
     shared = shared_of(cell, search)

@@ -1,4 +1,4 @@
-"""First in, first out: what is possible first is served first, as a list and as a policy."""
+"""First in, first out: the task that became possible first is served first; as a sequencer and as a policy."""
 
 from collections.abc import Sequence
 
@@ -12,10 +12,10 @@ from lab.sequencing.simulate.execution import WAIT, Choose, Observed, one_by_one
 
 
 def fifo(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceResult:
-    """One sequence, by the cell's own times: what is possible first is served first (see `first_in_first_out`).
+    """One sequence by the cell's own times, in which the task that became possible first is served first.
 
-    When nothing is possible yet, the robot goes where something will be next and waits there: the sequence costs what
-    its simulation does. Raises BadInput and WorkFailed as `lab.sequencing.methods.random_search`.
+    The policy is `first_in_first_out`. In the simulated sequence, the robot drives ahead to the next task and waits there
+    instead of staying where it is. Raises BadInput and WorkFailed as `lab.sequencing.methods.random_search`.
     """
     search.check(cell)
     execution = one_by_one(cell, lambda cell: _Queue(cell, stays=False))
@@ -26,16 +26,16 @@ def fifo(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceResult
 def first_in_first_out(cell: Cell) -> Choose:
     """The policy of a robot with a queue of tasks: a task joins it when an event makes it possible; the head is served.
 
-    Possible: there is room for it, the part has come, its machine has finished. With an empty queue the robot stays
-    where it is until the next event, so it costs more than the simulation of its sequence, where the robot goes ahead.
-    Parts that may choose between routes take them in turn, whether another has room or not. Tasks of the same moment:
-    first the part that has been ready longest, then the lowest decision. Source: thesis App. III.
+    A task is possible when there is room for it, its part has arrived, and its machine has finished. With an empty queue the
+    robot stays where it is until the next event, so a run costs more than the simulation of its sequence, where the robot
+    drives ahead. Parts that may choose between routes take them in turn, even if only another route has room. Ties go to the
+    part that has been ready longest, then to the lowest decision. Source: thesis App. III.
     """
     return _Queue(cell, stays=True)
 
 
 class _Queue:
-    """Since when the next task of each part has been possible, as far as room is concerned; an entry a part."""
+    """The queue: for each part, since when there has been room for its next task."""
 
     def __init__(self, cell: Cell, *, stays: bool) -> None:
         self._routes = _route_of_choice(cell)
@@ -64,7 +64,7 @@ class _Queue:
         return tasks[min(ready or tasks, key=order)]
 
     def _soonest_first(self, seen: Observed, allowed: tuple[int, ...]) -> Sequence[int]:
-        """Of several robots that are free the one that is there first takes a task."""
+        """The allowed decisions by when their robot would arrive: of several free robots, the nearest takes a task."""
         if seen.cell.serial or not self._stays:
             return allowed
         ways = {decision: seen.option(decision) for decision in allowed}
@@ -72,7 +72,7 @@ class _Queue:
         return sorted(allowed, key=lambda decision: (picks_s[decision], decision))
 
     def _in_turn(self, seen: Observed, decision: int) -> bool:
-        """Whether the route that a part is about to take is the next one of its product; True once it is on one."""
+        """Whether a part's first decision takes the route whose turn it is for its product; True for parts already on a route."""
         cell, part = seen.cell, part_of(decision, seen.cell.parts)
         if seen.locations[part - 1] != cell.starts[part - 1] or not cell.serial:
             return True
@@ -88,7 +88,7 @@ def _waits(seen: Observed, decision: int) -> bool:
 
 
 def something_comes(seen: Observed) -> bool:
-    """Whether an event is still to come by itself: the end of a process, or a part that is on its way."""
+    """Whether an event will happen without a decision: the end of a process, or an arrival."""
     cell = seen.cell
     following = None if cell.arrivals is None else cell.coming[seen.fetched : seen.fetched + 1]
     return any(
@@ -98,7 +98,7 @@ def something_comes(seen: Observed) -> bool:
 
 
 def _route_of_choice(cell: Cell) -> dict[str, tuple[int, ...]]:
-    """Product -> the number of the route, from 0, that each choice at its start belongs to."""
+    """For each product, the number of the route (from 0) that each choice at its start belongs to."""
     return {
         product.name: tuple(
             number

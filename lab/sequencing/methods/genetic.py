@@ -1,4 +1,4 @@
-"""A genetic algorithm as a rival: it begins with the dispatching rules, crosses lists of priorities and improves each child."""
+"""A genetic algorithm on lists of priorities: it begins with the dispatching rules' lists and improves each child locally."""
 
 from typing import Any, NamedTuple
 
@@ -24,12 +24,12 @@ from lab.sequencing.simulate.cell_arrays import Flags, Floats, Ints
 
 
 class Population(NamedTuple):
-    """N lists of L priorities of K parts, and the child that is being improved.
+    """A population of N lists of L priorities for K parts, and the child that is being improved.
 
-    parts, choices (N, L), costs (N,): the lists; tried (1,): how many of them have been carried out. child: the neighbour of
-    child_parts, child_choices (L,), which cost child_cost (1,) and have `left` (1,) neighbours still to be tried; -1: there is no
-    child. inherited (K,): the parts that it has from its first parent. best (L,): the best decisions, then zeros; best_cost (1,).
-    stream (1,): the state of the random numbers.
+    parts, choices (N, L), costs (N,): the lists and their costs; tried (1,): how many of them were simulated so far. child_parts,
+    child_choices (L,), child_cost (1,): the child; child: the neighbour of it under trial; left (1,): neighbours still to try,
+    -1: there is no child. inherited (K,): the parts that the child has from its first parent. best (L,): the incumbent's
+    decisions, then zeros; best_cost (1,). stream (1,): the state of the random number generator.
     """
 
     parts: Ints
@@ -49,7 +49,7 @@ class Population(NamedTuple):
 
 @without_refcounts
 def shuffled(parts: Any, choices: Any, stream: Any, most: int) -> None:
-    """A list (L,) in an even order, each entry with any of `most` ways. Source: Fisher and Yates 1938."""
+    """Shuffles a list (L,) uniformly and draws one of `most` choices for each entry. Source: Fisher and Yates 1938."""
     for i in range(len(parts) - 1, -1, -1):
         other = below(stream, i + 1)
         parts[i], parts[other] = parts[other], parts[i]
@@ -58,7 +58,7 @@ def shuffled(parts: Any, choices: Any, stream: Any, most: int) -> None:
 
 @inner
 def _tournament(population: Any, best: bool) -> int:
-    """The better, or the worse, of two lists that are drawn."""
+    """The index of the better, or the worse, of two lists that are drawn."""
     one = below(population.stream, len(population.costs))
     other = below(population.stream, len(population.costs))
     return one if (population.costs[one] < population.costs[other]) == best else other
@@ -66,7 +66,7 @@ def _tournament(population: Any, best: bool) -> int:
 
 @without_refcounts
 def crossed(population: Any, one: int, other: int) -> None:
-    """The child of two lists: the parts drawn stay where the first one has them, all others fill up in the second one's order.
+    """Makes the child of two lists: the inherited parts stay where the first has them, the rest follow in the second's order.
 
     Source: job-based order crossover, Ono, Yamamura and Kobayashi 1996.
     """
@@ -86,7 +86,7 @@ def crossed(population: Any, one: int, other: int) -> None:
 
 @inner
 def _note(cell: Any, run: Any, population: Any, limit: float) -> float:
-    """What the child's list costs; the best decisions are kept."""
+    """The cost of the child's list, simulated up to `limit`; a new incumbent is kept."""
     value = carried_out(cell, run, population.child, limit)
     if value < population.best_cost[0] and run.whole[1] == 0:
         population.best_cost[0] = value
@@ -97,7 +97,7 @@ def _note(cell: Any, run: Any, population: Any, limit: float) -> float:
 
 @inner
 def _survives(population: Any) -> None:
-    """The child takes the place of the worse of two lists, unless it is worse itself."""
+    """Replaces the worse of two drawn lists by the child, unless the child is worse than it."""
     n = _tournament(population, False)
     if population.child_cost[0] <= population.costs[n]:
         copied(population.child_parts, population.child_choices, population.parts[n], population.choices[n])
@@ -107,7 +107,7 @@ def _survives(population: Any) -> None:
 
 @without_refcounts
 def evolve(cell: Any, run: Any, population: Any, costs: Any, improved: int) -> None:
-    """As many lists are tried as there are costs (N,), which are filled; improved: neighbours of each child that are tried."""
+    """Simulates N lists and writes their costs into `costs` (N,); improved: how many neighbours of each child are tried."""
     choices, child = most_choices(cell), population.child
     for n in range(len(costs)):
         if population.tried[0] < len(population.costs):
@@ -132,22 +132,22 @@ def evolve(cell: Any, run: Any, population: Any, costs: Any, improved: int) -> N
             _survives(population)
 
 
-# ---- genetic ----------------------------------------------------------------------------------------------------------
+# ---- The method `ga` --------------------------------------------------------------------------------------------------
 
 
-SMALLEST, LARGEST = 4, 50  # lists in a population: a 20th of the root of the budget, within these
-CHILDREN = 20  # for each list of the population; what is left of the budget goes into improving them
+SMALLEST, LARGEST = 4, 50  # limits of the population's size, which is a 20th of the budget's square root
+CHILDREN = 20  # for each list of the population; the rest of the budget goes into improving them
 ROUND = 500  # sequences between two looks at the clock, the listener and Ctrl-C
 
 
 def genetic(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceResult:
     """The best sequence that a genetic algorithm with local improvement finds by the mean times; every one tried is an episode.
 
-    A population holds the lists of all dispatching rules and others that are drawn. Again and again two parents, each the
-    better of two drawn ones, have a child, which a short descent improves (a memetic algorithm); it takes the place of the
-    worse of two drawn ones if it is no worse, so that the best one always stays. Of makespans, a neighbour that has become
-    too long is given up, and its episode costs what it would have cost at the least. It is a search and learns nothing.
-    Raises BadInput and WorkFailed as the other methods do.
+    The population begins with the lists of all dispatching rules and random ones. In each step two parents, each the winner of
+    a tournament of two, have a child, which a short descent improves (a memetic algorithm); it replaces the worse of two drawn
+    lists if it is no worse, so that the best list always stays. When the makespan is minimised, the simulation of a neighbour
+    stops as soon as it is too long, and its episode costs the lower bound reached. It is a search and learns nothing. Raises
+    BadInput and WorkFailed as the other methods do.
     Source: Moscato 1989; steady state, Whitley 1989; job-based order crossover, Ono, Yamamura and Kobayashi 1996;
     lists of operations as chromosomes, Bierwirth 1995.
     """
@@ -169,7 +169,8 @@ def genetic(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceRes
 
 
 def _population(orders: Orders, size: int, seed: int) -> Population:
-    """The lists of the rules that come to their ends, the best first, at most half of all; others are drawn."""
+    """The first population: the lists of the rules that end without a deadlock, the best first and at most half of all, and
+    random lists."""
     ruled = sorted((one for one in orders.begun if one.done), key=lambda one: one.cost)[: max(1, size // 2)]
     first, stream = orders.first, np.array([seed], np.uint64)
     parts, choices = np.tile(first.parts, (size, 1)), np.tile(first.choices, (size, 1))

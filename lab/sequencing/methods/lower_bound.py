@@ -1,4 +1,5 @@
-"""The highest of the lower bounds of what a cell still needs: robot, machines, parts alone, and parts that still arrive."""
+"""Lower bounds of the time that a cell still needs, and the highest of them: the robot's work, each machine, each part alone,
+and parts that still arrive."""
 
 from collections.abc import Iterator, Sequence
 from itertools import accumulate
@@ -12,16 +13,16 @@ from lab.sequencing.cell.routes import from_the_ends
 from lab.sequencing.cell.ways import FAR, TICKS_PER_S, Way, distances, empty_ticks, follows, ticks, ways_of
 from lab.sequencing.simulate.merged import MergedCell, MergedState
 
-SMALL = 1e-3  # a gain beside that of the start
+SMALL = 1e-3  # the weight of other states beside the start in the linear program's objective
 
 
 class RobotWork:
-    """What the robot still has to do at least, if it never waited, in ticks: rest[p] for each part in position p, + here.
+    """A lower bound of the robot's remaining work without waiting [ticks]: the sum of rest[p] over parts in position p, + here.
 
-    here: by the robot's station. Never below 0.
-    Every pick has a price, every drop a credit, such that no way from a drop to a pick takes less than price - credit:
-    added up, the credits of all drops but the last and the prices of all picks bound the empty travel. The best
-    credits for the cell's start come from a linear program; the prices then follow exactly, in whole ticks.
+    rest: by position. here: by the robot's station. The bound is never below 0.
+    Every pick has a price and every drop a credit, such that no drive from a drop to a pick takes less than price - credit. So
+    the prices of all picks minus the credits of all drops but the last bound the empty travel. The best credits for the cell's
+    start come from a linear program; the prices then follow exactly, in whole ticks.
     Source: duality of the assignment of picks to drops, as the bound of the travelling salesman's problem.
     """
 
@@ -46,9 +47,9 @@ class RobotWork:
 
 
 def least_rest(cell: Cell, ways: Sequence[Way], carried: dict[int, int]) -> list[int]:
-    """The least sum of `carried` from each position to an end; ways that it does not name are never taken.
+    """The least sum of `carried` along any path from each position to an end; options that it does not name are never taken.
 
-    Where no end can be reached it is 0: such a state has no time still to come.
+    Where no end can be reached it is 0.
     """
     own: list[list[int]] = [[] for _ in cell.positions]
     for number, way in enumerate(ways):
@@ -62,7 +63,7 @@ def least_rest(cell: Cell, ways: Sequence[Way], carried: dict[int, int]) -> list
 
 
 def _gaps(cell: Cell, ways: Sequence[Way]) -> dict[tuple[int, int], int]:
-    """Least ticks from a drop at a station to where the pick of a way (by number) can begin; none: it never follows."""
+    """By station and option number, the least ticks from a drop there to the pick of the option; missing: it never follows."""
     empty, begin = empty_ticks(cell), cell.index(cell.robot_start)
     gaps: dict[tuple[int, int], int] = {}
     for number, way in enumerate(ways):
@@ -75,7 +76,7 @@ def _gaps(cell: Cell, ways: Sequence[Way]) -> dict[tuple[int, int], int]:
 
 
 def _waits(cell: Cell, done: Way, way: Way) -> Iterator[int]:
-    """How long the robot waits at least when `way` follows `done`, with the same part and with another; none: never."""
+    """The robot's least waits when `way` follows `done`, with the same part and with another; empty: it never follows."""
     if follows(cell, done, way, same=True):
         process_s = cell.positions[way.place].processing_s or 0.0
         yield round(process_s * TICKS_PER_S) if way.option.waits else 0
@@ -84,10 +85,10 @@ def _waits(cell: Cell, done: Way, way: Way) -> Iterator[int]:
 
 
 def _credits(cell: Cell, ways: Sequence[Way], gaps: dict[tuple[int, int], int]) -> list[int]:
-    """The credit of a drop at each station [ticks]. Any are right; these are the best for the cell's start.
+    """The credit of a drop at each station [ticks]. Any credits give a valid bound; these give the best one at the start.
 
-    Variables [s]: a credit per station, a price per way, the rest per position, and the least credit of an end. Of
-    equally good ones those are taken that bound other states best: hence the small gains.
+    Variables [s]: a credit per station, a price per option, the rest per position, and the least credit of an end. Small weights
+    for the other states choose, among equally good credits, those that bound these states best.
     """
     size, begin = len(cell.stations), cell.index(cell.robot_start)
     price, rest = size, size + len(ways)
@@ -119,7 +120,7 @@ def _credits(cell: Cell, ways: Sequence[Way], gaps: dict[tuple[int, int], int]) 
     return [round(float(credit) * TICKS_PER_S) for credit in found.x[:size]]
 
 
-# ---- lower bound ------------------------------------------------------------------------------------------------------
+# ---- The highest of all bounds ----------------------------------------------------------------------------------------
 
 
 NEVER = -(1 << 61)
@@ -127,19 +128,19 @@ Spans = tuple[tuple[int, int], ...]
 
 
 class Term(NamedTuple):
-    """A bound that shrinks as time passes: `plus`, + the least of `ways` for what is waited for longest in a slot.
+    """A bound that shrinks as time passes: `plus` + the minimum over `ways` for one of the waits in a slot.
 
-    ways: (stay, after) ticks: all takes `stay` at least, and `after` from when the waiting ends.
+    ways: pairs (stay, after) in ticks: the path takes at least `stay` from now, and at least `after` from the end of the wait.
     """
 
     slot: int
-    which: int  # 0 the first that is waited for, -1 the last
+    which: int  # the index of the wait: 0 the first that ends, -1 the last
     ways: Spans
     plus: int
 
 
 class Least(NamedTuple):
-    """What bounds the time left while the counts stay as they are, in ticks; `latest`: no end before that moment."""
+    """The bounds of all states with the same counts, in ticks; latest: a moment before which no such state can end."""
 
     rest: int
     here: Sequence[int]
@@ -148,7 +149,7 @@ class Least(NamedTuple):
     latest: int
 
     def left(self, now: int, robot: int, waits: Sequence[Sequence[int]]) -> int:
-        """Ticks still needed at least; waits: by slot, until when (see `merged.MergedState`)."""
+        """The least ticks until the end; waits: as in `merged.MergedState`."""
         most = max(self.fixed, self.rest + self.here[robot], self.latest - now)
         for slot, which, ways, plus in self.terms:
             wait = waits[slot][which] - now
@@ -171,7 +172,7 @@ class LowerBound:
         self._after_arrival = _after_arrival(cell, self._to_end)
 
     def left(self, state: MergedState) -> int:
-        """Ticks still needed at least; FAR when a part can no longer be fetched in time."""
+        """The least ticks until the end of a state; FAR when a part can no longer be picked in time."""
         if self._merged.latest and self._merged.too_late(state):
             return FAR
         known = self._known.get(state.counts)
@@ -211,15 +212,15 @@ class LowerBound:
 
 
 def _passed(cell: Cell, station: int) -> bool:
-    """Whether a part can still be brought to a station, and on from there."""
+    """Whether some path brings parts to a station and takes room there."""
     return any(station in cell.positions[way.option.to].holds for way in ways_of(cell) if way.option.target == station)
 
 
 class _Spans:
-    """The least time of one part alone from each position on, until it leaves a station (None: until its end).
+    """The least time [ticks] of one part alone from each position until it leaves a station (None: until its end).
 
-    ways: (stay, after) as in `Term`, of a part that is still processed. least: of one that is ready. entered: from the
-    drop on, processing and all.
+    ways: by position, pairs (stay, after) as in `Term` for a part that is still processed. least: for a part that is ready.
+    entered: from its drop in the position, processing included.
     """
 
     def __init__(self, cell: Cell, station: int | None) -> None:
@@ -232,12 +233,12 @@ class _Spans:
         self.least = [min(stay for stay, _ in ways) for ways in self.ways]
 
     def _spans(self, place: int, ahead: list[Spans]) -> Spans:
-        """All spans from a position on, by those of the positions ahead."""
+        """The pairs (stay, after) of a position, from those of the positions ahead."""
         own = zip(self._own[place], ahead, strict=True)
         return tuple(dict.fromkeys(span for way, then in own for span in self._through(way, then))) or ((0, 0),)
 
     def _through(self, way: Way, then: Spans) -> Iterator[tuple[int, int]]:
-        """The spans that begin with a way; then: those from where it leads."""
+        """The pairs (stay, after) of paths that begin with an option; then: the pairs of the position that it leads to."""
         option, work = way.option, way.work
         here, there = self._cell.positions[way.place], self._cell.positions[option.to]
         if self._station in here.holds and self._station not in there.holds:
@@ -257,7 +258,7 @@ class _Spans:
 
 
 class _MachineWork:
-    """What a station with room for one part still has to hold at least, one part after the other, in ticks."""
+    """The least time that a station of capacity 1 still needs for the parts to come, one after the other, in ticks."""
 
     def __init__(self, cell: Cell, station: int, to_end: _Spans) -> None:
         self.station, self.spans = station, _Spans(cell, station)
@@ -277,7 +278,7 @@ class _MachineWork:
         self._rest = least_rest(cell, ways, each)
 
     def plus(self, counts: Sequence[int], inside: bool) -> int:
-        """Ticks for those to come, and after the last one; the part inside comes on top of it."""
+        """The least ticks for the parts to come and for what follows the last one; a part inside is not counted."""
         rest = sum(count * each for count, each in zip(counts, self._rest, strict=True))
         if inside:
             return rest + self._last
@@ -285,7 +286,8 @@ class _MachineWork:
 
 
 def _after_arrival(cell: Cell, to_end: _Spans) -> list[int]:
-    """By parts fetched: ticks from the next arrival to the last end, at least; with a clock: the moment of that end."""
+    """By number of parts fetched, the least ticks from the next arrival to the last end; where parts arrive by the clock, the
+    earliest moment of that end."""
     if cell.arrivals is None or not cell.coming:
         return []
     intervals = ticks([cell.arrivals.interval_s[part - 1] for part in cell.coming])

@@ -14,15 +14,15 @@ from lab.sequencing.search import LearnedSequence, Search
 
 @dataclass(frozen=True)
 class MonteCarloResult(LearnedSequence):
-    """A sequencer's result, and what was learned: `q` by state and decision (see `state_keys.key_of`), where visited."""
+    """A sequencer's result and the learned values: `q` by state and decision (see `state_keys.key_of`), for visited pairs."""
 
     q: Table
 
 
 class MonteCarlo(GreedyLearner):
-    """Q is the average of the returns of the episodes in which a pair was visited; 1 before the first, as in the listing.
+    """Q is the average return of the episodes in which a pair was visited; before the first visit it is 1, as in the listing.
 
-    No return of the thesis's cells comes near 1, so the greedy choice tries what was never tried before all else.
+    The initial values are optimistic: no return of the thesis's cells comes near 1, so the greedy choice tries new pairs first.
     """
 
     name = "mc"
@@ -33,7 +33,7 @@ class MonteCarlo(GreedyLearner):
         self.visits: dict[Key, int] = {}
 
     def end(self, values: Values, trail: list[Key], cost: float, best_before: float) -> None:
-        """Takes the episode's return into the averages, once for each visit."""
+        """Adds the episode's return to the averages of the visited pairs, once for each visit."""
         worth = gain(cost, self.rules.offset)
         for key in trail:
             before = self.visits.get(key, 0)
@@ -42,10 +42,10 @@ class MonteCarlo(GreedyLearner):
 
 
 def monte_carlo(cell: Cell, search: Search, rng: np.random.Generator) -> MonteCarloResult:
-    """Learn a sequence in so many episodes; the best one found is the result.
+    """The best sequence found in the search's episodes, and the values learned in them.
 
     The return of an episode is 1 / T of its makespan [s], or 1 / (1 + cost) of another objective. Decisions are chosen
-    as in `srl`. Raises BadInput for an objective that the cell has not got what it takes for, and for a makespan of 0 s;
+    as in `srl`. Raises BadInput for an objective that the cell lacks data for, and for a makespan of 0 s;
     WorkFailed when every episode ended in a deadlock. Source: thesis ch. 7.6 and its listing (Q = 1 at the start).
     """
     learned = learn(cell, search, drawn_seed(rng), MonteCarlo)

@@ -1,4 +1,5 @@
-"""The proven shortest makespan of a job shop with one transport robot: states layer by layer, a move each, as many as it takes.
+"""The proven shortest makespan of a job shop with one transport robot, by a beam search, a layer per move, that is widened until
+it is exact.
 
 For cells of one robot whose parts have one route each, through machines with one server each and room for all (the instances of
 Bilge and Ulusoy with one vehicle); `why_not` says what else a cell has.
@@ -26,14 +27,17 @@ if TYPE_CHECKING:
     from lab.sequencing.methods.one_robot_kernels import Work
 
 TIME_LIMIT_S = 60.0
-FIRST_WIDTH = 1000  # states kept of a layer, the most promising; ten times as many whenever that was no proof
+FIRST_WIDTH = (
+    1000  # states kept in a layer, those of least bound; ten times as many after each pass that proved nothing
+)
 MOST_WIDTH = 3_000_000  # a gigabyte for ten parts
 MOST_RESTS = 20_000_000  # entries of the table of bounds, 8 bytes each
 
 
 @dataclass(frozen=True)
 class OneRobot:
-    """The best sequence found and the bound of all: equal when `proven`. rounded_s: as of `cp_sat`. states: that were kept."""
+    """The best sequence found and the lower bound of all: equal when `proven`. rounded_s: as in `CpSatResult`. states: how many
+    were kept."""
 
     cost: float
     sequence: tuple[int, ...]
@@ -49,7 +53,7 @@ class OneRobot:
 
 
 def why_not(cell: Cell) -> str:
-    """What the cell has that this search does not know, in words; empty when it fits."""
+    """The features of the cell that this search does not support, in words; empty when it supports the cell."""
     reasons = {
         "it needs one robot": len(cell.robots) != 1,
         "parts that arrive": cell.arrivals is not None,
@@ -71,12 +75,12 @@ def why_not(cell: Cell) -> str:
 
 
 def one_robot(cell: Cell, time_limit_s: float = TIME_LIMIT_S, shared: Shared | None = None) -> OneRobot:
-    """The shortest makespan, proven, unless the time limit [s] or memory ends it: then the best found and the bound.
+    """The shortest makespan with its proof; when the time limit [s] or memory runs out, the best sequence found and a bound.
 
-    The first pass, of a second, is always made; the first use of all compiles, which takes half a minute. Each pass tells
-    `shared` its order and its bound, which may end it (see `Shared.look`).
-    Raises BadInput for a cell that it does not know (`why_not`). Source: dynamic programming of job shops with bounding, Gromicho
-    et al. 2012, as a beam search that is widened until what it left out cannot be better; bounds by `one_robot_kernels`.
+    The first pass, of about a second, is always completed; the first use compiles, which takes half a minute. After each pass
+    `shared` receives its order and its bound, and may end the search (see `Shared.look`).
+    Raises BadInput for a cell that it does not support (`why_not`). Source: dynamic programming of job shops with bounding,
+    Gromicho et al. 2012, as a beam search that is widened until no state left out can be better; bounds by `one_robot_kernels`.
     """
     reason = why_not(cell)
     if reason:
@@ -112,7 +116,10 @@ class _Search:
         self.best, self.low, self.sequence = kernels.FAR, 0, tuple[int, ...]()
 
     def widen(self, width: int, until_s: float, look: Callable[[], None]) -> tuple[bool, int]:
-        """One pass with so many states a layer; whether it came to its end, and how many states it kept. look: at each layer."""
+        """Whether one pass with at most `width` states in a layer was completed, and how many states it kept.
+
+        look: called at each layer, to report and to check limits.
+        """
         kernels, work, parts = self._kernels, self._work, len(self._work.counts)
         none, zero = np.full(1, -1, np.int64), np.zeros(1, np.int64)
         layer = kernels.Layer(zero, none, zero, work.ready.reshape(1, parts), zero, np.zeros((1, 3), np.int64))
@@ -139,7 +146,7 @@ class _Search:
         return True, states
 
     def _decisions(self, made: Sequence[NDArray[np.int64]], number: int) -> tuple[int, ...]:
-        """The list of decisions that leads to a state of the last layer: moves in their order, servers as their queues say."""
+        """The decisions that lead to a state of the last layer: the robot's moves in order, the servers' by their queues."""
         moves = list[tuple[int, int]]()
         for layer in reversed(made):
             before, part, place = (int(value) for value in layer[number])
@@ -160,7 +167,7 @@ class _Search:
         return self._listed([part for part, _ in reversed(moves)], ends)
 
     def _listed(self, tour: Sequence[int], ends: dict[tuple[int, int], int]) -> tuple[int, ...]:
-        """A robot's tour through parts, with the decisions of the servers in the order of their ends."""
+        """The decisions of a robot's tour through parts, with those of the servers inserted in the order of their ends."""
         run, work, parts, found = Run(self._cell), self._work, self._cell.parts, list[int]()
         at = [0] * parts
         served = set[tuple[int, int]]()
@@ -174,7 +181,7 @@ class _Search:
             return end, end - int(work.process[part, at[part]])
 
         def serve(part: int) -> None:
-            """The machine of a part does all that it has to do before, and the part."""
+            """Decides the work of a part's machine up to and including the part."""
             machine, own_s = work.at[part, at[part]], when(part)
             own = [j for j in range(parts) if at[j] and work.at[j, at[j]] == machine and when(j) <= own_s]
             for j in sorted(own, key=when):
@@ -202,7 +209,7 @@ def _may_be_full(cell: Cell) -> bool:
 
 
 def _ways(cell: Cell, part: int) -> list[Option]:
-    """A part's route, way by way."""
+    """The options along a part's only route."""
     place, found = cell.begin_at[part], list[Option]()
     while cell.positions[place].options:
         found.append(cell.positions[place].options[0])
@@ -211,7 +218,7 @@ def _ways(cell: Cell, part: int) -> list[Option]:
 
 
 def _sizes(cell: Cell) -> int:
-    """How many entries the table of bounds has."""
+    """The number of entries of the table of bounds."""
     size = cell.parts
     for part in range(cell.parts):
         size *= 1 + sum(way.robot != SERVER for way in _ways(cell, part))

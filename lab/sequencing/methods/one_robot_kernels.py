@@ -1,8 +1,9 @@
-"""The states of a cell of one robot and machines with queues, compiled with numba: what follows them, and which are needless.
+"""The states of a cell of one robot and machines with queues, compiled with numba: successors, bounds and dominance.
 
-A state: how far each part is (`code`, a mixed radix of `weight`), which part the robot dropped last, and when, and when each
-part is ready (its machine done with it). A part that is dropped is put at once into the order of its machine's queue, before any
-that are not done yet; those behind it are put off. Parts, operations and stations are numbered from 0, times whole.
+A state holds how far each part is (`code`, a mixed-radix number with the digits' `weight`), which part the robot dropped last and
+when, and when each part is ready (its machine has finished it). A dropped part enters its machine's queue at once, at any place
+among the parts that are not finished yet; the parts behind it are delayed. Parts, operations and stations are numbered from 0;
+times are integers.
 """
 
 from typing import NamedTuple
@@ -17,11 +18,13 @@ Whole = NDArray[np.int64]
 
 
 class Work(NamedTuple):
-    """What is to be done: counts (part) of moves; at (part, n), where a part is after n moves; process and carry beside it.
+    """The work of a cell as arrays, times in units.
 
-    carry: the move that leaves it, service included. empty, least (station, station): the empty way, and the shortest way at
-    all. queues (station): whether one part after the other is worked on there. ready (part): when a part may be taken first.
-    tail: from when a part is ready until it is finished. weight (part): of its moves in a state's code.
+    counts (part,): moves of each part. at, process, carry, tail (part, n): after n moves, the part's station, its processing
+    there, the move that leaves, service included, and the least time from when the part is ready until it is finished. empty,
+    least (station, station): the direct empty drive, and the shortest one by any stations. queues (station,): whether a station
+    works on one part after the other. ready (part,): when a part may first be picked. weight (part,): of the part's digit in a
+    state's code.
     """
 
     counts: Whole
@@ -38,7 +41,7 @@ class Work(NamedTuple):
 
 @compiled
 def machine_bound(work: Work, c: Whole, ready: Whole, now: int, here: int) -> int:
-    """No end is before this, for what each machine still has to do: heads, work, the least tail (Carlier 1982)."""
+    """A lower bound of the end by each machine's remaining work: heads, work and the least tail (Carlier 1982)."""
     counts, at, process, carry = work.counts, work.at, work.process, work.carry
     worst, most = 0, int(counts.sum())
     heads, times, tails = np.empty(most, np.int64), np.empty(most, np.int64), np.empty(most, np.int64)
@@ -71,10 +74,10 @@ def machine_bound(work: Work, c: Whole, ready: Whole, now: int, here: int) -> in
 
 @compiled
 def least_rest(work: Work) -> Whole:
-    """(code, part): from when the robot dropped that part until the end at least, if nothing else were being worked on.
+    """A table (code, part) of the least time from the robot's drop of that part until the end, if no part were in process.
 
-    The best tour through all moves that are left, by dynamic programming (Held and Karp 1962, here with an order of each part's
-    moves); a part that is fetched right after it was dropped is waited for; parts and machines need their time.
+    It is the best tour through all moves left, by dynamic programming (Held and Karp 1962, with each part's moves in order). The
+    robot waits for a part that it picks right after its drop, and each part and machine needs its own time.
     """
     counts, at, carry = work.counts, work.at, work.carry
     parts, size = len(counts), 1
@@ -104,7 +107,7 @@ def least_rest(work: Work) -> Whole:
 
 @compiled
 def queue_at(work: Work, c: Whole, ready: Whole, part: int, now: int) -> Whole:
-    """The parts that a machine is not done with at a time, in their order: where a part goes with its next move."""
+    """The parts in the queue of the machine that a part's next move leads to, in order, as far as unfinished at a time."""
     queue, n = np.empty(len(c), np.int64), 0
     machine = work.at[part, c[part] + 1]
     if work.queues[machine]:
@@ -121,7 +124,7 @@ def queue_at(work: Work, c: Whole, ready: Whole, part: int, now: int) -> Whole:
 
 @compiled
 def put(work: Work, c: Whole, ready: Whole, part: int, now: int, queue: Whole, place: int) -> None:
-    """`part`, dropped now at its position c, is worked on after so many of the queue: `ready` becomes so."""
+    """Inserts `part`, dropped now, after `place` parts of the queue and updates `ready` of it and of the parts behind it."""
     end = now if place == 0 else ready[queue[place - 1]]
     end += work.process[part, c[part]]
     ready[part] = end
@@ -132,7 +135,7 @@ def put(work: Work, c: Whole, ready: Whole, part: int, now: int, queue: Whole, p
 
 @compiled
 def bound(work: Work, rest: Whole, code: int, last: int, now: int, c: Whole, ready: Whole) -> int:
-    """No end of this state is before."""
+    """A lower bound of the end of a state."""
     here, least, all_done, most = work.at[last, c[last]], FAR, True, now + rest[code, last]
     for i in range(len(c)):
         most = max(most, ready[i] + work.tail[i, c[i]])
@@ -146,9 +149,9 @@ def bound(work: Work, rest: Whole, code: int, last: int, now: int, c: Whole, rea
 
 
 class Layer(NamedTuple):
-    """States with as many moves made: code, last, now and bound (n,), ready (n, parts), and what made them of the layer before.
+    """The n states with equally many moves made: code, last, now and bound (n,), ready (n, parts).
 
-    made (n, 3): the state's number there, the part, and its place in the queue.
+    made (n, 3): how each came from the layer before: the state's number there, the part, and its place in the queue.
     """
 
     code: Whole
@@ -163,9 +166,9 @@ class Layer(NamedTuple):
 def expand(
     work: Work, rest: Whole, layer: Layer, start: int, below: int
 ) -> tuple[Whole, Whole, Whole, Whole, Whole, Whole]:
-    """The fields of a layer of all states after these whose bound is below a value; start: where the robot stands at first.
+    """The fields of the layer of all successors whose bound is below a value; start: the robot's first station.
 
-    A plain tuple: a named one is made by Python, where Ctrl-C may be raised, which compiled code does not look at.
+    The result is a plain tuple: a named tuple would be built in Python, where Ctrl-C may be raised inside compiled code.
     """
     parts, n, cap = len(work.counts), 0, max(64, 2 * len(layer.code))
     out, times, made = np.empty((cap, 4), np.int64), np.empty((cap, parts), np.int64), np.empty((cap, 3), np.int64)
@@ -194,7 +197,7 @@ def expand(
                     cap *= 2
                     out, times, made = _longer(out, cap), _longer(times, cap), _longer(made, cap)
                 for i in range(parts):
-                    # Earlier than the robot can be there is no better.
+                    # Finishing the part before the robot can be there is no better.
                     reach = drop + (work.least[work.at[j, c[j]], work.at[i, c[i]]] if c[i] < work.counts[i] else 0)
                     times[n, i] = max(ready[i], reach)
                 out[n, 0], out[n, 1], out[n, 2], out[n, 3] = code, j, drop, least
@@ -214,9 +217,9 @@ def _longer(array: Whole, rows: int) -> Whole:
 
 @compiled
 def needed(work: Work, layer: Layer, order: Whole) -> NDArray[np.bool_]:
-    """Which states, in an order with equal codes and last parts together, none before is at least as good as.
+    """A mask of the states that no earlier state dominates, in an order that groups equal codes and last parts.
 
-    As good: no time is later, and the parts that both machines still have to do stand in the same order.
+    A state dominates another one if none of its times is later and the queues have the unfinished parts of both in one order.
     """
     n, parts, low = len(order), len(work.counts), 0
     keep, c = np.ones(n, np.bool_), np.empty(parts, np.int64)

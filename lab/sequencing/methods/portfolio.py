@@ -1,4 +1,5 @@
-"""The methods together: rules, annealing, and the exact search that proves most, each going on from the best order so far."""
+"""The portfolio: rules, annealing and the exact search that proves most, each beginning with the best order so far; and
+`fewer_moves`, which leaves out stopovers."""
 
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -23,10 +24,10 @@ from lab.sequencing.simulate.follow import follow, steps
 
 
 def fewer_moves(cell: Cell, sequence: Sequence[int], objective: str = MAKESPAN) -> tuple[int, ...]:
-    """The sequence with as many stopovers left out as can be, one after the other, at no more cost.
+    """The sequence without the stopovers that it does not need: they are left out one after the other, at no more cost.
 
-    A stopover is a place where nothing is done with the part. Both are tried: to go straight on when the part set out, and
-    when it would have left the stopover. It is a local search: of several that exclude each other the first is left out.
+    A stopover is a place where nothing is done with the part. The direct move is tried both at the time of the move to the
+    stopover and at that of the move from it. It is a local search: of stopovers that exclude each other, the first is left out.
     """
     best, least = tuple(sequence), _cost(cell, sequence, objective)
     while True:
@@ -37,7 +38,7 @@ def fewer_moves(cell: Cell, sequence: Sequence[int], objective: str = MAKESPAN) 
 
 
 def _straight(cell: Cell, sequence: Sequence[int]) -> Iterator[tuple[int, ...]]:
-    """Each sequence that is left when one stopover is left out."""
+    """Each sequence with one stopover less."""
     came = dict[int, tuple[int, int]]()  # by part: where in the sequence it set out last, and from where
     for number, (run, decision, wait) in enumerate(steps(cell, sequence)):
         part = part_of(decision, cell.parts)
@@ -55,30 +56,30 @@ def _straight(cell: Cell, sequence: Sequence[int]) -> Iterator[tuple[int, ...]]:
 
 
 def _cost(cell: Cell, sequence: Sequence[int], objective: str) -> float:
-    """What a sequence costs; infinite where it may not be carried out, or does not come to its end."""
+    """The cost of a sequence; infinite when it is not feasible or not complete."""
     try:
         return cost(run, objective) if (run := follow(cell, sequence)).done else float("inf")
     except BadInput:
         return float("inf")
 
 
-# ---- portfolio --------------------------------------------------------------------------------------------------------
+# ---- The best known order, and how it is searched ---------------------------------------------------------------------
 
 
-MOVES, ROUND = 12_000_000, 3_000  # of all sequences that annealing tries; how many it tries between two looks at Ctrl-C
-EACH = 500  # how often it tries each of a list's neighbours, on average: a short list takes far fewer moves
+MOVES, ROUND = 12_000_000, 3_000  # moves in all sequences of an annealing; sequences between two checks for Ctrl-C
+EACH = 500  # how often annealing tries each neighbour of a list, on average: a short list takes far fewer moves
 TIME_LIMIT_S = 60.0
-WORKERS = 6  # threads of CP-SAT, also on two cores: they look in different ways
-ANNEALERS, ANNEALINGS = 2, 40  # threads beside CP-SAT, with seeds of their own; how often each begins at the most
-FIRST_LOOK = 2_000  # states of A*
-SHORTEST_S, WAIT_S = 0.1, 0.05  # what CP-SAT is left at least; between two looks at the clock
+WORKERS = 6  # threads of CP-SAT, even on two cores: each uses another strategy
+ANNEALERS, ANNEALINGS = 2, 40  # annealing threads beside CP-SAT, with seeds of their own; the most restarts of each
+FIRST_LOOK = 2_000  # states that A* may expand in `look_first`
+SHORTEST_S, WAIT_S = 0.1, 0.05  # the least time left for CP-SAT; the time between two checks of the clock
 
 
 @dataclass(frozen=True)
 class BestKnown:
-    """The best order that was found and by whom, the bound that no order is below and whose it is; `proven`: they are equal.
+    """The best order found and the method that found it, and the best lower bound and the method that proved it.
 
-    sequence: without pointless hops; empty, and the cost infinite, where none was found.
+    sequence: without needless stopovers; empty, and the cost infinite, where no order was found.
     """
 
     sequence: tuple[int, ...]
@@ -97,20 +98,20 @@ class BestKnown:
 def best_known(
     cell: Cell, objective: str = MAKESPAN, time_limit_s: float = TIME_LIMIT_S, seed: int = 0, workers: int = 1
 ) -> BestKnown:
-    """What `look_on` comes to in a cell of which nothing is known yet."""
+    """The result of `look_on` for a cell of which nothing is known yet."""
     return look_on(Shared(cell, objective), time_limit_s, seed, workers)
 
 
 def look_on(
     shared: Shared, time_limit_s: float = TIME_LIMIT_S, seed: int = 0, workers: int = 1, most: int = MAX_EXPANDED
 ) -> BestKnown:
-    """The best order by the mean times, and what is proven of it; CP-SAT is looked at only where nothing faster proves it.
+    """The best order by the mean times with its bound; CP-SAT is used only where nothing faster proves the order.
 
-    Of a cell with one robot that does all the work the shortest makespan is searched by states (`optimum`), `most` of them; of a
-    job shop with one robot by its tours (`one_robot`). Else annealing and CP-SAT look: with one worker one after the other, the
-    same seed giving the same order; with more side by side, each going on from the best order of all, until it is proven.
-    time_limit_s: of the search of tours, and of CP-SAT, or of both together [s].
-    Raises BadInput as they do, WorkFailed where it is proven, or seems, that no order comes to its end, and as `Shared.look`.
+    For a cell in which one robot does all the work, the shortest makespan is searched by states (`optimum`), at most `most` of
+    them; for a job shop with one robot by its tours (`one_robot`). Otherwise annealing and CP-SAT search: with one worker one
+    after the other, where the same seed gives the same order; with more side by side, each restarting from the incumbent, until
+    it is proven. time_limit_s: of the search of tours, of CP-SAT, or of both together [s].
+    Raises BadInput as they do, WorkFailed where no order can be completed or none was found, and the errors of `Shared.look`.
     """
     cell, objective = shared.cell, shared.objective
     if objective == MAKESPAN and cell.serial:
@@ -128,30 +129,31 @@ def look_on(
 
 
 def look_first(shared: Shared) -> None:
-    """What is proven within a second: of a small cell all that `look_on` would, of a large one a bound, and an order."""
+    """Tells `shared` what is known within a second: bounds and, of the makespan where one robot does all the work, an order,
+    which is the optimum of a small cell."""
     if shared.objective == MAKESPAN and shared.cell.serial:
-        with suppress(WorkFailed):  # whoever looks longer says so
+        with suppress(WorkFailed):  # a longer search reports it
             look_on(shared, most=FIRST_LOOK)
     else:
         tell_alone(shared)
 
 
 def tell_alone(shared: Shared) -> None:
-    """Tells the bounds that are known without any search."""
+    """Tells `shared` the bounds that are known without any search."""
     shared.tell("each part alone", bound=_alone(shared.cell, shared.objective))
     if shared.objective == MAKESPAN:
         shared.tell("each machine alone", bound=_machines_alone(shared.cell))
 
 
 def known_of(shared: Shared) -> BestKnown:
-    """What is shared, without pointless hops."""
+    """The best known order in `shared` without needless stopovers, and its bound."""
     sequence = fewer_moves(shared.cell, shared.sequence, shared.objective) if shared.sequence else ()
     value = cost(follow(shared.cell, sequence), shared.objective) if sequence else inf
     return BestKnown(sequence, value, shared.found_by, min(shared.bound, value), shared.bound_by)
 
 
 def portfolio(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceResult:
-    """The best order that any method finds within its time, one sequence; it draws nothing from `rng`."""
+    """The best sequence that any method finds within its time; it draws nothing from `rng`."""
     search.check(cell)
     shared = shared_of(cell, search)
     found = look_on(shared, shared.left_s(TIME_LIMIT_S), workers=WORKERS)
@@ -161,7 +163,7 @@ def portfolio(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceR
 
 
 def _look(shared: Shared, time_limit_s: float, seed: int, workers: int) -> None:
-    """Annealing and CP-SAT: side by side, or in turn; where one robot does all the work CP-SAT needs no help to begin with."""
+    """Runs annealing and CP-SAT, side by side or in turn; in turn CP-SAT goes first where one robot does all the work."""
     until_s = perf_counter() + time_limit_s
     if shared.cell.serial and workers == 1:
         shared.tell("first come, first served", first_come(shared.cell))
@@ -174,7 +176,7 @@ def _look(shared: Shared, time_limit_s: float, seed: int, workers: int) -> None:
 
 
 def _machines_alone(cell: Cell) -> float:
-    """What the machine with the most work takes for it at least [s]; batches are left out."""
+    """The least time of the machine with the most work [s]; machines with batches are left out."""
     to_come, total = loads_s(cell, least=True), dict[int, float]()
     for part in cell.unfinished:
         for station, seconds in to_come[cell.begin_at[part - 1]].items():
@@ -184,7 +186,7 @@ def _machines_alone(cell: Cell) -> float:
 
 
 def _alone(cell: Cell, objective: str) -> float:
-    """What it costs at least if no part ever waits for another one; 0 where that says nothing."""
+    """A lower bound of the cost from parts that never wait for one another; 0 where that gives no bound."""
     if not all(way.waits for place in cell.positions for way in place.options):
         return 0.0
     left_s = work_left_s(cell)
@@ -193,11 +195,11 @@ def _alone(cell: Cell, objective: str) -> float:
     known = {MAKESPAN: max(ends.values(), default=0.0)}
     if late:
         known |= {"mean-tardiness": sum(late) / cell.parts, "tardy-parts": float(sum(one > SAME for one in late))}
-    return float(known.get(objective, 0.0))  # of numpy, which no JSON has
+    return float(known.get(objective, 0.0))  # a Python float, since JSON has no numpy types
 
 
 def _side_by_side(shared: Shared, until_s: float, seed: int, workers: int) -> None:
-    """Annealing, again and again, beside CP-SAT, in threads of their own, until it is proven or the time is over."""
+    """Runs repeated annealing and CP-SAT in threads of their own until the order is proven or the time is over."""
     with ThreadPoolExecutor() as pool:
         left_s = max(SHORTEST_S, until_s - perf_counter())
         working = [pool.submit(_prove, shared, left_s, seed, workers)]
@@ -214,20 +216,20 @@ def _side_by_side(shared: Shared, until_s: float, seed: int, workers: int) -> No
 
 
 def _prove(shared: Shared, time_limit_s: float, seed: int, workers: int) -> None:
-    """What CP-SAT makes of it, told to all."""
+    """Runs CP-SAT on the shared cell."""
     from lab.sequencing.methods.cp_sat import beside  # only where it is needed: OR-Tools takes its time
 
     beside(shared, time_limit_s, seed, workers)
 
 
 def _anneal_on(shared: Shared, seed: int) -> None:
-    """Annealing again and again, longer and longer."""
+    """Repeats annealing, each time longer."""
     for again in range(1, ANNEALINGS):
         _anneal(shared, seed + again, again)
 
 
 def _anneal(shared: Shared, seed: int, again: int) -> None:
-    """Annealing once, the longer the oftener it was done before; each third time it goes on from the best order of all."""
+    """Runs annealing once, longer with each repetition; every third one begins with the incumbent."""
     from lab.sequencing.methods.anneal import Annealing
 
     if shared.over.is_set():

@@ -1,4 +1,4 @@
-"""Lists of priorities: what stands for a sequence where whole orders are changed, crossed or learned."""
+"""Lists of priorities, the encoding of sequences for local search, crossover and learning: their simulation and neighbours."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -24,10 +24,10 @@ _following: Any = inner(splitmix.following, inline="always")
 
 
 class OrderArrays(NamedTuple):
-    """What a list of L priorities is carried out with.
+    """The buffers with which a list of L priorities is simulated.
 
-    parts, choices (L,): the list. used (L,): which entries are done. sequence (L,): decisions, then zeros. left_s (P,): how
-    long a part takes from each position on at least [s]; -inf: nobody may go by it (see `carried_out`).
+    parts, choices (L,): the list. used (L,): which entries are done. sequence (L,): the decisions, then zeros. left_s (P,): the
+    least time of a part from each position to its end [s]; -inf: it gives no bound of the cost (see `carried_out`).
     """
 
     parts: Ints
@@ -39,20 +39,20 @@ class OrderArrays(NamedTuple):
 
 @inner
 def drawn(stream: Any) -> float:
-    """The next of a stream's numbers from 0 to 1; stream (1,): its state."""
+    """The next uniform number in [0, 1) of a stream; stream (1,): its state."""
     stream[0] = _following(stream[0])
     return float(fraction(mixed(stream[0])))
 
 
 @inner
 def below(stream: Any, most: int) -> int:
-    """A whole number from 0 to most - 1, each as likely."""
+    """A uniform integer from 0 to most - 1."""
     return min(int(drawn(stream) * most), most - 1)
 
 
 @inlined
 def _way(cell: Any, run: Any, part: int, choice: int) -> int:
-    """The way that a part may take now: by its choice, else the first that it may; -1: none."""
+    """The number of the option that a part takes now: that of its choice if allowed, else the first allowed; -1: none."""
     place = run.locations[part]
     first, last = cell.first_option[place], cell.first_option[place + 1]
     found = -1
@@ -67,9 +67,9 @@ def _way(cell: Any, run: Any, part: int, choice: int) -> int:
 
 @inner
 def carried_out(cell: Any, run: Any, order: Any, limit: float) -> float:
-    """What the list costs; its sequence stands in order.sequence, followed by zeros.
+    """The cost of the list; its decisions are written into order.sequence, followed by zeros.
 
-    It is given up, parts being left unfinished, where a part cannot end before `limit` any more: then that end is returned.
+    The simulation stops when a part can no longer end by `limit`; the lower bound of that part's end is then returned.
     """
     reset(cell, run, np.uint64(0))
     for i in range(len(order.parts)):
@@ -79,7 +79,7 @@ def carried_out(cell: Any, run: Any, order: Any, limit: float) -> float:
 
 @inner
 def carried_on(cell: Any, run: Any, order: Any, limit: float, seed: Any) -> float:
-    """`carried_out` from where the run is, with what is not used of the list, and the times of an episode's seed."""
+    """`carried_out` from the run's state, with the unused entries of the list and the times of an episode's seed."""
     size, first, moves = len(order.parts), 0, 0
     for i in range(size):
         order.sequence[i] = 0
@@ -92,7 +92,7 @@ def carried_on(cell: Any, run: Any, order: Any, limit: float, seed: Any) -> floa
                 if o >= 0:
                     break
                 if cell.first_option[run.locations[part]] == cell.first_option[run.locations[part] + 1]:
-                    order.used[i] = True  # it is finished: the entry is spare
+                    order.used[i] = True  # the part is finished, so the entry is spare
             i += 1
         if o < 0:
             break
@@ -111,10 +111,10 @@ def carried_on(cell: Any, run: Any, order: Any, limit: float, seed: Any) -> floa
 
 @inner
 def changed(order: Any, stream: Any, choices: int) -> None:
-    """Turns the list into a neighbour: another way for an entry, or entries moved or swapped, mostly not far.
+    """Turns the list into a neighbour: another choice for an entry, or entries shifted or swapped, mostly over short distances.
 
-    Often an entry takes the next one of its part along: a part that is brought earlier is also worked on earlier.
-    choices: the most that an entry may have.
+    An entry often takes along the next one of its part, since a part that is brought earlier is also worked on earlier.
+    choices: the largest number of choices of an entry.
     """
     size = len(order.parts)
     at = below(stream, size)
@@ -150,7 +150,7 @@ def _swap(order: Any, at: int, to: int) -> None:
 
 @inlined
 def _shift(order: Any, at: int, to: int) -> None:
-    """An entry goes from one place to another; those between make room."""
+    """Moves an entry from one place to another; the entries between shift by one."""
     part, choice = order.parts[at], order.choices[at]
     step = 1 if to > at else -1
     while at != to:
@@ -161,14 +161,14 @@ def _shift(order: Any, at: int, to: int) -> None:
 
 @inner
 def copied(parts: Any, choices: Any, into_parts: Any, into_choices: Any) -> None:
-    """A list into another one of the same length."""
+    """Copies a list into another one of the same length."""
     for i in range(len(parts)):
         into_parts[i], into_choices[i] = parts[i], choices[i]
 
 
 @inner
 def most_choices(cell: Any) -> int:
-    """The most ways that a part may have."""
+    """The largest number of choices that a part may have."""
     most = 1
     for choice in cell.choice:
         most = max(most, choice + 1)
@@ -177,20 +177,19 @@ def most_choices(cell: Any) -> int:
 
 @without_refcounts
 def cost_of(cell: Any, run: Any, order: Any, limit: float) -> float:
-    """`carried_out`."""
+    """`carried_out`, callable from Python."""
     return float(carried_out(cell, run, order, limit))
 
 
-# ---- priorities -------------------------------------------------------------------------------------------------------
+# ---- Lists for Python, and the dispatching rules' sequences as first lists --------------------------------------------
 
 
 @dataclass(frozen=True)
 class Priorities:
-    """A list of priorities, from the highest: a part's number from 0 for each of its moves, and which of its ways it takes.
+    """A list of priorities, the highest first: for each move of each part an entry of the part (from 0) and its choice.
 
-    It stands for the sequence in which again and again the first move is made that is still to be made and may be made now.
-    Every sequence stands for itself; one that gets stuck costs what a deadlock does. Each part has as many entries as it
-    has moves at the most.
+    It encodes the sequence that repeatedly takes the first unused entry whose move is allowed. Every sequence is encoded by
+    itself. A list that ends in a deadlock has the cost of one. Each part has as many entries as it makes moves at most.
     """
 
     parts: Ints
@@ -198,7 +197,7 @@ class Priorities:
 
     @classmethod
     def of(cls, cell: Cell, sequence: Sequence[int]) -> "Priorities":
-        """Those of a sequence; beyond it, of moves that its parts did not need, part after part by turns."""
+        """The list of a sequence, followed by entries for the moves that its parts did not need, by turns of all parts."""
         spare = moves_each(cell)
         for one in sequence:
             spare[part_of(one, cell.parts) - 1] -= 1
@@ -210,7 +209,7 @@ class Priorities:
 
 @dataclass(frozen=True)
 class Begun:
-    """A dispatching rule's sequence, its cost, and whether it came to its end."""
+    """A dispatching rule's sequence, its cost, and whether it finished all parts."""
 
     sequence: tuple[int, ...]
     cost: float
@@ -218,10 +217,10 @@ class Begun:
 
 
 class Orders:
-    """Where lists are carried out: the cell and a run as arrays, and what the dispatching rules come to there.
+    """A cell and a run as arrays, in which lists are simulated, and the sequences of the dispatching rules.
 
-    begun: of each rule that the cell has the data for. first: the best one's list; scale: its cost, or a tenth of a
-    deadlock's where every rule ends in one. Raises BadInput for an objective that the kernels do not know.
+    begun: the result of each rule that the cell has the data for. first: the list of the best rule. scale: its cost, or a tenth
+    of a deadlock's cost where every rule ends in one. Raises BadInput for an objective that the kernels do not know.
     """
 
     def __init__(self, cell: Cell, objective: str, who: str) -> None:
@@ -235,20 +234,20 @@ class Orders:
         self.scale = self.best.cost if self.best.done else self.stuck_cost / 10.0
 
     def order(self) -> OrderArrays:
-        """Room for a list to be carried out: the first one."""
+        """New buffers for a list, filled with the first one."""
         size = len(self.first.parts)
         used, sequence = np.zeros(size, np.bool_), np.zeros(size, np.int64)
         return OrderArrays(self.first.parts.copy(), self.first.choices.copy(), used, sequence, self._left_s)
 
     def padded(self) -> Ints:
-        """The best rule's decisions, then zeros; only these, where it does not come to its end."""
+        """The best rule's decisions followed by zeros; only zeros where it ends in a deadlock."""
         row = np.zeros(len(self.first.parts), np.int64)
         if self.best.done:
             row[: len(self.best.sequence)] = self.best.sequence
         return row
 
     def note_rules(self, log: Log) -> None:
-        """The rules' sequences as the first episodes, as far as the budget goes."""
+        """Notes the rules' sequences as the first episodes, within the budget."""
         for one in self.begun[: log.search.episodes]:
             log.note(one.sequence, one.cost, one.done)
 
@@ -260,7 +259,7 @@ class Orders:
 
 
 def _left_s(cell: Cell, objective: str) -> Floats:
-    """How long a part takes from each position on at least [s]; -inf where an order's cost is not bounded by it."""
+    """The least time of a part from each position to its end [s]; -inf where it does not bound the cost of a sequence."""
     waits = all(way.waits for place in cell.positions for way in place.options)
     if objective == MAKESPAN and waits:
         return np.array(work_left_s(cell))

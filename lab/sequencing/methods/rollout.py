@@ -1,4 +1,4 @@
-"""Policies that look ahead: a rule asked at every decision, and the rest of the work planned anew."""
+"""Policies for times drawn by chance: a dispatching rule, and replanning of the remaining work by rollout."""
 
 from collections.abc import Collection, Sequence
 from math import inf
@@ -13,16 +13,16 @@ from lab.sequencing.simulate.run import Run, branch
 
 
 def by_rule(rule: Rule) -> Policy:
-    """A dispatching rule as a policy: it goes by what is known, and by the means for what is not."""
+    """A dispatching rule as a policy; it sees the mean for every time that is not known yet."""
     return lambda cell: rule
 
 
 def replan(objective: str = MAKESPAN, planned: Sequence[int] = ()) -> Policy:
-    """A policy that plans the rest of the work anew at every decision (`rollout`), and takes the first step of it.
+    """A policy that replans the remaining work at every decision (`rollout`) and takes the first decision of the plan.
 
-    It plans by mean times. With several robots or servers it is asked whenever something happens, keeps to its last plan, at
-    first `planned`, as long as that costs no more than a new one, and takes the first step that is asked for, or waits. A run of
-    the policy raises BadInput for an objective that the cell does not allow.
+    It plans by mean times. With several robots or servers it is asked at every event; it keeps its last plan, at first
+    `planned`, as long as that costs no more than a new one, and takes the first decision of the plan that is allowed, or waits.
+    A run of the policy raises BadInput for an objective that the cell does not allow.
     """
 
     def policy(cell: Cell) -> Choose:
@@ -35,14 +35,14 @@ def replan(objective: str = MAKESPAN, planned: Sequence[int] = ()) -> Policy:
 
 
 class _Replanning:
-    """An episode of several robots or servers: the plan that is kept, each decision with where its part stands before it."""
+    """The replanning of an episode with several robots or servers. It keeps a plan: each decision with its part's position."""
 
     def __init__(self, cell: Cell, planned: Sequence[int], objective: str) -> None:
         self.objective = objective
         self._plan = _placed(Run(cell), planned)
 
     def choose(self, seen: Observed, allowed: tuple[int, ...]) -> int:
-        """The first step, in the best plan known, that is allowed; WAIT: none."""
+        """The first decision of the best known plan that is allowed; WAIT when there is none."""
         found = rollout(seen, self.objective)
         kept = self._left(seen)
         costs = [inf if run is None else cost(run, self.objective) for run in (_moved(seen, kept), _moved(seen, found))]
@@ -51,7 +51,7 @@ class _Replanning:
         return first_of(seen, kept, allowed, self.objective)
 
     def _left(self, seen: Observed) -> tuple[int, ...]:
-        """What is left of the plan, from where each part stands."""
+        """The rest of the plan from where each part stands now."""
         parts, reached, left = seen.cell.parts, set[int](), list[int]()
         for decision, place in self._plan:
             part = part_of(decision, parts)
@@ -63,7 +63,7 @@ class _Replanning:
 
 
 def _placed(run: Run, plan: Sequence[int]) -> list[tuple[int, int]]:
-    """A plan, each decision with where its part stands before it."""
+    """The decisions of a plan, each with its part's position before it."""
     ahead, found = branch(run), list[tuple[int, int]]()
     for decision in plan:
         found.append((decision, ahead.locations[part_of(decision, run.cell.parts) - 1]))
@@ -72,9 +72,9 @@ def _placed(run: Run, plan: Sequence[int]) -> list[tuple[int, int]]:
 
 
 def first_of(run: Run, plan: Sequence[int], allowed: Collection[int], objective: str = MAKESPAN) -> int:
-    """The first decision of a plan that is allowed, and the first one there of its part and of its robot; WAIT: there is none.
+    """The first allowed decision of a plan that is the first of its part and of its robot; WAIT when there is none.
 
-    What robots that are busy or out of order are to do before it must not cost more for its being taken first.
+    Taking it before the plan's earlier decisions, which wait for busy or broken robots, must not raise the plan's cost.
     """
     ahead, taken = branch(run), set[str]()
     by = [ahead.move(decision).by for decision in plan]
@@ -89,7 +89,7 @@ def first_of(run: Run, plan: Sequence[int], allowed: Collection[int], objective:
 
 
 def _moved(run: Run, sequence: Sequence[int]) -> Run | None:
-    """Where a list of decisions leads from a run; None where one of them may not be taken."""
+    """The run after a list of decisions; None when one of them is not allowed."""
     ahead = branch(run)
     for decision in sequence:
         if ahead.option(decision) is None:
@@ -99,10 +99,10 @@ def _moved(run: Run, sequence: Sequence[int]) -> Run | None:
 
 
 def rollout(run: Run, objective: str = MAKESPAN, depth: int = 1) -> tuple[int, ...]:
-    """The best of: each allowed decision, `depth` of them in a row, then each of the dispatching rules to the end.
+    """The best continuation of a run among all that take `depth` decisions and then follow a dispatching rule to the end.
 
-    A bounded search: branching ** depth times as many simulations as there are rules. Of alike parts in one position,
-    which a swap does not change, only the first to be ready is tried. Ties to the decision tried first.
+    The search makes branching ** depth simulations for each rule. Of alike parts in one position, which may be swapped, only the
+    first to be ready is tried. Ties go to the decision tried first.
     Source: Bertsekas, Tsitsiklis and Wu 1997, rollout algorithms for combinatorial optimization.
     """
     allowed = _distinct(run)
@@ -118,12 +118,12 @@ def rollout(run: Run, objective: str = MAKESPAN, depth: int = 1) -> tuple[int, .
         value = cost(ahead, objective)
         if best is None or value < best[0]:
             best = value, (decision, *tail)
-    assert best is not None  # there was an allowed decision
+    assert best is not None  # the run had an allowed decision
     return best[1]
 
 
 def _distinct(run: Run) -> list[int]:
-    """Of the allowed decisions those that differ: by position, choice and due time."""
+    """The allowed decisions that differ in position, choice or due time."""
     parts, due_s = run.cell.parts, run.cell.due_s
     found: dict[tuple[int, int, float], int] = {}
     for decision in sorted(run.allowed(), key=lambda decision: (run.ready_s[part_of(decision, parts) - 1], decision)):

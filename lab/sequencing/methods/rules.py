@@ -1,7 +1,8 @@
-"""Dispatching rules: which of the allowed decisions to take next, by one number; ties go to the lowest decision.
+"""Dispatching rules, the sequences that they give, and the work left and loads that they compare.
 
-A rule looks at a run as it stands and never ahead, so it plans (by a cell's own times) as well as it reacts (see
-`simulate.execution`). Every rule may end in a deadlock where a cell has one.
+A rule picks the allowed decision with the least or highest value of one number; ties go to the lowest decision. It looks at the
+present state of a run only, so the same rule plans (by a cell's own times) and reacts (see `simulate.execution`). Every rule may
+end in a deadlock where the cell has one.
 """
 
 from collections.abc import Callable, Mapping
@@ -33,9 +34,9 @@ def shortest_move(run: Run, allowed: tuple[int, ...]) -> int:
 
 
 def longest_remaining_work(run: Run, allowed: tuple[int, ...]) -> int:
-    """The part with the most work left: what its machine still has to do, then processing, moves and services to the end.
+    """The part with the most work left: the rest of its processing, then processing, moves and services to its end.
 
-    Where a part has several ways on, the shortest one counts. Source: MWKR in Panwalkar and Iskander 1977.
+    Where a part has several routes left, the shortest one counts. Source: MWKR in Panwalkar and Iskander 1977.
     """
     left_s = work_left_s(run.cell)
 
@@ -47,12 +48,12 @@ def longest_remaining_work(run: Run, allowed: tuple[int, ...]) -> int:
 
 
 def most_urgent_machine(run: Run, allowed: tuple[int, ...]) -> int:
-    """The decision that feeds, or empties, the machine most behind; of several the one that drops soonest.
+    """The decision that feeds or empties the machine most behind; of several the one that drops soonest.
 
-    Most behind: the machine that would end last if from now on it never stood still, which is when it is through with
-    what it has, plus all processing still to come to it (divided by its capacity; where parts may choose between routes,
-    an even share for each). A machine with nothing to come is never behind. A decision feeds the first machine that the
-    part comes to, and empties the one it leaves. Source: bottleneck starvation avoidance, Glassey and Resende 1988.
+    Most behind is the machine that would end last if it never stood idle from now on: the end of its present work plus all
+    processing still to come (divided by its capacity; parts that may choose between routes count in equal shares). A machine
+    with no work to come is never behind. A decision feeds the first machine that the part comes to, and empties the one that it
+    leaves. Source: bottleneck starvation avoidance, Glassey and Resende 1988.
     """
     ends_s = _machine_ends_s(run)
     feeds = _feeds(run.cell)
@@ -79,7 +80,7 @@ def earliest_due(run: Run, allowed: tuple[int, ...]) -> int:
 
 
 def nearest_ready(run: Run, allowed: tuple[int, ...]) -> int:
-    """The decision whose pick, or service before it, can begin soonest: the later of getting there and being ready.
+    """The decision whose pick, or service before it, can begin soonest: when both robot and part are there and ready.
 
     Source: earliest start first, as non-delay schedules are generated (Baker 1974), with the robot as the resource.
     """
@@ -109,7 +110,7 @@ def usable(cell: Cell) -> dict[str, Rule]:
 
 
 def dispatch(run: Run, rule: Rule) -> tuple[int, ...]:
-    """Goes on with a run as a rule says, to its end or to a deadlock; the decisions."""
+    """The decisions by which a rule continues a run, until all parts are finished or none can move."""
     sequence = []
     while allowed := run.allowed():
         sequence.append(rule(run, allowed))
@@ -118,7 +119,7 @@ def dispatch(run: Run, rule: Rule) -> tuple[int, ...]:
 
 
 def dispatched(cell: Cell, rule: Rule, search: Search) -> SequenceResult:
-    """A rule as a sequencer: its one sequence, by the cell's own times.
+    """A rule's sequence by the cell's own times.
 
     Raises BadInput for an objective or a rule that the cell has no data for, WorkFailed when it ends in a deadlock.
     """
@@ -129,10 +130,10 @@ def dispatched(cell: Cell, rule: Rule, search: Search) -> SequenceResult:
 
 
 def first_come(cell: Cell) -> tuple[int, ...]:
-    """A sequence that comes to its end: what is ready first goes first; when that ends in a deadlock, part after part.
+    """A complete sequence: the part that is ready first goes first or, when that ends in a deadlock, one part after the other.
 
-    From the start one part alone never meets a full station: its routes are sound, and every station has room for one.
-    Where work begins in the middle, neither may come to its end: then it is empty.
+    A single part never meets a full station from the start, since every station has room for one. Where work begins in the
+    middle, both may fail: then the sequence is empty.
     """
     run = Run(cell)
     ready_first = dispatch(
@@ -152,7 +153,7 @@ def first_come(cell: Cell) -> tuple[int, ...]:
 
 
 def any_order(cell: Cell) -> tuple[int, ...]:
-    """A sequence that comes to its end, by whatever finds one at once; empty: a rule would have to look ahead."""
+    """A complete sequence from the first quick method that finds one; empty when none does, since rules never look ahead."""
     if found := first_come(cell):
         return found
     for rule in usable(cell).values():
@@ -164,10 +165,8 @@ def any_order(cell: Cell) -> tuple[int, ...]:
 
 @lru_cache(maxsize=16)
 def work_left_s(cell: Cell) -> tuple[float, ...]:
-    """Seconds of moves, services and processing from each position to the end, by the shortest way, processing there left out.
-
-    (positions,) in the order of `cell.positions`.
-    """
+    """The work left from each position to the end by the shortest route [s], (positions,): moves, services and processing,
+    without the processing in the position itself."""
 
     least_s = cell.loaded_s / max([robot.speed for robot in cell.robots], default=1.0)
 
@@ -186,7 +185,8 @@ def work_left_s(cell: Cell) -> tuple[float, ...]:
 
 @lru_cache(maxsize=16)
 def loads_s(cell: Cell, least: bool = False) -> tuple[dict[int, float], ...]:
-    """For each position, station index -> processing still to come there [s]: the mean, or the least, of the ways on."""
+    """For each position, the processing still to come by station index [s]: the mean over the options, or with `least` the
+    minimum."""
 
     def loads_s(place: int, ahead: list[dict[int, float]]) -> dict[int, float]:
         each = list[dict[int, float]]()
@@ -205,7 +205,7 @@ def loads_s(cell: Cell, least: bool = False) -> tuple[dict[int, float], ...]:
 
 @lru_cache(maxsize=16)
 def _feeds(cell: Cell) -> tuple[frozenset[int], ...]:
-    """For each position, the machines that a part there is at, or else comes to first."""
+    """For each position, the machine that holds the part or, if none does, the machines that it may come to first."""
 
     def feeds(place: int, ahead: list[frozenset[int]]) -> frozenset[int]:
         ways = cell.positions[place].options
@@ -216,13 +216,13 @@ def _feeds(cell: Cell) -> tuple[frozenset[int], ...]:
 
 
 def machine_of(cell: Cell, position: int) -> int | None:
-    """The machine, by station index, that the part takes room in; None: it is in none."""
+    """The index of the machine in which a part at the position takes room; None: it is in none."""
     holds = cell.positions[position].holds
     return next((station for station in holds if cell.stations[station].kind == "machine"), None)
 
 
 def _machine_ends_s(run: Run) -> dict[int, float]:
-    """Station index -> when the machine would end without ever standing still [s]; only machines with work to come."""
+    """By station index, when the machine would end if it never stood idle [s]; only machines with work to come."""
     cell, by_position = run.cell, loads_s(run.cell)
     to_come_s: dict[int, float] = {}
     through_s: dict[int, list[float]] = {}
@@ -236,14 +236,14 @@ def _machine_ends_s(run: Run) -> dict[int, float]:
     ends_s = {}
     for station, seconds in to_come_s.items():
         busy_s = through_s.get(station, [])
-        # The first of its places to be through with its part counts, once all are taken.
+        # When all places are taken, the one whose part is finished first counts.
         free_s = min(busy_s) if len(busy_s) == cell.capacities[station] else run.free_s(station)
         ends_s[station] = max(run.now_s, free_s) + seconds
     return ends_s
 
 
 def _soonest(run: Run, decision: int) -> tuple[float, int]:
-    """What tells equally urgent decisions apart: the lowest; where several robots or servers may begin, the soonest."""
+    """The sort key of equally urgent decisions: with several robots or servers the soonest, then the lowest decision."""
     if run.cell.serial:
         return 0.0, decision
     return run.pick_s(part_of(decision, run.cell.parts), _option(run, decision)), decision

@@ -1,4 +1,4 @@
-"""Sessions that learn in the simulation of `kernels`, compiled with numba; held equal to `session_readable`."""
+"""Learning sessions compiled with numba, in the simulation of `kernels`; tests hold them equal to `session_readable`."""
 
 from typing import Any, NamedTuple
 
@@ -15,14 +15,14 @@ from lab.sequencing.simulate.kernels import cost, list_allowed, move, reset
 from lab.sequencing.simulate.room_kernels import fraction, mixed, uniform
 
 LEARNER_CODES = {"random": 0, "srl": 1, "mc": 2}
-DENSE_KEYS = 2**18  # up to so many keys a table has a place for each, above it is a hash table
+DENSE_KEYS = 2**18  # up to so many keys a table is an array by key; above, it is a hash table
 
 
 class ValueTable(NamedTuple):
-    """Values by key. Rows are filled from 1; row 0 has the value of every key that is not in the table.
+    """Values by key. Rows are filled from 1; row 0 holds the value of every key that is not in the table.
 
-    rows: the row by key where `dense`, else an open hash table of rows. visits: by row, for averages. used (1,): the
-    last row filled.
+    rows: the row by key where `dense`, else a hash table of rows with open addressing. visits: by row, for averages. used (1,):
+    the last row filled.
     """
 
     rows: NDArray[np.int32]
@@ -34,10 +34,11 @@ class ValueTable(NamedTuple):
 
 
 class LearningRules(NamedTuple):
-    """What is learned by. learner: one of LEARNER_CODES; the logarithms are those of the step update's factors.
+    """The parameters of a session's updates. learner: one of LEARNER_CODES.
 
-    log_keep: 1 - alpha, log_take: alpha times discount. end_keep and end_add: what the last value of a finished episode
-    is multiplied by, and what is added. type_a: the reward factor. offset: see `gain`.
+    log_keep, log_take: the logarithms of 1 - alpha and of alpha times discount. end_keep, end_add: the last value of a finished
+    episode is multiplied by the first and increased by the second. type_a: whether the reward factor is of type A. offset: see
+    `gain`.
     """
 
     learner: int
@@ -50,14 +51,14 @@ class LearningRules(NamedTuple):
 
 
 class Method(NamedTuple):
-    """How a session learns: the keys of its values, and its rules."""
+    """The keys of a session's values and the parameters of its updates."""
 
     keys: Keys
     rules: LearningRules
 
 
 class Learning(NamedTuple):
-    """What sessions learn in and how: the cell, the same without chance."""
+    """The cell in which sessions learn, the same cell without chance, and the method."""
 
     cell: CellArrays
     calm: CellArrays
@@ -65,10 +66,10 @@ class Learning(NamedTuple):
 
 
 class Found(NamedTuple):
-    """What N sessions of E episodes of up to L moves come to.
+    """The results of N sessions of E episodes of up to L moves.
 
-    costs, complete (N, E): of the episodes. sequences (N, L): the best so far, then zeros; ends (N, 2): its cost, and
-    the greedy policy's.
+    costs, complete (N, E): of each episode. sequences (N, L): the best decisions so far, then zeros. ends (N, 2): the cost of
+    the best sequence and of the final greedy policy.
     """
 
     costs: Floats
@@ -78,17 +79,17 @@ class Found(NamedTuple):
 
     @classmethod
     def room(cls, sessions: int, episodes: int, moves: int) -> "Found":
-        """Room for so many."""
+        """Empty arrays for the results."""
         shape = sessions, episodes
         ends = np.zeros((sessions, 2))
         return cls(np.zeros(shape), np.zeros(shape, np.bool_), np.zeros((sessions, moves), np.int64), ends)
 
 
 class SessionArrays(NamedTuple):
-    """What a session of sequences of up to L moves writes to.
+    """The buffers of a session of sequences of up to L moves.
 
-    values: those of the allowed decisions. trail, sequence (L,): rows and decisions of the episode under way. best (L,),
-    best_cost (1,): the best sequence so far, then zeros; inf: none. stream (1,): the state of the random numbers.
+    values: those of the allowed decisions. trail, sequence (L,): the rows and decisions of the present episode. best (L,): the
+    incumbent's decisions, then zeros; best_cost (1,): inf without one. stream (1,): the state of the random number generator.
     """
 
     run: RunArrays
@@ -102,7 +103,7 @@ class SessionArrays(NamedTuple):
 
 
 def value_table(keys: int, rows: int, first: float) -> ValueTable:
-    """An empty table for so many keys and up to so many rows; `first`: the value of what was never visited."""
+    """An empty table for `keys` keys and up to `rows` rows; first: the value of keys that were never visited."""
     rows = min(rows, keys)
     dense = keys <= DENSE_KEYS
     values = np.zeros(rows + 1)
@@ -118,7 +119,7 @@ def value_table(keys: int, rows: int, first: float) -> ValueTable:
 
 
 def session_arrays(cell: Cell, memory: ValueTable) -> SessionArrays:
-    """Room for a session; `session_kernels.advance` makes it ready."""
+    """Empty buffers for a session; `advance` initialises them."""
     run, moves = run_arrays(cell), most_moves(cell)
     trail, sequence, best = np.zeros((3, moves), np.int64)
     return SessionArrays(
@@ -126,7 +127,7 @@ def session_arrays(cell: Cell, memory: ValueTable) -> SessionArrays:
     )
 
 
-# ---- session kernels --------------------------------------------------------------------------------------------------
+# ---- Compiled sessions ------------------------------------------------------------------------------------------------
 
 
 RANDOM, SRL, MONTE_CARLO = (LEARNER_CODES[name] for name in ("random", "srl", "mc"))
@@ -150,7 +151,7 @@ def _episode_seed(seed: Any, episode: int) -> Any:
 
 @inner
 def _find(memory: Any, key: int) -> Any:
-    """The row of a key, 0 when it has none."""
+    """The row of a key; 0 when it has none."""
     if memory.dense:
         return np.int64(memory.rows[key])
     mask = np.uint64(len(memory.rows) - 1)
@@ -162,7 +163,7 @@ def _find(memory: Any, key: int) -> Any:
 
 @inner
 def _add(memory: Any, key: int, value: float, visits: int) -> Any:
-    """A row for a key that has none."""
+    """The new row of a key that has none."""
     row = memory.used[0] + 1
     memory.used[0], memory.keys[row], memory.values[row], memory.visits[row] = row, key, value, visits
     at = np.uint64(key)
@@ -177,14 +178,14 @@ def _add(memory: Any, key: int, value: float, visits: int) -> Any:
 
 @without_refcounts
 def copy_rows(memory: Any, larger: Any) -> None:
-    """All rows of a table into an empty one with more room."""
+    """Copies all rows of a table into a larger empty one."""
     for row in range(1, memory.used[0] + 1):
         _add(larger, memory.keys[row], memory.values[row], memory.visits[row])
 
 
 @inner
 def _begin(work: Any, seed: Any) -> None:
-    """Forgets what a session has learned, and begins the random numbers of a seed (uint64)."""
+    """Clears the values of a session and starts its random numbers from a seed (uint64)."""
     memory = work.memory
     if memory.dense:
         for row in range(1, memory.used[0] + 1):
@@ -207,7 +208,7 @@ def _state_number(keys: Any, run: Any) -> int:
 
 @inner
 def _key(cell: Any, keys: Any, run: Any, state: int, i: int) -> Any:
-    """`state_keys.key_of`: of the i-th allowed decision in a state of this number."""
+    """`state_keys.key_of` for the i-th allowed decision in the state with this number."""
     part, o = (run.allowed[i] - 1) % len(run.locations), run.options[i]
     here, there = run.locations[part], cell.to[o]
     if keys.pairs:
@@ -223,7 +224,7 @@ def _key(cell: Any, keys: Any, run: Any, state: int, i: int) -> Any:
 
 @inner
 def _choose(cell: Any, keys: Any, work: Any, state: int, count: int, epsilon: float) -> int:
-    """`session_readable.choose`: which of the allowed decisions; no number is drawn where there is only one."""
+    """`session_readable.choose`: the index of the chosen decision; no number is drawn where only one is allowed."""
     if count == 1:
         return 0
     u = _next_uniform(work.stream)
@@ -236,7 +237,7 @@ def _choose(cell: Any, keys: Any, work: Any, state: int, count: int, epsilon: fl
 
 @inner
 def _episode(cell: Any, method: Any, work: Any, epsilon: float, seed: Any, learns: bool) -> int:
-    """`session_readable.walk`: one pass through a cell with the step update of SRL where it learns; how many moves were made."""
+    """`session_readable.walk`: the number of moves of one episode; with `learns`, SRL updates values after each step."""
     run, memory, keys, rules = work.run, work.memory, method.keys, method.rules
     reset(cell, run, seed)
     moves, row, state = 0, 0, 0
@@ -268,7 +269,7 @@ def _episode(cell: Any, method: Any, work: Any, epsilon: float, seed: Any, learn
 
 @inner
 def _learn(rules: Any, work: Any, moves: int, value: float, best_before: float) -> None:
-    """`SessionLearner.end`: what the cost of an episode does to the values of what was visited, once for each visit."""
+    """`SessionLearner.end`: updates the values of the visited keys by the episode's cost, once for each visit."""
     memory = work.memory
     if rules.learner == SRL:
         factor = _log_factor(value, best_before, rules.type_a, rules.offset)
@@ -284,7 +285,7 @@ def _learn(rules: Any, work: Any, moves: int, value: float, best_before: float) 
 
 @inner
 def _keep(work: Any, value: float, moves: int) -> None:
-    """The episode under way is the best so far."""
+    """Keeps the present episode as the best so far."""
     work.best_cost[0] = value
     for m in range(len(work.best)):
         work.best[m] = work.sequence[m] if m < moves else 0
@@ -292,10 +293,10 @@ def _keep(work: Any, value: float, moves: int) -> None:
 
 @without_refcounts
 def advance(learning: Any, work: Any, seeds: Any, epsilons: Any, first: int, found: Any) -> None:
-    """Sessions of the seeds (N,): E episodes numbered from `first`, and what the greedy policy costs then, into `found`.
+    """Runs a session for each of the seeds (N,) and writes its E episodes and the greedy policy's final cost into `found`.
 
-    first: 1, or how far the last session has come, as left in `work`. epsilons (E,). The only entry to this module's
-    compiled sessions: each one more would take seconds to compile.
+    first: the number of the first episode: 1, or the next one of a session that is resumed from `work`. epsilons (E,). It is the
+    only entry to the compiled sessions, since each further entry would take seconds to compile.
     """
     cell, calm, method = learning.cell, learning.calm, learning.method
     rules = method.rules

@@ -1,7 +1,7 @@
-"""A session of episodes that learns values of decisions: readable here, compiled in `session_kernels`, with the same numbers.
+"""Sessions that learn the values of decisions in episodes: the readable form; `session_kernels` holds the compiled one.
 
-Each choice takes the next of the session's uniform numbers, and each episode's chance has a seed of its own, so that
-both give the same sequences, costs and values. The compiled session is taken wherever a state fits in 63 bits.
+Each choice takes the next of the session's uniform numbers, and the chance of each episode has its own seed, so both forms give
+the same sequences, costs and values. The compiled form is used wherever a state fits in 63 bits.
 """
 
 from collections.abc import Callable
@@ -24,14 +24,14 @@ from lab.sequencing.simulate.cell_arrays import cell_arrays, most_moves
 from lab.sequencing.simulate.run import Run
 
 Table = dict[State, dict[int, float]]
-END_REWARD = 1.5  # of the last state in the listings, which keep values per state
+END_REWARD = 1.5  # the reward of the last state in the thesis's listings, which keep values per state
 BLOCK = 256  # episodes of a compiled session between two reports to the listener
-ROWS = 2**16  # rows of a table before it has to grow
+ROWS = 2**16  # initial rows of a table, which grows when they are full
 
 
 @dataclass
 class Values:
-    """Values by state and decision; `first` is that of what was never visited."""
+    """Values by state and decision; first: the value of keys that were never visited."""
 
     first: float
     held: dict[Key, float] = field(default_factory=dict)
@@ -51,7 +51,7 @@ class Values:
 
 
 class SessionLearner:
-    """What a session learns by. This one learns nothing and tries every allowed decision alike: random search."""
+    """The update rules of a session. This base class learns nothing and draws decisions uniformly: random search."""
 
     name = "random"
     first = 0.0
@@ -71,7 +71,7 @@ class SessionLearner:
         )
 
     def learning(self, cell: Cell, keys: Keys) -> arrays.Learning:
-        """The same, compiled, in a cell; `keys`: those of its settings."""
+        """The parameters of the compiled session in a cell; keys: those of its settings."""
         there = cell_arrays(cell, self._search.objective, self._search.chance)
         return arrays.Learning(there, cell_arrays(cell, self._search.objective), arrays.Method(keys, self.rules))
 
@@ -81,33 +81,33 @@ class SessionLearner:
 
     @staticmethod
     def keys(cell: Cell, settings: SrlSettings) -> Keys | None:
-        """What its values are kept by when compiled; None when that does not fit in 63 bits."""
+        """The keys of its values when compiled; None when they do not fit in 63 bits."""
         return no_keys(cell)
 
     def check(self, cost: float) -> None:
         """BadInput for a cost that it cannot learn from."""
 
     def step(self, values: Values, key: Key, following: Key | None, complete: bool) -> None:
-        """After a decision, once the following one is chosen; None: the episode is over, at its end if `complete`."""
+        """Updates a value once the following decision is chosen; following None: the episode is over, `complete` or not."""
 
     def end(self, values: Values, trail: list[Key], cost: float, best_before: float) -> None:
-        """After an episode: the keys that were visited, in order, and what it cost."""
+        """Updates values after an episode; trail: the visited keys, in order."""
 
 
 class GreedyLearner(SessionLearner):
-    """One that keeps values, and chooses by them more and more."""
+    """A learner that keeps values and chooses epsilon-greedily by them, with falling epsilon."""
 
     def __init__(self, search: Search) -> None:
         super().__init__(search)
         self.beta = search.settings.beta
 
     def epsilon(self, episode: int) -> float:
-        """Eq. 5.1."""
+        """The probability of a random decision, eq. 5.1."""
         return float(episode**-self.beta)
 
     @staticmethod
     def keys(cell: Cell, settings: SrlSettings) -> Keys | None:
-        """By pairs or next states, as the settings say."""
+        """The keys by pairs or by next states, as the settings say."""
         return keys_of(cell, settings.values, settings.state)
 
     def check(self, cost: float) -> None:
@@ -118,7 +118,7 @@ class GreedyLearner(SessionLearner):
 
 @dataclass(frozen=True)
 class Learned:
-    """What a session came to: its episodes, the cost of its greedy policy at the end, and its values."""
+    """The results of a session: its episodes, the final greedy policy's cost, and the values."""
 
     log: Log
     final_cost: float
@@ -126,13 +126,13 @@ class Learned:
 
 
 class Guide:
-    """Who has a say in a readable session's decisions; the base has none."""
+    """A hook that may replace decisions of a readable session; this base class replaces none."""
 
     def begins(self, episode: int) -> None:
         """An episode begins, numbered from 1."""
 
     def decide(self, run: Run, allowed: tuple[int, ...], own: int) -> int:
-        """The decision to take instead of the learner's own, one of those allowed."""
+        """The allowed decision to take; `own` is the learner's."""
         return own
 
     def ends(self, cost: float) -> None:
@@ -141,7 +141,7 @@ class Guide:
 
 @dataclass
 class _Session:
-    """A readable session under way."""
+    """The state of a readable session."""
 
     cell: Cell
     search: Search
@@ -152,9 +152,9 @@ class _Session:
 
 
 def learn(cell: Cell, search: Search, seed: int, kind: type[SessionLearner]) -> Learned:
-    """A session with the uniform numbers of a seed, 0 to 2**64 - 1; compiled, unless its states do not fit in 63 bits.
+    """The results of a session; it is compiled unless its states do not fit in 63 bits. seed: 0 to 2**64 - 1.
 
-    Raises BadInput for an objective that the cell cannot be judged by, and for a cost of 0 where 1 / T is needed.
+    Raises BadInput for an objective that the cell lacks data for, and for a cost of 0 where the learner needs 1 / T.
     """
     search.check(cell)
     keys = kind.keys(cell, search.settings)
@@ -166,7 +166,7 @@ def learn(cell: Cell, search: Search, seed: int, kind: type[SessionLearner]) -> 
 def learn_readably(
     cell: Cell, search: Search, seed: int, kind: type[SessionLearner], guide: Guide | None = None
 ) -> Learned:
-    """`learn`, one move after the other in Python; a guide has a say in every decision, and is told how it went."""
+    """`learn` in Python, one move after the other; a guide may replace every decision and is told each episode's cost."""
     learner = kind(search)
     session = _Session(cell, search, learner, stream(seed), Values(learner.first))
     session.guide = guide or session.guide
@@ -186,7 +186,7 @@ def learn_readably(
 
 
 def walk(session: _Session, times: Episode, epsilon: float, learns: bool) -> tuple[Run, list[int], list[Key]]:
-    """One episode: the finished run, its decisions, and the keys of their values."""
+    """The run of one episode, its decisions, and the keys of their values."""
     run, sequence, trail = Run(session.cell, times), list[int](), list[Key]()
     while allowed := run.allowed():
         keys = [key_of(run, decision, session.search.settings) for decision in allowed]
@@ -203,9 +203,9 @@ def walk(session: _Session, times: Episode, epsilon: float, learns: bool) -> tup
 
 
 def choose(keys: list[Key], values: Values, epsilon: float, draw: Callable[[], float]) -> int:
-    """Any decision with probability epsilon, else one of highest value; no number is drawn where there is only one.
+    """The index of a random decision with probability epsilon, else of one of highest value; nothing is drawn for a single key.
 
-    Source: thesis eq. 5.1; the same uniform number decides what to do and, scaled up again, between what.
+    One uniform number decides whether to explore and, rescaled, which decision to take. Source: thesis eq. 5.1.
     """
     if len(keys) == 1:
         return 0
@@ -216,12 +216,12 @@ def choose(keys: list[Key], values: Values, epsilon: float, draw: Callable[[], f
 
 
 def episode_seed(seed: int, episode: int) -> int:
-    """The seed of what chance does in an episode of a session."""
+    """The seed of the chance in an episode of a session."""
     return int(uniform(~seed & MASK, episode) * 2.0**53)
 
 
 def learn_compiled(cell: Cell, search: Search, seed: int, kind: type[SessionLearner], keys: Keys) -> Learned:
-    """`learn`, compiled; `keys`: those of its settings."""
+    """`learn`, compiled; keys: those of its settings."""
     learner, noted, longest = kind(search), Log(search), most_moves(cell)
     learning = learner.learning(cell, keys)
     memory = arrays.value_table(keys.size, min(search.episodes * longest, max(ROWS, BLOCK * longest)), learner.first)
@@ -241,7 +241,7 @@ def learn_compiled(cell: Cell, search: Search, seed: int, kind: type[SessionLear
 
 
 def _with_room(work: arrays.SessionArrays, keys: Keys, rows: int) -> arrays.SessionArrays:
-    """The same with a table that has room for so many rows more, or for all there are."""
+    """The buffers with a table that has room for `rows` more rows, or for all keys."""
     memory, full = work.memory, int(work.memory.used[0]) + rows
     if full < len(memory.keys) or len(memory.keys) > keys.size:
         return work
@@ -251,7 +251,7 @@ def _with_room(work: arrays.SessionArrays, keys: Keys, rows: int) -> arrays.Sess
 
 
 def _table(keys: Keys, memory: arrays.ValueTable) -> Table:
-    """The rows of a table, by state and decision as in `key_of`."""
+    """The values of a compiled table by state and decision, as in `key_of`."""
     table: Table = {}
     filled = slice(1, int(memory.used[0]) + 1)
     for key, value in zip(memory.keys[filled].tolist(), memory.values[filled].tolist(), strict=True):

@@ -1,7 +1,7 @@
-"""How a session chooses a decision and changes a value: plain functions of numbers, which numba compiles as well.
+"""The choice of a decision and the updates of a value: plain functions of numbers, which numba compiles as well.
 
-Values are kept as logarithms by SRL, because the type B factor divides a value by hundreds at each visit: below 1e-308
-plain floats would all be 0 and the choice between them a draw.
+SRL keeps the logarithms of values, because the type B factor divides a value by hundreds at each visit: below 1e-308 plain floats
+would all be 0, and the choice between them random.
 """
 
 from collections.abc import Sequence
@@ -13,16 +13,16 @@ from numpy.typing import NDArray
 # Eq. 5.3 leaves a and b open; the listing has 1 / (T - T* + 5) + 0.8, which is 1 where T equals the best.
 FACTOR_A_OFFSET = 5.0
 FACTOR_A_FLOOR = 0.8
-NEGLIGIBLE = 37.0  # exp(-37) of a number is less than half of what its last bit stands for
+NEGLIGIBLE = 37.0  # exp(-37) times a number is less than half of its last bit
 
 
 def explore(u: float, epsilon: float, count: int) -> int:
-    """Any of `count` decisions, for a uniform number u below epsilon."""
+    """The index of a random one of `count` decisions; u: a uniform number below epsilon."""
     return min(int(u / epsilon * count), count - 1)
 
 
 def best_of(values: Sequence[float] | NDArray[np.float64], count: int, u: float) -> int:
-    """The decision of the highest value; the uniform number u in [0, 1) decides between equally good ones."""
+    """The index of the highest of the first `count` values; the uniform number u in [0, 1) breaks ties."""
     top, ties = values[0], 1
     for i in range(1, count):
         if values[i] > top:
@@ -47,12 +47,12 @@ def log_sum(a: float, b: float) -> float:
 
 
 def gain(cost: float, offset: float) -> float:
-    """What an episode is worth: 1 / T of a makespan (offset 0), 1 / (1 + cost) of objectives that may be 0 (offset 1)."""
+    """The return of an episode: 1 / T of a makespan (offset 0), 1 / (1 + cost) of objectives that may be 0 (offset 1)."""
     return 1.0 / (offset + cost)
 
 
 def log_factor(cost: float, best_before: float, type_a: bool, offset: float) -> float:
-    """Logarithm of the reward factor, type A (eq. 5.3) or type B (eq. 5.4)."""
+    """The logarithm of the reward factor, type A (eq. 5.3) or type B (eq. 5.4)."""
     if not type_a:
         return -log(offset + cost)
     late = cost - best_before
@@ -60,10 +60,10 @@ def log_factor(cost: float, best_before: float, type_a: bool, offset: float) -> 
 
 
 def average(mean: float, visits: int, new: float) -> float:
-    """The mean of `visits` numbers and a new one."""
+    """The mean of a new number and of `visits` numbers with the given mean."""
     return (visits * mean + new) / (visits + 1)
 
 
 def log_of(value: float) -> float:
-    """log(value); of 0, -inf."""
+    """The logarithm of a value; -inf for 0."""
     return log(value) if value > 0 else -inf

@@ -1,4 +1,4 @@
-"""What is known while methods look, alone or side by side: the best order, the best bound, and whether to go on."""
+"""The state that methods share while they search, alone or side by side: incumbent, bound, limits, and whether to go on."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -13,12 +13,12 @@ from lab.sequencing.cell.objectives import cost
 from lab.sequencing.search import SAME, Search, gap
 from lab.sequencing.simulate.follow import follow
 
-REPORT_S = 1.0  # between two reports to the listener at least
+REPORT_S = 1.0  # the least time between two reports to the listener
 LEAST_S = 0.01
 
 
 class SearchOver(Exception):
-    """A limit ends a search; `by` which one. What it found until then is in its `Shared`."""
+    """Ends a search at the limit `by`; its results so far are in its `Shared`."""
 
     def __init__(self, by: Literal["seconds", "gap"]) -> None:
         super().__init__(by)
@@ -27,14 +27,14 @@ class SearchOver(Exception):
 
 @dataclass(frozen=True)
 class Limits:
-    """When a search ends early: at a moment of the clock `perf_counter`, or within a gap of the bound (see `search.gap`)."""
+    """The limits of a search: a deadline on the clock `perf_counter`, and a gap to the bound (see `search.gap`)."""
 
     until_s: float = inf
     gap: float | None = None
 
     @classmethod
     def of(cls, seconds: float | None, gap: float | None) -> "Limits":
-        """So many seconds from now on, and a gap as a fraction; None: no such limit. BadInput for what is none."""
+        """The limits of `seconds` from now on and of a gap as a fraction; None: no limit. Raises BadInput for other values."""
         if seconds is not None and not 0 < seconds < inf:
             raise BadInput(f"seconds = {seconds} (--seconds): allowed are finite times above 0")
         if gap is not None and not 0 <= gap < inf:
@@ -57,12 +57,12 @@ class _Bound(NamedTuple):
 
 
 class Shared:
-    """The best order and the best bound that any method found, and whose they are; told and asked from any thread.
+    """The incumbent and the best bound of all methods, and which methods they are from; it may be used from any thread.
 
-    sequence: empty, and its cost infinite, where there is none yet. over: nobody has to go on, since it is proven, a limit is
-    reached, or it was stopped. Whoever is interrupted leaves it whole: Ctrl-C loses nothing that was told.
-    limits: see `look`. hear: is told of news, by `look`. parent: is told what is told here, and its listener hears of it; its
-    bound holds here.
+    sequence: empty, and its cost infinite, where there is none yet. over: every method is to stop, since the order is proven, a
+    limit is reached, or the search was stopped. An interruption such as Ctrl-C loses nothing that was told.
+    limits: see `look`. hear: called by `look` when something is new. parent: receives all that is told here and reports it to
+    its own listener; its bound holds here too.
     """
 
     def __init__(
@@ -84,46 +84,46 @@ class Shared:
 
     @property
     def sequence(self) -> tuple[int, ...]:
-        """The best order."""
+        """The decisions of the incumbent."""
         return self._best.sequence
 
     @property
     def cost(self) -> float:
-        """What the best order costs."""
+        """The cost of the incumbent."""
         return self._best.cost
 
     @property
     def found_by(self) -> str:
-        """Who found the best order."""
+        """The method that found the incumbent."""
         return self._best.by
 
     @property
     def bound(self) -> float:
-        """What no order costs less than."""
+        """The best lower bound of the cost."""
         return self._bound.value
 
     @property
     def bound_by(self) -> str:
-        """Who proved the bound."""
+        """The method that proved the bound."""
         return self._bound.by
 
     @property
     def proven(self) -> bool:
-        """Whether no order costs less."""
+        """Whether the incumbent's cost equals the bound."""
         return self.cost <= self.bound + SAME
 
     @property
     def near(self) -> bool:
-        """Whether the best order is within the gap that was asked for."""
+        """Whether the incumbent is within the gap of the limits."""
         return self.limits.gap is not None and self.cost < inf and gap(self.cost, self.bound) <= self.limits.gap
 
     def beats(self, known: float, by: str) -> bool:
-        """Whether somebody else than `by` has an order that costs less."""
+        """Whether a method other than `by` has an order of lower cost than `known`."""
         best = self._best
         return best.by != by and best.cost < known - SAME
 
     def tell(self, by: str, sequence: Sequence[int] = (), bound: float = 0.0) -> None:
-        """A complete order, which is carried out here, and a cost that none is below; either is kept if it is better."""
+        """Reports an order, which is simulated here, and a lower bound; each is kept if it improves the one known."""
         if self._parent is not None:
             self._parent.tell(by, sequence, bound)
         value = cost(follow(self.cell, sequence), self.objective) if sequence else inf
@@ -136,13 +136,13 @@ class Shared:
                 self.over.set()
 
     def left_s(self, usual_s: float) -> float:
-        """How long a search may still take [s], above 0: to the limit, or `usual_s` where there is none."""
+        """The time that a search may still take [s], above 0: up to the deadline, or `usual_s` where there is none."""
         return usual_s if self.limits.until_s == inf else max(LEAST_S, self.limits.until_s - perf_counter())
 
     def look(self) -> None:
-        """Tell the listener what is new, and end the search at a limit: raises SearchOver. Every method calls it, often.
+        """Tells the listener what is new, and raises SearchOver at a limit. Every method calls it often.
 
-        Only in the thread that made this; in any other it does nothing, and `over` says when to end.
+        It acts only in the thread that made this object; in any other it does nothing, and `over` says when to end.
         """
         if get_ident() != self._owner:
             return
@@ -152,11 +152,11 @@ class Shared:
             raise SearchOver("gap" if self.near else "seconds")
 
     def told(self) -> None:
-        """What is known now has been told in another way: it is no news for the listener."""
+        """Marks the present state as known to the listener, who was told of it in another way."""
         self._heard = self._best, self._bound
 
     def report(self, least_s: float = 0.0) -> None:
-        """Tell the listener what is new, unless it was told of something within the last seconds."""
+        """Tells the listener what is new, unless the last report is less than `least_s` seconds old."""
         now_s, news = perf_counter(), (self._best, self._bound)
         if self._hear is not None and now_s >= self._heard_s + least_s and self._heard != news:
             self._heard, self._heard_s = news, now_s
@@ -164,5 +164,5 @@ class Shared:
 
 
 def shared_of(cell: Cell, search: Search) -> Shared:
-    """What a search shares with whoever asked for it, or what is its own."""
+    """The shared state that a search was given, or a new one."""
     return search.shared if isinstance(search.shared, Shared) else Shared(cell, search.objective)

@@ -1,4 +1,4 @@
-"""SRL with advice: when the makespan stops improving, it asks which part to move next, and rejects who misleads."""
+"""SRL with advice: when the makespan stops improving, it asks which part to move next, and rejects misleading advisors."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -17,15 +17,15 @@ from lab.sequencing.methods.srl import Srl
 from lab.sequencing.search import LearnedSequence, Search, SequenceRequest, state_of
 from lab.sequencing.simulate.run import Run
 
-NEVER_REACHED = 10**12  # a cost that no episode has, so that a gate takes every episode for a finished one
-FITTING = ("ccrl", "always", "never")  # gates that judge by episodes alone; those that compare values know steps only
+NEVER_REACHED = 10**12  # the gate's step limit, a cost that no episode has: every episode counts as finished
+FITTING = ("ccrl", "always", "never")  # gates that judge whole episodes; the others compare values of a table of states
 
 
 @dataclass(frozen=True)
 class AdvisedResult(LearnedSequence):
-    """A sequencer's result, and the advice in it: episodes that asked, decisions taken from the advisor, misleads.
+    """A sequencer's result and its advice: the episodes that asked, the decisions taken from the advisor, and the misleads.
 
-    first_helped: the first episode in which a decision was the advisor's; None: there was none.
+    first_helped: the first episode with a decision by the advisor; None: there was none.
     """
 
     requests: int
@@ -36,12 +36,12 @@ class AdvisedResult(LearnedSequence):
 
     @property
     def advised(self) -> bool:
-        """Whether advice has a share in the sequence: a move was advised in its episode, or in one before, and learned from."""
+        """Whether the sequence may owe something to advice: a move was advised in its episode or in an earlier one."""
         return self.first_helped is not None and self.episode_costs.index(self.cost) + 1 >= self.first_helped
 
 
 def check_gate(gate: str) -> None:
-    """BadInput for a gate that does not judge by episodes."""
+    """Raises BadInput for a gate that does not judge whole episodes."""
     if gate not in FITTING and gate in GATES:
         allowed = f"it looks at a table of states, which sequencing has not; allowed here: {', '.join(FITTING)}"
         raise BadInput(f"gate '{gate}' (--gate): {allowed}")
@@ -57,10 +57,10 @@ def advised_srl(
     advisor: Advisor | None,
     tell: Callable[[Event], None] = lambda event: None,
 ) -> AdvisedResult:
-    """SRL as printed that asks for advice when the gate says so; an advised decision is learned from as its own.
+    """The result of SRL as printed when it asks for advice as the gate says; advised decisions are learned like its own.
 
-    The gates are those of the low level: the step counts that they compare are costs here (makespans [s]), and so are those
-    of the events. Raises BadInput for a gate that does not judge by episodes, and as `srl` does. Source: thesis 10.2.1 iii
+    The gates are those of the low level; where they compare step counts, and where events report them, costs stand here
+    (makespans [s]). Raises BadInput for a gate that does not judge whole episodes, and as `srl` does. Source: thesis 10.2.1 iii
     with fig. 6.2.
     """
     check_gate(gate.gate)
@@ -78,7 +78,7 @@ def advised_srl(
 
 
 class _Advised(Guide):
-    """What a session asks before it takes its own decision, and tells when an episode has ended."""
+    """The guide of an advised session: it asks the advisor before a decision, and judges each episode by its cost."""
 
     def __init__(
         self, gate: Gate, settings: GateSettings, advisor: Advisor | None, tell: Callable[[Event], None]
@@ -93,19 +93,19 @@ class _Advised(Guide):
         self._made: list[int] = []  # the decisions of this episode
 
     def begins(self, episode: int) -> None:
-        """An episode begins: may it ask?"""
+        """Decides by the gate whether the episode may ask."""
         self._open = self._advisor is not None and self.gate.opens(episode, self._costs)
         self._asked, self._helped, self._made = False, 0, []
 
     def decide(self, run: Run, allowed: tuple[int, ...], own: int) -> int:
-        """The decision of whoever is asked where the episode is open and there is a choice, else the learner's own."""
+        """The advisor's decision where the episode may ask and there is a choice, else the learner's own."""
         said = self._asks(run, allowed, own)
         self._helped += said is not None
         self._made.append(own if said is None else said)
         return self._made[-1]
 
     def _asks(self, run: Run, allowed: tuple[int, ...], own: int) -> int | None:
-        """What is said, None where nobody is asked or nothing is said."""
+        """The advisor's decision; None when nobody is asked or no advice is given."""
         if not self._open or self._advisor is None or len(allowed) == 1:
             return None
         known, number = improvement(self._costs, self._settings.window), len(self._costs) + 1
@@ -141,7 +141,7 @@ class _Advised(Guide):
         return Standing(helped, settings.budget, self.gate.misleads, settings.omega, settings.lambda_threshold)
 
     def ends(self, cost: float) -> None:
-        """An episode has ended: was it better than those before?"""
+        """Judges the advice of the episode by whether its cost improved."""
         self._costs.append(cost)
         self.helped_steps += self._helped
         number, helped, window = len(self._costs), self._helped, self._settings.window

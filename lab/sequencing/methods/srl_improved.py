@@ -1,4 +1,4 @@
-"""SRL improved for large cells: where in the order each move belongs is learned, from episodes that are improved before."""
+"""SRL improved for large cells: it learns where in the order each move belongs, from episodes improved by local search."""
 
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -15,13 +15,13 @@ from lab.sequencing.simulate.cell_arrays import Floats, Ints, moves_each
 
 
 class LearnedOrders(NamedTuple):
-    """What is learned of the L entries of a list, and the episode under way.
+    """The learned distribution of lists with L entries, and the present episode.
 
-    An entry is a part and which of its moves; first (K + 1,): where the entries of each part begin. place, spread (L,): where
-    in the list it should stand, from 0 to 1, and how unsure that is. ways (L, C): the probability of each way. drawn (L,):
-    the places of an episode; by (L,): the entries in their order. tried: the neighbour of parts, choices (L,), which cost
-    cost (2,): of these, and the least so far. nth (K,): how many entries of a part were met. best (L,): the best decisions,
-    then zeros. stream (1,): the state of the random numbers.
+    An entry is one move of one of K parts; first (K + 1,): where the entries of each part begin. place, spread (L,): mean and
+    spread of an entry's place in the list, from 0 to 1. ways (L, C): the probability of each choice. drawn (L,): the places of an
+    episode; by (L,): the entries sorted by them. parts, choices (L,): the current list; tried: its neighbour. cost (2,): of the
+    current list, and the least so far. nth (K,): how many entries of a part were met. best (L,): the incumbent's decisions, then
+    zeros. stream (1,): the state of the random number generator.
     """
 
     first: Ints
@@ -41,7 +41,7 @@ class LearnedOrders(NamedTuple):
 
 @inner
 def _way_of(learned: Any, entry: int, explores: bool) -> int:
-    """A way for an entry: drawn by their probabilities, or the likeliest one."""
+    """The choice of an entry: drawn by the probabilities, or without exploring the likeliest one."""
     count, best = learned.ways.shape[1], 0
     for way in range(count):
         if learned.ways[entry, way] > learned.ways[entry, best]:
@@ -58,16 +58,16 @@ def _way_of(learned: Any, entry: int, explores: bool) -> int:
 
 @inner
 def _listed(learned: Any, explores: bool) -> None:
-    """A list drawn from what was learned, or the one that it comes to without chance, into `tried`."""
+    """Writes a list drawn from the learned distribution into `tried`, or without exploring its mean."""
     size = len(learned.place)
     for part in range(len(learned.nth)):
         learned.nth[part] = 0
         for entry in range(learned.first[part], learned.first[part + 1]):
-            learned.parts[entry] = part  # only until the list is kept
+            learned.parts[entry] = part  # temporarily, until the list is kept
     for entry in range(size):
         at = learned.place[entry]
         if explores:
-            wide = drawn(learned.stream) + drawn(learned.stream) - 1.0  # a triangle, of variance 1 / 6
+            wide = drawn(learned.stream) + drawn(learned.stream) - 1.0  # triangular distribution of variance 1 / 6
             at += wide * np.sqrt(6.0) * learned.spread[entry]
         learned.drawn[entry] = at
         i = entry
@@ -84,7 +84,7 @@ def _listed(learned: Any, explores: bool) -> None:
 
 @inner
 def _learn(learned: Any, alpha: float) -> None:
-    """What was learned goes towards the list kept, by a share alpha."""
+    """Moves the learned distribution towards the current list, by a share alpha."""
     size = len(learned.parts)
     for part in range(len(learned.nth)):
         learned.nth[part] = 0
@@ -102,7 +102,7 @@ def _learn(learned: Any, alpha: float) -> None:
 
 @inner
 def _try(cell: Any, run: Any, learned: Any, limit: float) -> float:
-    """What the list in `tried` costs; up to the limit it is kept."""
+    """The cost of the list in `tried`, which becomes the current list if its cost is at most `limit`."""
     value = carried_out(cell, run, learned.tried, limit)
     if value <= limit:
         learned.cost[0] = value
@@ -116,7 +116,7 @@ def _try(cell: Any, run: Any, learned: Any, limit: float) -> float:
 
 @without_refcounts
 def lesson(cell: Any, run: Any, learned: Any, costs: Any, alpha: float, temperature: float) -> None:
-    """As many sequences as there are costs (N,), which are filled: one drawn, the others to improve it; then it is learned."""
+    """One lesson: draws a list, improves it by N - 1 neighbours, learns from it, and writes the N costs into `costs` (N,)."""
     _listed(learned, True)
     learned.cost[0] = np.inf
     costs[0] = _try(cell, run, learned, np.inf)
@@ -125,37 +125,33 @@ def lesson(cell: Any, run: Any, learned: Any, costs: Any, alpha: float, temperat
         changed(learned.tried, learned.stream, learned.ways.shape[1])
         warm = temperature * (1.0 - n / len(costs))
         costs[n] = _try(cell, run, learned, learned.cost[0] - warm * np.log(1.0 - drawn(learned.stream)))
-    if learned.cost[1] < np.inf:  # else nothing has come to its end yet
+    if learned.cost[1] < np.inf:  # otherwise every sequence so far ended in a deadlock
         _learn(learned, alpha * np.exp((learned.cost[1] - learned.cost[0]) / max(1e-9, temperature)))
 
 
 @without_refcounts
 def greedy(cell: Any, run: Any, learned: Any) -> float:
-    """What the list costs that was learned, without chance; its sequence stands in `tried`."""
+    """The cost of the learned list without exploring; its decisions are written into `tried`."""
     _listed(learned, False)
     return float(carried_out(cell, run, learned.tried, np.inf))
 
 
-# ---- srl improved -----------------------------------------------------------------------------------------------------
+# ---- The method `srl-improved` ----------------------------------------------------------------------------------------
 
 
-LONGEST, LESSONS = (
-    10_000,
-    100,
-)  # sequences between two lessons: at most so many, and so few that there are as many lessons
-ALPHA = 0.2  # share by which a lesson as good as the best one moves what is learned
-SPREAD, WARM = (
-    0.1,
-    0.01,
-)  # how unsure a place is at first; the temperature of improving, as a share of the best rule's cost
+LONGEST = 10_000  # the most sequences in a lesson
+LESSONS = 100  # the least number of lessons, in which a small budget is divided
+ALPHA = 0.2  # step size of a lesson whose cost equals the best one's
+SPREAD = 0.1  # the spread of every place before the first lesson
+WARM = 0.01  # the temperature of the annealing in a lesson, as a share of the best rule's cost
 
 
 @dataclass(frozen=True)
 class SrlImprovedResult(LearnedSequence):
-    """A sequencer's result, and what was learned of the L moves, part after part (see `Priorities`).
+    """A sequencer's result and the learned distribution over the L moves, part after part (see `Priorities`).
 
-    place, spread (L,): where in the order a move belongs, from 0, first, to 1, and how unsure that is. ways (L, C): the
-    probability of each choice. `final_cost` is that of the order which the places alone come to, without improving.
+    place, spread (L,): mean and spread of a move's place in the order, from 0, first, to 1. ways (L, C): the probability of each
+    choice. final_cost: the cost of the order of the mean places, without local search.
     """
 
     place: tuple[float, ...]
@@ -164,14 +160,14 @@ class SrlImprovedResult(LearnedSequence):
 
 
 def srl_improved(cell: Cell, search: Search, rng: np.random.Generator) -> SrlImprovedResult:
-    """Learn where in the order each move belongs and by which way; the best sequence found is the result.
+    """The best sequence found while it learns where in the order each move belongs, and which choice it takes.
 
-    It begins with the places of the best dispatching rule. A lesson draws an order from what was learned, improves it by a
-    short annealing, and moves place, spread and ways towards it: by ALPHA exp((best - cost) / temperature), so that, as
-    in SRL, the reward of the whole counts. Every sequence tried, the neighbours too, is an episode; what has become too long is
-    given up as in `anneal`. Most of what it finds is the search's: on the 80 of Bilge and Ulusoy what was learned, alone
-    (`final_cost`), is no better than a dispatching rule. It works by the mean times. Raises BadInput and WorkFailed as the
-    other methods do.
+    It begins with the places of the best dispatching rule. A lesson draws an order from the learned distribution, improves it by
+    a short annealing, and moves place, spread and ways towards it by ALPHA exp((best - cost) / temperature), so that, as in SRL,
+    the reward of the whole episode counts. Every sequence tried, neighbours too, is an episode; simulations are cut off as in
+    `anneal`. Most of the quality comes from the search: on the 80 instances of Bilge and Ulusoy the learned order alone
+    (`final_cost`) is no better than a dispatching rule. It works by the mean times. Raises BadInput and WorkFailed as the other
+    methods do.
     Source: population-based incremental learning of real values, Sebag and Ducoulombier 1998; learning from improved
     solutions, Whitley, Gordon and Mathias 1994.
     """
@@ -193,7 +189,7 @@ def srl_improved(cell: Cell, search: Search, rng: np.random.Generator) -> SrlImp
 
 
 def _begun(orders: Orders, seed: int) -> LearnedOrders:
-    """Nothing learned yet but the first list's places; all ways are alike."""
+    """The distribution before the first lesson: the places of the first list, and equal probabilities of all choices."""
     cell, first = orders.cell, orders.first
     begins, size = np.cumsum([0, *moves_each(cell)]), len(first.parts)
     place, met = np.zeros(size), np.zeros(cell.parts, np.int64)

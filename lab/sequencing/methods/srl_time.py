@@ -1,4 +1,4 @@
-"""Q-learning of what time still to come costs, from a lower bound of the full model on: close to heuristic search."""
+"""Q-learning of the cost to go, with values that begin at a lower bound from the full model: close to heuristic search."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -15,8 +15,8 @@ from lab.sequencing.search import SAME, LearnedSequence, Log, Search
 from lab.sequencing.simulate.execution import Choose, Observed, Policy
 from lab.sequencing.simulate.merged import MergedCell, MergedKey, MergedState
 
-SMALL_JOBS = (5, 6, 7)  # parts; what is learned with so few is tried with more
-MOST_VALUES = 2_000_000  # of a table: half a gigabyte
+SMALL_JOBS = (5, 6, 7)  # numbers of parts in the small jobs whose values are tried on the whole job
+MOST_VALUES = 2_000_000  # values in a table: half a gigabyte
 PRACTICE, TRIES = 5, 20  # each small job is practised in a fifth of the episodes, and tried in a twentieth
 
 Action = tuple[int, int, int]  # position, choice, and the part where parts are told apart (else 0)
@@ -26,29 +26,26 @@ Table = dict[tuple[object, ...], Row]
 
 @dataclass(frozen=True)
 class SrlTimeResult(LearnedSequence):
-    """A sequencer's result, and what was learned: the cost still to come, by state and by what to move next.
+    """A sequencer's result and the learned cost to go, by state and action.
 
-    A state is how many parts stand at each position, where the robot is, and how long is still to be waited for what is
-    processed or arrives [ticks of a nanosecond]. With many parts `final_cost` is that of the best policy learned with
-    few or with all.
+    A state is how many parts stand at each position, where the robot is, and the time left until each process or arrival ends
+    [ticks of a nanosecond]. With many parts, final_cost is that of the best policy, learned on a small job or on the whole one.
     """
 
     q: Table
 
 
 def srl_time(cell: Cell, search: Search, rng: np.random.Generator, bounded: bool = True) -> SrlTimeResult:
-    """Learn in simulated episodes which position to serve next; the best sequence found is the result.
+    """The best sequence found while Q-learning, in simulated episodes, learns which position to serve next.
 
-    Where alike parts are more than in SMALL_JOBS, these are learned first, each in a fifth of the episodes, and what was
-    learned is tried on the job in a twentieth: with many parts waiting and many done, it does not matter how many. In
-    what is left the job itself is learned. `episode_costs` are those of the job.
-    Q(s,a) begins at what the step costs and what has to come at least after it (`lower_bound`), never above the
-    truth, so that greedy choices explore by themselves; ties are drawn by `rng`. That bound knows the whole model, its
-    times and all that is still to come, which a learner that only sees episodes does not: with `bounded` False values begin
-    at 0. After an episode, from its last step to
-    its first, Q(s,a) = cost of the step + min Q(s',.): Q-learning with alpha 1, exact where nothing is left to chance. It
-    learns with the mean times; `srl_time_reacting` goes on learning where times are drawn. Raises BadInput for an
-    objective that the cell has no times for.
+    When there are more identical parts than in SMALL_JOBS, the small jobs are learned first, each in a fifth of the episodes, and
+    their values are tried on the whole job in a twentieth: with many parts waiting and many done, their numbers hardly matter. In
+    the remaining episodes the whole job is learned; `episode_costs` are those of the whole job.
+    Q(s,a) begins at the cost of the step plus a lower bound of the cost after it (`lower_bound`). Such values are optimistic, so
+    greedy choices explore; ties are drawn by `rng`. The bound uses the whole model, which a learner that only sees episodes does
+    not have: with `bounded` False values begin at 0. After an episode, from its last step to its first,
+    Q(s,a) = cost of the step + min Q(s',.): Q-learning with alpha 1, which is exact when times are not drawn. It learns with the
+    mean times; `reacting` goes on learning where times are drawn. Raises BadInput for an objective that the cell lacks data for.
     Source: Q-learning (Watkins 1989) with admissible start values, as learning real-time A* (Korf 1990).
     """
     search.check(cell)
@@ -72,7 +69,7 @@ def srl_time(cell: Cell, search: Search, rng: np.random.Generator, bounded: bool
 
 
 def bound_alone(cell: Cell, search: Search, rng: np.random.Generator) -> float | None:
-    """What an order costs that follows the first values of `srl_time` greedily, nothing learned; None: it gets stuck."""
+    """The cost of the order that is greedy by the initial values of `srl_time`, without learning; None: it ends in a deadlock."""
     _, cost, done = TimeLearner(cell, search.objective, rng).episode(learns=False)
     return cost if done else None
 
@@ -83,9 +80,9 @@ def _many_alike(cell: Cell) -> bool:
 
 
 class TimeLearner:
-    """The table, and how an episode goes. distinct: alike parts are told apart, which due times make necessary.
+    """The table of values and its episodes. distinct: whether identical parts are told apart, as due times require.
 
-    bounded: values begin at what has to come at least; else at 0.
+    bounded: whether values begin at a lower bound of the cost to go; else they begin at 0.
     """
 
     def __init__(self, cell: Cell, objective: str, rng: np.random.Generator, bounded: bool = True) -> None:
@@ -100,11 +97,11 @@ class TimeLearner:
         self._all_work_s = sum(place.processing_s or 0.0 for place in cell.positions)
 
     def greedy(self, state: MergedState) -> Action:
-        """The action of least cost to come."""
+        """The action of least cost to go."""
         return self._best(self._row(state))
 
     def episode(self, begin: MergedState | None = None, *, learns: bool = True) -> tuple[tuple[int, ...], float, bool]:
-        """One greedy pass, from the start or from `begin`; the decisions, their cost, and whether it came to its end."""
+        """The decisions of a greedy episode from the start or from `begin`, their cost, and whether all parts were finished."""
         state, sequence, total = begin or self.merged.start(named=True), list[int](), 0.0
         steps: list[tuple[Row, Action, float, Row]] = []
         row = self._row(state)
@@ -123,7 +120,7 @@ class TimeLearner:
         return tuple(sequence), total if done else self.stuck_cost, done
 
     def step(self, state: MergedState, action: Action) -> tuple[MergedState, float]:
-        """The state after an action, and what that adds to the cost."""
+        """The state after an action, and the cost of the step."""
         place, choice, part = action
         way = self.merged.choices(state)[place, choice]
         ahead = self.merged.after(state, way, part)
@@ -137,9 +134,9 @@ class TimeLearner:
         return ahead, (self._machines * (ahead.now - state.now) - worked) / TICKS_PER_S
 
     def tried_on(self, job: "TimeLearner") -> tuple[tuple[int, ...], float, bool]:
-        """One greedy pass through a larger job by what was learned in this one; what `episode` returns.
+        """The result, as of `episode`, of a greedy pass through a larger job by the values of this one.
 
-        As how many the done parts count while others still wait is drawn. Where nothing is known it serves any part.
+        The number of parts that count as done while others still wait is drawn. In unknown states a random action is taken.
         """
         state, sequence, total = job.merged.start(named=True), list[int](), 0.0
         done = int(self._rng.integers(1, self._cell.parts - 1))
@@ -153,7 +150,7 @@ class TimeLearner:
         return tuple(sequence), total if complete else job.stuck_cost, complete
 
     def actions(self, state: MergedState) -> Iterator[Action]:
-        """What may be done now: from which position, by which of its ways, and with which part where that matters."""
+        """The allowed actions: position, choice, and the part where parts are told apart."""
         for (place, choice), way in self.merged.choices(state).items():
             if not self.distinct or state.who is None:
                 yield place, choice, 0
@@ -164,7 +161,7 @@ class TimeLearner:
                     yield place, choice, part
 
     def _as_if_small(self, job: MergedCell, state: MergedState, done: int) -> MergedKey:
-        """The state of a larger job as it would be with this one's few: those that wait and those that are done are fewer."""
+        """The key of a larger job's state in this small one: with fewer parts that wait and fewer that are done."""
         counts, first, ends = job.counted(state.counts), self._cell.starts[0], job.ends
         finished = sum(counts[place] for place in ends)
         here = self._cell.parts - (sum(counts) - counts[first] - finished)
@@ -176,9 +173,9 @@ class TimeLearner:
         return job.code(counts), robot, waits
 
     def _row(self, state: MergedState) -> Row:
-        """The values of what may be done now; none when all is done, or nothing can move any more.
+        """The values of the allowed actions; empty when all parts are finished or none can move.
 
-        Where the table is full, a state that it does not hold has the values that states begin with, each time anew.
+        When the table is full, a state that it does not hold gets its initial values anew each time.
         """
         key = (*self.merged.key(state), state.now, state.who) if self.distinct else self.merged.key(state)
         if (row := self.q.get(key)) is None:
@@ -189,7 +186,7 @@ class TimeLearner:
         return row
 
     def _at_least(self, state: MergedState, action: Action) -> float:
-        """What an action costs, and what has to come at least after it; 0 where nobody is to know."""
+        """The initial value of an action: the cost of the step plus a lower bound of the cost after it; 0 if not `bounded`."""
         if not self._bounded:
             return 0.0
         ahead, cost = self.step(state, action)
@@ -199,11 +196,11 @@ class TimeLearner:
         return cost + (least_s if self._objective == MAKESPAN else self._machines * least_s - self._work_left_s(ahead))
 
     def _work_left_s(self, state: MergedState) -> float:
-        """More than what machines still will be given to do [s]."""
+        """An upper bound of the processing that machines still have to begin [s]."""
         return (self._cell.parts - self.merged.finished(state)) * self._all_work_s
 
     def _late(self, state: MergedState) -> float:
-        """What the part costs that was just finished."""
+        """The cost of the part that was just finished."""
         due_s = self._cell.due_s
         if due_s is None:
             return 0.0
@@ -216,23 +213,23 @@ class TimeLearner:
         return ties[int(self._rng.integers(len(ties)))]
 
 
-# ---- srl time reacting ------------------------------------------------------------------------------------------------
+# ---- Where times are drawn: a policy that goes on learning ------------------------------------------------------------
 
 
 PRACTICE_EPISODES = 20  # simulated episodes before each decision
 
 
 def reacting(cell: Cell, objective: str = MAKESPAN, seed: int = 0) -> Policy:
-    """A policy that, before each decision, learns in a few simulated episodes from what can be seen to the end.
+    """A policy that, before each decision, learns in a few simulated episodes from the observed state to the end.
 
-    It sees what stands where and for how long machines have been at work, and takes the mean for what is left. The table
-    is the one of `srl_time`, and it is kept from decision to decision and from episode to episode, so that little is
-    learned twice. Source: learning real-time A* (Korf 1990), as `srl_time`; certainty equivalence for the times.
+    It observes where parts stand and how long machines have been at work, and assumes mean times for the rest. Its table is that
+    of `srl_time`, kept from decision to decision and from episode to episode, so that little is learned twice. Source: learning
+    real-time A* (Korf 1990), as `srl_time`; certainty equivalence for the times.
     """
     learner = TimeLearner(cell, objective, np.random.default_rng(seed))
 
     def choose(seen: Observed, allowed: tuple[int, ...]) -> int:
-        """The decision that serves the position of least cost to come; of alike parts the one that is ready first."""
+        """The decision that serves the position of least cost to go; of identical parts the first that is ready."""
         if len(allowed) == 1:
             return allowed[0]
         here = learner.merged.of_run(seen)

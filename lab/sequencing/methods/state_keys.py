@@ -1,4 +1,4 @@
-"""What the value of a decision is kept under: a state and a decision as tuples, and both as one number when compiled."""
+"""The keys of values: a state and a decision as tuples, and both as one number for the compiled sessions."""
 
 from typing import NamedTuple
 
@@ -16,11 +16,11 @@ MAX_KEY = 2**63 - 1
 
 
 class Keys(NamedTuple):
-    """How a state, or a state and a decision, becomes one number from 0 to `size` - 1.
+    """The encoding of a state, or of a state and a decision, as one number from 0 to `size` - 1.
 
-    A state is a row of digits, the first one lowest, digit i from 0 to radix[i] - 1. weight (K, P): what a part in a
-    position adds to the number; done (P,): what it adds more once its machine has finished. pairs: whether values
-    are kept by state and decision, of which `labels` are told apart; else by next state. merged: alike parts are one.
+    A state is a mixed-radix number, the lowest digit first, digit i from 0 to radix[i] - 1. weight (K, P): what each part adds to
+    the number in each position; done (P,): what it adds once its machine has finished. pairs: whether values are kept by state
+    and decision, with `labels` different decisions; else by next state. merged: whether identical parts are merged.
     """
 
     radix: Ints
@@ -33,12 +33,12 @@ class Keys(NamedTuple):
 
 
 def key_of(run: Run, decision: int, settings: SrlSettings) -> Key:
-    """What the value of an allowed decision is kept under.
+    """The key of an allowed decision's value: a state and a decision, by the settings `values` and `state`.
 
-    "pairs": the state, and the decision; where alike parts are one, it is named by the position of its part, from 1, as
-    `entry` does by the part's number. "states": the state that the decision leads to, as far as it is known now, and 0.
-    "parts": the position of each part. "stations": how many parts stand at each position that takes room, in the order
-    of the positions, then on how many the machine has finished, for each position where one is at work.
+    values "pairs": the state and the decision; where identical parts are merged, the decision is the entry of its part's position
+    (from 1) instead of its part's number. values "states": the state that the decision leads to, as far as known now, and 0.
+    state "parts": the position of each part. state "stations": how many parts stand at each position that takes room, then, for
+    each position where a machine works, how many of them it has finished.
     """
     part = part_of(decision, run.cell.parts)
     option, here = run.option(decision), run.locations[part - 1]
@@ -86,7 +86,7 @@ def no_keys(cell: Cell) -> Keys:
 
 
 def decoded(keys: Keys, key: int) -> tuple[tuple[int, ...], int]:
-    """The digits of the state, and the label from 0, that a key was made of."""
+    """The digits of the state and the decision's label (from 0) that a key encodes."""
     number, label = divmod(key, keys.labels)
     digits = []
     for radix in keys.radix.tolist():
@@ -101,7 +101,7 @@ def timed_positions(cell: Cell) -> tuple[int, ...]:
 
 
 def _station_digits(cell: Cell) -> list[int]:
-    """Radices: how many parts stand in each position that holds room, then on how many the machine has finished."""
+    """The radices of the digits: parts in each position that takes room, then parts that its machine has finished."""
     most = [1 + min([cell.capacities[station] for station in place.holds] + [cell.parts]) for place in cell.positions]
     held = [most[index] for index, place in enumerate(cell.positions) if place.holds]
     return held + [most[index] for index in timed_positions(cell)]

@@ -1,1 +1,1 @@
-"""What a sequence comes to: a readable run, one with alike parts merged, and a compiled one."""
+"""The simulations of a cell: a readable run, states with identical parts merged, and a compiled run."""

@@ -1,4 +1,4 @@
-"""A cell and a run of it as plain arrays: what the compiled simulation works on."""
+"""A cell and a run of it as plain arrays, for the compiled simulation."""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -16,8 +16,8 @@ Ints = NDArray[np.int64]
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-WIDTH = 2  # stations that a position holds, or an option needs: at most a machine and the place of its pallet
-ENDLESS = 2**40  # room of a station that is never full
+WIDTH = 2  # the most stations that a position holds, or an option needs: a machine and the place of its pallet
+ENDLESS = 2**40  # the capacity of a station that is never full
 NO_ARRIVALS = 0
 ARRIVAL_CODES = {name: code for code, name in enumerate(ARRIVALS_AFTER, 1)}
 LAW_CODES = {name: code for code, name in enumerate(LAWS)}
@@ -25,19 +25,19 @@ OBJECTIVE_CODES = {name: code for code, name in enumerate(BUILT_IN)}
 
 
 class CellArrays(NamedTuple):
-    """A cell of K parts, S stations, P positions with O options, what it is judged by, and what chance does to it.
+    """A cell of K parts, S stations and P positions with O options, its objective, and its chance.
 
     first_option (P + 1,): where the options of each position begin. holds (P, 2), needs (O, 2) and if_full (O,):
-    stations; where there are fewer, S stands for one with endless room and S + 1 for one that is always full.
-    begins (P,): whether a processing begins there. at_most_s (P,): how long after it a part may be picked; inf: at any time;
-    windows: whether there is such a limit. rooms (S + 2,): room for parts. empty_s, loaded_s (S, S) [s];
+    stations; unused entries hold S, a station that is never full, in holds and needs, and S + 1, one that is always full, in
+    if_full. begins (P,): whether a processing begins there. at_most_s (P,): how long after it a part may be picked; inf: at any
+    time; windows: whether there is such a limit. rooms (S + 2,): capacities. empty_s, loaded_s (S, S) [s].
     starts, begin_at (K,): the first position of a part's routes, and the one in which it begins; begin_s (K,): when it may be
     picked there [s]; coming (C,): the parts, from 0, that begin at a start.
-    tracked: whether there is a track; first_held (S * S + 1,): where the stretches of each way on it begin in held (H,);
-    held_from_s, held_until_s (R, H): from when until when a robot on that way is on each [s].
-    takers (S + 2, R + 1): whether a robot, or a server, may make room in a station; shared: whether one may for another one.
-    ruled: whether there are precedences, R of them; made, ended (R, P): as `Rule` has them; counts (R, K): as many as it
-    has, then 0. batched: whether there are machines with batches; batch (S + 2,): which.
+    tracked: whether there is a track; first_held (S * S + 1,): where the stretches of each path on it begin in held (H,);
+    held_from_s, held_until_s (R, H): from when until when a robot on that path is on each stretch [s].
+    takers (S + 2, R + 1): whether a robot, or a server, may free room in a station; shared: whether one may do so for another.
+    ruled: whether there are precedences, R of them; made, ended (R, P): as in `Rule`; counts (R, K): its counts, then 0.
+    batched: whether there are machines with batches; batch (S + 2,): which.
     interval_s, due_s (K,) [s]. many: whether a part may have several choices. The codes are those of this module.
     """
 
@@ -100,16 +100,15 @@ class CellArrays(NamedTuple):
 
 
 class RunArrays(NamedTuple):
-    """A run, as `lab.sequencing.simulate.run.Run`, and the decisions allowed now.
+    """The state of a run, as in `lab.sequencing.simulate.run.Run`, and the decisions allowed now.
 
-    locations, ready_s, finished_s (K,). room (S + 2,): what is left. clock (4,): when a robot is free first, waited,
-    processed, the end of all that was decided [s]. whole (2,): parts fetched, parts not yet finished. robots_at,
-    robots_s (R,): the robots. track_s: since when each stretch is free.
-    rooms_s, servers_s: since when each room and server is free, those of a station ascending as
-    far as they are free; worked: the last product of each server, -1: none. held (R, 4): the part that a robot holds while
-    it waits for room, from 0, how many wait longer, and the stations in which it waits; -1: none. fetched_s, put_s (K,),
-    kept_s (S + 2,): as in `Run`. seed (1,): of the episode, by which robots break down.
-    allowed: decisions, ascending; options: what each means.
+    locations, ready_s, finished_s (K,). room (S + 2,): the free room. clock (4,): when the first robot is free, total waits,
+    total processing, and the end of all decided moves [s]. whole (2,): parts fetched, parts not yet finished. robots_at,
+    robots_s (R,): where and when each robot is free. track_s: since when each stretch is free. rooms_s, servers_s: since when
+    each room and server is free, those of a station that are free in ascending order; worked: the last product of each server,
+    -1: none. held (R, 4): the part (from 0) that a robot holds while it waits for room, how many robots wait longer, and the
+    stations where it waits; -1: none. fetched_s, put_s (K,), kept_s (S + 2,): as in `Run`. seed (1,): of the episode, by which
+    robots break down. allowed: the decisions, ascending; options: the option of each.
     """
 
     locations: Ints
@@ -134,9 +133,9 @@ class RunArrays(NamedTuple):
 
 
 def cell_arrays(cell: Cell, objective: str = MAKESPAN, chance: Chance = NO_CHANCE) -> CellArrays:
-    """The cell as arrays, to be judged by an objective that it has been checked for (`check_objective`).
+    """The cell as arrays; the objective must have passed `check_objective`.
 
-    BadInput for an objective that the kernels do not know.
+    Raises BadInput for an objective that the kernels do not know.
     """
     check_built_in(objective, "the compiled simulation")
     check_chance(cell, chance)
@@ -197,7 +196,7 @@ def cell_arrays(cell: Cell, objective: str = MAKESPAN, chance: Chance = NO_CHANC
 
 
 def run_arrays(cell: Cell) -> RunArrays:
-    """Room for a run of the cell; `kernels.reset` fills it."""
+    """Empty arrays for a run of the cell; `kernels.reset` fills them."""
     decisions = cell.parts * cell.most_choices
     return RunArrays(
         locations=np.zeros(cell.parts, np.int64),
@@ -223,30 +222,30 @@ def run_arrays(cell: Cell) -> RunArrays:
 
 
 def most_moves(cell: Cell) -> int:
-    """How many moves the longest sequence has."""
+    """The number of moves in the longest sequence."""
     return sum(moves_each(cell))
 
 
 def moves_each(cell: Cell) -> list[int]:
-    """How many moves each part has at the most, part 1 first."""
+    """The largest number of moves of each part, part 1 first."""
     longest = from_the_ends(cell.positions, lambda _, ahead: max((1 + moves for moves in ahead), default=0))
     return [longest[start] for start in cell.begin_at]
 
 
 def _padded(stations: Sequence[Sequence[int]], spare: int) -> Ints:
-    """One row each, filled up to WIDTH with `spare`."""
+    """The lists of stations as rows, filled up to WIDTH with `spare`."""
     return np.array([[*given, *(spare,) * (WIDTH - len(given))] for given in stations], np.int64)
 
 
 def _with_stays(table: Floats, robots: Sequence[Robot]) -> Floats:
-    """A copy for each robot, at its speed, in which staying takes 0 s."""
+    """The table for each robot at its speed, with 0 s for staying."""
     table = table.copy()
     np.fill_diagonal(table, 0.0)
     return np.array([table / robot.speed for robot in robots]).reshape(len(robots), *table.shape)
 
 
 def _held(cell: Cell) -> dict[str, Any]:
-    """The stretches of every way on the track."""
+    """The fields for the stretches of every path on the track."""
     pairs = [(a, b) for a in range(len(cell.stations)) for b in range(len(cell.stations))]
     ways = [cell.ways.get(pair, ()) for pair in pairs] if cell.track else []
     held, speeds = [one for way in ways for one in way], np.array([robot.speed for robot in cell.robots])
@@ -259,7 +258,7 @@ def _held(cell: Cell) -> dict[str, Any]:
 
 
 def _ruled(cell: Cell) -> dict[str, Any]:
-    """The precedences."""
+    """The fields for the precedences."""
     places, rules = range(len(cell.positions)), cell.rules
     shape = len(rules), len(places)
     return {
@@ -273,7 +272,7 @@ def _ruled(cell: Cell) -> dict[str, Any]:
 
 
 def _rooms(cell: Cell) -> list[int]:
-    """How many rooms of each station are looked at one by one: none where decisions follow one another in time."""
+    """The number of rooms of each station that are tracked one by one; 0 in a serial cell."""
     return [0 if cell.serial or room >= UNLIMITED else room for room in cell.capacities]
 
 

@@ -1,6 +1,6 @@
-"""Carrying work out in a cell where times are drawn by chance: a fixed list of decisions, or a policy that reacts.
+"""The execution of work in a cell of one robot when times are drawn by chance, and what a policy may observe of it.
 
-A policy sees an `Observed` run: what stands where and what is finished, but not how long anything will still take.
+A policy sees an `Observed` run: where parts stand and what is finished, but not how long anything will still take.
 """
 
 from collections.abc import Callable
@@ -16,18 +16,18 @@ WAIT = 0  # the decision to stay where the robot is until something happens: a m
 
 
 class Observed(Run):
-    """What can be known of a run while it goes on; itself a run, by the mean times, so that it can be played on.
+    """The observable state of a run, as a run by the mean times that can be simulated further.
 
-    ready: whether each part may be picked now, part 1 first. ready_s: when it was ready or, as long as it is not, when
-    it should be: by the mean time since it began, and now when it is later than that. processed_s counts means for what
-    is not finished. began_s: when what goes on with it began, or when it was to come. clock_s: the time, where robots that
-    are busy do not tell it.
+    ready: whether each part may be picked now, part 1 first. ready_s: when it became ready or, while it is not, when it is
+    expected to be: the mean time after its process began, or now when that has passed. processed_s: counts means for unfinished
+    processes. began_s: when a part's present process began, or when its arrival was due. clock_s: the present time, where it
+    does not follow from the robots.
     """
 
     def __init__(self, run: Run) -> None:
         super().__init__(run.cell)
         take_over(self, run)
-        self.moves.clear()  # they say how long the work will take
+        self.moves.clear()  # since they reveal how long the work will take
         self.ready: tuple[bool, ...] = ()
         self.began_s: list[float] = []
         self.clock_s: float | None = None
@@ -42,31 +42,31 @@ Policy = Callable[[Cell], Choose]  # called once an episode: what it remembers i
 
 
 class Execution:
-    """A run whose times nobody knows beforehand, carried out decision by decision. `sequence`: without the waiting."""
+    """The execution, decision by decision, of a run whose times are not known in advance. sequence: without waits."""
 
     def __init__(self, cell: Cell, times: Episode | None = None) -> None:
         self.run = Run(cell, times)
         self.sequence: list[int] = []
-        # For each part: when its latest process began, and how long that takes on average; when it came to its first
-        # station, and when it was picked there. And the parts that were held for want of room.
+        # For each part: when its latest process began, and the mean time of that; when it came to its first station, and when
+        # it was picked there. Further, the parts that robots hold while they wait for room.
         self._began_s, self._mean_s = list(cell.begin_s), [0.0] * cell.parts
         self._came_s, self._left_s = [0.0] * cell.parts, [0.0] * cell.parts
         self._held = set[int]()
 
     @property
     def moves(self) -> list[Move]:
-        """What was done."""
+        """The moves made so far."""
         return self.run.moves
 
     def observe(self) -> Observed:
-        """What is known now; nothing of it changes when the run goes on."""
+        """A copy of the state that can be observed now."""
         run, seen = self.run, Observed(self.run)
         seen.began_s = self._began_s.copy()
         known = enumerate(run.ready_s)
         seen.ready = tuple(s <= run.now_s and not self._coming(n) and n + 1 not in run.held for n, s in known)
         for index, ready in enumerate(seen.ready):
             if not ready and self._at_start(index):
-                seen.ready_s[index] = max(run.now_s, run.cell.begin_s[index])  # those that arrive are looked at below
+                seen.ready_s[index] = max(run.now_s, run.cell.begin_s[index])  # arrivals are handled below
             elif not ready:
                 began_s, mean_s = self._began_s[index], self._mean_s[index]
                 seen.ready_s[index] = max(run.now_s, began_s + mean_s)
@@ -75,7 +75,7 @@ class Execution:
         return seen
 
     def step(self, decision: int) -> None:
-        """Carry a decision out, or wait for the next event; BadInput for a decision that may not be taken."""
+        """Carries out a decision, or waits for the next event; raises BadInput for a decision that is not allowed."""
         if decision == WAIT:
             self._wait()
             return
@@ -104,7 +104,7 @@ class Execution:
         run.wait(min(coming_s))
 
     def _coming(self, index: int) -> bool:
-        """Whether the part has not even set out: where each is brought after a pick, those behind the next one."""
+        """Whether the part's arrival has not even been started: where arrivals follow picks, all but the next part."""
         arrivals = self.run.cell.arrivals
         if arrivals is None or arrivals.after != "pick" or not self._at_start(index):
             return False
@@ -114,7 +114,7 @@ class Execution:
         return self.run.locations[index] == self.run.cell.starts[index]
 
     def _expect_arrivals(self, seen: Observed) -> None:
-        """Each part that has not come is expected its mean interval after the one before; after a pick, if picked now."""
+        """Sets expected arrivals: each part its mean interval after the one before, or after a pick that happens now."""
         arrivals, came_s = seen.cell.arrivals, 0.0
         if arrivals is None:
             return
@@ -129,7 +129,7 @@ class Execution:
 
 
 def one_by_one(cell: Cell, policy: Policy, times: Episode | None = None) -> Execution:
-    """What a policy makes of one episode, to the end or to a deadlock, one decision after the other."""
+    """The execution of one episode by a policy, decision by decision, to the end or to a deadlock."""
     execution, choose = Execution(cell, times), policy(cell)
     while allowed := execution.run.allowed():
         execution.step(choose(execution.observe(), allowed))

@@ -1,4 +1,4 @@
-"""A whole list of decisions carried out in a cell."""
+"""The simulation of a whole list of decisions, with the deliberate waits that it needs."""
 
 from collections.abc import Iterator, Sequence
 
@@ -12,14 +12,14 @@ from lab.sequencing.simulate.waits import waits_of
 
 
 def waits_in(start: Run, sequence: Sequence[int]) -> tuple[Wait, ...]:
-    """The waits on purpose with which a list keeps to all windows from where a run is; none where it needs none, or where none
-    would help."""
+    """The deliberate waits with which a list satisfies all time windows from the state of a run; empty where no waits are
+    needed, or none would help."""
     if not start.cell.has_windows:
         return ()
     run = branch(start)
     for decision in sequence:
         if run.option(decision) is None:
-            # Where rounded times make a circle, it is kept to by as much as they may be off.
+            # Rounded times may make a circuit infeasible; then the windows are widened by the rounding error.
             waits = run.spoils(decision) and (waits_of(start, sequence) or waits_of(start, sequence, SLACK_S / 2))
             return waits or ()
         run.move(decision)
@@ -27,15 +27,14 @@ def waits_in(start: Run, sequence: Sequence[int]) -> tuple[Wait, ...]:
 
 
 def steps(cell: Cell, sequence: Sequence[int], times: Episode | None = None) -> Iterator[tuple[Run, int, Wait]]:
-    """The run before each decision of a list, that decision, and its wait on purpose, by the cell's own times; whoever asks makes
-    the move."""
+    """The run before each decision of a list, the decision, and its deliberate wait; the caller must make the move."""
     run, waits = Run(cell, times), waits_in(Run(cell), sequence)
     for number, decision in enumerate(sequence):
         yield run, decision, waits[number] if waits else NO_WAIT
 
 
 def spoils(cell: Cell, sequence: Sequence[int]) -> bool:
-    """Whether a part would be picked too late by a list of decisions, whatever the waits."""
+    """Whether a list of decisions picks a part too late, whatever the deliberate waits."""
     for run, decision, wait in steps(cell, sequence) if cell.has_windows else ():
         if run.spoils(decision):
             return True
@@ -44,7 +43,7 @@ def spoils(cell: Cell, sequence: Sequence[int]) -> bool:
 
 
 def follow(cell: Cell, sequence: Sequence[int], times: Episode | None = None) -> Run:
-    """The run of a list of decisions, one after the other whatever the times; BadInput where one may not be taken."""
+    """The run after a list of decisions; raises BadInput when one of them is not allowed."""
     run = Run(cell, times)
     for run, decision, wait in steps(cell, sequence, times):
         run.move(decision, wait)
@@ -52,10 +51,10 @@ def follow(cell: Cell, sequence: Sequence[int], times: Episode | None = None) ->
 
 
 def simulate(cell: Cell, sequence: Sequence[int], times: Episode | None = None) -> Schedule:
-    """The schedule of a sequence of decisions (see `Run`; one entry a move), with the cell's times or an episode's.
+    """The schedule of a sequence of decisions (see `Run`; one entry per move), with the cell's times or an episode's.
 
-    Robots and servers wait on purpose where a part would be picked too late else (see `waits_of`).
-    Raises BadInput, with the position, for a decision that may not be taken there and for a sequence that ends too early.
+    Robots and servers wait deliberately where a part would otherwise be picked too late (see `waits_of`).
+    Raises BadInput, with the position, for a decision that is not allowed there and for a sequence that ends too early.
     Source: thesis ch. 7.4, 7.5; makespan to the last arrival at the end of a route.
     """
     run = Run(cell, times)
@@ -81,7 +80,7 @@ def simulate(cell: Cell, sequence: Sequence[int], times: Episode | None = None) 
 
 
 def closes(run: Run, station: int, following: Sequence[int]) -> bool:
-    """Whether nothing more comes into a machine with batches before one of its parts is taken out, by the decisions to come."""
+    """Whether the following decisions take a part out of a machine with batches before they bring another one in."""
     ahead = Windowless(run.cell, run.times, run)
     for decision in following:
         option = ahead.option(decision)

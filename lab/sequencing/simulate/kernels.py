@@ -1,4 +1,5 @@
-"""The simulation of a cell, compiled with numba; held equal to `run`, `chance` and `objectives`. Sessions learn in it."""
+"""The simulation of a cell, compiled with numba, in which sessions learn; tests hold it equal to `run`, `chance` and
+`objectives`."""
 
 from typing import Any
 
@@ -106,7 +107,7 @@ def _hold(cell: Any, run: Any, robot: int, origin: int, target: int, leave_s: fl
 
 @inner
 def _leaves_s(cell: Any, run: Any, o: int) -> float:
-    """When the robot of a way sets out for where it picks."""
+    """When the robot of an option sets out for its pick."""
     robot, at = cell.robot[o], run.robots_at[cell.robot[o]]
     if at == cell.origin[o]:
         return float(run.robots_s[robot])
@@ -125,7 +126,7 @@ def reached_s(cell: Any, run: Any, o: int) -> float:
 
 @inner
 def pick_times(cell: Any, run: Any, part: int, o: int) -> Any:
-    """When a robot, if it goes there now, begins the service that ends with the pick of a part (from 0), picks, and sets out."""
+    """When the robot of an option, if it goes now, begins the service before the pick of a part (from 0), picks, and leaves."""
     robot, begin_s = cell.robot[o], reached_s(cell, run, o)
     if cell.waits[o]:
         begin_s = max(begin_s, run.ready_s[part])
@@ -150,7 +151,7 @@ def _too_late(cell: Any, run: Any, part: int, o: int) -> bool:
 
 @inner
 def _waits_for(cell: Any, run: Any, part: int, o: int) -> bool:
-    """`Run._waits_for`: whether a precedence lets a part (from 0) wait."""
+    """`Run.waits_for`: whether a precedence makes a part (from 0) wait."""
     here, there = run.locations[part], cell.to[o]
     for r in range(len(cell.made)):
         if cell.made[r, there] and not cell.made[r, here]:
@@ -182,7 +183,7 @@ def server_for(cell: Any, run: Any, part: int, o: int) -> Any:
 
 @without_refcounts
 def list_allowed(cell: Any, run: Any) -> int:
-    """`Run.allowed`: how many decisions may be taken now; they stand in run.allowed, what they mean in run.options."""
+    """`Run.allowed`: the number of allowed decisions; they are written into run.allowed, and their options into run.options."""
     parts, count = len(run.locations), 0
     for part in range(parts):
         place = run.locations[part]
@@ -201,7 +202,7 @@ def list_allowed(cell: Any, run: Any) -> int:
 
 @inner
 def _sort(run: Any, count: int) -> None:
-    """The allowed decisions into ascending order; with one choice a part they are listed so."""
+    """Sorts the allowed decisions; with one choice per part they are already sorted."""
     for j in range(1, count):
         i, decision, o = j, run.allowed[j], run.options[j]
         while i > 0 and run.allowed[i - 1] > decision:
@@ -212,13 +213,13 @@ def _sort(run: Any, count: int) -> None:
 
 @without_refcounts
 def move(cell: Any, run: Any, i: int, seed: Any) -> None:
-    """`Run.move`: carries out the i-th of the allowed decisions, with the times of an episode's seed."""
+    """`Run.move` for the i-th allowed decision, with the times of an episode's seed."""
     take(cell, run, (run.allowed[i] - 1) % len(run.locations), run.options[i], seed)
 
 
 @without_refcounts
 def may(cell: Any, run: Any, part: int, o: int) -> bool:
-    """Whether a part (from 0) may take a way of its position now."""
+    """Whether a part (from 0) may take an option of its position now."""
     place = run.locations[part]
     if cell.arrivals != NO_ARRIVALS and place == cell.starts[part] and part != cell.coming[run.whole[0]]:
         return False
@@ -229,7 +230,7 @@ def may(cell: Any, run: Any, part: int, o: int) -> bool:
 
 @without_refcounts
 def take(cell: Any, run: Any, part: int, o: int, seed: Any) -> None:
-    """A part (from 0) takes a way that it may take, with the times of an episode's seed."""
+    """Carries out an allowed option of a part (from 0), with the times of an episode's seed."""
     robot = cell.robot[o]
     here, there, server, reach_s = run.locations[part], cell.to[o], 0, 0.0
     if robot == SERVER:
@@ -281,7 +282,7 @@ def take(cell: Any, run: Any, part: int, o: int, seed: Any) -> None:
                     grant(cell, run, station, left_s, seed)
                 else:
                     free(cell, run, station, left_s)
-    run.room[cell.holds[here, 0]] += 1  # WIDTH stations, written out: a loop takes twice the time of the whole move
+    run.room[cell.holds[here, 0]] += 1  # WIDTH stations, unrolled, since a loop would double the time of the whole move
     run.room[cell.holds[here, 1]] += 1
     run.room[cell.holds[there, 0]] -= 1
     run.room[cell.holds[there, 1]] -= 1
@@ -325,9 +326,9 @@ def cost(cell: Any, run: Any) -> float:
 
 @without_refcounts
 def follow(cell: Any, run: Any, sequence: Any, seed: Any) -> float:
-    """The cost of a sequence of decisions with the times of an episode's seed; NaN when one of them may not be taken.
+    """The cost of a sequence of decisions with the times of an episode's seed; NaN when one of them is not allowed.
 
-    What the sequence leaves undone counts as a deadlock; where parts may be picked too late, so does what may not be taken.
+    An incomplete sequence costs what a deadlock does; in a cell with time windows, so does a decision that is not allowed.
     """
     reset(cell, run, seed)
     for decision in sequence:
@@ -342,7 +343,7 @@ def follow(cell: Any, run: Any, sequence: Any, seed: Any) -> float:
 
 @without_refcounts
 def follow_all(cell: Any, run: Any, sequences: Any, lengths: Any, seeds: Any, costs: Any) -> None:
-    """`follow` of each row of sequences (N, L), as many decisions as lengths (N,) says, with M seeds; costs (N, M)."""
+    """Writes `follow` of each row of sequences (N, L), up to its length in lengths (N,), for M seeds into costs (N, M)."""
     for n in range(len(sequences)):
         for m in range(len(seeds)):
             costs[n, m] = follow(cell, run, sequences[n, : lengths[n]], seeds[m])

@@ -1,4 +1,5 @@
-"""A cell in which alike parts are one: what stands at each position, not who. What searches and learners walk through."""
+"""The states of a cell with identical parts merged: how many parts are in each position, not which. Searches and learners
+use them."""
 
 from bisect import bisect_right
 from collections.abc import Iterator, Mapping, Sequence
@@ -12,7 +13,7 @@ from lab.sequencing.cell.routes import entry
 from lab.sequencing.cell.ways import FAR, TICKS_PER_S, Way, distances, empty_ticks, loaded_ticks, ticks, ways_of
 from lab.sequencing.simulate.run import SLACK_S, Run
 
-_BITS = 8  # a count in the code of all counts; MAX_PARTS fits
+_BITS = 8  # bits of one count in the code of all counts, enough for MAX_PARTS
 _LOW = (1 << _BITS) - 1
 Choices = Mapping[tuple[int, int], Way]  # by position and choice, in their order
 MergedKey = tuple[int, int, tuple[int, ...]]
@@ -21,9 +22,9 @@ Waits = tuple[tuple[int, ...], ...]
 
 
 class Row(NamedTuple):
-    """How much later than a part is ready `now` is at the least, and each of `waits`, however far that is put off [ticks].
+    """The least times from when a part is ready to `now` and to each of `waits`, however late the part is ready [ticks].
 
-    until: to when it may be put off, by what was picked since; FAR: as far as one likes.
+    until: how late the part may become ready, given what was picked since; FAR: without limit.
     """
 
     now: int
@@ -32,14 +33,13 @@ class Row(NamedTuple):
 
 
 class MergedState(NamedTuple):
-    """Between two moves, in ticks: how many parts stand in each position, the robot's station, what is waited for.
+    """A state between two moves, in ticks: the counts of parts by position, the robot's station, and the times waited for.
 
-    Of the parts of one product in one position the first that is ready, and not too late, goes first. waits: by slot (see
-    `MergedCell`), when each part there is finished, ascending, never before `now` unless it may be picked too late; where
-    parts arrive, the last slot has when each comes that has not been fetched. who: by position, the parts on their way, each
-    in the order of its waits; None: nobody asks. rows: by slot, of each part there that may be picked too late; none but in a
-    `WindowedCell`. `way`, `part` (0: nobody asks) and `nth`, which of its position's parts from 0,
-    led here from `parent`.
+    Of the parts of one product in one position, the first that is ready, and not too late, moves first. waits: by slot (see
+    `MergedCell`), when each part there is ready, ascending, and never before `now` unless it has a latest pick; where parts
+    arrive, the last slot holds the arrivals of parts that were not fetched yet. who: by position, the unfinished parts in the
+    order of their waits; None: parts are not named. rows: by slot, a row for each part there with a latest pick; only in a
+    `WindowedCell`. way, part (0: not named) and nth (which of its position's parts, from 0): the move from `parent` to here.
     """
 
     now: int
@@ -55,11 +55,11 @@ class MergedState(NamedTuple):
 
 
 class MergedCell:
-    """The cell in ticks, and the states that follow one another.
+    """The cell in ticks, and the transitions between its states.
 
-    slots: by position where something is waited for, where the states have it in `waits`. process: what begins in each
-    position [ticks]; None: nothing does. starts, ends: where parts begin and finish. one_by_one: each sets out when the
-    one before is picked. latest: by position, how long a part may be finished before it is too late to pick it [ticks].
+    slots: the index in `waits` of each position where parts are waited for. process: the processing that begins in each position
+    [ticks]; None: none begins. starts, ends: the positions where parts begin and finish. one_by_one: whether each part sets out
+    when the one before is picked. latest: by position, how long after a part is ready it may be picked [ticks].
     """
 
     def __init__(self, cell: Cell) -> None:
@@ -77,14 +77,16 @@ class MergedCell:
         later |= set(self.latest)
         later |= {n for n, place in enumerate(cell.positions) if cell.batches.intersection(place.holds)}
         timed = [n for n, seconds in enumerate(process) if seconds is None or seconds > 0 or n in later]
-        self._past = [-1 - self.latest[n] if n in self.latest else 0 for n in timed]  # what is too late is too late
+        self._past = [
+            -1 - self.latest[n] if n in self.latest else 0 for n in timed
+        ]  # all times beyond it are equally late
         self.slots = {place: slot for slot, place in enumerate(timed)}
         intervals_s = [cell.arrivals.interval_s[part - 1] for part in cell.coming] if cell.arrivals is not None else []
         self._intervals = ticks(intervals_s)
         self.one_by_one = bool(self._intervals) and cell.arrivals is not None and cell.arrivals.after == "pick"
         self.starts = frozenset(cell.starts[part - 1] for part in cell.coming)
         self.ends = [place for place, at in enumerate(cell.positions) if not at.options]
-        # Of a machine with batches: a bit of the code, above all counts, that something was taken out and it is not empty.
+        # For each machine with batches, a bit of the code above all counts: a part was taken out and it is not empty yet.
         self._closed = {station: 1 << _BITS * len(process) + n for n, station in enumerate(sorted(cell.batches))}
         self._inside = {
             station: [n for n, place in enumerate(cell.positions) if station in place.holds] for station in cell.batches
@@ -96,22 +98,22 @@ class MergedCell:
         self._fetching = self._times_to_fetch() if self.latest else {}
 
     def start(self, *, named: bool = False) -> MergedState:
-        """Where all begins; `named`: parts are told from one another."""
+        """The initial state; named: whether parts are told apart."""
         begin = self.of_run(Run(self.cell))
         waits = list(begin.waits)
-        if self._intervals and not self.one_by_one:  # whole ticks added up, not seconds
+        if self._intervals and not self.one_by_one:  # arrivals are sums of integer ticks, not of seconds
             waits[-1] = tuple(accumulate(self._intervals))
         return begin._replace(waits=tuple(waits), who=begin.who if named else None)
 
     def of_run(self, run: Run) -> MergedState:
-        """Where a run is, to go on from by the cell's own times; parts are told from one another."""
+        """The state of a run, with parts told apart, to continue from by the cell's own times."""
         now, ready = round(run.now_s * TICKS_PER_S), [round(ready_s * TICKS_PER_S) for ready_s in run.ready_s]
         who: list[list[int]] = [[] for _ in self._ways]
         for part, place in enumerate(run.locations, 1):
             if self._ways[place]:
                 who[place].append(part)
         for place, parts in enumerate(who):
-            if not (self._intervals and place in self.starts):  # these come in their order
+            if not (self._intervals and place in self.starts):  # parts that arrive stay in their order
                 parts.sort(key=lambda part: ready[part - 1])
         past = zip(self.slots, self._past, strict=True)
         waits = [tuple([max(ready[part - 1], now + least) for part in who[place]]) for place, least in past]
@@ -123,35 +125,35 @@ class MergedCell:
         return MergedState(now, counts, run.robot, tuple(waits), tuple(map(tuple, who)))
 
     def code(self, counts: Sequence[int]) -> int:
-        """The parts in each position as one number."""
+        """The counts of parts by position as one number."""
         return sum(count << _BITS * place for place, count in enumerate(counts))
 
     def counted(self, counts: int) -> list[int]:
-        """The parts in each position, of such a number."""
+        """The counts of parts by position from their code."""
         return [counts >> _BITS * place & _LOW for place in range(len(self._ways))]
 
     def finished(self, state: MergedState) -> int:
-        """How many parts are at an end of their routes."""
+        """The number of parts at an end of their routes."""
         return sum([state.counts >> _BITS * place & _LOW for place in self.ends])
 
     def done(self, state: MergedState) -> bool:
         """Whether all parts are finished."""
-        return self.finished(state) == self.cell.parts  # those that have nothing to do among them
+        return self.finished(state) == self.cell.parts  # which includes parts that make no move
 
     def fetched(self, state: MergedState) -> int:
-        """How many parts have left the start of their routes."""
+        """The number of parts that have left the start of their routes."""
         return len(self.cell.coming) - sum([state.counts >> _BITS * place & _LOW for place in self.starts])
 
     def key(self, state: MergedState) -> MergedKey:
-        """All that the future depends on when parts are alike: counts, robot, how long there is still to wait."""
+        """The key of a state when parts are identical: counts, robot, and the waits counted from now."""
         now = state.now
         if not self.latest:
             return state.counts, state.robot, tuple([max(at - now, 0) for row in state.waits for at in row])
-        rows = zip(state.waits, chain(self._past, [0]), strict=False)  # the last: of arrivals, where there are
+        rows = zip(state.waits, chain(self._past, [0]), strict=False)  # the last entry is for arrivals, if any
         return state.counts, state.robot, tuple([max(at - now, least) for row, least in rows for at in row])
 
     def choices(self, state: MergedState) -> Choices:
-        """The ways that may be taken now: one an option of a position, since its parts are alike."""
+        """The options that are allowed now, one for each option of a position, since its parts are identical."""
         known = self._known.get(state.counts)
         if known is None:
             known = self._known[state.counts] = self._allowed(state.counts)
@@ -160,15 +162,16 @@ class MergedCell:
         return known
 
     def successors(self, state: MergedState) -> Iterator[MergedState]:
-        """The states after each of them; where parts may be too late, by each that is not: to wait for a later one may help."""
+        """The states after each allowed option; in a cell with time windows, after each part that is not too late, since the
+        first one is not always the best."""
         for way in self.choices(state).values():
             for nth in self._in_time(state, way) if self.latest else (0,):
                 yield self.after(state, way, nth=nth)
 
     def after(self, state: MergedState, way: Way, part: int = 0, nth: int = -1) -> MergedState:
-        """The state after a way that may be taken, by the first part that is ready and not too late.
+        """The state after an allowed option, taken by the first part that is ready and not too late.
 
-        Or by the `nth` from 0 of those in that position, or, where they are named, by `part`.
+        part: the part that takes it, where parts are named; nth: the index of that part (from 0) among those in its position.
         """
         place, option, _ = way
         who, first = state.who, nth
@@ -184,10 +187,10 @@ class MergedCell:
     def moments(
         self, state: MergedState, now: int, waits: Waits, way: Way, first: int, behind: int | None = None
     ) -> tuple[int, int, Waits, int | None]:
-        """What `now` and `waits` become by a way from a state, with the `first` part of its position, and the counts.
+        """The counts, `now` and `waits` after an option taken by the part of index `first` in its position, and `behind`.
 
-        behind: how many of those that wait where it leads stay before it; None: those that are ready no later, and that is
-        returned as well. Each moment is the latest of some before, and times: so are differences of moments.
+        behind: how many of the parts that wait in the new position stay before it; None: those that are ready no later. Each
+        moment is a maximum of earlier moments plus times, so the function applies to differences of moments, too.
         """
         (place, option, work), there = way, list(waits)
         ready, slot, starts = now, self.slots.get(place), bool(self._intervals) and place in self.starts
@@ -207,7 +210,7 @@ class MergedCell:
         if self._closed:
             counts = self._batches(counts, way, now, there)
         coming = there.pop() if self._intervals else None
-        # A part that finished earlier is ready now: forgetting since when lets more states be equal.
+        # A part that was ready before counts as ready now, so that more states are equal.
         past = zip(there, self._past, strict=True)
         rows = [tuple([max(tick, now + least) for tick in row]) if row else () for row, least in past]
         if coming is not None:
@@ -216,8 +219,8 @@ class MergedCell:
         return now, counts, tuple(rows), behind
 
     def _batches(self, counts: int, way: Way, now: int, waits: list[tuple[int, ...]]) -> int:
-        """The code of counts after a way, a machine that something was taken from closed; all parts in the machine that a part
-        was brought to begin together, and `waits` says so."""
+        """The code of counts after an option, with batches: a machine that a part was taken from is closed, and all parts in a
+        machine that a part was brought to begin together, which is written into `waits`."""
         counted = self.counted(counts)
         for station, closed in self._closed.items():
             inside = [n for n in self._inside[station] if counted[n]]
@@ -230,17 +233,17 @@ class MergedCell:
         return counts
 
     def waited(self, state: MergedState, ahead: MergedState) -> int:
-        """How long the robot waited in the move from a state to the one ahead of it."""
+        """The robot's wait in the move from a state to its successor `ahead` [ticks]."""
         assert ahead.way is not None
         return ahead.now - state.now - ahead.way.work - self._empty[state.robot][ahead.way.option.origin]
 
     def decision(self, state: MergedState) -> int:
-        """The entry of a sequence that led to a state, where parts are named."""
+        """The decision that led to a state in which parts are named."""
         assert state.way is not None
         return entry(state.part, state.way.option.choice, self.cell.parts)
 
     def decisions(self, state: MergedState) -> tuple[int, ...]:
-        """All entries from the start to a state in which parts need not be named."""
+        """All decisions from the start to a state, whose parts need not be named."""
         steps, named = list[tuple[Way, int]](), self.start(named=True)
         while state.way is not None and state.parent is not None:
             steps.append((state.way, state.nth))
@@ -252,7 +255,7 @@ class MergedCell:
         return tuple(found)
 
     def too_late(self, state: MergedState) -> bool:
-        """Whether a part can no longer be fetched in time, whichever way the robot takes."""
+        """Whether some part can no longer be picked in time, whatever the robot does."""
         for place, least in self._fetching.items():
             there = state.waits[self.slots[place]]
             if there and state.now + least[state.robot] > there[0] + self.latest[place]:
@@ -260,7 +263,7 @@ class MergedCell:
         return False
 
     def in_time(self, state: MergedState, way: Way, nth: int) -> bool:
-        """Whether the `nth` part from 0 in a way's position would be picked in time."""
+        """Whether the part of index `nth` (from 0) in an option's position would be picked in time."""
         place, option, work = way
         if place not in self.latest or not option.waits:
             return True
@@ -268,7 +271,7 @@ class MergedCell:
         return max(state.now + self._empty[state.robot][option.origin], ready) + service <= ready + self.latest[place]
 
     def _in_time(self, state: MergedState, way: Way) -> list[int]:
-        """Which of the parts in a way's position, from 0, would be picked in time; one of those that are alike in all."""
+        """The indices (from 0) of the parts in an option's position that would be picked in time, one of identical states."""
         there = state.waits[self.slots[way.place]] if way.place in self.slots else (0,)
         differ = [nth for nth, ready in enumerate(there) if nth == 0 or ready != there[nth - 1]]
         return [nth for nth in differ if self.in_time(state, way, nth)]
@@ -295,7 +298,7 @@ class MergedCell:
         }
 
     def _times_to_fetch(self) -> dict[int, list[int]]:
-        """By position where parts may be too late and by the robot's station: the least time until one is picked [ticks]."""
+        """By position with a latest pick and by the robot's station, the least time until a part is picked there [ticks]."""
         far, found = distances(self.cell), dict[int, list[int]]()
         for place in self.latest:
             out = [way for way in self._ways[place] if way.option.waits]
@@ -306,14 +309,14 @@ class MergedCell:
         return found
 
     def _left_to_come(self, coming: tuple[int, ...], fetched: int, pick: int) -> tuple[int, ...]:
-        """When parts come once the first of them is picked: then the next one sets out, where they are brought so."""
+        """The arrivals left once the first part is picked, when the next one sets out where arrivals follow picks."""
         coming, following = coming[1:], fetched + 1
         if not self.one_by_one or following == len(self.cell.coming):
             return coming
         return (pick + self._intervals[following], *coming[1:])
 
     def _moved(self, who: Who, way: Way, first: int, behind: int | None) -> Who:
-        """Who is where after a move: the `first` of those in its position goes behind so many others, None: all."""
+        """The named parts by position after a move: the part of index `first` goes behind `behind` others; None: behind all."""
         rows, (place, option, _) = list(who), way
         part, rows[place] = who[place][first], who[place][:first] + who[place][first + 1 :]
         if self._ways[option.to]:

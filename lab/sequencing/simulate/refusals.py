@@ -1,4 +1,4 @@
-"""Why a decision may not be taken in a run, in words."""
+"""The rooms of stations that may be full and the robots that wait for them; and why a run does not allow a decision."""
 
 from bisect import insort
 from collections.abc import Sequence
@@ -12,26 +12,29 @@ from lab.sequencing.cell.stations import UNLIMITED
 
 @dataclass
 class Rooms:
-    """free_s: by station that may be full, since when each of its free rooms is free, ascending [s]. robots: by station, those
-    that wait for room there, in the order of their decisions."""
+    """The rooms of stations that may be full.
+
+    free_s: by station, since when each of its free rooms is free, ascending [s]. robots: by station, the robots that wait for
+    room there, in the order of their decisions.
+    """
 
     free_s: dict[int, list[float]] = field(default_factory=dict)
     robots: dict[int, list[int]] = field(default_factory=dict)
 
     def lacking(self, stations: Sequence[int]) -> list[int]:
-        """Those in which there is no room."""
+        """The stations among these that have no free room."""
         return [station for station in stations if station in self.free_s and not self.free_s[station]]
 
     def take(self, stations: Sequence[int]) -> float:
-        """Since when there is room in all of these, which has it [s]: in each what is free first is taken."""
+        """Since when all these stations have room [s]; the room that was free first is taken in each."""
         return max((self.free_s[s].pop(0) for s in stations if s in self.free_s), default=0.0)
 
     def wait(self, robot: int, station: int) -> None:
-        """A robot waits for room in a station, behind those that do so already."""
+        """Adds a robot to those that wait for room in a station, behind the others."""
         self.robots.setdefault(station, []).append(robot)
 
     def free(self, station: int, at_s: float) -> int | None:
-        """A room is free from a time on; the robot that has waited for it and takes it; None: nobody has."""
+        """Frees a room from a time on; returns the robot that waited for it and takes it, None when no robot waited."""
         if self.robots.get(station):
             return self.robots[station].pop(0)
         if station in self.free_s:
@@ -47,7 +50,7 @@ class Rooms:
         return [station for station, robots in self.robots.items() if robot in robots]
 
     def copy(self) -> "Rooms":
-        """The same, which changes by itself."""
+        """An independent copy."""
         return Rooms(
             {at: times_s.copy() for at, times_s in self.free_s.items()},
             {at: one.copy() for at, one in self.robots.items()},
@@ -55,16 +58,16 @@ class Rooms:
 
 
 def rooms_of(capacities: Sequence[int], occupied: Sequence[int]) -> Rooms:
-    """The rooms at time 0."""
+    """The rooms of all stations at time 0."""
     both = enumerate(zip(capacities, occupied, strict=True))
     return Rooms({n: [0.0] * (room - taken) for n, (room, taken) in both if room < UNLIMITED})
 
 
-# ---- refusals ---------------------------------------------------------------------------------------------------------
+# ---- Reasons for refusals ---------------------------------------------------------------------------------------------
 
 
 class Decided(Protocol):
-    """What is asked of a run: see `Run`."""
+    """The part of `Run` that reasons are derived from."""
 
     cell: Cell
     locations: list[int]
@@ -83,7 +86,7 @@ class Decided(Protocol):
 
 
 def refusal(run: Decided, decision: int) -> str:
-    """Why a decision, which is not, may not be taken now, in words."""
+    """The reason, in words, why a decision is not allowed now; it must be one that is not."""
     cell, part = run.cell, part_of(decision, run.cell.parts)
     if decision < 1 or choice_of(decision, cell.parts) >= cell.most_choices:
         return f"there is no part {decision}, only 1 to {cell.parts}"
@@ -118,7 +121,7 @@ def refusal(run: Decided, decision: int) -> str:
 
 
 def _burns(run: Decided, part: int) -> str:
-    """That a part would be picked too late, in words."""
+    """The reason, in words, that a part would be picked too late."""
     cell, place = run.cell, run.cell.positions[run.locations[part - 1]]
     option = next(option for option in place.options if run.too_late(part, option))
     times_s = f"done at {run.ready_s[part - 1]:g} s, fetched at {run.pick_s(part, option):g} s"

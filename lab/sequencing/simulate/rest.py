@@ -1,4 +1,4 @@
-"""The work that remains of a run that has come to its middle, as a cell of its own: to plan anew from the state reached."""
+"""The remaining work of a run as a cell of its own, so that it can be replanned from the state reached."""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -15,11 +15,11 @@ from lab.sequencing.simulate.run import Run
 
 @dataclass(frozen=True)
 class Mishaps:
-    """What is otherwise than a run believes. Parts are numbered from 1.
+    """Differences between the real state and a run's. Parts are numbered from 1.
 
-    lost: parts that are nowhere any more. closed: the stations to which nothing may be brought from now on; None: those of
-    before. ready_s: when a part may be picked, counted from now [s]. moved: the station at which a part stands instead, or its
-    position, where a station has several; what is done there begins now. robot: the station at which the robot is.
+    lost: the parts that no longer exist. closed: the stations to which nothing may be brought from now on; None: as before.
+    ready_s: when a part may be picked, counted from now [s]. moved: the station where a part really stands, or its position if
+    the station has several; its processing there begins now. robot: the station where the robot is.
     """
 
     lost: frozenset[int] = frozenset()
@@ -31,9 +31,9 @@ class Mishaps:
 
 @dataclass(frozen=True)
 class Rest:
-    """cell: the work that remains, its decisions numbered as before; None: there is none.
+    """The remaining work. cell: None: there is none; its decisions are numbered as before.
 
-    stuck: the parts that cannot be finished, and why not; they stay where they are and take their room.
+    stuck: the parts that cannot be finished, each with the reason; they stay where they are and take room.
     """
 
     cell: Cell | None
@@ -44,12 +44,12 @@ NOTHING = Mishaps()
 
 
 def rest_of(run: Run, mishaps: Mishaps = NOTHING, fallback_s: float | None = None) -> Rest:
-    """What remains to be done from where a run is, as a cell whose time 0 is the run's `now_s`.
+    """The remaining work of a run, as a cell whose time 0 is the run's `now_s`.
 
-    A part that stands in a closed machine can be finished only if it is done there. Lateness that was there before now does
-    not count (a due time that has passed is 0). fallback_s: what an empty way takes that the run's cell has no time for, which
-    happens where robot or parts are not where they would be; None: such a way is an error.
-    Raises BadInput for parts, stations and positions that there are not, and as Cell does.
+    A part in a closed machine can be finished only if its processing there is done. Tardiness before now does not count (a due
+    time that has passed becomes 0). fallback_s: the time of an empty move for which the run's cell has none, which may be needed
+    when robot or parts are at unexpected stations; None: such a move is an error.
+    Raises BadInput for unknown parts, stations and positions, and as Cell does.
     """
     cell = run.cell
     for part in (*mishaps.lost, *mishaps.ready_s, *mishaps.moved):
@@ -81,7 +81,7 @@ def rest_of(run: Run, mishaps: Mishaps = NOTHING, fallback_s: float | None = Non
 
 
 def _begin(run: Run, part: int, mishaps: Mishaps) -> Begins:
-    """Where a part is now, as it would be if nothing were closed."""
+    """The present state of a part, ignoring closed stations."""
     cell, place = run.cell, run.locations[part - 1]
     known = cell.begins[part - 1] if cell.begins is not None else None
     if part in mishaps.lost:
@@ -89,7 +89,7 @@ def _begin(run: Run, part: int, mishaps: Mishaps) -> Begins:
     if part in mishaps.moved:
         place = _position(cell, part, place, mishaps.moved[part])
         return Begins(place, mishaps.ready_s.get(part, cell.laid_out[place].processing_s or 0.0))
-    if known is not None and (known.stays or known.position is None):  # nothing has been done with it
+    if known is not None and (known.stays or known.position is None):  # the part was not moved
         return replace(known, stays=False, ready_s=mishaps.ready_s.get(part, known.ready_s))
     if not cell.laid_out[place].options:
         return Begins(place)
@@ -101,7 +101,7 @@ def _begin(run: Run, part: int, mishaps: Mishaps) -> Begins:
 
 
 def _position(cell: Cell, part: int, place: int, wanted: str | int) -> int:
-    """The position that a part has at a station: of several the nearest ahead of where it is believed to be, else behind."""
+    """The position of a part at a station: of several the nearest ahead of the run's position, else the nearest behind it."""
     product = cell.laid_out[cell.starts[part - 1]].product
     own = [n for n, at in enumerate(cell.laid_out) if at.product == product]
     if isinstance(wanted, int):
@@ -119,7 +119,7 @@ def _position(cell: Cell, part: int, place: int, wanted: str | int) -> int:
 
 
 def _stuck(cell: Cell, begins: Sequence[Begins], closed: set[int]) -> dict[int, str]:
-    """The parts that no open way leads to an end of their routes, and why; each takes room, which may shut out others."""
+    """The parts without an open path to an end of their routes, each with the reason; their room may shut out other parts."""
     stuck: dict[int, str] = {}
     shut = dict.fromkeys(closed, "out of use")
     while True:
@@ -149,7 +149,7 @@ def _stuck(cell: Cell, begins: Sequence[Begins], closed: set[int]) -> dict[int, 
 
 
 def _waiting(cell: Cell, begins: Sequence[Begins], stuck: Collection[int]) -> dict[int, str]:
-    """The parts that wait, by a precedence, for parts that cannot make their step any more, and for which: too few are left."""
+    """The parts that can never move because a precedence waits for parts which cannot make their step, with the reason."""
     found = dict[int, str]()
     for rule, one in zip(cell.rules, cell.precedences, strict=True):
         at = {part: begins[part - 1].position for part in (*one.parts, *one.of)}
@@ -168,12 +168,12 @@ def _waiting(cell: Cell, begins: Sequence[Begins], stuck: Collection[int]) -> di
 
 
 def _ahead(cell: Cell, place: int) -> set[int]:
-    """The stations on the ways on from a position."""
+    """The stations on all paths from a position."""
     return {way.target for at in reached_from(cell.laid_out, {place}) for way in cell.laid_out[at].options}
 
 
 def _intervals_s(run: Run, begins: Sequence[Begins]) -> tuple[float, ...]:
-    """When those come that have not been taken yet: by the clock the time from one to the next, counted from now."""
+    """The intervals of arrivals of the parts not fetched yet, counted from now [s]."""
     cell, came_s, found = run.cell, 0.0, list[float]()
     first = True
     for part, (one, start) in enumerate(zip(begins, cell.starts, strict=True), 1):
@@ -192,7 +192,7 @@ def _intervals_s(run: Run, begins: Sequence[Begins]) -> tuple[float, ...]:
 
 
 def _filled(cell: Cell, fallback_s: float) -> NDArray[np.float64]:
-    """The empty ways, with a time for those that have none."""
+    """The table of empty moves, with `fallback_s` for those without a time."""
     table = np.where(np.isnan(cell.empty_s), fallback_s, cell.empty_s)
     np.fill_diagonal(table, 0.0)
     return table

@@ -1,4 +1,7 @@
-"""Rooms that are free or come free, where what is decided later may happen earlier; held equal to `run` and `rooms`."""
+"""Drawn times, and rooms that are free or come free when decisions are not carried out in their order; compiled with numba.
+
+Tests hold these functions equal to `chance`, `run` and `refusals`.
+"""
 
 from typing import Any
 
@@ -26,7 +29,7 @@ def uniform(seed: Any, number: int) -> float:
 
 @inner
 def drawn(law: int, spread: float, mean_s: float, seed: Any, number: int) -> float:
-    """`chance.Episode`: one time [s]."""
+    """`chance.Episode._drawn`: one time [s]."""
     if law == CONSTANT or mean_s == 0.0:
         return mean_s
     u, v = uniform(seed, 2 * number), uniform(seed, 2 * number + 1)
@@ -81,7 +84,7 @@ def interval(cell: Any, seed: Any, part: int) -> float:
     return drawn(cell.arrivals_law, cell.spread, cell.interval_s[part], seed, number)
 
 
-# ---- room kernels -----------------------------------------------------------------------------------------------------
+# ---- Rooms of stations ------------------------------------------------------------------------------------------------
 
 
 @inner
@@ -102,7 +105,7 @@ def may_go_s(cell: Any, run: Any, part: int, o: int) -> float:
 
 @inner
 def in_order(cell: Any, run: Any, robot: int, at_s: float) -> float:
-    """`Run._in_order_s`."""
+    """`Run.in_order_s`."""
     return float(until(cell, run.seed[0], len(run.locations), robot, at_s, 0.0))
 
 
@@ -125,7 +128,7 @@ def possible(cell: Any, run: Any, part: int, o: int) -> bool:
 
 @inner
 def _comes_free(cell: Any, run: Any, station: int, o: int) -> bool:
-    """`Run._comes_free`; in a full station as many robots wait as its room is below 0."""
+    """`Run._comes_free`; the room of a full station is minus the number of robots that wait for it."""
     if cell.takers[station, SERVER]:  # the last column
         return True
     for other in range(len(run.held)):
@@ -137,7 +140,7 @@ def _comes_free(cell: Any, run: Any, station: int, o: int) -> bool:
 
 @inner
 def room_s(cell: Any, run: Any, station: int) -> float:
-    """Since when the room of a station that is free first is free; it is taken: the row's last place is then left."""
+    """`Rooms.take` for one station: since when its first room is free [s]; the others move up in the row."""
     first, left = cell.first_room[station], run.room[station]
     if cell.first_room[station + 1] == first or left <= 0:
         return 0.0
@@ -149,7 +152,7 @@ def room_s(cell: Any, run: Any, station: int) -> float:
 
 @inner
 def free(cell: Any, run: Any, station: int, at_s: float) -> None:
-    """A room of a station is free from then on; those that are free stand ascending."""
+    """`Rooms.free` without waiting robots: inserts a room that is free from `at_s` into the ascending row of a station."""
     first, i = cell.first_room[station], cell.first_room[station] + run.room[station]
     if cell.first_room[station + 1] == first:
         return
@@ -182,7 +185,7 @@ def grant(cell: Any, run: Any, station: int, at_s: float, seed: Any) -> None:
 
 @inner
 def _put(cell: Any, run: Any, part: int, at_s: float, seed: Any) -> None:
-    """`Run._put`, but for the end of a part's routes, which needs no room."""
+    """`Run._put`, except for the end of a part's routes, which takes no room."""
     there = run.locations[part]
     run.put_s[part] = at_s
     if cell.begins[there]:
@@ -192,7 +195,7 @@ def _put(cell: Any, run: Any, part: int, at_s: float, seed: Any) -> None:
 
 @inner
 def hold_part(cell: Any, run: Any, part: int, o: int) -> None:
-    """A robot waits for room with a part: for each station in which there is none."""
+    """Lets a robot with a part wait for room in each station that has none."""
     number, robot = 0, cell.robot[o]
     for other in range(len(run.held)):
         if run.held[other, 0] >= 0:

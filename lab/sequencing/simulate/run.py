@@ -1,4 +1,4 @@
-"""One pass through a cell, decision by decision: the readable simulation. `kernels` holds the compiled one."""
+"""The readable simulation of a cell, decision by decision; `kernels` holds the compiled one."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -12,11 +12,11 @@ from lab.sequencing.cell.routes import SERVER, Option, Position, choice_of, entr
 from lab.sequencing.cell.schedule import Move
 from lab.sequencing.simulate.refusals import Rooms, refusal, rooms_of
 
-SLACK_S = 1e-6  # so much later is not too late: what sums of times may differ by
+SLACK_S = 1e-6  # tolerance of latest picks, for the rounding of sums of times
 
 
 class Wait(NamedTuple):
-    """How long a robot waits on purpose (see `waits_of`): before its work where it picks, and before it drops [s].
+    """The deliberate waits of a move (see `waits_of`): before the robot's work at the pick, and before its drop [s].
 
     A server waits before it begins.
     """
@@ -29,32 +29,35 @@ NO_WAIT = Wait()
 
 
 class Run:
-    """Where parts and robots are, and at what time; `move` carries one decision out.
+    """The state of a simulated cell: positions of parts and robots, and times; `move` carries out one decision.
 
-    A decision is an entry of a sequence: the part's number, + the number of parts for the second choice it has, and so on. A
-    robot travels empty to where the part, or its pallet, is picked, waits there until it is ready, does its service work and
-    carries it on; processing starts at arrival, or, where a machine has servers, with the decision that lets one of them take
-    the part. All is done as early as it can be, after what was decided before with the same robot, server, part or room: a
-    robot that comes to a station before there is room waits there, and nobody waits for anything else, unless `move` is told
-    so. With one robot and no servers what is decided later also happens later (`Cell.serial`). Where another robot can still
-    make the room, it need not be there yet: the robot picks, goes there and holds the part until what is decided later frees
-    the room, which those who wait get in the order of their decisions; meanwhile nothing is decided for robot or part. A
-    buffer for a full station is used while it is full: not before its parts were picked to come, none leaves before. A
-    decision that would pick a part later than it may be picked is not allowed (see `Station.at_most_s`): what was left too
-    long stays where it is, and the run ends as a deadlock does. The order also says what a batch is (see `Station.batch`):
-    all that is brought before one of it is taken out. It begins with the last that is brought: to begin later helps no order,
-    to begin before is another order. `ready_s` is as if nothing more were to come. Parts that stand in such a machine at
-    first have begun.
-    No decision is allowed that a precedence lets wait (see `Precedence`).
+    A decision is an entry of a sequence: the part's number, + the number of parts for its second choice, and so on. The robot
+    drives empty to the pick of the part, or of its pallet, waits until it is ready, does its service work, and carries it on.
+    Processing starts at arrival or, where a machine has servers, with the decision that lets a server take the part.
+
+    Times: every move is made as early as possible after earlier decisions with the same robot, server, part or room, unless
+    `move` is given deliberate waits. With one robot and no servers, decisions are carried out in their order (`Cell.serial`).
+
+    Room: a robot that comes to a station before there is room waits there. Where another robot can still free the room, it need
+    not be free at the decision: the robot picks, drives there and holds the part until a later decision frees the room; robots
+    get it in the order of their decisions, and meanwhile nothing is decided for the robot or its part. A buffer ahead of a full
+    station is used only while that is full: after its parts were picked to come, and before one of them leaves.
+
+    Not allowed are decisions that a precedence makes wait (see `Precedence`), and those that pick a part after its latest time
+    (see `Station.at_most_s`): such a part stays where it is, and the run ends as a deadlock does.
+
+    Batches (see `Station.batch`): the order decides them. A batch is all parts brought before one of them is taken out, and
+    begins with the last one brought. `ready_s` assumes that no more parts come. Parts in such a machine at time 0 have begun.
+
+    Track: a robot stands beside it at a station, drives the shortest path without stopping, and holds each stretch while it is
+    on it; it sets out as soon as every stretch will be free when it gets there, after earlier decisions.
+
     locations: the position of each part, part 1 first. occupied: room taken at each station. ready_s: when each part may be
-    picked. finished_s: when each part was finished (None: not yet; 0: before the work began, or nothing is to be done with
-    it). robots_at, robots_s: where each robot is after what it was given to do, and when. end_s: when all that was decided
-    is done. fetched: how many parts were taken from the start of their routes. waited_s: how long the robots have waited.
-    processed_s: how long machines were given work for. moves: what was decided, in its order, a drop that waits for room as
-    early as it may be. held: the part that each robot holds and cannot drop yet; 0: none.
-    On a track a robot stands beside it at a station, drives the shortest way without stopping, and holds each stretch while it
-    is on it; it sets out, also with what it has picked, as soon as the stretches will be free when it comes to them, after
-    what was decided before.
+    picked. finished_s: when each part was finished (None: not yet; 0: before time 0, or the part makes no move). robots_at,
+    robots_s: where and when each robot is free. end_s: when all decided moves are done. fetched: how many parts were taken from
+    the start of their routes. waited_s: the robots' total waits. processed_s: the machines' total processing. moves: the decided
+    moves in order, a drop that waits for room at its earliest time. held: the part that each robot holds and cannot drop yet;
+    0: none.
     Source: thesis ch. 7.4, 7.5; App. III; serial schedule generation, Kolisch 1996.
     """
 
@@ -76,23 +79,23 @@ class Run:
         self.ready_s = self._first_ready_s()
         self.moves: list[Move] = []
         self.held = [0] * len(cell.robots)
-        # What is decided later may happen earlier: since when each room is free, and each server, and what it worked on last.
+        # Where decisions are not carried out in their order: since when each room and server is free, and its last product.
         self.rooms = Rooms() if cell.serial else rooms_of(cell.capacities, self.occupied)
         servers = enumerate(() if cell.serial else cell.stations)
         self.servers = {n: [(0.0, "")] * (station.servers or 0) for n, station in servers}
-        # When each part was picked to come where it is; when it, or its pallet, was put down, or the one that came before it was
-        # taken; before when nothing leaves a station.
+        # By part: when it was picked for its present position; and when it, or its pallet, was put down there, or the part that
+        # arrived before it was taken. By station: the earliest time at which a part may leave it.
         self._fetched_s, self.put_s = [0.0] * cell.parts, [0.0] * cell.parts
         self._kept_s = [0.0] * len(cell.stations)
 
     @property
     def robot(self) -> int:
-        """Where the first robot is."""
+        """The station (by index) of the first robot."""
         return self.robots_at[0]
 
     @property
     def now_s(self) -> float:
-        """When the robot is free, of several the first one [s]; where there is none, when all is done that was decided."""
+        """When the first of the robots is free [s]; without robots, when all decided moves are done."""
         return min(self.robots_s, default=self.end_s)
 
     @property
@@ -101,7 +104,7 @@ class Run:
         return None not in self.finished_s
 
     def allowed(self) -> tuple[int, ...]:
-        """The decisions that may be taken now, ascending; none when all is done, or when nothing can move any more."""
+        """The decisions allowed now, ascending; empty when all parts are finished, or in a deadlock."""
         parts, full = self.cell.parts, self.full()
         found = [
             entry(part, option.choice, parts)
@@ -114,7 +117,7 @@ class Run:
         return tuple(sorted(found))
 
     def option(self, decision: int) -> Option | None:
-        """The way on that a decision means now; None when it may not be taken."""
+        """The option that a decision takes now; None when it is not allowed."""
         part = part_of(decision, self.cell.parts)
         if decision < 1 or not self.in_turn(part):
             return None
@@ -125,7 +128,7 @@ class Run:
         return None
 
     def too_late(self, part: int, option: Option) -> bool:
-        """Whether a part would be picked later than it may be, if that were done now."""
+        """Whether an option, if taken now, would pick its part after the latest time."""
         at_most_s = self.cell.positions[self.locations[part - 1]].at_most_s
         if at_most_s is None or not option.waits:
             return False
@@ -141,7 +144,7 @@ class Run:
         return any(self.too_late(part, option) for option in own if not self.waits_for(part, option))
 
     def _possible(self, part: int, option: Option, full: Sequence[bool]) -> bool:
-        """Whether there is room for a way, or will be by another robot, and neither the part nor the robot waits for room."""
+        """Whether an option has room, or another robot can free it, and neither its part nor its robot waits for room."""
         if part in self.held or (option.robot != SERVER and self.held[option.robot]):
             return False
         if option.possible(full):
@@ -150,7 +153,8 @@ class Run:
         return fits and all(not full[station] or self._comes_free(station, option) for station in option.needs)
 
     def _comes_free(self, station: int, option: Option) -> bool:
-        """Whether a server may free a full station, or another robot that does not wait, or only for what this way frees."""
+        """Whether a full station may still be freed: by a server, or by another robot that does not wait itself, or that waits
+        only for room which this option frees."""
         return any(
             other == SERVER
             or (other != option.robot and (not self.held[other] or other in self.rooms.waiting(option.origin)))
@@ -158,7 +162,7 @@ class Run:
         )
 
     def waits_for(self, part: int, option: Option) -> str:
-        """What must have been done before a part may take a way, in words; "" when nothing is missing."""
+        """The precedence that an option waits for, in words; "" when it waits for none."""
         cell, place = self.cell, self.locations[part - 1]
         for rule, one in zip(cell.rules, cell.precedences, strict=True):
             if rule.applies(place, option):
@@ -169,7 +173,7 @@ class Run:
         return ""
 
     def move(self, decision: int, wait: Wait = NO_WAIT) -> Move:
-        """Carry a decision out, with a wait on purpose; BadInput when it may not be taken."""
+        """Carries out a decision with its deliberate waits; raises BadInput when it is not allowed."""
         option = self.option(decision)
         if option is None:
             raise BadInput(self.refusal(decision))
@@ -213,7 +217,7 @@ class Run:
         return self.moves[-1]
 
     def _put(self, part: int, at_s: float, process_s: float) -> None:
-        """A part, or its pallet, is put down where it is now."""
+        """Puts down a part, or its pallet, in its present position."""
         there = self.cell.positions[self.locations[part - 1]]
         self.put_s[part - 1] = at_s
         if there.processing_s is not None:
@@ -221,7 +225,7 @@ class Run:
         self._ends(part, there, at_s)
 
     def _grant(self, robot: int, at_s: float) -> None:
-        """A robot that waits for room with a part has it from a time on."""
+        """Gives room from a time on to a robot that waits for it with a part."""
         part, drop_s = self.held[robot], self.robots_s[robot]
         drop_s = self.in_order_s(robot, at_s) if at_s > drop_s else drop_s
         self.waited_s += drop_s - self.robots_s[robot]
@@ -236,7 +240,7 @@ class Run:
             self.held[robot] = 0
 
     def _serve(self, part: int, option: Option, wait: Wait) -> Move:
-        """A server of a machine takes a part and works on it."""
+        """The move in which a server of a machine takes a part and works on it."""
         cell = self.cell
         begin_s, server = self._server(part, option)
         begin_s += wait.pick_s
@@ -254,7 +258,7 @@ class Run:
         return self.moves[-1]
 
     def _server(self, part: int, option: Option) -> tuple[float, int]:
-        """When a part may begin at a machine with servers, and with which of them: the one that lets it begin first."""
+        """The earliest begin of a part at a machine with servers, and the index of the server that allows it."""
         product, setups = self.cell.order[part - 1], self.cell.setups[option.target]
         ready_s, there = max(self.ready_s[part - 1], self.put_s[part - 1]), self.cell.positions[option.to]
         if option.target not in there.holds:
@@ -263,7 +267,7 @@ class Run:
         return min(free_s), free_s.index(min(free_s))
 
     def _leave(self, part: int, option: Option, left_s: float) -> None:
-        """A part goes from where it is to where a way leads: what it leaves is free from then on."""
+        """Moves a part to the position that an option leads to; the room that it leaves is free from `left_s` on."""
         cell = self.cell
         here, there = cell.positions[self.locations[part - 1]], cell.positions[option.to]
         for station in here.holds:
@@ -281,45 +285,45 @@ class Run:
         return [n for n, at in enumerate(self.locations, 1) if station in self.cell.positions[at].holds]
 
     def _close(self, station: int) -> None:
-        """Nothing comes into a machine with batches any more until it is empty: all its room counts as taken."""
+        """Closes a machine with batches until it is empty: all its room counts as taken."""
         self.occupied[station] = self.cell.capacities[station] if self.inside(station) else 0
 
     def _batch(self, station: int, at_s: float) -> None:
-        """All parts in a machine begin together."""
+        """Begins the processing of all parts in a machine together."""
         parts = self.inside(station)
         longest_s = max(self.times.processing_s(part, self.locations[part - 1]) for part in parts)
         for part in parts:
             self.ready_s[part - 1] = at_s + longest_s
 
     def _ends(self, part: int, there: Position, at_s: float) -> None:
-        """A part has come to a position at a time."""
+        """Notes the arrival of a part in a position: its processing, or its end."""
         self.end_s = max(self.end_s, at_s)
         if not there.options:
             self.finished_s[part - 1] = at_s
 
     def wait(self, until_s: float) -> None:
-        """The robots stay where they are until then, as far as they are free before."""
+        """Makes all robots that are free earlier wait where they are until `until_s`."""
         self.waited_s += sum(max(0.0, until_s - free_s) for free_s in self.robots_s)
         self.robots_s = [max(until_s, free_s) for free_s in self.robots_s]
 
     def refusal(self, decision: int) -> str:
-        """Why the decision may not be taken now, in words; empty when it may."""
+        """The reason why a decision is not allowed now, in words; empty when it is allowed."""
         return "" if self.option(decision) is not None else refusal(self, decision)
 
     def free_s(self, station: int) -> float:
-        """When the first of a station's servers is through with what it was given; 0 where there is none."""
+        """When the first of a station's servers is free; 0 for a station without servers."""
         return min((free_s for free_s, _ in self.servers.get(station, ())), default=0.0)
 
     def reach_s(self, option: Option) -> float:
-        """When the robot of a way is where it picks, if it goes there now."""
+        """When the robot of an option arrives at its pick if it drives there now."""
         return self._reached_s(option)[1]
 
     def _reached_s(self, option: Option) -> tuple[float, float]:
-        """When the robot of a way sets out for where it picks, and when it is there."""
+        """When the robot of an option sets out for its pick, and when it arrives there."""
         return self.drive_s(option.robot, option.origin, self.robots_s[option.robot])
 
     def drive_s(self, robot: int, station: int, at_s: float) -> tuple[float, float]:
-        """When a robot, not before a time, sets out for a station without a part, and when it is there."""
+        """When a robot sets out empty for a station, not before `at_s`, and when it arrives there."""
         at = self.robots_at[robot]
         if at == station:
             return at_s, at_s
@@ -328,18 +332,18 @@ class Run:
         return leave_s, self.times.until_s(robot, leave_s, empty_s)
 
     def drive(self, robot: int, station: int) -> None:
-        """A robot drives to a station without a part, as soon as it is free."""
+        """Makes a robot drive empty to a station as soon as it is free."""
         leave_s, reach_s = self.drive_s(robot, station, self.robots_s[robot])
         self._hold(robot, self.robots_at[robot], station, leave_s)
         self.waited_s += leave_s - self.robots_s[robot]
         self.robots_at[robot], self.robots_s[robot] = station, reach_s
 
     def in_order_s(self, robot: int, at_s: float) -> float:
-        """From when on, not before a time, a robot is in order [s]."""
+        """The earliest time from `at_s` on when a robot is not broken down [s]."""
         return self.times.until_s(robot, at_s, 0.0)
 
     def _clear_s(self, robot: int, origin: int, target: int, at_s: float) -> float:
-        """From when on, not before a time, a robot finds every stretch of its way free when it comes to it."""
+        """The earliest start from `at_s` on with which a robot finds every stretch of its path free when it gets there [s]."""
         if not self.track_s:
             return at_s
         speed = self.cell.robots[robot].speed
@@ -347,32 +351,32 @@ class Run:
         return max([at_s, *(self.track_s[held.stretch] - held.from_s / speed for held in way)])
 
     def _hold(self, robot: int, origin: int, target: int, leave_s: float) -> None:
-        """A robot sets out on a way: each of its stretches is free when it has left it."""
+        """Reserves the stretches of a robot's path: each is free again when the robot has left it."""
         speed = self.cell.robots[robot].speed
         for held in self.cell.ways[origin, target] if self.track_s else ():
             self.track_s[held.stretch] = leave_s + held.until_s / speed
 
     def pick_s(self, part: int, option: Option) -> float:
-        """When a way takes a part up, if that were done now; where a server works on it: when it begins."""
+        """When an option, if taken now, picks its part, or when a server begins to work on it [s]."""
         return self._server(part, option)[0] if option.robot == SERVER else self._times_s(part, option)[3]
 
     def begin_s(self, part: int, option: Option) -> float:
-        """When the robot of a way begins its service, or picks where it has none, if that were done now [s]."""
+        """When the robot of an option, if taken now, begins its service, or picks where there is none [s]."""
         return self._times_s(part, option)[2]
 
     def drop_s(self, part: int, option: Option) -> float:
-        """When a way brings a part to its end, by the cell's own times, as soon as there is room."""
+        """When an option, if taken now and if there is room, drops its part or ends a server's work, by the cell's times [s]."""
         if option.robot == SERVER:
             return self.pick_s(part, option) + (self.cell.positions[option.to].processing_s or 0.0)
         out_s = self._clear_s(option.robot, option.origin, option.target, self.pick_s(part, option))
         return out_s + self.carry_s(option)
 
     def carry_s(self, option: Option) -> float:
-        """How long a robot's way with a part is [s]."""
+        """The duration of an option's loaded move [s]."""
         return float(self.cell.loaded_s[option.origin, option.target]) / self.cell.robots[option.robot].speed
 
     def _times_s(self, part: int, option: Option) -> tuple[float, float, float, float]:
-        """When the robot sets out, when it is there, when it begins its service, and when it picks the part, that done."""
+        """When the robot sets out, when it arrives, when it begins its service, and when it then picks the part [s]."""
         leave_s, reach_s = self._reached_s(option)
         ready_s = max(reach_s, self.ready_s[part - 1]) if option.waits else reach_s
         if not self.cell.serial:
@@ -380,8 +384,8 @@ class Run:
         return leave_s, reach_s, ready_s, self.times.until_s(option.robot, ready_s, option.service_s)
 
     def _may_go_s(self, part: int, option: Option) -> float:
-        """Before when a way may not pick, whoever takes it: where the part or its pallet is still carried, the part before it
-        has not been taken, or what was decided depends on a full station."""
+        """The earliest pick of an option, whichever robot takes it [s]: after the part or its pallet was put down, the part
+        before it was taken, and all earlier decisions that depend on a full station."""
         here, there = self.cell.positions[self.locations[part - 1]], self.cell.positions[option.to]
         inside = self.inside(option.if_full) if option.if_full is not None else ()
         kept_s = [self._kept_s[station] for station in here.holds if station not in there.holds]
@@ -398,7 +402,7 @@ class Run:
         return all_s
 
     def _fetch(self, pick_s: float) -> None:
-        """A part was taken from its first station: where the next one is brought only now, it sets out."""
+        """Notes that a part was taken from its first station; where arrivals follow picks, the next one sets out."""
         self.fetched += 1
         arrivals, coming = self.cell.arrivals, self.cell.coming
         if arrivals is None or self.fetched == len(coming):
@@ -409,20 +413,20 @@ class Run:
             self.ready_s[following - 1] = self.times.comes_s(following, pick_s)
 
     def in_turn(self, part: int) -> bool:
-        """Whether it is there: parts that arrive are taken in their order."""
+        """Whether a part is not behind another one in the order of arrivals."""
         waits = self.locations[part - 1] == self.cell.starts[part - 1]
         return self.cell.arrivals is None or not waits or part == self.cell.coming[self.fetched]
 
     def full(self) -> list[bool]:
-        """Whether each station is."""
+        """Whether each station is full."""
         return [taken >= most for taken, most in zip(self.occupied, self.cell.capacities, strict=True)]
 
 
 class Windowless(Run):
-    """A run in which no part is ever picked too late: where somebody else sees to that."""
+    """A run without latest picks, for callers that handle time windows themselves."""
 
     def __init__(self, cell: Cell, times: Episode | None = None, state: Run | None = None) -> None:
-        """state: where it begins; None: where the cell does."""
+        """state: the run whose state it begins with; None: the cell's initial state."""
         super().__init__(cell, times)
         if state is not None:
             take_over(self, state)
@@ -432,14 +436,14 @@ class Windowless(Run):
 
 
 def branch(run: Run) -> Run:
-    """Another run that goes on from where this one is, by the same times."""
+    """A copy of a run, with the same times, that can be continued independently."""
     other = Run(run.cell, run.times)
     take_over(other, run)
     return other
 
 
 def take_over(run: Run, state: Run) -> None:
-    """Put a run where another one is; both share the cell, not the times."""
+    """Copies the state of another run of the same cell into a run, which keeps its own times."""
     run.locations, run.occupied = state.locations.copy(), state.occupied.copy()
     run.ready_s, run.finished_s = state.ready_s.copy(), state.finished_s.copy()
     run.robots_at, run.robots_s, run.fetched = state.robots_at.copy(), state.robots_s.copy(), state.fetched

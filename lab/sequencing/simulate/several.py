@@ -1,4 +1,5 @@
-"""Carrying work out with several robots or servers where times are drawn: decided anew whenever something happens."""
+"""The execution of work with several robots or servers when times are drawn, event by event; and the cost of policies and
+sequences over many episodes."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -19,9 +20,9 @@ from lab.sequencing.simulate.run import Run, Windowless
 
 @dataclass(frozen=True)
 class Known(Episode):
-    """What is known of an episode at a time: what is not over by then takes its mean, or ends now where that has passed.
+    """The times of an episode as known at a moment: what is not over takes its mean, or ends now if that has passed.
 
-    A robot that is out of order is repaired after its mean time from now on; none breaks down again.
+    A broken robot is repaired after its mean repair time from now on; no robot breaks down again.
     """
 
     real: Episode = field(kw_only=True)
@@ -49,7 +50,7 @@ class Known(Episode):
 
 
 class Drive(NamedTuple):
-    """A robot, by index, drives empty from a station to another one, both by index."""
+    """An empty drive of a robot between two stations, all by index."""
 
     robot: int
     origin: int
@@ -59,22 +60,23 @@ class Drive(NamedTuple):
 
 
 class _Task(NamedTuple):
-    """What a robot is on its way to: a decision of a part in a position."""
+    """A robot's target: a decision for a part in a position."""
 
     decision: int
     place: int
 
 
 class Dispatch(Execution):
-    """A run of several robots or servers whose times nobody knows beforehand, carried out event by event.
+    """The execution, event by event, of a run with several robots or servers whose times are not known in advance.
 
-    Events: a robot is there, breaks down or is repaired, a part is ready, put down or there at last, a server is free. At each of
-    them whoever decides is asked for every robot that is free, and for servers that could begin. A robot that is given a part
-    drives to where that stands and picks it there once it may. Whatever it has not picked yet is not bound to it: as it
-    stands there and waits, it is decided anew, and of what a robot that breaks down was on its way to, too; on its way it
-    keeps to what it was given. What it holds when it breaks down waits with it. A server changes over for a part only once
-    that is there. drives: the ways without a part; moves: all others.
-    done: when each of either was begun, and a decision, or a robot and where it drives to, by index.
+    Events: a robot arrives, breaks down or is repaired; a part arrives, is put down or becomes ready; a server becomes free. At
+    each event the policy is asked for every free robot, and for every server that could begin. A robot that is given a part
+    drives to it and picks it as soon as that is allowed. On its way it keeps its target; while it stands and waits, or when it
+    breaks down, the target is decided anew. A part that it holds when it breaks down waits with it. A server changes over for a
+    part only after the part's arrival.
+
+    drives: the empty drives; moves: all others. done: when each drive or move was begun, with its decision, or with the robot and
+    the station that it drives to, by index.
     """
 
     def __init__(self, cell: Cell, times: Episode | None = None) -> None:
@@ -85,13 +87,16 @@ class Dispatch(Execution):
         self._tasks: dict[int, _Task] = {}
 
     def decide(self, choose: Choose) -> None:
-        """Ask for all that can be begun now, and begin it; again where what was begun takes no time."""
+        """Asks the policy for everything that can begin now, and begins it; repeats while something begun takes no time."""
         driven = set[int]()
         while self._round(choose, driven):
             pass
 
     def _round(self, choose: Choose, driven: set[int]) -> bool:
-        """Ask once for whoever is free; whether something was begun that is over by now. driven: who had a way of no time."""
+        """Asks once for each free robot and server; returns whether something begun is already over.
+
+        driven: the robots that have already made a drive of no time, which is not counted twice.
+        """
         free, told, over = self._free(), set[int](), False
         self._tasks = {n: task for n, task in self._tasks.items() if n not in free and self._works(n)}
         seen = self.observe()
@@ -118,7 +123,7 @@ class Dispatch(Execution):
         return over
 
     def goes_on(self) -> bool:
-        """Whether anything is still to happen by itself; the time is then that of the next event."""
+        """Whether another event will happen without a decision; if so, the time advances to it."""
         run, robots = self.run, range(len(self.run.robots_s))
         servers = [free_s for own in run.servers.values() for free_s, _ in own]
         rooms = chain.from_iterable(run.rooms.free_s.values())
@@ -130,7 +135,7 @@ class Dispatch(Execution):
         return True
 
     def observe(self) -> Observed:
-        """What is known now: all that was begun, by the times that are over and the means of the others."""
+        """The observable state now: past times are known, and unfinished ones have their means."""
         run = Windowless(self.run.cell, Known(self.run.cell, real=self.run.times, now_s=self.now_s))
         for at_s, what, station in self.done:
             _decided(run, at_s, what) if station is None else _set_out(run, at_s, what, station)
@@ -141,7 +146,7 @@ class Dispatch(Execution):
         return seen
 
     def _free(self) -> set[int]:
-        """The robots that stand in order with nothing in hand."""
+        """The robots that stand still, in working order, without a part."""
         run = self.run
         return {n for n, s in enumerate(run.robots_s) if s <= self.now_s and not run.held[n] and self._works(n)}
 
@@ -149,14 +154,14 @@ class Dispatch(Execution):
         return self.run.in_order_s(robot, self.now_s) == self.now_s
 
     def _next_s(self, robot: int) -> Iterator[float]:
-        """When a robot breaks down, or is repaired, next."""
+        """The next breakdown or repair of a robot."""
         for time_s in chain.from_iterable(self.run.times.outages(robot)):
             if time_s > self.now_s:
                 yield time_s
                 return
 
     def _ready(self, seen: Observed) -> tuple[bool, ...]:
-        """Whether each part may be picked now where it is seen."""
+        """Whether each part may be picked now, as observed."""
         run = self.run
         stand = [here == there and n + 1 not in run.held for n, (here, there) in enumerate(self._places(seen))]
         return tuple(
@@ -167,7 +172,7 @@ class Dispatch(Execution):
         return zip(self.run.locations, seen.locations, strict=True)
 
     def _open(self, seen: Observed, free: set[int]) -> tuple[int, ...]:
-        """The decisions for robots that are free, and for servers that could begin."""
+        """The allowed decisions for free robots, and for servers that could begin."""
         found = []
         for decision in seen.allowed():
             option, index = seen.option(decision), part_of(decision, seen.cell.parts) - 1
@@ -182,13 +187,13 @@ class Dispatch(Execution):
         return tuple(found)
 
     def _begin(self, decision: int, option: Option, seen: Observed) -> None:
-        """A server begins, a robot picks or sets out; where it can do neither yet, it stays until the next event."""
+        """Begins a decision: a server begins its work, or a robot picks or sets out; otherwise it stays until the next event."""
         run, robot, index = self.run, option.robot, part_of(decision, seen.cell.parts) - 1
         if robot == SERVER:
             self._commit(decision)
         elif run.robots_at[robot] != option.origin:
             leave_s, reach_s = run.drive_s(robot, option.origin, self.now_s)
-            if leave_s == self.now_s:  # else it waits beside the track
+            if leave_s == self.now_s:  # otherwise it waits beside the track
                 self.drives.append(Drive(robot, run.robots_at[robot], option.origin, leave_s, reach_s))
                 self._tasks[robot] = _Task(decision, seen.locations[index])
                 self.done.append((self.now_s, robot, option.origin))
@@ -205,7 +210,7 @@ class Dispatch(Execution):
 
 
 def _rest(run: Run, robot: int, until_s: float) -> None:
-    """A robot has been waiting until then."""
+    """Counts a robot's wait up to `until_s`."""
     run.waited_s += max(0.0, until_s - run.robots_s[robot])
     run.robots_s[robot] = max(until_s, run.robots_s[robot])
 
@@ -216,7 +221,7 @@ def _set_out(run: Run, at_s: float, robot: int, station: int) -> None:
 
 
 def _decided(run: Run, at_s: float, decision: int) -> None:
-    """A decision is carried out from a time on, a server's by one that is free then."""
+    """Carries out a decision from a time on; a server's decision by one that is free then."""
     option = run.option(decision)
     if option is None or option.robot != SERVER:
         if option is not None:
@@ -232,7 +237,7 @@ def _decided(run: Run, at_s: float, decision: int) -> None:
 
 
 def dispatched(cell: Cell, policy: Policy, times: Episode | None = None) -> Dispatch:
-    """What a policy makes of one episode of several robots or servers, to the end or until nothing happens any more."""
+    """The execution of one episode by a policy with several robots or servers, until no event is left."""
     execution, choose = Dispatch(cell, times), policy(cell)
     execution.decide(choose)
     while not execution.run.done and execution.goes_on():
@@ -240,18 +245,18 @@ def dispatched(cell: Cell, policy: Policy, times: Episode | None = None) -> Disp
     return execution
 
 
-# ---- replications -----------------------------------------------------------------------------------------------------
+# ---- Many episodes ----------------------------------------------------------------------------------------------------
 
 
 def carry_out(cell: Cell, policy: Policy, times: Episode | None = None) -> Execution:
-    """What a policy makes of one episode, to the end or to a deadlock; several robots or servers as `several.Dispatch` says."""
+    """The execution of one episode by a policy, to the end or to a deadlock; several robots or servers go by `Dispatch`."""
     if not cell.serial:
         return dispatched(cell, policy, times)
     return one_by_one(cell, policy, times)
 
 
 def _followed(cell: Cell, sequence: Sequence[int], times: Episode) -> Run:
-    """The run of a list of decisions, to where one would pick its part too late by these times."""
+    """The run of a list of decisions, up to one that would pick its part too late by these times."""
     run = Run(cell, times)
     for decision in sequence:
         if run.spoils(decision):
@@ -263,12 +268,11 @@ def _followed(cell: Cell, sequence: Sequence[int], times: Episode) -> Run:
 def replicate(
     cell: Cell, how: Policy | Sequence[int], chance: Chance, episodes: int, seed: int, objective: str = MAKESPAN
 ) -> NDArray[np.float64]:
-    """The cost of a policy, or of a fixed list, in each of so many episodes (episodes,); in seconds, for most objectives.
+    """The costs (episodes,) of a policy, or of a fixed list of decisions, in each episode; in seconds for most objectives.
 
-    Episode n meets the same times whatever is carried out, and however many episodes there are: common random numbers,
-    so compare two policies by their differences. A deadlock costs `stuck_cost`, and so does a part that a list would pick
-    too late. Raises BadInput for fewer than 1
-    episode, a negative seed, an objective that the cell does not allow, and a list that is not one of the cell's.
+    Episode n has the same times for every policy and every number of episodes (common random numbers), so two policies are best
+    compared by their differences. A deadlock costs `stuck_cost`, and so does a list that picks a part too late. Raises BadInput
+    for fewer than 1 episode, a negative seed, an objective that the cell does not allow, and a list that does not fit the cell.
     Source: thesis App. III (50 replications).
     """
     check_objective(objective, cell)

@@ -1,4 +1,4 @@
-"""Waits on purpose: how long a robot stays before it picks and before it drops, so that no part of a list is picked too late."""
+"""Deliberate waits: how long robots and servers wait in a list of decisions so that no part is picked too late."""
 
 from collections.abc import Sequence
 from math import inf
@@ -7,11 +7,11 @@ from typing import NamedTuple
 from lab.sequencing.cell.routes import SERVER, Option, part_of
 from lab.sequencing.simulate.run import SLACK_S, Run, Wait, Windowless
 
-TINY_S = 1e-9  # sums of times that differ by less are equal
+TINY_S = 1e-9  # tolerance within which sums of times are equal
 
 
 class Arc(NamedTuple):
-    """begin[then] >= begin[one] + least_s - periods * period."""
+    """A difference constraint: begin[then] >= begin[one] + least_s - periods * period."""
 
     one: int
     then: int
@@ -20,7 +20,7 @@ class Arc(NamedTuple):
 
 
 def earliest(arcs: Sequence[Arc], moves: int, first: int, period_s: float) -> tuple[list[float], list[Arc]]:
-    """The earliest begins after the first move's, or a circle of arcs that cannot be kept (Bellman and Ford)."""
+    """The earliest begins after the first move's, and a violated circuit of arcs, empty if there is none (Bellman and Ford)."""
     begin_s, by = [-inf] * moves, dict[int, Arc]()
     begin_s[first], late = 0.0, -1
     for _ in range(moves + 1):
@@ -31,7 +31,7 @@ def earliest(arcs: Sequence[Arc], moves: int, first: int, period_s: float) -> tu
                 begin_s[arc.then], by[arc.then], late = at_s, arc, arc.then
         if late < 0:
             return begin_s, []
-    for _ in range(moves):  # then it is on the circle, whatever led there
+    for _ in range(moves):  # after so many steps back the arc is on the circuit
         late = by[late].one
     broken = [by[late]]
     while broken[-1].one != late:
@@ -39,15 +39,15 @@ def earliest(arcs: Sequence[Arc], moves: int, first: int, period_s: float) -> tu
     return begin_s, broken
 
 
-# ---- waits ------------------------------------------------------------------------------------------------------------
+# ---- The waits of a list of decisions ---------------------------------------------------------------------------------
 
 
 def waits_of(start: Run, sequence: Sequence[int], beyond_s: float = 0.0) -> tuple[Wait, ...] | None:
-    """The least waits with which a list of decisions keeps to all windows from where a run is, one a decision; None: no waits do.
+    """The least waits, one for each decision, with which a list satisfies all time windows from a run's state; None: none do.
 
-    The list says what comes first at the same robot, server, room or stretch of a track, and everything is done as early as that
-    and the windows allow. That is the least solution of difference constraints, and no other way of timing the moves ends
-    any of them earlier. beyond_s: how much later than its window says a part may be picked, at most as much as the window [s].
+    The list is the order of use of each robot, server, room and stretch of track, and every move is made as early as that order
+    and the windows allow. That is the least solution of difference constraints, so no other timing ends any move earlier.
+    beyond_s: by how much the windows are widened, at most by their own length [s].
     Source: simple temporal networks, Dechter, Meiri and Pearl 1991; hoist scheduling, Che and Chu 2004.
     """
     if not start.cell.serial:
@@ -67,14 +67,14 @@ def _window_s(at_most_s: float, beyond_s: float) -> float:
 
 
 def waits_of_several(start: Run, sequence: Sequence[int], beyond_s: float) -> tuple[Wait, ...] | None:
-    """The least waits of several robots or servers: a part that would be picked too late is to be ready later, by a later drop
-    or begin of work, and all is carried out again, until none is too late.
+    """The least waits with several robots or servers; None: no waits help.
 
-    Each pass keeps to all that comes first. Only windows lead back in the list, so a wait that still grows after as many passes
-    as there are decisions lies on a circle, and grows for ever (Bellman and Ford). A part is picked as early as may be, since
-    what it leaves is room for others.
+    A part that would be picked too late is made ready later, by a later drop or begin of work, and the list is simulated again,
+    until no part is late. Each pass satisfies all constraints that point forward in the list; only windows point backward. So a
+    wait that still grows after as many passes as there are decisions lies on a circuit and would grow for ever (Bellman and
+    Ford). Parts are picked as early as possible, since that frees room for others.
     """
-    cell, ready_s = start.cell, [0.0] * len(sequence)  # by decision: before when its part is not to be ready
+    cell, ready_s = start.cell, [0.0] * len(sequence)  # by decision: the earliest time at which its part becomes ready
     for _ in range(len(sequence) + 1):
         run, waits, last, late = Windowless(cell, start.times, start), list[Wait](), dict[int, int](), False
         for number, decision in enumerate(sequence):
@@ -102,7 +102,7 @@ def waits_of_several(start: Run, sequence: Sequence[int], beyond_s: float) -> tu
 
 
 class _Timed(NamedTuple):
-    """What a move demands: what its begin comes after, its drop after that, and, if it may not be put off, no later than what."""
+    """The constraints of a move: on its begin, from its begin to its drop, and its latest begin; None: it has no latest."""
 
     comes: Sequence[Arc]
     carried: Arc
@@ -110,16 +110,16 @@ class _Timed(NamedTuple):
 
 
 class _Network:
-    """What the moves demand of one another. Moment 0 is time 0; of move n, 2 n - 1 begins its work where it picks, 2 n drops."""
+    """The constraints between moves. Moment 0 is time 0; moments 2 n - 1 and 2 n are the begin of move n's work and its drop."""
 
     def __init__(self, start: Run, beyond_s: float) -> None:
         self._cell, self._begins_s, self._beyond_s = start.cell, start.now_s, beyond_s
         self._moves = list[_Timed]()
-        self._ready = dict[int, tuple[int, float]]()  # by part: since which moment it is ready, and how much later [s]
-        self._next: tuple[int, float] | None = None  # where parts come after a pick: when the next one does
+        self._ready = dict[int, tuple[int, float]]()  # by part: it is ready so long [s] after this moment
+        self._next: tuple[int, float] | None = None  # where arrivals follow picks: the same for the next arrival
 
     def add(self, part: int, run: Run, option: Option) -> None:
-        """The next move of a run, before it is made."""
+        """Adds the next move of a run, before it is made."""
         cell, drop = self._cell, 2 * len(self._moves)
         begin, robot, place = drop + 1, cell.robots[option.robot], run.locations[part - 1]
         at, at_most_s = run.robots_at[option.robot], cell.positions[place].at_most_s
@@ -143,15 +143,15 @@ class _Network:
             self._next = begin, option.service_s + interval_s
         there, does = cell.positions[option.to], {part: option.to}
         if there.processing_s is not None:
-            if there.station in cell.batches:  # all that stand in it begin together
+            if there.station in cell.batches:  # all parts in it begin together
                 does |= {other: run.locations[other - 1] for other in run.inside(there.station)}
             longest_s = max(run.times.processing_s(*one) for one in does.items())
             self._ready |= dict.fromkeys(does, (begin + 1, longest_s))
 
     def waits(self) -> tuple[Wait, ...] | None:
-        """How much later than they could be begins and drops have to be; None: there is no way.
+        """The waits before the begin and the drop of each move; None: no waits satisfy all constraints.
 
-        A drop that is to be late has its part picked as late as may be, too: better it lies than it is held.
+        Where a drop must wait, its part is picked as late as possible: it rather stays where it is than is held by the gripper.
         """
         arcs = [
             arc for comes, carried, latest in self._moves for arc in (*comes, carried, *((latest,) if latest else ()))
@@ -161,7 +161,7 @@ class _Network:
 
 
 def _wait(move: _Timed, at_s: Sequence[float]) -> Wait:
-    """The waits of a move by the moments' times."""
+    """The waits of a move, from the times of all moments."""
     begin_s = at_s[move.carried.one]
     earliest_s = max(at_s[arc.one] + arc.least_s for arc in move.comes)
     held_s = at_s[move.carried.then] - begin_s - move.carried.least_s

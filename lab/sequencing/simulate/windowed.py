@@ -1,4 +1,4 @@
-"""The states of a cell in which parts may be picked too late, where the robot waits on purpose so that none is."""
+"""The merged states of a cell with time windows, in which the robot waits deliberately so that no part is picked too late."""
 
 from collections.abc import Iterator
 from itertools import chain
@@ -8,19 +8,18 @@ from lab.sequencing.cell.ways import FAR, TICKS_PER_S, Way
 from lab.sequencing.simulate.merged import MergedCell, MergedState, Row, Waits
 from lab.sequencing.simulate.run import SLACK_S
 
-_SLACK = round(SLACK_S / 2 * TICKS_PER_S)  # so much is no circle: what sums of rounded times may differ by
+_SLACK = round(SLACK_S / 2 * TICKS_PER_S)  # tolerance of circuits, for the rounding of sums of times
 
 
 class WindowedCell(MergedCell):
-    """A cell with windows, and its states, each as early as the order of its moves and all windows allow (see `waits_of`).
+    """A cell with time windows, and its states, each as early as the order of its moves and all windows allow (see `waits_of`).
 
-    A part that would be picked too late is dropped later before; what it is ready at is put off. The moments of a state and its
-    rows are longest paths in a network of difference constraints: to pick a part adds an arc from the pick to what the part was
-    ready at, and all that follows from that moment is put off with it. Where the pick itself would be, by more than the window
-    allows, no waits help, and the state is left away. A state that is no later than another one that is alike, in all its
-    moments and rows, can be followed by all that can follow the other one.
-    Parts that are alike go on in the order in which they are ready: where one overtakes another, they may as well be swapped.
-    windows: how long after it is ready a part may be picked, by position [ticks]; `latest` is empty, as nothing is too late yet.
+    A part that would be picked too late is made ready later, by a later drop. The moments of a state and its rows are longest
+    paths in a network of difference constraints: a pick adds an arc from the pick back to the moment when the part was ready,
+    which delays all that follows from that moment. If this would delay the pick itself beyond the window, no waits help, and
+    the state is discarded. A state dominates another one with equal counts if none of its moments and rows is later. Identical
+    parts move on in the order in which they are ready: where one overtakes another, they may as well be swapped. windows: by
+    position, how long after it is ready a part may be picked [ticks]; `latest` is empty, since no part is too late yet.
     Source: difference bound matrices, Dill 1989; simple temporal networks, Dechter, Meiri and Pearl 1991.
     """
 
@@ -30,12 +29,12 @@ class WindowedCell(MergedCell):
         at_most = {n: place.at_most_s for n, place in enumerate(cell.positions) if place.at_most_s is not None}
         self.windows = {n: round(at_most_s * TICKS_PER_S) for n, at_most_s in at_most.items()}
         begins = zip(cell.begin_at, cell.starts, cell.begin_s, strict=True)
-        # Where parts come to in another order than that in which they will be ready.
+        # Positions that parts reach in another order than that in which they will be ready.
         self._unordered = {at for at, start, begin_s in begins if at != start and begin_s > 0}
         self._unordered |= {n for n, process in enumerate(self.process) if process is None}
 
     def start(self, *, named: bool = True) -> MergedState:
-        """Where all begins; parts are told from one another. What is ready then, or will be, cannot be put off."""
+        """The initial state, with parts told apart; the times at which its parts are ready cannot be delayed."""
         state = super().start(named=True)
         rows: list[tuple[Row, ...]] = [()] * len(state.waits)
         for place in self.windows:
@@ -44,7 +43,7 @@ class WindowedCell(MergedCell):
         return state._replace(rows=tuple(rows))
 
     def successors(self, state: MergedState) -> Iterator[MergedState]:
-        """The states after each way, by the first part that is ready in its position, or by each where that is not known."""
+        """The states after each option, taken by the first part that is ready, or by each where the first is not known."""
         for way in self.choices(state).values():
             for nth in range(len(state.waits[self.slots[way.place]]) if way.place in self._unordered else 1):
                 put_off = self._picked(state, way, nth)
@@ -53,7 +52,7 @@ class WindowedCell(MergedCell):
                     yield ahead
 
     def decisions(self, state: MergedState) -> tuple[int, ...]:
-        """All entries from the start to a state."""
+        """All decisions from the start to a state."""
         found = list[int]()
         while state.parent is not None:
             found.append(self.decision(state))
@@ -61,7 +60,7 @@ class WindowedCell(MergedCell):
         return tuple(found[::-1])
 
     def _picked(self, state: MergedState, way: Way, nth: int) -> MergedState | None:
-        """A state in which a part is ready late enough to be picked by a way next; None: no waits help."""
+        """The state delayed so that a part is ready late enough to be picked next by an option; None: no waits help."""
         place, option, work = way
         if place not in self.windows or not option.waits:
             return state
@@ -69,7 +68,7 @@ class WindowedCell(MergedCell):
         return _put_off(state, self.slots[place], nth, pick - self.windows[place])
 
     def _moved_on(self, state: MergedState, way: Way, nth: int) -> MergedState:
-        """The state after a way, with its rows."""
+        """The state after an option, with its rows."""
         place, option, _ = way
         ahead = self.after(state, way, nth=nth)
         assert ahead.who is not None
@@ -91,14 +90,14 @@ class WindowedCell(MergedCell):
         return ahead._replace(rows=tuple(rows))
 
     def _row(self, state: MergedState, slot: int, nth: int, process: int) -> Row:
-        """The row of a part that was dropped just now: nothing was to wait for it before."""
-        past = chain(self._past, [0])  # the last: of arrivals, where there are
+        """The row of a part that was just dropped, on which no earlier moment depends."""
+        past = chain(self._past, [0])  # the last entry is for arrivals, if any
         waits = [(least - process,) * len(there) for least, there in zip(past, state.waits, strict=False)]
         waits[slot] = (*waits[slot][:nth], 0, *waits[slot][nth + 1 :])
         return Row(-process, tuple(waits))
 
     def _kept(self, state: MergedState) -> MergedState | None:
-        """A state in which each part is ready late enough to be picked if the robot went there now; None: no waits help."""
+        """The state delayed so that each part could be picked in time if the robot went there now; None: no waits help."""
         kept: MergedState | None = state
         for place, least in self._fetching.items():
             slot = self.slots[place]
@@ -108,7 +107,7 @@ class WindowedCell(MergedCell):
 
 
 def _put_off(state: MergedState, slot: int, nth: int, gap: int) -> MergedState | None:
-    """A state in which a part is ready `gap` after now at the least, or before; None: that puts now off as well."""
+    """The state with one part ready at least `gap` after now (before now if negative); None: this would delay now as well."""
     own = state.rows[slot][nth]
     if own.now + gap > _SLACK or state.now + gap > own.until + _SLACK:
         return None
@@ -122,7 +121,7 @@ def _put_off(state: MergedState, slot: int, nth: int, gap: int) -> MergedState |
 
 
 def _follows(row: Row, own: Row, by: int) -> Row:
-    """A row from which what another one counts from follows after `by`."""
+    """A row after the constraint that the part of row `own` is ready at least `by` after this row's part."""
     now, waits = _latest(row, own, by)
     return Row(now, waits, min(row.until, own.until - by) if own.until < FAR else row.until)
 
@@ -132,7 +131,7 @@ def _shifted(waits: Waits, by: int) -> Waits:
 
 
 def _latest(one: MergedState | Row, own: Row, by: int) -> tuple[int, Waits]:
-    """The later ones of moments, and of those that follow from a moment `by`."""
+    """The maximum of `now` and `waits` and of those of row `own`, shifted by `by`."""
     waits = [
         tuple([at if at > other + by else other + by for at, other in zip(*both, strict=False)]) if both[0] else ()
         for both in zip(one.waits, own.waits, strict=True)

@@ -1,4 +1,4 @@
-"""Instances as the field writes them, read as the lab's cell files: a file a format, and how a format is told by its content."""
+"""Scheduling instances in public formats, read as the lab's cell files: a module per format, chosen by the file's content."""
 
 import re
 from dataclasses import dataclass
@@ -18,14 +18,14 @@ SUFFIXES = (".csv", ".dzn", ".yaml", ".yml", ".json", ".jsp", ".jssp", ".fjs")  
 
 @dataclass(frozen=True)
 class Format:
-    """A format: what it is, the module of this package that reads it, the endings that mean it where the content says nothing."""
+    """A format: its description, the module of this package that reads it, and the file endings that decide unclear content."""
 
     help: str
     module: str
     suffixes: tuple[str, ...] = ()
 
     def read(self, source: Source, asked: Asked) -> CellFile:
-        """The cell of a file of this format, whose module is loaded now; BadInput, with file and line, for a damaged one."""
+        """The cell of a file of this format; imports its module. Raises BadInput, with file and line, for a damaged file."""
         cell: CellFile = import_module(f"{__name__}.{self.module}").read(source, asked)
         return cell
 
@@ -43,24 +43,24 @@ INSTANCES = {
 
 
 def is_instance(path: Path) -> bool:
-    """Whether a file that is there is read as an instance: all but .toml, and .txt files that begin as text grids do."""
+    """Whether an existing file is read as an instance: every file but .toml, and .txt files that begin like text grids."""
     if path.suffix != ".txt":
         return path.suffix != ".toml"
     try:
         with path.open(encoding="utf-8", errors="replace") as file:
             start = file.read(400)
-    except OSError:  # which reading it as a grid says
+    except OSError:  # reading it as a grid reports it
         return False
     return re.match(r"\s*(#[^\n]*[^\n.#SG][^\n]*\n\s*)*([0-9]|[Nn]b\b)", start) is not None
 
 
 def takes_case(path: Path, asked: Asked) -> bool:
-    """Whether --case names one of the instances that a file and its layouts hold, and no order of parts."""
+    """Whether --case names one of several instances in a file and its layouts, instead of an order of parts."""
     return asked.layout is not None or format_of(_source(path)) == "bilge-ulusoy"
 
 
 def read_instance(path: Path, asked: Asked | None = None) -> CellFile:
-    """The cell of an instance file of any of these formats; BadInput, with file and line, for a damaged one."""
+    """The cell of an instance file of any format; raises BadInput, with file and line, for a damaged file."""
     source = _source(path)
     return INSTANCES[format_of(source)].read(source, asked or Asked())
 
@@ -73,7 +73,7 @@ def _source(path: Path) -> Source:
 
 
 def format_of(source: Source) -> str:
-    """Which format a file has, by its content; by its ending where that says nothing. BadInput for none of them."""
+    """The format of a file by its content, or by its ending where that is unclear; raises BadInput for no known format."""
     rows = [*source.rows()]
     found = None if not rows else _of_text(source) or _of_numbers(source)
     if found is None:
@@ -104,7 +104,7 @@ def _of_text(source: Source) -> str | None:
 
 
 def _of_numbers(source: Source) -> str | None:
-    """Of a text of numbers: two blocks are Taillard's, rows of pairs JSPLIB's, three numbers in the head FJSPLIB's."""
+    """The format of a text of numbers: two blocks are Taillard's, rows of pairs JSPLIB's, a head of three FJSPLIB's."""
     rows = [*source.rows()]
     words = {row[0].lower() for _, row in rows}
     numbers = [row for _, row in rows if row[0][0].isdigit()]

@@ -1,4 +1,4 @@
-"""The job sets of Bilge and Ulusoy (1995) as CSV: set, job, operation, machine, time; the layouts are in a file of their own."""
+"""The job sets of Bilge and Ulusoy (1995) as CSV (set, job, operation, machine, time); layouts come from a separate file."""
 
 from collections.abc import Mapping
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""MiniZinc data (.dzn), as far as instances need it: numbers, lists and matrices, each with its line; and hoist lines in it.
+"""A reader of MiniZinc data (.dzn), as far as instances need it: numbers, lists and matrices, with lines; and hoist lines.
 
 The names are those of public hoist models: Ninner, tmin, tmax, f, e (Wallace and Yorke-Smith 2020; MiniZinc challenge 2020), or
 numTanks, minTime, maxTime, full, empty (Rodosek and Wallace 1998; the older MiniZinc and AMPL examples).
@@ -13,8 +13,8 @@ from lab.tasks.cell_file import CellFile
 from lab.tasks.instances.hoist import LOAD, PARTS, UNLOAD, HoistLine, cell_of_line
 from lab.tasks.instances.source import MOST_MACHINES, Asked, Source
 
-NO_MOST = 9999  # how these files write that a part may stay as long as you like
-NAMES = {  # what it is -> its names
+NO_MOST = 9999  # the value in these files for a stay without limit
+NAMES = {  # quantity -> its names in the files
     "tanks": ("Ninner", "numTanks"),
     "least": ("tmin", "minTime"),
     "most": ("tmax", "maxTime"),
@@ -42,7 +42,7 @@ class Token(NamedTuple):
 
 @dataclass(frozen=True)
 class Value:
-    """What a name is given: its numbers as words, row by row where it is a matrix, and the line it begins on."""
+    """The value of a name: its numbers as words, row by row for a matrix, and the line where it begins."""
 
     rows: tuple[tuple[Token, ...], ...]
     line: int
@@ -50,7 +50,7 @@ class Value:
 
 
 def tokens(source: Source) -> Iterator[Token]:
-    """The words of a text; BadInput, with line, for a character that means nothing."""
+    """The words of a text; raises BadInput, with line, for an invalid character."""
     at, line = 0, 1
     while at < len(source.text):
         match = _TOKEN.match(source.text, at)
@@ -64,7 +64,7 @@ def tokens(source: Source) -> Iterator[Token]:
 
 
 def values(source: Source) -> dict[str, Value]:
-    """What each name is given; BadInput, with line, for what is no MiniZinc data. Sets and strings are passed over."""
+    """The value of each name; sets and strings are skipped. Raises BadInput, with line, for invalid MiniZinc data."""
     words, found = [*tokens(source)], dict[str, Value]()
     end, at = Token("the end of the file", words[-1].line if words else 1, "end"), 0
     while at < len(words):
@@ -84,7 +84,7 @@ def values(source: Source) -> dict[str, Value]:
 
 
 def _value(source: Source, name: Token, words: list[Token]) -> Value:
-    """A number, a list [..], a matrix [|..|..|], or either within arrayNd(sets, ..)."""
+    """The value in some words: a number, a list [..], a matrix [|..|..|], or either within arrayNd(sets, ..)."""
     if not words:
         raise source.refusal(name.line, f"a value of '{name.text}'")
     if re.fullmatch(r"array[1-6]d", words[0].text):
@@ -97,7 +97,7 @@ def _value(source: Source, name: Token, words: list[Token]) -> Value:
         return Value((tuple(words),), first.line, single=True)
     closing = {"[": "]", "[|": "|]", "{": "}"}.get(first.text)
     if closing is None:
-        return Value((tuple(words),), first.line)  # such as a set, 1..12
+        return Value((tuple(words),), first.line)  # for example a set, 1..12
     if last.text != closing:
         raise source.refusal(last.line, f"'{closing}' at the end of '{name.text}'", last.text)
     rows, row = list[tuple[Token, ...]](), list[Token]()
@@ -146,12 +146,12 @@ class _Data:
         return next(((name, self.found[name]) for name in NAMES[what] if name in self.found), None)
 
     def line(self, what: str) -> int | None:
-        """Where a value begins."""
+        """The line where a value begins."""
         found = self._value(what)
         return None if found is None else found[1].line
 
     def count(self, what: str, default: int | None, most: int) -> int:
-        """A whole number from 1 to `most`; default None: it must be there."""
+        """The value as an integer from 1 to `most`; default None: it is required."""
         found = self._value(what)
         if found is None:
             if default is None:
@@ -163,11 +163,11 @@ class _Data:
         return self.source.whole(value.rows[0][0].text, value.line, f"'{name}'", 1, most)
 
     def times(self, what: str, count: int) -> list[float]:
-        """So many times, in one row."""
+        """The value as `count` times in one row."""
         return self._numbers(what, count)[1]
 
     def matrix(self, what: str, count: int) -> list[list[float]]:
-        """A square of times, as a matrix or as one list."""
+        """The value as a square matrix of times, which may be written as one list."""
         value, times = self._numbers(what, count * count)
         if len(value.rows) > 1:
             for row in value.rows:

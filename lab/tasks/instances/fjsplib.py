@@ -1,4 +1,4 @@
-"""Flexible job shops as text, as FJSPLIB has them and PyJobShop reads them: each operation lists the machines that can do it."""
+"""Flexible job shops as text in the format of FJSPLIB: each operation lists the machines that can do it."""
 
 from collections.abc import Sequence
 
@@ -8,7 +8,7 @@ from lab.tasks.instances.source import MOST_OPERATIONS, Asked, Source
 
 
 def read(source: Source, asked: Asked) -> CellFile:
-    """The cell of such a text; machines are numbered from 1. BadInput, with file and line, for any other."""
+    """The cell of a text in this format, with machines numbered from 1; raises BadInput, with file and line, for others."""
     rows = [*source.rows()]
     jobs, machines = source.shape(rows[0])
     if len(rows) != 1 + jobs:
@@ -19,7 +19,7 @@ def read(source: Source, asked: Asked) -> CellFile:
 
 
 def _job(source: Source, job: int, line: int, words: Sequence[str], machines: int) -> list[Operation]:
-    """The operations of a row: their number; for each of them how many machines can do it, and each with its time."""
+    """The operations of a row, which holds their number and, for each, the number of machines and each machine's time."""
     rest = iter(words)
 
     def word(what: str) -> str:

@@ -1,4 +1,7 @@
-"""Cyclic hoist lines as cells: one hoist carries parts through tanks in order, each for a least and a most time."""
+"""Cyclic hoist lines as cells: one hoist carries parts through tanks in order, each with a least and a largest soak time.
+
+`read` reads the format of Phillips and Unger: CSV with a row for each tank.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -11,7 +14,7 @@ from lab.tasks.instances.layout import csv_rows, read_layout
 from lab.tasks.instances.source import MOST_MACHINES, Asked, Source
 
 LOAD, UNLOAD = "load", "unload"
-PARTS = 4  # of a finite order, if -n does not say
+PARTS = 4  # the default number of parts of a finite order
 _STORE = 200
 
 
@@ -19,8 +22,8 @@ _STORE = 200
 class HoistLine:
     """A line of tanks, all times in the file's unit.
 
-    least, most: soak times (None: no most). full: the loaded move into each tank and, last, to the end. empty: from tank -> to
-    tank -> the hoist's time, tanks by name, beside LOAD and UNLOAD. capacity: parts that a tank holds.
+    least, most: soak times (None: no limit). full: the times of the loaded moves into each tank and, last, to the end. empty:
+    from tank -> to tank -> time of the hoist, by the names of tanks, LOAD and UNLOAD. capacity: parts that a tank holds.
     """
 
     tanks: Sequence[str]
@@ -33,7 +36,7 @@ class HoistLine:
 
 
 def cell_of_line(source: Source, line: HoistLine, asked: Asked) -> CellFile:
-    """The cell of a hoist line; BadInput for several hoists, which share a track and would meet."""
+    """The cell of a hoist line; raises BadInput for several hoists, which would meet on their common track."""
     if asked.robots not in (None, 1):
         wanted = "wanted 1: hoists share a track, and the lab's robots do not hinder each other"
         raise BadInput(f"--robots {asked.robots} beside {source.path}: {wanted}")
@@ -57,14 +60,17 @@ def cell_of_line(source: Source, line: HoistLine, asked: Asked) -> CellFile:
     return built(source, raw)
 
 
-# ---- phillips unger ---------------------------------------------------------------------------------------------------
+# ---- The format of Phillips and Unger ---------------------------------------------------------------------------------
 
 
 HEADER = ("tank", "soak_min", "soak_max", "move_from_previous")
 
 
 def read(source: Source, asked: Asked) -> CellFile:
-    """The cell of such a file: a row a tank, in the order of the parts' way, and a last one, "unload". BadInput, with line."""
+    """The cell of a file with a row for each tank, in the order of the parts' path, and a last row "unload".
+
+    Raises BadInput, with file and line, for any other.
+    """
     rows = csv_rows(source)
     line, header = next(rows, (1, []))
     if tuple(word.lower() for word in header) != HEADER:

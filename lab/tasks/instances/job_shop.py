@@ -1,4 +1,4 @@
-"""Job shops, whatever file they come from, as the lab's cells: with vehicles that carry the jobs, or without any."""
+"""Job shops of all formats as the lab's cells, with vehicles that carry the jobs or without."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -13,16 +13,16 @@ from lab.tasks.instances.layout import Layout, read_layout
 from lab.tasks.instances.source import MOST_OPERATIONS, Asked, Source
 from lab.tasks.toml_text import explain
 
-IN = "in"  # where the jobs of a shop without travel times wait
+IN = "in"  # the station where jobs wait in a shop without travel times
 Operation = tuple[tuple[int, float], ...]  # (machine, time) for each machine that can do it
 
 
 @dataclass(frozen=True)
 class JobShop:
-    """Jobs, each a list of operations; machines by index. Each machine has one server and room for all.
+    """A job shop: jobs as lists of operations, machines by index. Each machine has one server and unlimited room.
 
-    servers: of machines that have more. setups: machine -> (job before, job after) -> time, jobs by index. release, due: of
-    each job; None: all at 0, none. lines: where each job stands in its file.
+    servers: of machines that have several. setups: machine -> (job before, job after) -> time, jobs by index. release, due: the
+    times of each job; None: all are released at 0, and none is due. lines: each job's line in its file.
     """
 
     machines: int
@@ -35,7 +35,7 @@ class JobShop:
 
 
 def cell_of_shop(source: Source, shop: JobShop, asked: Asked) -> CellFile:
-    """The cell of a job shop; its machines are called as in the layout, in their order. BadInput for what does not fit."""
+    """The cell of a job shop; machines take the layout's names, in its order. Raises BadInput for a layout that does not fit."""
     if asked.layout is None:
         if asked.robots is not None:
             raise BadInput(f"--robots {asked.robots} beside {source.path}: it has no travel times: give --layout FILE")
@@ -45,7 +45,7 @@ def cell_of_shop(source: Source, shop: JobShop, asked: Asked) -> CellFile:
 
 
 def case_parts(case: str | None) -> tuple[str | None, str | None]:
-    """The set of jobs and the layout that --case names: "7:1", "EX71", or the layout alone, "1"."""
+    """The job set and the layout that --case names: "7:1", "EX71", or the layout alone, "1"."""
     if case is None:
         return None, None
     if ":" in case:
@@ -57,7 +57,7 @@ def case_parts(case: str | None) -> tuple[str | None, str | None]:
 
 
 def in_layout(source: Source, shop: JobShop, layout: Layout, robots: int) -> CellFile:
-    """The cell of a job shop in a layout, with so many vehicles alike that begin where the jobs do."""
+    """The cell of a job shop in a layout, with `robots` identical vehicles that start where the jobs do."""
     if layout.start is None:
         raise Source(layout.path, "").refusal(None, "a station LU (or load, in, in-buf), where jobs and vehicles begin")
     if len(layout.machines) != shop.machines:
@@ -68,7 +68,7 @@ def in_layout(source: Source, shop: JobShop, layout: Layout, robots: int) -> Cel
 
 
 def vehicles(count: int, start: str) -> list[dict[str, Any]]:
-    """So many robots alike, as a cell file has them."""
+    """The fields of `count` identical robots for a cell file."""
     return [{"name": ROBOT if count == 1 else f"{ROBOT} {n}", "start": start} for n in range(1, count + 1)]
 
 
@@ -118,7 +118,7 @@ def _cell(
 
 
 def built(source: Source, raw: Mapping[str, Any]) -> CellFile:
-    """The cell file of these fields; BadInput, beginning with the instance's file, for what cannot be a cell."""
+    """The cell file of these fields; raises BadInput, beginning with the instance's file, for an invalid cell."""
     try:
         found = CellFile.model_validate(raw)
     except ValidationError as error:

@@ -1,8 +1,9 @@
-"""Job shops with vehicles as YAML, as JobShopLab has them: jobs, machines and travel times as tables within strings.
+"""Job shops with vehicles in JobShopLab's YAML: jobs, machines and travel times as tables within strings.
 
-As its simulator does: vehicle n begins at machine n, counted round; jobs begin in the input buffer; machines have room for all
-before and after them; the clock stops with the last operation: the way to the output buffer does not count. Its vehicles set
-out for a part once its machine works on it, not earlier; here they may. Source: github.com/proto-lab-ro/jobshoplab.
+As in its simulator, vehicle n starts at machine n (modulo the number of machines); jobs start in the input buffer; machines have
+unlimited room before and after them; the makespan ends with the last operation, without the transport to the output buffer. Its
+vehicles set out for a part only once its machine works on it; here they may set out earlier.
+Source: github.com/proto-lab-ro/jobshoplab.
 """
 
 import re
@@ -20,7 +21,7 @@ from lab.tasks.instances.source import MOST_MACHINES, MOST_OPERATIONS, Asked, So
 MAX_YAML = 100_000  # bytes; the safe reader takes seconds for more
 MOST_VEHICLES = 50
 BUFFERS = {"input": "in-buf", "output": "out-buf"}
-_LEFT_OUT = ("setup_times", "outages")  # of instance_config: what the lab has no equal of
+_LEFT_OUT = ("setup_times", "outages")  # keys of instance_config that the lab does not support
 _JOB = re.compile(r"j([0-9]{1,4})\|(.*)")
 _PAIR = re.compile(r"\(\s*([0-9]{1,9})\s*,\s*([0-9]{1,9})\s*\)")
 
@@ -38,7 +39,7 @@ class _Yaml:
         return int(self.node.start_mark.line) + 1
 
     def get(self, key: str) -> "_Yaml | None":
-        """What stands under a key of this mapping; None where it has no such key."""
+        """The value under a key of this mapping; None where it has no such key."""
         where = f"{self.where}.{key}" if self.where else key
         if not isinstance(self.node, yaml.MappingNode):
             raise self.source.refusal(self.line, f"a mapping under '{self.where}', with '{key}'")
@@ -46,7 +47,7 @@ class _Yaml:
         return _Yaml(self.source, found[0], where) if found else None
 
     def need(self, *keys: str) -> "_Yaml":
-        """As `get`, through several; BadInput, with line, where one lacks."""
+        """The value under a path of keys; raises BadInput, with line, where one is missing."""
         at = self
         for key in keys:
             found = at.get(key)
@@ -56,7 +57,7 @@ class _Yaml:
         return at
 
     def table(self) -> Iterator[tuple[int, str]]:
-        """The lines of a string that hold something, each after its number in the file."""
+        """The non-empty lines of a string, each with its number in the file."""
         if not isinstance(self.node, yaml.ScalarNode):
             raise self.source.refusal(self.line, f"a table as text under '{self.where}'")
         first = self.line + (1 if self.node.style in ("|", ">") else 0)
@@ -65,7 +66,7 @@ class _Yaml:
                 yield number, text.strip()
 
     def whole(self, most: int) -> int:
-        """A whole number from 1."""
+        """The value as an integer from 1 to `most`."""
         word = self.node.value if isinstance(self.node, yaml.ScalarNode) else "a mapping or a list"
         return self.source.whole(word, self.line, f"'{self.where}'", 1, most)
 
@@ -74,7 +75,7 @@ def _parsed(source: Source) -> _Yaml:
     if len(source.text) > MAX_YAML:
         raise source.refusal(None, f"up to {MAX_YAML} characters of YAML", f"{len(source.text)}")
     try:
-        node = yaml.compose(source.text, Loader=yaml.SafeLoader)  # nodes, which aliases cannot multiply
+        node = yaml.compose(source.text, Loader=yaml.SafeLoader)  # nodes, since aliases cannot multiply them
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         line = None if mark is None else mark.line + 1
@@ -89,7 +90,7 @@ def _parsed(source: Source) -> _Yaml:
 
 
 def read(source: Source, asked: Asked) -> CellFile:
-    """The cell of such a file. BadInput, with file and line, for a damaged one, and for outages, tools and drawn times."""
+    """The cell of such a file; raises BadInput, with file and line, for a damaged one and for outages, tools and drawn times."""
     config = _parsed(source).need("instance_config")
     for key in _LEFT_OUT:
         if (found := config.get(key)) is not None:
@@ -120,7 +121,7 @@ def read(source: Source, asked: Asked) -> CellFile:
 
 
 def _jobs(source: Source, spec: _Yaml) -> tuple[int, list[list[Operation]], list[int | None]]:
-    """How many machines the head names, the operations of each job, and where these stand."""
+    """The number of machines in the head, the operations of each job, and the line of each job."""
     rows = list(spec.table())
     if not rows:
         raise source.refusal(spec.line, "a head such as (m0,t)|(m1,t) and a row a job: the table is empty")
@@ -149,7 +150,7 @@ def _jobs(source: Source, spec: _Yaml) -> tuple[int, list[list[Operation]], list
 
 
 def _travel(source: Source, spec: _Yaml, machines: int) -> Layout:
-    """The matrix of travel times, but for the output buffer's; the input buffer is called in-buf."""
+    """The matrix of travel times without the output buffer; the input buffer is called in-buf."""
     rows = list(spec.table())
     head = [_station(name) for name in rows[0][1].split("|")] if rows else []
     wanted = {*(f"m-{number}" for number in range(machines)), BUFFERS["input"]}
@@ -178,7 +179,7 @@ def _ordered(names: Sequence[str]) -> tuple[str, ...]:
 
 
 def _station(name: str) -> str:
-    """One name for all that JobShopLab takes for its two buffers."""
+    """The station's name, with one spelling for all that JobShopLab accepts for its two buffers."""
     plain = re.sub(r"[ _]", "-", name.strip().lower())
     for word, own in BUFFERS.items():
         if plain in (word, f"{word}-buffer", f"{word}buffer", own, own.replace("-", ""), f"{own[:-4]}-buffer"):

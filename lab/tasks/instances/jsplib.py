@@ -1,4 +1,4 @@
-"""Job shops as text, as JSPLIB and the OR-Library have them: a row a job, of machine and time for each operation."""
+"""Job shops as text in the format of JSPLIB and the OR-Library: a row per job with machine and time of each operation."""
 
 from lab.tasks.cell_file import CellFile
 from lab.tasks.instances.job_shop import JobShop, Operation, cell_of_shop
@@ -6,7 +6,7 @@ from lab.tasks.instances.source import MOST_OPERATIONS, Asked, Source
 
 
 def read(source: Source, asked: Asked) -> CellFile:
-    """The cell of such a text; machines are numbered from 0. BadInput, with file and line, for any other."""
+    """The cell of a text in this format, with machines numbered from 0; raises BadInput, with file and line, for others."""
     rows = [*source.rows()]
     jobs, machines = source.shape(rows[0])
     line, words = rows[0]

@@ -1,4 +1,4 @@
-"""Files of travel times, CSV: a matrix with the stations' names around it, or rows of from, to, time; one layout or several."""
+"""CSV files of travel times: a matrix with the stations' names, or rows of from, to, time; one layout or several."""
 
 import csv
 from collections.abc import Iterator, Mapping
@@ -9,7 +9,7 @@ from pathlib import Path
 from lab.tasks.instances.source import Source
 from lab.tasks.record import read_text
 
-STARTS = ("lu", "l/u", "load", "in", "in-buf", "input", "depot")  # what the place where parts begin is called
+STARTS = ("lu", "l/u", "load", "in", "in-buf", "input", "depot")  # names of the station where parts start
 ENDS = ("out", "out-buf", "output", "unload")
 FROM = ("from", "origin", "after_move_into")
 TO = ("to", "target", "to_remove_from")
@@ -26,12 +26,12 @@ class Layout:
 
     @property
     def start(self) -> str | None:
-        """The station where parts and vehicles begin; None: no name says so."""
+        """The station where parts and vehicles start; None: no station has such a name."""
         return next((name for name in self.names if name.lower() in STARTS), None)
 
     @property
     def end(self) -> str | None:
-        """The station to which parts are brought in the end; None: there is none."""
+        """The station to which finished parts are brought; None: there is none."""
         return next((name for name in self.names if name.lower() in ENDS), None)
 
     @property
@@ -41,7 +41,7 @@ class Layout:
 
 
 def csv_rows(source: Source) -> Iterator[tuple[int, list[str]]]:
-    """The rows of a CSV file that hold anything, spaces around values left out, each after its line; BadInput for no CSV."""
+    """The non-empty rows of a CSV file with their lines, values stripped of spaces; raises BadInput for invalid CSV."""
     reader = csv.reader(StringIO(source.text), strict=True)
     try:
         for count, row in enumerate(reader):
@@ -54,7 +54,7 @@ def csv_rows(source: Source) -> Iterator[tuple[int, list[str]]]:
 
 
 def read_layout(path: Path, case: str | None = None) -> Layout:
-    """The travel times of a file; case: which of several layouts. BadInput, with file and line, for what cannot be one."""
+    """The travel times of a file; case: the name of one of several layouts. Raises BadInput, with file and line."""
     source = Source(path, read_text(path))
     rows = csv_rows(source)
     line, header = next(rows, (1, []))
@@ -75,7 +75,7 @@ def read_layout(path: Path, case: str | None = None) -> Layout:
 def _listed(
     source: Source, rows: Iterator[tuple[int, list[str]]], header: list[str], case: str | None
 ) -> dict[str, dict[str, float]]:
-    """The times of rows of from, to, time; before these, if the header says so, which layout a row belongs to."""
+    """The times of rows of from, to, time, with the layout in a first column if the header has one."""
     found: dict[str, dict[str, dict[str, float]]] = {}
     for line, row in rows:
         if len(row) != len(header):
@@ -99,7 +99,7 @@ def _listed(
 def _matrix(
     source: Source, rows: Iterator[tuple[int, list[str]]], names: list[str], line: int
 ) -> dict[str, dict[str, float]]:
-    """The times of a matrix: a row for each station, after its name; an empty place is no allowed move."""
+    """The times of a matrix with a row per station, which begins with its name; an empty field is a forbidden move."""
     if len(set(names)) < len(names) or "" in names:
         raise source.refusal(line, "a name for each column, each once", ",".join(names))
     travel: dict[str, dict[str, float]] = {}

@@ -1,4 +1,4 @@
-"""Job shops as PyJobShop's JSON (`ProblemData.to_json`), both ways, for cells without a robot. Source: pyjobshop 0.0.9."""
+"""Reads and writes job shops without robots as PyJobShop's JSON (`ProblemData.to_json`). Source: pyjobshop 0.0.9."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -14,10 +14,10 @@ from lab.tasks.cell_file import CellFile
 from lab.tasks.instances.job_shop import JobShop, Operation, cell_of_shop
 from lab.tasks.instances.source import MOST_MACHINES, MOST_OPERATIONS, MOST_TIME, Asked, Source, json_line
 
-NEVER = 2**25  # how PyJobShop writes that a deadline never comes; larger ones are taken for it, too
+NEVER = 2**25  # PyJobShop's value for no deadline; larger values count as none, too
 LISTS = {"jobs": MAX_PARTS, "resources": MOST_MACHINES, "tasks": 20_000, "modes": 200_000}
-READ = ("end_before_start", "setup_times")  # the constraints that the lab has an equal of
-PLAIN: Mapping[str, Mapping[str, Any]] = {  # fields that must be as they are by default, for each list
+READ = ("end_before_start", "setup_times")  # the constraints that the lab supports
+PLAIN: Mapping[str, Mapping[str, Any]] = {  # fields that must have their default values, for each list
     "jobs": {"weight": 1},
     "resources": {"breaks": [], "no_idle": False},
     "tasks": {"earliest_start": 0, "earliest_end": 0, "allow_idle": False, "allow_breaks": False, "optional": False},
@@ -26,7 +26,7 @@ PLAIN: Mapping[str, Mapping[str, Any]] = {  # fields that must be as they are by
 
 @dataclass(frozen=True)
 class _Json:
-    """A value of a JSON document, with the way to it; its line is looked for only when it is wrong."""
+    """A value of a JSON document with the path to it; its line is looked up only for an error."""
 
     source: Source
     value: Any
@@ -37,7 +37,7 @@ class _Json:
         return self.source.refusal(json_line(self.source.text, self.way), f"{wanted} as '{where}'", got)
 
     def get(self, key: str, default: Any = None) -> "_Json":
-        """What stands under a key of this mapping, or the default."""
+        """The value under a key of this mapping, or the default."""
         if not isinstance(self.value, dict):
             raise self.refusal("a mapping", json.dumps(self.value))
         return _Json(self.source, self.value.get(key, default), (*self.way, key))
@@ -50,14 +50,14 @@ class _Json:
         return [_Json(self.source, value, (*self.way, number)) for number, value in enumerate(self.value)]
 
     def whole(self, most: int, least: int = 0) -> int:
-        """A whole number from 0."""
+        """The value as an integer from `least` to `most`."""
         if not isinstance(self.value, int) or isinstance(self.value, bool) or not least <= self.value <= most:
             raise self.refusal(f"a whole number from {least} to {most}", json.dumps(self.value))
         return self.value
 
 
 def read(source: Source, asked: Asked) -> CellFile:
-    """The cell of such a document. BadInput, with file and line, for a damaged one, and for what the lab has no equal of."""
+    """The cell of such a document; raises BadInput, with file and line, for a damaged one and for unsupported features."""
     try:
         raw = json.loads(source.text)
     except json.JSONDecodeError as error:
@@ -94,7 +94,7 @@ def _unless_none(values: Sequence[Any], none: Any) -> tuple[float, ...] | None:
 
 
 def _check_plain(document: _Json, lists: Mapping[str, Sequence[_Json]]) -> None:
-    """BadInput for what the lab has no equal of."""
+    """Raises BadInput for features that the lab does not support."""
     for name, plain in PLAIN.items():
         for one in lists[name]:
             for key, value in plain.items():
@@ -145,7 +145,7 @@ def _ways(tasks: Sequence[_Json], modes: Sequence[_Json], resources: int) -> lis
 
 
 def _orders(document: _Json, jobs: Sequence[_Json], tasks: Sequence[_Json]) -> list[list[int]]:
-    """The tasks of each job in the order that the constraints `end_before_start` put them in."""
+    """The tasks of each job in the order that the constraints `end_before_start` determine."""
     after: dict[int, set[int]] = {}
     for one in document.get("constraints", {}).get("end_before_start", []).each(LISTS["modes"]):
         if (delay := one.get("delay", 0)).value != 0:
@@ -179,7 +179,7 @@ def _orders(document: _Json, jobs: Sequence[_Json], tasks: Sequence[_Json]) -> l
 
 
 def _reached(after: Mapping[int, set[int]], task: int) -> set[int]:
-    """All tasks after one."""
+    """All tasks that must follow a task."""
     found: set[int] = set()
     ahead = [*after.get(task, ())]
     while ahead:
@@ -190,7 +190,7 @@ def _reached(after: Mapping[int, set[int]], task: int) -> set[int]:
 
 
 def _setups(document: _Json, orders: Sequence[Sequence[int]], machines: int) -> dict[int, dict[tuple[int, int], float]]:
-    """The setup times of each machine, by jobs: job -> job -> time; a job has one task on such a machine."""
+    """The setup times of each machine: (job before, job after) -> time; a job has a single task on such a machine."""
     job_of = {task: number for number, order in enumerate(orders) for task in order}
     found: dict[int, dict[tuple[int, int], float]] = {}
     for one in document.get("constraints", {}).get("setup_times", []).each(LISTS["modes"]):
@@ -206,7 +206,7 @@ def _setups(document: _Json, orders: Sequence[Sequence[int]], machines: int) -> 
 
 
 def write(file: CellFile) -> str:
-    """The document of a cell without a robot. BadInput, with what PyJobShop has no equal of, for any other."""
+    """The document of a cell without a robot; raises BadInput for features that PyJobShop does not support."""
     return json.dumps(_document(file), indent=2) + "\n"
 
 
@@ -253,7 +253,7 @@ def _document(file: CellFile) -> dict[str, Any]:
 
 
 def _check_written(file: CellFile) -> None:
-    """BadInput for what PyJobShop has no equal of."""
+    """Raises BadInput for features that PyJobShop does not support."""
     where = f"cell '{file.name}' as PyJobShop's JSON"
     if file.built_robots:
         raise BadInput(f"{where}: it has {len(file.built_robots)} robots: only cells without a robot (robots = [])")
@@ -271,7 +271,8 @@ def _check_written(file: CellFile) -> None:
 
 
 def _operations(product: CellProduct, index: Mapping[str, int], own: Mapping[str, float]) -> list[Operation]:
-    """The machines that can do each step of a product, and their times. BadInput where its routes are no choice step by step."""
+    """The machines that can do each step of a product, with times; raises BadInput unless its routes are all combinations of
+    a choice of machine at each step."""
     stages = [
         [
             tuple(

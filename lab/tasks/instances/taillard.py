@@ -1,4 +1,4 @@
-"""Job shops as text, as Taillard has them: a block of times, a row a job, and a block of machines, numbered from 1."""
+"""Job shops as text in Taillard's format: a block of times with a row per job, then a block of machines numbered from 1."""
 
 from lab.tasks.cell_file import CellFile
 from lab.tasks.instances.job_shop import JobShop, Operation, cell_of_shop
@@ -8,7 +8,7 @@ BLOCKS = ("times", "machines")
 
 
 def read(source: Source, asked: Asked) -> CellFile:
-    """The cell of such a text; the words between the blocks may be left out. BadInput, with file and line, for any other."""
+    """The cell of a text in this format, with or without words between the blocks; raises BadInput, with file and line."""
     rows = [(line, words) for line, words in source.rows() if words[0][0].isdigit() or words[0][0] in "-+."]
     if not rows:
         raise source.refusal(1, "how many jobs and how many machines")
