@@ -37,7 +37,7 @@ def show(
 @contextmanager
 def seen(what: str | Path | GridWorld | Task, asked: Asked) -> "Iterator[tuple[str, Recording]]":
     """What a page calls a task or a world, and one frame of it; a large world's mesh is there as long as the block lasts."""
-    from lab.mdp import shortest_way
+    from lab.mdp import shortest_path
     from lab.production.recorder import show_scene
     from lab.sim.scene.scene_check import check_scene
     from lab.skills.prepared_scene import lay_out
@@ -49,7 +49,7 @@ def seen(what: str | Path | GridWorld | Task, asked: Asked) -> "Iterator[tuple[s
     found = load_any(str(what)) if isinstance(what, str | Path) else what
     if isinstance(found, GridWorld):
         mdp = found.mdp()
-        way = [mdp.state_cell(state) for state in shortest_way(mdp)]
+        way = [mdp.state_cell(state) for state in shortest_path(mdp)]
         with closing(WorldBodies(found)) as drawn:
             said = [found.title or found.name, f"shortest way: {counted(len(way) - 1, 'move')}"]
             if drawn.drawn < len(found.obstacles):
