@@ -1,4 +1,4 @@
-"""Errors of one line, which name the bad value, where it came from and what is allowed; how long values and lists are shortened."""
+"""Errors of one line, which name the bad value, where it came from and what is allowed; shortened values and lists."""
 
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches

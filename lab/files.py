@@ -124,7 +124,7 @@ _LOCK = ".lock"  # suffix of the file beside a draft folder that is locked while
 
 
 def write_whole(path: Path, content: bytes, drafts: Path | None = None) -> None:
-    """Writes a file atomically: to a draft draft_path it, or in the folder `drafts` on the same file system, which is then renamed.
+    """Writes a file atomically: first a draft, beside it or in `drafts` (on the same file system), which is then renamed.
 
     Drafts of the same file that killed processes left are removed. The folders must exist. Raises OSError if the file cannot be
     written, and then leaves no draft.
@@ -214,7 +214,7 @@ def is_file(path: Path | str) -> bool:
 
 
 def within(folder: Path, name: str, beside: Path | None = None) -> Path | None:
-    """The path that a name path in a file means, relative to `beside` (default: `folder`).
+    """The path that a name in a file means, relative to `beside` (default: `folder`).
 
     None if the path leads out of `folder`, or if no file can have that name.
     """

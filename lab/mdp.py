@@ -192,7 +192,7 @@ def _common_reward(values: FloatArray, moves: str) -> float:
 
 
 def _neighbours(shape: tuple[int, ...]) -> IntArray:
-    """The cell that each move leads to, (cells, 2 * axes) int32, in the order -axis0, +axis0, -axis1, ...; moves stop at the border."""
+    """The cell that each move leads to, (cells, 2 * axes) int32: -axis0, +axis0, -axis1, ...; moves stop at the border."""
     cells = np.indices(shape).reshape(len(shape), -1)
     columns = []
     for axis, length in enumerate(shape):
@@ -204,7 +204,7 @@ def _neighbours(shape: tuple[int, ...]) -> IntArray:
 
 
 def distances(successor: IntArray, closed: BoolArray, source: int) -> IntArray:
-    """The number of moves from `source` to each state, (S,) int32, -1 if unreachable. States that are `closed` (S,) are not left."""
+    """The moves needed from `source` to each state, (S,) int32, -1 if unreachable; no path leaves a `closed` (S,) state."""
     distance = np.full(len(successor), -1, np.int32)
     frontier = np.array([source])
     steps = 0

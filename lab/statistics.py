@@ -80,8 +80,8 @@ def share(success: ArrayLike) -> tuple[float, float, float]:
 def share_error(percent: float, n: float) -> float:
     """The standard error [points] of a share [%] of n sessions.
 
-    Two successes and two failures are added, so that shares of 0 and 100 % have an error as well. Source: A. Agresti, B. Coull, Am. Stat.
-    52 (1998), 119-126.
+    Two successes and two failures are added, so that shares of 0 and 100 % have an error as well.
+    Source: A. Agresti, B. Coull, Am. Stat. 52 (1998), 119-126.
     """
     p = (percent / 100 * n + 2) / (n + 4)
     return 100 * sqrt(p * (1 - p) / (n + 4))
@@ -96,8 +96,8 @@ def mean_error(values: ArrayLike, n: float | None = None) -> float:
 def score(sp: ArrayLike, hs: ArrayLike, sp_range: Range, hs_range: Range) -> FloatArray:
     """The score of combinations: 1 for the highest success percentage and the fewest helped steps, 0 for the opposite.
 
-    sp [%], hs [steps]: numbers or arrays of one shape; sp_range, hs_range: (low, high) over all combinations, from `ranges` or from
-    the printed ones (then a score may lie outside [0, 1]). In a range of width 0 every value counts as the best.
+    sp [%], hs [steps]: numbers or arrays of one shape; sp_range, hs_range: (low, high) over all combinations, from `ranges` or
+    from the printed ones (then a score may lie outside [0, 1]). In a range of width 0 every value counts as the best.
     Raises BadInput for a range whose low end is above its high end. Source: thesis eq. 9.4.
     """
     for name, (low, high) in (("SP", sp_range), ("HS", hs_range)):
@@ -157,7 +157,7 @@ def ranks(order: Sequence[str], differ: Collection[tuple[str, str]]) -> dict[str
     """The ranks by group, given the groups from best to worst (`order`) and the pairs that differ significantly.
 
     Each maximal set of groups without a differing pair is a rank; a group in several sets has all their ranks: "1-2" or "1,3".
-    Source: thesis tables 9.2-9.5; the sets are numbers as in H.-P. Piepho, J. Comput. Graph. Stat. 13 (2004), 456-466.
+    Source: thesis tables 9.2-9.5; the sets are found as in H.-P. Piepho, J. Comput. Graph. Stat. 13 (2004), 456-466.
     """
     alike = [frozenset(order)]
     for pair in differ:
@@ -229,7 +229,7 @@ def _anova(samples: Sequence[FloatArray]) -> tuple[float, float, float]:
 def _tukey(samples: Mapping[str, FloatArray], mean_square: float) -> dict[tuple[str, str], float]:
     """p by pair, from the studentized range with the harmonic mean of both sizes (Tukey-Kramer).
 
-    For thousands of values and nearly equal means scipy warns that its integral converges slowly; its p, 1, is right all the same.
+    For thousands of values and nearly equal means scipy warns that its integral converges slowly; its p, 1, is right.
     """
     from scipy.integrate import IntegrationWarning
     from scipy.stats import studentized_range
