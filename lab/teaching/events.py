@@ -209,7 +209,7 @@ class PlanMade:
 
 @dataclass(frozen=True)
 class MoveBegan:
-    """The robot begins a move; number: of `moves`; start: where the robot is; origin, target: where it picks and places the part."""
+    """The robot begins move `number` of `moves`, from `start`; origin, target: where it picks and places the part."""
 
     number: int
     moves: int

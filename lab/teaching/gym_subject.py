@@ -66,7 +66,7 @@ def _own_physics(name: GymName) -> PhysicsEnvironment | None:
 
 
 def fitting(environment: GymEnvironment | PhysicsEnvironment) -> tuple[LearnerSettings, GateSettings]:
-    """Settings of a learner that mostly finds the optimal policy without advice, and of a gate; found in the toy-text environments.
+    """Settings of a gate, and of a learner that mostly finds the optimal policy without advice; found in toy-text environments.
 
     With several starts every state matters, so the learner explores for longer. If steps are stochastic, the steps of one episode
     say little about its advice, so the gate averages over more episodes and tolerates more misleads.

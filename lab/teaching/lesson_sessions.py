@@ -47,9 +47,8 @@ class Sessions:
         self.plan, self.advising, self.journal, self.tell = plan, advising, journal, tell
         self.place = plan.problem.environment or TableEnvironment(plan.problem.mdp)
         self.gate = replace(plan.gate, judge_unhelped=False) if advising.records else plan.gate
-        before = (
-            0 if plan.unfinished is None else len(plan.unfinished.curve)
-        )  # part of the seed, so that a continued lesson draws other numbers
+        # Part of the seed, so that a continued lesson draws other numbers.
+        before = 0 if plan.unfinished is None else len(plan.unfinished.curve)
         self.rng = np.random.default_rng([seed, crc32(plan.problem.name.encode()), before])
         self.alone = False  # the advisor left or was rejected: nobody is asked about this skill again
         mdp = plan.problem.mdp  # only needed if further sessions may follow

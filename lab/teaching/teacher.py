@@ -72,7 +72,7 @@ class Teacher:
     def _looked_up(
         self, plan: LessonPlan, known: KnownPolicies
     ) -> tuple[Lesson | None, Policy | None, tuple[Policy, Fitness] | None]:
-        """(the lesson of a reused policy, the policy of exactly this problem, the best one of another problem with its fitness)."""
+        """(the lesson of a reused policy, the policy of this problem, the best one of another problem with its fitness)."""
         problem = plan.problem
         found = known.get((problem.subtask, problem.mdp.signature))
         if found is not None and not _belongs(found, problem.mdp):
@@ -177,9 +177,7 @@ class Teacher:
             failure = None
             if not (result.interrupted or journal.read_only):
                 policy, failure = self._tried(problem, policy)
-            if not (
-                result.interrupted and journal.folding
-            ):  # an interrupted replay of the journal knows less than the saved policy
+            if not (result.interrupted and journal.folding):  # otherwise the saved policy has learned more
                 saved = self.toolbox.put(policy)
                 if not saved.in_use:
                     self.tell(KeptBeside(policy.name, saved.version, saved.why_not))
