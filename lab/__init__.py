@@ -1,9 +1,9 @@
 """Teaching Lab: a robot that learns sub-tasks with advice, orders them and carries them out in physics.
 
-What is listed in `__all__` is stable: see docs/reference.md. Each is loaded when it is touched.
+The names in `__all__` are stable: docs/reference.md lists them. Each is imported when it is first used.
 """
 
-TYPE_CHECKING = False  # as typing's, which would be all that `import lab` takes time for
+TYPE_CHECKING = False  # typing.TYPE_CHECKING without its import, which would dominate the time of `import lab`
 if TYPE_CHECKING:
     from typing import Any
 

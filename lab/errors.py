@@ -1,29 +1,29 @@
-"""What the lab says when something is wrong: one line, the bad value, where it came from, what is allowed; counts in words."""
+"""Errors of one line, which name the bad value, where it came from and what is allowed; shortened values and lists."""
 
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 
-MOST_CHARACTERS = 295  # of a message: with "lab: " before it, a line that is read at a glance
+MOST_CHARACTERS = 295  # of a message, to which a command prepends "lab: "
 MOST_OF_VALUE = 80  # characters of a bad value
-MOST_OF_PLACE = 140  # and of where it comes from: a path that is cut cannot be copied
-MOST_COMPARED = 10_000  # names with a bad one: more take seconds
-KNOWN = " known: "  # before the names that are known, the last of a message
+MOST_OF_PLACE = 140  # characters of where it comes from: more, because a shortened path cannot be copied
+MOST_COMPARED = 10_000  # known names that are searched for the nearest one: more would take seconds
+KNOWN = " known: "  # precedes the known names, which end a message
 _GAP, _MORE = " ... ", ", ..."
-_END = 150  # of a longer message: where it comes from stands first, what is allowed last
+_END = 150  # characters that are kept of a long message's end, which says what is allowed
 
 
 def printable(text: str) -> str:
-    """Text with each character that cannot be printed, such as a line break or an escape code, as its escape."""
+    """The text with unprintable characters, such as line breaks and escape codes, replaced by their escapes."""
     return text if text.isprintable() else "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
 
 
 def escaped(text: str) -> str:
-    """As `printable`, of several lines: line breaks and tabs stay."""
+    """The text with unprintable characters replaced by their escapes, except line breaks and tabs."""
     return "\n".join("\t".join(map(printable, line.split("\t"))) for line in text.split("\n"))
 
 
 def shortened(value: object, most: int = MOST_OF_VALUE) -> str:
-    """A value as an error shows it: printable, and the middle of a long one left out."""
+    """A value as text for an error message: printable, and at most `most` characters long; the middle is left out."""
     text = printable(_ends(str(value)))
     if len(text) <= most:
         return text
@@ -32,10 +32,17 @@ def shortened(value: object, most: int = MOST_OF_VALUE) -> str:
 
 
 class LabError(Exception):
-    """Any failure the lab explains in one line; `exit_code` is what a command ends with.
+    """The base of all failures that the lab explains in one line; `exit_code` is the exit code of the command.
 
-    What cannot be printed, such as a line break or an escape code in a bad value, is shown as its escape; of a message of
-    more than MOST_CHARACTERS the last known names are left out, or the middle.
+    Unprintable characters of the message are replaced by their escapes. A message of more than MOST_CHARACTERS loses the last
+    of the known names that it lists, or its middle.
+
+        >>> import lab
+        >>> try:
+        ...     lab.grid((3, 3), [[0] * 3] * 3, (0, 0), (5, 5))
+        ... except lab.LabError as error:
+        ...     print(error.exit_code, error)
+        2 goal (5, 5) is outside the grid: allowed 0..2 x 0..2
     """
 
     exit_code = 1
@@ -45,33 +52,33 @@ class LabError(Exception):
 
 
 def _ends(text: str) -> str:
-    """A text without the middle of a very long one, which would take seconds to be made printable."""
+    """The text without its middle if it is very long: `printable` would take seconds on it."""
     return text if len(text) <= 4 * MOST_CHARACTERS else text[: 2 * MOST_CHARACTERS] + text[-2 * MOST_CHARACTERS :]
 
 
 def _in_a_line(text: str) -> str:
-    """A message of at most MOST_CHARACTERS: of a list of known names at its end the last ones are left out, or its middle."""
+    """The message, shortened to MOST_CHARACTERS: the last known names that it lists are dropped, or else its middle."""
     if len(text) <= MOST_CHARACTERS:
         return text
-    said, known, names = text.partition(KNOWN)
-    if known and len(said) < MOST_CHARACTERS - MOST_OF_VALUE:
-        kept = names[: MOST_CHARACTERS - len(said + known + _MORE)].rpartition(", ")[0]
-        return f"{said}{known}{kept}{_MORE}"
+    beginning, known, names = text.partition(KNOWN)
+    if known and len(beginning) < MOST_CHARACTERS - MOST_OF_VALUE:
+        kept = names[: MOST_CHARACTERS - len(beginning + known + _MORE)].rpartition(", ")[0]
+        return f"{beginning}{known}{kept}{_MORE}"
     return f"{text[: MOST_CHARACTERS - len(_GAP) - _END]}{_GAP}{text[-_END:]}"
 
 
 class Notice(UserWarning):
-    """What goes on all the same, but should be known: a command says it in one line."""
+    """A warning that a command prints in one line before it continues."""
 
 
 class BadInput(LabError):
-    """The input is wrong: nothing was tried, nothing was written (exit 2)."""
+    """The input is wrong; nothing was started and nothing was written (exit code 2)."""
 
     exit_code = 2
 
 
 class WorkFailed(LabError):
-    """The work was tried and failed (exit 1)."""
+    """The work was started and failed (exit code 1)."""
 
     exit_code = 1
 
@@ -80,9 +87,9 @@ _NO_ROOM = ("failed to map segment", "annot allocate memory", "can't start new t
 
 
 def out_of_memory(error: BaseException) -> WorkFailed | None:
-    """The error for one that comes of too little memory, here or in what it comes from; None for any other.
+    """A WorkFailed if the error or one of its causes means that memory ran out, otherwise None.
 
-    Libraries that cannot be loaded for want of memory say so in words only.
+    The text of each error is searched too, because a library that cannot be loaded for lack of memory raises no MemoryError.
     """
     cause: BaseException | None = error
     while cause is not None:
@@ -94,16 +101,20 @@ def out_of_memory(error: BaseException) -> WorkFailed | None:
 
 
 def unknown(kind: str, value: object, known: Iterable[str], where: str) -> BadInput:
-    """The error for a name that no table holds: shows it, where it came from, the nearest and the known names that fit."""
+    """The error for a name that is not in a table.
+
+    kind: what the name stands for, such as "gate"; value: the name; where: where it came from. The message adds the nearest known
+    name and as many of the known names as it has room for.
+    """
     names = sorted(known)
-    near = get_close_matches(str(value)[:MOST_OF_VALUE], names, n=1) if len(names) <= MOST_COMPARED else []
-    hint = f" did you mean '{shortened(near[0])}'?" if near else ""
-    said = f"unknown {kind} '{shortened(value)}' ({shortened(where, MOST_OF_PLACE)}):{hint}{KNOWN}"
-    return BadInput(f"{said}{listed(names, max(20, MOST_CHARACTERS - len(said))) or 'none'}")
+    nearest = get_close_matches(str(value)[:MOST_OF_VALUE], names, n=1) if len(names) <= MOST_COMPARED else []
+    hint = f" did you mean '{shortened(nearest[0])}'?" if nearest else ""
+    beginning = f"unknown {kind} '{shortened(value)}' ({shortened(where, MOST_OF_PLACE)}):{hint}{KNOWN}"
+    return BadInput(f"{beginning}{listed(names, max(20, MOST_CHARACTERS - len(beginning))) or 'none'}")
 
 
 def listed(names: Sequence[str], most: int) -> str:
-    """Names with commas between them, as many as `most` characters hold, and how many more there are."""
+    """The names, separated by commas: as many as fit into `most` characters, and how many more there are."""
     text = ", ".join(names[:most])
     if len(text) <= most and len(names) <= most:
         return text
@@ -114,7 +125,7 @@ def listed(names: Sequence[str], most: int) -> str:
     return text if shown else counted(len(names), "name")
 
 
-def counted(number: float, what: str) -> str:
-    """How many of something: "1 step", "2 steps", "2 boxes"."""
-    ending = "es" if what.endswith(("s", "x", "z", "ch", "sh")) else "s"
-    return f"{number} {what}" if number == 1 else f"{number} {what}{ending}"
+def counted(number: float, noun: str) -> str:
+    """A number with its noun in the singular or plural: "1 step", "2 steps", "2 boxes"."""
+    ending = "es" if noun.endswith(("s", "x", "z", "ch", "sh")) else "s"
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}{ending}"

@@ -1,4 +1,4 @@
-"""Files: where the shipped ones are; read within bounds; written whole or not at all; folders looked at before use."""
+"""Where the shipped files are; bounded reading; atomic writing; drafts and locks; checks of output folders and of named files."""
 
 import hashlib
 import json
@@ -21,21 +21,21 @@ from lab.errors import BadInput, WorkFailed
 from lab.operating_system import lock, lock_file, opened, replace
 
 PACKAGE = Path(__file__).resolve().parent
-MOST_BYTES = 256 << 20  # of any file that is read; most kinds have a lower limit of their own
+MOST_BYTES = 256 << 20  # of any file that is read; most file formats have a lower limit of their own
 
 
 def tasks_folder() -> Path:
-    """The folder of the task files that ship (`*.toml`); raises WorkFailed when the installation lost it."""
+    """The folder of the task files that ship (`*.toml`); raises WorkFailed if it is missing."""
     return find("tasks", PACKAGE)
 
 
 def assets_folder() -> Path:
-    """The folder of the shipped URDFs and meshes; raises WorkFailed when the installation lost it."""
+    """The folder of the shipped URDFs and meshes; raises WorkFailed if it is missing."""
     return find("assets", PACKAGE)
 
 
 def pybullet_data_folder() -> Path:
-    """The folder of the models that PyBullet's package brings; raises WorkFailed when the installation lost it."""
+    """The folder of the models in PyBullet's package; raises WorkFailed if it is missing."""
     spec = find_spec("pybullet_data")
     for folder in (spec.submodule_search_locations or []) if spec else []:
         return Path(folder)
@@ -43,10 +43,10 @@ def pybullet_data_folder() -> Path:
 
 
 def find(name: str, package: Path) -> Path:
-    """The data folder `name` of the package folder `package`; raises WorkFailed naming the two places it looked in.
+    """The data folder `name` of a package: inside the package (installed), or beside it (checkout).
 
-    A folder beside the package counts only next to a `pyproject.toml`: beside an installed package any `tasks` folder
-    would be somebody else's.
+    A folder beside the package counts only if a `pyproject.toml` is there too; beside an installed package it would belong to
+    something else. Raises WorkFailed, which names both places, if there is none.
     """
     wheel, checkout = package / "_data" / name, package.parent / name
     if wheel.is_dir():
@@ -60,10 +60,10 @@ def find(name: str, package: Path) -> Path:
 
 @cache
 def source_hash(package: Path = PACKAGE) -> str:
-    """A hash (64 hex digits) of every Python source of a package, by its place in it; a single file is a package of its own.
+    """The SHA-256 (64 hex digits) of the paths and contents of all Python files in a package folder, or of one file.
 
-    What is computed once and kept, such as measured durations and compiled functions, is kept under this hash: whatever
-    source may have decided it is in it. Raises WorkFailed when there is no source, or one cannot be read.
+    Caches, such as those of measured durations and compiled functions, use it as a key, so that any change of the source
+    invalidates them. Raises WorkFailed if there is no source, or if a file cannot be read.
     """
     digest, paths = hashlib.sha256(), [package] if package.is_file() else sorted(package.rglob("*.py"))
     if not paths:
@@ -79,9 +79,9 @@ def source_hash(package: Path = PACKAGE) -> str:
 
 @cache
 def source_key(module: str) -> str:
-    """The name of a loaded module's package, or of one that lies in none, with hashes of all of its source and of the lab's.
+    """A cache key for a loaded module: the name of its top-level package or module, a hash of that source, a hash of the lab's.
 
-    Raises WorkFailed when there is no source.
+    Raises WorkFailed if there is no source.
     """
     package = module.partition(".")[0]
     file = Path(str(sys.modules[package].__file__))
@@ -90,7 +90,7 @@ def source_key(module: str) -> str:
 
 
 def read_limited(path: Path, most: int = MOST_BYTES) -> bytes:
-    """All bytes of a file. Raises OSError, its reason in words, also for no regular file and for more than `most` bytes."""
+    """The bytes of a file. Raises OSError if it cannot be read, is no regular file, or has more than `most` bytes."""
     if path.exists() and not path.is_file():
         raise OSError(EINVAL, "it is no regular file", str(path))
     with path.open("rb") as file:
@@ -102,7 +102,7 @@ def read_limited(path: Path, most: int = MOST_BYTES) -> bytes:
 
 
 def json_of(content: str | bytes) -> Any:
-    """What JSON holds, as its standard has it, without NaN and infinities. ValueError for anything else."""
+    """The value of a JSON text. Raises ValueError for anything that the standard excludes, NaN and infinities among it."""
     try:
         return json.loads(content, parse_constant=_reject_constant, parse_float=_finite)
     except RecursionError:
@@ -119,42 +119,42 @@ def _finite(text: str) -> float:
     return number
 
 
-_DRAFT = re.compile(r"\.run-\w{8}")  # the folder of a draft
-_LOCK = ".lock"  # the ending of the file beside it that is locked while somebody writes in it
+_DRAFT = re.compile(r"\.run-\w{8}")  # the name of a draft folder
+_LOCK = ".lock"  # suffix of the file beside a draft folder that is locked while the draft is in use
 
 
 def write_whole(path: Path, content: bytes, drafts: Path | None = None) -> None:
-    """Writes beside the target, or in the folder `drafts` next to it, then renames: readers never see half a file.
+    """Writes a file atomically: first a draft, beside it or in `drafts` (on the same file system), which is then renamed.
 
-    What killed commands left of the same file goes. The folders must be there. Raises OSError when it cannot be written;
-    then nothing is left behind.
+    Drafts of the same file that killed processes left are removed. The folders must exist. Raises OSError if the file cannot be
+    written, and then leaves no draft.
     """
     folder = drafts or path.parent
     _clear_drafts(folder, path.name)
     while True:
-        beside = folder / f".{path.name}.{token_hex(4)}.tmp"
+        draft_path = folder / f".{path.name}.{token_hex(4)}.tmp"
         try:
-            with beside.open("xb") as file:
-                with suppress(OSError):  # where nothing can be locked, nothing is taken for one that was left
+            with draft_path.open("xb") as file:
+                with suppress(OSError):  # a file system without locks: no process removes drafts there
                     lock(file.fileno())
                 file.write(content)
                 file.flush()
                 os.fsync(file.fileno())
             try:
-                replace(beside, path)
+                replace(draft_path, path)
                 return
             except FileNotFoundError:
-                if beside.exists():
+                if draft_path.exists():
                     raise
-                # another process has taken it for one that was left: once more
+                # another process took the draft for an abandoned one and removed it: try again
         except BaseException:
             with suppress(OSError):
-                beside.unlink(missing_ok=True)
+                draft_path.unlink(missing_ok=True)
             raise
 
 
 def _clear_drafts(folder: Path, name: str) -> None:
-    """Removes the drafts of a file whose writers are gone: nobody holds their lock."""
+    """Removes the abandoned drafts of a file: those whose lock no process holds."""
     draft_of = re.compile(rf"\.{re.escape(name)}\.[0-9a-f]{{8}}\.tmp")
     with suppress(OSError), os.scandir(folder) as entries:
         for left in [Path(entry) for entry in entries if draft_of.fullmatch(entry.name)]:
@@ -169,10 +169,7 @@ def _clear_drafts(folder: Path, name: str) -> None:
 
 
 def nearest(folder: Path) -> Path:
-    """The folder itself or the next one above it that is there; what is made in `folder` is made in it.
-
-    Raises OSError for a name that cannot be.
-    """
+    """The deepest existing folder among `folder` and its parents. Raises OSError for an invalid name."""
     place = folder
     while not place.exists() and place != place.parent:
         place = place.parent
@@ -180,7 +177,7 @@ def nearest(folder: Path) -> Path:
 
 
 def check_out(out: Path) -> None:
-    """BadInput unless `out` is a folder that can be written, or can be made; makes nothing."""
+    """Raises BadInput unless `out` is a writable folder, or one that could be created; creates nothing."""
     try:
         place = nearest(out)
     except OSError as error:
@@ -193,9 +190,10 @@ def check_out(out: Path) -> None:
 
 @contextmanager
 def draft(folder: Path) -> Iterator[Path]:
-    """A hidden folder in `folder` for files that are not finished, gone in the end; those that killed ones left go, too.
+    """A hidden folder inside `folder` for unfinished files, removed at the end.
 
-    One that another process still writes in stays: its writer has locked the file beside it. Raises OSError.
+    Draft folders that killed processes left are removed as well; one that another process still uses is locked, by a file beside
+    it, and stays. Raises OSError if the folder cannot be created.
     """
     for left in {folder / path.name.removesuffix(_LOCK) for path in folder.iterdir()}:
         if _DRAFT.fullmatch(left.name):
@@ -211,23 +209,26 @@ def draft(folder: Path) -> Iterator[Path]:
 
 
 def is_file(path: Path | str) -> bool:
-    """Whether there is such a file; also False for what can be no file's name."""
+    """Whether the file exists; False also for a name that no file can have."""
     return os.path.isfile(path)
 
 
 def within(folder: Path, name: str, beside: Path | None = None) -> Path | None:
-    """What a name out of a file means, seen from `beside` or `folder`; None where that leads out of `folder`, or is no name."""
+    """The path that a name in a file means, relative to `beside` (default: `folder`).
+
+    None if the path leads out of `folder`, or if no file can have that name.
+    """
     try:
-        found = ((beside or folder) / name).resolve()
+        path = ((beside or folder) / name).resolve()
     except (OSError, ValueError):
         return None
-    return found if folder.resolve() in found.parents else None
+    return path if folder.resolve() in path.parents else None
 
 
 def beside_or_asset(name: str, folder: Path, what: str) -> Path:
-    """A file that a task file names, in the task file's folder or below it, else in the lab's own assets.
+    """The path of a file that a task file names: in the task file's folder or below it, otherwise among the lab's assets.
 
-    BadInput, beginning with `what`, when it is in neither, or when the name leads out of the folder.
+    Raises BadInput, which begins with `what`, if it is in neither, or if the name leads out of the folder.
     """
     for place in (folder, assets_folder()):
         found = within(place, name)

@@ -1,4 +1,4 @@
-"""Small deterministic decision problems in tables, their builders and their exact solutions."""
+"""Small deterministic Markov decision processes in tables: builders for grids and coverage boards, exact solutions, paths."""
 
 import hashlib
 from collections.abc import Sequence
@@ -23,7 +23,7 @@ BoolArray = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class Rewards:
-    """What a move is worth (thesis, sections 8.3 and 9.7)."""
+    """The rewards of the moves on a grid, dimensionless. Source: thesis, sections 8.3 and 9.7."""
 
     goal: Annotated[float, Gt(0), doc("what entering a goal is worth")] = 1.5
     collision: Annotated[float, Lt(0), doc("what entering an obstacle is worth")] = -1.0
@@ -33,8 +33,8 @@ class Rewards:
 class NoPath(BadInput):
     """No path joins start and goal.
 
-    `enclosing` holds the index tuples of the blocked cells that wall in the smaller of the two regions; `around`
-    says whether that is the one of the goal or the one of the start.
+    enclosing: the index tuples of the blocked cells around the smaller of the two regions, that of the start or that of the goal.
+    around: which of the two that is.
     """
 
     def __init__(self, message: str, enclosing: tuple[tuple[int, ...], ...], around: Literal["goal", "start"]):
@@ -45,14 +45,24 @@ class NoPath(BadInput):
 
 @dataclass(frozen=True, eq=False)
 class TabularMDP:
-    """A deterministic problem: which state and reward each action leads to.
+    """A deterministic Markov decision process with S states and A actions, as arrays.
 
-    successor (S, A) int32, reward (S, A) float64, terminal (S,) bool, goal (S,) bool (a subset of terminal), start
-    a state. `shape` is the grid's shape, () when the states are no grid; states are numbered in C order
-    (`ravel_multi_index`). `coverage_shape` is (rows, columns) of a coverage problem (see `coverage`), else ().
-    Where `starts` is not empty, each episode begins in one of these states, drawn at random; `start` is then the
-    one that `shortest_steps` speaks of. The arrays are copied and made read-only. Raises BadInput when they do not
-    fit together.
+    successor: (S, A) int32, the state that each action leads to.
+    reward: (S, A) float64, its reward.
+    terminal: (S,) bool, the states that end an episode.
+    goal: (S,) bool, those of them that are goals.
+    start: the state in which episodes begin.
+    action_labels: A names.
+    shape: the shape of the grid whose cells the states are, numbered in C order (`ravel_multi_index`); () if they are no grid.
+    coverage_shape: (rows, columns) of a coverage problem (see `coverage`), otherwise ().
+    starts: if not empty, each episode begins in one of these states, drawn at random; `shortest_steps` then counts from `start`.
+
+    The arrays are copied and made read-only. Raises BadInput if they do not fit together.
+
+        >>> import lab
+        >>> mdp = lab.TabularMDP([[0, 1], [1, 1]], [[-1, 0], [0, 0]], [False, True], [False, True], 0, ("stay", "go"))
+        >>> mdp.n_states, mdp.n_actions, mdp.state_label(0)
+        (2, 2, '0')
     """
 
     successor: IntArray
@@ -116,12 +126,12 @@ class TabularMDP:
 
     @property
     def cells(self) -> tuple[int, ...]:
-        """The grid whose cells the states are, as far as tile coding goes by it; () when they are no grid."""
+        """The shape of the grid that tile coding uses; () if the states are no grid."""
         return self.shape
 
     @cached_property
     def signature(self) -> str:
-        """The first 16 hex digits of a SHA-256 over all that defines the problem: equal problems, equal signatures."""
+        """The first 16 hex digits of a SHA-256 over everything that defines the problem; equal problems have equal signatures."""
         head = (self.start, self.starts, self.action_labels, self.shape, self.coverage_shape, self.successor.shape)
         digest = hashlib.sha256(repr(head).encode())
         for array, code in ((self.successor, "<i4"), (self.reward, "<f8"), (self.terminal, "?"), (self.goal, "?")):
@@ -130,24 +140,27 @@ class TabularMDP:
 
     @cached_property
     def step_reward(self) -> float:
-        """The reward of every move that enters no terminal state; BadInput when these moves differ."""
+        """The common reward of all moves that enter no terminal state. Raises BadInput if their rewards differ."""
         ordinary = ~self.terminal[:, None] & ~self.terminal[self.successor]
-        return _only(self.reward[ordinary], "the moves that enter no terminal state")
+        return _common_reward(self.reward[ordinary], "the moves that enter no terminal state")
 
     @cached_property
     def arrival(self) -> FloatArray:
-        """What entering each terminal state is worth, (S,) float64, 0 elsewhere; BadInput where it depends on the way there."""
+        """The reward for entering each terminal state, (S,) float64, 0 for all other states.
+
+        Raises BadInput if it depends on the state from which a terminal state is entered.
+        """
         moves = ~self.terminal[:, None] & self.terminal[self.successor]
         entered, rewards = self.successor[moves], self.reward[moves]
         lowest, highest = np.full(self.n_states, np.inf), np.full(self.n_states, -np.inf)
         np.minimum.at(lowest, entered, rewards)
         np.maximum.at(highest, entered, rewards)
         for state in np.flatnonzero(lowest < highest)[:1].tolist():
-            _only(rewards[entered == state], f"the moves into {self.state_label(state)}")
+            _common_reward(rewards[entered == state], f"the moves into {self.state_label(state)}")
         return np.where(np.isfinite(lowest), lowest, 0.0)
 
     def state_cell(self, state: int) -> tuple[int, ...]:
-        """The grid cell of a state (of the head in a coverage problem); () when the states are no grid."""
+        """The index of a state's grid cell (in a coverage problem, that of the head); () if the states are no grid."""
         if self.coverage_shape:
             cells = int(np.prod(self.coverage_shape))
             return tuple(int(i) for i in np.unravel_index(state >> cells, self.coverage_shape))
@@ -156,12 +169,12 @@ class TabularMDP:
         return tuple(int(i) for i in np.unravel_index(state, self.shape))
 
     def covered(self, state: int) -> BoolArray:
-        """Which cells are covered in a state of a coverage problem; (rows, columns) bool, empty for other problems."""
+        """The cells that are covered in a state of a coverage problem, (rows, columns) bool; empty for other problems."""
         cells = int(np.prod(self.coverage_shape)) if self.coverage_shape else 0
         return np.array([state >> i & 1 for i in range(cells)], bool).reshape(self.coverage_shape or (0,))
 
     def state_label(self, state: int) -> str:
-        """A state in words: "(3, 4)" on a grid, "(0, 1) covered 4 of 9" in a coverage problem, else its number."""
+        """A state as text: "(3, 4)" on a grid, "(0, 1) covered 4 of 9" in a coverage problem, otherwise its number."""
         if not 0 <= state < self.n_states:
             raise BadInput(f"state {state} is outside 0..{self.n_states - 1}")
         if self.coverage_shape:
@@ -170,15 +183,16 @@ class TabularMDP:
         return str(self.state_cell(state)) if self.shape else str(state)
 
 
-def _only(values: FloatArray, of: str) -> float:
+def _common_reward(values: FloatArray, moves: str) -> float:
+    """The single value among the rewards of these moves, 0.0 if there are none. Raises BadInput if there are several."""
     different = np.unique(values)
     if len(different) > 1:
-        raise BadInput(f"decision problem: {of} have the rewards {different[0]:g} to {different[-1]:g}: wanted one")
+        raise BadInput(f"decision problem: {moves} have the rewards {different[0]:g} to {different[-1]:g}: wanted one")
     return float(different[0]) if len(different) else 0.0
 
 
 def _neighbours(shape: tuple[int, ...]) -> IntArray:
-    """The cell each move leads to, staying at the border; (cells, 2 * axes) int32: -axis0, +axis0, -axis1, ..."""
+    """The cell that each move leads to, (cells, 2 * axes) int32: -axis0, +axis0, -axis1, ...; moves stop at the border."""
     cells = np.indices(shape).reshape(len(shape), -1)
     columns = []
     for axis, length in enumerate(shape):
@@ -190,7 +204,7 @@ def _neighbours(shape: tuple[int, ...]) -> IntArray:
 
 
 def distances(successor: IntArray, closed: BoolArray, source: int) -> IntArray:
-    """Moves from source to each state, -1 where unreachable; closed states are reached but not left; (S,) int32."""
+    """The moves needed from `source` to each state, (S,) int32, -1 if unreachable; no path leaves a `closed` (S,) state."""
     distance = np.full(len(successor), -1, np.int32)
     frontier = np.array([source])
     steps = 0
@@ -210,12 +224,22 @@ def grid(
     rewards: Rewards | None = None,
     action_labels: Sequence[str] | None = None,
 ) -> TabularMDP:
-    """A grid of any dimension with obstacles, one start and one goal.
+    """The problem of reaching a goal on a grid of any dimension with obstacles.
 
-    blocked: bool array of `shape`. Actions: -axis0, +axis0, -axis1, ...; their labels default to these words.
-    Entering a blocked cell costs `collision` and ends the episode, entering the goal gives `goal` and ends it; a
-    move out of the grid stays where it is and costs `step`.
-    Raises BadInput (start or goal outside, blocked or the same) and NoPath. Source: thesis, sections 8.3 and 9.7.
+    shape: the number of cells along each axis.
+    blocked: the obstacles, a bool array of `shape`.
+    start, goal: cells, as indices.
+    rewards: default `Rewards()`. Entering a blocked cell yields `collision`, entering the goal yields `goal`, and both end the
+    episode; any other move yields `step`, also one against the border, which does not change the state.
+    action_labels: the names of the actions -axis0, +axis0, -axis1, ...; default these words.
+
+    Raises BadInput if start or goal is outside, blocked or the same cell, and NoPath if no path joins them.
+    Source: thesis, sections 8.3 and 9.7.
+
+        >>> import lab
+        >>> mdp = lab.grid((3, 3), [[0, 0, 0], [1, 1, 0], [0, 0, 0]], start=(0, 0), goal=(2, 0))
+        >>> mdp.n_states, mdp.action_labels
+        (9, ('-axis0', '+axis0', '-axis1', '+axis1'))
     """
     shape = tuple(int(n) for n in shape)
     if not shape or min(shape) < 1:
@@ -241,6 +265,7 @@ def grid(
 
 
 def _free_cell(name: str, cell: Sequence[int], wall: BoolArray) -> int:
+    """The number of a cell. Raises BadInput if it is outside the grid or blocked."""
     index = tuple(int(i) for i in cell)
     if len(index) != wall.ndim or any(not 0 <= i < n for i, n in zip(index, wall.shape, strict=True)):
         raise BadInput(f"{name} {index} is outside the grid: allowed {' x '.join(f'0..{n - 1}' for n in wall.shape)}")
@@ -250,7 +275,7 @@ def _free_cell(name: str, cell: Sequence[int], wall: BoolArray) -> int:
 
 
 def _require_path(moves: IntArray, wall: BoolArray, start: int, goal: int) -> None:
-    """Raises NoPath, naming the obstacles around the smaller of the two regions that start and goal lie in."""
+    """Raises NoPath if no path joins start and goal; it names the obstacles around the smaller of their two regions."""
     closed = wall.ravel()
     from_goal = distances(moves, closed, goal) >= 0
     if from_goal[start]:
@@ -267,12 +292,14 @@ def _require_path(moves: IntArray, wall: BoolArray, start: int, goal: int) -> No
 
 
 def coverage(shape: Sequence[int], rewards: Rewards | None = None, start: Sequence[int] = (0, 0)) -> TabularMDP:
-    """Covering every cell of a small board with a moving head: the butter sub-task.
+    """The problem of covering every cell of a small board with a moving head: the butter sub-task.
 
-    state = head cell * 2**cells + mask, bit i of the mask = cell i (C order) is covered; actions up, down, left,
-    right (axis 0 down, axis 1 right); a move out of the board stays. The start has its own cell covered; a goal has
-    all covered. 3 x 3 has 4608 states and takes 8 moves. Raises BadInput for a board of 1 or more than 12 cells or
-    a start outside it.
+    shape: (rows, columns); start: the head's first cell, which counts as covered.
+    A state is head cell * 2**cells + mask, where bit i of the mask says whether cell i (C order) is covered. The actions are up,
+    down, left, right (axis 0 points down, axis 1 right); a move against the border does not move the head. The goals are the
+    states in which all cells are covered. A board of 3 x 3 has 4608 states and takes 8 moves.
+
+    Raises BadInput for a board of 1 or more than 12 cells and for a start outside it.
     """
     shape = tuple(int(n) for n in shape)
     cells = int(np.prod(shape))
@@ -293,9 +320,10 @@ def coverage(shape: Sequence[int], rewards: Rewards | None = None, start: Sequen
 
 
 def optimal_values(mdp: TabularMDP, discount: float, guess: FloatArray | None = None) -> FloatArray:
-    """The optimal action values by value iteration, from a guess (S, A); (S, A) float64, 0 in terminal states.
+    """The optimal action values by value iteration, (S, A) float64, 0 in terminal states.
 
-    Raises WorkFailed when the values do not settle (a discount of 1 where some states never end).
+    guess: (S, A), the values that the iteration starts from; default the rewards.
+    Raises WorkFailed if the values do not converge, as with a discount of 1 where some states never reach an end.
     """
     onward = discount * ~mdp.terminal[mdp.successor]
     q: FloatArray = np.where(mdp.terminal[:, None], 0.0, mdp.reward) if guess is None else guess
@@ -311,31 +339,31 @@ def optimal_values(mdp: TabularMDP, discount: float, guess: FloatArray | None = 
 
 
 def shortest_steps(mdp: TabularMDP) -> int:
-    """The fewest moves from the start to a goal that enter no other terminal state (breadth first). Raises NoPath."""
+    """The length in moves of a shortest path from the start to a goal that enters no other terminal state. Raises NoPath."""
     distance = distances(mdp.successor, mdp.terminal, mdp.start)[mdp.goal]
     if not (distance >= 0).any():
         raise NoPath(f"no goal can be reached from {mdp.state_label(mdp.start)}", (), "goal")
     return int(distance[distance >= 0].min())
 
 
-def shortest_way(mdp: TabularMDP) -> list[int]:
-    """The states of a way of `shortest_steps` moves, from the start to a goal. Raises NoPath."""
+def shortest_path(mdp: TabularMDP) -> list[int]:
+    """The states of a shortest path from the start to a goal, both included. Raises NoPath."""
     moves = shortest_steps(mdp)
     distance = distances(mdp.successor, mdp.terminal, mdp.start)
-    way = [int(np.flatnonzero(mdp.goal & (distance == moves))[0])]
-    for left in range(moves - 1, -1, -1):
-        before = np.flatnonzero((distance == left) & ~mdp.terminal)
-        way.append(int(before[np.any(mdp.successor[before] == way[-1], axis=1)][0]))
-    return way[::-1]
+    path = [int(np.flatnonzero(mdp.goal & (distance == moves))[0])]
+    for steps in range(moves - 1, -1, -1):
+        before = np.flatnonzero((distance == steps) & ~mdp.terminal)
+        path.append(int(before[np.any(mdp.successor[before] == path[-1], axis=1)][0]))
+    return path[::-1]
 
 
 def greedy_path(
     q: FloatArray, mdp: TabularMDP, max_steps: int, start: int | None = None
 ) -> tuple[list[int], list[int], bool]:
-    """Follows the best action of each state from `start`, by default the problem's (ties: the lowest index).
+    """The path of the greedy policy of action values q (S, A): its states, its actions, and whether it reaches a goal.
 
-    Returns the states (one more than actions), the actions and whether a goal was reached. It stops at a terminal
-    state, after max_steps, or at a state seen before, since from there it would only go round.
+    start: default the problem's. There is one state more than actions; ties go to the lowest action. The path ends at a terminal
+    state, after `max_steps` moves, or at a state visited before, from which it would repeat itself.
     """
     states: list[int] = [mdp.start if start is None else start]
     actions: list[int] = []

@@ -1,4 +1,4 @@
-"""What differs between Linux, macOS and Windows. Only this module imports what one of them lacks."""
+"""The differences between Linux, macOS and Windows: only this module imports what one of them lacks."""
 
 import os
 import sys
@@ -17,28 +17,31 @@ WINDOWS: bool = sys.platform == "win32"
 if WINDOWS:
     import msvcrt
 
-    _windows: Any = msvcrt  # of which the types are known on Windows only
+    _windows: Any = msvcrt  # typed as Any, because its types exist on Windows only
 else:
     import fcntl
 
-_BINARY: int = getattr(os, "O_BINARY", 0)  # without it Windows writes other line ends
+_BINARY: int = getattr(os, "O_BINARY", 0)  # without it Windows translates line endings
 _NO_FOLLOW: int = getattr(os, "O_NOFOLLOW", 0)
-# On Windows nobody else can read or write what is locked: it is a byte beyond the end of any file.
+# A lock on Windows keeps others from reading and writing the locked bytes, so the one that is locked lies beyond any file's end.
 _LOCKED_BYTE = (1 << 31) - 2
-_AGAIN_S, _BUSY_S = 0.01, 2.0  # between two tries; for how long a file that somebody else has open is tried
+_AGAIN_S, _BUSY_S = 0.01, 2.0  # the pause between two attempts; how long attempts on a file that is in use go on
 
 
 def opened(path: Path, flags: int, *, follow: bool = True) -> int:
-    """The descriptor of a file of bytes; a new one has the mode 0o644. Raises OSError: ELOOP for a link with `follow` false."""
+    """The descriptor of a file, opened in binary mode; a created file has the mode 0o644.
+
+    Raises OSError, with ELOOP for a symbolic link if `follow` is false.
+    """
     if not follow and not _NO_FOLLOW and path.is_symlink():
         raise OSError(ELOOP, os.strerror(ELOOP), str(path))
     return os.open(path, flags | _BINARY | (0 if follow else _NO_FOLLOW), 0o644)
 
 
 def lock(file: int, *, wait: bool = True) -> None:
-    """Take the lock of an open file, which ends when the file is closed, at the latest with this process.
+    """Takes the exclusive lock of an open file; closing the file, or the end of the process, releases it.
 
-    Raises BlockingIOError when another holds it and `wait` is false, OSError where nothing can be locked.
+    Raises BlockingIOError if another process holds it and `wait` is false, OSError where files cannot be locked.
     """
     if not WINDOWS:
         fcntl.flock(file, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
@@ -60,7 +63,7 @@ def lock(file: int, *, wait: bool = True) -> None:
 
 @contextmanager
 def lock_file(path: Path, *, wait: bool = True) -> Iterator[None]:
-    """Holds the lock of a file that serves nothing else: it is made for it, and gone in the end. Raises as `lock` does."""
+    """Holds the lock of a file that is created for it and removed afterwards. Raises what `lock` raises."""
     while True:
         file = opened(path, os.O_RDWR | os.O_CREAT, follow=False)
         try:
@@ -71,11 +74,11 @@ def lock_file(path: Path, *, wait: bool = True) -> Iterator[None]:
         except BaseException:
             os.close(file)
             raise
-        os.close(file)  # whoever held it before has removed it: the next one makes another
+        os.close(file)  # its previous holder has removed the file, so another one has to be created
     try:
         yield
     finally:
-        if WINDOWS:  # where no open file can be removed; one that another has opened meanwhile stays
+        if WINDOWS:  # an open file cannot be removed there; one that another process has opened meanwhile stays
             os.close(file)
         with suppress(OSError):
             path.unlink()
@@ -84,7 +87,7 @@ def lock_file(path: Path, *, wait: bool = True) -> Iterator[None]:
 
 
 def replace(source: Path, target: Path) -> None:
-    """As `os.replace`; tried for two seconds where Windows refuses because somebody has one of the two open."""
+    """Renames as `os.replace`; on Windows, which refuses while either file is open, it tries for two seconds."""
     until_s = time.monotonic() + _BUSY_S
     while True:
         try:
@@ -97,7 +100,7 @@ def replace(source: Path, target: Path) -> None:
 
 
 def replace_and_close(file: int, source: Path, target: Path) -> None:
-    """Rename the open file `source` and close it: in this order, so that it is locked until then, but on Windows closed first."""
+    """Renames the open file `source`, then closes it, which releases its lock; on Windows it has to be closed first."""
     if WINDOWS:
         os.close(file)
         replace(source, target)
@@ -109,22 +112,24 @@ def replace_and_close(file: int, source: Path, target: Path) -> None:
 
 
 def flush_c_streams() -> None:
-    """Write out what libraries in C hold back of their output."""
+    """Flushes the output buffers of C libraries."""
     import ctypes
 
     ctypes.CDLL("ucrtbase" if WINDOWS else None).fflush(None)
 
 
 def keep_port(own: "socket") -> None:
-    """Before `bind`: a port that was just given up is to be had again, one that somebody has is not, nor is it taken from us."""
+    """Sets a socket up, before `bind`, so that a port just released can be bound again, but a port in use can never be shared."""
     import socket
 
-    how: int = getattr(socket, "SO_EXCLUSIVEADDRUSE", socket.SO_REUSEADDR)  # Windows shares a reused one
-    own.setsockopt(socket.SOL_SOCKET, how, 1)
+    option: int = getattr(
+        socket, "SO_EXCLUSIVEADDRUSE", socket.SO_REUSEADDR
+    )  # on Windows SO_REUSEADDR would share a port in use
+    own.setsockopt(socket.SOL_SOCKET, option, 1)
 
 
 def most_descriptors() -> int | None:
-    """How many files and connections this process may have open at a time; None where there is no limit."""
+    """How many files and connections this process may have open at a time; None if there is no limit."""
     if WINDOWS:
         return None
     import resource
@@ -134,13 +139,13 @@ def most_descriptors() -> int | None:
 
 
 def is_own_folder(path: Path) -> bool:
-    """Whether it is a folder of this user, and no link; False on Windows, where that is not known. Raises OSError."""
-    seen = path.lstat()
-    return not WINDOWS and S_ISDIR(seen.st_mode) and seen.st_uid == os.getuid()
+    """Whether the path is a folder of this user and no link; False on Windows, where owners are not known. Raises OSError."""
+    status = path.lstat()
+    return not WINDOWS and S_ISDIR(status.st_mode) and status.st_uid == os.getuid()
 
 
 def is_gone(process: int) -> bool:
-    """Whether there is no such process any more; False on Windows, where to ask would end it. Raises OSError."""
+    """Whether the process has ended; False on Windows, where asking with a signal would end it. Raises OSError."""
     if WINDOWS or process < 1:
         return False
     try:

@@ -1,11 +1,11 @@
-"""Libraries that the lab uses where they are installed: where one is not, what to install is said in one line."""
+"""Optional libraries: if one is missing, a one-line error says what to install."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
 
 from lab.errors import BadInput, out_of_memory
 
-EXTRAS = {  # extra of pyproject.toml -> the optional libraries that it brings, by the names they are imported under
+EXTRAS = {  # extra in pyproject.toml -> the optional libraries that it installs, by their import names
     "dask": ("distributed",),
     "data": ("h5py", "minari", "pandas", "tensorboard"),
     "remote": ("fsspec", "s3fs"),
@@ -15,9 +15,9 @@ EXTRAS = {  # extra of pyproject.toml -> the optional libraries that it brings, 
 
 @contextmanager
 def optional(use: str) -> Iterator[None]:
-    """What is done inside needs an optional library. BadInput when it, or what it needs itself, cannot be imported.
+    """A block that imports an optional library; raises BadInput, which says what to install, if an import fails.
 
-    use: what was asked for, such as "--dask 127.0.0.1:8786". The message says what to install.
+    use: what the user asked for, such as "--dask 127.0.0.1:8786".
     """
     try:
         yield
@@ -33,7 +33,7 @@ def optional(use: str) -> Iterator[None]:
 
 
 def _missing(error: BaseException | None) -> str | None:
-    """The library that an error, or one that it comes from, did not find; None: no library is said to be missing."""
+    """The library whose import failed, according to the error or one of its causes; None if none of them names one."""
     while error is not None:
         if isinstance(error, ModuleNotFoundError) and error.name:
             return error.name.partition(".")[0]

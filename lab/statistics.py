@@ -1,4 +1,4 @@
-"""What studies compute from sessions: intervals, the score of chapter 9, comparisons of methods, agreement with print."""
+"""Statistics of sessions: confidence intervals, the score of chapter 9, comparisons of groups, agreement with printed figures."""
 
 import warnings
 from collections.abc import Collection, Mapping, Sequence
@@ -14,20 +14,20 @@ from lab.errors import BadInput
 FloatArray = NDArray[np.float64]
 Range = tuple[float, float]
 
-PERCENT_POINTS = 5.0  # a percentage agrees with the printed one when it is this near [points]
-RELATIVE = 0.15  # any other figure when it is this near, as a fraction of the printed one
-LEVEL = 0.95  # of intervals and tests
+PERCENT_POINTS = 5.0  # a percentage agrees with the printed one within this distance [points]
+RELATIVE = 0.15  # any other figure agrees within this fraction of the printed one
+LEVEL = 0.95  # confidence level of intervals and tests
 TAIL = (1 - LEVEL) / 2
 NOISE = 1e-12  # differences below this fraction of the largest value are rounding, not variation
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """Several groups compared.
+    """The comparison of several groups.
 
-    means: of each group; f, p: one-way ANOVA; tukey: p of each pair, in the groups' order; normality: p of each group
-    (Kolmogorov-Smirnov), None for a constant one; levene: p of equal variances; ranks: "1" is best, groups that do
-    not differ share one, "1-2" differs from neither of two that do.
+    means: by group; f, p: of the one-way ANOVA; tukey: p by pair, in the order of the groups; normality: p by group of the
+    Kolmogorov-Smirnov test, None for a constant group; levene: p of Levene's test of equal variances; ranks: by group, "1" is
+    best; groups that do not differ share a rank, and "1-2" means no difference from either of two groups that do differ.
     """
 
     means: dict[str, float]
@@ -40,9 +40,9 @@ class Comparison:
 
 
 def interval(values: ArrayLike) -> tuple[float, float, float]:
-    """Mean, low and high end of the t interval of the mean of values (n,), one a session, in their unit.
+    """(mean, low, high): the mean of values (n,), one per session, and the ends of its t interval, in their unit.
 
-    Raises BadInput for fewer than two values, and for one that is not finite.
+    Raises BadInput for fewer than two values and for values that are not finite.
     """
     from scipy.stats import t
 
@@ -54,7 +54,7 @@ def interval(values: ArrayLike) -> tuple[float, float, float]:
 
 
 def proportion_interval(successes: int, n: int) -> tuple[float, float, float]:
-    """Share of successful sessions, low and high end of its interval, all in percent.
+    """(share, low, high) [%]: the share of successful sessions and the ends of its Wilson interval.
 
     Raises BadInput unless 0 <= successes <= n and n >= 1. Source: E. B. Wilson, JASA 22 (1927), 209-212.
     """
@@ -66,39 +66,39 @@ def proportion_interval(successes: int, n: int) -> tuple[float, float, float]:
     share = successes / n
     middle = (share + z2 / (2 * n)) / (1 + z2 / n)
     half = sqrt(z2 * (share * (1 - share) + z2 / (4 * n)) / n) / (1 + z2 / n)
-    low = 0.0 if successes == 0 else middle - half  # Wilson's ends are exact here, floats are not
+    low = 0.0 if successes == 0 else middle - half  # the exact end of the interval, which rounding would miss
     high = 1.0 if successes == n else middle + half
     return 100 * share, 100 * low, 100 * high
 
 
 def share(success: ArrayLike) -> tuple[float, float, float]:
-    """`proportion_interval` of sessions of which each succeeded or not, (N,) bool."""
+    """The `proportion_interval` of N sessions; success: (N,) bool."""
     ended = np.asarray(success, np.bool_)
     return proportion_interval(int(ended.sum()), len(ended))
 
 
 def share_error(percent: float, n: float) -> float:
-    """The standard error of a share [percent] of n sessions, in points.
+    """The standard error [points] of a share [%] of n sessions.
 
-    Two successes and two failures are added, so that 0 and 100 % have one, too. Source: A. Agresti, B. Coull, Am. Stat.
-    52 (1998), 119-126.
+    Two successes and two failures are added, so that shares of 0 and 100 % have an error as well.
+    Source: A. Agresti, B. Coull, Am. Stat. 52 (1998), 119-126.
     """
     p = (percent / 100 * n + 2) / (n + 4)
     return 100 * sqrt(p * (1 - p) / (n + 4))
 
 
 def mean_error(values: ArrayLike, n: float | None = None) -> float:
-    """The standard error of the mean of values (m,), or of n values that spread as these do."""
+    """The standard error of the mean of values (m,), or of the mean of n values with the same standard deviation."""
     sample = _sample(values, "standard error")
     return float(np.std(sample, ddof=1)) / sqrt(n or len(sample))
 
 
 def score(sp: ArrayLike, hs: ArrayLike, sp_range: Range, hs_range: Range) -> FloatArray:
-    """How good a combination is: 1 with the highest success percentage and the fewest helped steps, 0 with neither.
+    """The score of combinations: 1 for the highest success percentage and the fewest helped steps, 0 for the opposite.
 
-    sp [%] and hs [steps] are numbers or arrays of one shape; the ranges are those of `ranges`, or of the printed
-    combinations (then a score may leave [0, 1]). Where all have the same, all are best. Raises BadInput for a range
-    upside down. Source: thesis eq. 9.4.
+    sp [%], hs [steps]: numbers or arrays of one shape; sp_range, hs_range: (low, high) over all combinations, from `ranges` or
+    from the printed ones (then a score may lie outside [0, 1]). In a range of width 0 every value counts as the best.
+    Raises BadInput for a range whose low end is above its high end. Source: thesis eq. 9.4.
     """
     for name, (low, high) in (("SP", sp_range), ("HS", hs_range)):
         if not low <= high:
@@ -110,25 +110,25 @@ def score(sp: ArrayLike, hs: ArrayLike, sp_range: Range, hs_range: Range) -> Flo
 
 
 def ranges(sp: ArrayLike, hs: ArrayLike) -> tuple[Range, Range]:
-    """Smallest and largest SP [%] and HS [steps] over all combinations of one world and view, for `score`.
+    """The (lowest, highest) SP [%] and HS [steps] over all combinations of one world and view, for `score`.
 
-    Raises BadInput for nothing, and for values that are not finite.
+    Raises BadInput for empty arrays and for values that are not finite.
     """
     percents, steps = _sample(sp, "range of SP", 1), _sample(hs, "range of HS", 1)
     return (float(percents.min()), float(percents.max())), (float(steps.min()), float(steps.max()))
 
 
 def part_means(values: ArrayLike, parts: int) -> FloatArray:
-    """The mean of each of so many replications that sessions are split into, (parts,)."""
+    """The means (parts,) of the `parts` replications that the sessions are split into."""
     return np.array([part.mean() for part in np.array_split(np.asarray(values), parts)])
 
 
 def compare(groups: Mapping[str, ArrayLike], lowest_is_best: bool = False) -> Comparison:
-    """One-way ANOVA, Tukey's HSD, the tests of their assumptions, and ranks; groups name -> values (n,).
+    """One-way ANOVA, Tukey's HSD, the tests of their assumptions, and ranks; groups: name -> values (n,).
 
-    Ranks follow Tukey's test, which counts only after a significant F-test; sizes may differ (Tukey-Kramer).
-    Differences that are rounding (`NOISE`) never count, so that constant groups can be compared: F stays finite.
-    Normality is tested as SPSS does, with the sample's own mean and deviation and the asymptotic distribution: lenient.
+    Ranks follow Tukey's test, which counts only after a significant F-test; group sizes may differ (Tukey-Kramer).
+    Differences below rounding (`NOISE`) do not count, so F stays finite even for constant groups.
+    Normality is tested as in SPSS, which is lenient: with the sample's own mean and deviation and the asymptotic distribution.
     Raises BadInput for fewer than two groups, fewer than two values in one, and values that are not finite.
     Source: thesis, Appendix II; tables 9.2-9.5.
     """
@@ -154,9 +154,9 @@ def compare(groups: Mapping[str, ArrayLike], lowest_is_best: bool = False) -> Co
 
 
 def ranks(order: Sequence[str], differ: Collection[tuple[str, str]]) -> dict[str, str]:
-    """Ranks of groups, best first in `order`, from the pairs that differ significantly.
+    """The ranks by group, given the groups from best to worst (`order`) and the pairs that differ significantly.
 
-    Each largest set of groups of which no two differ is one rank; a group in several has them all: "1-2", or "1,3".
+    Each maximal set of groups without a differing pair is a rank; a group in several sets has all their ranks: "1-2" or "1,3".
     Source: thesis tables 9.2-9.5; the sets are found as in H.-P. Piepho, J. Comput. Graph. Stat. 13 (2004), 456-466.
     """
     alike = [frozenset(order)]
@@ -166,22 +166,22 @@ def ranks(order: Sequence[str], differ: Collection[tuple[str, str]]) -> dict[str
         }
         alike = [part for part in parts if not any(part < other for other in parts)]
     alike.sort(key=lambda part: [place for place, name in enumerate(order) if name in part])
-    found = {name: [number for number, part in enumerate(alike, start=1) if name in part] for name in order}
+    numbers = {name: [number for number, part in enumerate(alike, start=1) if name in part] for name in order}
     return {
         name: f"{n[0]}-{n[-1]}" if len(n) > 1 and n[-1] - n[0] == len(n) - 1 else ",".join(map(str, n))
-        for name, n in found.items()
+        for name, n in numbers.items()
     }
 
 
 def allowed(thesis: float, measure: str) -> float:
-    """How far from the printed figure still agrees with it: 5 points for `..._percent`, else 15 % of it."""
+    """The distance from a printed figure within which a value agrees: 5 points for `..._percent`, otherwise 15 % of it."""
     return PERCENT_POINTS if measure.endswith("_percent") else RELATIVE * abs(thesis)
 
 
 def within(value: float, ci: Sequence[float] | None, thesis: float, measure: str) -> bool:
-    """Whether a measured value agrees with the printed one: its interval (low, high) holds it, or it is near enough.
+    """Whether a measured value agrees with the printed one: `ci` (low, high) contains that, or both are within `allowed`.
 
-    Without an interval only nearness counts; see `allowed`.
+    Without an interval only the distance counts.
     """
     if ci is not None and ci[0] <= thesis <= ci[1]:
         return True
@@ -189,17 +189,18 @@ def within(value: float, ci: Sequence[float] | None, thesis: float, measure: str
 
 
 def within_errors(value: float, thesis: float, errors: tuple[float, float]) -> bool:
-    """Whether a measured value differs from the printed one by no more than the standard errors of both explain (95 %).
+    """Whether the standard errors of a measured and a printed value explain their difference, at the 95 % level.
 
-    Rounding of the printed figure is left out.
+    The rounding of the printed figure is not taken into account.
     """
     from scipy.special import ndtri
 
-    room = -float(ndtri(TAIL)) * hypot(*errors)
-    return bool(abs(value - thesis) <= room + NOISE * max(abs(value), abs(thesis)))
+    tolerance = -float(ndtri(TAIL)) * hypot(*errors)
+    return bool(abs(value - thesis) <= tolerance + NOISE * max(abs(value), abs(thesis)))
 
 
 def _sample(values: ArrayLike, what: str, at_least: int = 2) -> FloatArray:
+    """The values as an array (n,). Raises BadInput, which begins with `what`, unless there are enough finite ones."""
     sample = np.asarray(values, dtype=np.float64)
     if sample.ndim != 1 or len(sample) < at_least or not np.isfinite(sample).all():
         raise BadInput(f"{what}: shape {sample.shape}; needed: at least {at_least} finite values in one row")
@@ -212,7 +213,7 @@ def _mean(sample: FloatArray) -> float:
 
 
 def _anova(samples: Sequence[FloatArray]) -> tuple[float, float, float]:
-    """F, p and the mean square within groups; samples (n,) of a unit in which the largest value is about 1."""
+    """F, p and the mean square within groups; samples (n,) are scaled so that the largest value is about 1."""
     from scipy.stats import f as f_distribution
 
     sizes, means = np.array([len(sample) for sample in samples]), np.array([_mean(sample) for sample in samples])
@@ -226,22 +227,22 @@ def _anova(samples: Sequence[FloatArray]) -> tuple[float, float, float]:
 
 
 def _tukey(samples: Mapping[str, FloatArray], mean_square: float) -> dict[tuple[str, str], float]:
-    """p of each pair by the studentized range; harmonic mean of the two sizes (Tukey-Kramer).
+    """p by pair, from the studentized range with the harmonic mean of both sizes (Tukey-Kramer).
 
-    For thousands of values and nearly equal means scipy warns that its integral converges slowly; p is right there, 1.
+    For thousands of values and nearly equal means scipy warns that its integral converges slowly; its p, 1, is right.
     """
     from scipy.integrate import IntegrationWarning
     from scipy.stats import studentized_range
 
     df = sum(map(len, samples.values())) - len(samples)
-    found = {}
-    for one, other in combinations(samples, 2):
-        error = sqrt(mean_square / 2 * (1 / len(samples[one]) + 1 / len(samples[other])))
-        q = abs(_mean(samples[one]) - _mean(samples[other])) / error
+    p_values = {}
+    for first, second in combinations(samples, 2):
+        error = sqrt(mean_square / 2 * (1 / len(samples[first]) + 1 / len(samples[second])))
+        q = abs(_mean(samples[first]) - _mean(samples[second])) / error
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", IntegrationWarning)
-            found[one, other] = float(studentized_range.sf(q, len(samples), df))
-    return found
+            p_values[first, second] = float(studentized_range.sf(q, len(samples), df))
+    return p_values
 
 
 def _normality(sample: FloatArray) -> float | None:

@@ -1,7 +1,7 @@
-"""Processes that work beside this one, on the other cores. What they do comes out the same as if it was done here.
+"""Worker processes on the other cores; the results are the same as without them.
 
-They are new interpreters, so a script of a user's needs no guard around its own code, and threads do no harm. A
-worker ends when its connection to the parent does, which is when the parent ends, however that happens.
+Workers are new interpreters, so a user's script needs no `if __name__ == "__main__"`, and threads of this process do no harm. A
+worker ends when its connection to this process closes, which happens however this process ends.
 """
 
 import json
@@ -23,24 +23,24 @@ Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 
-MOST = 8  # processes, where nobody says how many: each is an interpreter of about 100 MB
+MOST = 8  # default limit on processes: each is an interpreter of about 100 MB
 
 
 def cores() -> int:
-    """How many processors this process may use, at most MOST."""
+    """The number of processors that this process may use, at most MOST."""
     usable = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     return min(usable, MOST)
 
 
-Packed = tuple[bytes, bytes]  # a function and its arguments as they are sent: as they were when it was handed out
+Packed = tuple[bytes, bytes]  # a function and its arguments, pickled when the task was submitted
 
 
 class _Lost(Exception):
-    """What was handed to a worker did not come back: it could not be sent, or the worker is gone."""
+    """A task has no result from its worker: it could not be pickled, or the worker has ended."""
 
 
 class Task(Generic[Result]):
-    """Work that was handed out. Whoever needs its result before a worker has begun, or when one is lost, does it here."""
+    """A submitted function call; `result` makes the call in this process if no worker has begun it, or if its worker was lost."""
 
     def __init__(self, work: Callable[..., Result], arguments: Sequence[Any], packed: Packed | None = None) -> None:
         self.work, self.arguments, self.packed = work, arguments, packed
@@ -49,11 +49,11 @@ class Task(Generic[Result]):
 
     @property
     def running(self) -> bool:
-        """Whether a worker is at it."""
+        """Whether a worker has begun the task."""
         return self.future.running()
 
     def result(self) -> Result:
-        """What the work comes to; raises what it raises."""
+        """The result of the call. Raises what the call raises."""
         if self._done_here is None:
             if not self.future.cancel():
                 try:
@@ -65,11 +65,12 @@ class Task(Generic[Result]):
 
 
 class Workers:
-    """This process and `count` - 1 others, which end with the block; with 1, everything is done here.
+    """A pool of this process and `count` - 1 worker processes, which end with the `with` block.
 
-    count: None for one a core, at most MOST. first: what each of the others does as soon as it has begun, such as loading
-    what it will need. What is handed out are functions of modules with arguments that can be pickled, as they are at that
-    moment; what cannot be is done here.
+    count: default 1, without workers; None for one process per core, at most MOST.
+    first: a function that each worker calls when it starts, such as one that imports what it will need.
+    Tasks are module-level functions with arguments that can be pickled; they are pickled at once. This process itself does
+    what cannot be pickled.
     """
 
     def __init__(self, count: int | None = 1, first: Callable[[], object] | None = None) -> None:
@@ -81,13 +82,13 @@ class Workers:
     def __enter__(self) -> Self:
         if self._others > 0:
             key = token_hex(32)
-            # Where there is no room for another process or thread, those that are there do the work.
+            # If the system refuses another process or thread, the existing ones do the work.
             with suppress(OSError, RuntimeError):
                 self._listener = Listener(authkey=key.encode(), backlog=self._others)
-                told = {"address": self._listener.address, "key": key}
+                connection = {"address": self._listener.address, "key": key}
                 for _ in range(self._others):
                     threading.Thread(target=self._hand_out, args=[self._listener], daemon=True).start()
-                    self._processes.append(_started(json.dumps(told)))
+                    self._processes.append(_started(json.dumps(connection)))
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -102,35 +103,36 @@ class Workers:
             self._listener = None
 
     def begin(self, work: Callable[..., Result], *arguments: Any) -> Task[Result]:
-        """Hand work out; another process begins with it as soon as one is free. Raises nothing that the work raises."""
-        return self._handed(work, arguments, self._pack(work))
+        """The submitted task, which a worker begins as soon as one is free. What the call raises, `Task.result` raises."""
+        return self._submitted(work, arguments, self._pack(work))
 
     def each(self, work: Callable[[Item], Result], items: Sequence[Item]) -> Iterator[Result]:
-        """What the work makes of each item, in the order of the items; meanwhile this process works from the end on.
+        """The results of the function for each item, in order; while it waits, this process does items from the end.
 
-        What the work raises is raised in the item's turn.
+        An exception is raised when its item's turn comes.
         """
         packed = self._pack(work)
-        tasks = [self._handed(work, (item,), packed) for item in items]
+        tasks = [self._submitted(work, (item,), packed) for item in items]
         first_own = len(tasks)
         for number, task in enumerate(tasks):
             while task.running and number < first_own:
                 first_own -= 1
                 if not tasks[first_own].running:
-                    with suppress(Exception):  # it is raised when its turn comes
+                    with suppress(Exception):  # raised again when the item's turn comes
                         tasks[first_own].result()
             yield task.result()
 
-    def _pack(self, thing: object) -> bytes | None:
-        """How it is sent; None where nothing is, or where it cannot be."""
+    def _pack(self, item: object) -> bytes | None:
+        """The pickled object; None without workers, or if it cannot be pickled."""
         if not self._processes:
             return None
         try:
-            return bytes(ForkingPickler.dumps(thing))
-        except Exception:  # pickle says in many ways that it cannot
+            return bytes(ForkingPickler.dumps(item))
+        except Exception:  # pickle raises many kinds of errors
             return None
 
-    def _handed(self, work: Callable[..., Result], arguments: Sequence[Any], packed: bytes | None) -> Task[Result]:
+    def _submitted(self, work: Callable[..., Result], arguments: Sequence[Any], packed: bytes | None) -> Task[Result]:
+        """A task, put into the queue of the workers if function and arguments can be pickled."""
         sent = None if packed is None else self._pack(arguments)
         task = Task(work, arguments, None if packed is None or sent is None else (packed, sent))
         if task.packed is not None:
@@ -138,57 +140,58 @@ class Workers:
         return task
 
     def _hand_out(self, listener: Listener) -> None:
-        """Give one worker task after task, as long as it takes them; the same function is sent once."""
+        """Sends one worker task after task until it ends; a function is sent only when it differs from the one before."""
         try:
             worker = listener.accept()
             if self._first is not None:
                 worker.send_bytes(bytes(ForkingPickler.dumps(self._first)))
                 worker.send_bytes(bytes(ForkingPickler.dumps(())))
                 worker.recv()
-        except Exception:  # it did not begin, or this process ends: whatever it is, nothing was handed out yet
+        except Exception:  # the worker did not start, or this process ends; no task was taken yet
             return
-        known = b""
+        sent_before = b""
         while (task := self._handed_out.get()) is not None:
             if not task.future.set_running_or_notify_cancel():
                 continue
             assert task.packed is not None
             work, arguments = task.packed
             try:
-                worker.send_bytes(b"" if work == known else work)
+                worker.send_bytes(b"" if work == sent_before else work)
                 worker.send_bytes(arguments)
-                known = work
-                done, came = worker.recv()
-            except Exception:  # the worker is gone, or what came of it cannot be read here
+                sent_before = work
+                done, result = worker.recv()
+            except Exception:  # the worker has ended, or its result cannot be unpickled here
                 task.future.set_exception(_Lost())
                 return
-            task.future.set_result(came) if done else task.future.set_exception(_Lost())
+            task.future.set_result(result) if done else task.future.set_exception(_Lost())
 
 
-def _started(told: str) -> "subprocess.Popen[bytes]":
-    # -P: what lies in the working folder is not imported, as it is not in this process.
+def _started(connection: str) -> "subprocess.Popen[bytes]":
+    """A new worker process, which reads the address and the key of its parent from its standard input."""
+    # -P keeps the working folder off the import path, as in this process.
     command = [sys.executable, "-P", "-c", "from lab.workers import serve; serve()"]
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
     process = subprocess.Popen(
         command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=environment
     )
     assert process.stdin is not None
-    process.stdin.write(told.encode() + b"\n")
+    process.stdin.write(connection.encode() + b"\n")
     process.stdin.flush()
     return process
 
 
 def serve() -> None:
-    """Work for the process that has begun this one, until it ends."""
+    """Runs a worker: does the tasks of the parent process until that ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent
-    told = json.loads(sys.stdin.readline())
-    with Client(told["address"], authkey=told["key"].encode()) as parent:
+    connection = json.loads(sys.stdin.readline())
+    with Client(connection["address"], authkey=connection["key"].encode()) as parent:
         messages: SimpleQueue[tuple[bytes, bytes]] = SimpleQueue()
         threading.Thread(target=_receive, args=[parent, messages], daemon=True).start()
         _work_for(parent, messages)
 
 
 def _receive(parent: Connection, messages: "SimpleQueue[tuple[bytes, bytes]]") -> None:
-    """Take what the parent sends; when it is gone, however it ended, this process ends."""
+    """Queues what the parent sends; when the connection closes, however the parent ended, this process ends."""
     try:
         while True:
             messages.put((parent.recv_bytes(), parent.recv_bytes()))
@@ -197,9 +200,9 @@ def _receive(parent: Connection, messages: "SimpleQueue[tuple[bytes, bytes]]") -
 
 
 def _work_for(parent: Connection, messages: "SimpleQueue[tuple[bytes, bytes]]") -> None:
-    """Answer each task with whether it was done, and with what came of it.
+    """Answers each task with (done, result).
 
-    What was not done, for whatever reason, the parent does itself: so it raises what the work raises, with its own lines.
+    The parent repeats a task that was not done, whatever the reason, so an exception is raised there, with its own traceback.
     """
     work: Callable[..., object] | None = None
     while True:
@@ -214,5 +217,5 @@ def _work_for(parent: Connection, messages: "SimpleQueue[tuple[bytes, bytes]]") 
             answer = (False, None)
         try:
             parent.send(answer)
-        except Exception:  # what came of it cannot be pickled
+        except Exception:  # the result cannot be pickled
             parent.send((False, None))

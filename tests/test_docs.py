@@ -1,5 +1,6 @@
 """The documentation's examples are run, page by page, in an empty folder; its tables are those of the code."""
 
+import doctest
 import importlib
 import os
 import re
@@ -15,7 +16,7 @@ import lab
 from devtools.page_examples import COMMANDS_RUN, run
 from lab.cli.app import made
 from lab.learning.settings import SETTINGS
-from lab.studies import STUDIES
+from lab.studies import STUDIES, Study
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"
@@ -93,6 +94,34 @@ def test_the_stable_names_are_those_of_the_package() -> None:
     told = (DOCS / "reference.md").read_text(encoding="utf-8").split("## Stable names")[1]
     rows = [line.split("|")[1] for line in told.splitlines() if line.startswith("| `")]
     assert sorted(name for row in rows for name in re.findall(r"`(\w+)`", row)) == sorted(lab.__all__)
+
+
+EXAMPLES = {name: getattr(lab, name) for name in lab.__all__} | {"Study": Study}
+
+
+@pytest.mark.parametrize("name", [name for name, thing in EXAMPLES.items() if ">>>" in (thing.__doc__ or "")])
+def test_the_example_of_a_public_name_runs(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("LAB_TOOLBOX", str(tmp_path))
+    runner = doctest.DocTestRunner()
+    (example,) = doctest.DocTestFinder(recurse=False).find(EXAMPLES[name], name, globs={})
+    assert runner.run(example).failed == 0
+
+
+def test_what_others_build_on_has_an_example() -> None:
+    shown = {name for name, thing in EXAMPLES.items() if ">>>" in (thing.__doc__ or "")}
+    assert shown >= {
+        "AdviceRequest",
+        "Gate",
+        "Study",
+        "Toolbox",
+        "Update",
+        "compare",
+        "grid",
+        "sequence",
+        "teach",
+        "watch",
+        "world",
+    }
 
 
 def test_every_setting_is_told() -> None:

@@ -19,8 +19,8 @@ from lab.mdp import (
     greedy_path,
     grid,
     optimal_values,
+    shortest_path,
     shortest_steps,
-    shortest_way,
 )
 
 OPEN_2X2 = np.zeros((2, 2), bool)
@@ -170,7 +170,7 @@ def test_values_that_never_settle(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_shortest_way_goes_round_the_obstacle() -> None:
     mdp = grid((2, 3), walled((2, 3), (0, 1)), (0, 0), (0, 2))
     assert shortest_steps(mdp) == 4
-    assert shortest_way(mdp) == [0, 3, 4, 5, 2]
+    assert shortest_path(mdp) == [0, 3, 4, 5, 2]
 
 
 def test_greedy_path_ties_loops_and_limits() -> None:
@@ -255,7 +255,7 @@ def test_any_grid_is_solved_or_says_what_is_wrong(data: st.DataObject) -> None:
     states, actions, reached = greedy_path(optimal_values(mdp, 0.99), mdp, size)
     assert reached
     assert len(actions) == shortest_steps(mdp)
-    way = shortest_way(mdp)
+    way = shortest_path(mdp)
     assert len(way) == len(states)
     assert way[0] == mdp.start
     assert mdp.goal[way[-1]]

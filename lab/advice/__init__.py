@@ -1,1 +1,1 @@
-"""Who advises the learner, and when it asks."""
+"""Advisors: who answers, whom to believe, the journal of a session, and the receipt for its advice."""

@@ -1,4 +1,4 @@
-"""Who advises in a session: one advisor or several, simulated, recorded, learned or people, and how they are brought together."""
+"""The advisors of a session: one or several, simulated, recorded, learned or people, combined into one `Advisor`."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -25,10 +25,11 @@ EXPERT = AdvisorName.of("expert")
 
 @dataclass(frozen=True)
 class Advising:
-    """Who is asked in a session, and the people behind such names as "terminal".
+    """The advisors of a session.
 
-    panel: how several are asked, and whom to follow; region (S,): where anybody is heard;
-    toolbox: where policies that advise are, None: the user's own.
+    names: the advisors; people: the functions that ask the people behind names such as "terminal"; panel: how several advisors
+    are asked and combined; region: (S,) bool, the states in which advice counts, None for all; toolbox: holds the policies that
+    advise, None for the user's own.
     """
 
     names: tuple[AdvisorName, ...] = (EXPERT,)
@@ -45,11 +46,11 @@ class Advising:
         asked: str = PanelSettings.asked,
         decide: str = PanelSettings.decide,
     ) -> "Advising":
-        """From names as they are typed, or advisors that were made in Python (see `AdvisorName.made`).
+        """The advisors with these names, or made in Python (see `AdvisorName.made`).
 
-        BadInput for a name that no advisor has, and for an unknown way of asking or deciding.
+        Raises BadInput for an unknown name, or an unknown way of asking or deciding.
         """
-        found = tuple(
+        advisors = tuple(
             AdvisorName.of(name, "--advisor") if isinstance(name, str) else AdvisorName.made(name) for name in names
         )
         if "none" in names and len(names) > 1:
@@ -57,7 +58,7 @@ class Advising:
         for name in PEOPLE:
             if names.count(name) > 1:
                 raise BadInput(f"advisor '{name}' (--advisor) is named {names.count(name)} times: once is enough")
-        return cls(found, people or {}, PanelSettings(asked, decide))
+        return cls(advisors, people or {}, PanelSettings(asked, decide))
 
     def __str__(self) -> str:
         several = f" ({self.panel.asked}, {self.panel.decide})" if len(self.names) > 1 else ""
@@ -65,22 +66,22 @@ class Advising:
 
     @property
     def records(self) -> bool:
-        """Whether anybody speaks only where a record or a policy has something: such silence is not held against the advice."""
+        """Whether any advisor can answer only in states that a record or a policy knows; its silence is then no mislead."""
         return any(
             name.folder or name.policy or name.answers or isinstance(name.itself, RecordedAdvisor)
             for name in self.names
         )
 
     def cut_records(self) -> list[Read]:
-        """The journals among the advisors whose last line was cut off. Raises BadInput for what is no journal."""
+        """The journals of recorded advisors whose last line is incomplete. Raises BadInput if one is no journal."""
         folders = [name.folder for name in self.names if name.folder is not None]
         return [read for read in (read_journal(folder, "--advisor") for folder in folders) if read.cut]
 
     def check_records(self, mdp: TabularMDP) -> list[PolicyAdvisor]:
-        """The policies that advise; BadInput for a record or a policy that is not about this problem."""
+        """The policies that advise. Raises BadInput for a record or a policy of another problem."""
         level = TableLevel(mdp, 1.0, np.random.default_rng(0), toolbox=self.toolbox)
-        known = [make_advisor(name, level) for name in self.names if name.folder or name.policy or name.answers]
-        return [one for one in known if isinstance(one, PolicyAdvisor)]
+        advisors = [make_advisor(name, level) for name in self.names if name.folder or name.policy or name.answers]
+        return [advisor for advisor in advisors if isinstance(advisor, PolicyAdvisor)]
 
     def gather(
         self,
@@ -91,9 +92,9 @@ class Advising:
         journal: Journal | None = None,
         tell: Callable[[Event], None] = lambda event: None,
     ) -> Advisor | None:
-        """The advisors of a session as one, None when there is nobody; people's answers go through the journal.
+        """The advisors combined into one, None if there are none; people's answers are recorded in the journal.
 
-        Each of several draws from a stream of its own. Raises BadInput as `make_advisor` does.
+        Several advisors draw from independent streams. Raises BadInput as `make_advisor` does.
         """
         mdp, people = environment.mdp, through(journal, self.people)
         streams = [rng] if len(self.names) == 1 else rng.spawn(len(self.names) + 1)
@@ -110,7 +111,7 @@ class Advising:
 
 
 def through(journal: Journal | None, people: Mapping[str, Ask]) -> dict[str, Ask]:
-    """The same people, asked through a journal, which keeps what they say, or says it again."""
+    """Functions that ask the same people through a journal, which records their answers, or answers for them in a replay."""
 
     def asked(by: str, ask: Ask) -> Ask:
         return ask if journal is None else lambda request: journal.answer(by, request, ask)

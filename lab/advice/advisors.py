@@ -1,7 +1,7 @@
-"""Who can be asked, by name: simulated advisors, a person, recorded advice, a policy that was learned, or nobody.
+"""The advisors by name: simulated ones, people, recorded advice, learned policies, or none.
 
-A name is read once, where it comes in, into an `AdvisorName`; a `Level` (a table's steps, the order of the transfers) makes of
-it who answers there. One row of ADVISORS serves both.
+A name is parsed once, into an `AdvisorName`. Its row in ADVISORS makes the advisor for a `Level`: for the steps of a table, or
+for the order of transfers.
 """
 
 from collections.abc import Callable, Mapping
@@ -20,30 +20,31 @@ if TYPE_CHECKING:
 
 
 class Level(Protocol):
-    """What a learner learns, as far as an advisor of it has to know."""
+    """The interface of what a learner learns (a table or an order), as advisors are made for it."""
 
     @property
     def people(self) -> "Mapping[str, Ask]":
-        """Who can be asked, by name."""
+        """The functions that ask people, by advisor name."""
 
     def simulated(self, taus: tuple[float, ...], sign: float) -> "Advisor":
-        """Knows the exact values; a first and a last tau are passed through over the session; sign -1: the worst is best."""
+        """An advisor that draws from the exact values with tau, or from the first to the last tau; sign -1 inverts the values."""
 
     def check(self, recorded: "Read") -> None:
-        """BadInput when that is advice about something else."""
+        """Raises BadInput if the record is about another problem."""
 
     def learned(self, name: str) -> "Advisor":
-        """The policy of that name, or in that file; BadInput where there is none, and where it knows nothing of this."""
+        """A policy, by its name or file, as an advisor. Raises BadInput if there is none, or if no state of it matches."""
 
     def answered(self, path: Path) -> "Mapping[int, int]":
-        """What a file of answers says in each state; BadInput where it is about something else."""
+        """The answers by state that a file holds. Raises BadInput if they do not fit."""
 
 
 @dataclass(frozen=True)
 class AdvisorName:
-    """An advisor as it was asked for: its row in ADVISORS, what was said beside that, and the text itself.
+    """A parsed advisor name.
 
-    itself: one that was made in Python; it is in no table.
+    text: as it was typed; row: the key in ADVISORS; taus, folder, policy, answers: the parameters in the name.
+    itself: an advisor made in Python, which is in no table.
     """
 
     text: str
@@ -56,7 +57,7 @@ class AdvisorName:
 
     @classmethod
     def made(cls, advisor: "Advisor | Ask") -> "AdvisorName":
-        """For an advisor, or a function of a request; BadInput for anything else."""
+        """The name of an advisor object or of a function of a request. Raises BadInput for anything else."""
         text = getattr(advisor, "__name__", type(advisor).__name__)
         if hasattr(advisor, "advise"):
             return cls(text, PYTHON, itself=advisor)
@@ -66,7 +67,7 @@ class AdvisorName:
 
     @classmethod
     def of(cls, text: str, where: str = "advisor") -> "AdvisorName":
-        """From "expert", "tau=0.2", "recorded:DIR", "answers:FILE", "policy:NAME"...; BadInput, with `where` it was said."""
+        """The parsed name: "expert", "tau=0.2", "recorded:DIR", "answers:FILE", "policy:NAME"... Raises BadInput."""
         kind, colon, rest = text.partition(":")
         if colon and kind in PREFIXED:
             row, field, make, wanted = PREFIXED[kind]
@@ -90,31 +91,31 @@ class AdvisorName:
 
 
 class AdvisorKind(NamedTuple):
-    """A row of ADVISORS: how whoever bears that name is made for a level (None: nobody), and a few words for the help."""
+    """A row of ADVISORS: the function that makes the advisor for a level (None: no advisor), and a few words for the help."""
 
     make: "Callable[[AdvisorName, Level], Advisor | None]"
     help: str = ""
 
 
 class Person:
-    """A person, asked through a prompt or a page that is brought along (see lab/seat), or any function of a request."""
+    """An advisor that calls a function of a request, such as one that asks a person (see lab/seat)."""
 
     def __init__(self, ask: "Ask"):
         self._ask = ask
 
     def advise(self, request: "Request") -> int | None:
-        """What the person says."""
+        """The function's answer."""
         return self._ask(request)
 
 
 class RecordedAdvisor:
-    """Says again in each state what was last said there, where that may be done, and nothing elsewhere."""
+    """An advisor that repeats recorded answers: the last one for each state, none in other states."""
 
     def __init__(self, said: Mapping[int, int]):
         self._said = dict(said)
 
     def advise(self, request: "Request") -> int | None:
-        """What the record holds for this state."""
+        """The recorded answer for this state, None if there is none or if it is not allowed."""
         said = self._said.get(request.state)
         return said if said in request.allowed else None
 
@@ -133,15 +134,15 @@ def _recorded(name: AdvisorName, level: Level) -> "Advisor":
     from lab.advice.entries import read_journal
 
     assert name.folder is not None
-    found = read_journal(name.folder, "--advisor")
-    said = found.said()
+    journal = read_journal(name.folder, "--advisor")
+    answers = journal.said()
     try:
-        level.check(found)
-        if not said:
+        level.check(journal)
+        if not answers:
             raise BadInput("nothing was advised in that session")
     except BadInput as error:
         raise BadInput(f"advisor '{name}': {error}") from None
-    return RecordedAdvisor(said)
+    return RecordedAdvisor(answers)
 
 
 def _answers(name: AdvisorName, level: Level) -> "Advisor":
@@ -159,7 +160,7 @@ def _learned(name: AdvisorName, level: Level) -> "Advisor":
         raise BadInput(f"advisor '{name}': {error}") from None
 
 
-# what is told by a prefix: its row, the field of AdvisorName, what that is made by, and what is said where it is missing
+# prefix -> row, field of AdvisorName, the type of that field, the error text if it is empty
 PREFIXED: dict[str, tuple[str, str, Callable[[str], Any], str]] = {
     "recorded": ("recorded:DIR", "folder", Path, "no file: wanted recorded:DIR, the folder of a session"),
     "answers": ("answers:FILE", "answers", Path, "no file: wanted answers:FILE, see docs/teaching.md"),
@@ -193,21 +194,21 @@ ADVISORS = Family("advisors", _SHIPPED, _adopted)
 
 
 def named() -> list[str]:
-    """The names that are said as they stand; the others have something of the user's in them."""
+    """The names without parameters."""
     return [name for name in ADVISORS if not {"=", ":"} & {*name}]
 
 
 def make_advisor(name: AdvisorName, level: Level) -> "Advisor | None":
-    """Who answers to that name there, None for "none".
+    """The advisor of that name for a level, None for "none".
 
-    Raises BadInput for a person who is not there, for a record that does not fit, and for what is too large to know.
+    Raises BadInput if there is no way to ask the person, if a record does not fit, and if the exact values cannot be computed.
     """
     return name.itself or ADVISORS[name.row].make(name, level)
 
 
-def recorded_fault(found: "Read", what: str, signature: str) -> BadInput:
-    """What is said of a record that is about something else."""
-    then = found.session
+def recorded_fault(record: "Read", what: str, signature: str) -> BadInput:
+    """The error for a record of another problem; what: "problem" or "order"; signature: the one that is needed."""
+    recorded = record.session
     return BadInput(
-        f"it is advice about another {what}, '{then.problem}' ({then.signature[:8]}): wanted {signature[:8]}"
+        f"it is advice about another {what}, '{recorded.problem}' ({recorded.signature[:8]}): wanted {signature[:8]}"
     )

@@ -1,4 +1,4 @@
-"""What a session's journal holds: its entries, one line of JSON each, and the reader that takes them in again."""
+"""The entries of a session's journal, one line of JSON each, and the reader of journals."""
 
 import json
 from collections.abc import Sequence
@@ -34,11 +34,11 @@ Name = Annotated[str, MaxLen(1000), Predicate(str.isprintable)]
 
 @dataclass(frozen=True)
 class Session:
-    """What a session was: the words that began it, the problem, and whether it went on from an earlier table.
+    """The head of a journal: how the session was started.
 
-    words: the options of the command by name; signature: of the problem; learner and gate: their settings by name; lab: the
-    version that wrote it; continues: the name of the policy that it went on from, "" for none; command: "teach" or
-    "sequence".
+    words: the options of the command, by name; problem, signature: of the problem; lab: the version that wrote it; learner, gate:
+    their settings, by name; continues: the name of the policy that the session continued or was warm-started from, "" for
+    none; command: "teach" or "sequence".
     """
 
     words: dict[str, Any]
@@ -54,7 +54,7 @@ class Session:
 
 @dataclass(frozen=True)
 class Answer:
-    """What a person said: an action, None for "skip"; left: nothing more in this session, and why."""
+    """A person's answer: an action, None for "skip"; left: the person stopped advising, and why."""
 
     by: str
     episode: int
@@ -67,7 +67,7 @@ class Answer:
 
 @dataclass(frozen=True)
 class Undone:
-    """The last answer of a person, and all that came of it, was taken back."""
+    """A person took the last answer back; the entries since then do not count."""
 
     by: str
     episode: int
@@ -75,7 +75,7 @@ class Undone:
 
 @dataclass(frozen=True)
 class Closed:
-    """The session is over: its last word; the steps of an order are its cost and the proven optimum."""
+    """The session has ended; for an order, the steps are its cost and the proven optimum [s]."""
 
     episodes: int
     final_steps: int | float | None
@@ -105,19 +105,19 @@ _LINES = EntryKinds(KINDS)
 
 
 def line_of(entry: Entry) -> str:
-    """An entry as one line of JSON, without the line's end."""
+    """An entry as one line of JSON, without a line break."""
     return _LINES.line_of(entry)
 
 
 def entry_of(line: str) -> Entry:
-    """What a line holds. Raises ValueError for anything but an entry."""
+    """The entry in a line. Raises ValueError if it holds none."""
     entry: Entry = _LINES.entry_of(line.encode(), MAX_LINE_BYTES)
     return entry
 
 
 @dataclass(frozen=True)
 class Read:
-    """A journal as it was found: its head, its entries, how many bytes are whole lines, what was cut off at the end."""
+    """A journal that was read: its head, its entries, the size of its complete lines, and an incomplete last line."""
 
     path: Path
     session: Session
@@ -126,7 +126,7 @@ class Read:
     cut: str = ""
 
     def effective(self) -> list[Entry]:
-        """The entries without those that were taken back."""
+        """The entries that count: without those that were taken back."""
         kept: list[Entry] = []
         for entry in self.entries:
             if isinstance(entry, Undone):
@@ -137,25 +137,25 @@ class Read:
         return kept
 
     def said(self) -> dict[int, int]:
-        """What was advised by state, the last word counting: by people, where any have answered, else by whoever did."""
+        """The last advised action by state: of people if any have answered, otherwise of all advisors."""
         kept = self.effective()
         people = {e.state: e.action for e in kept if isinstance(e, Answer) and e.action is not None}
         return people or {e.state: e.action for e in kept if isinstance(e, AdviceGiven) and e.action is not None}
 
     @property
     def closed(self) -> Closed | None:
-        """The session's last word, None when it is not over."""
+        """The entry that ends the session, None if it has not ended."""
         last = self.entries[-1] if self.entries else None
         return last if isinstance(last, Closed) else None
 
     def check_goes_on(self) -> None:
-        """Raises BadInput when the session is over."""
+        """Raises BadInput if the session has ended."""
         if self.closed is not None:
             raise BadInput(f"the session in '{self.path.parent}' is over: look at it again with lab replay")
 
 
 def undoable(entries: Sequence[Entry], by: str) -> int | None:
-    """The place of the answer that a person may take back: the last one in the episode under way; None: there is none."""
+    """The index of the answer that a person may take back, the last one in the current episode; None if there is none."""
     for place in range(len(entries) - 1, -1, -1):
         entry = entries[place]
         if isinstance(entry, EpisodeEnded):
@@ -166,18 +166,18 @@ def undoable(entries: Sequence[Entry], by: str) -> int | None:
 
 
 def read_journal(folder: Path, where: str) -> Read:
-    """A journal from its folder, or its file; a last line that was cut off is left out and said.
+    """The journal in a folder, or in a file; an incomplete last line is reported in `Read.cut` and otherwise ignored.
 
-    Raises BadInput, naming `where` it was asked for and the line, for what is no journal or of another schema.
+    Raises BadInput, which names `where` and the line, if it is no journal or has another schema.
     """
     path = folder / FILE if folder.is_dir() else folder
     try:
         raw = read_limited(path, MAX_BYTES)
     except OSError as error:
         raise BadInput(f"journal '{path}' ({where}): cannot be read: {error.strerror or error}") from None
-    whole = raw.rfind(b"\n") + 1
+    complete_bytes = raw.rfind(b"\n") + 1
     entries: list[Entry] = []
-    for number, line in enumerate(raw[:whole].split(b"\n")[:-1], start=1):
+    for number, line in enumerate(raw[:complete_bytes].split(b"\n")[:-1], start=1):
         try:
             entries.append(_LINES.entry_of(line, MAX_LINE_BYTES))
         except ValueError as error:
@@ -192,17 +192,17 @@ def read_journal(folder: Path, where: str) -> Read:
     for number, entry in enumerate(entries[1:], start=2):
         if isinstance(entry, Session) or (isinstance(entry, Closed) and number < len(entries)):
             raise BadInput(f"journal '{path}' ({where}): line {number}: a second session in one journal")
-    cut = raw[whole:].decode("utf-8", "replace")
-    return Read(path, entries[0], tuple(entries[1:]), whole, cut)
+    cut = raw[complete_bytes:].decode("utf-8", "replace")
+    return Read(path, entries[0], tuple(entries[1:]), complete_bytes, cut)
 
 
 def is_unbegun(path: Path) -> bool:
-    """Whether a journal's first line was cut off: nothing of a session is in it."""
+    """Whether a journal's first line is incomplete, so that it holds no session."""
     return is_unwritten(path, b'{"kind": "session", ')
 
 
 def _refuse_schema(line: bytes, path: Path, where: str) -> None:
-    """Raises BadInput when a journal's head is of a schema that this version does not know."""
+    """Raises BadInput if the head of a journal has a schema that this version cannot read."""
     try:
         schema = json.loads(line).get("schema")
     except (ValueError, AttributeError, RecursionError):

@@ -1,8 +1,8 @@
-"""A session's journal: an append-only file of JSON lines, from which the session can be had again, bit for bit.
+"""A session's journal: an append-only file of JSON lines, from which the session can be reproduced exactly.
 
-A session is a function of its settings, its seed and what people answered. So nothing but the journal has to be kept: to go
-on after a break, or to take an answer back, the session is run again from its beginning while the journal answers for the
-people, and everything else that it tells is held against what was written.
+A session is a function of its settings, its seed and people's answers, so the journal is all that has to be stored. To resume
+it, or to take an answer back, the session is run again from its beginning: the journal answers for the people, and all other
+events are compared with the recorded ones.
 """
 
 from dataclasses import dataclass, field, replace
@@ -28,19 +28,20 @@ from lab.learning.session_events import EpisodeEnded
 
 
 class Undo(Exception):
-    """The person takes the last answer of this episode back."""
+    """Raised by a person's `Ask` function to take the last answer of this episode back."""
 
 
 class Again(Exception):
-    """The session must be run again from its beginning: an answer was taken back."""
+    """Raised if an answer was taken back, so that the session has to be run again from its beginning."""
 
 
 @dataclass
 class Journal:
-    """A journal under way; without a path nothing is written, and answers can be taken back all the same.
+    """The journal of a running session.
 
-    `folding`: the session is being run again, and what it tells was told before. `read_only`: a replay; when the
-    entries are used up, the session is stopped. found: where one was read that is not written.
+    path: of the file, None if nothing is written (answers can be taken back all the same).
+    entries: those that count.
+    read_only: a replay, which stops the session at the last entry; found: the file that is replayed.
     """
 
     path: Path | None = None
@@ -49,17 +50,17 @@ class Journal:
     found: Path | None = None
     _at: int = 0
     _file: AppendedFile | None = None
-    _unsafe: bool = False  # a person has said something that the disk may not have
+    _unsafe: bool = False  # an answer may not be on the disk yet
 
     @classmethod
     def begin(cls, folder: Path, session: Session) -> "Journal":
-        """A new journal in a folder, which is made; raises BadInput when it cannot be, or there is one already."""
+        """A new journal in a folder, which is created. Raises BadInput if it cannot be, or if it holds a journal."""
         path = folder / FILE
         journal = cls(path)
         try:
             folder.mkdir(parents=True, exist_ok=True)
             journal._file = AppendedFile.again(path) if is_unbegun(path) else AppendedFile.new(path)
-            if not is_unbegun(path):  # another command has been faster
+            if not is_unbegun(path):  # another command has begun a journal meanwhile
                 journal.close()
                 raise FileExistsError
             journal._file.cut(0)
@@ -74,9 +75,9 @@ class Journal:
 
     @classmethod
     def resume(cls, found: Read) -> "Journal":
-        """Go on with a journal: what was cut off at its end is taken away first. Raises BadInput when it is over.
+        """A journal to be continued; an incomplete last line is removed. Raises BadInput if the session has ended.
 
-        Another command may have gone on with it since it was found: it is read again once no other can write it.
+        The file is read again once it is locked, because another command may have continued it meanwhile.
         """
         journal = cls(found.path)
         try:
@@ -97,17 +98,17 @@ class Journal:
 
     @property
     def folding(self) -> bool:
-        """Whether what the session does now was done before."""
+        """Whether the session is being run again, so that its next event is in the journal already."""
         return self._at < len(self.entries)
 
     def rewind(self) -> None:
-        """The session is run again from its beginning."""
+        """Goes back to the first entry, for running the session again."""
         self._at = 0
 
     def tell(self, entry: Entry) -> bool:
-        """Writes an entry; of a session that is run again, holds it against what was written. Whether it is new.
+        """Records an entry, or compares it with the recorded one if the session is run again; returns whether it is new.
 
-        Raises WorkFailed when the session goes another way than it did.
+        Raises WorkFailed if it differs.
         """
         if not self.folding:
             if self.read_only:
@@ -132,16 +133,16 @@ class Journal:
         )
 
     def closes(self, closed: Closed) -> None:
-        """The session is over. Raises WorkFailed when it was over sooner than it once was."""
+        """Records the end of the session. Raises WorkFailed if it ended later before."""
         if self.folding and not isinstance(self.entries[self._at], Closed):
             raise self._differs(closed)
         if not self.read_only and not self.folding:
             self._append(closed)
 
     def answer(self, by: str, request: Request, ask: Ask) -> int | None:
-        """What the person `by` says to a request: from the journal, or asked now and written before it is followed.
+        """A person's answer to a request: the recorded one, or one asked for now and written before it is used.
 
-        Raises AdvisorLeft, and Again when the person has taken the last answer of the episode back.
+        Raises AdvisorLeft, and Again if the person took the last answer of the episode back.
         """
         if self.folding:
             before = self.entries[self._at]
@@ -150,11 +151,11 @@ class Journal:
                 allowed = "allowed " + allowed_words(request)
                 raise BadInput(f"{self._which}: {line_of(known)}: action {known.action}: {allowed}: it was edited")
             self.tell(replace(known, by=by, episode=request.episode, step=request.step, state=request.state))
-            return _said(known)
+            return _answered_action(known)
         given = self._asked(by, request, ask)
         self._append(given)
         self._unsafe = True
-        return _said(given)
+        return _answered_action(given)
 
     def _asked(self, by: str, request: Request, ask: Ask) -> Answer:
         if self.read_only:
@@ -183,7 +184,7 @@ class Journal:
             return
         self._file.write(line_of(entry))
         if self._unsafe and isinstance(entry, EpisodeEnded):
-            self._file.sync()  # a person's words are dear, and waiting for the disk at each of them is slow
+            self._file.sync()  # once per episode with answers, because a sync after each answer would be slow
             self._unsafe = False
 
     def close(self) -> None:
@@ -193,7 +194,7 @@ class Journal:
             self._file = None
 
 
-def _said(given: Answer) -> int | None:
+def _answered_action(given: Answer) -> int | None:
     if given.left:
         raise AdvisorLeft(given.why)
     return given.action

@@ -1,4 +1,4 @@
-"""Files to which lines of JSON are appended, one entry a line: how they are written by one command at a time, and read."""
+"""Append-only files of JSON lines: their entries, and writing them by one process at a time."""
 
 import json
 import os
@@ -14,23 +14,23 @@ from lab.files import json_of
 from lab.operating_system import lock, opened, replace_and_close
 
 MAX_LINE_BYTES = 1 << 22
-_SHOWN = 40  # characters of each of two lines that differ
-_PLAINLY = {"predicate_failed": "it holds what cannot be printed"}  # for pydantic's words, by the kind of fault
+_SHOWN = 40  # characters that an error shows of each of two differing lines
+_PLAINLY = {"predicate_failed": "it holds what cannot be printed"}  # kind of fault -> text that replaces pydantic's
 
 
 class EntryKinds:
-    """The kinds of entries in one sort of file: dataclasses by the name that their lines bear as "kind"."""
+    """The kinds of entries in one file format: dataclasses by the value of "kind" in their lines."""
 
     def __init__(self, kinds: Mapping[str, type[Any]]) -> None:
         self._kinds = dict(kinds)
         self._name_of = {kind: name for name, kind in kinds.items()}
 
     def line_of(self, entry: Any) -> str:
-        """An entry as one line of JSON, without the line's end."""
+        """An entry as one line of JSON, without a line break."""
         return json.dumps({"kind": self._name_of[type(entry)], **asdict(entry)}, allow_nan=False)
 
     def entry_of(self, line: bytes, most_bytes: int = MAX_LINE_BYTES) -> Any:
-        """What a line holds. Raises ValueError for anything but an entry."""
+        """The entry in a line. Raises ValueError if it holds none."""
         from pydantic import ValidationError
 
         if len(line) > most_bytes:
@@ -52,7 +52,7 @@ class EntryKinds:
 
 
 def differing(before: str, now: str) -> str:
-    """How two lines of JSON differ, short enough for an error: how they begin, and each from where they do not agree."""
+    """The difference of two lines of JSON, shortened for an error: their common beginning, and each from the difference on."""
     same = next((at for at, (one, other) in enumerate(zip(before, now, strict=False)) if one != other), len(before))
     begin = max(before.rfind(mark, 0, same) for mark in (", ", "{")) + 1
     then, comes = (line[begin : begin + _SHOWN].strip() for line in (before, now))
@@ -69,7 +69,7 @@ def _reader(model: Hashable) -> Any:
 
 
 def is_unwritten(path: Path, head: bytes) -> bool:
-    """Whether a file is there that a command was killed in before its first line, which begins with `head`, was whole."""
+    """Whether the file holds only an incomplete first line, which would begin with `head`: its writer was killed."""
     try:
         with path.open("rb") as file:
             begun = file.read(MAX_LINE_BYTES + 1) if stat.S_ISREG(os.fstat(file.fileno()).st_mode) else b"\n"
@@ -80,10 +80,10 @@ def is_unwritten(path: Path, head: bytes) -> bool:
 
 
 class AppendedFile:
-    """A file that one command at a time appends to: it holds the file's lock until it is closed."""
+    """A file open for appending; its lock is held until it is closed, so only one process writes."""
 
     def __init__(self, path: Path, flags: int) -> None:
-        """Open it with flags beside O_APPEND. Raises OSError, and BadInput when another command is writing it."""
+        """Opens the file with these flags and O_APPEND. Raises OSError, and BadInput if another process writes it."""
         self.path = path
         self._file: int | None = opened(path, flags | os.O_APPEND)
         try:
@@ -101,27 +101,27 @@ class AppendedFile:
 
     @classmethod
     def new(cls, path: Path) -> Self:
-        """A file that is not there yet; FileExistsError when it is."""
+        """A new file. Raises FileExistsError if it exists."""
         return cls(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL)
 
     @classmethod
     def again(cls, path: Path) -> Self:
-        """A file that is there."""
+        """An existing file."""
         return cls(path, os.O_WRONLY)
 
     def put_aside(self, to: Path) -> None:
-        """Give it another name, while nobody else can write it, and close it. Raises OSError."""
+        """Renames the file while it is locked, and closes it. Raises OSError."""
         file, self._file = self._file, None
         assert file is not None
         replace_and_close(file, self.path, to)
 
     def cut(self, size: int) -> None:
-        """Take away all but the first `size` bytes. Raises OSError."""
+        """Truncates the file to `size` bytes. Raises OSError."""
         assert self._file is not None
         os.ftruncate(self._file, size)
 
     def write(self, line: str) -> None:
-        """Append a line, which is safe from the death of this process then; WorkFailed when it cannot be written."""
+        """Appends a line; afterwards it survives the end of this process. Raises WorkFailed if it cannot be written."""
         if self._file is None:
             return
         left = (line + "\n").encode()
@@ -132,7 +132,7 @@ class AppendedFile:
             raise WorkFailed(f"journal '{self.path}' cannot be written: {error.strerror or error}") from error
 
     def sync(self) -> None:
-        """Have what was written on the disk. Raises WorkFailed."""
+        """Flushes what was written to the disk. Raises WorkFailed."""
         if self._file is None:
             return
         try:
@@ -141,7 +141,7 @@ class AppendedFile:
             raise WorkFailed(f"journal '{self.path}' cannot be written: {error.strerror or error}") from error
 
     def close(self) -> None:
-        """Close it; safe to call again."""
+        """Closes the file; may be called again."""
         if self._file is not None:
             os.close(self._file)
             self._file = None

@@ -1,4 +1,4 @@
-"""Advice on the order of the transfers: what its advisors are made from, and one that knows all values."""
+"""Advice on the order of transfers: the level for which advisors are made, and the advisor that knows the exact values."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -19,7 +19,7 @@ from lab.sequencing.search import SequenceRequest
 
 
 def signature_of(cell: Cell, objective: str) -> str:
-    """The first 16 hex digits of a SHA-256 over all that defines the order that is looked for."""
+    """The first 16 hex digits of a SHA-256 over cell and objective, which define the sequencing problem."""
     parts = (
         cell.stations,
         cell.products,
@@ -38,7 +38,7 @@ def signature_of(cell: Cell, objective: str) -> str:
 
 @dataclass(frozen=True)
 class OrderLevel:
-    """A cell, its signature, the session's length, and whom the learner may ask which part to move next."""
+    """The level of the order of transfers: cell, generator, people, the session's length, and the problem's signature."""
 
     cell: Cell
     rng: np.random.Generator
@@ -47,28 +47,28 @@ class OrderLevel:
     signature: str = ""
 
     def simulated(self, taus: tuple[float, ...], sign: float) -> Advisor:
-        """An advisor that knows the exact values; BadInput for a cell with too many states to know."""
+        """An advisor that knows the exact values. Raises BadInput for a cell with too many states."""
         return OrderAdvisor(self.cell, tau_schedule(taus, self.episodes), self.rng, sign)
 
     def check(self, recorded: Read) -> None:
-        """BadInput for advice about another cell."""
+        """Raises BadInput for advice about another cell."""
         if recorded.session.signature != self.signature:
             raise recorded_fault(recorded, "order", self.signature)
 
     def answered(self, path: Path) -> Mapping[int, int]:
-        """BadInput: such files are about the states of a table."""
+        """Raises BadInput, because such files are about the states of a table."""
         raise BadInput("a file of answers is about the steps of a sub-task, not the order: wanted another advisor")
 
     def learned(self, name: str) -> Advisor:
-        """BadInput: policies in the toolbox are tables of steps."""
+        """Raises BadInput, because policies are about the steps of a sub-task."""
         raise BadInput("a policy knows the steps of a sub-task, not the order: wanted another advisor")
 
 
 class OrderAdvisor:
-    """A simulated advisor: draws from a softmax over the exact values; tau in units of the optimum's mean step.
+    """A simulated advisor that draws from a softmax over the exact values.
 
-    taus: of each episode, the last one's from then on. sign -1: it takes the worst for the best. Source: thesis eq. 9.1,
-    taken to the high level (10.2.1 iii).
+    taus: by episode, the last one also for later episodes, in units of the optimum's mean step; sign: -1 prefers the worst.
+    Source: thesis eq. 9.1, applied to the high level (10.2.1 iii).
     """
 
     def __init__(self, cell: Cell, taus: Sequence[float], rng: np.random.Generator, sign: float = 1.0) -> None:
@@ -77,7 +77,7 @@ class OrderAdvisor:
         self._unit_s = best.cost / len(best.sequence) or 1.0
 
     def advise(self, request: SequenceRequest) -> int | None:
-        """One draw among the allowed decisions."""
+        """A decision, drawn among the allowed ones."""
         left_s = self._values.of(request.run, tuple(request.allowed))
         worst_s = max((value for value in left_s if value < np.inf), default=0.0) + 10 * self._unit_s
         worth = [-self._sign * min(value, worst_s) / self._unit_s for value in left_s]

@@ -1,4 +1,4 @@
-"""Several advisors at once: who is asked, whose word counts, and who is heard no more (thesis section 10.2.4 iii)."""
+"""Panels of advisors: who is asked, how their votes are combined, who is dropped (thesis section 10.2.4 iii)."""
 
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -18,32 +18,36 @@ ASKED = ("together", "in-turn")
 
 
 def majority(trusts: Sequence[float], chance: float) -> float:
-    """The number of advisors who say so."""
+    """The number of advisors that vote for an action."""
     return float(len(trusts))
 
 
 def best_trusted(trusts: Sequence[float], chance: float) -> float:
-    """The trust in the best of those who say so."""
+    """The trust in the most trusted of the advisors that vote for an action."""
     return max(trusts)
 
 
 def trust_weighted(trusts: Sequence[float], chance: float) -> float:
-    """The log odds of all who say so against those of chance, added up; one that is trusted less than chance counts against it.
+    """The sum of the log odds of the advisors that vote for an action, relative to chance; trust below chance counts against it.
 
-    Source: Nitzan and Paroush, Int. Econ. Rev. 23 (1982), 289-297, for two choices; between several, a voter who is right in
-    fewer than half of the cases still tells much, if guessing would be right in fewer.
+    Source: Nitzan and Paroush, Int. Econ. Rev. 23 (1982), 289-297, for two choices; with more choices, a voter that is right in
+    fewer than half of the cases is still informative if guessing would be right in fewer.
     """
-    return fsum(log(one / (1.0 - one)) - log(chance / (1.0 - chance)) for one in trusts)
+    return fsum(
+        log(trust_in_voter / (1.0 - trust_in_voter)) - log(chance / (1.0 - chance)) for trust_in_voter in trusts
+    )
 
 
-Decide = Callable[
-    [Sequence[float], float], float
-]  # an action's worth: from trusts in those who said it, and guessing's
+# An action's score, from the trust in each advisor that votes for it and the probability that guessing is right.
+Decide = Callable[[Sequence[float], float], float]
 DECISIONS: dict[str, Decide] = {"majority": majority, "best-trusted": best_trusted, "trust-weighted": trust_weighted}
 
 
 def decided(votes: Mapping[str, int], trusts: Mapping[str, float], own: int, decide: Decide, among: int = 2) -> int:
-    """The action that is followed, of so many; ties: what the most trusted one says, the learner's own, the lowest index."""
+    """The action with the highest score; ties: the most trusted vote, then the learner's own, then the lowest index.
+
+    votes: action by advisor; trusts: by advisor; own: the learner's action; among: the number of allowed actions.
+    """
     by_action: dict[int, list[float]] = {}
     for name, action in votes.items():
         by_action.setdefault(action, []).append(trusts[name])
@@ -56,7 +60,7 @@ def decided(votes: Mapping[str, int], trusts: Mapping[str, float], own: int, dec
 
 @dataclass(frozen=True)
 class PanelSettings:
-    """How a panel works: several are asked "together" or "in-turn"; decide: a row of DECISIONS. BadInput for other words."""
+    """How a panel works: asked "together" or "in-turn"; decide: a key of DECISIONS. Raises BadInput for other values."""
 
     asked: str = "together"
     decide: str = "trust-weighted"
@@ -70,7 +74,7 @@ class PanelSettings:
 
 @dataclass(frozen=True)
 class MemberStanding:
-    """How an advisor stands: the expected share of good advice with its 95 % interval, and its judged answers."""
+    """The standing of an advisor: its trust (expected share of good advice) with the 95 % interval, and its judged answers."""
 
     name: str
     trust: float
@@ -82,7 +86,7 @@ class MemberStanding:
 
 
 class _Member:
-    """An advisor with what it has said since it came, or was dropped or readmitted last."""
+    """An advisor with its answers since it joined, or was last dropped or readmitted."""
 
     def __init__(self, advisor: Advisor):
         self.advisor = advisor
@@ -91,21 +95,21 @@ class _Member:
         self._said: dict[int, Counter[int]] = defaultdict(Counter)
         self._circled: set[Pair] = set()
         self._now: dict[int, Pair] = {}  # in this episode, by step
-        self._trusts: dict[int, float] = {}  # by state: they change only when an episode has ended
+        self._trusts: dict[int, float] = {}  # cached by state; they change only at the end of an episode
 
     def begin(self) -> None:
-        """Another episode."""
+        """Begins an episode."""
         self._now.clear()
 
     def ask(self, request: AdviceRequest) -> int | None:
-        """What it says, which is kept to be judged. Raises AdvisorLeft."""
+        """The answer, recorded for later judgement. Raises AdvisorLeft."""
         action = self.advisor.advise(request)
         if action is not None:
             self._now[request.step] = request.state, action
         return action
 
     def judge(self, trail: Trail, ways: Ways) -> None:
-        """Takes in what was said in an episode and counts anew what is good and bad by the ways known now."""
+        """Adds the answers of an episode and recounts the good and bad ones by the paths known now."""
         for state, action in self._now.values():
             self._said[state][action] += 1
         self._circled |= circles(trail, {step: action for step, (_, action) in self._now.items()})
@@ -114,13 +118,13 @@ class _Member:
         self.good, self.bad = ways.tally(self._said, self._circled)
 
     def forget(self) -> None:
-        """From now on only what it says from now on counts."""
+        """Clears the record, so that only later answers count."""
         self.good = self.bad = 0
         for record in (self._said, self._circled, self._trusts):
             record.clear()
 
     def trust_in(self, state: int, ways: Ways) -> float:
-        """How far it is trusted in a state."""
+        """The trust in the advisor in a state."""
         if state not in self._trusts:
             said = {state: self._said[state]} if state in self._said else {}
             there = ways.tally(said, self._circled)
@@ -129,12 +133,12 @@ class _Member:
 
 
 class Panel:
-    """Several advisors as one. It hears after each episode what came of it, and trusts them by that (see trust.py).
+    """Several advisors as one, trusted by what their advice led to (see trust.py).
 
-    Asked "together", all are asked about each step; "in-turn", one an episode, and the next one where it says nothing. An
-    advisor whose advice is bad beyond doubt is dropped: it is asked about one question in ten, and not followed; when these
-    answers are good beyond doubt, it is readmitted, and only they count from then on. All chance is from `draw`. Raises
-    BadInput for no members.
+    "together" asks all of them about each step; "in-turn" asks one per episode, and the next if it is silent. An advisor
+    whose advice is significantly bad is dropped: it is still asked about one question in ten, but not followed, and is readmitted
+    when these answers are significantly good; then only they count. All randomness comes from `draw`.
+    Raises BadInput if there are no members.
     """
 
     def __init__(
@@ -157,7 +161,7 @@ class Panel:
         self._turn = -1
 
     def advise(self, request: AdviceRequest) -> int | None:
-        """What the panel has decided; None when nobody who counts has spoken. Raises AdvisorLeft when all have left."""
+        """The panel's decision, None if no member that counts has answered. Raises AdvisorLeft if all have left."""
         self._terminal = request.mdp.terminal
         if request.episode != self._episode:
             self._episode, self._turn = request.episode, self._turn + 1
@@ -180,7 +184,7 @@ class Panel:
         return action
 
     def _votes(self, request: AdviceRequest) -> dict[str, int]:
-        """What those who count say, by name."""
+        """The answers of the members that are not dropped, by name."""
         heard = [name for name, member in self._members.items() if not member.dropped]
         if self._in_turn and heard:
             first = self._turn % len(heard)
@@ -195,7 +199,7 @@ class Panel:
         return {name: votes[name] for name in self._members if name in votes}
 
     def _probe(self, request: AdviceRequest) -> None:
-        """Asks dropped members now and then; what they say is judged later."""
+        """Asks dropped members about a random share of the questions, to judge their answers later."""
         for name in [name for name, member in self._members.items() if member.dropped]:
             if self._draw() < PROBED:
                 self._ask(name, request)
@@ -208,7 +212,7 @@ class Panel:
             return None
 
     def followed(self, walked: Walked) -> None:
-        """Learns from an episode where actions lead and judges all answers by it; drops and readmits."""
+        """Learns from an episode where actions lead, judges all answers anew, and drops or readmits members."""
         if not walked.trail:
             return
         over = self._terminal is not None and bool(self._terminal[walked.trail[-1][2]])
@@ -231,7 +235,7 @@ class Panel:
         member.dropped = not member.dropped
 
     def standing(self) -> list[MemberStanding]:
-        """How the members stand that have not left, in the order in which they came."""
+        """The standing of the members that have not left, in their original order."""
         return [
             MemberStanding(
                 name,
@@ -246,7 +250,7 @@ class Panel:
 
 
 def members_of(names: Iterable[str], advisors: Iterable[Advisor | None]) -> dict[str, Advisor]:
-    """The members of a panel, those that are None left out; two of one name are "expert" and "expert 2"."""
+    """The members of a panel by name, without those that are None; a second "expert" becomes "expert 2"."""
     members: dict[str, Advisor] = {}
     for name, advisor in zip(names, advisors, strict=True):
         if advisor is not None:

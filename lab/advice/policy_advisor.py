@@ -1,4 +1,4 @@
-"""A policy in the toolbox as an advisor: what it would do itself, in the states that mean the same where it learned."""
+"""A learned policy as an advisor in the states that correspond to states of its own problem."""
 
 from pathlib import Path
 
@@ -16,10 +16,10 @@ SILENT = -1
 
 
 class PolicyAdvisor:
-    """Says what a policy would do, nothing in states it has never been in.
+    """An advisor that answers with a policy's greedy action, and does not answer in states that the policy never visited.
 
-    said (S,): the action in each state, SILENT where it knows none. known: how many states it can speak of, `of` all that go
-    on; here: it learned in exactly this problem.
+    said: (S,) int32, the answer in each state, SILENT for none; known: the number of states with an answer; of: the number of
+    nonterminal states; here: whether the policy was learned in exactly this problem.
     """
 
     def __init__(self, policy: Policy, mdp: TabularMDP):
@@ -38,26 +38,26 @@ class PolicyAdvisor:
 
 
 def advice_of(policy: Policy, mdp: TabularMDP) -> IntArray:
-    """What a policy would do in each state of a problem, (S,), SILENT where it has never been.
+    """The policy's greedy action in each state of a problem, (S,) int32, SILENT in states that it never visited.
 
-    In another problem than its own, cells of grids with as many axes are the same where their indices are, and actions where
-    their labels are. Raises BadInput where nothing is the same, or nothing of it was visited.
+    If the problem is not the policy's own, grid cells are matched by their indices (both grids need the same number of axes) and
+    actions by their labels. Raises BadInput if nothing matches, or if no matching state was visited.
     """
-    there = np.arange(mdp.n_states, dtype=np.int32) if policy.signature == mdp.signature else _places(policy, mdp)
-    been = policy.visits.max(axis=1) > 0
+    own_state = np.arange(mdp.n_states, dtype=np.int32) if policy.signature == mdp.signature else _places(policy, mdp)
+    visited = policy.visits.max(axis=1) > 0
     if policy.ends is not None:
-        been &= policy.ends == ON
+        visited &= policy.ends == ON
     labels = {label: action for action, label in enumerate(mdp.action_labels)}
     named = np.array([labels.get(label, SILENT) for label in policy.action_labels], np.int32)
-    speaks = (there >= 0) & been[there] & ~mdp.terminal
-    said = np.where(speaks, named[policy.q.argmax(axis=1)][there], SILENT).astype(np.int32)
+    speaks = (own_state >= 0) & visited[own_state] & ~mdp.terminal
+    said = np.where(speaks, named[policy.q.argmax(axis=1)][own_state], SILENT).astype(np.int32)
     if not (said != SILENT).any():
-        raise BadInput("it has been in none of this problem's states")
+        raise BadInput("it has visited in none of this problem's states")
     return said
 
 
 def _places(policy: Policy, mdp: TabularMDP) -> IntArray:
-    """The policy's state for each state of a problem, (S,), -1 where it has none. BadInput for what cannot be matched."""
+    """The policy's state for each state of a problem, (S,), -1 for none. Raises BadInput if the problems cannot be matched."""
     if not (policy.shape and mdp.shape) or mdp.coverage_shape:
         raise BadInput("it learned in another problem, and only the cells of grids can be matched")
     if len(policy.shape) != len(mdp.shape):
@@ -67,17 +67,17 @@ def _places(policy: Policy, mdp: TabularMDP) -> IntArray:
         raise BadInput(f"it has none of this problem's actions: {own}; wanted {here}")
     cells = np.indices(mdp.shape).reshape(len(mdp.shape), -1)
     inside = (cells < np.array(policy.shape)[:, None]).all(axis=0)
-    there = np.full(mdp.n_states, -1, np.int32)
-    there[inside] = np.ravel_multi_index(tuple(cells[:, inside]), policy.shape)
-    return there
+    own_state = np.full(mdp.n_states, -1, np.int32)
+    own_state[inside] = np.ravel_multi_index(tuple(cells[:, inside]), policy.shape)
+    return own_state
 
 
 def policy_of(name: str, toolbox: Toolbox | None) -> Policy:
-    """The policy in use under a name, or in a file. BadInput for what is neither."""
+    """The policy in use under a name, or in a file. Raises BadInput if there is neither."""
     box = toolbox or Toolbox()
     if name.endswith(SUFFIX) and is_file(name):
         return box.load(Path(name))
-    found = box.versions(name).in_use()
-    if found is None:
+    version = box.versions(name).in_use()
+    if version is None:
         raise BadInput(f"nothing is in use under this name: it was removed (toolbox {box.address})")
-    return found.policy
+    return version.policy

@@ -1,4 +1,4 @@
-"""What advice was worth: counted from a session's journal, for whoever gave it (thesis section 10.2.2)."""
+"""The receipt for advice: what it was worth, counted from a session's journal (thesis section 10.2.2)."""
 
 import json
 import textwrap
@@ -32,10 +32,11 @@ SILENT, OVERRULED, UNHEARD = "nothing was said", "another advisor was followed",
 
 @dataclass(frozen=True)
 class Voice:
-    """One of several advisors, as far as the journal knows.
+    """The count for one of several advisors.
 
-    whole: all that it said is on record, as of people; of others only what was disagreed about, which shows no skill.
-    said = followed + overruled + unheard; against_best: answers that were not the best, None where nobody knows.
+    whole: whether all of its answers are in the journal, as those of people are; of other advisors the journal has only disputed
+    answers, from which no skill can be estimated. said: answers, the sum of followed, overruled and unheard.
+    against_best: answers that were not the best, None if the optimal values are unknown.
     """
 
     name: str
@@ -52,16 +53,20 @@ class Voice:
 class Receipt:
     """What the advice of a session was worth.
 
-    requests: episodes in which the learner asked; questions: the steps it asked about, taken of them with advice that was
-    carried out; refused: by reason, questions without advice and answers that were not carried out; remembered: steps made
-    from memory, without asking; helped_steps, episodes, guided: of finished episodes; better: guided ones that the
-    gate found better than before, or where it judges none, with fewer steps than the mean of the K before; best: others
-    that were as good as the best so far; mean_before, mean_after: of the K before the first guided one and the K after the last,
-    None without any; change_percent: from one to the other; agreed: taken, and the learner's own choice, too; into_walls,
-    into_obstacles: taken steps that stayed where they were, or ended the episode short of the goal; sent_back: states in
-    which advice led back to one asked about before in the episode; against_best: taken steps that were not the best,
-    differences: the LISTED most frequent of them, None and nothing where nobody knows; notices: rejections and the like;
-    hints: what would help more next time; yours: a person gave all of this advice, and is spoken to.
+    requests: episodes in which the learner asked; questions: steps about which it asked; taken: advised steps carried out.
+    refused: by reason, questions without an answer and answers that were not carried out.
+    remembered: steps practised from memory, without asking.
+    helped_steps, episodes, guided: counted over finished episodes; guided ones have an advised step.
+    better: guided episodes that the gate judged better or, without its judgement, with fewer steps than the mean of the K before;
+    best: further ones that were as good as the best so far.
+    mean_before, mean_after: the mean steps of the K episodes before the first guided one and after the last, None if there are
+    none; change_percent: from the one to the other.
+    agreed: taken steps that were also the learner's own choice; into_walls: taken steps that did not change the state;
+    into_obstacles: taken steps that ended the episode without reaching the goal; sent_back: states in which advice led back to a
+    state asked about before in the episode.
+    against_best: taken steps that were not the best; differences: the LISTED most frequent of them; None and () if the optimal
+    values are unknown. skill: estimated from the taken steps; voices: by advisor, if there are several.
+    notices: rejections and the like; hints: for better advice next time; yours: whether people gave all of the advice.
     """
 
     requests: int
@@ -90,19 +95,19 @@ class Receipt:
     hints: tuple[str, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
-        """Plain lists, dictionaries, numbers and text."""
+        """The receipt as JSON values."""
         document: dict[str, Any] = json.loads(json.dumps(asdict(self), allow_nan=False))
         return document
 
     def lines(self) -> list[str]:
-        """Plain text, at most WIDTH wide."""
+        """The receipt as lines of plain text, at most WIDTH characters wide."""
         plain = ("".join(one if one.isprintable() else "?" for one in line) for line in _lines(self))
         return [part for line in plain for part in textwrap.wrap(line, WIDTH, subsequent_indent="    ")]
 
 
 @dataclass(frozen=True)
 class _Question:
-    """What was asked, and who said what; heard: whose word counted where they disagreed."""
+    """A question with all answers by advisor; heard: the advisors that counted if they disagreed."""
 
     given: AdviceGiven
     said: dict[str, int]
@@ -117,15 +122,15 @@ def receipt(
     *,
     certain: bool = True,
 ) -> Receipt:
-    """The receipt for the effective entries of a journal; values: optimal ones (S, A), None where nobody knows them.
+    """The receipt for the entries of a journal that count.
 
-    mdp: None for advice on the order, whose steps are costs; window: K of the moving averages; certain: steps lead where
-    the table says, so that an advisor answers for walls, obstacles and circles. Entries of states and actions that the
-    problem does not have count as answers only.
+    mdp: None for advice on the order, whose steps are costs; values: (S, A), the optimal ones, None if unknown; window: K of the
+    moving averages; certain: whether the table's steps are deterministic, so that walls, obstacles and loops are the advisor's
+    responsibility. Entries with states or actions that the problem does not have count as answers only.
     """
     questions = list(_questions(entries))
     taken = [(one.given.state, one.given.action) for one in questions if one.given.action is not None]
-    there = _there(taken, mdp)
+    there = _existing(taken, mdp)
     led = [int(mdp.successor[pair]) for pair in there] if certain and mdp else []
     voices = _voices(questions, {one.by for one in entries if isinstance(one, Answer)}, mdp, values)
     wrong = None if values is None else worse(there, values)
@@ -151,7 +156,7 @@ def receipt(
 
 
 def _questions(entries: Iterable[Entry]) -> Iterator[_Question]:
-    """Each question with all that is known of what was said to it."""
+    """The questions, each with all recorded answers."""
     said: dict[str, int] = {}
     heard: frozenset[str] = frozenset()
     for entry in entries:
@@ -166,24 +171,25 @@ def _questions(entries: Iterable[Entry]) -> Iterator[_Question]:
             said, heard = {}, frozenset()
 
 
-def _there(pairs: Iterable[Pair], mdp: TabularMDP | None) -> list[Pair]:
+def _existing(pairs: Iterable[Pair], mdp: TabularMDP | None) -> list[Pair]:
+    """The (state, action) pairs that exist in the problem."""
     return [] if mdp is None else [(s, a) for s, a in pairs if 0 <= s < mdp.n_states and 0 <= a < mdp.n_actions]
 
 
 def _voices(
     of: Sequence[_Question], people: Collection[str], mdp: TabularMDP | None, values: Values
 ) -> tuple[Voice, ...]:
-    found = []
+    voices = []
     for name in dict.fromkeys(name for one in of for name in one.said):
         own = [one for one in of if name in one.said]
         followed = sum(one.said[name] == one.given.action for one in own)
         overruled = sum(one.said[name] != one.given.action and name in one.heard for one in own)
-        said = _there([(one.given.state, one.said[name]) for one in own], mdp)
-        against = None if values is None else sum(worse(said, values).values())
-        skill = skill_of(said, values) if values is not None and name in people else None
+        answers = _existing([(one.given.state, one.said[name]) for one in own], mdp)
+        against = None if values is None else sum(worse(answers, values).values())
+        skill = skill_of(answers, values) if values is not None and name in people else None
         unheard = len(own) - followed - overruled
-        found.append(Voice(name, name in people, len(own), followed, overruled, unheard, against, skill))
-    return tuple(found)
+        voices.append(Voice(name, name in people, len(own), followed, overruled, unheard, against, skill))
+    return tuple(voices)
 
 
 def _refused(questions: Sequence[_Question], voices: Sequence[Voice]) -> dict[str, int]:
@@ -197,19 +203,19 @@ def _refused(questions: Sequence[_Question], voices: Sequence[Voice]) -> dict[st
 
 def _sent_back(questions: Iterable[_Question], mdp: TabularMDP) -> set[int]:
     """The states from which advice led back to a state that was asked about before in the same episode."""
-    found: set[int] = set()
+    sent_from: set[int] = set()
     seen: set[int] = set()
     episode, last = None, 0
     for given in (one.given for one in questions):
         if given.episode != episode or given.step <= last:
             seen.clear()
         episode, last = given.episode, given.step
-        for state, action in _there([] if given.action is None else [(given.state, given.action)], mdp):
+        for state, action in _existing([] if given.action is None else [(given.state, given.action)], mdp):
             entered = int(mdp.successor[state, action])
             if entered in seen and entered != state:
-                found.add(state)
+                sent_from.add(state)
         seen.add(given.state)
-    return found
+    return sent_from
 
 
 def _mean(episodes: Sequence[EpisodeEnded]) -> float | None:
@@ -217,7 +223,7 @@ def _mean(episodes: Sequence[EpisodeEnded]) -> float | None:
 
 
 def _judged(ended: Sequence[EpisodeEnded], window: int) -> list[bool]:
-    """Whether each guided episode was a good one: better than the mean of the K before it, or as good as the best."""
+    """For each guided episode, whether it was good: better than the mean of the K before it, or as good as the best."""
     means = [_mean(ended[max(0, n - window) : n]) for n in range(len(ended))]
     return [
         one.verdict != "misled" if one.verdict else mean is not None and one.steps < mean
@@ -244,7 +250,7 @@ def _episodes(ended: Sequence[EpisodeEnded], window: int) -> dict[str, Any]:
 
 
 def _notices(entries: Sequence[Entry]) -> Iterator[str]:
-    """What became of the advice, in words."""
+    """Rejections, the end of advice, and dropped or readmitted advisors, in words."""
     for n, entry in enumerate(entries):
         if isinstance(entry, AdviceRejected):
             left = sum(isinstance(one, EpisodeEnded) for one in entries[n:])
@@ -258,7 +264,7 @@ def _notices(entries: Sequence[Entry]) -> Iterator[str]:
 
 
 def _hints(of: Receipt, entries: Sequence[Entry], window: int) -> Iterator[str]:
-    """What would help more next time, each from the numbers that say so."""
+    """Suggestions for better advice, each based on a count."""
     ended = [one for one in entries if isinstance(one, EpisodeEnded)]
     if not of.taken:
         if of.questions:

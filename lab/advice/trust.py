@@ -1,10 +1,10 @@
-"""Whom to believe: where actions led so far, how much of what an advisor said leads nearer to the goal, and its skill.
+"""Trust in advisors, from where their advice has led so far; below it, their skill, judged afterwards by the optimal values.
 
-An answer is good when it leads nearer to the goal by the ways that have been walked; bad when it leads nowhere, to where an
-episode was lost, off the known ways, no nearer, or, all by the advisor's own advice, round in a circle. What nobody has
-tried is neither; so an advisor that is seldom followed is judged mostly where it agrees, which flatters it. All answers are
-judged by what is known now: when a shorter way is found, an old one is judged anew.
-`Skill` and what stands below it look back and know the optimal values; nothing above knows more than was walked.
+An answer is good if it leads nearer to the goal along the paths made so far. It is bad if it does not change the state, ends the
+episode without success, leaves the known paths, leads no nearer, or closes a loop of advised moves. An answer that nobody has
+tried is neither, so an advisor that is seldom followed is judged mostly where it agrees with others, which flatters it. All
+answers are judged by the paths known now: when a shorter one is found, old answers are judged anew.
+`Skill` and everything below it know the optimal values; everything above knows only the moves that were made.
 """
 
 from collections import Counter, deque
@@ -17,10 +17,10 @@ import numpy as np
 from lab.advice.advisors import SKILL_TAUS
 from lab.mdp import FloatArray, TabularMDP
 
-PRIOR = 1.0  # pseudo-answers of either kind before anything is known: an even Beta
-STATE_PRIOR = 4.0  # pseudo-answers with which the trust in an advisor as a whole speaks in a state
+PRIOR = 1.0  # pseudo-counts of good and of bad answers: the parameters of the Beta prior
+STATE_PRIOR = 4.0  # the weight, in pseudo-answers, of the overall trust in a single state
 LEVEL = 0.95  # of credible intervals
-EVEN = 0.5  # trust below it: more of the advice leads away than nearer
+EVEN = 0.5  # below this trust, more of the advice is bad than good
 ENOUGH = 10  # judged answers before an advisor may be dropped
 
 FEWEST = 5  # answers from which a skill is estimated
@@ -34,7 +34,7 @@ Said = Mapping[int, Mapping[int, int]]  # how often an action was said, by state
 
 
 class Ways:
-    """Where actions led, and the fewest moves to the goal along all that was walked; states 0..S-1."""
+    """The moves made so far, and from them the fewest known moves to the goal from each of the states 0..S-1."""
 
     def __init__(self, states: int):
         self._entered: list[dict[int, int]] = [{} for _ in range(states)]  # the last time, by state and action
@@ -43,7 +43,7 @@ class Ways:
         self._lost: set[int] = set()
 
     def walked(self, trail: Trail, reached: bool, over: bool) -> None:
-        """Takes in an episode of at least one step; over: it ended where no step goes on, at the goal or not."""
+        """Adds an episode of at least one step; over: whether it ended in a terminal state."""
         for state, action, entered in trail:
             self._entered[state][action] = entered
             self._left[entered].add(state)
@@ -55,7 +55,7 @@ class Ways:
         self._shorten(entered for _, _, entered in reversed(trail))
 
     def _shorten(self, states: Iterable[int]) -> None:
-        """Looks whether the ways that lead through these states are shorter now."""
+        """Updates the fewest moves of all states that lead to these."""
         waiting = deque(states)
         while waiting:
             entered = waiting.popleft()
@@ -65,7 +65,7 @@ class Ways:
                     waiting.append(state)
 
     def verdict(self, state: int, action: int) -> bool | None:
-        """Whether an action leads nearer to the goal there; None: nobody has tried it, or nothing can be said yet."""
+        """Whether an action leads nearer to the goal; None if it was never tried, or if no path to the goal is known."""
         entered = self._entered[state].get(action)
         if entered is None:
             return None
@@ -73,10 +73,10 @@ class Ways:
             return False
         if self._moves[state] == inf:
             return None
-        return self._moves[entered] < self._moves[state]  # without a way from there: no nearer
+        return self._moves[entered] < self._moves[state]  # inf, without a known path from there, is no nearer
 
     def tally(self, said: Said, circled: Collection[Pair] = ()) -> tuple[int, int]:
-        """How many answers were good and how many bad; those of `circled` are bad when nothing else can be said."""
+        """(good, bad): the numbers of good and bad answers; answers in `circled` are bad if there is no other verdict."""
         counts: Counter[bool | None] = Counter()
         for state, actions in said.items():
             for action, times in actions.items():
@@ -86,11 +86,11 @@ class Ways:
 
 
 def circles(trail: Trail, advised: Mapping[int, int]) -> set[Pair]:
-    """The steps that closed a circle, or were part of one, in which all was as advised: an action by step, from 1 on.
+    """The (state, action) pairs of loops in which every move was advised; advised: action by step, from 1.
 
-    A circle in which others had a hand proves nothing: it may have been the way back from their mistake.
+    A loop with moves of others proves nothing, because it may have been the way back from their mistake.
     """
-    found: set[Pair] = set()
+    loops: set[Pair] = set()
     run: list[Pair] = []
     left: dict[int, int] = {}  # when a state was left last in this run
     for step, (state, action, entered) in enumerate(trail, start=1):
@@ -100,22 +100,22 @@ def circles(trail: Trail, advised: Mapping[int, int]) -> set[Pair]:
         left[state] = len(run)
         run.append((state, action))
         if entered in left:
-            found.update(run[left[entered] :])
-    return found
+            loops.update(run[left[entered] :])
+    return loops
 
 
 def trust(good: int, bad: int) -> float:
-    """The share of an advisor's advice that is expected to be good: the mean of its Beta."""
+    """The expected share of good advice: the mean of the Beta posterior."""
     return (PRIOR + good) / (2.0 * PRIOR + good + bad)
 
 
 def trust_there(overall: float, good: int, bad: int) -> float:
-    """Trust in one state, from the answers there; the overall trust is the mean of its prior."""
+    """The trust in one state: the mean of a Beta posterior whose prior has the overall trust as its mean."""
     return (STATE_PRIOR * overall + good) / (STATE_PRIOR + good + bad)
 
 
 def bounds(good: int, bad: int, level: float = LEVEL) -> tuple[float, float]:
-    """Between which shares the trust lies, believed at this level: the quantiles of its Beta."""
+    """(low, high): the credible interval of the share of good advice, from quantiles of the Beta posterior."""
     from scipy.special import betaincinv
 
     tail = (1.0 - level) / 2.0
@@ -124,18 +124,18 @@ def bounds(good: int, bad: int, level: float = LEVEL) -> tuple[float, float]:
 
 
 def is_bad(good: int, bad: int) -> bool:
-    """Whether, beyond doubt, more of the advice leads away than nearer."""
+    """Whether significantly more of the advice is bad than good."""
     return good + bad >= ENOUGH and bounds(good, bad)[1] < EVEN
 
 
 def is_good(good: int, bad: int) -> bool:
-    """Whether, beyond doubt, more of the advice leads nearer than away."""
+    """Whether significantly more of the advice is good than bad."""
     return bounds(good, bad)[0] > EVEN
 
 
 @dataclass(frozen=True)
 class Skill:
-    """An advisor's tau of thesis eq. 9.1 within TAUS, its 95 % interval, the nearest of SKILL_TAUS, and from how many answers."""
+    """The estimate of an advisor's tau (thesis eq. 9.1) within TAUS: 95 % interval, nearest of SKILL_TAUS, number of answers."""
 
     tau: float
     low: float
@@ -150,9 +150,9 @@ class Skill:
 
 
 def skill_of(answers: Sequence[Pair], values: FloatArray) -> Skill | None:
-    """The tau that makes these answers likeliest, drawn from the softmax over values (S, A), with its likelihood interval.
+    """The maximum-likelihood tau of answers drawn from a softmax over values (S, A), with its likelihood interval.
 
-    Only states in which one action is better than another count; None with fewer than FEWEST. Source: thesis eq. 9.1.
+    Only states count in which the actions differ in value; None for fewer than FEWEST of them. Source: thesis eq. 9.1.
     """
     from scipy.optimize import brentq, minimize_scalar
 
@@ -162,15 +162,15 @@ def skill_of(answers: Sequence[Pair], values: FloatArray) -> Skill | None:
     if telling.sum() < FEWEST:
         return None
     below = below[telling]
-    said = below[np.arange(len(below)), np.array([action for _, action in answers])[telling]]
+    chosen = below[np.arange(len(below)), np.array([action for _, action in answers])[telling]]
 
     def likelihood(log_tau: float) -> float:
         tau = exp(log_tau)
-        return float(said.sum() / tau - np.log(np.exp(below / tau).sum(axis=1)).sum())
+        return float(chosen.sum() / tau - np.log(np.exp(below / tau).sum(axis=1)).sum())
 
     ends = log(TAUS[0]), log(TAUS[1])  # one peak: the likelihood is concave in 1/tau
-    found = float(minimize_scalar(lambda at: -likelihood(at), bounds=ends, method="bounded").x)
-    best = max((*ends, found), key=lambda at: likelihood(at) + SAME * (at in ends))
+    inner = float(minimize_scalar(lambda at: -likelihood(at), bounds=ends, method="bounded").x)
+    best = max((*ends, inner), key=lambda at: likelihood(at) + SAME * (at in ends))
     floor = likelihood(best) - EDGE
     low, high = (
         end if likelihood(end) >= floor else float(brentq(lambda at: likelihood(at) - floor, *sorted((end, best))))
@@ -183,7 +183,7 @@ def skill_of(answers: Sequence[Pair], values: FloatArray) -> Skill | None:
 
 @dataclass(frozen=True)
 class Difference:
-    """A state where something was said that is not among the best actions, and how often; actions by label."""
+    """An answer that was not among the best actions of a state, and how often it was given; actions are labels."""
 
     state: int
     label: str
@@ -193,12 +193,12 @@ class Difference:
 
 
 def worse(pairs: Iterable[Pair], values: FloatArray) -> Counter[Pair]:
-    """How often something was said that is worse than another action there."""
+    """The number of times by (state, action) that an answer was not among the best actions."""
     return Counter(pair for pair in pairs if values[pair] < values[pair[0]].max() - SAME)
 
 
 def differences(wrong: Mapping[Pair, int], mdp: TabularMDP, values: FloatArray, most: int) -> tuple[Difference, ...]:
-    """The most frequent of what is worse than the best, in words."""
+    """The `most` frequent answers that were not the best, with labels."""
     labels = mdp.action_labels
     return tuple(
         Difference(

@@ -1,1 +1,1 @@
-"""What `import lab` gives: the work of the commands as functions, and what they come to as records."""
+"""The public functions of `import lab`, one for each command, and the records that they return."""

@@ -1,4 +1,4 @@
-"""`lab.teach`: one lesson, and what came of it."""
+"""`lab.teach`: one lesson and its result."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -28,9 +28,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class LessonResult:
-    """What a lesson came to: the policy, and how it was learned.
+    """The result of a lesson.
 
-    problem: what was learned; lesson: with the policy and the session's counts; document: as `lab teach --json` gives it.
+    problem: the problem; lesson: the policy and the session's counts; document: the dict that `lab teach --json` prints.
+
+        >>> import lab
+        >>> lesson = lab.teach(lab.world("S.#\\n..G"), gate="never", advisor=None)
+        >>> lesson.q.shape, lesson.solved, len(lesson.rows()) == len(lesson.session.steps)
+        ((6, 4), True, True)
     """
 
     problem: Problem
@@ -46,18 +51,18 @@ class LessonResult:
 
     @property
     def session(self) -> SessionResult:
-        """The session's arrays and counts."""
+        """The session's arrays and counts, see `lab.learning.session_result.SessionResult`."""
         assert self.lesson.result is not None
         return self.lesson.result
 
     @property
     def q(self) -> FloatArray:
-        """The learned action values, (S, A)."""
+        """The learned action values, (S, A) float64."""
         return self.policy.q
 
     @property
     def solved(self) -> bool:
-        """Whether the greedy way is as short as can be, and the skill worked in physics where it was tried."""
+        """Whether the greedy path is a shortest one and, if the skill was tried in physics, it succeeded."""
         return bool(self.document["solved"])
 
     def act(self, state: int) -> int:
@@ -65,24 +70,24 @@ class LessonResult:
         return int(self.q[state].argmax())
 
     def rows(self) -> list[dict[str, Any]]:
-        """One row an episode: its steps (max_steps + 1 where it failed), and whether it had advice."""
+        """One row per episode: its number, its steps (max_steps + 1 if it failed), and whether any step was advised."""
         curve = zip(self.session.steps.tolist(), self.session.guided.tolist(), strict=True)
         return [{"episode": n, "steps": steps, "guided": guided} for n, (steps, guided) in enumerate(curve, start=1)]
 
     def to_dataframe(self) -> "pandas.DataFrame":
-        """`rows` as a DataFrame. BadInput when pandas is not installed."""
+        """`rows` as a DataFrame. Raises BadInput if pandas is not installed."""
         return data_frame(self.rows())
 
     @cached_property
     def curve(self) -> Picture:
-        """The learning curve: steps of each episode, those with advice marked."""
+        """The learning curve: steps by episode, with the advised episodes marked."""
         from lab.view.plots import learning_curves
 
         return Picture.drawn(lambda path: learning_curves({self.problem.name: self.policy}, path))
 
     @cached_property
     def map(self) -> Picture:
-        """What the cells are worth to the learner, and its way. BadInput for what is no map."""
+        """The value map: the value of each cell, and the greedy path. Raises BadInput if the problem is no grid with two axes."""
         with TemporaryDirectory() as folder:
             files = self._subject.draw(self.policy, Path(folder))
             if "value_map" not in files:
@@ -90,12 +95,12 @@ class LessonResult:
             return Picture(Path(files["value_map"]).read_bytes())
 
     def keep(self, toolbox: ToolboxOrPlace = None) -> Path:
-        """Keep the policy in a toolbox, None: the user's own; the file. It is in use unless the one in use does better."""
+        """Saves the policy in a toolbox (None: the user's own) and returns its file; a better policy in use stays in use."""
         return (toolbox if isinstance(toolbox, Toolbox) else Toolbox(toolbox)).save(self.policy)
 
     @property
     def steps(self) -> StepRecord:
-        """Every step of the lesson, with `to_minari` and `to_tensorboard`. BadInput unless it was taught with record=True."""
+        """The record of all steps, with `to_minari` and `to_tensorboard`. Raises BadInput unless taught with record=True."""
         if self._record is None:
             raise BadInput(f"'{self.problem.name}': its steps were not recorded: teach it with record=True")
         return self._record
@@ -121,14 +126,25 @@ def teach(
     record: bool = False,
     **settings: Unpack[Settings],
 ) -> LessonResult:
-    """One teaching session, as `lab teach` holds it: the same problem, settings and seed give the same table.
+    """The result of one teaching session; the same problem, settings and seed give the same table.
 
-    problem: what `lab teach` takes by name (a sub-task of `task`, a world, "gym:ID"), or a `GridWorld`, a `TabularMDP` or
-    a `Problem`; advisor: a name ("expert", "tau=0.2", "none"), a function of a request that gives an action or None, an
-    object with `advise`, or several of these; toolbox: where the policy is kept, and an unfinished one gone on with;
-    None: nothing is kept (see `LessonResult.keep`); sight: "limited": advice is heard in a world's region only; record: each
-    step is recorded (see `LessonResult.steps`).
-    Raises BadInput for whatever does not fit.
+    problem: a name as for `lab teach` (a sub-task of `task`, a world, "gym:ID"), a `GridWorld`, a `TabularMDP` or a `Problem`.
+    advisor: a name ("expert", "tau=0.2", "none"), a function of an `AdviceRequest` that returns an action or None, an object with
+    `advise`, or a list of these.
+    seed: of all randomness.
+    toolbox: saves the policy, and provides an unfinished one to continue; None (default): nothing is saved, see
+    `LessonResult.keep`.
+    task: the task that a sub-task belongs to, default "toast".
+    sight: "limited" restricts advice to the region in a world's file; default "full".
+    record: whether all steps are recorded, see `LessonResult.steps`.
+    settings: of learner and gate, by the names in docs/settings.md; `learner` and `gate` may also be classes.
+
+    Raises BadInput if these do not fit together.
+
+        >>> import lab
+        >>> lesson = lab.teach("world-1", advisor="expert", seed=1, episodes=100)
+        >>> print(lesson.solved, lesson.act(lesson.problem.mdp.start))
+        True 3
     """
     subject = subject_from(problem, task, sight)
     subject.settings = subject.settings.changed("", **settings)

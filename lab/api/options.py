@@ -1,4 +1,4 @@
-"""The options that the functions of `import lab` share: settings, toolboxes, own code, and data frames on request."""
+"""The options that the functions of `import lab` share: settings, advisors and toolboxes; rows as data frames."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -18,19 +18,19 @@ if TYPE_CHECKING:
 
 
 def data_frame(rows: Iterable[Mapping[str, Any]]) -> "pandas.DataFrame":
-    """Rows as a DataFrame. BadInput when pandas is not installed."""
+    """The rows as a DataFrame. Raises BadInput if pandas is not installed."""
     with optional("to_dataframe()"):
         from pandas import DataFrame
     return DataFrame.from_records([dict(row) for row in rows])
 
 
-# ---- settings ---------------------------------------------------------------------------------------------------------
+# ---- settings of learner and gate -----------------------------------------------------------------------------------
 
 
 class Settings(TypedDict, total=False):
-    """The settings of `LearnerSettings` and `GateSettings`; those that are not given stay as the problem's file has them.
+    """The settings of `LearnerSettings` and `GateSettings`; the default of each is the value in the problem's file.
 
-    learner and gate: a name, or a class of one's own.
+    learner, gate: a name, or a subclass of `Update` or `Gate`.
     """
 
     learner: str | type[Update]
@@ -65,7 +65,7 @@ class Settings(TypedDict, total=False):
     memory: bool
 
 
-# ---- options ----------------------------------------------------------------------------------------------------------
+# ---- advisors and toolboxes -----------------------------------------------------------------------------------------
 
 
 OneAdvisor = str | Advisor | Ask
@@ -74,7 +74,7 @@ ToolboxOrPlace = Toolbox | Path | str | None
 
 
 def checked(given: Mapping[str, Any], known: type, where: str) -> dict[str, Any]:
-    """The options that a TypedDict knows; BadInput for a name that it does not."""
+    """The options as a dict. Raises BadInput for a name that is not in the TypedDict `known`."""
     for name in given:
         if name not in known.__annotations__:
             raise unknown("option", name, known.__annotations__, where)
@@ -82,18 +82,18 @@ def checked(given: Mapping[str, Any], known: type, where: str) -> dict[str, Any]
 
 
 def several(advisors: Advisors) -> list[OneAdvisor]:
-    """One advisor, several or nobody as a list."""
+    """The advisors as a list; ["none"] for None."""
     if isinstance(advisors, Sequence) and not isinstance(advisors, str):
         return list(advisors)
     return ["none" if advisors is None else advisors]
 
 
 def advising_of(advisors: Advisors, toolbox: ToolboxOrPlace) -> Advising:
-    """Who advises; policies that do are in that toolbox, None: in the user's own."""
+    """The advisors of a session; the toolbox (None: the user's own) holds the policies that advise."""
     box = None if toolbox is None else toolbox_of(toolbox, "")
     return replace(Advising.of(several(advisors)), toolbox=box)
 
 
 def toolbox_of(given: ToolboxOrPlace, nowhere: str) -> Toolbox:
-    """The toolbox that is given, or one in the folder `nowhere`."""
+    """The given toolbox, or one in the folder `nowhere` if there is none."""
     return given if isinstance(given, Toolbox) else Toolbox(nowhere if given is None else given)

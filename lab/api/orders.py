@@ -1,4 +1,4 @@
-"""`lab.sequence`: the order of a robot's transfers through a cell, and what came of looking for it."""
+"""`lab.sequence`: the search for the order of a robot's transfers through a cell, and its result."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 class OrderOptions(TypedDict, total=False):
-    """The options of `lab sequence`, by their names there; those that are not given are as the file says."""
+    """The options of `lab sequence`, by their names there; the default of each is the value in the file."""
 
     case: str
     toasts: int
@@ -42,9 +42,9 @@ class OrderOptions(TypedDict, total=False):
 
 @dataclass(frozen=True, eq=False)
 class OrderResult:
-    """What looking for an order came to.
+    """The result of a search for an order of transfers.
 
-    cell: what is ordered; sessions: what each session of the method found; document: as `lab sequence --json` gives it.
+    cell: the cell; sessions: the result of each session of the method; document: the dict that `lab sequence --json` prints.
     """
 
     cell: Cell
@@ -53,27 +53,27 @@ class OrderResult:
 
     @property
     def cost(self) -> float:
-        """What the best order that anything found costs, in the units of the objective."""
+        """The cost of the best order found, in the unit of the objective ([s] for "makespan")."""
         return float(self.document["best_cost"])
 
     @property
     def bound(self) -> float:
-        """What no order can cost less than."""
+        """The lower bound: no order costs less."""
         return float(self.document["bound_cost"])
 
     @property
     def proven(self) -> bool:
-        """Whether no order costs less than the best one."""
+        """Whether the best order is proven optimal."""
         return bool(self.document["proven"])
 
     @property
     def stopped_by(self) -> str | None:
-        """What ended it early: "Ctrl-C", "seconds" or "gap"; None: nothing did."""
+        """What ended the search early: "Ctrl-C", "seconds" or "gap"; None if nothing did."""
         return None if self.document["stopped_by"] is None else str(self.document["stopped_by"])
 
     @property
     def proven_of(self) -> str:
-        """Of which plans `bound` and `proven` speak: "every plan"."""
+        """The set of plans that `bound` and `proven` hold for, such as "every plan"."""
         return str(self.document["proven_of"])
 
     @property
@@ -86,7 +86,7 @@ class OrderResult:
         return list(self.document["schedule"])
 
     def to_dataframe(self) -> "pandas.DataFrame":
-        """`rows` as a DataFrame. BadInput when pandas is not installed."""
+        """`rows` as a DataFrame. Raises BadInput if pandas is not installed."""
         return data_frame(self.rows())
 
     @cached_property
@@ -108,10 +108,19 @@ class OrderResult:
 def sequence(
     cell: str | Path | Cell, *, seed: int = 0, toolbox: ToolboxOrPlace = None, **options: Unpack[OrderOptions]
 ) -> OrderResult:
-    """The order of the robot's transfers, as `lab sequence` finds it: by a method, beside what is proven.
+    """The best order of the robot's transfers that a method finds, with a lower bound on the cost of any order.
 
-    cell: what `lab sequence` takes by name (a cell, an instance file, a task, whose moves are timed in simulation), or a
-    `Cell`; toolbox: where a task's skills are found and kept; None: nothing is kept. Raises BadInput for what does not fit.
+    cell: a name as for `lab sequence` (a cell, an instance file, or a task, whose moves are timed in simulation), or a `Cell`.
+    seed: of all randomness.
+    toolbox: provides and saves a task's skills; None (default): nothing is saved.
+    options: those of `lab sequence`, such as method, objective, episodes, seconds [s], gap (a fraction).
+
+    Raises BadInput if these do not fit together.
+
+        >>> import lab
+        >>> order = lab.sequence("toast-case-1", toasts=2)
+        >>> order.proven, order.cost == order.bound, order.rows()[0]["start_s"]
+        (True, True, 0.0)
     """
     given = checked(options, OrderOptions, "lab.sequence")
     case, toasts = given.pop("case", None), given.pop("toasts", None)

@@ -1,4 +1,4 @@
-"""Pictures and pages as a notebook shows them, and as files."""
+"""Pictures and pages, which notebooks display and `save` writes to files."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,13 +14,13 @@ PAGE_HEIGHT = 480  # pixels of a page in a notebook
 
 @dataclass(frozen=True)
 class Picture:
-    """A picture, PNG or SVG: shown in a notebook by itself, written by `save`."""
+    """A picture, the bytes of a PNG or SVG file; notebooks display it, and `save` writes it."""
 
     data: bytes
 
     @classmethod
     def drawn(cls, draw: Callable[[Path], object], form: str = "svg") -> "Picture":
-        """What a function draws into the file that it is given; form: "svg" or "png"."""
+        """The picture that a function draws into the file at the path that it is called with; form: "svg" or "png"."""
         with TemporaryDirectory() as folder:
             path = Path(folder) / f"picture.{form}"
             draw(path)
@@ -28,11 +28,11 @@ class Picture:
 
     @property
     def form(self) -> str:
-        """What it is: "png" or "svg"."""
+        """The format: "png" or "svg"."""
         return "png" if self.data.startswith(b"\x89PNG") else "svg"
 
     def save(self, path: Path | str) -> Path:
-        """Write it; BadInput for a name that does not end in .png or .svg, whichever it is."""
+        """Writes the picture and returns the path. Raises BadInput unless the name ends in .png or .svg, as `form` says."""
         return _written(Path(path), f".{self.form}", self.data)
 
     def _repr_png_(self) -> bytes | None:
@@ -44,12 +44,12 @@ class Picture:
 
 @dataclass(frozen=True)
 class Page:
-    """A whole page (HTML) that needs no server and no network: shown in a notebook, Colab too, written by `save`."""
+    """An HTML page that needs neither server nor network; notebooks (Colab too) display it, and `save` writes it."""
 
     html: str
 
     def save(self, path: Path | str) -> Path:
-        """Write it, for any browser; BadInput for a name that does not end in .html."""
+        """Writes the page and returns the path. Raises BadInput unless the name ends in .html."""
         return _written(Path(path), ".html", self.html.encode())
 
     def _repr_html_(self) -> str:

@@ -1,4 +1,4 @@
-"""`lab.run`: a whole task carried out in physics, and what came of it."""
+"""`lab.run`: a whole task carried out in physics, and its result."""
 
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -43,7 +43,7 @@ class TaskOptions(TypedDict, total=False):
 
 @dataclass(frozen=True, eq=False)
 class RunResult:
-    """What a run came to. document: as `lab run --json` gives it."""
+    """The result of a run; report: its details; document: the dict that `lab run --json` prints."""
 
     report: Report
     document: dict[str, Any]
@@ -56,12 +56,12 @@ class RunResult:
 
     @property
     def failure(self) -> str | None:
-        """Why it ended before that; None where it did not."""
+        """Why the run failed, None if it did not."""
         return self.report.outcome.failure
 
     @property
     def makespan_s(self) -> float:
-        """How long the robot and the machines worked, in simulated seconds."""
+        """The duration of the work of robot and machines [s], in simulated time."""
         return self.report.outcome.schedule.makespan_s
 
     def rows(self) -> list[dict[str, Any]]:
@@ -69,12 +69,12 @@ class RunResult:
         return rows_of(self.report.outcome.schedule, self.report.taught.cell, "measured")
 
     def to_dataframe(self) -> "pandas.DataFrame":
-        """`rows` as a DataFrame. BadInput when pandas is not installed."""
+        """`rows` as a DataFrame. Raises BadInput if pandas is not installed."""
         return data_frame(self.rows())
 
     @cached_property
     def gantt(self) -> Picture:
-        """The Gantt chart: thick as carried out, thin as planned."""
+        """The Gantt chart: thick bars show what was carried out, thin bars what was planned."""
         from lab.sequencing.simulate.follow import simulate
         from lab.view.gantt import gantt
 
@@ -83,7 +83,7 @@ class RunResult:
 
     @cached_property
     def replay(self) -> Page:
-        """The film of the run."""
+        """The replay of the run in 3D."""
         return Page(self._replay)
 
     def __str__(self) -> str:
@@ -106,13 +106,18 @@ def run(
     workers: int | None = None,
     **options: Unpack[TaskOptions],
 ) -> RunResult:
-    """Find or learn a task's skills, time them, order them, and carry them out in physics, as `lab run` does.
+    """The result of a task whose skills are found or learned, timed, sequenced and carried out in physics.
 
-    advisor: as in `lab.teach`; toolbox: where skills are found and kept; None: they are learned anew and not kept; out: a
-    folder for pictures, replay, numbers and the journal, with which `lab run --resume` goes on; None: nothing is written.
-    workers: processes that survey, time moves and draw, None: one a core, at most 8; the numbers are the same.
-    A run that fails raises nothing: see `RunResult.failure`. Raises BadInput for what does not fit, WorkFailed where a
-    skill cannot be learned.
+    task: a name or a task file.
+    advisor: as in `lab.teach`.
+    seed: of all randomness.
+    toolbox: provides and saves skills; None (default): they are learned anew and not saved.
+    out: a folder for pictures, replay, numbers and the journal, which `lab run --resume` continues; None: nothing is written.
+    workers: the number of processes for surveys, timing and drawing; None: one per core, at most 8; results do not depend on it.
+    options: those of `lab run`, by their names there; override in percent.
+
+    Raises BadInput if these do not fit together, WorkFailed if a skill cannot be learned. A run that fails raises nothing:
+    see `RunResult.failure`.
     """
     given = checked(options, TaskOptions, "lab.run")
     if workers is not None and workers < 1:
@@ -125,8 +130,8 @@ def run(
     loaded = load(words.task)
     wanted = words.by_method(loaded)
     with ExitStack() as stack:
-        beside = stack.enter_context(Workers(workers))
-        prepared = prepare(wanted, words.ordered(loaded), seed, workers=beside)
+        worker_pool = stack.enter_context(Workers(workers))
+        prepared = prepare(wanted, words.ordered(loaded), seed, workers=worker_pool)
         nowhere = stack.enter_context(TemporaryDirectory())
         folder = Path(nowhere) / "run" if out is None else Path(out)
         check_out(folder)
@@ -139,6 +144,6 @@ def run(
             parts_per_cycle=words.parts_per_cycle,
         )
         conditions = Conditions(words.override / 100, journal=journal, fault_seed=words.faults, advice=advice)
-        report = run_task(prepared, teacher, folder, conditions, beside)
+        report = run_task(prepared, teacher, folder, conditions, worker_pool)
         replay = (folder / "replay.html").read_text(encoding="utf-8")
     return RunResult(report, report.to_json() | ({"files": {}} if out is None else {}), replay)

@@ -1,4 +1,4 @@
-"""`lab.show`: a task's scene or a world in 3D, as one page."""
+"""`lab.show`: the scene of a task or a grid world in 3D, as an HTML page."""
 
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class Asked(NamedTuple):
-    """What of a task is shown: --toasts, --parts and --seed."""
+    """The options that say which scene of a task is shown: --toasts, --parts and --seed."""
 
     toasts: int | None = None
     parts: str | None = None
@@ -26,7 +26,11 @@ class Asked(NamedTuple):
 def show(
     what: str | Path | GridWorld | Task, *, toasts: int | None = None, parts: str | None = None, seed: int = 0
 ) -> Page:
-    """A task's scene or a grid world in 3D, as `lab view` shows it. BadInput for what has no scene."""
+    """The scene of a task or a grid world in 3D, as a page.
+
+    what: a name or file of a task or world, or the object itself; toasts, parts: the order, as for `lab run`; seed: of the scene.
+    Raises BadInput for anything that has no scene, such as a cell without physics.
+    """
     from lab.view.meshcat import replay_html
 
     with seen(what, Asked(toasts, parts, seed)) as (title, recording), TemporaryDirectory() as folder:
@@ -36,8 +40,8 @@ def show(
 
 @contextmanager
 def seen(what: str | Path | GridWorld | Task, asked: Asked) -> "Iterator[tuple[str, Recording]]":
-    """What a page calls a task or a world, and one frame of it; a large world's mesh is there as long as the block lasts."""
-    from lab.mdp import shortest_way
+    """The title of a task or world, and a recording of one frame; the meshes of a large world exist only within the block."""
+    from lab.mdp import shortest_path
     from lab.production.recorder import show_scene
     from lab.sim.scene.scene_check import check_scene
     from lab.skills.prepared_scene import lay_out
@@ -46,24 +50,24 @@ def seen(what: str | Path | GridWorld | Task, asked: Asked) -> "Iterator[tuple[s
     from lab.view.rasterizer import Still
     from lab.view.world_bodies import WorldBodies
 
-    found = load_any(str(what)) if isinstance(what, str | Path) else what
-    if isinstance(found, GridWorld):
-        mdp = found.mdp()
-        way = [mdp.state_cell(state) for state in shortest_way(mdp)]
-        with closing(WorldBodies(found)) as drawn:
-            said = [found.title or found.name, f"shortest way: {counted(len(way) - 1, 'move')}"]
-            if drawn.drawn < len(found.obstacles):
-                said.append(f"{drawn.drawn} of {len(found.obstacles)} obstacles drawn")
-            yield "; ".join(said), drawn.still(way)
+    shown = load_any(str(what)) if isinstance(what, str | Path) else what
+    if isinstance(shown, GridWorld):
+        mdp = shown.mdp()
+        path = [mdp.state_cell(state) for state in shortest_path(mdp)]
+        with closing(WorldBodies(shown)) as drawn:
+            title_parts = [shown.title or shown.name, f"shortest path: {counted(len(path) - 1, 'move')}"]
+            if drawn.drawn < len(shown.obstacles):
+                title_parts.append(f"{drawn.drawn} of {len(shown.obstacles)} obstacles drawn")
+            yield "; ".join(title_parts), drawn.still(path)
         return
-    if isinstance(found, CellFile) and found.in_physics is not None:
-        found = load(str(what))
-    if not isinstance(found, Task):
+    if isinstance(shown, CellFile) and shown.in_physics is not None:
+        shown = load(str(what))
+    if not isinstance(shown, Task):
         raise BadInput(
             f"{what}: it is a cell, which has no scene: look at its order with lab sequence {what} --gantt x.svg"
         )
-    order = found.ordered(asked.toasts, asked.parts)
-    check_scene(found)
+    order = shown.ordered(asked.toasts, asked.parts)
+    check_scene(shown)
     still = Still()
-    show_scene(found, order, lay_out(found, order, asked.seed), still)
-    yield found.title or found.name, still.recording
+    show_scene(shown, order, lay_out(shown, order, asked.seed), still)
+    yield shown.title or shown.name, still.recording

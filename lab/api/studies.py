@@ -1,4 +1,4 @@
-"""`lab.study` and `lab.compare`: many sessions, and what they come to."""
+"""`lab.study`, `lab.compare` and `lab.tune`: many sessions, and their results."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,19 +22,19 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class StudyResult:
-    """What a study comes to. findings: rows, summary, pictures, remarks."""
+    """The result of a study: its title and its findings (rows, summary, pictures, remarks)."""
 
     title: str
     findings: Findings
 
     @property
     def rows(self) -> list[Row]:
-        """A row a measure: its settings, the value, its 95 % interval, what is printed where something is."""
+        """One row per measured value: settings, measure, value, ci95 (the 95 % interval), thesis (the printed value or None)."""
         return self.findings.rows
 
     @property
     def summary(self) -> Row:
-        """It in short."""
+        """The findings in short, by name."""
         return self.findings.summary
 
     @property
@@ -43,11 +43,11 @@ class StudyResult:
         return {caption: Picture(data) for caption, data in self.findings.figures.items()}
 
     def to_dataframe(self) -> "pandas.DataFrame":
-        """`rows` as a DataFrame. BadInput when pandas is not installed."""
+        """`rows` as a DataFrame. Raises BadInput if pandas is not installed."""
         return data_frame(self.rows)
 
     def report(self, path: Path | str) -> Path:
-        """Write the report, one page (HTML) without network or scripts; where it is."""
+        """Writes the report, an HTML page without scripts that needs no network, and returns its path."""
         from lab.studies.report import write_report
 
         write_report(Path(path), self.title, self.title, self.findings)
@@ -62,7 +62,12 @@ class StudyResult:
 
 
 def study(name: str, *, sessions: int | None = None, seed: int = 0, workers: int = 1, **reading: Any) -> StudyResult:
-    """A study of `lab study list`; reading: the options that only some have. BadInput for what it does not know."""
+    """The result of a study.
+
+    name: as `lab study list` prints it; sessions: per setting, default the study's own; seed: of all randomness; workers: the
+    number of processes, on which results do not depend; reading: the options that some studies have.
+    Raises BadInput for an unknown study, an option that it does not have, and too few sessions.
+    """
     job = Job(sessions or study_of(name).sessions, seed, workers)
     known = checked(name, job, reading)
     return StudyResult(known.title, known.run(job, reading))
@@ -79,10 +84,16 @@ def compare(
     sight: str | None = None,
     **settings: Any,
 ) -> StudyResult:
-    """Every combination of advisors and of the values of settings, in many sessions each, as `lab study compare` does.
+    """The comparison of all combinations of advisors and settings, in many sessions each.
 
-    problem, advisor, settings: as in `lab.teach`, but each setting, and the advisor, may be a list of values to compare.
-    Raises BadInput for whatever does not fit.
+    problem, advisor, task, sight, settings: as in `lab.teach`, but each setting, and the advisor, may be a list of values to
+    compare; sessions: per combination; seed: of all randomness; workers: the number of processes, on which results do not depend.
+    Raises BadInput if these do not fit together.
+
+        >>> import lab
+        >>> compared = lab.compare("world-1", advisor=["expert", "none"], sessions=10, episodes=60)
+        >>> sorted({row["advisor"] for row in compared.rows})
+        ['expert', 'none']
     """
     values = {name: _listed(value) for name, value in settings.items()}
     what = Compared(problem, several(advisor), values, task, sight)
@@ -102,10 +113,12 @@ def tune(
     workers: int = 1,
     **held: Any,
 ) -> StudyResult:
-    """Settings tuned to a problem, and what that gains on unseen seeds, as `lab tune` does; nothing is written.
+    """Settings tuned to a problem, and their gain on unseen seeds; nothing is written.
 
-    problem, advisor: as in `lab.teach`; over: the settings that are tuned; held: others, at a value, task and sight among them.
-    Raises BadInput for whatever does not fit, and where Optuna is not installed.
+    problem, advisor: as in `lab.teach`; over: the names of the settings to tune; trials: combinations to try; sessions: per
+    trial;
+    seed: of all randomness; workers: the number of processes; held: other settings with fixed values, and task and sight.
+    Raises BadInput if these do not fit together, and if Optuna is not installed.
     """
     where = {name: held.pop(name) for name in ("task", "sight") if name in held}
     what = Tuning(problem, advisor, held, tuple(over), trials, **where)

@@ -1,1 +1,1 @@
-"""How a table is learned: update rules, action selection and the one session."""
+"""How a table of action values is learned with advice: update rules, action selection, gates and the session."""

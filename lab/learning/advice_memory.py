@@ -1,23 +1,23 @@
-"""What a learner with memory keeps: where each of its moves led, and how far it trusts whoever advises.
+"""The memory of advice: a learned model of the moves, from which demonstrated paths are practised, and the trust in the advisor.
 
-The gate decides when the learner would ask; memory decides whether the advisor must be bothered, and does again what was
-shown without asking:
+The gate decides when the learner would ask; the memory decides whether the advisor has to be asked, or whether the learner can
+repeat what was demonstrated:
 
-1. An episode with advice in it is a showing. After one the learner asks no more, even if the gate is open; but if it missed
-   the goal or had a loop with advice, the learner asks to be shown again: 3 showings in all, K episodes apart.
-2. A loop with an advised move in it costs a point of trust; so does a crash by an advised move. An advised move to a new
-   place earns a quarter. Trust begins with 1 point and has at most 3; below 0 the advisor is never asked again.
-3. The way is the shortest to the goal by moves that the learner has made, whoever led it, parts of different walks put
-   together. A move that has led to different places belongs to no way.
-4. In the last 15 % of the episodes nobody is asked and nothing is tried out by chance: each move is the one that the table
-   rates best. Whenever its own last result was longer than the way, it practises the way in as many episodes as the way
-   has moves, then tries alone again. It learns from each step as always. The very last episode is its own: it shows what
-   the table has learned.
+1. An episode with at least one advised move is a demonstration. After the first one the learner asks no more, even if the gate is
+   open, unless that episode missed the goal or contained a loop with an advised move; then it asks for another demonstration,
+   at least K episodes later, up to 3 in total.
+2. Trust begins at 1 point and is at most 3. A loop with an advised move costs a point, and so does an advised move into an
+   obstacle; an advised move to a new place earns a quarter. Below 0 points the advisor is never asked again.
+3. The known path is the shortest path to the goal in the learned model: all moves that were made, advised or not, in any
+   episode. A move that has led to different states is not used.
+4. In the last 15 % of the episodes the learner neither asks nor explores: each move is greedy. Whenever its last own episode was
+   longer than the known path, it practises that path in as many episodes as the path has moves, then acts on its own again. It
+   learns from every step. The very last episode is greedy, without practice: it shows what the table has learned.
 
-"A loop" is a return onto this episode's walk, whose earlier loops are cut out; staying in place is one. The way is planned
-from where an episode begins: with several starts, practice may miss it.
-The rule was found by experiment in worlds I and II; the study `advice-budget` measures it, there and in random worlds. The
-functions are written in the Python that numba compiles, too: the session hands them lists, the compiled kernel arrays.
+A loop is a return to a state of the current walk, from which earlier loops have been removed; staying in place is a loop. The
+path is planned from the state in which an episode begins, so practice may miss it if there are several starts.
+The rule was found by experiment in worlds I and II; the study `advice-budget` measures it there and in random worlds. The
+functions are also compiled by numba: the session passes lists, the kernel arrays.
 Source: rule 3 plans in a learned model, as Sutton's Dyna does (Proc. ICML 1990, 216-224).
 """
 
@@ -27,25 +27,26 @@ from typing import NamedTuple
 
 from lab.learning.session_events import AdviceEnded, AdviceRemembered, Event
 
-OWN, ASKED, PRACTISED = range(3)  # where a move comes from
+OWN, ASKED, PRACTISED = range(3)  # sources of a move: own choice, advice, practice of the known path
 START, GAIN, LOSS, MOST = 4, 1, 4, 12  # trust, in quarters of a point
 SHOWINGS = 3
-LATE_PERCENT = 15  # of the episodes, at their end: when the way is practised
+LATE_PERCENT = 15  # the last share of the episodes, in which the known path is practised
 NOTHING = -1
-GOAL, NOWHERE = -2, -3  # where a move led: to the goal; to another end, or to different places
-UNKNOWN = 1 << 40  # more moves than any way has
+GOAL, NOWHERE = -2, -3  # the outcome of a move: the goal; another terminal state, or different states
+UNKNOWN = 1 << 40  # more moves than any path has
 
 Cells = MutableSequence[int]
 
 
 @dataclass
 class Now:
-    """The numbers of a memory; the kernel keeps them in a record of the same names.
+    """The scalars of a memory; the kernel keeps them in a record with the same field names.
 
-    trust: in quarters; best: the moves of the way; practices: episodes of practice that are due, -1: the way is to be
-    planned first; last_alone: the moves of the last episode without advice; showings, again (it wants another), shown_at:
-    see rule 1; of the episode under way: its number, whether it is a late one (rule 4), `at` as in `Memory`, loops with
-    advice, and moves of practice.
+    trust: in quarters of a point; best: the moves of the known path; practices: the episodes of practice left, -1: the path
+    has to be planned first; last_alone: the moves of the last episode without advice; showings, again, shown_at: how many
+    demonstrations there were, whether another one is wanted, and the episode of the last one (rule 1).
+    Of the current episode: episode: its number; late: whether rule 4 applies; at: see `Memory`; loops: those with advised moves;
+    practised: moves of practice.
     """
 
     trust: int = START
@@ -65,14 +66,16 @@ class Now:
 class Memory(NamedTuple):
     """What a session remembers.
 
-    led (S * A,): the state that a move led to, -1: not made yet, or GOAL or NOWHERE. way (S,): the action that the way
-    takes in a state, -1: none; came, queue (S,): of `plan`, by which move a state was reached, and in which order. walk:
-    the states of this episode without its loops, `now.at` is the last one's place in it; advised: how many of the moves
-    before it were; on_walk (S,): the episode in which a state was on it; place (S,): where.
+    led (S * A,): the state that each move led to, -1 if it was never made, or GOAL or NOWHERE.
+    path (S,): the action that the known path takes in each state, -1 if the state is not on it.
+    came, queue (S,): working space of `plan`: the move by which each state was reached, and the order of the states.
+    walk: the states of this episode without its loops; `now.at` is the index of the current state.
+    advised: for each state of the walk, how many of the moves before it were advised.
+    on_walk, place (S,): the last episode in whose walk a state was, and its index there.
     """
 
     led: Cells
-    way: Cells
+    path: Cells
     came: Cells
     queue: Cells
     on_walk: Cells
@@ -83,9 +86,9 @@ class Memory(NamedTuple):
 
 
 class Move(NamedTuple):
-    """A move: its place in `led` (state * A + action), OWN, ASKED or PRACTISED, the state entered.
+    """A move: its number (state * A + action), its source (OWN, ASKED or PRACTISED) and the state entered.
 
-    over: no step goes on from there; reached: it is the goal.
+    over: the state entered is terminal; reached: it is a goal.
     """
 
     number: int
@@ -96,23 +99,23 @@ class Move(NamedTuple):
 
 
 def places(states: int, moves: int) -> int:
-    """How many places a walk may need that visits no state twice."""
+    """The length of the array for a walk that visits no state twice."""
     return min(states, moves + 1) + 1
 
 
 def blank(states: int, actions: int, moves: int) -> Memory:
-    """The memory of a session that begins; moves: the most that an episode has."""
-    way, came, queue, on_walk, place = ([NOTHING] * states for _ in range(5))
+    """The memory of a new session; moves: the limit of an episode."""
+    path, came, queue, on_walk, place = ([NOTHING] * states for _ in range(5))
     walk, advised = ([0] * places(states, moves) for _ in range(2))
-    memory = Memory([NOTHING] * (states * actions), way, came, queue, on_walk, place, walk, advised, Now())
+    memory = Memory([NOTHING] * (states * actions), path, came, queue, on_walk, place, walk, advised, Now())
     clear(memory)
     return memory
 
 
 def clear(memory: Memory) -> None:
-    """Another session begins."""
-    for state in range(len(memory.way)):
-        memory.way[state] = NOTHING
+    """Resets the memory for another session."""
+    for state in range(len(memory.path)):
+        memory.path[state] = NOTHING
         memory.on_walk[state] = 0
     for number in range(len(memory.led)):
         memory.led[number] = NOTHING
@@ -122,7 +125,7 @@ def clear(memory: Memory) -> None:
 
 
 def opens(memory: Memory, episode: int, episodes: int, window: int, gate_opens: bool) -> bool:
-    """Whether episode n of so many may ask (rules 1, 2 and 4)."""
+    """Whether this episode may ask (rules 1, 2 and 4); window: K; gate_opens: what the gate decided."""
     now = memory.now
     now.episode, now.loops, now.practised = episode, 0, 0
     now.late = 1 if episode >= episodes - episodes * LATE_PERCENT // 100 else 0
@@ -134,7 +137,7 @@ def opens(memory: Memory, episode: int, episodes: int, window: int, gate_opens: 
 
 
 def starts(memory: Memory, state: int) -> bool:
-    """The episode begins in a state; whether the way is to be planned from there."""
+    """Begins an episode in a state; returns whether the path has to be planned from there."""
     now = memory.now
     now.at = 0
     memory.walk[0] = state
@@ -144,11 +147,11 @@ def starts(memory: Memory, state: int) -> bool:
 
 
 def plan(memory: Memory, start: int) -> None:
-    """The way from a state becomes the shortest that is known (rule 3), breadth first; decides whether it is practised."""
-    now, led, way, came, queue = memory.now, memory.led, memory.way, memory.came, memory.queue
-    actions = len(led) // len(way)
-    for state in range(len(way)):
-        way[state] = came[state] = NOTHING
+    """Plans the known path from a state by breadth-first search (rule 3), and decides whether it is practised."""
+    now, led, path, came, queue = memory.now, memory.led, memory.path, memory.came, memory.queue
+    actions = len(led) // len(path)
+    for state in range(len(path)):
+        path[state] = came[state] = NOTHING
     now.best, now.practices = UNKNOWN, 0
     came[start] = queue[0] = start
     first, last, reaching = 0, 1, NOTHING
@@ -167,19 +170,19 @@ def plan(memory: Memory, start: int) -> None:
     if reaching == NOTHING:
         return
     state = reaching // actions
-    way[state] = reaching - state * actions
+    path[state] = reaching - state * actions
     now.best = 1
     while state != start:
         number = came[state]
         state = number // actions
-        way[state] = number - state * actions
+        path[state] = number - state * actions
         now.best += 1
     if now.last_alone > now.best:
         now.practices = now.best
 
 
 def moved(memory: Memory, move: Move) -> None:
-    """Takes in a move (rules 2 and 3)."""
+    """Updates model, walk and trust after a move (rules 2 and 3)."""
     now, at, led = memory.now, memory.now.at, memory.led
     number, source, entered, over, reached = move
     leads = entered if not over else GOAL if reached else NOWHERE
@@ -208,7 +211,7 @@ def moved(memory: Memory, move: Move) -> None:
 
 
 def ended(memory: Memory, moves: int, reached: bool, helped: int) -> None:
-    """An episode is over (rules 1 and 4); helped: moves that were asked for; moves: one above the most when it failed."""
+    """Ends an episode (rules 1 and 4); moves: one above the limit if it failed; helped: its advised moves."""
     now = memory.now
     if now.practices > 0:
         now.practices -= 1
@@ -223,7 +226,7 @@ def ended(memory: Memory, moves: int, reached: bool, helped: int) -> None:
 
 
 class Recall:
-    """A session's memory between the gate and the advisor: when it asks, what it practises, and what is to be told of it."""
+    """The memory as the session uses it, between gate and advisor: when to ask, what to practise, which events to report."""
 
     def __init__(self, states: int, actions: int, moves: int, episodes: int, window: int):
         self.memory = blank(states, actions, moves)
@@ -233,7 +236,7 @@ class Recall:
 
     @property
     def late(self) -> bool:
-        """Whether the episode under way is one of the last, in which nothing is tried out by chance."""
+        """Whether the current episode is one of the last, which do not explore (rule 4)."""
         return self.memory.now.late == 1
 
     @property
@@ -242,33 +245,33 @@ class Recall:
         return self.memory.now.trust >= 0
 
     def opens(self, episode: int, gate_opens: bool) -> bool:
-        """`opens` of this session."""
+        """Whether this episode may ask: see the function `opens`."""
         return opens(self.memory, episode, self._episodes, self._window, gate_opens)
 
     def starts(self, state: int) -> None:
-        """`starts`, and `plan` where it is due."""
+        """Begins an episode, and plans the known path if necessary."""
         if starts(self.memory, state):
             plan(self.memory, state)
 
     def chosen(self, state: int, own: int) -> int:
-        """The known way's action in an episode of practice; off it, and else, the learner's own."""
-        way = self.memory.way[state]
-        if self.memory.now.practices <= 0 or way == NOTHING:
+        """The action of the known path in an episode of practice; off the path, and in other episodes, the learner's own."""
+        known_action = self.memory.path[state]
+        if self.memory.now.practices <= 0 or known_action == NOTHING:
             return own
         self._source = PRACTISED
-        return way
+        return known_action
 
     def asked(self) -> None:
-        """The next move is an advised one."""
+        """Marks the next move as advised."""
         self._source = ASKED
 
     def moved(self, state: int, action: int, entered: int, over: bool, reached: bool) -> None:
-        """`moved`, of the move that was chosen last: the learner's own, unless `chosen` or `asked` said otherwise."""
+        """Records the last chosen move, which counts as the learner's own unless `chosen` or `asked` marked it otherwise."""
         moved(self.memory, Move(state * self._actions + action, self._source, entered, over, reached))
         self._source = OWN
 
     def ended(self, moves: int | None, helped: int) -> Iterator[Event]:
-        """`ended`, with what is told: moves of practice, and, once, that the trust in the advisor is lost."""
+        """Ends an episode; yields its moves of practice as an event, and, once, that the trust in the advisor is lost."""
         ended(self.memory, self._moves + 1 if moves is None else moves, moves is not None, helped)
         now = self.memory.now
         if now.practised:

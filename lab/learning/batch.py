@@ -1,6 +1,6 @@
-"""Many sessions at once, for studies: settings in, what the compiled kernel made of them out.
+"""Many sessions at once, for studies: `run_sessions` prepares the arrays of the compiled kernel and returns its results.
 
-What has no compiled form is run in the interactive session, one after the other: slower, and the same.
+Settings without a compiled form run in the interactive session, one after the other: slower, with the same results.
 """
 
 from typing import NamedTuple
@@ -35,11 +35,11 @@ CHOICES = {"softmax": linear_loop.SOFTMAX, "epsilon-greedy": linear_loop.EPSILON
 
 
 class Batch(NamedTuple):
-    """What N sessions of E episodes came to, in the order of their seeds.
+    """The results of N sessions of E episodes, in the order of their seeds.
 
-    steps (N, E) int32, a failed episode as max_steps + 1; guided (N, E) bool: at least one helped step; requests,
-    helped_steps, misleads (N,) int64, as in `SessionResult`; rejected_at_episode (N,) int64, 0 where none was;
-    moves (N,) int64: all that were made; q (N, S, A) float64, of no sessions unless asked for.
+    steps: (N, E) int32, a failed episode counts as max_steps + 1; guided: (N, E) bool, episodes with a helped step; requests,
+    helped_steps, misleads: (N,) int64, as in `SessionResult`; rejected_at_episode: (N,) int64, 0 if no advisor was rejected;
+    moves: (N,) int64, all moves made; q: (N, S, A) float64, or (0, S, A) unless the tables were asked for.
     """
 
     steps: NDArray[np.int32]
@@ -61,14 +61,13 @@ def run_sessions(
     *,
     keep_tables: bool = False,
 ) -> Batch:
-    """Learns a table in each of N sessions, seeds (N,) uint64; advice None: nobody to ask.
+    """The results of N sessions, one per seed.
 
-    problem: a table, or the environment whose steps are made; compiled are a table's own, those of a
-    `ChanceTable` and those of `physics`.
+    problem: a table, or the environment in which steps are made; compiled are tables, `ChanceTable` and the worlds of `physics`.
+    advice: None if there is nobody to ask; seeds: (N,) uint64; keep_tables: whether the results include the learned tables.
 
-    The same tables, step counts, requests, helped steps and misleads as `Session.run` with draws `splitmix.stream(seed)` and
-    a `TableAdvisor` on the same draws. Raises BadInput for an unknown learner, selection or gate, or advice of another
-    shape.
+    The results equal those of `Session.run` with the draws `splitmix.stream(seed)` and a `TableAdvisor` on the same draws.
+    Raises BadInput for an unknown learner, selection or gate, and for advice of another shape.
     """
     check_members(learner, gate)
     place = TableEnvironment(problem) if isinstance(problem, TabularMDP) else problem
@@ -81,22 +80,28 @@ def run_sessions(
         return _one_by_one(place, learner, gate, advice, seeds, keep_tables)
     asking = _asking(gate, advice is not None, learner.max_steps)
     learning, arrays = _learning(mdp, learner), _problem(mdp, learner)
-    said = (np.zeros((1, 1, mdp.n_actions)), np.zeros(mdp.n_states, np.bool_))
+    advice_arrays = (np.zeros((1, 1, mdp.n_actions)), np.zeros(mdp.n_states, np.bool_))
     if advice is not None:
-        said = advice.thresholds, advice.region
+        advice_arrays = advice.thresholds, advice.region
     if learner.tilings > 1:
-        found = _sessions(learner, seeds, TileCoding(mdp.cells, learner.tilings).count * mdp.n_actions, keep_tables)
+        sessions = _sessions(learner, seeds, TileCoding(mdp.cells, learner.tilings).count * mdp.n_actions, keep_tables)
         lanes = _lanes(mdp.n_actions, learner.episodes, 0, 0)
         learning = learning._replace(actions=np.zeros(mdp.n_actions))  # of any length: compiled once for all
-        return _on_tiles(mdp, learner, records.Work(arrays, learning, asking, *said, found, lanes))
+        return _on_tiles(mdp, learner, records.Work(arrays, learning, asking, *advice_arrays, sessions, lanes))
     size = mdp.n_states * (1 if _is_afterstate(learner) else mdp.n_actions)
-    found = _sessions(learner, seeds, size, keep_tables)
+    sessions = _sessions(learner, seeds, size, keep_tables)
     ensemble = gate.ensemble if asking.gate.asks == ASKS_WHERE_TABLES_DIFFER else 0
-    lanes = _lanes(mdp.n_actions, learner.episodes, found.kept.shape[1], ensemble)
+    lanes = _lanes(mdp.n_actions, learner.episodes, sessions.kept.shape[1], ensemble)
     memories = _memories(mdp.n_states, mdp.n_actions, learning.max_moves) if gate.memory else None
     hearing, walks = _hearing(mdp, asking, advice), _walks(mdp, asking, learning, learner.episodes)
-    run(records.Work(arrays, learning, asking, *said, found, lanes), memories, hearing, _chances(place), walks)
-    return _batch(found.steps, found.guided, found.counts, _action_values(mdp, learning, found.kept))
+    run(
+        records.Work(arrays, learning, asking, *advice_arrays, sessions, lanes),
+        memories,
+        hearing,
+        _chances(place),
+        walks,
+    )
+    return _batch(sessions.steps, sessions.guided, sessions.counts, _action_values(mdp, learning, sessions.kept))
 
 
 def _batch(steps: NDArray[np.int32], guided: NDArray[np.bool_], counts: NDArray[np.void], q: FloatArray) -> Batch:
@@ -104,7 +109,7 @@ def _batch(steps: NDArray[np.int32], guided: NDArray[np.bool_], counts: NDArray[
 
 
 def is_compiled(mdp: TabularMDP, learner: LearnerSettings, gate: GateSettings, advice: Advice | None = None) -> bool:
-    """Whether a kernel knows this learner, its selection, this gate by all of its settings, and when the advisor speaks."""
+    """Whether a kernel implements this combination of problem, learner, selection, gate and advice."""
     rules = GATES[gate.gate].compiled
     if rules is None:
         return False
@@ -114,7 +119,7 @@ def is_compiled(mdp: TabularMDP, learner: LearnerSettings, gate: GateSettings, a
         simple = rules.asks != ASKS_WHERE_TABLES_DIFFER and (not rules.judges or len(mdp.starts) < 2)
         return known and plain and simple
     if isinstance(mdp, CellTable) or learner.start_value:
-        return False  # its steps are made by the kernel of tiles alone
+        return False  # only the kernel for tile coding makes these steps
     return UPDATES[learner.learner].compiled is not None and SELECTIONS[learner.selection].compiled is not None
 
 
@@ -123,7 +128,7 @@ def _speaks_at_once(advice: Advice) -> bool:
 
 
 def _hearing(mdp: TabularMDP, asking: records.Asking, advice: Advice | None) -> records.Hearing | None:
-    """What gates that weigh and advisors that hold back need, None where neither does."""
+    """The arrays for gates that weigh advice and for advisors that hold back; None if neither is the case."""
     weighs = asking.gate.weighs != WEIGHS_NOTHING
     if advice is None or (not weighs and _speaks_at_once(advice)):
         return None
@@ -145,7 +150,7 @@ def _hearing(mdp: TabularMDP, asking: records.Asking, advice: Advice | None) -> 
 
 
 def _walks(mdp: TabularMDP, asking: records.Asking, learning: records.Learning, episodes: int) -> records.Walks | None:
-    """What gates that judge need where episodes begin in different states."""
+    """The arrays for gates that judge episodes which begin in different states; None otherwise."""
     if not asking.gate.judges or len(mdp.starts) < 2:
         return None
     walk, begun = np.zeros((LANES, learning.max_moves), np.int32), np.zeros((LANES, episodes), np.int32)
@@ -164,26 +169,26 @@ def _one_by_one(
     seeds: NDArray[np.uint64],
     keep_tables: bool,
 ) -> Batch:
-    """The same sessions, each with the draws that it would have in the kernel."""
+    """The same sessions without the kernel, each with the draws that it would have there."""
     steps, counts = np.zeros((len(seeds), learner.episodes), np.int32), np.zeros(len(seeds), records.COUNTS)
     q = np.zeros((len(seeds) if keep_tables else 0, *place.mdp.successor.shape))
-    found = _batch(steps, np.zeros(steps.shape, np.bool_), counts, q)
+    batch = _batch(steps, np.zeros(steps.shape, np.bool_), counts, q)
     for n, seed in enumerate(seeds):
         draw = splitmix.stream(int(seed))
         advisor = None if advice is None else TableAdvisor(advice, draw)
-        one = Session(place, learner, gate, advisor, draw).run()
-        if one.interrupted:
+        result = Session(place, learner, gate, advisor, draw).run()
+        if result.interrupted:
             raise KeyboardInterrupt
-        found.steps[n], found.guided[n], found.moves[n] = one.steps, one.guided, one.visits.sum()
-        found.requests[n], found.helped_steps[n] = one.requests, one.helped_steps
-        found.misleads[n], found.rejected_at_episode[n] = one.misleads, one.rejected_at_episode or 0
+        batch.steps[n], batch.guided[n], batch.moves[n] = result.steps, result.guided, result.visits.sum()
+        batch.requests[n], batch.helped_steps[n] = result.requests, result.helped_steps
+        batch.misleads[n], batch.rejected_at_episode[n] = result.misleads, result.rejected_at_episode or 0
         if keep_tables:
-            found.q[n] = one.q
-    return found
+            batch.q[n] = result.q
+    return batch
 
 
 def _on_tiles(mdp: TabularMDP, learner: LearnerSettings, work: records.Work) -> Batch:
-    """The sessions of a learner whose values are sums of weights of tiles."""
+    """The results of sessions of a learner with tile coding."""
     coding, rule = TileCoding(mdp.cells, learner.tilings), LINEAR[learner.learner]
     size, episodes = coding.count * mdp.n_actions, range(1, learner.episodes + 1)
     linear = linear_loop.Linear(
@@ -204,9 +209,9 @@ def _on_tiles(mdp: TabularMDP, learner: LearnerSettings, work: records.Work) -> 
         selection=CHOICES[learner.selection],
     )
     linear_loop.run(work, linear, _world(mdp))
-    found, tables = work.sessions, work.sessions.kept.reshape(-1, coding.count, mdp.n_actions)
+    sessions, tables = work.sessions, work.sessions.kept.reshape(-1, coding.count, mdp.n_actions)
     q = np.array([coding.values(weights) for weights in tables]).reshape(-1, *mdp.successor.shape)
-    return _batch(found.steps, found.guided, found.counts, q)
+    return _batch(sessions.steps, sessions.guided, sessions.counts, q)
 
 
 def _world(mdp: TabularMDP) -> linear_loop.World:
@@ -220,7 +225,10 @@ def _world(mdp: TabularMDP) -> linear_loop.World:
 
 
 def play(mdp: CellTable, policy: NDArray[np.int64], drawn: FloatArray, most: int) -> NDArray[np.int64]:
-    """The moves (N,) of a policy (S,) from starts made of uniform numbers (N, D), at most so many; negative: it goes on."""
+    """The number of moves (N,) of a policy (S,) from N starts, negated where the episode had not ended after `most` moves.
+
+    drawn: (N, D), uniform numbers in [0, 1), from which the world makes its starts.
+    """
     starts, moves = drawn.copy(), np.zeros(len(drawn), np.int64)
     for start in starts:
         mdp.physics.begin(start)

@@ -1,8 +1,7 @@
-"""Functions compiled with numba and kept between runs, under a hash of every source that may be compiled in.
+"""Functions compiled with numba and cached between runs, under a hash of all source that they may depend on.
 
-numba's own cache knows changes of the function's file only, and writes beside it. Here compiled functions lie in the
-user's cache, in a folder that is named by a hash of the function's whole package. Where that folder cannot be made or
-written, nothing is kept: each run compiles anew, and says so.
+numba's own cache notices changes of the function's own file only, and writes beside it. Here the cache is a folder in the user's
+cache, named by a hash of the function's whole package. If it cannot be written, each run compiles anew, and a warning says so.
 """
 
 import os
@@ -24,20 +23,20 @@ from lab.files import source_key
 
 MOST_FOLDERS = 6  # versions of packages whose compiled functions are kept, each of a few tens of MB
 _WITHOUT_REFCOUNTS: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
-_CONFIG: Any = numba.config  # its types do not know what it holds
+_CONFIG: Any = numba.config  # typed as Any, because its type stubs lack the attributes
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 class NotKept(Notice):
-    """Compiled functions cannot be kept, or what was kept cannot be read: each run compiles anew."""
+    """The warning that compiled functions cannot be cached, or a cached one cannot be read, so that each run compiles anew."""
 
 
 class _Kept(FunctionCache):
-    """A function's kept versions; one that cannot be read or written is one that is not there."""
+    """A function's cache; an entry that cannot be read or written counts as missing."""
 
     @contextmanager
     def _guard_against_spurious_io_errors(self) -> Iterator[None]:
-        """Around every reading and writing, in numba's own words."""
+        """Surrounds every read and write; the name is numba's."""
         try:
             yield
         except Exception as error:  # a damaged file: pickle raises anything
@@ -45,7 +44,7 @@ class _Kept(FunctionCache):
 
 
 def compiled(function: Function, **options: Any) -> Function:
-    """The function compiled, without the GIL, for each kind of arguments that it meets; options: those of `numba.njit`."""
+    """The function compiled by `numba.njit`, without the GIL, for each combination of argument types; options: those of njit."""
     jit: Any = numba.njit  # its types do not know all options
     jitted: Any = jit(nogil=True, **options)(function)
     kept, before = cache_folder(), _CONFIG.CACHE_DIR
@@ -54,7 +53,11 @@ def compiled(function: Function, **options: Any) -> Function:
         _CONFIG.CACHE_DIR = str(folder)  # read when the cache is made
         _make(folder)
         jitted._cache = cast(Any, _Kept)(function)
-    except (OSError, RuntimeError, WorkFailed) as error:  # numba's, of a folder in which no file can be made
+    except (
+        OSError,
+        RuntimeError,
+        WorkFailed,
+    ) as error:  # a RuntimeError is numba's, if no file can be created in the folder
         _not_kept(kept, error)
     finally:
         _CONFIG.CACHE_DIR = before
@@ -62,14 +65,14 @@ def compiled(function: Function, **options: Any) -> Function:
     return made
 
 
-_said: set[Path] = set()
+_warned: set[Path] = set()
 
 
 def _not_kept(kept: Path, error: Exception) -> None:
-    """Says, once of each cache folder, that nothing is kept there."""
-    if kept in _said:
+    """Warns, once per cache folder, that nothing can be cached there."""
+    if kept in _warned:
         return
-    _said.add(kept)
+    _warned.add(kept)
     why = getattr(error, "strerror", None) or " ".join(str(error).split())[:100] or type(error).__name__
     warnings.warn(
         f"what is compiled cannot be kept in '{kept}' ({why}): each run compiles anew, which takes seconds; "
@@ -85,10 +88,9 @@ def without_refcounts(function: Function, **options: Any) -> Function:
 
 
 def inner(function: Function, **options: Any) -> Function:
-    """The function compiled as part of functions without reference counting, the only ones that call it: it is not kept, and
-    Python cannot call it.
+    """The function compiled for calls from other functions without reference counting only.
 
-    What Python would need to call it takes a third of the time to compile.
+    Python cannot call it and it is not cached by itself; leaving out the wrapper for Python saves a third of the compile time.
     """
     jit: Any = numba.njit
     jitted: Function = jit(nogil=True, no_cpython_wrapper=True, no_cfunc_wrapper=True, **_WITHOUT_REFCOUNTS, **options)(
@@ -98,40 +100,40 @@ def inner(function: Function, **options: Any) -> Function:
 
 
 def inlined(function: Function) -> Function:
-    """The function as `inner`, inlined: for what is called in every step, so that handing records on costs nothing."""
+    """The function compiled as `inner` and inlined, for calls in every step: passing records then costs nothing."""
     return inner(function, forceinline=True)
 
 
 def cache_folder() -> Path:
-    """The folder "compiled" in the user's cache folder, or "teaching-lab" in NUMBA_CACHE_DIR where that is set."""
+    """The cache folder: "compiled" in the user's cache folder, or "teaching-lab" in NUMBA_CACHE_DIR if that is set."""
     if _CONFIG.CACHE_DIR:
         return Path(_CONFIG.CACHE_DIR, "teaching-lab")
     return Path(user_cache_dir("teaching-lab", appauthor=False), "compiled")
 
 
 def linked(function: Function, **called: Any) -> Function:
-    """A plain function that calls, by these names, compiled functions in place of the plain ones of its module."""
+    """A copy of a plain function in which these names refer to compiled functions instead of the plain ones of its module."""
     made: Any = FunctionType(function.__code__, function.__globals__ | called, function.__name__, function.__defaults__)
     linked: Function = made
     return linked
 
 
 def _make(folder: Path) -> None:
-    """Makes the folder, or marks it as used now; the oldest beyond MOST_FOLDERS go. Raises OSError when it cannot be written."""
+    """Creates the folder or marks it as just used; removes the oldest beyond MOST_FOLDERS. Raises OSError if not writable."""
     try:
         if not folder.is_dir():
             folder.mkdir(parents=True)
             _clear(folder.parent)
         os.utime(folder)
     except FileExistsError:
-        if not folder.is_dir():  # it is not another process that has just made it
+        if not folder.is_dir():  # otherwise another process has just created it
             raise
     if not os.access(folder, os.W_OK | os.X_OK):
         raise PermissionError(EACCES, os.strerror(EACCES), str(folder))
 
 
 def _clear(parent: Path) -> None:
-    """Removes the folders that have not been used for longest; whoever still needs one compiles again."""
+    """Removes the least recently used folders; a process that still needs one compiles again."""
     with suppress(OSError):
         used = sorted((folder.stat().st_mtime, folder) for folder in parent.iterdir() if folder.is_dir())
         for _, folder in used[:-MOST_FOLDERS]:

@@ -1,6 +1,6 @@
-"""Where a learner acts: what an episode begins with, what a step leads to, and how a learned table is judged.
+"""Environments: where a learner acts, which state each episode begins in, what each step leads to, how a learned table is judged.
 
-A `TabularMDP` is such an environment by its table; others, such as Gymnasium's, are stepped (see lab/gym).
+`TableEnvironment` makes one of a `TabularMDP`; Gymnasium's are in lab/gym, continuous worlds in lab/learning/physics.
 """
 
 from typing import NamedTuple, Protocol
@@ -9,14 +9,18 @@ import numpy as np
 
 from lab.learning.selection import Draw
 from lab.learning.settings import LearnerSettings
-from lab.learning.values import greedy_moves, values_of_ways
+from lab.learning.values import greedy_moves, values_of_shortest_paths
 from lab.mdp import FloatArray, TabularMDP, greedy_path, optimal_values, shortest_steps
 
-LARGE = 100_000  # states: sweeps through as many take long
+LARGE = 100_000  # states: beyond it value iteration begins with the values of shortest paths
 
 
 class Step(NamedTuple):
-    """What a step led to: the reward, the state entered, whether the episode is over (`terminated`: no future) and won."""
+    """The outcome of a step: the reward and the state entered.
+
+    terminated: that state is terminal; reached: it is a goal; truncated: the episode is cut off although the state is not
+    terminal.
+    """
 
     reward: float
     state: int
@@ -26,7 +30,11 @@ class Step(NamedTuple):
 
 
 class Judged(NamedTuple):
-    """A learned table: the steps of its greedy way (None: it misses the goal), the fewest known (None: unknown), the verdict."""
+    """The judgement of a learned table.
+
+    final_steps: the steps of its greedy path, None if that misses the goal; optimal_steps: the fewest possible, None if unknown;
+    solved: whether the table solves the problem.
+    """
 
     final_steps: int | None
     optimal_steps: int | None
@@ -34,30 +42,30 @@ class Judged(NamedTuple):
 
 
 class Environment(Protocol):
-    """What a session asks of the world that its learner acts in."""
+    """The interface of the world in which a session's learner acts."""
 
     @property
     def mdp(self) -> TabularMDP:
-        """Its states and actions by name; where steps are left to chance, the table holds the likeliest."""
+        """Its states and actions; if steps are stochastic, the table holds the likeliest outcomes."""
 
     def reset(self, episode: int, draw: Draw) -> int:
-        """The state in which episode n (from 1) begins; all chance comes from `draw`, and episode 1 begins anew."""
+        """The state in which episode n (from 1) begins; all randomness comes from `draw`, and episode 1 resets everything."""
 
     def step(self, state: int, action: int, draw: Draw) -> Step:
-        """What an action leads to."""
+        """The outcome of an action."""
 
     def picture(self, state: int) -> str:
-        """The environment's own drawing of where the learner is; "" when the table's grid is drawn."""
+        """The environment's own drawing of a state as text; "" if the table's grid is to be drawn."""
 
     def values(self, discount: float) -> FloatArray:
-        """The optimal action values (S, A) that simulated advisors know; raises WorkFailed when they cannot be known."""
+        """The optimal action values (S, A), which simulated advisors know. Raises WorkFailed if they cannot be computed."""
 
     def judge(self, q: FloatArray, learner: LearnerSettings) -> Judged:
-        """How good the greedy policy of a table (S, A) is."""
+        """The judgement of the greedy policy of a table (S, A)."""
 
 
 class TableEnvironment:
-    """A `TabularMDP`: every step is certain."""
+    """The environment of a `TabularMDP`, whose steps are deterministic."""
 
     def __init__(self, mdp: TabularMDP):
         self.mdp = mdp
@@ -67,26 +75,26 @@ class TableEnvironment:
         self._goal: list[bool] = mdp.goal.tolist()
 
     def reset(self, episode: int, draw: Draw) -> int:
-        """The problem's start, or one of its several ones."""
+        """The problem's start; if it has several, one drawn at random."""
         starts = self.mdp.starts
         return starts[int(draw() * len(starts))] if starts else self.mdp.start
 
     def step(self, state: int, action: int, draw: Draw) -> Step:
-        """The table's row."""
+        """The outcome that the table holds."""
         entered = self._successor[state][action]
         return Step(self._reward[state][action], entered, self._terminal[entered], self._goal[entered])
 
     def picture(self, state: int) -> str:
-        """An empty string: it has no drawing of its own."""
+        """An empty string: the table's grid is drawn."""
         return ""
 
     def values(self, discount: float) -> FloatArray:
-        """By value iteration; a large table's begins with the ways to the goal."""
-        guess = values_of_ways(self.mdp, discount) if self.mdp.n_states > LARGE and discount < 1.0 else None
+        """The optimal action values (S, A) by value iteration; for a large table from the values of shortest paths."""
+        guess = values_of_shortest_paths(self.mdp, discount) if self.mdp.n_states > LARGE and discount < 1.0 else None
         return optimal_values(self.mdp, discount, guess)
 
     def judge(self, q: FloatArray, learner: LearnerSettings) -> Judged:
-        """Solved: the greedy path from the start is a shortest one, or, with several starts, each one's reaches the goal."""
+        """Solved: the greedy path is a shortest one or, with several starts, that from each of them reaches the goal."""
         mdp, optimal = self.mdp, shortest_steps(self.mdp) + learner.count_start
         _, actions, reached = greedy_path(q, mdp, learner.max_steps)
         final = len(actions) + learner.count_start if reached else None
@@ -95,6 +103,6 @@ class TableEnvironment:
 
 
 def check_solvable(environment: Environment) -> None:
-    """Raises NoPath when no goal of a certain problem can be reached from its start."""
+    """Raises NoPath if no goal of a deterministic problem can be reached from its start."""
     if isinstance(environment, TableEnvironment):
         shortest_steps(environment.mdp)

@@ -1,4 +1,4 @@
-"""The tables of families (learners, selections, gates): a name, what it stands for, and one line of help."""
+"""The row type of the tables of learners, selections and gates."""
 
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
@@ -10,8 +10,8 @@ Made = TypeVar("Made")
 class Member(Generic[Made]):
     """A row of a family's table.
 
-    make: the member, or what makes it; help: what it is, in one line, as listings show it; compiled: its form in the
-    kernel, None where it has none and runs in the session alone.
+    make: the class or function; help: one line, as listings show it; compiled: its form in the kernel, None if it runs in the
+    session only.
     """
 
     make: Made

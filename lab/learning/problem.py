@@ -1,4 +1,4 @@
-"""What there is to learn: a table's problem by its name, and the environment that its steps are made in."""
+"""The problem of one lesson: its name, its table, and the environment in which steps are made."""
 
 from dataclasses import dataclass
 
@@ -8,9 +8,15 @@ from lab.mdp import TabularMDP
 
 @dataclass(frozen=True)
 class Problem:
-    """What one lesson teaches: its name, the sub-task, the table's problem; environment: where its steps are made.
+    """The problem of one lesson.
 
-    scene: where that is, in words, where the name does not tell; arm: which one carries it out, "": none.
+    name: of the problem; subtask: of the skill that it belongs to; mdp: its table.
+    environment: where steps are made; None for the table itself.
+    scene: the place in words, if the name does not say it; arm: the arm that carries the sub-task out, "" for none.
+
+        >>> import lab
+        >>> lab.Problem("board", "push", lab.grid((1, 3), [[0, 0, 0]], (0, 0), (0, 2))).mdp.n_states
+        3
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""What a learner shows when it asks, who may be asked, and what came of an episode: records below all who advise."""
+"""Requests for advice: why a learner asks, what it shows, who can answer, and the record of an advised episode."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from lab.mdp import TabularMDP
 
 @dataclass(frozen=True, slots=True)
 class Reason:
-    """Why the last question was asked; this one: nothing decides it."""
+    """Why a gate asked; this base class stands for a gate that asks unconditionally."""
 
     def __str__(self) -> str:
         return "it asks about every step"
@@ -21,7 +21,7 @@ class Reason:
 
 @dataclass(frozen=True, slots=True)
 class TooSlow(Reason):
-    """The improvement rate is below Lambda."""
+    """The improvement rate is below the threshold Lambda."""
 
     rate: float
     threshold: float
@@ -32,7 +32,7 @@ class TooSlow(Reason):
 
 @dataclass(frozen=True, slots=True)
 class TooLong(Reason):
-    """The mean of the last K episodes is above a constant."""
+    """The mean step count of the last K episodes is above a constant."""
 
     window: int
     mean: float
@@ -44,7 +44,7 @@ class TooLong(Reason):
 
 @dataclass(frozen=True, slots=True)
 class ValuesAlike(Reason):
-    """The values of the state span at most Psi."""
+    """The action values of the state span at most Psi."""
 
     width: float
     psi: float
@@ -55,7 +55,7 @@ class ValuesAlike(Reason):
 
 @dataclass(frozen=True, slots=True)
 class ValuesApart(Reason):
-    """The values of the state span at least Psi."""
+    """The action values of the state span at least Psi."""
 
     width: float
     psi: float
@@ -78,7 +78,7 @@ class TablesDiffer(Reason):
 
 @dataclass(frozen=True, slots=True)
 class ByChance(Reason):
-    """Chance says so, at a rate."""
+    """The gate asks at random, at this rate."""
 
     rate: float
 
@@ -88,7 +88,7 @@ class ByChance(Reason):
 
 @dataclass(frozen=True, slots=True)
 class Both(Reason):
-    """Two reasons that hold at a time."""
+    """Two reasons hold at the same time."""
 
     first: Reason
     second: Reason
@@ -99,7 +99,7 @@ class Both(Reason):
 
 @dataclass(frozen=True, slots=True)
 class ToldSeldom(Reason):
-    """So many answers were given in this state before."""
+    """Few answers have been given in this state so far."""
 
     answers: int
 
@@ -109,7 +109,7 @@ class ToldSeldom(Reason):
 
 @dataclass(frozen=True, slots=True)
 class Trusted(Reason):
-    """Advised episodes did better than going alone; rate: how many of the recent ones reached the goal."""
+    """Advised episodes did better than the others; rate: the share of the recent advised ones that reached the goal."""
 
     rate: float
 
@@ -119,12 +119,12 @@ class Trusted(Reason):
         )
 
 
-# ---- requests ---------------------------------------------------------------------------------------------------------
+# ---- what a request shows -------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
 class Standing:
-    """How advice stands with the learner: steps helped of those allowed, episodes misled of those tolerated, Lambda."""
+    """The record of the advice so far: helped steps of `budget`, misleads of `omega` tolerated, Lambda."""
 
     helped_steps: int = 0
     budget: int = GateSettings.budget
@@ -134,19 +134,23 @@ class Standing:
 
 
 class SupportsPicture(Protocol):
-    """An environment, as far as a request shows it beside the table."""
+    """The part of an environment that a request uses."""
 
     def picture(self, state: int) -> str:
-        """The environment's own drawing, "" when there is none."""
+        """The environment's own drawing of a state as text, "" if it has none."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Request:
-    """What a learner shows when it asks, about a table or about the order: where it is, what it would do, why it asks.
+    """A question of a learner, about a table or about the order of transfers.
 
-    episode and step count from 1; state: a number for where it is; own: what it would do itself; allowed: what may be
-    answered; improvement: of the last K episodes over the K before, None before there are 2K; reason: the gate's;
-    undoable: an answer of this episode can be taken back.
+    episode, step: both count from 1.
+    state: the number of the state.
+    own: the learner's own choice; allowed: the possible answers.
+    improvement: of the last K episodes over the K before, None before 2K episodes.
+    reason: why the gate asks.
+    standing: the record of the advice so far.
+    undoable: whether the last answer of this episode can be taken back.
     """
 
     episode: int
@@ -161,17 +165,25 @@ class Request:
 
 
 def allowed_words(request: Request) -> str:
-    """What may be answered, such as "0..3" or "1, 4, 6"."""
+    """The possible answers as text, such as "0..3" or "1, 4, 6"."""
     known = request.allowed
     return f"{known[0]}..{known[-1]}" if isinstance(known, range) else ", ".join(map(str, known))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AdviceRequest(Request):
-    """A request about the next action in a state of a table.
+    """A question about the next action in a state of a table. An advisor is a function of it, or an object with `advise`.
 
-    q: its live action values, `q[state][action]`, not to be changed; temperature and selection: how it chooses now;
-    environment: what can draw the state.
+    mdp: the problem.
+    q: the learner's current action values, `q[state][action]`; they must not be changed.
+    temperature, selection: how the learner chooses at present; temperature is epsilon for "epsilon-greedy".
+    environment: draws the state; None if the table's grid is all there is.
+    The other fields are those of `Request`.
+
+        >>> import lab
+        >>> def advise(request: lab.AdviceRequest) -> int | None:
+        ...     return request.mdp.action_labels.index("right") if request.step == 1 else None
+        >>> lab.teach(lab.grid((3, 3), [[0] * 3] * 3, (0, 0), (2, 2), None, ("up", "down", "left", "right")), advisor=advise)
     """
 
     mdp: TabularMDP
@@ -182,27 +194,27 @@ class AdviceRequest(Request):
 
     @property
     def chances(self) -> list[float]:
-        """The chance of each action if the learner chose by itself: its preference, and how sure it is."""
+        """The probability of each action, (A,), if the learner chose by itself."""
         return chances(self.selection, self.q[self.state], self.temperature)
 
     @property
     def picture(self) -> str:
-        """The environment's own drawing of the state, "" where the problem's grid is all there is."""
+        """The environment's own drawing of the state as text, "" if the table's grid is all there is."""
         return "" if self.environment is None else self.environment.picture(self.state)
 
     @property
     def shapes(self) -> list[dict[str, Any]]:
-        """The state as shapes, where the environment draws some: see `lab.learning.physics.environment.shapes`."""
-        found: list[dict[str, Any]] = getattr(self.environment, "shapes", lambda state: [])(self.state)
-        return found
+        """The state as shapes (see `lab.learning.physics.environment.shapes`), [] if the environment draws none."""
+        shapes: list[dict[str, Any]] = getattr(self.environment, "shapes", lambda state: [])(self.state)
+        return shapes
 
 
 @dataclass(frozen=True)
 class Walked:
-    """An episode that was open for advice, as its advisor may judge it.
+    """The record of an episode that was open for advice.
 
-    trail: the states left, the actions taken there, the states entered; steps as in `EpisodeEnded`; mean_before: of the
-    K episodes before it.
+    trail: (state, action, state entered) of each step; steps: as in `EpisodeEnded`; mean_before: the mean step count of the K
+    episodes before it.
     """
 
     episode: int
@@ -213,14 +225,14 @@ class Walked:
 
 
 class AdvisorLeft(Exception):
-    """The advisor ends its advice for the session."""
+    """Raised by an advisor that gives no more advice in this session; the text says why."""
 
 
-Ask = Callable[[Any], int | None]  # given a kind of `Request`
+Ask = Callable[[Any], int | None]  # a function of a `Request`
 
 
 class Advisor(Protocol):
-    """Whoever can be asked."""
+    """The interface of an advisor."""
 
     def advise(self, request: Any) -> int | None:
-        """One of `request.allowed`; None leaves this step to the learner. Raises AdvisorLeft to end advice for good."""
+        """The answer: one of `request.allowed`, or None for the learner's own choice. Raises AdvisorLeft to stop advising."""

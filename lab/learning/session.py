@@ -32,13 +32,14 @@ OnEvent = Callable[[events.Event], None]
 
 
 class Session:
-    """One learned table, in `learner.episodes` episodes, asking `advisor` when the gate says so (None: nobody to ask).
+    """A session of `learner.episodes` episodes, in which one table is learned, with advice when the gate decides to ask.
 
-    problem: where the steps are made; rng: a generator, or uniform numbers one after the other; q0: (S, A) start values,
-    default 0. An advised action is carried out and learned from as if it were the learner's own choice. An advisor with a
-    method `followed` hears after each episode what it led to.
-    Raises BadInput for an unknown learner, selection or gate, a q0 that does not fit or an advisor that names no
-    action, and NoPath.
+    problem: a table, or the environment in which steps are made; advisor: None if there is nobody to ask; rng: a generator, or a
+    function that returns uniform numbers; q0: (S, A), the start values, default the learner's start value.
+    An advised action is carried out and learned from like the learner's own choice. If the advisor has a method `followed`, it is
+    called with the `Walked` record after each open episode.
+    Raises BadInput for an unknown learner, selection or gate, for a q0 that does not fit and for an answer that is no action, and
+    NoPath.
     """
 
     def __init__(
@@ -60,7 +61,7 @@ class Session:
         mdp, cells = self.mdp, self.mdp if isinstance(self.mdp, CellTable) else None
         self.draw = uniforms(rng) if isinstance(rng, np.random.Generator) else rng
         self.update = update_of(learner, mdp, start_values(mdp, q0, learner))
-        self.q = self.update.q  # what the loop touches are plain lists
+        self.q = self.update.q  # plain lists, which the loop reads faster than arrays
         self.visits: list[list[int]] = [[0] * mdp.n_actions for _ in range(mdp.n_states)]
         self.actions = range(mdp.n_actions)
         self.longer_is_better = cells is not None and cells.physics.longer_is_better
@@ -78,15 +79,16 @@ class Session:
         self.guided: list[bool] = []
         self.requests = self.helped_steps = 0
         self.rejected_at: int | None = None
-        self.episode, self.tau = 0, 1.0  # from here on: of the episode under way
+        self.episode, self.tau = 0, 1.0  # from here on: the state of the current episode
         self.improved: events.Improvement | None = None
         self.asked_now, self.helped_now = False, 0
-        self.trail: list[tuple[int, int, int]] | None = None  # where an advisor wants to hear of it
+        self.trail: list[tuple[int, int, int]] | None = None  # recorded if the advisor has `followed`
 
     def run(self, on_event: OnEvent | None = None, enough: Callable[[], bool] = lambda: False) -> SessionResult:
-        """The result of all episodes, told to `on_event`, or of fewer: until after one it is `enough`.
+        """The result of the session; `on_event` receives its events.
 
-        A KeyboardInterrupt ends them at once, and what was learned so far counts.
+        The session ends early when `enough` returns True after an episode, or at once on KeyboardInterrupt; what was learned so
+        far is returned.
         """
         self.tell = on_event or self.tell
         interrupted = False
@@ -100,7 +102,7 @@ class Session:
         return self.result(interrupted)
 
     def play(self, episode: int) -> None:
-        """One episode: may it ask, the walk, and the verdict on it."""
+        """Runs one episode: decides whether it may ask, makes its moves, judges it."""
         self.episode, self.asked_now, self.helped_now = episode, False, 0
         self.tau = temperature(episode, self.settings.beta, self.settings.exploration)  # eq. 9.2
         gate, recall, was_converged = self.gate, self.recall, self.gate.converged
@@ -115,9 +117,9 @@ class Session:
         self._judge(is_open, self._walk(self._advised_choice if is_open else alone))
 
     def _walk(self, choose: Callable[[int, int], int]) -> int | None:
-        """The moves from the start to the goal, None if it was not reached: each is chosen, made, and learned from.
+        """The number of moves to the goal, None if it was not reached; each move is chosen, made and learned from.
 
-        Where an episode is the better the longer it lasts, the moves that it was too short, and one.
+        In worlds where longer episodes are better, it is 1 plus the number of moves by which the episode was too short.
         """
         act, draw, discount, visits = self.environment.step, self.draw, self.settings.discount, self.visits
         learn, lookahead, recall = self.update.learn, self.update.lookahead, self.recall
@@ -137,7 +139,7 @@ class Session:
             discount_t = 0.0 if over else discount
             following = 0
             if lookahead and not over:
-                # the move after the last one is never made: nobody is asked for it
+                # this choice is never carried out, so no advice is asked for
                 following = self._own_choice(entered, step) if last else choose(entered, step + 1)
             learn(state, action, reward, discount_t, entered, following)
             if self.trail is not None:
@@ -159,21 +161,21 @@ class Session:
         return own if self.recall is None else self.recall.chosen(state, own)
 
     def _advised_choice(self, state: int, step: int) -> int:
-        """What the advisor says, where the gate asks, else the learner's own."""
+        """The advisor's action if the gate asks and the advisor answers, otherwise the learner's own."""
         own, recall, gate = self._own_choice(state, step), self.recall, self.gate
         advisor = self.advisor if self.helped_steps + self.helped_now < self.gate_settings.budget else None
         if (advisor is None and not gate.weighs) or (recall is not None and not recall.trusts):
             return own
-        wanted = gate.asks(state, self.update.gauge(state))
-        said = self._ask(advisor, state, step, own) if wanted and advisor is not None else None
-        if said is not None:
+        gate_asks = gate.asks(state, self.update.gauge(state))
+        answer = self._ask(advisor, state, step, own) if gate_asks and advisor is not None else None
+        if answer is not None:
             self.helped_now += 1
             if recall is not None:
                 recall.asked()
-        return gate.takes(state, own, said)
+        return gate.takes(state, own, answer)
 
     def _ask(self, advisor: Advisor, state: int, step: int, own: int) -> int | None:
-        """The advisor's action, None when nothing is said."""
+        """The advisor's answer, None if it gives none. Raises BadInput if the answer is no action."""
         if not self.asked_now:
             self.asked_now = True
             self.tell(events.AdviceRequested.of(self.episode, self.improved))
@@ -205,7 +207,7 @@ class Session:
         return action
 
     def _judge(self, is_open: bool, moves: int | None) -> None:
-        """Book the episode, let the gate judge it (eqs. 6.3 and 6.4), and tell what came of it."""
+        """Records the episode, lets the gate judge it (eqs. 6.3 and 6.4), and reports its events."""
         self.update.end()
         episode, helped, limits, gate = self.episode, self.helped_now, self.gate_settings, self.gate
         steps = self.settings.max_steps + 1 if moves is None else moves + self.settings.count_start
@@ -230,7 +232,7 @@ class Session:
             self.tell(event)
 
     def result(self, interrupted: bool) -> SessionResult:
-        """What was learned so far; an unfinished episode counts in q and visits only."""
+        """The result so far; an unfinished episode counts in q and visits only."""
         q, finished = self.update.table(), len(self.guided)
         final_steps, optimal_steps, solved = self.environment.judge(q, self.settings)
         return SessionResult(

@@ -1,16 +1,16 @@
-"""What happens in a session, as records: what the learner tells whoever teaches, watches or keeps a journal."""
+"""The events of a session, as records for teachers, displays and journals."""
 
 from dataclasses import dataclass
 from typing import Literal
 
-Verdict = Literal["", "better", "best", "misled"]  # of a gate on an episode that was open for advice; "": none
-# why there is no more advice
+Verdict = Literal["", "better", "best", "misled"]  # on an episode that was open for advice; "": none
+# Why advice has ended.
 Ending = Literal["converged", "advisor left", "budget spent", "misled by what was remembered"]
 
 
 @dataclass(frozen=True)
 class Improvement:
-    """The last K episodes beside the K before them: rate = (previous - current) / previous (thesis eq. 6.1)."""
+    """The means of the last K episodes and of the K before: rate = (previous - current) / previous (thesis eq. 6.1)."""
 
     rate: float
     current_mean: float
@@ -19,9 +19,11 @@ class Improvement:
 
 @dataclass(frozen=True)
 class EpisodeEnded:
-    """An episode is over: `steps` is max_steps + 1 when it failed, of an order its cost; the rate is None before 2K episodes.
+    """An episode has ended.
 
-    verdict: "better" than those before it, no better but the "best" so far, or "misled"; "" for a gate that gives none.
+    steps: max_steps + 1 if it failed; for an order of transfers, its cost. guided: whether any step was helped.
+    improvement_rate: None before 2K episodes.
+    verdict: "better" than the mean before it; "best", as good as the best so far; "misled"; "" if the gate gives none.
     """
 
     episode: int
@@ -35,7 +37,7 @@ class EpisodeEnded:
 
 @dataclass(frozen=True)
 class AdviceRequested:
-    """The learner asks for the first time in this episode; means of step counts over K episodes, None before 2K."""
+    """The learner asks for the first time in an episode; the rate and both means over K episodes are None before 2K."""
 
     episode: int
     improvement_rate: float | None
@@ -44,14 +46,14 @@ class AdviceRequested:
 
     @classmethod
     def of(cls, episode: int, known: Improvement | None) -> "AdviceRequested":
-        """From the improvement, None before 2K episodes."""
+        """The event with the values of an improvement, which is None before 2K episodes."""
         means = (None, None, None) if known is None else (known.rate, known.current_mean, known.previous_mean)
         return cls(episode, *means)
 
 
 @dataclass(frozen=True)
 class AdviceRejected:
-    """Misled more than `omega` times, the learner asks no more; `steps` was not better than `mean_before`."""
+    """The learner rejects the advisor: more than `omega` misleads, the last with `steps` no better than `mean_before`."""
 
     episode: int
     misleads: int
@@ -62,7 +64,7 @@ class AdviceRejected:
 
 @dataclass(frozen=True)
 class AdviceEnded:
-    """No more advice in this session, and why."""
+    """Advice has ended for this session, and why."""
 
     episode: int
     reason: Ending
@@ -70,7 +72,7 @@ class AdviceEnded:
 
 @dataclass(frozen=True)
 class AdviceGiven:
-    """What came of one question: the state, the advised action (None: nothing was said), the learner's own choice."""
+    """The answer to one question: the advised action (None if there was no answer) and the learner's own choice."""
 
     episode: int
     step: int
@@ -81,7 +83,7 @@ class AdviceGiven:
 
 @dataclass(frozen=True)
 class AdviceRemembered:
-    """In the episode that is over so many steps were made from memory, without asking: practice of a known way."""
+    """In the episode that has ended, this many steps were practice of a path from memory, without asking."""
 
     episode: int
     steps: int
@@ -89,7 +91,7 @@ class AdviceRemembered:
 
 @dataclass(frozen=True)
 class AdvisorsDisagreed:
-    """Several advisors said different things: (name, action) of each that spoke, and the action that was followed."""
+    """Several advisors gave different answers: (name, action) of each, and the action that was carried out."""
 
     episode: int
     step: int
@@ -100,7 +102,7 @@ class AdvisorsDisagreed:
 
 @dataclass(frozen=True)
 class _Turned:
-    """An advisor is heard no more, or again; trust is the share of its advice that is expected to help."""
+    """An advisor was dropped or readmitted; trust: the expected share of good advice."""
 
     episode: int
     advisor: str
@@ -109,11 +111,11 @@ class _Turned:
 
 
 class AdvisorDropped(_Turned):
-    """One of several advisors is heard no more."""
+    """One of several advisors is no longer followed."""
 
 
 class AdvisorReadmitted(_Turned):
-    """A dropped advisor is heard again, because of what it said when it was asked now and then."""
+    """A dropped advisor is followed again, because its answers to occasional questions were good."""
 
 
 Event = (

@@ -1,4 +1,4 @@
-"""What a session learned, and what it can be begun with."""
+"""The result of a session; checks of its settings and of its start values."""
 
 from dataclasses import dataclass
 
@@ -18,14 +18,15 @@ CountArray = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class SessionResult:
-    """What a session learned and how it went.
+    """The result of a session.
 
-    q (S, A) float64, visits (S, A) int64; steps (episodes,) int64, a failed episode as max_steps + 1; guided
-    (episodes,) bool: at least one advised step; requests: episodes in which the learner asked; helped_steps:
-    advised steps that were carried out; misleads and rejected_at_episode: see lab/learning/gates; final_steps:
-    those of the greedy path from the start, None if it does not reach the goal, optimal_steps: the fewest, None where
-    nobody knows them, both counted as in `steps`; solved: see `Environment.judge`; interrupted: stopped by Ctrl-C, only
-    finished episodes count.
+    q: (S, A) float64, the action values; visits: (S, A) int64.
+    steps: (episodes,) int64, a failed episode counts as max_steps + 1; guided: (episodes,) bool, episodes with an advised step.
+    requests: episodes in which the learner asked; helped_steps: advised steps that were carried out.
+    misleads, rejected_at_episode: see lab/learning/gates.
+    optimal_steps: the fewest possible, None if unknown; final_steps: those of the greedy path from the start, None if it misses
+    the goal; both are counted as in `steps`. solved: see `Environment.judge`.
+    interrupted: whether Ctrl-C stopped the session; then only finished episodes count.
     """
 
     q: FloatArray
@@ -45,7 +46,7 @@ class SessionResult:
 def check_members(
     learner: LearnerSettings, gate: GateSettings, where: tuple[str, str] = ("learner settings", "gate settings")
 ) -> None:
-    """Raises BadInput for an unknown learner, selection or gate; `where`: where the learner and the gate came from."""
+    """Raises BadInput for an unknown learner, selection or gate; where: the sources of learner and gate, for the message."""
     for kind, name, table, source in (
         ("learner", learner.learner, UPDATES, where[0]),
         ("selection", learner.selection, SELECTIONS, where[0]),
@@ -61,13 +62,13 @@ def check_members(
 
 
 def start_values(mdp: TabularMDP, q0: FloatArray | None, learner: LearnerSettings) -> FloatArray:
-    """The action values (S, A) that a session begins with: `q0`, or the learner's start value in each; 0 in terminal states.
+    """The action values (S, A) that a session begins with: `q0`, or the learner's start value; 0 in terminal states.
 
     Raises BadInput for a `q0` of another shape, or with values that are not finite.
     """
     start = np.full(mdp.successor.shape, learner.start_value) if q0 is None else np.array(q0, np.float64)
     if start.shape != mdp.successor.shape or not np.isfinite(start).all():
         raise BadInput(f"start values: shape {start.shape}, allowed {mdp.successor.shape} with finite values")
-    if learner.tilings == 1:  # on tiles, what is worth nothing would take from what lies beside it
+    if learner.tilings == 1:  # with tile coding, zeros in terminal states would lower their neighbours
         start[mdp.terminal] = 0.0
     return start

@@ -14,7 +14,7 @@ WORDS = {"gt": "above", "ge": "at least", "le": "at most", "lt": "below"}
 
 @cache
 def _checked(kind: type) -> Any:
-    """The pydantic model with the fields of a class of settings."""
+    """A strict pydantic model with the fields of a settings class."""
     from pydantic import ConfigDict, create_model
 
     fields: dict[str, Any] = {name: (hint, ...) for name, hint in get_type_hints(kind, include_extras=True).items()}
@@ -22,7 +22,7 @@ def _checked(kind: type) -> Any:
 
 
 def _require_allowed(settings: Any) -> None:
-    """Raises BadInput for the first field that has the wrong type or lies outside its annotated range; numbers become plain."""
+    """Raises BadInput for the first field of a wrong type or outside its range; converts numpy numbers to plain ones."""
     from pydantic import ValidationError
 
     kind: Any = type(settings)
@@ -39,16 +39,16 @@ def _require_allowed(settings: Any) -> None:
 
 
 def _limits(metadata: "list[Any] | tuple[Any, ...]") -> list[str]:
-    """What a field allows, in words."""
+    """The limits of a field in words, such as "at least 0"."""
     limits = (limit for limit in metadata if not isinstance(limit, DocInfo))
     return [f"{WORDS[name]} {value}" for limit in limits for name, value in asdict(limit).items()]
 
 
 @dataclass(frozen=True)
 class LearnerSettings:
-    """How a learner learns; the defaults are those of the thesis (sections 8.3 and 9.8).
+    """The settings of a learner; the defaults are those of the thesis (sections 8.3 and 9.8).
 
-    In episode n the temperature (or epsilon) is exploration * n**-beta, constant with beta 0.
+    In episode n the temperature (or epsilon) is exploration * n**-beta, which is constant for beta 0.
     Raises BadInput for a value outside its range.
     """
 
@@ -85,9 +85,9 @@ class LearnerSettings:
 
 @dataclass(frozen=True)
 class GateSettings:
-    """When a learner asks for advice and when it stops; the defaults are those of the thesis (chapter 6, section 9.3).
+    """The settings of a gate: when a learner asks and when it stops; defaults: thesis, chapter 6 and section 9.3.
 
-    spare_best is off as printed; lessons and runs set it (see lab/tasks/record.py). memory: see
+    spare_best is off as in the thesis; lessons and runs switch it on (lab/tasks/record.py). memory:
     lab/learning/advice_memory.py.
     Raises BadInput for a value outside its range, or for X < 2K with a gate that compares moving averages.
     """
@@ -130,7 +130,7 @@ class GateSettings:
 
 
 class Setting(NamedTuple):
-    """A setting of learner or gate: what it is, what it may be, and what it is by default."""
+    """A setting of learner or gate: its meaning, its allowed values in words, its default."""
 
     meaning: str
     allowed: str
@@ -138,17 +138,17 @@ class Setting(NamedTuple):
 
 
 def _described() -> dict[str, Setting]:
-    found = {}
+    settings = {}
     for kind in (LearnerSettings, GateSettings):
         hints = get_type_hints(kind, include_extras=True)
         for field in fields(kind):
             metadata = hints[field.name].__metadata__
-            meaning = next(one.documentation for one in metadata if isinstance(one, DocInfo))
+            meaning = next(item.documentation for item in metadata if isinstance(item, DocInfo))
             allowed = " and ".join(_limits(metadata)) or (
                 "true or false" if field.default in (True, False) else "a name"
             )
-            found[field.name] = Setting(meaning, allowed, field.default)
-    return found
+            settings[field.name] = Setting(meaning, allowed, field.default)
+    return settings
 
 
-SETTINGS = _described()  # of learner and gate, by name
+SETTINGS = _described()  # all settings of learner and gate, by name

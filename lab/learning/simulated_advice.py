@@ -1,4 +1,4 @@
-"""What a simulated advisor would say: chances of actions from a table, drawn from in a session, or compiled in `kernels`."""
+"""Simulated advice: probabilities of actions from a table, drawn from in a session or compiled in `kernels`."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,17 +10,18 @@ from lab.learning.requests import AdviceRequest
 from lab.learning.selection import Draw
 from lab.mdp import BoolArray, FloatArray
 
-# when an advisor speaks: always, where the learner would choose otherwise, or where it chose otherwise when last here
+# When an advisor answers: always; if the learner would choose another action; if it did so when it last asked there.
 SPEAKS_ALWAYS, SPEAKS_TO_CORRECT, SPEAKS_AS_EXPECTED = range(3)
 
 
 @dataclass(frozen=True, eq=False)
 class Advice:
-    """What a simulated advisor would say: the same for the interactive session and the compiled kernel.
+    """The answers of a simulated advisor as probabilities, for the interactive session and the compiled kernel.
 
-    thresholds (T, S, A) float64: the cumulated chances of the actions in each state, in episode n those of row
-    min(n, T) - 1; region (S,) bool: where the advisor sees the robot; late: it answers the question before; speaks: of
-    SPEAKS_ALWAYS and so on. Source: thesis section 9.2, limited view 9.7; Torrey and Taylor 2013 for when it speaks.
+    thresholds: (T, S, A) float64, the cumulative probabilities of the actions; episode n uses row min(n, T) - 1.
+    region: (S,) bool, the states in which the advisor sees the robot; late: each answer is that to the previous question;
+    speaks: SPEAKS_ALWAYS, SPEAKS_TO_CORRECT or SPEAKS_AS_EXPECTED. Source: thesis section 9.2, limited view 9.7; Torrey and
+    Taylor 2013 for when it speaks.
     """
 
     thresholds: FloatArray
@@ -30,7 +31,7 @@ class Advice:
 
     @classmethod
     def of(cls, chances: FloatArray, region: BoolArray | None = None) -> "Advice":
-        """From the chances (S, A) or (T, S, A) of the actions. Raises BadInput when shapes or chances do not fit."""
+        """The advice with these probabilities (S, A) or (T, S, A). Raises BadInput if shapes or probabilities do not fit."""
         table = chances[None] if chances.ndim == 2 else chances
         states = table.shape[1] if table.ndim == 3 else 0
         view = np.ones(states, bool) if region is None else np.asarray(region, bool)
@@ -44,9 +45,10 @@ class Advice:
 
 
 def advice_chances(q: FloatArray, tau: float | Sequence[float]) -> FloatArray:
-    """The chances (S, A) of an advisor that draws from a softmax over a table q (S, A); (T, S, A) for several tau.
+    """The softmax probabilities (S, A) over a table q (S, A), from which an advisor draws; (T, S, A) for several tau.
 
-    tau > 0: .01 is an expert, 1 a novice. Source: thesis eq. 9.1.
+    tau > 0: 0.01 is an expert, 1 a novice. Raises BadInput for values that are not finite and for tau <= 0. Source: thesis eq.
+    9.1.
     """
     taus = np.atleast_1d(np.asarray(tau, np.float64))
     if q.ndim != 2 or not np.isfinite(q).all() or not (np.isfinite(taus).all() and (taus > 0.0).all()):
@@ -59,12 +61,12 @@ def advice_chances(q: FloatArray, tau: float | Sequence[float]) -> FloatArray:
 
 
 def tau_schedule(taus: Sequence[float], episodes: int) -> list[float]:
-    """The tau of each episode, the last one's from then on: the only one, or from the first to the second in equal ratios."""
+    """The tau of each episode: [tau] for one, otherwise a geometric sequence from the first to the second tau."""
     return np.geomspace(taus[0], taus[1], episodes).tolist() if len(taus) > 1 else [*taus]
 
 
 class TableAdvisor:
-    """A simulated advisor: draws from its `Advice`, and says nothing where it does not see the robot."""
+    """A simulated advisor, which draws from its `Advice` and does not answer where it cannot see the robot."""
 
     def __init__(self, advice: Advice, draw: Draw):
         self.advice = advice
@@ -72,11 +74,11 @@ class TableAdvisor:
         self._region: list[bool] = advice.region.tolist()
         self._last = len(advice.thresholds) - 1
         self._thresholds = advice.thresholds
-        self._before: int | None = None  # the state of the question before
+        self._before: int | None = None  # the state of the previous question
         self._chose: dict[int, int] = {}  # what the learner would have chosen in a state when it last asked there
 
     def advise(self, request: AdviceRequest) -> int | None:
-        """One draw for the state asked about, or the one before."""
+        """An action drawn for the state asked about (if late, for the previous one); None if the advisor does not answer."""
         state: int | None = request.state
         if self.advice.late:
             state, self._before = self._before, state

@@ -1,10 +1,10 @@
-"""Tile coding: values that neighbouring states share, for spaces too large for a table, and the cells that it tells apart.
+"""Tile coding: linear values that neighbouring states share, for spaces too large for a table; the cells of continuous spaces.
 
-A tiling is a grid of tiles, each `tilings` cells wide along each axis; there are `tilings` of them, each shifted by a few
-cells against the one before. A state's value is the sum of its tiles' weights, one of each tiling. As all borders of tiles
-are borders of cells, a cell's number says all that tile coding can know of a state: for a continuous space, too, the state
-of the learner is a number, and what is asked, remembered and kept goes by it. One tiling is a table of the cells.
-The functions are written in the Python that numba compiles, too.
+A tiling is a grid of tiles, each `tilings` cells wide along each axis; there are `tilings` of them, each shifted by a few cells
+against the previous one. A state's value is the sum of the weights of its tiles, one in each tiling. All borders of tiles are
+borders of cells, so a cell's number is all that tile coding knows of a state; in a continuous space, too, the learner's state is
+such a number, by which it asks, remembers and stores. With one tiling the result is a table of the cells.
+The functions are also compiled by numba.
 Source: Sutton and Barto 2018, section 9.5.4.
 """
 
@@ -19,19 +19,19 @@ from numpy.typing import NDArray
 
 from lab.errors import BadInput
 
-MOST_ROUNDS = 300  # in which weights are found that made a table
+MOST_ROUNDS = 300  # iterations of the least-squares fit of weights to a table
 
 TileArray = NDArray[np.int32]
 Cell = TypeVar("Cell", int, TileArray)
 
 
 def cell_along(value: float, low: float, high: float, cells: int) -> int:
-    """The cell, 0 to cells - 1, of a value along an axis; what lies outside the bounds belongs to the last cell there."""
+    """The index, 0 to cells - 1, of the cell of a value along an axis; out of bounds, of the outermost cell."""
     return int(min(max((value - low) / (high - low) * cells, 0.0), cells - 1.0))
 
 
 def shift(tiling: int, axis: int, tilings: int) -> int:
-    """By how many cells a tiling is shifted along an axis: by 1, 3, 5, ... more than the tiling before it.
+    """The shift of a tiling along an axis, in cells: by axis 1, 3, 5, ... times its number, modulo `tilings`.
 
     Source: Miller and Glanz 1996; Sutton and Barto 2018, section 9.5.4.
     """
@@ -39,27 +39,27 @@ def shift(tiling: int, axis: int, tilings: int) -> int:
 
 
 def tile_along(cell: Cell, shifted: int, tilings: int) -> Cell:
-    """The tile of a cell, or of each of several, along an axis of a shifted tiling."""
+    """The index of a cell's tile along an axis of a shifted tiling; also for an array of cells."""
     return (cell + shifted) // tilings
 
 
 @dataclass(frozen=True)
 class Bounds:
-    """The cells of a continuous space: along each axis equally wide ones between low and high; numbered in C order."""
+    """The cells of a continuous space: `shape` equal intervals along each axis between low and high; numbered in C order."""
 
     low: tuple[float, ...]
     high: tuple[float, ...]
     shape: tuple[int, ...]
 
     def number(self, point: Sequence[float]) -> int:
-        """The number of the cell that a point lies in."""
+        """The number of the cell that contains a point."""
         number = 0
         for axis, cells in enumerate(self.shape):
             number = number * cells + cell_along(point[axis], self.low[axis], self.high[axis], cells)
         return number
 
     def centre(self, number: int) -> tuple[float, ...]:
-        """The middle of a cell."""
+        """The centre of a cell."""
         cells = np.unravel_index(number, self.shape)
         ends = zip(cells, self.low, self.high, self.shape, strict=True)
         return tuple(low + (int(cell) + 0.5) * (high - low) / count for cell, low, high, count in ends)
@@ -67,7 +67,7 @@ class Bounds:
 
 @dataclass(frozen=True)
 class TileCoding:
-    """The tiles of a grid of cells; they are numbered tiling after tiling. Raises BadInput where there is no grid."""
+    """The tiles of a grid of cells, numbered tiling after tiling. Raises BadInput if the states are no grid."""
 
     shape: tuple[int, ...]
     tilings: int
@@ -78,49 +78,49 @@ class TileCoding:
 
     @cached_property
     def per_tiling(self) -> tuple[int, ...]:
-        """How many tiles a tiling has along each axis: a shifted one needs one more than cover the grid."""
+        """The number of tiles of a tiling along each axis: one more than cover the grid, because tilings are shifted."""
         return tuple((cells - 1 + self.tilings - 1) // self.tilings + 1 for cells in self.shape)
 
     @cached_property
     def count(self) -> int:
-        """How many tiles there are."""
+        """The number of tiles."""
         return self.tilings * prod(self.per_tiling)
 
     def tiles_of(self, state: int) -> list[int]:
-        """The tiles of a cell, one of each tiling."""
+        """The numbers of a cell's tiles, one in each tiling."""
         cells = [int(cell) for cell in np.unravel_index(state, self.shape)]
-        found = []
+        tiles = []
         for tiling in range(self.tilings):
             number = tiling
             for axis, cell in enumerate(cells):
                 shifted = shift(tiling, axis, self.tilings)
                 number = number * self.per_tiling[axis] + tile_along(cell, shifted, self.tilings)
-            found.append(number)
-        return found
+            tiles.append(number)
+        return tiles
 
     @cached_property
     def active(self) -> TileArray:
-        """`tiles_of` all cells; (S, tilings) int32."""
+        """The numbers of the tiles of all cells, (S, tilings) int32."""
         cells = np.indices(self.shape, np.int32).reshape(len(self.shape), -1)
-        found = np.empty((cells.shape[1], self.tilings), np.int32)
+        tiles = np.empty((cells.shape[1], self.tilings), np.int32)
         for tiling in range(self.tilings):
             number = np.full(cells.shape[1], tiling, np.int32)
             for axis, cell in enumerate(cells):
                 number = number * self.per_tiling[axis] + tile_along(
                     cell, shift(tiling, axis, self.tilings), self.tilings
                 )
-            found[:, tiling] = number
-        return found
+            tiles[:, tiling] = number
+        return tiles
 
     def values(self, weights: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The action values (S, A) of all cells, of weights (count, A): summed tiling after tiling."""
+        """The action values (S, A) of all cells for weights (count, A), summed tiling after tiling."""
         total = np.zeros((len(self.active), weights.shape[1]))
         for tiling in range(self.tilings):
             total += weights[self.active[:, tiling]]
         return total
 
     def weights(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Weights (count, A) whose values come nearest to given ones (S, A): exactly where tile coding has made these."""
+        """The weights (count, A) whose values fit given ones (S, A) best (least squares); exact for tile-coded values."""
         if (values == values[0, 0]).all():
             return np.full((self.count, values.shape[1]), values[0, 0] / self.tilings)
         from scipy.sparse import csr_matrix

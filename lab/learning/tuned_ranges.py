@@ -1,17 +1,17 @@
-"""Where each setting of learner and gate is looked for when it is tuned: narrower than what it may be (`SETTINGS`)."""
+"""The search ranges of the settings of learner and gate in tuning; they are narrower than what is allowed (`SETTINGS`)."""
 
 from typing import Any, NamedTuple
 
 
 class Span(NamedTuple):
-    """Both ends belong to it, of whole numbers where both are; log: the same share of trials to each factor of ten."""
+    """A search range, both ends included: of integers if both ends are; log: sampled uniformly in the logarithm."""
 
     low: float
     high: float
     log: bool = False
 
 
-Range = Span | tuple[Any, ...]  # a span, or the values that are tried; none: all members of its family
+Range = Span | tuple[Any, ...]  # a span, or the values to try; (): all members of the family
 RANGES: dict[str, Range] = {
     "learner": (),
     "selection": (),
@@ -38,4 +38,4 @@ RANGES: dict[str, Range] = {
     "spare_best": (False, True),
     "memory": (False, True),
 }
-USUAL = ("alpha", "trace", "exploration", "beta", "lambda_threshold", "omega")  # what is tuned when nobody says
+USUAL = ("alpha", "trace", "exploration", "beta", "lambda_threshold", "omega")  # the settings that are tuned by default

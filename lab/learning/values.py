@@ -1,4 +1,4 @@
-"""What a table is worth in a problem, for all states at once: ways counted in moves, and the values of known moves."""
+"""Values of all states of a problem at once: distances to the goal in moves, values of shortest paths, values of known moves."""
 
 from itertools import pairwise
 
@@ -10,17 +10,17 @@ MOST_SWEEPS, SETTLED = 1000, 1e-9
 
 
 def fewest_moves(mdp: TabularMDP) -> FloatArray:
-    """The fewest moves from each state to a goal that enter no other terminal state; (S,) float64, inf where none lead there."""
+    """The length in moves of the shortest path from each state to a goal, (S,) float64, inf if there is none."""
     return _moves_along(mdp, mdp.successor)
 
 
 def greedy_moves(q: FloatArray, mdp: TabularMDP) -> FloatArray:
-    """The moves to a goal by the best action of each state, as `greedy_path`; (S,) float64, inf where they miss it."""
+    """The length in moves of the greedy path from each state, (S,) float64, inf if it misses the goal."""
     return _moves_along(mdp, mdp.successor[np.arange(mdp.n_states), q.argmax(axis=1)][:, None])
 
 
 def _moves_along(mdp: TabularMDP, onward: IntArray) -> FloatArray:
-    """The fewest moves to a goal when a state leads on to `onward` (S, choices)."""
+    """The fewest moves to a goal from each state if its moves lead to `onward` (S, choices); breadth-first from the goals."""
     left, moves = np.where(mdp.goal, 0.0, np.inf), 0
     order = np.argsort(onward, axis=None, kind="stable")  # the moves by the state that they enter
     before, number = order // onward.shape[1], np.bincount(onward.ravel(), minlength=mdp.n_states)
@@ -29,16 +29,16 @@ def _moves_along(mdp: TabularMDP, onward: IntArray) -> FloatArray:
     while frontier.size:
         moves, each = moves + 1, number[frontier]
         within = np.arange(each.sum()) - np.repeat(np.cumsum(each) - each, each)
-        found = np.unique(before[np.repeat(first[frontier], each) + within])
-        frontier = found[np.isinf(left[found]) & ~mdp.terminal[found]]
+        predecessors = np.unique(before[np.repeat(first[frontier], each) + within])
+        frontier = predecessors[np.isinf(left[predecessors]) & ~mdp.terminal[predecessors]]
         left[frontier] = moves
     return left
 
 
-def values_of_ways(mdp: TabularMDP, discount: float) -> FloatArray:
-    """What the moves (S, A) are worth to one who then goes a shortest way to a goal: a guess at the optimal values.
+def values_of_shortest_paths(mdp: TabularMDP, discount: float) -> FloatArray:
+    """The value (S, A) of each move if a shortest path to a goal follows it: a first guess at the optimal values.
 
-    Where no way leads to one, all moves are worth walking for ever; discount: below 1.
+    States without a path to a goal have the value of moving for ever; discount: below 1.
     """
     left = fewest_moves(mdp)
     for_ever = float(np.median(mdp.reward[~mdp.terminal])) / (1.0 - discount)
@@ -58,17 +58,17 @@ def values_of_ways(mdp: TabularMDP, discount: float) -> FloatArray:
 
 
 def known_values(mdp: TabularMDP, known: BoolArray, others: FloatArray, discount: float) -> FloatArray:
-    """The values (S, A) of the moves of which it is `known` (S, A) where they lead, by value iteration over them alone.
+    """The action values (S, A) by value iteration over the moves whose outcomes are known.
 
-    `others` (S, A): what all other moves are worth. The sweeps end when the values have settled, or after MOST_SWEEPS.
-    Source: Sutton 1990 (Dyna); Brafman and Tennenholtz 2002 (R-max), where the others are worth as much as can be.
+    known: (S, A) bool; others: (S, A), the values of all other moves. The sweeps end on convergence, or after MOST_SWEEPS.
+    Source: Sutton 1990 (Dyna); Brafman and Tennenholtz 2002 (R-max), where unknown moves have the highest possible value.
     """
     onward = discount * ~mdp.terminal[mdp.successor]
     q = others
     for _ in range(MOST_SWEEPS):
-        found: FloatArray = np.where(known, mdp.reward + onward * q.max(axis=1)[mdp.successor], others)
-        settled = bool(np.abs(found - q).max() < SETTLED)
-        q = found
+        updated: FloatArray = np.where(known, mdp.reward + onward * q.max(axis=1)[mdp.successor], others)
+        settled = bool(np.abs(updated - q).max() < SETTLED)
+        q = updated
         if settled:
             break
     return q

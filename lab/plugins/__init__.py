@@ -1,1 +1,1 @@
-"""Members that others add to the families, by entry points of installed packages or from a file that the user names."""
+"""Families, and the members that plug-ins add: by entry points of installed packages, or from a file that the user names."""

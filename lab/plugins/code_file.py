@@ -10,7 +10,7 @@ from typing import Any
 from lab.errors import BadInput, unknown
 from lab.plugins.family import Family
 
-_files: dict[str, tuple[str, str]] = {}  # by a member's name: the kind of its family, and the words it was named by
+_files: dict[str, tuple[str, str]] = {}  # name of a member -> kind of its family, and the word that named it
 
 
 def is_file_word(word: str) -> bool:
@@ -22,11 +22,11 @@ def is_file_word(word: str) -> bool:
 def take(
     families: Family[Any] | Sequence[Family[Any]], word: str, tell: Callable[[str], None] = lambda line: None
 ) -> str:
-    """Load the object that "./mine.py:MyGate" names into its family, of several the first that it fits; its name there,
-    "mine.MyGate".
+    """The name "mine.MyGate", under which the object that "./mine.py:MyGate" names is now in the first family that accepts it.
 
-    Only for words that the user has typed: its code runs, which `tell` hears before. Any other word is given back as it is.
-    BadInput when there is no such file or object, when its code fails, and when it is no member.
+    Any other word is returned unchanged. The file's code runs, after `tell` was called with a line about it, so this is only for
+    words that the user has typed. Raises BadInput if there is no such file or object, if its code fails, or if no family
+    accepts the object.
     """
     if not is_file_word(word):
         return word
@@ -34,27 +34,29 @@ def take(
     file = Path(path)
     if not isfile(file):
         raise BadInput(f"{word}: there is no file '{path}'")
-    own = f"{file.stem}.{name}"
-    if own in _files:
-        return own
+    member_name = f"{file.stem}.{name}"
+    if member_name in _files:
+        return member_name
     tell(f"runs the code of {file.resolve()}")
     module = _run(file, word)
     if not hasattr(module, name):
-        raise unknown("object", name, [one for one in vars(module) if not one.startswith("_")], str(file))
+        raise unknown(
+            "object", name, [attribute for attribute in vars(module) if not attribute.startswith("_")], str(file)
+        )
     faults = []
     for family in [families] if isinstance(families, Family) else families:
         try:
-            family.adopted(own, getattr(module, name), str(file))
+            family.adopted(member_name, getattr(module, name), str(file))
         except BadInput as error:
             faults.append(str(error))
             continue
-        _files[own] = family.kind, f"{file.resolve()}:{name}"
-        return own
+        _files[member_name] = family.kind, f"{file.resolve()}:{name}"
+        return member_name
     raise BadInput(f"{word}: {', or '.join(faults)}")
 
 
 def from_file(kind: str, name: str, where: str) -> BadInput | None:
-    """The error for a name like "mine.MyGate", whose file was not named this time; None for any other name."""
+    """The error for a name such as "mine.MyGate" whose file was not named in this command; None for any other name."""
     stem, dot, thing = name.partition(".")
     if not (dot and stem.isidentifier() and thing.isidentifier()):
         return None
@@ -63,13 +65,13 @@ def from_file(kind: str, name: str, where: str) -> BadInput | None:
 
 
 def _run(file: Path, word: str) -> Any:
-    """The module of a file, which is run."""
+    """The module of a file, whose code is run. Raises BadInput if it fails."""
     called = f"lab_file_{file.stem}"
     spec = spec_from_file_location(called, file)
     assert spec is not None
     assert spec.loader is not None
     module = module_from_spec(spec)
-    sys.modules[called] = module  # dataclasses look their own module up
+    sys.modules[called] = module  # dataclasses look up their own module
     try:
         spec.loader.exec_module(module)
     except (Exception, SystemExit) as error:
@@ -79,5 +81,5 @@ def _run(file: Path, word: str) -> Any:
 
 
 def files_taken() -> dict[str, tuple[str, str]]:
-    """The members that came from files, by name: the kind of their family, and the words for `take`, in another process."""
+    """The members from files by name: kind of family, and the word with which another process can `take` them."""
     return dict(_files)

@@ -1,19 +1,20 @@
-"""A family: the table of its members that ship, and what other packages add to it by entry points."""
+"""Families: tables of members, shipped or added by other packages through entry points; the blame for faulty members."""
 
 import warnings
 from collections.abc import Callable, Iterator, Mapping, MutableMapping
 from dataclasses import is_dataclass
+from inspect import signature
 from traceback import walk_tb
 from typing import Any, TypeVar
 
 from lab.errors import BadInput, Notice
 
-OWN = "package 'teaching-lab'"  # its faults keep their traceback
-_modules: dict[str, str] = {}  # of others, by name: where they come from
+OWN = "package 'teaching-lab'"  # the source of shipped members, whose errors keep their traceback
+_modules: dict[str, str] = {}  # module of an added member -> where it comes from
 
 
 def known_source(thing: object, source: str) -> None:
-    """Note whose the code of a member is. In a record of the lab, such as a `Study`, that is the code of its functions."""
+    """Records the source of a member's code; for a record such as a `Study`, of the code of its functions."""
     if source == OWN:
         return
     for one in (thing, *vars(thing).values()) if is_dataclass(thing) else (thing,):
@@ -23,7 +24,7 @@ def known_source(thing: object, source: str) -> None:
 
 
 def blame(error: BaseException) -> str | None:
-    """What failed in the code of others, in one line; None where it did not."""
+    """A line that names the source and line of the added member in which an error was raised; None if there is none."""
     for frame, line in reversed([*walk_tb(error.__traceback__)]):
         source = _modules.get(frame.f_globals.get("__name__", ""))
         if source is not None:
@@ -31,7 +32,7 @@ def blame(error: BaseException) -> str | None:
     return None
 
 
-# ---- family -----------------------------------------------------------------------------------------------------------
+# ---- the family -----------------------------------------------------------------------------------------------------
 
 
 GROUP = "teaching_lab"  # entry points of the family "gates" are in the group "teaching_lab.gates"
@@ -40,17 +41,16 @@ Row = TypeVar("Row")
 
 
 class PluginFault(Notice):
-    """What is wrong with a member that another package adds; it is left out."""
+    """The warning that a member of another package is faulty and was left out."""
 
 
 class Family(MutableMapping[str, Row]):
-    """Members by name: those that ship, then those of other packages, which are loaded where they are first asked for.
+    """A table of members by name: the shipped ones, then those of other packages, which are loaded when first needed.
 
-    An entry point gives one member, called by its name, or a mapping of names to members.
-
-    kind: "gates" and so on; adopt: makes a row of what somebody else's code gives, BadInput for what is none.
-    A name that ships is found without looking at other packages. One that is faulty, or whose name is taken, is told in a
-    `PluginFault` and left out.
+    kind: of the family, such as "gates"; rows: the shipped members; adopt: makes a row of an object from other code, and raises
+    BadInput if that is no member.
+    An entry point provides one member, under its own name, or a mapping of names to members. A faulty member, or one whose
+    name is taken, causes a `PluginFault` warning and is left out. Looking up a shipped name does not load other packages.
     """
 
     def __init__(self, kind: str, rows: Mapping[str, Row], adopt: Callable[[str, Any], Row]):
@@ -85,23 +85,23 @@ class Family(MutableMapping[str, Row]):
         return name in self._rows or name in self._used
 
     def adopted(self, name: str, thing: Any, source: str) -> None:
-        """Take in a member; BadInput for what is none, and for a name that another one has."""
+        """Adds a member to the listed ones. Raises BadInput if it is none, or if the name is taken."""
         if name in self._rows:
             raise BadInput(f"the name '{name}' is taken")
         self._rows[name] = self._adopt(name, thing)
         known_source(thing, source)
 
     def named(self, thing: Any) -> Any:
-        """The name of a class that is used in Python (see `use`); anything else as it is."""
+        """The name of a class, which is added by `use`; any other object unchanged."""
         return self.use(thing.__name__, thing) if isinstance(thing, type) else thing
 
     def use(self, name: str, thing: Any) -> str:
-        """Let something be found under a name that is not listed; the name. BadInput for what is no member."""
+        """Adds a member under a name that is not listed, and returns the name. Raises BadInput if it is no member."""
         self._used[name] = self._adopt(name, thing)
         return name
 
     def _look(self) -> None:
-        """Take in what installed packages add."""
+        """Adds the members of installed packages, once."""
         if self._complete:
             return
         self._complete = True
@@ -122,14 +122,12 @@ class Family(MutableMapping[str, Row]):
 
 
 def first_line(thing: Any) -> str:
-    """What a member's own text says of it, in one line."""
+    """The first line of a member's docstring, without the full stop; its name if there is none."""
     return ((thing.__doc__ or "").strip() or getattr(thing, "__name__", str(thing))).splitlines()[0].rstrip(".")
 
 
 def takes(thing: Any, *given: str) -> bool:
-    """Whether it can be called with so many arguments."""
-    from inspect import signature
-
+    """Whether an object can be called with as many arguments as `given` has."""
     try:
         signature(thing).bind(*given)
     except (TypeError, ValueError):
@@ -138,5 +136,5 @@ def takes(thing: Any, *given: str) -> bool:
 
 
 def wanted(thing: Any, what: str) -> BadInput:
-    """The error for what is no member: wanted a subclass of Gate, and so on."""
+    """The error for an object that is no member; what: what was wanted, such as "a subclass of lab.Gate"."""
     return BadInput(f"it is {type(thing).__name__} {getattr(thing, '__name__', thing)!r}: wanted {what}")

@@ -1,7 +1,7 @@
-"""Studies: how many sessions are run for a question, and what is written of the answer. Packages bring the questions.
+"""Studies: the family, running a study, and writing its report.
 
-A study is a function of a job and a reading (changes to all settings) that returns its findings. Those that ship are in
-the package `lab_studies`, which enters the family as any other package does.
+A study is a function of a job and a reading (values of its options) that returns its findings. The shipped studies are in the
+package `lab_studies`, which adds them by entry points, as any other package can.
 """
 
 import re
@@ -18,15 +18,24 @@ if TYPE_CHECKING:
     from lab.studies.findings import Findings
     from lab.studies.runner import Job
 
-TABLES = ("learned", "exact")  # what simulated advisors know: a table that a learner learned, or the exact values
+TABLES = ("learned", "exact")  # what simulated advisors draw from: a learned table, or the exact values
 ADVISED = ("advisor_table",)
 
 
 @dataclass(frozen=True)
 class Study:
-    """A study: its title, what runs it with a job and a reading, and what it reads: options that only some studies have.
+    """A study.
 
-    sessions: as many as it has unless --sessions says otherwise; least: fewer are refused.
+    title: in one line; run: a function of a `Job` and a reading (option -> value) that returns `Findings`.
+    reads: the options that the study has, besides those of all studies.
+    sessions: the default number per setting; least: the fewest allowed.
+
+        >>> from lab.studies import Study
+        >>> from lab.studies.findings import Findings, row
+        >>> def run(job, reading):
+        ...     return Findings([row({}, "sessions", job.sessions)], {"sessions": job.sessions})
+        >>> from lab.testing import check_study
+        >>> check_study(Study("Counts its sessions", run))
     """
 
     title: str
@@ -51,24 +60,23 @@ STUDIES = Family("studies", {}, _adopted)
 
 
 def study_of(name: str) -> Study:
-    """The study called `name`; BadInput lists the known ones."""
+    """The study of that name. Raises BadInput, which lists the known ones."""
     if name not in STUDIES:
         raise unknown("study", name, STUDIES, "STUDY")
     return STUDIES[name]
 
 
 def run_study(name: str, job: "Job", out: Path, reading: Mapping[str, Any] | None = None) -> dict[str, Any]:
-    """Run a study and write its report, rows and sessions to `out`; the document of `lab study run --json`.
+    """The document of `lab study run --json`; report, rows and sessions are written to the folder `out`.
 
-    reading: the values of such options; "advisor_table" is one of TABLES. BadInput for an unknown study or
-    advisor table, a reading that the study has not got, too few sessions and a folder that cannot be; WorkFailed when it cannot
-    be written.
+    reading: option -> value; "advisor_table" is one of TABLES. Raises BadInput for an unknown study or advisor table, an option
+    that the study does not have, too few sessions and an unusable folder; WorkFailed if a file cannot be written.
     """
     return carried_out(checked(name, job, reading or {}), name, job, out, reading)
 
 
 def checked(name: str, job: "Job", reading: Mapping[str, Any]) -> Study:
-    """The study called `name`; BadInput for what `run_study` refuses."""
+    """The study of that name. Raises BadInput as `run_study` does."""
     study = study_of(name)
     if job.sessions < study.least:
         raise BadInput(f"{counted(job.sessions, 'session')} (--sessions): '{name}' takes {study.least} at the least")
@@ -84,36 +92,36 @@ def checked(name: str, job: "Job", reading: Mapping[str, Any]) -> Study:
 def carried_out(
     study: Study, name: str, job: "Job", out: Path, reading: Mapping[str, Any] | None = None
 ) -> dict[str, Any]:
-    """As `run_study`, of a study that need not be in the table, and with a reading that fits it."""
+    """The document of a study that need not be in the table, with a checked reading; see `run_study`."""
     from lab.studies.runner import STORE
 
     check_out(out)
     try:
-        found = study.run(replace(job, folder=out), reading or {})
+        findings = study.run(replace(job, folder=out), reading or {})
     except KeyboardInterrupt:
-        goes_on = f"'{out}' keeps what is done, and the same command goes on"
-        kept = goes_on if (out / STORE).is_file() else "nothing is kept"
+        can_continue = f"'{out}' keeps what is done, and the same command goes on"
+        kept = can_continue if (out / STORE).is_file() else "nothing is kept"
         raise KeyboardInterrupt(f"stopped by Ctrl-C; {kept}") from None
-    found = replace(found, summary={"sessions": job.sessions, "seed": job.seed, **found.summary})
-    files = _written(study.title, name, found, out)
+    findings = replace(findings, summary={"sessions": job.sessions, "seed": job.seed, **findings.summary})
+    files = _written(study.title, name, findings, out)
     if (out / STORE).is_file():
         files["sessions"] = str(out / STORE)
-    document = {"study": name, "seed": job.seed, "sessions": job.sessions, "rows": found.rows}
-    return document | {"summary": found.summary, "notes": list(found.notes), "files": files}
+    document = {"study": name, "seed": job.seed, "sessions": job.sessions, "rows": findings.rows}
+    return document | {"summary": findings.summary, "notes": list(findings.notes), "files": files}
 
 
-def _written(title: str, name: str, found: "Findings", out: Path) -> dict[str, str]:
-    """Rows, report, pictures and texts are written; where they are."""
+def _written(title: str, name: str, findings: "Findings", out: Path) -> dict[str, str]:
+    """Writes rows, report, pictures and texts; returns their paths by name."""
     from lab.studies.report import write_file, write_report, write_rows
 
     files = {"report": str(out / "report.html"), "rows": str(out / "rows.csv")}
-    write_rows(out / "rows.csv", found.rows)
-    write_report(out / "report.html", title, name, found)
-    for number, (caption, picture) in enumerate(found.figures.items(), start=1):
+    write_rows(out / "rows.csv", findings.rows)
+    write_report(out / "report.html", title, name, findings)
+    for number, (caption, picture) in enumerate(findings.figures.items(), start=1):
         path = out / f"{number:02}-{re.sub(r'[^a-z0-9.]+', '-', caption.lower()).strip('-')[:60]}.svg"
         write_file(path, picture.decode())
         files[caption] = str(path)
-    for file, text in found.files.items():
+    for file, text in findings.files.items():
         write_file(out / file, text)
         files[file] = str(out / file)
     return files

@@ -1,4 +1,4 @@
-"""What a study comes to: rows, each a measured value beside what is printed, and what is said and drawn of them."""
+"""The findings of a study: rows of measured and printed values, and summaries of their agreement, in values and in ranks."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -13,16 +13,24 @@ from numpy.typing import ArrayLike
 from lab.sequencing.search import SAME
 from lab.statistics import allowed, interval, mean_error, share, share_error, within, within_errors
 
-Row = dict[str, Any]  # of a study, see `findings`
+Row = dict[str, Any]  # see `row`
 
-JUDGED = ("within", "within_errors", "used", "easy")  # what a row with a printed figure is said to be
-TABLE = ("table", "environment", "case", "toasts", "world", "view")  # rows that agree in these are one printed table
+JUDGED = ("within", "within_errors", "used", "easy")  # the judgements of a row with a printed figure
+TABLE = (
+    "table",
+    "environment",
+    "case",
+    "toasts",
+    "world",
+    "view",
+)  # rows with equal values here belong to the same printed table
 PARTS = {"not used": False, "used to choose": True}
 
 
 def marked(rows: Iterable[Row]) -> list[Row]:
-    """The rows; those with a printed figure also say whether it is `easy`: more than half of the other figures that
-    its table prints of the same measure lie within what counts as agreeing with it (`statistics.allowed`).
+    """The rows; those with a printed figure also say whether that is `easy` to reproduce.
+
+    It is if more than half of the other figures that its table prints for the same measure agree with it (`statistics.allowed`).
     """
     rows = list(rows)
     tables: dict[tuple[Any, ...], list[float]] = {}
@@ -43,20 +51,20 @@ def _is_easy(row: Row, printed: Sequence[float]) -> bool:
 
 
 def counts(rows: Sequence[Row]) -> dict[str, list[Row]]:
-    """Rows that say whether they were used, by what their agreement shows: not used, used to choose, easy."""
+    """The rows that say whether they were used to choose settings, in three groups: not used, used to choose, easy."""
     told = [one for one in rows if one.get("used") is not None]
     parts = {name: [one for one in told if one["used"] == used and not one.get("easy")] for name, used in PARTS.items()}
     return {**parts, "easy": [one for one in told if one.get("easy")]} if told else {}
 
 
 def share_within(rows: Iterable[Row], judged: str = "within") -> str:
-    """ "3 of 4 agree", of the rows for which that is known."""
+    """The agreement of the rows for which it is known, such as "3 of 4 agree"."""
     known = [one[judged] for one in rows if one.get(judged) is not None]
     return f"{sum(known)} of {len(known)} agree"
 
 
 def in_short(rows: Sequence[Row]) -> Row:
-    """The lines of a summary: agreement of what was used and what was not, by both rules, and of easy cells."""
+    """The summary of agreement: of rows that were used and that were not, by both rules, and of easy ones."""
     parts = counts(rows)
     if not parts:
         return {}
@@ -77,10 +85,10 @@ def middle(rank: str) -> float:
 
 
 def ordered(groups: Iterable[Sequence[tuple[float, str]]]) -> tuple[int, int, float]:
-    """Pairs of a group that the thesis ranks differently and we order as it does, of how many, and p by chance.
+    """(right, pairs, p): of the pairs with different printed ranks, how many the measured values order alike, and p by chance.
 
-    groups: (our value, the printed rank) of what is ranked together, the best having the highest value. By chance half of
-    the pairs are right; p: that so many or more are when the values of each group are shuffled, counted exactly.
+    groups: (measured value, printed rank) of each member of a group that is ranked together; the best has the highest value.
+    p: the exact probability of at least as many right pairs if the values of each group are shuffled.
     """
     right, pairs, ways = 0, 0, {0: 1.0}  # chance of so many right pairs
     for group in groups:
@@ -101,7 +109,7 @@ def _right(values: Sequence[float], ranks: Sequence[float]) -> int:
 
 
 def ranked(rows: Sequence[Row]) -> Row:
-    """The lines of a summary about ranks, beside what chance gives; rows with `rank` and `thesis_rank`."""
+    """The summary of agreement in ranks, with the values expected by chance; rows with `rank` and `thesis_rank`."""
     groups: dict[tuple[Any, ...], list[Row]] = {}
     for one in rows:
         groups.setdefault((*_table(one), one.get("tau")), []).append(one)
@@ -117,7 +125,7 @@ def ranked(rows: Sequence[Row]) -> Row:
     }
 
 
-# ---- findings ---------------------------------------------------------------------------------------------------------
+# ---- the record, and the makers of its rows -------------------------------------------------------------------------
 
 
 # settings under their names, then measure, value, ci95, thesis, within; where known also within_errors, used, easy
@@ -125,7 +133,11 @@ def ranked(rows: Sequence[Row]) -> Row:
 
 @dataclass(frozen=True)
 class Findings:
-    """Rows as `lab study run --json` gives them, a summary, pictures (SVG) by caption, remarks, texts by file name."""
+    """The findings of a study.
+
+    rows: as `lab study run --json` prints them, see `row`; summary: by name; figures: SVG pictures by caption; notes: remarks;
+    files: texts by file name.
+    """
 
     rows: list[Row]
     summary: Row
@@ -142,9 +154,10 @@ def row(
     thesis: float | None = None,
     errors: tuple[float, float] | None = None,
 ) -> Row:
-    """One row of a study: its settings, the measured value with its interval, the printed one, whether they agree.
+    """One row of a study: the settings, then measure, value, ci95, thesis, within, and, with `errors`, within_errors.
 
-    errors: the standard errors of both, where the thesis says how many sessions it ran.
+    named: the settings by name; ci: the (low, high) 95 % interval; thesis: the printed value; errors: the standard errors of the
+    measured and of the printed value, if the thesis says how many sessions it ran.
     """
     ends = None if ci is None else [float(ci[0]), float(ci[1])]
     agrees = None if thesis is None else within(value, ends, thesis, measure)
@@ -157,7 +170,7 @@ def row(
 def share_row(
     named: Row, measure: str, success: ArrayLike, thesis: float | None = None, theirs: int | None = None
 ) -> Row:
-    """The row of how many sessions succeeded, (N,) bool, in percent; theirs: sessions of the thesis."""
+    """The row of the share [%] of sessions that succeeded; success: (N,) bool; theirs: the number of sessions of the thesis."""
     percent, *ends = share(success)
     if thesis is None or theirs is None:
         return row(named, measure, percent, ends, thesis)
@@ -169,30 +182,30 @@ def share_row(
 def mean_row(
     named: Row, measure: str, values: ArrayLike, thesis: float | None = None, theirs: float | None = None
 ) -> Row:
-    """The row of the mean of values (N,), one a session; theirs: how many such values the thesis had, spread alike."""
+    """The row of the mean of values (N,), one per session; theirs: the number of values of the thesis, assumed to vary alike."""
     mean, *ends = interval(values)
     errors = None if theirs is None else (mean_error(values), mean_error(values, theirs))
     return row(named, measure, mean, ends, thesis, errors)
 
 
 def varying_row(named: Row, measure: str, values: ArrayLike) -> Row:
-    """The row of the mean of values (N,); without an interval where nothing varies."""
+    """The row of the mean of values (N,), without an interval if they are constant."""
     found = np.asarray(values, np.float64)
     return row(named, measure, found.mean()) if np.ptp(found) <= SAME else mean_row(named, measure, found)
 
 
 def median_row(named: Row, measure: str, values: Sequence[float]) -> Row:
-    """The row of the median of a few values; its interval: the lowest and the highest."""
+    """The row of the median of a few values; its interval is their range."""
     return row(named, measure, median(values), (min(values), max(values)))
 
 
 def those(rows: Iterable[Row], **wanted: Any) -> list[Row]:
-    """The rows that have these values under these names; None: they have none."""
+    """The rows with these values under these names; None selects rows without the name."""
     return [one for one in rows if all(one.get(name) == value for name, value in wanted.items())]
 
 
 def agreement(rows: Sequence[Row]) -> Row:
-    """How many cells have a printed figure and how many lie within its bounds, in all and by measure."""
+    """The summary of agreement: how many rows have a printed figure and how many agree with it, in total and by measure."""
     compared = [one for one in rows if one["within"] is not None]
     summary: Row = {"cells": len(compared), "within": sum(one["within"] for one in compared)}
     for measure in dict.fromkeys(one["measure"] for one in compared):

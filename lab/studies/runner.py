@@ -1,7 +1,7 @@
-"""Runs the sessions that a study asks for: in this process, in several, or on a Dask cluster, always the same ones.
+"""Runs the sessions of a study in this process, in several, or on a Dask cluster, with the same results.
 
-The chance of a session depends on the study's seed and on its own setting only. A study may keep what is done in its
-folder, a line a setting, so that it is not done again.
+The randomness of a session depends only on the study's seed and on the session's own setting. A study may store finished work
+in its folder, one line per setting, so that it is not repeated.
 """
 
 import json
@@ -25,8 +25,8 @@ from lab.files import read_limited
 from lab.optional import optional
 
 STORE = "sessions.jsonl"
-BATCH = 4  # items that a worker is given at once, where there are many
-PARENT_LOOK_S = 0.2  # how often a worker looks whether its parent is still there
+BATCH = 4  # the most items that a worker is given at once
+PARENT_LOOK_S = 0.2  # the interval at which a worker checks whether its parent still runs
 Progress = Callable[[int, int], None]  # settings done, of how many
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -34,7 +34,11 @@ Result = TypeVar("Result")
 
 @dataclass(frozen=True)
 class Job:
-    """How a study is run: sessions a setting, the seed, by how many processes or on which cluster, and where it is kept."""
+    """How a study is run.
+
+    sessions: per setting; seed: of all randomness; workers: the number of processes; dask: the address of a cluster, None for
+    none; folder: stores finished work, None for nowhere; progress: called with the numbers of finished and of all settings.
+    """
 
     sessions: int = 500
     seed: int = 0
@@ -44,7 +48,7 @@ class Job:
     progress: Progress = lambda done, total: None
 
     def each(self, work: Callable[[Item], Result], items: Sequence[Item]) -> dict[Item, Result]:
-        """What `work`, a function of a module, makes of each item, done where the job says; nothing is kept in the folder."""
+        """The result of `work`, a module-level function, by item; nothing is stored in the folder."""
         wanted = list(dict.fromkeys(items))
         done: dict[Item, Result] = {}
         self.progress(0, len(wanted))
@@ -54,7 +58,7 @@ class Job:
         return {item: done[item] for item in wanted}
 
     def in_turn(self, steps: Sequence[Callable[[], Result]]) -> list[Result]:
-        """What each step comes to, one after another in this process: what is timed has a core to itself."""
+        """The result of each step, one after the other in this process, so that each has a core to itself while it is timed."""
         done: list[Result] = []
         self.progress(0, len(steps))
         for step in steps:
@@ -65,9 +69,9 @@ class Job:
     def computed(
         self, work: Callable[[Item], Result], items: list[Item], most: int = BATCH
     ) -> Iterator[tuple[Item, Result]]:
-        """Each item with what `work` makes of it, as soon as it is done; a process is handed `most` at a time at the most.
+        """(item, result) pairs, each as soon as it is finished; a process is given at most `most` items at a time.
 
-        Raises BadInput without Dask, WorkFailed when the cluster cannot be reached or is lost.
+        Raises BadInput if Dask is not installed, WorkFailed if the cluster cannot be reached or is lost.
         """
         if self.dask is not None:
             yield from _on_cluster(work, items, self.dask)
@@ -76,17 +80,17 @@ class Job:
         else:
             from joblib import Parallel, delayed
 
-            # a process that has grown is replaced, and nothing is lost
+            # joblib replaces a process that has grown too large; no work is lost
             warnings.filterwarnings("ignore", "A worker stopped while some jobs were given", UserWarning)
 
             ending: dict[str, Any] = {"initializer": _end_with_parent, "initargs": (os.getpid(),)}
-            # few items are long ones: each is shared out alone
+            # if there are few items, each of them takes long and is given out alone
             batch = min(most, max(1, len(items) // (4 * self.workers)))
             pool = Parallel(self.workers, return_as="generator", batch_size=batch, **ending)
             yield from zip(items, pool(delayed(work)(item) for item in items), strict=True)
 
     def kept(self) -> Iterator[Any]:
-        """What `keep` wrote, line by line; lines that were cut off, or are no JSON, are passed over."""
+        """The records that `keep` stored; incomplete lines and lines that are no JSON are skipped."""
         path = None if self.folder is None else self.folder / STORE
         if path is None or not path.is_file():
             return
@@ -101,27 +105,27 @@ class Job:
                 continue
 
     def kept_as(self, read: Callable[[Any], tuple[Any, Result] | None]) -> dict[Any, Result]:
-        """What `keep` wrote, as `read` understands a line: a key and what it holds, None where it is not wanted.
+        """The stored results by key; read: returns (key, result) for a record, None if it is not needed.
 
-        Lines that it cannot understand, such as another study's or damaged ones, are passed over: they are done again.
+        Records for which it fails, such as those of another study, are skipped, so that their work is repeated.
         """
-        found = {}
+        results = {}
         for entry in self.kept():
             try:
-                if (understood := read(entry)) is not None:
-                    found[understood[0]] = understood[1]
+                if (keyed_result := read(entry)) is not None:
+                    results[keyed_result[0]] = keyed_result[1]
             except (BadInput, KeyError, IndexError, TypeError, ValueError, AttributeError, OverflowError):
                 continue
-        return found
+        return results
 
     def keep(self, record: dict[str, Any]) -> None:
-        """Add a line to what the folder keeps; WorkFailed when it cannot be written."""
+        """Stores a record in the folder, if there is one. Raises WorkFailed if it cannot be written."""
         if self.folder is None:
             return
         path = self.folder / STORE
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
-            if path.is_file() and _is_cut(path):  # a line that was cut off: it is done again now
+            if path.is_file() and _is_cut(path):  # an incomplete line, whose work has just been repeated
                 os.truncate(path, read_limited(path).rfind(b"\n") + 1)
             with path.open("a", encoding="utf-8") as file:
                 file.write(json.dumps(record) + "\n")
@@ -130,34 +134,34 @@ class Job:
 
 
 def record_of(kind: type[Result], record: Any) -> Result:
-    """A dataclass from what JSON holds of it, every field as its type says. Raises ValueError for anything else."""
+    """An instance of a dataclass from its JSON values. Raises ValueError if a value does not have its field's type."""
     from pydantic import TypeAdapter
 
     return TypeAdapter(kind).validate_python(record)
 
 
 def _is_cut(path: Path) -> bool:
-    """Whether the last line of a file has no end."""
+    """Whether the last line of a file is incomplete."""
     with path.open("rb") as file:
         file.seek(max(0, path.stat().st_size - 1))
         return file.read(1) not in (b"", b"\n")
 
 
 def seeds_of(setting: Any, sessions: int, seed: int) -> NDArray[np.uint64]:
-    """The seeds (N,) of a setting's sessions, whichever dataclass it is: its own, whoever runs it."""
+    """The seeds (N,) uint64 of the sessions of a setting, a dataclass; they depend on its values and on `seed` alone."""
     digest = sha256(json.dumps(asdict(setting, dict_factory=said)).encode()).digest()
     rng = np.random.default_rng([seed, int.from_bytes(digest[:8], "big")])
     return rng.integers(2**64, size=sessions, dtype=np.uint64)
 
 
 def said(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """What seeds and stored results go by: a switch that was added later counts only where it is on."""
+    """The items of a setting that identify it; options that were added later count only if they are not at their defaults."""
     off = {"memory": False, "wrong": False, "tilings": 1, "start_value": 0.0}
     return {name: value for name, value in pairs if name not in off or value != off[name]}
 
 
 def _end_with_parent(parent: int) -> None:
-    """Ends this process soon after its parent's end, which may be a kill -9 that leaves no time to say so."""
+    """Starts a thread that ends this process soon after its parent has ended, even by kill -9."""
 
     from psutil import STATUS_ZOMBIE, NoSuchProcess, Process
 
@@ -172,6 +176,7 @@ def _end_with_parent(parent: int) -> None:
 
 
 def _on_cluster(work: Callable[[Item], Result], items: list[Item], address: str) -> Iterator[tuple[Item, Result]]:
+    """(item, result) pairs from a Dask cluster, each as soon as it is finished."""
     with optional(f"--dask {address}"):
         from distributed import Client, as_completed
     try:
@@ -184,9 +189,9 @@ def _on_cluster(work: Callable[[Item], Result], items: list[Item], address: str)
         tasks = {client.submit(work, item, pure=False): item for item in items}
         for task in as_completed(tasks):  # type: ignore[no-untyped-call]
             try:
-                found = task.result()
+                result = task.result()
             except LabError:
                 raise
             except Exception as error:  # whatever a lost worker or scheduler comes to; what is done is kept
                 raise WorkFailed(f"--dask {address}: the cluster gave up: {type(error).__name__}: {error}") from None
-            yield tasks[task], found
+            yield tasks[task], result

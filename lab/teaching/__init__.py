@@ -1,1 +1,1 @@
-"""Find a fitting skill in the toolbox, or learn it: the teacher, its sessions, and what they tell."""
+"""Lessons: a fitting skill is found in the toolbox, or learned and saved; sessions, journals and events of lessons."""

@@ -1,4 +1,4 @@
-"""What happens in a lesson and in a whole run, as records; whoever hears them is one function of an event."""
+"""The events of lessons and runs, as records; a listener is a function of an event."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -17,14 +17,15 @@ from lab.sequencing.search import EpisodeSequenced, Reference, SequenceResult
 from lab.teaching.lesson_plan import Lesson, LessonPlan
 from lab.toolbox.policy import Policy
 
-ORDER = "The order of the transfers"  # the lesson of that name in a `LessonEvent`
+ORDER = "The order of the transfers"  # the name of its lesson in a `LessonEvent`
 
 
 @dataclass(frozen=True)
 class ScenePrepared:
-    """Where the next lesson takes place, for those who show it: a prepared task, a world, None for no place at all.
+    """The place of the next lesson is ready.
 
-    problem: its own; None for a task whose skills are about to be learned one after the other.
+    scene: a prepared task or a world, None if there is no place; problem: the lesson's, None for a task whose skills are learned
+    one after the other.
     """
 
     scene: Any
@@ -33,14 +34,14 @@ class ScenePrepared:
 
 @dataclass(frozen=True)
 class LessonContinued:
-    """The next lesson goes on from a policy that was left unfinished."""
+    """The next lesson continues an unfinished policy."""
 
     unfinished: Policy
 
 
 @dataclass(frozen=True)
 class LessonBegan:
-    """A lesson begins, or begins again because an answer was taken back: what it told before is told again."""
+    """A lesson begins, or begins again because an answer was taken back; then its events are repeated."""
 
     plan: LessonPlan
     journal: Journal = field(default_factory=Journal)
@@ -48,21 +49,21 @@ class LessonBegan:
 
 @dataclass(frozen=True)
 class AdvisorGathered:
-    """Who advises in the session that begins now, several as a `Panel`."""
+    """The advisor of the next session is ready; several are a `Panel`."""
 
     advisor: Advisor | None
 
 
 @dataclass(frozen=True)
 class SessionBegan:
-    """A session of the lesson begins; its table and counts are those of the learner under way."""
+    """A session of the lesson begins; its table and counts are live."""
 
     session: Session
 
 
 @dataclass(frozen=True)
 class LessonEvent:
-    """Something happened in a session of the lesson of that name; not new: it is told again."""
+    """An event of a session of the lesson; is_new: False if it is repeated."""
 
     lesson: str
     event: session.Event
@@ -71,7 +72,7 @@ class LessonEvent:
 
 @dataclass(frozen=True)
 class QuestionAnswered:
-    """What an advisor said to a request; None: the step was left to the learner."""
+    """An advisor answered a request; action: None if the step was left to the learner."""
 
     request: Request
     action: int | None
@@ -79,7 +80,7 @@ class QuestionAnswered:
 
 @dataclass(frozen=True)
 class PhaseBegan:
-    """A phase of a run with so many parts begins."""
+    """A phase of a run begins; parts: the number of parts of the run."""
 
     name: str
     parts: int
@@ -87,14 +88,14 @@ class PhaseBegan:
 
 @dataclass(frozen=True)
 class RecordSkipped:
-    """What was kept is damaged, and was not read; or what was to be kept could not be."""
+    """A record is damaged and was not read, or could not be saved."""
 
     why: str
 
 
 @dataclass(frozen=True)
 class KeptBeside:
-    """What was learned is kept as a version of that name, but another one stays in use, and why."""
+    """The learned policy was saved as a version, but another version stays in use, and why."""
 
     name: str
     version: int
@@ -103,7 +104,7 @@ class KeptBeside:
 
 @dataclass(frozen=True)
 class PolicyAdvises:
-    """A policy of the toolbox advises in the lesson that begins now."""
+    """A policy of the toolbox advises in the next lesson."""
 
     advisor: PolicyAdvisor
 
@@ -126,7 +127,7 @@ class MoveTimed:
 
 @dataclass(frozen=True)
 class SequencingBegan:
-    """A sequencer, method, begins to try orders; gate: when it asks which part to move, None: it asks nobody."""
+    """A sequencing method begins; gate: decides when it asks which part to move, None if it asks nobody."""
 
     episodes: int
     reference: Reference | None = None
@@ -136,14 +137,14 @@ class SequencingBegan:
 
 @dataclass(frozen=True)
 class OrderLearned:
-    """How the order was learned, in words, a line each: by what, when it was found, what of it a method's bound is."""
+    """How the order was learned, in lines of text: the method, when it found the order, the bound."""
 
     lines: tuple[str, ...]
 
 
 @dataclass(frozen=True)
 class SequencingStands:
-    """What is known while orders are looked for: the best cost, inf where there is no order yet, whose it is, and the bound."""
+    """The state of the search for an order: the best cost, inf before the first order, the method that found it, the bound."""
 
     cost: float
     found_by: str
@@ -152,9 +153,10 @@ class SequencingStands:
 
 @dataclass(frozen=True)
 class SequenceFound:
-    """The best order of a sequencer's session, beside what no order can beat; None: costs were drawn. parts: how many.
+    """The best order of a session of a sequencing method.
 
-    method: by what it was found, a method's name or one of `lab.sequencing.BESIDE_METHODS`; "" where that is not said.
+    reference: the bound on the cost of any order, None if durations are random; parts: the number of parts; method: what found
+    it, the name of a method or one of `lab.sequencing.BESIDE_METHODS`, "" if unknown.
     """
 
     result: SequenceResult
@@ -165,7 +167,7 @@ class SequenceFound:
 
 @dataclass(frozen=True)
 class OrderChosen:
-    """Which of several orders is used, and what each of them costs, by a method's name or one of `BESIDE_METHODS`."""
+    """The order that is used, and the costs of all orders; keys are names of methods or `BESIDE_METHODS`."""
 
     used: str
     costs: dict[str, float]
@@ -174,7 +176,7 @@ class OrderChosen:
 
 @dataclass(frozen=True)
 class MoveMade:
-    """A part was brought on; part: what it is called."""
+    """A part was moved to its next position; part: its name."""
 
     move: Move
     part: str
@@ -182,17 +184,18 @@ class MoveMade:
 
 @dataclass(frozen=True)
 class MoveRetried:
-    """A step failed and is tried again."""
+    """A move failed and is tried again."""
 
     why: str
 
 
 @dataclass(frozen=True)
 class PlanMade:
-    """An order for the work that remains was found: its schedule, how many moves, and the proven gap (None: not known).
+    """An order for the remaining work was found.
 
-    at_s: when; the schedule's times are counted from the same beginning of the run [s], as all of a run's. why: what
-    made a new plan necessary, "" at first; method: by what the new one was found.
+    schedule: its times count from the beginning of the run [s], like at_s, the time of this event; moves: their number; gap: the
+    proven one, None if unknown; proven: whether the order is optimal; why: the reason for a new plan, "" for the first one;
+    method: what found it.
     """
 
     schedule: Schedule
@@ -206,7 +209,7 @@ class PlanMade:
 
 @dataclass(frozen=True)
 class MoveBegan:
-    """The robot sets out to bring a part on: the move's number of how many, from where it is to where it picks and drops."""
+    """The robot begins move `number` of `moves`, from `start`; origin, target: where it picks and places the part."""
 
     number: int
     moves: int
@@ -219,7 +222,7 @@ class MoveBegan:
 
 @dataclass(frozen=True)
 class SkillBegan:
-    """The robot begins with a skill; words: what it does, for people."""
+    """The robot begins a skill; words: its description for people."""
 
     name: str
     words: str
@@ -229,7 +232,7 @@ class SkillBegan:
 
 @dataclass(frozen=True)
 class MachineBegan:
-    """A machine works on a part; until_s: until when, None where that is not known before."""
+    """A machine begins to process a part; until_s: when it will finish, None if unknown."""
 
     station: str
     part: str
@@ -239,7 +242,7 @@ class MachineBegan:
 
 @dataclass(frozen=True)
 class MachineDone:
-    """A machine has finished its part."""
+    """A machine has finished a part."""
 
     station: str
     part: str
@@ -248,7 +251,7 @@ class MachineDone:
 
 @dataclass(frozen=True)
 class MachineFailed:
-    """A machine does not do what it is for."""
+    """A machine failed to process a part."""
 
     station: str
     part: str
@@ -258,7 +261,7 @@ class MachineFailed:
 
 @dataclass(frozen=True)
 class PartDone:
-    """A part stands at the end of its route."""
+    """A part has reached the end of its route."""
 
     part: str
     at_s: float
@@ -266,7 +269,7 @@ class PartDone:
 
 @dataclass(frozen=True)
 class PartLost:
-    """A part is given up."""
+    """A part was given up."""
 
     part: str
     why: str
@@ -275,7 +278,7 @@ class PartLost:
 
 @dataclass(frozen=True)
 class RunHeld:
-    """The run stands still: kind "pause", "protective" or "emergency", and who stopped it."""
+    """The run was stopped; kind: "pause", "protective" or "emergency"; by: who stopped it."""
 
     kind: str
     why: str
@@ -285,14 +288,14 @@ class RunHeld:
 
 @dataclass(frozen=True)
 class RunWentOn:
-    """The run goes on."""
+    """The run continues."""
 
     at_s: float
 
 
 @dataclass(frozen=True)
 class OperatorActed:
-    """The operator gave a command; refused: why it was not followed, "" when it was."""
+    """The operator gave a command; refused: why it was not carried out, "" if it was."""
 
     words: str
     by: str
@@ -302,7 +305,7 @@ class OperatorActed:
 
 @dataclass(frozen=True)
 class TroubleMet:
-    """Something is not as planned: what was noticed, and what is done about it."""
+    """A deviation from the plan was noticed; answer: what is done about it."""
 
     what: str
     answer: str
@@ -350,7 +353,7 @@ Tell = Callable[[Event], None]
 
 
 def told_to(*listeners: Tell) -> Tell:
-    """One listener that tells several."""
+    """A listener that passes each event to all of these."""
 
     def tell(event: Any) -> None:
         for listener in listeners:
@@ -360,4 +363,4 @@ def told_to(*listeners: Tell) -> Tell:
 
 
 def unheard(event: Event) -> None:
-    """Nobody listens."""
+    """A listener that ignores every event."""

@@ -1,4 +1,4 @@
-"""What `lab teach gym:...` teaches: the problem that a Gymnasium environment sets, and how it is learned by default."""
+"""The subject of `lab teach gym:...`: the problem of a Gymnasium environment, and default settings that suit it."""
 
 from dataclasses import dataclass, replace
 from typing import Self
@@ -18,31 +18,31 @@ from lab.tasks.record import Learned
 from lab.teaching.lesson import Subject
 from lab.teaching.lesson_options import LessonOptions
 
-CERTAIN_EPISODES = (1000, 5000)  # eight for each entry of the table, but at least and at most so many
-CHANCE_EPISODES = (5000, 20_000)  # twenty for each entry
+CERTAIN_EPISODES = (1000, 5000)  # limits on 8 episodes per entry of the table, for deterministic steps
+CHANCE_EPISODES = (5000, 20_000)  # limits on 20 episodes per entry, for stochastic steps
 CONTINUOUS = GateSettings(window=5, first_episode=10, omega=30, spare_best=True)
 
 
 class GymWorld(Learned):
-    """A Gymnasium environment, by its id and keywords, and how it is learned; made by `gym_world`."""
+    """A Gymnasium environment with its settings; `gym_world` makes it from an id and keywords."""
 
     name: str
     _environment: GymEnvironment | PhysicsEnvironment = PrivateAttr()
 
     @classmethod
     def of(cls, environment: GymEnvironment | PhysicsEnvironment, name: GymName) -> Self:
-        """The environment with the settings that fit it."""
+        """The environment with settings that suit it."""
         learner, gate = fitting(environment)
         made = cls(name=str(name), learner=learner, gate=gate)
         made._environment = environment
         return made
 
     def problem(self) -> Problem:
-        """What it sets to learn."""
+        """The problem that it poses."""
         return Problem(self.name, "gym", self._environment.mdp, self._environment)
 
     def check_members(self, where: str = "") -> None:
-        """As `Learned.check_members`; BadInput also for a learner that needs to know where each action leads."""
+        """Raises BadInput as `Learned.check_members`, and for "afterstate" if the steps are not known to be deterministic."""
         super().check_members(where)
         model = self._environment.model if isinstance(self._environment, GymEnvironment) else None
         if self.learner.learner == "afterstate" and not (model is not None and model.certain):
@@ -51,13 +51,13 @@ class GymWorld(Learned):
 
 
 def gym_world(word: str, where: str = "SUBTASK") -> GymWorld:
-    """The environment that "gym:ID?KEYWORD=VALUE&..." means. Raises BadInput in one line for whatever it cannot be."""
+    """The environment that "gym:ID?KEYWORD=VALUE&..." names. Raises BadInput if it cannot be made or is not discrete."""
     name = parse_name(word, where)
     return GymWorld.of(_own_physics(name) or GymEnvironment(NumberedEnvironment(name, where)), name)
 
 
 def _own_physics(name: GymName) -> PhysicsEnvironment | None:
-    """The lab's own form of an environment, which makes the same steps, and is compiled; None where it has none."""
+    """The lab's own compiled form of an environment, which makes the same steps; None if there is none."""
     most = name.options.get("max_episode_steps")
     own = PHYSICS.get(name.id) if set(name.options) <= {"max_episode_steps"} else None
     if own is None or (most is not None and not (isinstance(most, int) and 1 <= most <= MOST_STEPS)):
@@ -66,11 +66,10 @@ def _own_physics(name: GymName) -> PhysicsEnvironment | None:
 
 
 def fitting(environment: GymEnvironment | PhysicsEnvironment) -> tuple[LearnerSettings, GateSettings]:
-    """A learner that mostly finds the best policy alone, and a gate; the numbers come from sessions in the toy texts.
+    """Settings of a gate, and of a learner that mostly finds the optimal policy without advice; found in toy-text environments.
 
-    With several starts every state matters, not only those on the way from one: it explores for longer. Where chance has
-    a hand in steps, what an episode takes says little about the advice in it: step counts are averaged over more
-    episodes, and more misleads tolerated.
+    With several starts every state matters, so the learner explores for longer. If steps are stochastic, the steps of one episode
+    say little about its advice, so the gate averages over more episodes and tolerates more misleads.
     """
     if isinstance(environment, PhysicsEnvironment):
         return fitting_alone(environment.physics), CONTINUOUS
@@ -92,7 +91,7 @@ def _within(number: int, limits: tuple[int, int]) -> int:
 
 @dataclass
 class GymSubject(Subject):
-    """An environment with discrete states and actions; nothing of it is shown beside its table."""
+    """A Gymnasium environment as the subject of a lesson."""
 
     world: GymWorld
 
@@ -105,10 +104,10 @@ class GymSubject(Subject):
         for option, value in (("--task", options.task), ("--sight", options.view)):
             if value is not None:
                 raise BadInput(
-                    f"{option} {value}: a Gymnasium environment, '{options.subtask}', has none: leave it away"
+                    f"{option} {value}: a Gymnasium environment, '{options.subtask}', has none: remove {option}"
                 )
         return cls(options.changed(gym_world(options.subtask)))
 
     def prepare(self, seed: int) -> Problem:
-        """What the environment sets to learn."""
+        """The problem that the environment poses."""
         return self.world.problem()

@@ -1,4 +1,4 @@
-"""Advice on the order of the transfers, kept: its journal, and what is needed to go on with it or to look at it again."""
+"""Stored sessions of advice on the order of transfers: their options and journals, for resuming and replaying them."""
 
 import json
 from collections.abc import Mapping
@@ -27,7 +27,7 @@ DURATIONS = "durations.json"  # beside the journal of a run's order
 
 @dataclass(frozen=True)
 class OrderOptions(SessionOptions):
-    """The options of `lab sequence` that a session depends on, by name; None or empty: not given."""
+    """The options of `lab sequence` that a session depends on; None or empty if not given."""
 
     command = "sequence"
     wanted = "it is no advice on an order: lab teach --resume goes on with it"
@@ -52,35 +52,35 @@ class OrderOptions(SessionOptions):
     gap: float | None = None
 
     def complete(self) -> "OrderOptions":
-        """Themselves; BadInput when nothing is named to sequence."""
+        """The options themselves. Raises BadInput if they name nothing to sequence."""
         if not self.task:
             raise BadInput("nothing to sequence (TASK): name a task or a cell, or go on with --resume DIR")
         return self
 
     @property
     def asked(self) -> AdvisorName:
-        """The advisor; BadInput for a name that nobody has."""
+        """The advisor. Raises BadInput for an unknown name."""
         return AdvisorName.of(self.advisor, "--advisor")
 
     @property
     def advisors(self) -> tuple[str, ...]:
-        """All who advise, by name."""
+        """The names of all advisors."""
         return (self.advisor,)
 
     def to_json(self) -> dict[str, Any]:
-        """A plain dict, files by their whole paths, so that they are found from another folder."""
+        """A plain dict with absolute paths, which are valid from any folder."""
         beside = {"layout": self.layout, "policy": self.policy}
         whole = {name: None if path is None else str(Path(path).absolute()) for name, path in beside.items()}
         return asdict(self) | {"task": whole_path(self.task)} | whole
 
     @property
     def beside(self) -> Asked:
-        """What is asked for beside a file."""
+        """The options that apply to an instance file."""
         return Asked(None if self.layout is None else Path(self.layout), self.robots, self.case)
 
 
 class OrderSession(SessionInFolder):
-    """A session of `lab sequence`: a new one, or (`read`) one that is gone on with or, `read_only`, looked at again."""
+    """A session of `lab sequence`: a new one, or a stored one (`read`) that is resumed or replayed (`read_only`)."""
 
     def __init__(
         self,
@@ -91,7 +91,7 @@ class OrderSession(SessionInFolder):
         read_only: bool = False,
         durations: Mapping[str, Any] | None = None,
     ) -> None:
-        """durations: those that a run plans with, of a new session; they are kept beside its journal."""
+        """durations: for a new session of a run, those that the run plans with; they are stored beside the journal."""
         self.options: OrderOptions = options
         self._durations = durations
         self.read = read
@@ -99,7 +99,7 @@ class OrderSession(SessionInFolder):
         self.folder = None if read is None else read.path.parent
 
     def durations(self) -> Mapping[str, Any] | None:
-        """How long a run's moves take, in which its order was advised; None: as measured. BadInput for a damaged file."""
+        """The durations that a run plans with, None for measured ones. Raises BadInput for a damaged file."""
         if self._durations is not None or self.folder is None or not (self.folder / DURATIONS).exists():
             return self._durations
         try:
@@ -111,7 +111,7 @@ class OrderSession(SessionInFolder):
         return found
 
     def keep(self, cell: Cell, objective: str) -> Journal:
-        """The journal, once the cell is known; BadInput when it is not the kept session's any more."""
+        """The journal, once the cell is known. Raises BadInput if the cell is not that of the stored session."""
         signature, read = signature_of(cell, objective), self.read
         if read is None:
             name = f"order of {Path(self.options.task).stem}"
@@ -131,13 +131,13 @@ class OrderSession(SessionInFolder):
 
 
 def kept_order(folder: Path, where: str, toolbox: Toolbox, *, read_only: bool = False) -> OrderSession:
-    """A session of `lab sequence` that was kept. Raises BadInput for anything else."""
+    """A stored session of `lab sequence`. Raises BadInput for anything else."""
     read, options = read_session(folder, where, OrderOptions)
     return OrderSession(options, toolbox, read, read_only=read_only)
 
 
 def gone_on(given: OrderOptions, folder: Path, toolbox: Toolbox) -> OrderSession:
-    """The session that --resume names; BadInput when it is over, and for options beside it."""
+    """The session that --resume names. Raises BadInput if it has ended, and for further options."""
     read, options = read_session(folder, "--resume", OrderOptions)
     check_same(given, read)
     return OrderSession(options, toolbox, read)

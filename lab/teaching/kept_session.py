@@ -1,4 +1,4 @@
-"""Sessions kept in folders: where a journal is written, how a session goes on, and how it is looked at again."""
+"""Sessions in folders: new ones with their journals, and stored ones that are resumed or replayed."""
 
 import json
 import os
@@ -27,14 +27,14 @@ from lab.toolbox.policy_file import encode
 from lab.toolbox.registry import Toolbox
 
 _MOST = 100_000  # sessions of one name
-MOST_VALUES = 3_000_000  # a larger table's optimal values take too long to know
+MOST_VALUES = 3_000_000  # entries of a table; the optimal values of larger ones take too long to compute
 Options = TypeVar("Options", bound=SessionOptions)
 
 
 class SessionInFolder:
-    """What all sessions know that are kept in folders, about a table or about an order.
+    """The base class of sessions in folders, about a table or about an order.
 
-    folder, journal: None until it has begun; plan: None of an order; read: the journal as it was found, None of a new
+    folder, journal: None before the session begins; plan: None for an order; read: the journal that was read, None for a new
     session.
     """
 
@@ -45,15 +45,15 @@ class SessionInFolder:
     read: Read | None = None
 
     def receipt(self) -> Receipt:
-        """What the advice was worth; of an order nobody knows the values."""
+        """The receipt for the advice; for an order the optimal values are unknown."""
         if self.plan is None or self.journal is None:
             return receipt([] if self.journal is None else self.journal.entries, None, None, certain=False)
         return receipt_of(self.plan, self.journal, known_values(self.plan))
 
     def worth(self) -> dict[str, Any]:
-        """Where it is kept, and its receipt, which is written beside the journal; nothing where nothing is kept.
+        """The folder and the receipt, which is written beside the journal; {} if nothing is stored.
 
-        Raises BadInput when the journal is gone, or the receipt cannot be written.
+        Raises BadInput if the journal has been removed, or if the receipt cannot be written.
         """
         if self.folder is None or self.journal is None:
             return {}
@@ -64,7 +64,7 @@ class SessionInFolder:
         return {"session": str(self.folder), "receipt": made.to_json() | {"lines": made.lines()}}
 
     def resume_command(self, toolbox: Toolbox) -> str:
-        """What goes on with it; "" when there is nothing to go on with."""
+        """The end of a message that names the command to resume the session; "" if there is nothing to resume."""
         if self.folder is None or self.journal is None:
             return ""
         box = "" if toolbox.address == default_address() else f" --toolbox {quote(toolbox.address)}"
@@ -88,7 +88,7 @@ class SessionInFolder:
 
 
 def read_session(folder: Path, where: str, kind: type[Options]) -> tuple[Read, Options]:
-    """The journal in a folder, and the options that its session was begun with. BadInput for another command's."""
+    """The journal in a folder and the options of its session. Raises BadInput if it is another command's."""
     read = read_journal(folder, where)
     which = f"journal '{read.path}' ({where})"
     if read.session.command != kind.command:
@@ -97,18 +97,18 @@ def read_session(folder: Path, where: str, kind: type[Options]) -> tuple[Read, O
 
 
 def kept_journal(read: Read, read_only: bool) -> Journal:
-    """The journal of a kept session, which answers until it is used up."""
+    """The journal of a stored session, which answers for people up to its last entry."""
     return Journal(None, read.effective(), True, read.path) if read_only else Journal.resume(read)
 
 
 def receipt_of(plan: LessonPlan, journal: Journal, values: FloatArray | None) -> Receipt:
-    """What the advice in a lesson was worth so far; values: its problem's optimal ones, None where they are not known."""
+    """The receipt for the advice in a lesson so far; values: the optimal ones (S, A), None if unknown."""
     problem = plan.problem
     return receipt(journal.entries, problem.mdp, values, plan.gate.window, certain=problem.environment is None)
 
 
 def known_values(plan: LessonPlan) -> FloatArray | None:
-    """The optimal action values of a lesson's problem, None where they cannot be known."""
+    """The optimal action values of a lesson's problem, None if they cannot be computed."""
     problem, mdp = plan.problem, plan.problem.mdp
     if mdp.n_states * mdp.n_actions > MOST_VALUES:
         return None
@@ -119,14 +119,14 @@ def known_values(plan: LessonPlan) -> FloatArray | None:
 
 
 class NewSession(SessionInFolder):
-    """A session's journal in a folder, or, without one, in the toolbox's folder `sessions`; made when the lesson begins."""
+    """A new session in a folder, by default in the toolbox's folder `sessions`; its journal is created when the lesson begins."""
 
     def __init__(self, folder: Path | None, toolbox: Toolbox, options: LessonOptions):
         self._wanted, self._toolbox = folder, toolbox
         self.options: LessonOptions = options
 
     def keep(self, plan: LessonPlan) -> Journal:
-        """The journal of a lesson. Raises BadInput when the folder holds a session already."""
+        """The journal of a lesson. Raises BadInput if the folder already holds a session."""
         self.plan, problem = plan, plan.problem
         self.folder = claimed(self._toolbox, problem.name, Path.mkdir) if self._wanted is None else self._wanted
         if plan.begins_from is not None:
@@ -144,13 +144,13 @@ class NewSession(SessionInFolder):
         self.journal = Journal.begin(self.folder, head)
         if self._wanted is not None:
             target = self.folder.resolve()
-            with suppress(BadInput):  # where links cannot be made, it is only not listed
+            with suppress(BadInput):  # without a link the session is merely not listed
                 claimed(self._toolbox, problem.name, lambda place: place.symlink_to(target, target_is_directory=True))
         return self.journal
 
 
 def claimed(toolbox: Toolbox, name: str, make: Callable[[Path], None]) -> Path:
-    """A new place for a session of this problem; what two commands make at a time, only one of them gets."""
+    """A new folder for a session of this problem, made by `make`; no two processes get the same one."""
     plain = slug(name.lower().replace(" ", "-"))
     for number in range(1, _MOST):
         folder = toolbox.folder / SESSIONS / f"{plain}-{number}"
@@ -166,9 +166,10 @@ def claimed(toolbox: Toolbox, name: str, make: Callable[[Path], None]) -> Path:
 
 
 class KeptSession(SessionInFolder):
-    """A session that was kept: to go on with it, or (`read_only`) to look at it again. Raises BadInput for none.
+    """A stored session, to be resumed or replayed (`read_only`). Raises BadInput if there is none.
 
-    trusted: modules that the session may name: it may be somebody else's, and code runs when one is imported.
+    where: the option that names it, for messages; trusted: the modules that the session may import: it may come from somebody
+    else, and importing a module runs its code.
     """
 
     options: LessonOptions
@@ -180,7 +181,7 @@ class KeptSession(SessionInFolder):
         self._read_only, self.where, self.trusted = read_only, where, trusted
 
     def keep(self, plan: LessonPlan) -> Journal:
-        """The journal, which answers until it is used up. Raises BadInput when the problem is not the same any more."""
+        """The journal, which answers up to its last entry. Raises BadInput if problem or settings have changed."""
         self.plan, problem = plan, plan.problem
         head = self.read.session
         if head.signature != problem.mdp.signature:
@@ -202,14 +203,14 @@ class KeptSession(SessionInFolder):
         return self.journal
 
     def same(self, given: LessonOptions) -> LessonOptions:
-        """The options of the session; BadInput when the command names others, and when the session is over."""
+        """The options of the session. Raises BadInput if the command names others, or if the session has ended."""
         check_same(given, self.read)
         return self.options
 
     def begun(self, problem: Problem) -> Policy | None:
-        """The policy that the session went on from when it began, or of another problem, was warm-started from.
+        """The policy that the session continued or was warm-started from, None if it began anew.
 
-        Raises BadInput when it is not there any more.
+        Raises BadInput if that policy is missing.
         """
         name = self.read.session.continues
         if not name:
@@ -222,13 +223,13 @@ class KeptSession(SessionInFolder):
 
 
 def check_same(given: Any, read: Read) -> None:
-    """BadInput when a command that goes on with a session names options, too, or when the session is over."""
+    """Raises BadInput if a command that resumes a session also names options, or if the session has ended."""
     check_alone(given, type(given)(), read.path.parent)
     read.check_goes_on()
 
 
 def check_alone(given: Any, nothing: Any, folder: Path) -> None:
-    """BadInput when options were given beside --resume; `nothing`: what they are when none is."""
+    """Raises BadInput if options were given beside --resume; nothing: the options at their defaults."""
     for name, value in asdict(given).items():
         if value != getattr(nothing, name):
             option = given.typed.get(name, f"--{name}")
@@ -236,7 +237,7 @@ def check_alone(given: Any, nothing: Any, folder: Path) -> None:
 
 
 def check_new(folder: Path) -> None:
-    """Raises BadInput when a folder (--out) holds a session: what is kept in it would mean another lesson."""
+    """Raises BadInput if a folder (--out) holds a session, because its files would belong to another lesson."""
     path = folder / FILE
     if not os.path.lexists(path) or is_unbegun(path):
         return

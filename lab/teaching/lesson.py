@@ -1,4 +1,4 @@
-"""One lesson of one session in a subject, with its journal, its receipt and its pictures; and one shown again."""
+"""A lesson of one session: journal, receipt, pictures and document; and the replay of a stored lesson."""
 
 from dataclasses import replace
 from functools import partial
@@ -22,10 +22,10 @@ from lab.toolbox.registry import Toolbox
 
 
 class Subject(Protocol):
-    """What a lesson is about; it is made when its options are known to be right, before anything is surveyed.
+    """The subject of a lesson. It is made, with checked options, before anything is surveyed.
 
-    name: of the task, the world or the environment that the policy is kept under; settings: how it is learned; region
-    (S,): where advice is heard, None: everywhere; scene: where it takes place, for those who show it.
+    name: of the task, world or environment, which the policy is saved under; settings: of learner and gate; region: (S,) bool,
+    the states in which advice counts, None for all; scene: the place, for displays.
     """
 
     name: str
@@ -34,28 +34,28 @@ class Subject(Protocol):
     scene: object = None
 
     def prepare(self, seed: int) -> Problem:
-        """Survey what there is to learn; BadInput when it cannot be learned."""
+        """The problem, which is surveyed now. Raises BadInput if it cannot be learned."""
 
     def tried(self, problem: Problem, policy: Policy) -> str | None:
-        """Try in physics what was learned: why it failed, None when it did not, or where nothing is simulated."""
+        """Tries the policy in physics; returns why it failed, None if it did not, or if there is no simulation."""
         return None
 
     def draw(self, policy: Policy, out: Path) -> dict[str, str]:
-        """Pictures beside the learning curve: their files, by name."""
+        """Draws pictures other than the learning curve into the folder `out`; returns their files by name."""
         return {}
 
     def facts(self) -> dict[str, Any]:
-        """What the lesson's document says of it beside the rest."""
+        """Further items for the lesson's document."""
         return {}
 
 
 def teach(
     subject: Subject, options: LessonOptions, teacher: Teacher, out: Path | None, kept: KeptSession | None = None
 ) -> dict[str, Any]:
-    """The session that these options ask for, or `kept` gone on with, with its journal; the document of `lab teach --json`.
+    """The document of `lab teach --json`, after a new session with these options, or after the stored one `kept`, resumed.
 
-    Pictures and the receipt go to `out`. Raises BadInput for bad options, WorkFailed, and Interrupted, which says how to
-    go on.
+    Pictures and the receipt are written to `out`. Raises BadInput for bad options, WorkFailed, and Interrupted, whose text says
+    how to resume.
     """
     check_name(options.save)
     if kept is None and out is not None:
@@ -76,19 +76,18 @@ def teach(
         raise Interrupted(f"{what}{session.resume_command(teacher.toolbox)}") from None
     try:
         return document | session.worth()
-    except BadInput as error:  # the policy is kept by now
+    except BadInput as error:  # the policy has been saved already
         return document | {"missing": [*document.get("missing", []), str(error)]}
 
 
 def one_lesson(
     subject: Subject, teacher: Teacher, name: str | None = None, out: Path | None = None, sessions: int = 1
 ) -> dict[str, Any]:
-    """One session in a subject; the policy is kept. Returns the document of `lab teach --json` without a receipt.
+    """The document of `lab teach --json`, without a receipt, after one session whose policy is saved.
 
-    It goes on from an unfinished policy of the same problem, if there is one. A skill that is tried in physics counts as
-    solved when that succeeds, too; `failure` says why it did not; `missing`, why a picture could not be drawn.
-    sessions: those of the run that the lesson belongs to.
-    BadInput when the policy called `name` is of another problem.
+    The session continues an unfinished policy of the same problem, if there is one. A skill that is tried in physics counts as
+    solved only if that succeeds; `failure` says why it did not, and `missing` why a picture could not be drawn.
+    sessions: those of the run that the lesson belongs to. Raises BadInput if the policy called `name` is of another problem.
     """
     teacher, plan = planned(subject, teacher, name, sessions)
     problem, lesson = plan.problem, teacher.one_session(plan)
@@ -99,7 +98,7 @@ def one_lesson(
     for draw in (partial(_draw_curve, problem.name), subject.draw):
         try:
             document["files"] |= draw(lesson.policy, out)
-        except (OSError, LabError) as error:  # the policy is kept by now
+        except (OSError, LabError) as error:  # the policy has been saved already
             missing.append(str(error))
     return document | ({"missing": missing} if missing else {})
 
@@ -107,27 +106,27 @@ def one_lesson(
 def planned(
     subject: Subject, teacher: Teacher, name: str | None = None, sessions: int = 1
 ) -> tuple[Teacher, LessonPlan]:
-    """What is surveyed now and is to be learned, and the teacher of this subject, whose `one_session` learns it."""
+    """The teacher for this subject, and the plan of the lesson, which is surveyed now; `Teacher.one_session` carries it out."""
     check_name(name)
     problem = subject.prepare(teacher.seed)
     teacher.tell(ScenePrepared(subject.scene, problem))
     teacher = replace(teacher, advising=replace(teacher.advising, region=subject.region), trial=subject.tried)
-    how = subject.settings
-    return teacher, LessonPlan(problem, how.learner, how.gate, subject.name, name=name, sessions=sessions)
+    settings = subject.settings
+    return teacher, LessonPlan(problem, settings.learner, settings.gate, subject.name, name=name, sessions=sessions)
 
 
 def replay(kept: KeptSession, subject: Subject, tell: Tell) -> dict[str, Any]:
-    """Tells a kept session again, each question with its answer; nothing is learned or written.
+    """The document of `lab replay --json`, after the events of a stored session were repeated; nothing is written.
 
-    Returns the document of `lab replay --json`. Raises KeyboardInterrupt on Ctrl-C.
+    tell: receives the events. Raises KeyboardInterrupt on Ctrl-C.
     """
     options = kept.options
-    advising = options.advising(dict.fromkeys(PEOPLE, _nobody))  # the journal answers for them
+    advising = options.advising(dict.fromkeys(PEOPLE, _nobody))  # the journal answers for people
     with TemporaryDirectory() as folder:
         teacher = Teacher(Toolbox(folder), advising, options.seed, tell, keep=kept.keep, begun=kept.begun)
         try:
             one_lesson(subject, teacher, options.save, sessions=options.sessions or 1)
-        except Interrupted:  # by the journal's end, when it was not over, or by Ctrl-C
+        except Interrupted:  # at the end of an unfinished journal, or by Ctrl-C
             if kept.journal is None or kept.journal.folding:
                 raise KeyboardInterrupt from None
     return kept.replayed()

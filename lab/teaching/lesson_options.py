@@ -1,4 +1,4 @@
-"""The options of a session as one record: typed by a person, or read from a journal's head."""
+"""The options of a session as one record, from the command line or from the head of a journal."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
@@ -20,10 +20,9 @@ Settings = TypeVar("Settings", bound=Learned)
 
 
 class SessionOptions:
-    """What the options of every command have that keeps a session; a journal holds them by name.
+    """The base class of the options of commands that store a session; a journal holds them by name.
 
-    command: whose they are; wanted: what is said of a session of another one; typed: the options that are called
-    otherwise than their fields.
+    command: the command; wanted: the error text for a session of another command; typed: option by field, where names differ.
     """
 
     command: ClassVar[str]
@@ -33,7 +32,7 @@ class SessionOptions:
 
     @classmethod
     def from_json(cls, record: dict[str, Any], where: str) -> Self:
-        """What `to_json` wrote; BadInput, naming where it stands, for anything else."""
+        """The options that `to_json` wrote. Raises BadInput, which names `where`, for anything else."""
         from pydantic import TypeAdapter, ValidationError
 
         try:
@@ -44,12 +43,12 @@ class SessionOptions:
 
 
 def whole_path(name: str | None) -> str | None:
-    """The whole path of a file, so that it is found from another folder; any other name is itself."""
+    """The absolute path of an existing file; any other name unchanged."""
     return str(Path(name).absolute()) if name is not None and names_file(name) and is_file(name) else name
 
 
 def recorded_whole(advisor: str) -> str:
-    """An advisor's name; one that was recorded, or a policy's file, by its whole path."""
+    """An advisor's name, in which the path of a record or of a policy's file is absolute."""
     kind, _, path = advisor.partition(":")
     is_path = path and (kind == "recorded" or (kind == "policy" and is_file(path)))
     return f"{kind}:{Path(path).absolute()}" if is_path else advisor
@@ -57,10 +56,10 @@ def recorded_whole(advisor: str) -> str:
 
 @dataclass(frozen=True)
 class LessonOptions(SessionOptions):
-    """The options of `lab teach` that a session depends on, by name; None or empty: not given.
+    """The options of `lab teach` that a session depends on; None or empty if not given.
 
-    view: where in a world the advisor sees (--sight); toasts, parts and sessions: how many parts, and at most
-    how many sessions, the lesson of a `lab run` had.
+    view: where in a world the advisor sees (--sight); toasts, parts, sessions: for a lesson of `lab run`, the order, and the
+    limit on sessions.
     """
 
     command = "teach"
@@ -89,21 +88,20 @@ class LessonOptions(SessionOptions):
     sessions: Annotated[int, Ge(1), Le(MAX_SESSIONS)] | None = None
 
     def complete(self) -> "LessonOptions":
-        """With the advisor that is asked when none is named; BadInput when nothing is named to learn."""
+        """The options with the default advisor filled in. Raises BadInput if they name nothing to learn."""
         if not self.subtask:
             raise BadInput("nothing to learn (SUBTASK): name a sub-task, a world or gym:ID, or go on with --resume DIR")
         return replace(self, advisors=self.advisors or DEFAULT_ADVISORS)
 
     def changed(self, settings: Settings) -> Settings:
-        """How something is learned, with what these options say; BadInput for an unknown learner or gate."""
+        """The settings, changed by these options. Raises BadInput for an unknown learner or gate."""
         return settings.changed(learner=self.learner, gate=self.gate, episodes=self.episodes, memory=self.memory)
 
     def advising(self, people: Mapping[str, Ask] | None = None) -> Advising:
-        """Who advises, with the people behind such names as "terminal"."""
+        """The advisors; people: the functions that ask the people behind names such as "terminal"."""
         return Advising.of(self.advisors, people, self.asked, self.decide)
 
     def to_json(self) -> dict[str, Any]:
-        """A plain dict, files by their whole paths, so that they are found from another folder."""
-
+        """A plain dict with absolute paths, which are valid from any folder."""
         changed = {"subtask": whole_path(self.subtask), "task": whole_path(self.task)}
         return asdict(self) | changed | {"advisors": [recorded_whole(name) for name in self.advisors]}

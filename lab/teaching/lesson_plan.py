@@ -1,4 +1,4 @@
-"""What a lesson teaches and what comes of it: the records that teacher, sessions and listeners hand on."""
+"""The plan and the result of a lesson, which teacher, sessions and listeners share."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,15 +12,16 @@ from lab.toolbox.fitness import Fitness
 from lab.toolbox.policy import Policy
 
 Source = Literal["learned", "reused", "continued", "adapted"]
-MAX_SESSIONS = 20  # to reach the goal at all; further sessions go on from the table of the one before
+MAX_SESSIONS = 20  # the limit on sessions for reaching the goal; each continues the table of the one before
 
 
 @dataclass(frozen=True)
 class LessonPlan:
-    """What a lesson teaches, to which learner with which gate, and the task, world or environment that it is kept under.
+    """The plan of a lesson.
 
-    unfinished: a policy of this very problem that is learned on; warm: one of another problem that the table is begun
-    from; name: what the policy is saved as, None: a free name; sessions: at most so many.
+    problem, learner, gate: what is learned, and how; task: the name of the task, world or environment, which the policy is saved
+    under; unfinished: a policy of exactly this problem to continue; warm: a policy of another problem to warm-start from; name:
+    of the saved policy, None for a free name; sessions: the limit.
     """
 
     problem: Problem
@@ -34,19 +35,20 @@ class LessonPlan:
 
     @property
     def begins_from(self) -> Policy | None:
-        """The policy whose table it begins with, None: it begins with zeros."""
+        """The policy whose table the lesson begins with, None if it begins anew."""
         return self.unfinished or self.warm
 
 
 @dataclass(frozen=True)
 class Lesson:
-    """A taught skill: its policy with all its history, where that came from, and the sessions now (None when reused).
+    """The result of a lesson.
 
-    failure: why it failed when it was tried in physics, None when it did not, or was not tried. Of a lesson of a run also
-    reason: why it is reused, adapted or learned; parent: the policy that an adapted one was begun from; fitness: what was
-    judged of that, of the one that is reused though it was learned for another problem, or of the best one that was
-    refused; saved: how many episodes and helped steps fewer than the policy took that was found, or one session from
-    nothing, if that is more; other_arm: the one that the found policy was learned with, "" when it is this task's own.
+    policy: with its whole history; source: where it came from; result: of the sessions now, None if it was reused.
+    failure: why it failed in physics, None if it did not or was not tried.
+    In the lessons of a run also: reason: why the policy is reused, adapted or learned; parent: the policy that an adapted one was
+    warm-started from; fitness: of that parent, of a reused policy of another problem, or of the best refused one; saved: how many
+    fewer episodes and helped steps this took than the found policy, or than a session from nothing if that is more; other_arm:
+    the arm that the found policy was learned with, "" if it is this task's.
     """
 
     policy: Policy
@@ -61,22 +63,22 @@ class Lesson:
 
     @property
     def steps(self) -> tuple[int | None, int | None]:
-        """Those of the greedy way in this problem, and the fewest."""
+        """(steps, fewest): of the greedy path in this problem, and the fewest possible; None if missing or unknown."""
         if self.source == "reused" and self.fitness is not None:
             return self.fitness.moves, self.fitness.fewest
         return self.policy.final_steps, self.policy.optimal_steps
 
     @property
     def from_task(self) -> str:
-        """The task whose policy is reused, or was adapted; "" where it was learned from nothing, or here before."""
+        """The task whose policy is reused or was adapted; "" for none."""
         if self.source == "reused":
             return self.policy.task
         return "" if self.parent is None else self.parent.task
 
 
 class Interrupted(KeyboardInterrupt):
-    """Ctrl-C: what was learned so far has been kept, and the text says so."""
+    """Ctrl-C ended a lesson; what was learned has been saved, and the text says so."""
 
 
-Keep = Callable[[LessonPlan], Journal]  # gives a lesson its journal
-Trial = Callable[[Problem, Policy], str | None]  # tries in physics what was learned: why it failed, or None
+Keep = Callable[[LessonPlan], Journal]  # returns the journal of a lesson
+Trial = Callable[[Problem, Policy], str | None]  # tries a policy in physics; returns why it failed, or None

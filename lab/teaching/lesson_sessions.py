@@ -1,4 +1,4 @@
-"""The sessions of one lesson, taken as one: each goes on from the best table so far, and tells what happens."""
+"""The sessions of one lesson: each continues the best table so far; together they give one result."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -24,9 +24,9 @@ from lab.teaching.lesson_plan import LessonPlan
 from lab.toolbox.fitness import warm_start
 from lab.toolbox.policy import Policy
 
-MORE_SESSIONS = 8  # to find a shorter way once the goal is reached
+MORE_SESSIONS = 8  # the limit on sessions for a shorter path, once the goal is reached
 WARM_EPISODES = 29  # of a session that begins from what was learned elsewhere
-WARM_EXPLORATION = 0.1  # of what a beginner explores: what was learned elsewhere is to be tried, not forgotten
+WARM_EXPLORATION = 0.1  # of the usual exploration, so that what was learned elsewhere is tried, not forgotten
 
 
 class Sessions:
@@ -47,14 +47,15 @@ class Sessions:
         self.plan, self.advising, self.journal, self.tell = plan, advising, journal, tell
         self.place = plan.problem.environment or TableEnvironment(plan.problem.mdp)
         self.gate = replace(plan.gate, judge_unhelped=False) if advising.records else plan.gate
-        before = 0 if plan.unfinished is None else len(plan.unfinished.curve)  # what did not help is not drawn again
+        # Part of the seed, so that a continued lesson draws other numbers.
+        before = 0 if plan.unfinished is None else len(plan.unfinished.curve)
         self.rng = np.random.default_rng([seed, crc32(plan.problem.name.encode()), before])
         self.alone = False  # the advisor left or was rejected: nobody is asked about this skill again
-        mdp = plan.problem.mdp  # one session is not followed by another
+        mdp = plan.problem.mdp  # only needed if further sessions may follow
         self.fewest = float(fewest_moves(mdp)[list(mdp.starts)].sum()) if mdp.starts and plan.sessions > 1 else inf
 
     def run(self) -> SessionResult:
-        """The curves of all sessions, with the best table of these and of the unfinished policy. Raises Again."""
+        """The result of all sessions: their curves, and the best table, that of the unfinished policy included. Raises Again."""
         plan, several, unfinished = self.plan, self.plan.sessions > 1, self.plan.unfinished
         whole = None if plan.warm is None else self._alone(plan.warm)
         kept: SessionResult | Policy | None = unfinished or whole
@@ -86,7 +87,7 @@ class Sessions:
         return replace(whole, q=kept.q, final_steps=kept.final_steps, solved=kept.solved)
 
     def _begun(self, learner: LearnerSettings, advisor: Advisor | None, q0: FloatArray | None) -> Session:
-        """A session that begins from a table (S, A), told of."""
+        """A session that begins from a table (S, A); reports its begin."""
         session = Session(self.place, learner, self.gate, advisor, self.rng, q0)
         self.tell(SessionBegan(session))
         return session
@@ -121,7 +122,7 @@ def optimistic(mdp: TabularMDP, tried: BoolArray, discount: float) -> FloatArray
 
 
 class TellingAdvisor:
-    """An advisor whose answers are told."""
+    """An advisor whose answers are reported as events."""
 
     def __init__(self, advisor: Advisor, tell: Tell):
         self._advisor, self._tell = advisor, tell
@@ -140,7 +141,7 @@ def fits(q: FloatArray, problem: Problem, learner: LearnerSettings) -> bool:
 
 
 def moves_to_goal(q: FloatArray, problem: Problem, learner: LearnerSettings) -> float:
-    """The moves of the greedy paths from the problem's starts, together; infinite when one of them misses the goal."""
+    """The total moves of the greedy paths from all starts, inf if one of them misses the goal."""
     if problem.environment is not None:
         steps = problem.environment.judge(q, learner).final_steps
         return inf if steps is None else steps
@@ -152,7 +153,7 @@ def moves_to_goal(q: FloatArray, problem: Problem, learner: LearnerSettings) -> 
 
 
 def joined(before: SessionResult | Policy | None, now: SessionResult) -> SessionResult:
-    """A session with the history of what it went on from before it: curves one after the other, counts added."""
+    """The result of a session, joined to the history that it continued: curves are concatenated, counts added."""
     if before is None:
         return now
     steps = before.curve if isinstance(before, Policy) else before.steps

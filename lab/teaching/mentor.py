@@ -1,4 +1,4 @@
-"""A mentor for policies of any origin: at each step whether to ask somebody, and why, calibrated by a few episodes."""
+"""`lab.watch`: a mentor for any policy, which decides at each step whether to ask, and why, calibrated on a few episodes."""
 
 from collections import Counter
 from collections.abc import Callable, Hashable, Iterable, Sequence
@@ -10,23 +10,23 @@ import numpy as np
 
 from lab.errors import BadInput, unknown
 
-Policy = Callable[[Any], Any]  # an observation to an action, or to what each action is worth
+Policy = Callable[[Any], Any]  # a function from an observation to an action, or to a value per action
 
 
 class Predicts(Protocol):
-    """A policy as those of Stable-Baselines3 are."""
+    """The interface of the policies of Stable-Baselines3."""
 
     def predict(self, observation: Any) -> Any:
-        """The action, and what else it keeps."""
+        """The action, or a tuple that begins with it."""
 
 
-Step = tuple[Any, bool]  # an observation, and whether what the policy would do there is right
-DECIMALS = 1  # of an observation's numbers, where visits are counted
+Step = tuple[Any, bool]  # an observation, and whether the policy's action there is right
+DECIMALS = 1  # to which the numbers of observations are rounded for counting visits
 
 
 @dataclass(frozen=True)
 class Look:
-    """A step as its mentor sees it: the policy's action, whether to ask, how doubtful it is (more is worse), and why."""
+    """The mentor's view of a step: the policy's action, whether to ask, the doubt (0 to 1), and why."""
 
     action: int
     asks: bool
@@ -35,21 +35,21 @@ class Look:
 
 
 def margin(values: Sequence[Sequence[float]]) -> float:
-    """How little the best action is ahead of the second, as a share of the values' width; 1: not at all."""
+    """1 minus the lead of the best action over the second, as a share of the span of the values; 1 for no lead."""
     ordered = sorted(values[0])
     width = ordered[-1] - ordered[0]
     return 1.0 - (ordered[-1] - ordered[-2]) / width if width > 0.0 else 1.0
 
 
 def entropy(values: Sequence[Sequence[float]]) -> float:
-    """The entropy of the values as chances (or of their softmax, where they are none), as a share of the most there can be."""
+    """The entropy of the values as probabilities (of their softmax if they are none), as a share of its maximum."""
     row = np.asarray(values[0], np.float64)
     chances = row if row.min() >= 0.0 and abs(row.sum() - 1.0) < 1e-6 else _softmax(row)
     return float(-sum(p * log(p) for p in chances.tolist() if p > 0.0) / log(len(row)))
 
 
 def disagreement(values: Sequence[Sequence[float]]) -> float:
-    """The share of an ensemble that would do something else than most of it would."""
+    """The share of an ensemble that disagrees with its majority action."""
     best = Counter(int(np.argmax(row)) for row in values)
     return 1.0 - best.most_common(1)[0][1] / len(values)
 
@@ -69,11 +69,10 @@ NAMES = (*RULES, VISITS, CIRCLES)
 
 
 class Watched:
-    """A policy with a mentor: called with an observation it says what to do, and whether to ask (see `Look`).
+    """A policy with a mentor; a call with an observation returns a `Look`: the action, and whether to ask.
 
-    `begin` tells it that an episode begins, which the rule "circles" needs to know.
-
-    Raises BadInput for an unknown rule, an ensemble with another rule or a rule that the policy's answers do not serve.
+    `begin` has to be called at the begin of each episode for the rule "circles".
+    Raises BadInput for an unknown rule, and for a rule that does not fit the policy or its answers.
     """
 
     def __init__(
@@ -93,20 +92,22 @@ class Watched:
         if rule == VISITS and not self._visits:
             raise BadInput("rule 'visits' (watch): nothing was seen: give seen=, the observations of its training")
 
-        self._met = Counter[Hashable]()  # in this episode
+        self._met = Counter[Hashable]()  # observations of this episode
 
     def begin(self) -> None:
-        """An episode begins."""
+        """Begins an episode."""
         self._met.clear()
 
     def __call__(self, observation: Any) -> Look:
-        """The step at an observation."""
+        """The mentor's view of the step at an observation."""
         self._met[_key(observation)] += 1
-        answers = [one(observation) for one in self._policies]
+        answers = [policy(observation) for policy in self._policies]
         doubt = self._doubt(observation, answers)
         asks = doubt > self.threshold
-        way = "above" if asks else "no more than"
-        return Look(_action(answers), asks, doubt, f"{self.rule}: its doubt is {doubt:.2f}, {way} {self.threshold:.2f}")
+        relation = "above" if asks else "no more than"
+        return Look(
+            _action(answers), asks, doubt, f"{self.rule}: its doubt is {doubt:.2f}, {relation} {self.threshold:.2f}"
+        )
 
     def _doubt(self, observation: Any, answers: list[Any]) -> float:
         if self.rule == CIRCLES:
@@ -125,10 +126,10 @@ class Watched:
     def calibrate(
         self, episodes: Iterable[Iterable[Step]], share: float | None = None, caught: float = 0.9
     ) -> "Watched":
-        """Sets the threshold by labelled episodes: so that it asks in a share of their steps, or catches most wrong ones.
+        """This object, after its threshold was set by labelled episodes.
 
-        share: of the steps; caught: of the steps in which the policy is wrong, with as few questions as that takes. Returns
-        itself. Raises BadInput for no steps, and for no wrong ones where they are to be caught.
+        share: of all steps that it asks about; if None, caught: the share of the wrong steps that it asks about, with as few
+        questions as possible. Raises BadInput if there are no steps, or no wrong ones to be caught.
         """
         steps = []
         for episode in episodes:
@@ -157,14 +158,22 @@ def watch(
     threshold: float = 0.5,
     seen: Iterable[Any] = (),
 ) -> Watched:
-    """A mentor for a policy: whether to ask at each step, and why.
+    """A mentor for a policy: it decides at each step whether to ask, and why.
 
-    policy: a function of an observation, or an object with `predict` as those of Stable-Baselines3 have it; it answers an
-    action, or what each is worth (values or chances); several in a list are an ensemble. gate: "margin" or "entropy" of the
-    values, "ensemble" (they disagree), "visits" (how seldom an observation was met in training: `seen`), "circles" (how often
-    it was met in this episode: the policy leads round; `begin` tells where one begins). It asks where the
-    doubt, 0 to 1, is above the threshold: `calibrate` sets it.
-    Source: the measures are those of Torrey and Taylor 2013 (importance), da Silva et al. 2020 (ensembles), and counts.
+    policy: a function of an observation, or an object with `predict` as in Stable-Baselines3; it returns an action, or a value or
+    probability per action. A list of them is an ensemble.
+    gate: the measure of doubt, 0 to 1: "margin" or "entropy" of the values, "ensemble" (disagreement), "visits" (how rare an
+    observation was in training), "circles" (how often it was met in this episode; call `begin` at the begin of each).
+    threshold: it asks if the doubt is above it; `calibrate` sets it.
+    seen: the observations of the training, for "visits".
+
+    Raises BadInput for an unknown gate, and for one that does not fit the policy.
+    Source: Torrey and Taylor 2013 (importance), da Silva et al. 2020 (ensembles); the others are counts.
+
+        >>> import lab
+        >>> mentor = lab.watch(lambda observation: [0.1, 0.9] if observation else [0.5, 0.5])
+        >>> mentor(0).asks, mentor(1).asks
+        (True, False)
     """
     return Watched(policy, gate, threshold, seen)
 
@@ -179,19 +188,19 @@ def _called(policy: Any) -> Policy:
 
 
 def _first(answer: Any) -> Any:
-    """Stable-Baselines3 answers the action and its state."""
+    """The action in an answer of `predict`, which may be a tuple of action and state."""
     found = answer[0] if isinstance(answer, tuple) else answer
     return int(found) if np.ndim(found) == 0 else found
 
 
 def _action(answers: list[Any]) -> int:
-    """What most would do; ties: the lowest."""
+    """The majority action; ties: the lowest."""
     votes = Counter(int(one) if np.ndim(one) == 0 else int(np.argmax(one)) for one in answers)
     return max(votes, key=lambda action: (votes[action], -action))
 
 
 def _key(observation: Any) -> Hashable:
-    """What makes observations the same: whole numbers, others rounded."""
+    """A key that is equal for equal observations; floats are rounded."""
     if isinstance(observation, dict):
         return tuple((name, _key(value)) for name, value in sorted(observation.items()))
     found = np.asarray(observation)

@@ -1,4 +1,4 @@
-"""All sessions that a toolbox keeps, a row each: one that is damaged is a row as well, and hides no other."""
+"""The list of the sessions in a toolbox; damaged ones have rows, too."""
 
 from contextlib import suppress
 from pathlib import Path
@@ -15,16 +15,15 @@ _OPTIONS = (LessonOptions, OrderOptions)
 
 
 def session_rows(toolbox: Toolbox) -> list[dict[str, Any]]:
-    """The sessions in a toolbox, those changed last first: folder, problem, who advised, and whether it is over.
+    """A row per session in a toolbox, the last changed first: folder, problem, advisors, state, and why it is damaged.
 
-    Those kept in a folder elsewhere are links there; of one that is gone nothing is said. `why`: of a damaged one.
-    Raises BadInput for a toolbox that is a file.
+    Sessions in folders elsewhere are links; links to removed folders are left out. Raises BadInput if the toolbox is a file.
     """
     if toolbox.folder.exists() and not toolbox.folder.is_dir():
         raise BadInput(f"toolbox {toolbox.folder}: it is a file, a folder is needed")
     changed: dict[Path, float] = {}
     for path in (toolbox.folder / SESSIONS).glob(f"*/{FILE}"):
-        with suppress(OSError, RuntimeError):  # it is gone by now, or links lead round in a circle
+        with suppress(OSError, RuntimeError):  # it has been removed, or links form a loop
             found = path.resolve()
             changed[found] = found.stat().st_mtime
     return [_row(path) for path in sorted(changed, key=lambda path: changed[path], reverse=True)]

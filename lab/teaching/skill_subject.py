@@ -1,4 +1,4 @@
-"""One skill of a task as what a lesson is about: surveyed in its scene, and tried in physics when it is learned."""
+"""A skill of a task as the subject of a lesson: surveyed in its scene, and tried in physics once it is learned."""
 
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -20,7 +20,7 @@ from lab.toolbox.policy import Policy
 
 @dataclass
 class SkillSubject(Subject):
-    """A skill of a task, by its full name; order: the parts that the scene has."""
+    """A skill of a task as a subject; skill: its full name; order: the parts in the scene."""
 
     task: Task
     skill: str
@@ -33,7 +33,7 @@ class SkillSubject(Subject):
 
     @classmethod
     def of(cls, options: LessonOptions, task: Task | None = None) -> "SkillSubject":
-        """The skill that the options name, by its full name or its sub-task; task: by default the one that they name."""
+        """The skill that the options name, by its full name or its sub-task; task: default the one that they name."""
         if options.view is not None:
             raise BadInput(f"sight '{options.view}' (--sight): only a world has one, '{options.subtask}' is none")
         task = task or load(options.task or "toast")
@@ -43,17 +43,17 @@ class SkillSubject(Subject):
         return cls(task, wanted.name, order, options.changed(task.subtask(wanted.subtask)))
 
     def prepare(self, seed: int) -> Problem:
-        """Lay the scene out as the seed says, and survey the skill's problem."""
+        """The skill's problem, surveyed in the scene that the seed lays out."""
         self.scene = prepare(self.task, self.order, seed, self.skill)
         return self.scene.problems[self.skill]
 
     def tried(self, problem: Problem, policy: Policy) -> str | None:
-        """Why the skill failed in physics."""
+        """Why the skill failed in physics, None if it did not."""
         assert self.scene is not None
         return trial_of(self.scene)(problem, policy)
 
     def draw(self, policy: Policy, out: Path) -> dict[str, str]:
-        """The values over the picture that the problem was read from, where it was."""
+        """Draws the values over the picture that the problem was read from, if there is one."""
         from lab.view.plots import values_seen
 
         assert self.scene is not None
@@ -66,7 +66,7 @@ class SkillSubject(Subject):
 
 
 def find_skill(skills: "dict[str, Skill]", name: str) -> "Skill":
-    """The skill of that full name, or the first of that sub-task or process; BadInput lists what there is."""
+    """The skill of that full name, or the first of that sub-task or process. Raises BadInput, which lists the known ones."""
     if name in skills:
         return skills[name]
     for skill in skills.values():

@@ -1,4 +1,4 @@
-"""Every step of a lesson, recorded as it is taught or told again, and written as data that others read."""
+"""The record of every step of a lesson, and its export as a Minari dataset and for TensorBoard."""
 
 import time
 import warnings
@@ -20,7 +20,7 @@ from lab.teaching.events import LessonBegan, LessonEvent, QuestionAnswered, Sess
 
 @dataclass
 class RecordedEpisode:
-    """One episode of T steps: states (T + 1 of them), actions, rewards, which steps were advised, and how it ended."""
+    """One episode of T steps: T + 1 states, T actions, rewards and advised flags, and whether it terminated."""
 
     states: list[int]
     actions: list[int] = field(default_factory=list)
@@ -31,7 +31,7 @@ class RecordedEpisode:
 
 
 class StepRecord:
-    """Hears a lesson (`hear`), and keeps its finished episodes."""
+    """The finished episodes of a lesson, recorded by its listener `hear`."""
 
     def __init__(self) -> None:
         self.episodes: list[RecordedEpisode] = []
@@ -41,7 +41,7 @@ class StepRecord:
         self._advised = False
 
     def hear(self, event: Any) -> None:
-        """An event of the lesson."""
+        """Receives an event of the lesson."""
         if isinstance(event, LessonBegan):
             self.episodes, self._now = [], None
             self.name, self.mdp = event.plan.problem.name, event.plan.problem.mdp
@@ -55,11 +55,11 @@ class StepRecord:
             self._now = None
 
     def began(self, state: int) -> None:
-        """An episode begins."""
+        """Begins an episode."""
         self._now, self._advised = RecordedEpisode([state]), False
 
     def moved(self, action: int, step: Step) -> None:
-        """A step was made."""
+        """Records a step."""
         assert self._now is not None
         self._now.states.append(step.state)
         self._now.actions.append(action)
@@ -69,7 +69,7 @@ class StepRecord:
         self._advised = False
 
     def written(self, minari: str | None, tensorboard: Path | None) -> dict[str, str]:
-        """What is asked for, by name, and where it is."""
+        """Writes what is asked for (None: not); returns the places by name."""
         files = {}
         if minari is not None:
             files["minari"] = str(self.to_minari(minari))
@@ -78,10 +78,10 @@ class StepRecord:
         return files
 
     def to_minari(self, dataset_id: str) -> Path:
-        """Keep the episodes as a Minari dataset, such as "lab/world-1-v0"; its folder.
+        """The folder of a new Minari dataset with the episodes; dataset_id: such as "lab/world-1-v0".
 
-        Observations are states, infos tell which steps were advised. BadInput when Minari is not installed, when nothing was
-        recorded, and when there is a dataset of that name already.
+        Observations are states; infos say which steps were advised. Raises BadInput if Minari is not installed, if nothing was
+        recorded, and if the dataset exists; WorkFailed if it cannot be written.
         """
         from gymnasium.spaces import Discrete
 
@@ -122,9 +122,9 @@ class StepRecord:
         return Path(get_dataset_path(dataset_id))
 
     def to_tensorboard(self, folder: Path) -> Path:
-        """Write the learning curve for TensorBoard: steps, return and advised steps of each episode; the folder.
+        """The folder, to which steps, return and advised steps of each episode were written for TensorBoard.
 
-        BadInput when TensorBoard is not installed or the folder cannot be written.
+        Raises BadInput if TensorBoard is not installed, or if the folder cannot be written.
         """
         with optional(f"folder '{folder}'"):
             from tensorboard.compat.proto.event_pb2 import Event
@@ -143,7 +143,7 @@ class StepRecord:
 
 
 def check_libraries(minari: str | None, tensorboard: Path | None = None) -> None:
-    """BadInput where a library is missing that writing these would need; None: that one is not wanted."""
+    """Raises BadInput if a library for writing these is missing; None: that format is not wanted."""
     if minari is not None:
         with optional(f"dataset '{minari}'"):
             import h5py  # type: ignore[import-untyped]  # noqa: F401  # Minari misses it only with a folder half made
@@ -154,7 +154,7 @@ def check_libraries(minari: str | None, tensorboard: Path | None = None) -> None
 
 
 def _recorded(inner: Environment, record: StepRecord) -> Environment:
-    """The same environment, of the same class, whose steps are recorded."""
+    """A copy of the environment whose steps are recorded."""
     made = copy(inner)
 
     def reset(episode: int, draw: Draw) -> int:

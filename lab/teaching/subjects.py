@@ -1,4 +1,4 @@
-"""What a lesson is about, from what names it or is it: a world, a skill of a task, an environment, a table's problem."""
+"""The subjects of lessons, by name or object: worlds, skills of tasks, Gymnasium environments, tables; `lab.world`."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,14 +20,14 @@ from lab.toolbox.policy import Policy
 if TYPE_CHECKING:
     from lab.teaching.kept_session import KeptSession
 
-GYM = "gym:"  # as in `lab.gym`, which takes a while to load and is asked for such a name only
+GYM = "gym:"  # the prefix of `lab.gym`, which is slow to import and therefore imported for such names only
 Teachable = str | Path | GridWorld | TabularMDP | Problem
 KINDS = "a name, a GridWorld, a TabularMDP or a Problem"
 
 
 @dataclass
 class TableSubject(Subject):
-    """A table's problem that was made in Python."""
+    """A problem that was made in Python."""
 
     problem: Problem
 
@@ -35,11 +35,11 @@ class TableSubject(Subject):
         self.name, self.settings = self.problem.name, Learned()
 
     def prepare(self, seed: int) -> Problem:
-        """The problem as it is."""
+        """The problem."""
         return self.problem
 
     def draw(self, policy: Policy, out: Path) -> dict[str, str]:
-        """The values of a grid with two axes."""
+        """Draws the values of a grid with two axes."""
         mdp, path = self.problem.mdp, out / "value-map.png"
         if len(mdp.shape) != 2 or mdp.coverage_shape:
             return {}
@@ -50,13 +50,20 @@ class TableSubject(Subject):
 
 
 def world(rows: str, name: str = "world") -> GridWorld:
-    """A grid world from its rows: '.' free, '#' obstacle, one 'S' start, one 'G' goal; BadInput, and NoPath."""
+    """A grid world from its rows of cells: '.' free, '#' obstacle, one 'S' (start), one 'G' (goal).
+
+    Raises BadInput for other characters or rows of different lengths, and NoPath if no path joins start and goal.
+
+        >>> import lab
+        >>> lab.world("S.#\\n..G").mdp().n_states
+        6
+    """
     lines = [line.strip() for line in rows.strip().splitlines()]
     return from_rows("\n".join(lines), name, f"world '{name}'")
 
 
 def subject_from(problem: Teachable, task: str | None = None, sight: str | None = None) -> Subject:
-    """What is to be learned: whatever `lab teach` takes by name, or a world or a problem itself. BadInput for anything else."""
+    """The subject for a name as in `lab teach`, or for a world or problem itself. Raises BadInput for anything else."""
     if isinstance(problem, str | Path):
         return subject_of(LessonOptions(str(problem), task, sight).complete())
     if task is not None:
@@ -73,9 +80,9 @@ def subject_from(problem: Teachable, task: str | None = None, sight: str | None 
 
 
 def subject_of(options: LessonOptions, kept: "KeptSession | None" = None) -> Subject:
-    """The subject that the options name: an environment, a world or a skill of a task. BadInput for bad options.
+    """The subject that the options name: an environment, a world or a skill of a task. Raises BadInput for bad options.
 
-    A module whose name comes out of a file, `kept`, is imported only when the user has said that it is trusted.
+    If the options come from a stored session (`kept`), a module that they name is imported only if the user trusts it.
     """
     if options.subtask.startswith(GYM):
         from lab.gym import parse_name

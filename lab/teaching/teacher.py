@@ -1,4 +1,4 @@
-"""Find a policy that fits, or teach a new one and keep it, whatever happens."""
+"""The teacher: finds a fitting policy in the toolbox, or teaches a new one and saves it, even if it is interrupted."""
 
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -20,17 +20,17 @@ from lab.toolbox.policy import MAX_NAME_LENGTH, Origin, Policy, is_name
 from lab.toolbox.registry import Toolbox
 
 _UNFINISHED = " unfinished"
-_REUSED = "reused"  # the toolbox's records of which policy was used for a problem that it was not learned in
+_REUSED = "reused"  # the kind of records that note which policy was used for another problem than its own
 _LONGEST_PROBLEM = MAX_NAME_LENGTH - 20  # characters of a policy's name; the rest is for its signature and state
 
 
 @dataclass(frozen=True)
 class Teacher:
-    """How to teach: who advises, with which seed, whom to tell, and where policies and journals are kept.
+    """A teacher, with the toolbox that policies are saved in, the advisors, the seed and the listener.
 
-    keep: gives the journal of a lesson, by default one that is not written; begun: in a lesson that is resumed, the
-    policy that it once went on from, or was warm-started from; trial: tries in physics what was learned, before it is kept,
-    and what was learned elsewhere, before it is used.
+    keep: returns the journal of a lesson, by default one that is not written; begun: for a resumed lesson, returns the policy
+    that it continued or was warm-started from; trial: tries a learned policy in physics before it is saved, and a found one
+    before it is used.
     """
 
     toolbox: Toolbox
@@ -42,12 +42,12 @@ class Teacher:
     trial: Trial | None = None
 
     def find_or_teach(self, plan: LessonPlan, known: KnownPolicies) -> Lesson:
-        """A policy that reaches the goal of this problem: from `known`, by (sub-task, signature), or learned now.
+        """A policy that reaches the goal of this problem: found in `known`, or learned now.
 
-        A solved policy of exactly this problem is reused; then one of any other problem that would give nothing less (see
-        `lab.toolbox.fitness`), which is not kept twice. An unsolved one of this problem is learned on from where it stands, and
-        followed when it fits though no shorter way was found; then one of another problem is adapted. WorkFailed when no
-        session finds a way; Interrupted on Ctrl-C.
+        In this order: a solved policy of exactly this problem is reused; one of another problem that fits (see
+        `lab.toolbox.fitness`) is reused, and not saved again; an unsolved one of this problem is continued; one of another
+        problem is adapted; otherwise the lesson begins anew. Raises WorkFailed if no session reaches the goal, Interrupted on
+        Ctrl-C.
         """
         problem = plan.problem
         ready, found, fitting = self._looked_up(plan, known)
@@ -55,7 +55,7 @@ class Teacher:
             return ready
         if found is not None:
             lesson = self.teach(replace(plan, unfinished=found))
-            return _told(lesson, f"'{found.name}' was left unfinished", found, problem)
+            return _explained(lesson, f"'{found.name}' was left unfinished", found, problem)
         if fitting is None:
             return replace(self.teach(plan), reason="nothing in the toolbox has its states and moves")
         policy, fitness = fitting
@@ -63,16 +63,16 @@ class Teacher:
         lesson = self.teach(replace(plan, warm=parent))
         saved = (0, 0) if parent is None else _saved(plan, parent, lesson.result)
         lesson = replace(lesson, parent=parent, fitness=fitness, saved=saved)
-        return _told(lesson, _reason(policy, fitness, plan), policy, problem)
+        return _explained(lesson, _reason(policy, fitness, plan), policy, problem)
 
     def find(self, plan: LessonPlan, known: KnownPolicies) -> Lesson | None:
-        """The policy that `find_or_teach` would reuse, None where it would teach one."""
+        """The policy that `find_or_teach` would reuse, None if it would teach."""
         return self._looked_up(plan, known)[0]
 
     def _looked_up(
         self, plan: LessonPlan, known: KnownPolicies
     ) -> tuple[Lesson | None, Policy | None, tuple[Policy, Fitness] | None]:
-        """What is reused; else the policy of exactly this problem, and the best one of another, with what is judged of it."""
+        """(the lesson of a reused policy, the policy of this problem, the best one of another problem with its fitness)."""
         problem = plan.problem
         found = known.get((problem.subtask, problem.mdp.signature))
         if found is not None and not _belongs(found, problem.mdp):
@@ -93,17 +93,17 @@ class Teacher:
         return None, found, fitting
 
     def _candidates(self, known: KnownPolicies, problem: Problem) -> Iterator[Policy]:
-        """As `candidates`, but the one that was used for this problem before comes first: the next run does the same."""
+        """The `candidates`, beginning with the one that was used for this problem before, so that runs repeat."""
         record = None
         try:
             record = self.toolbox.load_record(_REUSED, _record_key(problem))
-        except BadInput as error:  # then any order will do
+        except BadInput as error:  # the order of candidates is not essential
             self.tell(RecordSkipped(str(error)))
         return candidates(known, problem, first=str((record or {}).get("policy")).rpartition("@")[0])
 
     def _remember(self, problem: Problem, record: dict[str, str]) -> None:
-        """Note what is used for a problem, where that is news; a note that cannot be kept is told: any order will do."""
-        with suppress(BadInput):  # a damaged note is written anew
+        """Records which policy is used for a problem, unless it is recorded already; a failure is only reported."""
+        with suppress(BadInput):  # a damaged record is replaced
             if self.toolbox.load_record(_REUSED, _record_key(problem)) == record:
                 return
         try:
@@ -112,7 +112,7 @@ class Teacher:
             self.tell(RecordSkipped(f"what is used for '{problem.name}': {error}"))
 
     def unfinished(self, problem: Problem, name: str | None = None) -> Policy | None:
-        """The unsolved policy to go on from: the one it would replace, the best one, or the one beside a solved one."""
+        """The unsolved policy to continue: the one of that name, the best one, or the unfinished one beside a solved one."""
         key = (problem.subtask, problem.mdp.signature)
         for wanted in (name or plain_name(problem), None, f"{plain_name(problem)}{_UNFINISHED}"):
             found = self.toolbox.find(*key, wanted)
@@ -121,10 +121,10 @@ class Teacher:
         return None
 
     def one_session(self, plan: LessonPlan) -> Lesson:
-        """One session that goes on from what was broken off, or left unsolved by the same learner, gate and advisor.
+        """One session, which continues a policy that was interrupted, or left unsolved by the same learner, gate and advisor.
 
-        It has several sessions when the lesson of a run had, and that is gone on with. BadInput when the plan's name is
-        that of another problem's policy.
+        It has several sessions if it resumes a lesson of a run that had. Raises BadInput if the plan's name is that of another
+        problem's policy.
         """
         problem, name = plan.problem, plan.name
         for row in self.toolbox.list() if name is not None else ():
@@ -146,16 +146,16 @@ class Teacher:
         return self.teach(replace(plan, unfinished=found))
 
     def _same(self, policy: Policy, plan: LessonPlan) -> bool:
-        """Whether a policy was learned in this way, or broken off before anything can be said of its gate and advisor."""
+        """Whether a policy was learned with these settings and advisors, or interrupted with the same learner."""
         length = {"episodes": 0}
         broken_off = len(policy.curve) < policy.learner.get("episodes", 0)
         alike = policy.gate == asdict(plan.gate) and policy.advisor == str(self.advising)
         return policy.learner | length == asdict(plan.learner) | length and (alike or broken_off)
 
     def teach(self, plan: LessonPlan) -> Lesson:
-        """Teach what is planned, and save the policy, solved or not. WorkFailed when several sessions find no way.
+        """The result of the planned lesson, whose policy is saved, solved or not.
 
-        Nothing is learned where nothing can be kept: BadInput.
+        Raises WorkFailed if several sessions do not reach the goal, BadInput before learning if the toolbox is not writable.
         """
         self.toolbox.check()
         problem, unfinished = plan.problem, plan.unfinished
@@ -177,7 +177,7 @@ class Teacher:
             failure = None
             if not (result.interrupted or journal.read_only):
                 policy, failure = self._tried(problem, policy)
-            if not (result.interrupted and journal.folding):  # what it was before is more
+            if not (result.interrupted and journal.folding):  # otherwise the saved policy has learned more
                 saved = self.toolbox.put(policy)
                 if not saved.in_use:
                     self.tell(KeptBeside(policy.name, saved.version, saved.why_not))
@@ -187,8 +187,8 @@ class Teacher:
         finally:
             journal.close()
         if policy.solved and unfinished is not None and unfinished.name == f"{policy.name}{_UNFINISHED}":
-            with suppress(BadInput):  # it may be gone already
-                self.toolbox.remove(unfinished.name)  # it is finished now, under its plain name
+            with suppress(BadInput):  # it may have been removed
+                self.toolbox.remove(unfinished.name)  # the finished policy has the plain name
         length = counted(len(result.steps), "episode")
         if result.interrupted:
             raise Interrupted(f"stopped by Ctrl-C after {length} of '{problem.name}'; what was learned is kept")
@@ -201,7 +201,7 @@ class Teacher:
         return Lesson(policy, source if plan.warm is None else "adapted", result, failure)
 
     def _tried(self, problem: Problem, policy: Policy) -> tuple[Policy, str | None]:
-        """The policy as it is to be kept, and why it failed in physics; then it is unsolved, and replaces no solved one."""
+        """(policy, failure): if it failed in physics, the policy counts as unsolved, and does not replace a solved one."""
         if self.trial is None:
             return policy, None
         kept, unproven = self.toolbox.find(policy.subtask, policy.signature, policy.name), policy
@@ -210,24 +210,24 @@ class Teacher:
             unproven = replace(policy, solved=False, name=beside if kept is not None and kept.solved else policy.name)
         try:
             failure = self.trial(problem, policy)
-        except BaseException:  # Ctrl-C, too: what was learned is kept
+        except BaseException:  # also on Ctrl-C, what was learned is saved
             self.toolbox.save(unproven)
             raise
         return (policy if failure is None else unproven), failure
 
     def _free_name(self, problem: Problem, solved: bool) -> str:
-        """The name to save under; what did not get finished never replaces what is."""
+        """The name to save under; an unfinished policy never replaces a solved one."""
         name = plain_name(problem)
         kept = None if solved else self.toolbox.find(problem.subtask, problem.mdp.signature, name)
         return f"{name}{_UNFINISHED}" if kept is not None and kept.solved else name
 
 
 def candidates(known: KnownPolicies, problem: Problem, first: str = "") -> Iterator[Policy]:
-    """The solved policies of a problem's sub-task and table size: the one called `first`, those of the same skill, the newest."""
+    """The solved policies of a problem's sub-task and table size: `first`, then those of the same skill, then the newest."""
     own = f"{problem.name[:_LONGEST_PROBLEM]} "
     found = known.alike(problem.subtask, problem.mdp.n_states, problem.mdp.n_actions)
     for key, _ in sorted(found, key=lambda one: (one[1] != first, not one[1].startswith(own))):
-        with suppress(KeyError):  # damaged, or gone meanwhile
+        with suppress(KeyError):  # damaged, or removed meanwhile
             yield known[key]
 
 
@@ -235,8 +235,8 @@ def _record_key(problem: Problem) -> str:
     return f"{problem.subtask} {problem.mdp.signature}"
 
 
-def _told(lesson: Lesson, reason: str, found: Policy, problem: Problem) -> Lesson:
-    """The lesson with its reason, which says the arm that the found policy was learned with when it is another."""
+def _explained(lesson: Lesson, reason: str, found: Policy, problem: Problem) -> Lesson:
+    """The lesson with its reason, which names the arm of the found policy if that is another one."""
     if problem.arm == found.arm or not found.arm:
         return replace(lesson, reason=reason)
     return replace(lesson, reason=f"learned with the arm {found.arm}; {reason}", other_arm=found.arm)
@@ -244,43 +244,43 @@ def _told(lesson: Lesson, reason: str, found: Policy, problem: Problem) -> Lesso
 
 def _reused(plan: LessonPlan, policy: Policy, reason: str, fitness: Fitness | None = None) -> Lesson:
     lesson = Lesson(policy, "reused", fitness=fitness, saved=_saved(plan, policy))
-    return _told(lesson, reason, policy, plan.problem)
+    return _explained(lesson, reason, policy, plan.problem)
 
 
 def _reason(policy: Policy, fitness: Fitness, plan: LessonPlan) -> str:
-    """Which policy was looked at, of which other task, and what was found of it."""
+    """The policy, its task if that is another one, and the reason for the verdict on it."""
     return f"'{policy.name}'{_elsewhere(policy, plan)}: {fitness.reason}"
 
 
 def _elsewhere(policy: Policy, plan: LessonPlan) -> str:
-    """Which task a policy was learned for, where that is another one."""
+    """The task that a policy was learned for, in words; "" if it is this one."""
     return "" if policy.task == plan.task else f" of task '{policy.task}'"
 
 
 def _saved(plan: LessonPlan, found: Policy, now: SessionResult | None = None) -> tuple[int, int]:
-    """Episodes and helped steps that a found policy saves: see `Lesson`."""
+    """The episodes and helped steps that a found policy saves, see `Lesson`."""
     episodes, helped = (0, 0) if now is None else (len(now.steps), now.helped_steps)
     return max(len(found.curve), plan.learner.episodes) - episodes, found.helped_steps - helped
 
 
 def _parent(plan: LessonPlan) -> str:
-    """What a policy's `parent` says: the one that it was warm-started from, be it in this lesson or before it."""
+    """The reference to the policy that this one was warm-started from, in this lesson or before; "" for none."""
     if plan.warm is not None:
         return reference(plan.warm)
     return "" if plan.unfinished is None else plan.unfinished.parent
 
 
 def check_name(name: str | None) -> None:
-    """BadInput unless a policy may have the name that a person chose."""
+    """Raises BadInput unless a policy may have this name."""
     if name is not None and not is_name(name):
         raise BadInput(f"policy name '{name}' (--save): wanted 1 to {MAX_NAME_LENGTH} printable characters")
 
 
 def plain_name(problem: Problem) -> str:
-    """What a policy of this problem is called when nobody names it."""
+    """The default name of a policy of this problem."""
     return f"{problem.name[:_LONGEST_PROBLEM]} {problem.mdp.signature[:8]}"
 
 
 def _belongs(policy: Policy, mdp: TabularMDP) -> bool:
-    """Whether a policy that bears a problem's signature also has its table's size and its actions."""
+    """Whether a policy with a problem's signature also has its table size and actions."""
     return policy.q.shape == (mdp.n_states, mdp.n_actions) and policy.action_labels == mdp.action_labels

@@ -1,4 +1,4 @@
-"""A grid world as what a lesson is about."""
+"""A grid world as the subject of a lesson."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,9 +17,9 @@ SIGHTS = ("full", "limited")
 
 @dataclass
 class WorldSubject(Subject):
-    """A grid world, in which nothing is simulated; with the sight "limited" advice comes from the region in its file only.
+    """A grid world as a subject; with the sight "limited", advice counts in the region of its file only.
 
-    Raises BadInput for an unknown sight, and when the world has no limited one.
+    Raises BadInput for an unknown sight, and if the file has no region.
     """
 
     world: GridWorld
@@ -39,20 +39,20 @@ class WorldSubject(Subject):
         world = load_world(options.subtask)
         if options.task is not None:
             raise BadInput(
-                f"task '{options.task}' (--task): the world '{options.subtask}' belongs to no task: leave --task away"
+                f"task '{options.task}' (--task): the world '{options.subtask}' belongs to no task: remove --task"
             )
         return cls(options.changed(world), options.view or "full")
 
     def prepare(self, seed: int) -> Problem:
-        """What the world sets to learn; BadInput when that cannot be learned (see `GridWorld.check`)."""
+        """The problem that the world poses. Raises BadInput if it cannot be learned (see `GridWorld.check`)."""
         return Problem(self.name, "world", self.world.check())
 
     def facts(self) -> dict[str, Any]:
-        """Where the advisor saw the robot."""
+        """The sight of the advisor."""
         return {"view": self.sight}
 
     def draw(self, policy: Policy, out: Path) -> dict[str, str]:
-        """The values of a world with two axes, and the learned way through it."""
+        """Draws the values of a world with two axes, and the greedy path."""
         if len(self.world.shape) != 2:
             return {}
         from lab.view.plots import grid_values

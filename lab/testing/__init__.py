@@ -1,4 +1,4 @@
-"""What every member of a family is held to, ours and yours: a function for each family, an AssertionError that says why."""
+"""Contract tests for members of the families, shipped or your own: each function raises an AssertionError that says why."""
 
 from lab.testing.learning import check_advisor, check_gate, check_learner
 from lab.testing.sequencing import check_sequencer

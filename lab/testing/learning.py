@@ -1,4 +1,4 @@
-"""What is asked of learners, gates and advisors: sessions on small boards, whose results fit together and repeat."""
+"""The contracts of learners, gates and advisors, tested in sessions on small boards."""
 
 from collections.abc import Callable
 from dataclasses import asdict, replace
@@ -24,7 +24,7 @@ SEEDS = 3
 
 
 def board(size: int) -> TabularMDP:
-    """A square board with obstacles beside the diagonal; 3 x 3: one in the middle."""
+    """The problem of a square board with obstacles beside the diagonal; 3 x 3 has one in the middle."""
     blocked = np.zeros((size, size), bool)
     blocked[1, 1] = blocked[size - 2, 1] = True
     return grid((size, size), blocked, (0, 0), (size - 1, size - 1), action_labels=("up", "down", "left", "right"))
@@ -33,7 +33,7 @@ def board(size: int) -> TabularMDP:
 def session(
     mdp: TabularMDP, advisor: str | Advisor | Ask = "expert", seed: int = 0, **changes: Any
 ) -> tuple[SessionResult, list[Event]]:
-    """A session of 60 episodes unless `changes`, settings of learner and gate, say otherwise; and what it told."""
+    """The result and the events of a session of 60 episodes; changes: settings of learner and gate."""
     learner = replace(SHORT, **{name: value for name, value in changes.items() if hasattr(SHORT, name)})
     gate = replace(EARLY, **{name: value for name, value in changes.items() if hasattr(EARLY, name)})
     events: list[Event] = []
@@ -44,20 +44,20 @@ def session(
 
 
 def check_learner(learner: str | type[Update]) -> None:
-    """A learner, by name or class: with an expert it solves small boards, and its sessions fit together and repeat."""
+    """Tests a learner, given by name or class: with an expert it solves small boards; its results repeat."""
     name = UPDATES.named(learner)
     for size in (3, 4):
         for seed in range(SEEDS):
             result, _ = session(board(size), seed=seed, learner=name, episodes=100)
             what = f"learner '{name}', board {size} x {size}, seed {seed}, with an expert"
-            require(result.solved, f"{what}: the shortest way of {2 * (size - 1)} moves is not learned")
+            require(result.solved, f"{what}: the shortest path of {2 * (size - 1)} moves is not learned")
             require(result.helped_steps > 0, f"{what}: no advice was taken")
     for gate in ("always", "ccrl"):
         check_session(name, gate)
 
 
 def check_gate(gate: str | type[Gate]) -> None:
-    """A gate, by name or class: its sessions fit together and repeat, alone, with advice and with memory."""
+    """Tests a gate, given by name or class: its results are consistent and repeat, without advice, with it, and with memory."""
     name = GATES.named(gate)
     for learner in ("q", "sarsa-lambda"):
         for memory in (False, True):
@@ -69,7 +69,7 @@ def check_gate(gate: str | type[Gate]) -> None:
 
 
 def check_advisor(advisor: str | Advisor | Ask | Callable[[], Advisor]) -> None:
-    """An advisor, by name, as a function of a request, or an object or a class with `advise`: it answers what is allowed."""
+    """Tests an advisor, given by name, as a function of a request, or as an object or class with `advise`."""
     if isinstance(advisor, str):
         require(advisor in ADVISORS, f"advisor '{advisor}': it is in no table")
     made: Any = advisor() if isinstance(advisor, type) else advisor
@@ -81,7 +81,7 @@ def check_advisor(advisor: str | Advisor | Ask | Callable[[], Advisor]) -> None:
 
 
 def check_session(learner: str, gate: str, memory: bool = False) -> None:
-    """A session's arrays, counts and events fit together, and the same seed gives the same ones."""
+    """Tests that the arrays, counts and events of a session are consistent, and that the same seed repeats them."""
     mdp, what = board(4), f"learner '{learner}', gate '{gate}'{', with memory' if memory else ''}"
     (result, events), (again, events_again) = (
         session(mdp, "limited", 5, learner=learner, gate=gate, memory=memory) for _ in range(2)
@@ -107,4 +107,6 @@ def check_session(learner: str, gate: str, memory: bool = False) -> None:
     walked = int(result.steps[result.steps <= 30].sum())  # failed episodes walked too
     require(int(result.visits.sum()) >= walked, f"{what}: fewer visits than steps")
     path = greedy_path(result.q, mdp, 30)
-    require(result.final_steps == (len(path[1]) if path[2] else None), f"{what}: final_steps is not the greedy way's")
+    require(
+        result.final_steps == (len(path[1]) if path[2] else None), f"{what}: final_steps is not that of the greedy path"
+    )

@@ -1,7 +1,7 @@
-"""What a contract says when it does not hold."""
+"""The assertion that contract tests use."""
 
 
 def require(holds: bool, otherwise: str) -> None:
-    """Raises an AssertionError that says what is wrong, also where Python leaves asserts out."""
+    """Raises an AssertionError with the text `otherwise` unless `holds`, also if Python runs without assertions (-O)."""
     if not holds:
         raise AssertionError(otherwise)

@@ -1,4 +1,4 @@
-"""What is asked of a sequencer: its order is allowed, costs what it says, and beats no proof."""
+"""The contract of sequencing methods: the order is feasible, has the stated cost, and beats no proven bound."""
 
 from lab.sequencing import SEQUENCERS, Find, find_sequence
 from lab.sequencing.cell.cell import Cell
@@ -13,14 +13,14 @@ SMALL = ("toast-case-1", "toast-case-2", "toast-case-3")
 
 
 def check_sequencer(method: str | Find) -> None:
-    """A method, by name or as a function of cell, search and generator, on two toasts in each of the thesis's cells."""
+    """Tests a method, given by name or as a function of cell, search and generator, on two toasts in each cell of the thesis."""
     name = method if isinstance(method, str) else SEQUENCERS.use(method.__name__, method)
     for cell in SMALL:
         check_order(name, load_cell(cell).cell(2), seed=1)
 
 
 def check_order(name: str, cell: Cell, seed: int) -> SequenceResult:
-    """What a method finds for a cell: allowed, told episode by episode, not below the optimum, and the same again."""
+    """The result of a method for a cell, tested: feasible, consistent with its events, and not below the optimum."""
     seen: list[EpisodeSequenced] = []
     result = find_sequence(cell, name, Search(20, on_episode=seen.append), seed)
     cost, what = simulate(cell, result.sequence).makespan_s, f"method '{name}', seed {seed}"

@@ -1,4 +1,4 @@
-"""What is asked of a skill: its problem can be solved from everywhere it begins, repeats, and works in physics."""
+"""The contract of skills: the problem is solvable from every start, is the same each time, and succeeds in physics."""
 
 from dataclasses import replace
 
@@ -16,7 +16,7 @@ from lab.toolbox.policy import Origin, Policy
 
 
 def check_skill(skill: str | type[Skill], task: str = "toast") -> None:
-    """A skill, by its sub-task or its class, in a task that needs it, carried out in PyBullet with the best table there is."""
+    """Tests a skill, given by sub-task or class, in a task that needs it: PyBullet carries it out with the optimal table."""
     subtask = skill if isinstance(skill, str) else skill.subtask
     if not isinstance(skill, str) and subtask not in SKILLS:
         SKILLS.adopted(subtask, skill, "check_skill")
@@ -34,9 +34,12 @@ def check_skill(skill: str | type[Skill], task: str = "toast") -> None:
     require(shortest_steps(mdp) > 0, f"{what}: it begins at its goal")
     q = optimal_values(mdp, 0.99)
     for start in (mdp.start, *mdp.starts):
-        require(greedy_path(q, mdp, mdp.n_states, start)[2], f"{what}: no way leads from {mdp.state_label(start)}")
+        require(
+            greedy_path(q, mdp, mdp.n_states, start)[2],
+            f"{what}: no path to the goal leads from {mdp.state_label(start)}",
+        )
     learner, gate = LearnerSettings(episodes=1, max_steps=1), GateSettings("never")
     result = Session(problem.environment or mdp, learner, gate, None, np.random.default_rng(0)).run()
-    made = Policy.of(result, mdp, learner, gate, Origin("best", subtask, task, "none", 0))
-    failure = subject.tried(problem, replace(made, q=q, solved=True))
+    policy = Policy.of(result, mdp, learner, gate, Origin("best", subtask, task, "none", 0))
+    failure = subject.tried(problem, replace(policy, q=q, solved=True))
     require(failure is None, f"{what}: in physics: {failure}")

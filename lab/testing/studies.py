@@ -1,6 +1,7 @@
-"""What is asked of a study: rows with a measure and a value that can be written, the same for the same seed."""
+"""The contract of studies: rows with a measure and a value, valid as JSON, the same for the same seed."""
 
 import json
+from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from lab.studies import STUDIES, Run, Study, carried_out
@@ -9,20 +10,18 @@ from lab.testing.requirement import require
 
 
 def check_study(study: str | Study | Run) -> None:
-    """A study, by name, as a `Study` or as a function of a job and a reading, with as few sessions as it takes."""
+    """Tests a study, given by name, as a `Study`, or as a function of a job and a reading, with its fewest sessions."""
     if isinstance(study, str):
-        one, name = STUDIES[study], study
+        tested, name = STUDIES[study], study
     else:
-        one = study if isinstance(study, Study) else Study(study.__name__, study, least=2)
-        name = one.title
-    first, again = (one.run(Job(one.least, seed=1), {}) for _ in range(2))
+        tested = study if isinstance(study, Study) else Study(study.__name__, study, least=2)
+        name = tested.title
+    first, again = (tested.run(Job(tested.least, seed=1), {}) for _ in range(2))
     require(bool(first.rows), f"study '{name}': it has no rows")
     for row in first.rows:
         require({"measure", "value"} <= {*row}, f"study '{name}': a row has no measure or value: {row}")
         json.dumps(row, allow_nan=False)
     require(first.rows == again.rows, f"study '{name}': the same seed gives other rows")
     with TemporaryDirectory() as folder:
-        from pathlib import Path
-
-        document = carried_out(one, "study", Job(one.least, seed=1), Path(folder) / "out")
+        document = carried_out(tested, "study", Job(tested.least, seed=1), Path(folder) / "out")
         require(all(Path(file).is_file() for file in document["files"].values()), f"study '{name}': a file is missing")

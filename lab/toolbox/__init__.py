@@ -1,1 +1,1 @@
-"""What was learned, kept: policies in versions and measured records, in a folder or elsewhere, never loaded damaged."""
+"""The toolbox: learned policies with their versions, and records, in a folder or at an address; no damaged file is loaded."""

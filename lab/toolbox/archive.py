@@ -1,4 +1,4 @@
-"""Policies as one archive to give away: a zip file that the lab writes the same each time, and never reads on trust."""
+"""Archives of policies: zip files that are written reproducibly and checked completely when they are read."""
 
 import hashlib
 import json
@@ -24,19 +24,19 @@ from lab.toolbox.registry import Toolbox
 
 FORMAT: Literal["teaching-lab-archive-1"] = "teaching-lab-archive-1"
 MANIFEST = "manifest.json"
-MAX_BYTES = MOST_BYTES  # of an archive, and so of all that is in it, as nothing in it is compressed
+MAX_BYTES = MOST_BYTES  # of an archive, and of its contents, because nothing in it is compressed
 MAX_FILES = 10_000
-_EPOCH = (1980, 1, 1, 0, 0, 0)  # the date of every file in an archive: the first that a zip file can have
+_EPOCH = (1980, 1, 1, 0, 0, 0)  # the date of every file in an archive: the earliest that the format allows
 _PLAIN_NAME = re.compile(r"[a-z0-9][a-z0-9-]*\.safetensors")
 _ENCRYPTED = 0x1
-_CENTRAL_HEADER = b"PK\x01\x02"  # before what a zip file says of each of its files
+_CENTRAL_HEADER = b"PK\x01\x02"  # precedes each entry of a zip file's directory
 _BROKEN = (BadZipFile, NotImplementedError, RuntimeError, ValueError, EOFError, OverflowError, OSError, struct.error)
 
 Policies = Sequence[Policy]
 
 
 class Packed(BaseModel):
-    """One file of an archive, as its manifest has it."""
+    """The row of one file in a manifest."""
 
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
 
@@ -47,7 +47,7 @@ class Packed(BaseModel):
 
 
 class Manifest(BaseModel):
-    """What an archive says of itself."""
+    """The manifest of an archive."""
 
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
 
@@ -56,7 +56,7 @@ class Manifest(BaseModel):
 
 
 class TakenIn(NamedTuple):
-    """The names of policies that came into a toolbox: new ones, those in place of others, those that were there already."""
+    """The names of imported policies: new ones, ones that replaced others, ones that were in the toolbox already."""
 
     imported: list[str]
     replaced: list[str]
@@ -64,9 +64,9 @@ class TakenIn(NamedTuple):
 
 
 def pack(policies: Iterable[Policy]) -> tuple[bytes, Manifest]:
-    """An archive's bytes, always the same for the same policies, and its manifest.
+    """An archive's bytes, the same for the same policies, and its manifest.
 
-    Raises BadInput without policies, for two of one name, and for more than an archive may hold.
+    Raises BadInput if there are no policies, two of the same name, or more than an archive may hold.
     """
     named: dict[str, bytes] = {}
     for policy in policies:
@@ -94,9 +94,9 @@ def pack(policies: Iterable[Policy]) -> tuple[bytes, Manifest]:
 
 
 def unpack(path: Path) -> Policies:
-    """The policies of an archive, every one checked; nothing is written anywhere.
+    """The policies of an archive, each of them checked; nothing is written.
 
-    Raises BadInput, naming the file and what is wrong, for anything but a whole archive of the lab.
+    Raises BadInput, which names the file and the fault, for anything but a complete archive of the lab.
     """
     content = read_packed(path)
     if content.count(_CENTRAL_HEADER) > MAX_FILES + 1:
@@ -115,10 +115,9 @@ def unpack(path: Path) -> Policies:
 
 
 def take_in(toolbox: Toolbox, policies: Policies, replace: bool) -> TakenIn:
-    """Keeps policies in a toolbox: all of them, or none.
+    """The names of the policies, after all of them were saved in a toolbox.
 
-    Raises BadInput when a name is taken by another policy, unless that is to be replaced; then, and when one cannot be
-    written, the toolbox is as before.
+    Raises BadInput if a name is taken by another policy and `replace` is false. On this and any other error none is saved.
     """
     toolbox.check()
     hashes = {row["name"]: row["hash"] for row in toolbox.list()}
@@ -145,7 +144,7 @@ def take_in(toolbox: Toolbox, policies: Policies, replace: bool) -> TakenIn:
 
 
 def _put_back(toolbox: Toolbox, name: str, before: str | None) -> None:
-    """The version that was in use under a name is in use again; nothing, if nothing was."""
+    """Puts the version that was in use back in use, or removes the policy if there was none."""
     if before is not None:
         toolbox.promote(name, before)
     elif any(row["name"] == name for row in toolbox.list()):
@@ -153,7 +152,7 @@ def _put_back(toolbox: Toolbox, name: str, before: str | None) -> None:
 
 
 def _entry(name: str) -> ZipInfo:
-    """A file in an archive: the same date, rights and system, whenever and wherever it is written."""
+    """The entry of a file, with fixed date, permissions and system, so that archives are reproducible."""
     entry = ZipInfo(name, _EPOCH)
     entry.create_system = 3
     entry.external_attr = (stat.S_IFREG | 0o644) << 16
@@ -161,7 +160,7 @@ def _entry(name: str) -> ZipInfo:
 
 
 def read_packed(path: Path) -> bytes:
-    """All bytes of a regular file; BadInput when it has more than an archive may have, or cannot be read."""
+    """The bytes of a regular file. Raises BadInput if it cannot be read, or is larger than an archive may be."""
     try:
         return read_limited(path, MAX_BYTES)
     except FileNotFoundError:
@@ -171,7 +170,7 @@ def read_packed(path: Path) -> bytes:
 
 
 def _check_entry(entry: ZipInfo) -> None:
-    """BadInput unless it is a plain file with a plain name, neither compressed nor encrypted."""
+    """Raises BadInput unless the entry is a regular file with a plain name, neither compressed nor encrypted."""
     name = entry.orig_filename
     if not entry.filename:
         raise BadInput("it holds a file without a name")
@@ -191,7 +190,7 @@ def _check_entry(entry: ZipInfo) -> None:
 
 
 def _checked(archive: ZipFile, entries: Sequence[ZipInfo], size: int) -> Policies:
-    """The policies of an archive of `size` bytes; BadInput unless it holds just what its manifest says."""
+    """The policies of an archive of `size` bytes. Raises BadInput unless it holds exactly what its manifest lists."""
     by_name = {entry.orig_filename: entry for entry in entries}
     if len(by_name) < len(entries):
         raise BadInput(f"it holds a file twice: '{_most_common(entry.orig_filename for entry in entries)}'")
@@ -230,7 +229,7 @@ def _manifest(content: bytes) -> Manifest:
 
 
 def _policy(archive: ZipFile, entry: ZipInfo, row: Packed) -> Policy:
-    """One policy, its bytes and its name as the manifest has them."""
+    """One policy. Raises BadInput unless its bytes and its name are those in the manifest."""
     if entry.file_size != row.bytes:
         raise BadInput(f"'{row.file}' has {entry.file_size} bytes, {MANIFEST} says {row.bytes}")
     content = archive.read(entry)

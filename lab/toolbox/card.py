@@ -1,4 +1,4 @@
-"""A policy's card: what it does, where it was learned, who advised, and how it did since, as Markdown that anyone can read."""
+"""A policy's card in Markdown: what it does, where and how it was learned, and how it performed since."""
 
 import json
 import re
@@ -12,17 +12,17 @@ from lab.toolbox.policy import Policy
 from lab.toolbox.versions import EVALUATED
 
 Event = Mapping[str, Any]  # "time", "what", and facts; see the toolbox's log
-_PLUMBING = ("time", "what", "hash", "version")  # of an event, beside its facts
-_SHOWN = 20  # events that a card lists; of more, the last
-_ENDS = 5  # episodes at each end of the curve whose mean is told
+_PLUMBING = ("time", "what", "hash", "version")  # keys of an event that are no facts
+_SHOWN = 20  # the most events that a card lists, the last ones
+_ENDS = 5  # episodes at each end of the curve that are averaged
 
 
 @dataclass(frozen=True)
 class Telling:
-    """What a card tells beside the policy itself.
+    """The contents of a card that are not in the policy.
 
-    what: the sub-task in words; sha256: of the policy's file; file: its name beside the card; bring_in: the command that
-    brings it into a toolbox; pictures: file by what it shows ("learning curve", "value map"); events: its log.
+    what: the sub-task in words; sha256: of the policy's file; file: its name, beside the card; bring_in: the command that imports
+    it; pictures: file by content ("learning curve", "value map"); events: of its log.
     """
 
     what: str
@@ -48,12 +48,12 @@ def card(policy: Policy, telling: Telling) -> str:
 
 
 def plain(text: str) -> str:
-    """Text as itself in Markdown: no mark-up, no HTML, one line."""
+    """The text with Markdown and HTML characters escaped, in one line."""
     return re.sub(r"([\\`*<>|\[\]&])", r"\\\1", printable(text))
 
 
 def last_evaluation(events: Sequence[Event]) -> Event | None:
-    """The last event that tells how often the policy succeeded."""
+    """The last event with a complete evaluation, None if there is none."""
     told = [event for event in events if _tells_success(event)]
     return told[-1] if told else None
 
@@ -77,7 +77,7 @@ def _facts(policy: Policy, telling: Telling) -> str:
         "learned in": ", ".join(
             filter(None, [policy.task, policy.scene, policy.arm and f"arm {policy.arm}", f"seed {policy.seed}"])
         ),
-        "its way": _way(policy),
+        "its path": _path_length(policy),
         "learner": _settings(policy.learner),
         "gate (when it asks)": _settings(policy.gate),
         "advisor": _advice(policy),
@@ -90,18 +90,18 @@ def _facts(policy: Policy, telling: Telling) -> str:
 
 
 def _settings(settings: Mapping[str, Any]) -> str:
-    """Names and values in one line; of the learner and the gate themselves the value alone."""
+    """Names and values in one line; for "learner" and "gate" only the value."""
     return ", ".join(
         str(value) if name in ("learner", "gate") else f"{name} {value}" for name, value in settings.items()
     )
 
 
-def _way(policy: Policy) -> str:
-    """The learned way beside the shortest."""
-    way = "it does not reach the goal" if policy.final_steps is None else counted(policy.final_steps, "step")
+def _path_length(policy: Policy) -> str:
+    """The lengths of the learned and of the shortest path."""
+    length = "it does not reach the goal" if policy.final_steps is None else counted(policy.final_steps, "step")
     if policy.optimal_steps is not None:
-        way += f", the shortest takes {policy.optimal_steps}"
-    return f"{way}: {'solved' if policy.solved else 'not solved'}"
+        length += f", the shortest takes {policy.optimal_steps}"
+    return f"{length}: {'solved' if policy.solved else 'not solved'}"
 
 
 def _advice(policy: Policy) -> str:
@@ -137,12 +137,12 @@ def _values(policy: Policy, telling: Telling) -> str:
 
 
 def _picture(telling: Telling, name: str, shows: str) -> str:
-    """The picture and an empty line, or nothing where there is none."""
+    """The Markdown of the picture and an empty line, "" if there is no picture."""
     return f"![{name}: {shows}]({telling.pictures[name]})\n\n" if name in telling.pictures else ""
 
 
 def since(events: Sequence[Event]) -> str:
-    """What the log tells, the last event last, as a list."""
+    """The events of the log as a list in Markdown, the last one last."""
     if not events:
         return "Nothing is noted of it since it was learned."
     lines = [f"- {_happened(event)}" for event in events[-_SHOWN:]]
@@ -173,7 +173,7 @@ def _happened(event: Event) -> str:
 
 
 def _fact(name: str, value: object) -> str:
-    """A fact in words: what is true is named."""
+    """A fact in words; for True only its name."""
     if isinstance(value, bool):
         return name if value else f"not {name}"
     return f"{name} {value}"
@@ -181,7 +181,7 @@ def _fact(name: str, value: object) -> str:
 
 def _use(policy: Policy, telling: Telling) -> str:
     state = f"state {policy.start}"
-    return f"""Into a toolbox, from where `lab run` takes it for its own problem, and for others where its way is free and short:
+    return f"""Into a toolbox, from where `lab run` takes it for its own problem, and for others in which its path is free and short:
 
 ```sh
 {telling.bring_in}
@@ -193,11 +193,11 @@ Without the lab, in Python:
 {python_lines(policy, telling.file)}
 ```
 
-That prints the move that it makes in {state}, where its way begins."""
+That prints the move that it makes in {state}, where its path begins."""
 
 
 def python_lines(policy: Policy, file: str) -> str:
-    """Five lines of Python that read the file with safetensors alone, and print the best action of the first state."""
+    """Five lines of Python that read the file with safetensors alone, and print the best action in the start."""
     return f"""import json
 from safetensors import safe_open
 with safe_open({json.dumps(file)}, framework="numpy") as model:
@@ -213,7 +213,7 @@ def _limits(policy: Policy, telling: Telling) -> str:
         "The move that is rated best in a state that was seldom visited may be no good.",
     ]
     if not policy.solved:
-        limits.insert(0, "It is not solved: see its way above.")
+        limits.insert(0, "It is not solved: see its path above.")
     if last_evaluation(telling.events) is None:
         limits.append("It was not evaluated in other scenes yet: lab toolbox evaluate does that.")
     return "\n".join(f"- {limit}" for limit in limits)

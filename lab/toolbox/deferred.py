@@ -1,4 +1,4 @@
-"""What reads and writes policies, loaded when it is touched: `lab toolbox list` reads no table of numbers."""
+"""Lazy imports of what reads and writes policies, because `lab toolbox list` needs no numpy."""
 
 from typing import TYPE_CHECKING
 

@@ -1,7 +1,7 @@
-"""Whether a policy fits a problem that it was not learned in: judged from its table, before anything is run.
+"""The fitness of a policy for a problem that it was not learned in, judged from its table, without running anything.
 
-A policy has tried moves, and where they led holds as long as nothing changed there. A warm start goes through these moves
-again in thought, so that the values of all cells know of a change before the first step is made.
+The moves that a policy has tried have the same outcomes wherever the problem has not changed. A warm start replays these moves
+by value iteration, so that the values of all cells reflect a change before the first step is made.
 Source: R. S. Sutton, Integrated architectures for learning, planning, and reacting (Dyna), ICML 1990.
 """
 
@@ -23,23 +23,26 @@ from lab.toolbox.policy import GOAL, ON, OUT, Policy
 Verdict = Literal["use", "adapt", "refuse"]
 KindArray = NDArray[np.uint8]
 
-TOLERATED = 0.25  # moves above the shortest, mean over several starts: what is learned from nothing has up to as many
-MOST_JUDGED = 64  # policies that are looked at for one problem
-MOST_WARMED = 8  # of these whose warm start is looked at
+TOLERATED = 0.25  # mean moves above the shortest over several starts: as many as after learning from nothing
+MOST_JUDGED = 64  # the most policies that are judged for a problem
+MOST_WARMED = 8  # the most of these whose warm starts are judged
 DISCOUNT = 0.99
 _ORDER = ("use", "adapt", "refuse")
 
 
 @dataclass(frozen=True)
 class Fitness:
-    """What a policy would come to in a problem, and why.
+    """The fitness of a policy for a problem.
 
-    coverage: of the states that go on and can be reached there, the share in which it has made a move; reached: the share of
-    the starts from which its greedy steps reach the goal; worst, mean: how many moves above the shortest these ways take,
-    None where none reaches it; value: its highest action value in the start, the feasibility score; changed: how many states
-    go on or end otherwise than where it was learned, None for another table's size; warm: `reached` of its warm start,
-    None where that was not looked at; moves: of its path from the problem's start, None where it misses the goal, fewest: of the
-    shortest way.
+    verdict: "use", "adapt" or "refuse"; reason: in words.
+    coverage: the share of the reachable nonterminal states in which the policy has made a move.
+    reached: the share of the starts from which its greedy path reaches the goal; worst, mean: how many moves these paths have
+    above the shortest, None if there are none.
+    value: its highest action value in the start.
+    changed: the number of states that are terminal, goal or neither in another way than where it was learned, None for a table of
+    another size.
+    warm: `reached` of its warm start, None if that was not judged.
+    moves, fewest: the length of its path from the problem's start, None if it misses the goal, and of the shortest path.
     """
 
     verdict: Verdict
@@ -56,17 +59,17 @@ class Fitness:
 
     @property
     def rank(self) -> tuple[float, ...]:
-        """The smaller, the better it fits."""
-        way = self.mean if self.verdict == "use" and self.mean is not None else 0.0
-        return _ORDER.index(self.verdict), way, -(self.warm or 0.0), -self.reached, self.changed or 0
+        """A sort key; the smaller it is, the better the policy fits."""
+        extra_moves = self.mean if self.verdict == "use" and self.mean is not None else 0.0
+        return _ORDER.index(self.verdict), extra_moves, -(self.warm or 0.0), -self.reached, self.changed or 0
 
 
 @dataclass(frozen=True, eq=False)
 class Measure:
-    """What any policy is held against in a problem.
+    """The properties of a problem that policies are judged by.
 
-    kinds (S,) uint8: as `Policy.ends`; moves (S,) int32: the fewest to a goal, -1 where no way leads there; met (S,) bool:
-    the states that go on and can be reached from a start; starts (N,) int32.
+    kinds: (S,) uint8, as `Policy.ends`; moves: (S,) int32, the fewest to a goal, -1 if there is no path; met: (S,) bool, the
+    reachable nonterminal states; starts: (N,) int32.
     """
 
     kinds: KindArray
@@ -77,7 +80,7 @@ class Measure:
 
 @lru_cache(maxsize=64)
 def measure_of(mdp: TabularMDP) -> Measure:
-    """Found once for each problem."""
+    """The measure of a problem, computed once."""
     starts = np.array(mdp.starts or (mdp.start,), np.int32)
     fewest = fewest_moves(mdp)
     met = np.zeros(mdp.n_states, np.bool_)
@@ -91,31 +94,31 @@ def measure_of(mdp: TabularMDP) -> Measure:
 
 
 def followed(q: FloatArray, mdp: TabularMDP) -> tuple[IntArray, NDArray[np.int64]]:
-    """Where greedy steps from each state end (S,), and after how many moves (S,): all states at once.
+    """(ends, moves), (S,) each: the state in which the greedy path from each state ends, and its length.
 
-    As `greedy_path`: ties go to the lowest action. Who goes round in circles ends in a state that goes on.
+    Ties go to the lowest action, as in `greedy_path`. The end of a path that loops is a nonterminal state.
     """
     here = np.arange(mdp.n_states)
     entered = np.where(mdp.terminal, here, mdp.successor[here, q.argmax(axis=1)])
     moves = (~mdp.terminal).astype(np.int64)
     span = 1
-    while span < mdp.n_states:  # each time ways twice as long
+    while span < mdp.n_states:  # doubles the length of the paths
         moves, entered, span = np.minimum(moves + moves[entered], mdp.n_states), entered[entered], 2 * span
     return entered.astype(np.int32), moves
 
 
 def comparable(policy: Policy, mdp: TabularMDP) -> bool:
-    """Whether a policy's table has a problem's states and moves: all that a candidate needs."""
+    """Whether a policy's table has the states and actions of a problem, so that its fitness can be judged."""
     same_size = policy.q.shape == mdp.successor.shape and policy.shape == mdp.shape
     return same_size and policy.action_labels == mdp.action_labels
 
 
 def judged(policy: Policy, mdp: TabularMDP, discount: float = DISCOUNT) -> Fitness:
-    """Whether a policy is to be used in a problem as it is, to be learned on from, or refused; nothing is run.
+    """The fitness of a policy for a problem: it is reused, fine-tuned ("adapt") or refused.
 
-    Used only where its paths from all starts are free and shortest (from several starts: within TOLERATED in the mean),
-    so that learning from nothing would give nothing better. Refused where its table has other states or moves, or where it
-    knows no way although start or goal are others than its own: its warm start is then no faster than none.
+    It is reused if its paths from all starts are free and shortest (with several starts, within TOLERATED in the mean), so that
+    learning from nothing would give nothing better. It is refused if its table has other states or actions, or if start or goal
+    have moved and neither it nor its warm start reaches the goal, because a warm start is then no faster.
     """
     if not comparable(policy, mdp):
         return Fitness("refuse", "its table has other states or moves")
@@ -134,7 +137,7 @@ def judged(policy: Policy, mdp: TabularMDP, discount: float = DISCOUNT) -> Fitne
 
 
 def behaviour(policy: Policy, mdp: TabularMDP) -> Fitness:
-    """What its greedy steps come to: "use", or else "adapt", whether or not that is worth it."""
+    """The fitness by the greedy paths alone: "use", otherwise "adapt", whether or not that is worthwhile."""
     known = measure_of(mdp)
     end, moves = followed(policy.q, mdp)
     arrived = known.kinds[end[known.starts]] == GOAL
@@ -173,7 +176,7 @@ def _praise(above: NDArray[np.int64]) -> str:
 
 
 def _fault(end: int, known: Measure, mdp: TabularMDP, missing: int) -> str:
-    """Where the policy's path from a start ends that does not reach the goal."""
+    """Why a path misses the goal, in words: where it ends."""
     path = "its path" if len(known.starts) == 1 else f"its path from {missing} of {len(known.starts)} starts"
     if known.kinds[end] == OUT:
         return f"{path} meets what is in the way at {mdp.state_label(end)}"
@@ -181,11 +184,10 @@ def _fault(end: int, known: Measure, mdp: TabularMDP, missing: int) -> str:
 
 
 def warm_start(policy: Policy, mdp: TabularMDP, discount: float = DISCOUNT) -> FloatArray:
-    """The table (S, A) to learn on from: what the policy has tried and what has not changed, gone through again.
+    """The start values (S, A) for fine-tuning, by value iteration over the policy's moves between unchanged states.
 
-    A move that it made between two states that are as they were leads where it led; all values along such moves are found
-    anew, by value iteration over them. A move into a state that now ends an episode is worth what the problem says of it: the
-    survey has seen it. Any other move counts as never made: 0, as at the beginning.
+    A move into a state that is now terminal has the problem's reward as its value, because the survey has seen that state. All
+    other moves have the value 0, as if they had never been made.
     """
     as_it_was = measure_of(mdp).kinds == policy.ends
     kept = (policy.visits > 0) & as_it_was[:, None] & as_it_was[mdp.successor] & ~mdp.terminal[:, None]
@@ -194,31 +196,32 @@ def warm_start(policy: Policy, mdp: TabularMDP, discount: float = DISCOUNT) -> F
 
 
 def _has_moved(policy: Policy) -> BoolArray:
-    """Whether the policy was learned with a move in each state, (S,)."""
+    """The states in which the policy has made a move, (S,) bool."""
     moved: BoolArray = policy.visits.max(axis=1) > 0
     return moved
 
 
 def best_fit(policies: Iterable[Policy], mdp: TabularMDP, discount: float = DISCOUNT) -> tuple[Policy, Fitness] | None:
-    """Of comparable policies, the most promising first, the one that fits best; None where there is none.
+    """The comparable policy that fits best, with its fitness; None if there is none.
 
-    The first whose ways are all shortest ones ends the search; MOST_JUDGED are looked at, and the warm start of MOST_WARMED.
+    policies: the most promising first. The search ends at the first one whose paths are all shortest; at most MOST_JUDGED are
+    judged, and the warm starts of MOST_WARMED.
     """
-    found: list[tuple[Policy, Fitness]] = []
+    candidates: list[tuple[Policy, Fitness]] = []
     for policy in policies:
         if not comparable(policy, mdp):
             continue
         fitness = behaviour(policy, mdp)
-        found.append((policy, fitness))
-        if (fitness.verdict == "use" and not fitness.mean) or len(found) == MOST_JUDGED:
+        candidates.append((policy, fitness))
+        if (fitness.verdict == "use" and not fitness.mean) or len(candidates) == MOST_JUDGED:
             break
-    usable = [one for one in found if one[1].verdict == "use"]
+    usable = [candidate for candidate in candidates if candidate[1].verdict == "use"]
     if not usable:
-        nearest = sorted(found, key=lambda one: one[1].rank)[:MOST_WARMED]
+        nearest = sorted(candidates, key=lambda candidate: candidate[1].rank)[:MOST_WARMED]
         usable = [(policy, judged(policy, mdp, discount)) for policy, _ in nearest]
-    return min(usable, key=lambda one: one[1].rank, default=None)
+    return min(usable, key=lambda candidate: candidate[1].rank, default=None)
 
 
 def reference(policy: Policy) -> str:
-    """What another policy's `parent` calls this one: name@hash."""
+    """The reference to a policy in the `parent` of others: "name@hash"."""
     return f"{policy.name}@{hash_of(deferred.encode(policy))}"

@@ -1,4 +1,4 @@
-"""A toolbox in a local folder."""
+"""Places: the interface of the storage of a toolbox, and the place in a local folder."""
 
 import errno
 import json
@@ -21,18 +21,18 @@ MAX_FILE_BYTES = MOST_BYTES
 
 
 class FileState(NamedTuple):
-    """A file's size, and a stamp that changes when the file does; "" when that cannot be told yet."""
+    """A file's size, and a stamp that changes with the file; "" if it was modified too recently to tell."""
 
     size_bytes: int
     stamp: str
 
 
 class Place(Protocol):
-    """Files by name, such as "insert.safetensors" or "versions/insert/0001-1a2b3c4d5e6f.safetensors".
+    """The storage of a toolbox: files by name, such as "versions/insert/0001-1a2b3c4d5e6f.safetensors".
 
-    address: as --toolbox names it; folder, cache: local ones, for what can only be local, and for what can be made again;
-    alone: whether nobody else writes while `lock` is held. All methods raise BadInput or WorkFailed, naming the file and
-    the reason.
+    address: as for --toolbox; folder: local, for files that are never remote; cache: local, for files that can be made again;
+    alone: whether `lock` excludes all other writers. All methods raise BadInput or WorkFailed, which name the file and the
+    reason.
     """
 
     address: str
@@ -41,56 +41,56 @@ class Place(Protocol):
     alone: bool
 
     def check(self, to_write: bool = True) -> None:
-        """Raises unless files can be written here, or, without `to_write`, unless there can be such a place; makes nothing."""
+        """Raises unless files can be written here or, without `to_write`, unless the place can exist; creates nothing."""
 
     def names(self, under: str = "") -> list[str]:
-        """The names of the files right in a folder of the place; hidden ones are left out."""
+        """The names of the files directly in a folder of the place, without hidden ones."""
 
     def files(self, under: str = "") -> dict[str, FileState]:
-        """Those files by name, and how they are now."""
+        """The states of these files by name."""
 
     def exists(self, name: str) -> bool:
-        """Whether there is such a file."""
+        """Whether the file exists."""
 
     def tree(self, under: str) -> list[str]:
-        """The names of all files below a folder of the place, as they are in the place."""
+        """The names, relative to the place, of all files below a folder."""
 
     def folders(self, under: str) -> list[str]:
-        """The names of the folders right in a folder of the place."""
+        """The names of the folders directly in a folder of the place."""
 
     def read(self, name: str) -> bytes:
-        """All bytes of a file."""
+        """The bytes of a file."""
 
     def read_many(self, states: Mapping[str, FileState]) -> Iterator[tuple[str, bytes | BadInput]]:
-        """The bytes of several files whose states are known; of one that cannot be read, the error."""
+        """(name, bytes) of several files with known states; the error instead of the bytes for a file that cannot be read."""
 
     def write(self, name: str, content: bytes, drafts: str = "") -> None:
-        """Writes a file whole or not at all; where half-written ones are seen, they are seen in the folder `drafts`."""
+        """Writes a file atomically; a draft, if one is visible, is in the folder `drafts`."""
 
     def move(self, name: str, to: str) -> None:
-        """Gives a file another name, in place of one that has it."""
+        """Renames a file, and replaces a file of the new name."""
 
     def sweep(self, under: str) -> None:
-        """Deletes what writers that were killed left half written in a folder, for who holds its lock."""
+        """Deletes the drafts of killed writers in a folder; the caller holds its lock."""
 
     def tidy(self, older_s: float) -> list[str]:
-        """Removes what commands that were killed have left in a folder of this machine, so many seconds old; what it was."""
+        """The names of leftovers of killed commands on this machine, at least so many seconds old, after their removal."""
 
     def append(self, name: str, line: bytes) -> None:
-        """Adds a line to a log."""
+        """Appends a line to a log."""
 
     def lines(self, name: str) -> list[bytes]:
-        """The lines of a log; none where there is none."""
+        """The lines of a log, [] if it does not exist."""
 
     def lock(self, name: str) -> AbstractContextManager[None]:
-        """Keeps others from what goes with a log."""
+        """A context that excludes other writers of a log and its files, as far as the place can."""
 
     def where(self, name: str) -> str:
-        """A file's whole address."""
+        """The full address of a file."""
 
 
 def read_file(path: Path) -> bytes:
-    """All bytes of a local file. Raises BadInput for anything but a file, and for more than MAX_FILE_BYTES."""
+    """The bytes of a local file. Raises BadInput if it is no regular file, or has more than MAX_FILE_BYTES."""
     try:
         return read_limited(path, MAX_FILE_BYTES)
     except FileNotFoundError:
@@ -99,20 +99,20 @@ def read_file(path: Path) -> bytes:
         raise BadInput(error.strerror or str(error)) from error
 
 
-# ---- folder place -----------------------------------------------------------------------------------------------------
+# ---- the place in a local folder ------------------------------------------------------------------------------------
 
 
 _NOT_WRITABLE = {
     *(errno.EACCES, errno.EPERM, errno.EROFS, errno.ELOOP),
     *(errno.ENOTDIR, errno.EEXIST, errno.EISDIR, errno.ENAMETOOLONG),
 }
-_DRAFT = re.compile(r"\..+\.[0-9a-f]{8}\.tmp")  # what `files.write_whole` writes first
-_LONGEST_LINE = 1 << 20  # bytes of a log's last line that are looked at
-_FRESH_NS = 50_000_000  # a file changed so lately may change again without its times telling
+_DRAFT = re.compile(r"\..+\.[0-9a-f]{8}\.tmp")  # the name of a draft of `files.write_whole`
+_LONGEST_LINE = 1 << 20  # the most bytes of a log's last line that are read
+_FRESH_NS = 50_000_000  # a file changed more recently than this may change again with the same times
 
 
 class FolderPlace:
-    """A local folder, made when something is first written. Symbolic links in it are not followed out of it."""
+    """A local folder, created when something is first written. Symbolic links that lead out of it are not followed."""
 
     alone = True
 
@@ -198,14 +198,14 @@ class FolderPlace:
 
     def sweep(self, under: str) -> None:
         for left in (self.folder / under).glob(".*.tmp"):
-            with suppress(PermissionError):  # Windows removes nothing that somebody has open
+            with suppress(PermissionError):  # Windows cannot remove an open file
                 left.unlink(missing_ok=True)
 
     def tidy(self, older_s: float) -> list[str]:
-        """Half-written files, also of sessions that are linked here, and folders of sessions that were never begun."""
+        """Removes drafts, also those of linked sessions, and folders of sessions that never began; see `Place.tidy`."""
         gone, until_s = [], time.time() - older_s
         found = list[Path]()
-        with suppress(OSError):  # a folder that is taken away meanwhile
+        with suppress(OSError):  # a folder may be removed meanwhile
             found = [*self.folder.glob("**/.*.tmp"), *self.folder.glob(f"{SESSIONS}/*/.*.tmp")]
         for left in dict.fromkeys(found):
             is_draft = _DRAFT.fullmatch(left.name) is not None and left.is_file() and not left.is_symlink()
@@ -234,7 +234,7 @@ class FolderPlace:
                 size = os.fstat(handle).st_size
                 os.lseek(handle, max(0, size - _LONGEST_LINE), os.SEEK_SET)
                 cut = _cut_line(os.read(handle, _LONGEST_LINE))
-                if cut and not _is_whole(cut):  # by a crash: it never was said
+                if cut and not _is_whole(cut):  # an incomplete line, left by a crash, does not count
                     os.ftruncate(handle, size - len(cut))
                 _write_all(handle, b"\n" * _is_whole(cut) + line + b"\n")
             finally:
@@ -267,18 +267,18 @@ class FolderPlace:
         return str(self.folder / name)
 
     def _made(self, folder: Path) -> None:
-        """Makes a folder in the place; what is written into it stays in the place."""
+        """Creates a folder in the place. Raises BadInput if it leads out of the place."""
         folder.mkdir(parents=True, exist_ok=True)
         self._inside(folder)
 
     def _inside(self, path: Path) -> None:
-        """Raises BadInput when a name or a symbolic link leads out of the place."""
+        """Raises BadInput if a name or a symbolic link leads out of the place."""
         if not path.resolve().is_relative_to(self.folder.resolve()):
             raise BadInput(f"{path}: it leads out of the toolbox {self.folder}")
 
 
 def _is_begun(folder: Path) -> bool:
-    """Whether the folder of a session holds a journal with a whole line."""
+    """Whether the folder of a session holds a journal with a complete line."""
     path = folder / JOURNAL
     if not path.exists():
         return False
@@ -287,12 +287,12 @@ def _is_begun(folder: Path) -> bool:
 
 
 def _cut_line(content: bytes) -> bytes:
-    """What comes after the last line's end."""
+    """The bytes after the last line break."""
     return content[content.rfind(b"\n") + 1 :]
 
 
 def _is_whole(cut: bytes) -> bool:
-    """Whether all of a line is there but its end."""
+    """Whether a line is complete except for its line break."""
     try:
         return isinstance(json.loads(cut), dict)
     except (ValueError, RecursionError):

@@ -1,4 +1,4 @@
-"""A policy as a folder that the Hugging Face Hub takes: model card, safetensors, metadata; and such a folder read again.
+"""A policy as a folder for the Hugging Face Hub: model card, safetensors file, metadata; writing and reading.
 
 Source: https://huggingface.co/docs/hub/model-cards, and modelcard.md of huggingface/hub-docs for the card's header.
 """
@@ -19,14 +19,14 @@ from lab.toolbox.policy_file import decode, described, encode
 README, MODEL, CONFIG, ATTRIBUTES = "README.md", "model.safetensors", "config.json", ".gitattributes"
 FORMAT = "teaching-lab-hub-1"
 LIBRARY = "teaching-lab"
-UNKNOWN_LICENSE = "unknown"  # the Hub's word for one that nobody has chosen
+UNKNOWN_LICENSE = "unknown"  # the Hub's name for no chosen licence
 TAGS = ("reinforcement-learning", "robotics", LIBRARY)
 _LARGE = "".join(f"*.{suffix} filter=lfs diff=lfs merge=lfs -text\n" for suffix in ("png", "safetensors"))
 _LICENSE = re.compile(r"[a-z0-9][a-z0-9.-]{0,60}")
 
 
 def check_license(name: str) -> None:
-    """BadInput unless it looks like one of the Hub's names of licences."""
+    """Raises BadInput unless the name has the form of a licence name on the Hub."""
     if not _LICENSE.fullmatch(name):
         raise BadInput(
             f"licence '{name}' (--license): wanted a name that the Hub knows, such as mit, apache-2.0 or {UNKNOWN_LICENSE}"
@@ -34,7 +34,7 @@ def check_license(name: str) -> None:
 
 
 def hub_files(policy: Policy) -> dict[str, bytes]:
-    """The files of such a folder beside its card and pictures, by name."""
+    """The files of the folder by name, without card and pictures."""
     content = encode(policy)
     config = {"format": FORMAT, "sha256": sha256(content), **described(policy)}
     return {
@@ -50,7 +50,7 @@ def sha256(content: bytes) -> str:
 
 
 def header(policy: Policy, license_name: str, events: Sequence[Event]) -> str:
-    """The YAML that a card on the Hub begins with; the last evaluation is its result."""
+    """The YAML header of a card on the Hub; its result is the last evaluation."""
     lines = ["---", f"license: {_text(license_name)}", f"library_name: {LIBRARY}", "tags:"]
     lines += [f"- {tag}" for tag in TAGS]
     found = last_evaluation(events)
@@ -75,12 +75,12 @@ def header(policy: Policy, license_name: str, events: Sequence[Event]) -> str:
 
 
 def _text(text: str) -> str:
-    """Text as YAML has it in double quotes, which is as JSON has it."""
+    """The text as a double-quoted YAML string, which is also a JSON string."""
     return json.dumps(printable(text), ensure_ascii=False)
 
 
 def read_folder(folder: Path) -> Policy:
-    """The policy of such a folder. Raises BadInput unless its model is the one that its metadata speaks of."""
+    """The policy in such a folder. Raises BadInput unless the model's hash is the one in the metadata."""
     if not (folder / MODEL).is_file():
         raise BadInput(f"folder {folder}: it holds no {MODEL}, as a folder does that lab toolbox publish wrote")
     content = read_packed(folder / MODEL)
@@ -94,7 +94,7 @@ def read_folder(folder: Path) -> Policy:
 
 
 def _config(folder: Path) -> dict[str, Any]:
-    """The metadata that a folder tells."""
+    """The metadata in a folder. Raises BadInput if they cannot be read or have another format."""
     try:
         config = json.loads(read_packed(folder / CONFIG))
     except (ValueError, RecursionError) as error:

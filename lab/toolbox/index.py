@@ -1,4 +1,4 @@
-"""The index of a toolbox: what its policies are, so that a list need not read them all. Made again when lost or stale."""
+"""The index of a toolbox: a cache of the policies' metadata, so that a list need not read all files; lazily read policies."""
 
 import json
 import zlib
@@ -21,17 +21,16 @@ Row = dict[str, Any]
 Key = tuple[str, str]  # sub-task, signature
 _LEFT_OUT = ("learner", "gate", "versions", "curve", "guided", "start")
 _HEAD, _REST = '{"crc32": "', '", "index": '
-_MANY = 20  # so many files, or one in so many, and their versions are looked up all at once
-_STALE_SHARE = 0.01  # of the rows; with fewer stale ones it is not worth writing again
-_LEAST = 50  # policies; fewer are read in an instant
+_MANY = 20  # from this many files, or this fraction of all, their versions are listed in one call
+_STALE_SHARE = 0.01  # the share of stale rows from which the index is written again
+_LEAST = 50  # policies; for fewer no index is written
 
 
 class Index:
-    """A row for each policy in use: its metadata without curve and settings, or why it is damaged.
+    """A row per policy in use: its metadata without curve and settings, or why it is damaged.
 
-    Only files that changed since they were read are read. It is written when there are 50 policies or more. Any number of
-    processes may use it at once: it is written whole, and what it says of a file counts only while the file's stamp is the
-    same.
+    Only files that changed since they were read are read again. The index is written from 50 policies on. Several processes may
+    use it at once, because it is written atomically and a row counts only while the stamp of its file is unchanged.
     """
 
     def __init__(self, place: Place) -> None:
@@ -88,7 +87,7 @@ class Index:
         return found
 
     def _loaded(self) -> tuple[dict[str, Row], dict[str, str]]:
-        """What is kept of it; nothing when that is lost or damaged."""
+        """The stored rows and stamps, empty if the file is missing or damaged."""
         with suppress(OSError, ValueError, KeyError, TypeError, RecursionError):
             text = read_limited(self._place.cache / FILE)
             end = len(_HEAD) + 8
@@ -104,7 +103,7 @@ class Index:
         rows = {name: row for name, row in self._rows.items() if name in self._stamps and "damaged" not in row}
         stamps = {name: self._stamps[name] for name in rows}
         body = json.dumps({"format": FORMAT, "stamps": stamps, "rows": rows}).encode()
-        with suppress(OSError):  # a toolbox that may only be read is read all the same
+        with suppress(OSError):  # a read-only toolbox works without a stored index
             self._place.cache.mkdir(parents=True, exist_ok=True)
             write_whole(self._place.cache / FILE, f"{_HEAD}{_checksum(body)}{_REST}".encode() + body + b"}")
 
@@ -114,9 +113,9 @@ def _checksum(body: bytes) -> str:
 
 
 class KnownPolicies(MutableMapping[Key, "Policy"]):
-    """Policies by sub-task and signature, each read when it is first asked for; one that is gone by then is not there.
+    """Policies by (sub-task, signature), each read when it is first used; one that cannot be read raises KeyError.
 
-    rows: what the index says of each: at least its name, whether it is solved, when it was made, its table's size, its file.
+    rows: of the index, with at least name, solved, created, states, actions and file; load: reads a file.
     """
 
     def __init__(self, rows: Mapping[Key, Row], load: Callable[[str], "Policy"]) -> None:
@@ -125,24 +124,24 @@ class KnownPolicies(MutableMapping[Key, "Policy"]):
 
     @classmethod
     def of(cls, policies: Iterable["Policy"]) -> "KnownPolicies":
-        """These, which need not be read."""
+        """These policies, which are in memory already."""
         known = cls({}, lambda file: NotImplemented)
         known.update({(policy.subtask, policy.signature): policy for policy in policies})
         return known
 
     def alike(self, subtask: str, states: int, actions: int) -> list[tuple[Key, str]]:
-        """The solved ones of a sub-task whose tables have this size, by key and name, the newest first; none is read."""
+        """(key, name) of the solved policies of a sub-task with this table size, the newest first; no file is read."""
         wanted = {"solved": True, "states": states, "actions": actions}
         found = [key for key, row in self._rows.items() if key[0] == subtask and row | wanted == row]
         found.sort(key=lambda key: str(self._rows[key]["created"]), reverse=True)
         return [(key, self._rows[key]["name"]) for key in found]
 
     def made(self) -> dict[str, str]:
-        """When each was made, by sub-task and signature."""
+        """The creation time of each policy, by "sub-task signature"."""
         return {" ".join(key): str(row["created"]) for key, row in self._rows.items()}
 
     def only(self, made: Mapping[str, str]) -> "KnownPolicies":
-        """Those alone that are in such a table, and were not made anew since."""
+        """The policies that are in such a table with the same creation time."""
         rows = {key: row for key, row in self._rows.items() if made.get(" ".join(key)) == str(row["created"])}
         return KnownPolicies(rows, self._load)
 

@@ -1,4 +1,4 @@
-"""A learned policy with all that is needed to trust, reuse and explain it."""
+"""A learned policy: its table, and the provenance that is needed to trust, reuse and explain it."""
 
 import platform
 import re
@@ -21,12 +21,12 @@ if TYPE_CHECKING:
 
 MAX_NAME_LENGTH = 100
 Count = Annotated[int, Ge(0)]
-ON, GOAL, OUT = range(3)  # what becomes of an episode in a state
+ON, GOAL, OUT = range(3)  # kinds of states: not terminal, goal, another terminal state
 _SIGNATURE = re.compile(r"[0-9a-f]{16}")
 
 
 class Origin(NamedTuple):
-    """What a policy is called, what it was learned for, who advised, and with which seed."""
+    """The name of a policy, its sub-task and task, its advisor and its seed."""
 
     name: str
     subtask: str
@@ -37,17 +37,20 @@ class Origin(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Policy:
-    """One learned table with its provenance.
+    """A learned table with its provenance.
 
-    q (S, A) float64 and visits (S, A) int64; action_labels, shape, start and signature are those of the problem it
-    was learned in (`TabularMDP`); learner and gate: the settings by name; curve: steps of each episode, a failed
-    one as max_steps + 1; guided: which of them had advice; helped_steps, requests, optimal_steps, final_steps,
-    solved: see `SessionResult`; created: ISO 8601 in UTC; versions by package. Raises BadInput when these do not
-    fit together.
+    name: 1 to 100 printable characters; subtask, task: what it was learned for.
+    q: (S, A) float64, the action values; visits: (S, A) int64.
+    action_labels, shape, start, signature: those of its problem, see `TabularMDP`.
+    learner, gate: the settings by name; advisor: its name; seed: of the session.
+    curve: the steps of each episode, max_steps + 1 if it failed; guided: whether each had advice.
+    helped_steps, requests, optimal_steps, final_steps, solved: see `SessionResult`.
+    created: ISO 8601 in UTC; versions: by package.
+    ends: (S,) uint8, the kind of each state: 0 not terminal, 1 goal, 2 another terminal state.
+    parent: the policy that it was warm-started from, as "name@hash"; scene: where it was learned, in words; arm: the arm it was
+    learned with; each of these is "" if there is none.
 
-    ends (S,) uint8: which states of the problem go on (0), are the goal (1), or end without it (2). parent: the policy that
-    it was warm-started from, as "name@hash"; scene: where it was learned, in words; arm: which one it was learned with; each
-    of these is "" where there is none.
+    Raises BadInput if these do not fit together.
     """
 
     name: str
@@ -114,7 +117,7 @@ class Policy:
     def of(
         cls, result: "SessionResult", mdp: TabularMDP, learner: "LearnerSettings", gate: "GateSettings", origin: Origin
     ) -> Self:
-        """The policy that a session learned in a problem, stamped with the time and the versions of now."""
+        """The policy that a session learned in a problem, with the current time and versions."""
         return cls(
             **origin._asdict(),
             q=result.q,
@@ -139,5 +142,5 @@ class Policy:
 
 
 def is_name(name: str) -> bool:
-    """Whether a policy may have this name: 1 to 100 printable characters, not only blanks."""
+    """Whether a policy may have this name: 1 to 100 printable characters, not all of them blanks."""
     return bool(name.strip()) and len(name) <= MAX_NAME_LENGTH and name.isprintable()

@@ -1,4 +1,4 @@
-"""A policy as the bytes of one safetensors file: the same policy gives the same bytes, and no damaged one is read."""
+"""Policies as safetensors files: writing is reproducible, and a damaged file is never read."""
 
 import json
 import struct
@@ -20,7 +20,7 @@ _METADATA = tuple(field.name for field in fields(Policy) if field.name not in _T
 
 
 def encode(policy: Policy) -> bytes:
-    """The file's bytes: the same policy always gives the same ones."""
+    """The bytes of a policy's file; the same policy always gives the same bytes."""
     from safetensors.numpy import save
 
     metadata = {name: json.dumps(getattr(policy, name), allow_nan=False) for name in _METADATA}
@@ -29,7 +29,7 @@ def encode(policy: Policy) -> bytes:
 
 
 def decode(content: bytes, where: str) -> Policy:
-    """The policy that these bytes hold, all of it sound. Raises BadInput naming the file `where`."""
+    """The policy in these bytes, completely checked. Raises BadInput, which names the file `where`, if anything is wrong."""
     from safetensors import SafetensorError
 
     try:
@@ -41,19 +41,19 @@ def decode(content: bytes, where: str) -> Policy:
 
 
 def unreadable(where: str, error: Exception) -> BadInput:
-    """The error for a policy's file that cannot be read or is damaged."""
+    """The error for a policy file that cannot be read or is damaged."""
     return BadInput(f"policy file {where}: {' '.join(str(error).split()) or type(error).__name__}")
 
 
 def described(policy: Policy) -> dict[str, Any]:
-    """All metadata of a policy, and its table's size."""
+    """All metadata of a policy, and the size of its table."""
     states, actions = policy.q.shape
     values = {name: getattr(policy, name) for name in _METADATA}
     return {**values, "states": states, "actions": actions, "episodes": len(policy.curve)}
 
 
 def _ordered(content: bytes) -> bytes:
-    """The same file with its header in order; the library writes metadata in any order."""
+    """The file with a sorted header, because the library writes metadata in arbitrary order."""
     data = content[8 + _header_bytes(content) :]
     header = json.dumps(_header(content), sort_keys=True, separators=(",", ":")).encode()
     header += b" " * (-len(header) % 8)  # tables begin at a multiple of 8 bytes
@@ -67,7 +67,7 @@ def _header_bytes(content: bytes) -> int:
 
 def _header(content: bytes) -> dict[str, Any]:
     header = json.loads(content[8 : 8 + _header_bytes(content)])
-    assert isinstance(header, dict)  # the library has read it before
+    assert isinstance(header, dict)  # the library has already read it
     return header
 
 
@@ -94,7 +94,7 @@ def _date(text: str) -> str:
 
 @cache
 def _metadata() -> type[BaseModel]:
-    """What a policy's file holds beside its tables: the fields of `Policy`."""
+    """A model of the metadata in a policy's file: the fields of `Policy` without its arrays."""
     held: dict[str, Any] = {field.name: (field.type, ...) for field in fields(Policy) if field.name in _METADATA}
     held["created"] = (Annotated[str, AfterValidator(_date)], ...)
     held["learner"] = held["gate"] = (dict[str, str | bool | int | float], ...)

@@ -1,4 +1,7 @@
-"""The toolbox: learned policies in versions and measured records, written whole or not at all, never loaded damaged."""
+"""The toolbox: policies with their versions, and JSON records; files are written atomically, damaged ones are never loaded.
+
+Records come first, as functions of a place; then the class `Toolbox`.
+"""
 
 import json
 from contextlib import suppress
@@ -23,12 +26,12 @@ _SUFFIX = ".json"
 
 
 def file_of(kind: str, key: str) -> str:
-    """The file of a record in the toolbox."""
+    """The name of a record's file in the toolbox."""
     return f"{FOLDER}/{slug(kind)}/{slug(key)}{_SUFFIX}"
 
 
 def save(place: Place, kind: str, key: str, record: dict[str, Any]) -> None:
-    """Writes a record. Raises BadInput for what JSON cannot hold."""
+    """Writes a record. Raises BadInput if it has no JSON form."""
     try:
         whole = {"kind": kind, "key": key, "hash": _hash(record), "record": record}
         text = json.dumps(whole, indent=1, allow_nan=False)
@@ -38,7 +41,7 @@ def save(place: Place, kind: str, key: str, record: dict[str, Any]) -> None:
 
 
 def load(place: Place, kind: str, key: str) -> dict[str, Any] | None:
-    """The record of that kind and key; None when there is none. Raises BadInput when its file is damaged or was edited."""
+    """The record of that kind and key, None if there is none. Raises BadInput if its file is damaged or was edited."""
     file = file_of(kind, key)
     folder, _, name = file.rpartition("/")
     if name not in place.names(folder):
@@ -49,7 +52,7 @@ def load(place: Place, kind: str, key: str) -> dict[str, Any] | None:
 
 
 def faults(place: Place) -> dict[str, str]:
-    """What is wrong with each record's file, by file; "" where nothing is."""
+    """The fault of each record's file by name, "" for sound ones."""
     found = {}
     for folder in place.folders(FOLDER):
         for name in sorted(place.names(f"{FOLDER}/{folder}")):
@@ -80,29 +83,37 @@ def _read(place: Place, file: str) -> dict[str, Any]:
 
 
 def _hash(record: dict[str, Any]) -> str:
-    """The hash of a record, however its file is laid out."""
+    """The hash of a record, which does not depend on the layout of its file."""
     return hash_of(json.dumps(record, sort_keys=True).encode())
 
 
-# ---- registry ---------------------------------------------------------------------------------------------------------
+# ---- the toolbox ----------------------------------------------------------------------------------------------------
 
 
 Rows = list[Row]
 Words = list[str]
 Report = list[tuple[Path, bool, str]]  # path, whether it is sound, what is wrong
-LEFT_S = 600.0  # so old is what a command must have left: none that is alive takes so long to write a file
+LEFT_S = 600.0  # older drafts are leftovers: no running command takes so long to write a file
 _NOT_LISTED = ("action_labels", "shape")
-_MOST_NAMED = 12  # policies that an error lists; of more, only the nearest
+_MOST_NAMED = 12  # the most policies that an error lists; of more, it lists the nearest
 _NEAREST = 5
-_LONGEST_LINE = 100  # ancestors that are looked up
+_LONGEST_LINE = 100  # the most ancestors that are looked up
 
 
 class Toolbox:
-    """Policies and records in a folder or at an address that fsspec knows; a folder is made when something is first saved.
+    """Policies and records in a folder, or at an address that fsspec knows; a folder is created when something is first saved.
 
-    A policy's name leads to the version that is in use. A `Path` in `folder` names a file of the toolbox, wherever that is
-    kept. All methods raise BadInput when the place is no folder, cannot be read or cannot be written, and WorkFailed when it
-    cannot be reached.
+    where: the folder or address, default the user's own toolbox. The name of a policy stands for its version in use. A `Path` in
+    `folder` names a file of the toolbox, also if that is remote.
+    All methods raise BadInput if the place is no folder, cannot be read or cannot be written, and WorkFailed if it cannot be
+    reached.
+
+        >>> import lab, tempfile
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     toolbox = lab.Toolbox(folder)
+        ...     file = lab.teach("world-1", seed=1, episodes=60).keep(toolbox)
+        ...     len(toolbox.list()), toolbox.load(file).task
+        (1, 'world-1')
     """
 
     def __init__(self, where: Path | str | None = None):
@@ -114,17 +125,17 @@ class Toolbox:
         self._tidied = False
 
     def check(self, to_write: bool = True) -> None:
-        """Raises unless policies can be saved here, or, without `to_write`, unless it can be a toolbox; makes nothing."""
+        """Raises unless policies can be saved here or, without `to_write`, unless it can be a toolbox; creates nothing."""
         self.place.check(to_write)
 
     def save(self, policy: "Policy") -> Path:
-        """Keeps a policy, and puts it in use unless the one in use does better; returns the file that holds it."""
+        """The file of a policy that is saved now, and put in use unless the one in use is better."""
         return self.folder / self.put(policy).file
 
     def put(self, policy: "Policy") -> "Saved":
-        """Keeps a policy as `save` does, and says what became of it; at no time is there half a file.
+        """The result of saving a policy as `save` does: its file and version, and whether it is in use.
 
-        WorkFailed when a remote toolbox cannot be reached; then it is kept in the local folder, and the error says where.
+        Raises WorkFailed if a remote toolbox cannot be reached; then the policy is saved in a local folder that the error names.
         """
         if not self._tidied:
             self._tidied = True
@@ -138,7 +149,7 @@ class Toolbox:
             raise WorkFailed(f"{error}; it is kept in {beside.save(policy)}") from error
 
     def load(self, path: Path | str) -> "Policy":
-        """Reads one file, of the toolbox or a local one. Raises BadInput, naming it, unless it is a sound policy."""
+        """The policy in a file of the toolbox or a local file. Raises BadInput, which names it, unless it is a sound policy."""
         inside = self._inside(path)
         try:
             content = read_file(Path(path)) if inside is None else self.place.read(inside)
@@ -149,7 +160,7 @@ class Toolbox:
     def find(self, subtask: str, signature: str, name: str | None = None) -> "Policy | None":
         """The policy of a sub-task for exactly this problem, None if there is none.
 
-        Solved ones come before unsolved ones, then the newest. Damaged files are skipped; `verify` reports them.
+        Solved policies come before unsolved ones, then newer ones before older ones. Damaged files are skipped; see `verify`.
         """
         rows = [
             row
@@ -162,7 +173,7 @@ class Toolbox:
         return None
 
     def index(self) -> tuple[KnownPolicies, Words]:
-        """What `find` would give, for every (sub-task, signature); and what is wrong with each damaged file."""
+        """(policies, faults): the result of `find` for every (sub-task, signature), and the fault of each damaged file."""
         best: dict[Key, Row] = {}
         for row in self._rows():
             key = (row["subtask"], row["signature"])
@@ -178,7 +189,7 @@ class Toolbox:
         advisor: str | None = None,
         solved: bool | None = None,
     ) -> Rows:
-        """The policies in use, in file order: the metadata of each sound one without curve and settings."""
+        """The metadata, without curve and settings, of each sound policy in use, in the order of their files."""
         wanted = {"subtask": subtask, "task": task, "advisor": advisor, "solved": solved}
         filters = {field: value for field, value in wanted.items() if value is not None}
         rows = [row for row in self._rows() if all(row[field] == value for field, value in filters.items())]
@@ -188,7 +199,7 @@ class Toolbox:
         return rows
 
     def show(self, name: str) -> dict[str, Any]:
-        """All that is known of one policy, and of its versions. Raises BadInput for an unknown name or a damaged file."""
+        """All metadata of a policy, its versions and its log. Raises BadInput for an unknown name or a damaged file."""
         stem = self._stem(name)
         versions = self._of(stem)
         file = self.place.where(versions.in_use_file)
@@ -218,7 +229,7 @@ class Toolbox:
         }
 
     def _lineage(self, policy: "Policy") -> Rows:
-        """The policies that it came from by warm starts, the nearest first: name, hash, scene, and whether it is kept here."""
+        """A row for each ancestor by warm starts, the nearest first: name, hash, scene, and whether it is in this toolbox."""
         found: Rows = []
         seen, parent = set(), policy.parent
         while parent and parent not in seen and len(found) < _LONGEST_LINE:
@@ -236,25 +247,25 @@ class Toolbox:
         return found
 
     def versions(self, name: str) -> "Versions":
-        """The versions of a name, to read them. Raises BadInput for a name that nothing is kept of."""
+        """The versions under a name. Raises BadInput for an unknown name."""
         return self._of(self._stem(name, also_removed=True))
 
     def promote(self, name: str, version: str) -> "Version":
-        """Puts a version in use, by its number or hash, however well it does. Raises BadInput for one that is not there."""
+        """Puts a version in use, given by number or hash, even if it is worse. Raises BadInput if there is no such version."""
         return self.versions(name).promote(version)
 
     def rollback(self, name: str) -> "Version":
-        """Puts the version in use that was in use before. Raises BadInput when there was none."""
+        """Puts the previous version back in use. Raises BadInput if there was none."""
         return self.versions(name).rollback()
 
     def remove(self, name: str) -> Path:
-        """Removes a policy by its name, or a damaged file by its stem, so that `restore` can bring it back; its path."""
+        """The path of a policy (by name) or of a damaged file (by stem), after its removal; `restore` brings it back."""
         versions = self._of(self._stem(name))
         versions.remove()
         return self.folder / versions.in_use_file
 
     def restore(self, name: str) -> Path:
-        """Brings back the policy that was removed last under a name; returns its path. Raises BadInput if none was."""
+        """The path of the policy that was last removed under a name, after it was restored. Raises BadInput if there is none."""
         removed = {file.removesuffix(SUFFIX) for file in self.place.names(TRASH)}
         stem = next((stem for stem in (slug(name), name) if stem in removed), None)
         if stem is None:
@@ -264,20 +275,20 @@ class Toolbox:
         return self.folder / versions.in_use_file
 
     def log(self, name: str) -> Rows:
-        """What happened to the policies of a name, the first first: time, what, version, hash and more."""
+        """The events of the policies under a name, the oldest first: time, what, version, hash and more."""
         return self.versions(name).events()[0]
 
     def note(self, name: str, what: str, **facts: object) -> None:
-        """Something that happened to the policy in use, or to the version whose `hash` is given, for its log.
+        """Adds an event to the log of the policy in use, or of the version whose `hash` is given.
 
-        "evaluated" with `success_percent` counts when versions are compared.
+        An event "evaluated" with `success_percent` counts in the comparison of versions.
         """
         self.versions(name).note(what, **facts)
 
     def verify(self) -> Report:
-        """Checks every file: (path, whether it is sound, "" or what is wrong).
+        """(path, whether it is sound, the fault or "") for each policy in use and each record.
 
-        A row for each policy in use and each record; of versions and logs only those that are not sound.
+        Versions and logs have rows only if they are damaged.
         """
         report: Report = []
         stems = {file.removesuffix(SUFFIX) for file in self._files()}
@@ -302,16 +313,16 @@ class Toolbox:
         return report + [(self.folder / file, not reason, reason) for file, reason in checked]
 
     def repair(self) -> Words:
-        """Removes what commands that were killed have left, and no command can still be at work on; the files and folders."""
+        """The files and folders that killed commands had left, after their removal."""
         return self.place.tidy(LEFT_S)
 
     def save_record(self, kind: str, key: str, record: dict[str, Any]) -> Path:
-        """Keeps a JSON record, such as the measured duration of a transfer, under its kind and key."""
+        """The path of a JSON record, such as the measured duration of a transfer, which is saved under its kind and key."""
         save(self.place, kind, key, record)
         return self.folder / file_of(kind, key)
 
     def load_record(self, kind: str, key: str) -> dict[str, Any] | None:
-        """The record of that kind and key; None when there is none. Raises BadInput when its file is damaged or was edited."""
+        """The record of that kind and key, None if there is none. Raises BadInput if its file is damaged or was edited."""
         return load(self.place, kind, key)
 
     def _content(self, file: str) -> bytes:
@@ -321,12 +332,12 @@ class Toolbox:
             raise deferred.unreadable(self.place.where(file), error) from error
 
     def where(self, path: Path) -> str:
-        """The whole address of a path in the toolbox."""
+        """The full address of a path in the toolbox."""
         inside = self._inside(path)
         return str(path) if inside is None else self.place.where(inside)
 
     def _inside(self, path: Path | str) -> str | None:
-        """The name in the place that a path or an address stands for; None when it is elsewhere."""
+        """The name in the place of a path or an address, None if it is elsewhere."""
         for root in (self._root, f"{self.folder}/"):
             if root and str(path).startswith(root):
                 return str(path).removeprefix(root)
@@ -336,7 +347,7 @@ class Toolbox:
         return deferred.Versions(self.place, stem)
 
     def _rows(self) -> Rows:
-        """The index's sound rows, each with its file; they are copies."""
+        """Copies of the index's sound rows, each with its file."""
         rows = self._index.rows().items()
         return [{**row, "file": self._root + name} for name, row in rows if "damaged" not in row]
 
@@ -344,7 +355,7 @@ class Toolbox:
         return {name for name in self.place.names() if name.endswith(SUFFIX)}
 
     def _stem(self, name: str, also_removed: bool = False) -> str:
-        """The file stem of a policy in use, or, `also_removed`, of one that a log is kept of. BadInput for no such name."""
+        """The file stem of a policy in use or, with `also_removed`, of one with versions. Raises BadInput for an unknown name."""
         files = self._files()
         for stem in (slug(name), name):
             if f"{stem}{SUFFIX}" in files:
@@ -363,7 +374,7 @@ class Toolbox:
 
 
 def _place_of(where: Path | str | None) -> Place:
-    """The place that a folder or an address names, by default the user's own."""
+    """The place that a folder or an address names, default the user's own."""
     text = default_address() if where is None else str(where)
     if text.startswith("file://"):
         text = text.removeprefix("file://")

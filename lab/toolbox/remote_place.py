@@ -1,4 +1,4 @@
-"""A toolbox at an address that fsspec knows, such as s3://bucket/lab; what was read once is kept in a local cache."""
+"""The place at an address that fsspec knows, such as s3://bucket/lab, with a local cache of the files that were read."""
 
 import hashlib
 import re
@@ -18,7 +18,15 @@ from lab.toolbox.names import hash_of, slug
 
 LIMIT_S = 30.0  # for one call
 _AT_ONCE = 64  # files that are read in one call
-_BUCKETS = {"s3", "s3a", "gs", "gcs", "az", "abfs", "abfss"}  # whose folders are not made; the first part is a bucket
+_BUCKETS = {
+    "s3",
+    "s3a",
+    "gs",
+    "gcs",
+    "az",
+    "abfs",
+    "abfss",
+}  # protocols with buckets, in which folders need not be created
 _STAMPS = ("ETag", "etag", "LastModified", "last_modified", "updated", "mtime", "modified", "created", "ino")
 _OPTIONS: dict[str, dict[str, Any]] = {
     protocol: {"config_kwargs": {"connect_timeout": 5, "read_timeout": 20, "retries": {"max_attempts": 2}}}
@@ -28,10 +36,10 @@ Result = TypeVar("Result")
 
 
 class RemotePlace:
-    """Files at an address. What a person said, such as sessions, is in the local `folder`; `cache` may be deleted at any time.
+    """Files at an address. Sessions are in the local `folder`; the local `cache` may be deleted at any time.
 
-    Nobody can be kept away: of two that put a policy in use at once, `Versions` finds the better one afterwards. A log is a
-    folder of small files, an event each.
+    There is no lock: if two processes put a policy in use at once, `Versions` settles afterwards on the better one. A log is a
+    folder of small files, one per event.
     """
 
     alone = False
@@ -71,7 +79,7 @@ class RemotePlace:
         except FileNotFoundError:
             raise BadInput(f"toolbox {self.address}: there is no bucket '{bucket}'") from None
         except WorkFailed as error:
-            if not isinstance(error.__cause__, PermissionError):  # one may write into a bucket and not look at it
+            if not isinstance(error.__cause__, PermissionError):  # a bucket may be writable without being listable
                 raise
 
     def names(self, under: str = "") -> list[str]:
@@ -162,10 +170,10 @@ class RemotePlace:
         self._call("moved", self._fs.rm_file, self._path(name))
 
     def sweep(self, under: str) -> None:
-        """Does nothing: nothing is ever half written there."""
+        """Does nothing, because remote files are written atomically."""
 
     def tidy(self, older_s: float) -> list[str]:
-        """An empty list: nothing is ever left there; sessions are in the local folder."""
+        """Removes leftovers in the local folder; there are none at the address."""
         return FolderPlace(self.folder).tidy(older_s)
 
     def append(self, name: str, line: bytes) -> None:
@@ -188,9 +196,9 @@ class RemotePlace:
         return f"{self._root}/{name}" if name else self._root
 
     def _call(self, verb: str, function: Callable[..., Result], *args: Any, **named: Any) -> Result:
-        """What a function of the file system gives. Raises WorkFailed when it fails, or takes too long.
+        """The result of a function of the file system. Raises WorkFailed if it fails or takes longer than LIMIT_S.
 
-        FileNotFoundError is the caller's.
+        A FileNotFoundError is raised as it is.
         """
         results: list[Result] = []
         failures: list[BaseException] = []
@@ -201,7 +209,7 @@ class RemotePlace:
             except BaseException as error:
                 failures.append(error)
 
-        thread = Thread(target=run, daemon=True)  # one that hangs does not keep the lab from ending
+        thread = Thread(target=run, daemon=True)  # a hanging call does not keep the process alive
         thread.start()
         thread.join(LIMIT_S)
         if failures and isinstance(failures[0], FileNotFoundError):
@@ -212,7 +220,7 @@ class RemotePlace:
         return results[0]
 
     def _cached(self, name: str, stamp: str) -> bytes | None:
-        """What is cached of a file as it is now: the cached file's name holds the hash of its own bytes, too."""
+        """The cached bytes of a file with this stamp, None if there are none; the name of the cached file has their hash."""
         if not stamp:
             return None
         found = None
@@ -246,7 +254,7 @@ def _cache_stem(name: str, stamp: str = "") -> str:
 
 
 def _stamp(row: dict[str, Any]) -> str:
-    """What tells whether a file is still the same; "" where nothing does."""
+    """A stamp that changes with the file; "" if the file system provides none."""
     mark = next((row[mark] for mark in _STAMPS if row.get(mark) is not None), None)
     if isinstance(mark, datetime):
         mark = mark.timestamp()
@@ -258,6 +266,6 @@ def _last(path: str) -> str:
 
 
 def _reason(error: BaseException) -> str:
-    """An error in one line, without what may be secret in an address."""
+    """The text of an error in one line, without credentials in addresses."""
     text = " ".join(str(error).split()) or type(error).__name__
     return re.sub(r"//[^/@\s]+@", "//", text)

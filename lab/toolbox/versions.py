@@ -1,4 +1,7 @@
-"""The versions of one policy's name: kept for good, one of them in use, and never replaced by one that does worse."""
+"""The versions under one policy name: all are kept, one is in use, and it is not replaced by a worse one.
+
+The events of the log come first, then the class `Versions`, then the comparison of two policies.
+"""
 
 import json
 import re
@@ -21,12 +24,12 @@ Event = dict[str, Any]  # at least "time", ISO 8601 in UTC, and "what"
 
 
 def event(what: str, **facts: Any) -> Event:
-    """Something that happens now."""
+    """An event with the current time."""
     return {"time": datetime.now(UTC).isoformat(timespec="milliseconds"), "what": what, **facts}
 
 
 def line_of(happened: Event) -> bytes:
-    """An event as a line of the log. Raises BadInput for facts that JSON cannot hold."""
+    """An event as a line of the log. Raises BadInput if a fact has no JSON form."""
     try:
         return json.dumps(happened, allow_nan=False).encode()
     except (TypeError, ValueError) as error:
@@ -34,7 +37,7 @@ def line_of(happened: Event) -> bytes:
 
 
 def read_events(lines: Iterable[bytes]) -> tuple[list[Event], list[int]]:
-    """The events of a log, and the numbers (from 1) of the lines that are damaged."""
+    """(events, damaged): the events of a log, and the numbers (from 1) of its damaged lines."""
     events, damaged = [], []
     for number, line in enumerate(lines, 1):
         try:
@@ -49,7 +52,7 @@ def read_events(lines: Iterable[bytes]) -> tuple[list[Event], list[int]]:
 
 
 def success_percents(lines: Iterable[bytes]) -> dict[str, float]:
-    """How often the evaluated versions succeeded, by hash: the last evaluation of each."""
+    """The success rate [%] of each evaluated version by hash, from its last evaluation."""
     word = f'"{EVALUATED}"'.encode()
     events, _ = read_events(line for line in lines if word in line)
     return {
@@ -62,7 +65,7 @@ def success_percents(lines: Iterable[bytes]) -> dict[str, float]:
 
 
 def in_use_before(events: Iterable[Event], current: str | None) -> list[str]:
-    """The hashes that were in use before the current one, the last first; a rollback takes back what came since.
+    """The hashes that were in use before the current one, the last first; a rollback discards what came since.
 
     >>> put = [{"what": "learned", "hash": name, "in_use": True} for name in "abc"]
     >>> in_use_before(put, "c")
@@ -80,21 +83,21 @@ def in_use_before(events: Iterable[Event], current: str | None) -> list[str]:
                 stack.pop()
         if (read.get("in_use") is True or read["what"] == ROLLED_BACK) and stack[-1:] != [name]:
             stack.append(name)
-    if current is not None and stack[-1:] != [current]:  # a crash came before the log was written
+    if current is not None and stack[-1:] != [current]:  # a crash kept the log from being written
         stack.append(current)
     return stack[-2::-1] if current is not None else stack[::-1]
 
 
-# ---- versions ---------------------------------------------------------------------------------------------------------
+# ---- the versions ---------------------------------------------------------------------------------------------------
 
 
 _VERSION = re.compile(rf"(\d{{4,}})-([0-9a-f]{{12}}){re.escape(SUFFIX)}")
-_LEAST_DIGITS = 4  # of a hash that is cut short
-_SHOWN = 5  # versions that an error names
+_LEAST_DIGITS = 4  # the fewest digits of an abbreviated hash
+_SHOWN = 5  # the most versions that an error names
 
 
 class Version(NamedTuple):
-    """One kept version: its number, the hash of its bytes, and its file's name in the place."""
+    """A version: its number, the hash of its bytes, and the name of its file in the place."""
 
     number: int
     hash: str
@@ -102,13 +105,13 @@ class Version(NamedTuple):
 
 
 def version_of(file: str) -> Version | None:
-    """The version that a file in the place is; None when its name is none of a version's."""
+    """The version that a file's name denotes, None if it denotes none."""
     match = _VERSION.fullmatch(file.rpartition("/")[2])
     return None if match is None else Version(int(match[1]), match[2], file)
 
 
 class Saved(NamedTuple):
-    """What became of a policy that was saved: the file that holds it, and why it was not put in use ("": it was)."""
+    """The result of saving a policy: its file, version and hash, and why it was not put in use ("" if it was)."""
 
     file: str
     version: int
@@ -122,7 +125,7 @@ class Saved(NamedTuple):
 
 
 class InUse(NamedTuple):
-    """The sound policy that is in use."""
+    """The policy in use: its bytes, their hash, and the policy."""
 
     content: bytes
     hash: str
@@ -130,11 +133,10 @@ class InUse(NamedTuple):
 
 
 class Versions:
-    """All that a place holds of one name, which is given as its file stem.
+    """The files of one policy name in a place; stem: the file stem of the name.
 
-    "STEM.safetensors" is the version in use, "versions/STEM/NUMBER-HASH.safetensors" are all, "log/STEM.jsonl" tells what
-    happened, "trash/STEM.safetensors" is what was removed. A policy whose file somebody put there is kept as a version as
-    soon as anything takes its place.
+    "STEM.safetensors" is the version in use, "versions/STEM/NUMBER-HASH.safetensors" are all versions, "log/STEM.jsonl" the log,
+    "trash/STEM.safetensors" the removed policy. A file that was copied there by hand becomes a version before it is replaced.
     """
 
     def __init__(self, place: Place, stem: str) -> None:
@@ -149,21 +151,21 @@ class Versions:
         return {version.hash: version for version in sorted(filter(None, found))}
 
     def in_use(self) -> InUse | None:
-        """The policy in use; None when there is none, or a damaged one. Raises BadInput when it may not be read."""
+        """The policy in use, None if there is none or it is damaged. Raises BadInput if the file cannot be read."""
         try:
             content = self._place.read(self.in_use_file)
             return InUse(content, hash_of(content), decode(content, self._place.where(self.in_use_file)))
         except BadInput as error:
-            if isinstance(error.__cause__, OSError):  # it may be a good one, and must not be replaced
+            if isinstance(error.__cause__, OSError):  # it may be sound, and must not be replaced
                 raise unreadable(self._place.where(self.in_use_file), error) from error
             return None
 
     def read(self, version: Version) -> Policy:
-        """A kept version. Raises BadInput when its bytes are not those that its name says, or are no sound policy."""
+        """The policy of a version. Raises BadInput if its bytes do not have the hash in its name, or are no sound policy."""
         return decode(self._bytes_of(version), self._place.where(version.file))
 
     def put(self, policy: Policy) -> Saved:
-        """Keeps a policy as a version, and puts it in use unless the one in use does better."""
+        """The result of saving a policy as a version, which is put in use unless the one in use is better."""
         content = encode(policy)
         name = hash_of(content)
         with self._place.lock(self._log):
@@ -188,7 +190,7 @@ class Versions:
         return Saved(version.file if why_not else self.in_use_file, version.number, name, why_not)
 
     def promote(self, wanted: str) -> Version:
-        """Puts a version in use, by number or hash, however well it does. Raises BadInput for one that is not there."""
+        """Puts a version in use, given by number or hash, even if it is worse. Raises BadInput if there is no such version."""
         with self._place.lock(self._log):
             current, kept = self._kept_current()
             version = self._chosen(wanted, kept)
@@ -198,7 +200,7 @@ class Versions:
         return version
 
     def rollback(self) -> Version:
-        """Puts the version in use that was in use before. Raises BadInput when there was none."""
+        """Puts the previous version back in use. Raises BadInput if there was none."""
         with self._place.lock(self._log):
             current, kept = self._kept_current()
             events, _ = self.events()
@@ -213,14 +215,14 @@ class Versions:
         return version
 
     def remove(self) -> None:
-        """Takes the policy in use away; `restore` brings it back, and its versions stay."""
+        """Removes the policy in use; `restore` brings it back, and its versions remain."""
         with self._place.lock(self._log):
             current, kept = self._kept_current()
             self._place.move(self.in_use_file, self.trash_file)
             self._tell("removed", kept.get(current.hash) if current else None)
 
     def restore(self) -> None:
-        """Brings back what was removed. Raises BadInput when nothing was, or another has taken its place."""
+        """Restores the removed policy. Raises BadInput if there is none, or if another one is in use."""
         with self._place.lock(self._log):
             if self._place.exists(self.in_use_file):
                 raise BadInput(
@@ -231,18 +233,18 @@ class Versions:
             self._tell("restored", self.kept().get(current.hash) if current else None, in_use=True)
 
     def note(self, what: str, **facts: object) -> None:
-        """Something that happened to the version in use, or to the one whose `hash` is given."""
+        """Adds an event to the log, about the version in use or the one whose `hash` is given."""
         with self._place.lock(self._log):
             current = self.in_use() if "hash" not in facts else None
             about = facts.get("hash", current and current.hash)
             self._tell(what, self.kept().get(str(about)), **({"hash": about} if about else {}) | facts)
 
     def events(self) -> tuple[list[Event], list[int]]:
-        """What happened, and the numbers of the damaged lines of the log."""
+        """(events, damaged): the events of the log, and the numbers of its damaged lines."""
         return read_events(self._place.lines(self._log))
 
     def faults(self) -> list[tuple[str, str]]:
-        """Files that are not sound, with the reason: a damaged log, versions whose bytes are not those that were kept."""
+        """(file, reason) of damaged versions, and of a damaged log."""
         found = []
         for version in self.kept().values():
             try:
@@ -256,7 +258,7 @@ class Versions:
         return found
 
     def _kept_current(self) -> tuple[InUse | None, dict[str, Version]]:
-        """The policy in use and the kept versions, of which it is one from now on. For who holds the lock."""
+        """The policy in use, and the versions, to which it is added if necessary. The caller holds the lock."""
         self._place.sweep(self._folder)
         current, kept = self.in_use(), self.kept()
         if current is not None and current.hash not in kept:
@@ -265,14 +267,14 @@ class Versions:
         return current, kept
 
     def _keep(self, content: bytes, kept: dict[str, Version]) -> Version:
-        """Writes a version unless it is kept already. Raises WorkFailed for other bytes of the same hash."""
+        """The version of these bytes, written unless it exists. Raises WorkFailed for other bytes with the same hash."""
         name = hash_of(content)
         version = kept.get(name)
         if version is None:
             number = 1 + max((version.number for version in kept.values()), default=0)
             version = Version(number, name, f"{self._folder}/{number:04}-{name}{SUFFIX}")
         else:
-            with suppress(BadInput):  # a damaged one is written again
+            with suppress(BadInput):  # a damaged version is written again
                 if self._bytes_of(version) == content:
                     return version
                 raise WorkFailed(f"policy file {self._place.where(version.file)}: it has the same hash and other bytes")
@@ -287,7 +289,7 @@ class Versions:
         return does_worse(policy, current.policy, rates.get(name), rates.get(current.hash))
 
     def _settle(self, known: dict[str, Version]) -> None:
-        """Where no lock keeps others away: what was kept meanwhile, and does better, is put in use."""
+        """Puts a better version in use that another process saved meanwhile; for places without a lock."""
         for version in self.kept().values():
             current = self.in_use()
             if current is None or version.hash in known or current.hash == version.hash:
@@ -303,7 +305,7 @@ class Versions:
         self._place.append(self._log, line_of(event(what, **(known | facts))))
 
     def _bytes_of(self, version: Version) -> bytes:
-        """A version's bytes, exactly those that were kept."""
+        """The bytes of a version. Raises BadInput if they do not have its hash."""
         try:
             content = self._place.read(version.file)
         except BadInput as error:
@@ -330,10 +332,10 @@ class Versions:
 
 
 def does_worse(new: Policy, old: Policy, new_percent: float | None, old_percent: float | None) -> str:
-    """Why a policy does worse than the one in use; "" when it does not.
+    """Why a policy is worse than the one in use, "" if it is not.
 
-    Solved is better than unsolved. In the same problem the greater success counts where both were evaluated, else the
-    fewer steps, as a multiple of the fewest that are possible.
+    Solved is better than unsolved. In the same problem the higher success rate is better if both were evaluated, otherwise the
+    shorter path, relative to the shortest possible.
     """
     if new.solved != old.solved:
         return "the one in use is solved" if old.solved else ""

@@ -7,7 +7,7 @@ import lab
 
 def test_a_world_is_a_page_of_its_own() -> None:
     page = lab.show(lab.world("S.\n.G", "square"))
-    assert "square; shortest way: 2 moves" in page.html
+    assert "square; shortest path: 2 moves" in page.html
     assert page.html.startswith("<!DOCTYPE html>")
 
 

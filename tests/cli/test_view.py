@@ -62,7 +62,7 @@ def data(file: str) -> Any:
 
 def test_a_world_is_shown_and_written_as_a_page(tmp_path: Path) -> None:
     _, page = looked_at("world-1")
-    assert "World I: a path through 10 x 10 x 10 cells; shortest way: 12 moves" in page
+    assert "World I: a path through 10 x 10 x 10 cells; shortest path: 12 moves" in page
     document = write_page("world-1", ONE, tmp_path / "w.html")
     assert document == {"file": str(tmp_path / "w.html")}
     assert {body["name"] for body in data(document["file"])["scene"]["bodies"]} == {
@@ -73,8 +73,8 @@ def test_a_world_is_shown_and_written_as_a_page(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("what", "title"),
     [
-        ("w.txt", "w; shortest way: 3 moves"),
-        ("random:20x20x20:0.3:3", "Random world of 20x20x20 cells, density 0.3, seed 3; shortest way: "),
+        ("w.txt", "w; shortest path: 3 moves"),
+        ("random:20x20x20:0.3:3", "Random world of 20x20x20 cells, density 0.3, seed 3; shortest path: "),
         ("toast", "Toast making with one robot"),
     ],
 )

@@ -61,7 +61,7 @@ def way(kept: Memory, start: int = 0) -> list[int]:
     memory.plan(kept, start)
     states = [start]
     while kept.now.best < UNKNOWN and states[-1] != GOAL:
-        states.append(kept.way[states[-1]])
+        states.append(kept.path[states[-1]])
     return states
 
 
@@ -125,7 +125,7 @@ def test_the_way_is_put_together_from_different_walks() -> None:
     assert way(kept) == [0, 1, 2, 3, GOAL]
     walk(kept, 4, [(5, OWN), (4, OWN), (0, OWN), (6, OWN)])
     assert way(kept) == [0, 6, 3, GOAL]  # 6 to 3 from the second walk, 3 to the goal from the first
-    assert (kept.now.best, kept.way[6], kept.way[1]) == (3, 3, NOTHING)
+    assert (kept.now.best, kept.path[6], kept.path[1]) == (3, 3, NOTHING)
 
 
 def test_a_move_that_led_to_different_places_belongs_to_no_way() -> None:
@@ -190,7 +190,7 @@ def practised(kept: Memory, own: list[int]) -> list[int]:
         found += [episode] * practises
         states = [0]
         while states[-1] != GOAL:
-            entered = kept.way[states[-1]] if practises else own[len(states) - 1]
+            entered = kept.path[states[-1]] if practises else own[len(states) - 1]
             goes(kept, states[-1], entered, PRACTISED if practises else OWN)
             states.append(entered)
         memory.ended(kept, len(states) - 1, True, 0)
@@ -239,7 +239,7 @@ def test_another_session_begins_with_nothing() -> None:
     walk(kept, 1, [(1, ASKED), (1, ASKED), (GOAL, ASKED)])
     memory.plan(kept, 0)
     memory.clear(kept)
-    assert (set(kept.led), set(kept.way), set(kept.on_walk)) == ({NOTHING}, {NOTHING}, {0})
+    assert (set(kept.led), set(kept.path), set(kept.on_walk)) == ({NOTHING}, {NOTHING}, {0})
     assert (kept.now.trust, kept.now.best, kept.now.showings, kept.now.practices) == (START, UNKNOWN, 0, -1)
 
 
@@ -262,7 +262,7 @@ def test_whatever_happens_a_walk_has_no_repeats_and_the_way_is_the_shortest_know
         shortest = int(distances(successor, np.arange(STATES) >= GOAL, 0)[GOAL])
         found = way(kept)
         assert (len(found) - 1, kept.now.best) == ((shortest, shortest) if shortest > 0 else (0, UNKNOWN))
-        assert sum(one != NOTHING for one in kept.way) == len(found) - 1
+        assert sum(one != NOTHING for one in kept.path) == len(found) - 1
 
 
 def test_lists_and_arrays_are_alike() -> None:

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lab.learning.environment import TableEnvironment
-from lab.learning.values import fewest_moves, greedy_moves, known_values, values_of_ways
+from lab.learning.values import fewest_moves, greedy_moves, known_values, values_of_shortest_paths
 from lab.mdp import NoPath, Rewards, greedy_path, grid, optimal_values, shortest_steps
 
 CORRIDOR = grid((1, 4), np.zeros((1, 4), bool), (0, 1), (0, 3))  # its moves: up and down stay, left, right
@@ -59,7 +59,7 @@ def test_ways_are_a_guess_from_which_the_values_settle_alike(seed: int, density:
     wall = rng.random((7, 6)) < density
     wall[0, 0] = wall[0, 1] = False
     mdp = grid((7, 6), wall, (0, 0), (0, 1), Rewards(collision=-1000.0))
-    exact, guess = optimal_values(mdp, discount), values_of_ways(mdp, discount)
+    exact, guess = optimal_values(mdp, discount), values_of_shortest_paths(mdp, discount)
     np.testing.assert_allclose(optimal_values(mdp, discount, guess), exact, atol=1e-9)
     there = np.isfinite(fewest_moves(mdp))
     best = guess[there].max(axis=1), exact[there].max(axis=1)

@@ -104,7 +104,7 @@ def test_it_tells_of_one_that_came_from_another_and_reaches_nothing(make_policy:
         "| states | 4 |",
         "| advisor | none: no step was helped |",
         "Its states are no grid, so that there is no map of them.",
-        "- It is not solved: see its way above.",
+        "- It is not solved: see its path above.",
     ):
         assert f"{line}\n" in text, line
     assert "![" not in text

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lab.mdp import FloatArray, shortest_way
+from lab.mdp import FloatArray, shortest_path
 from lab.sim.frames import Body, Recording, Shape, Viewpoint
 from lab.tasks.grid_world import GridWorld, random_world
 from lab.tasks.task_file import load_world
@@ -27,7 +27,7 @@ def still(world: GridWorld) -> Recording:
     """The world with its shortest way."""
     mdp = world.mdp()
     with closing(WorldBodies(world)) as drawn:
-        return drawn.still([mdp.state_cell(state) for state in shortest_way(mdp)])
+        return drawn.still([mdp.state_cell(state) for state in shortest_path(mdp)])
 
 
 def body(recording: Recording, name: str) -> Body:
@@ -54,7 +54,7 @@ def test_the_tubes_are_as_long_as_the_way_and_all_is_in_the_picture(in_picture: 
     recording.check()
     size = WORLD_M / max(world.shape)
     tubes = [shape for shape in body(recording, "shortest way").shapes if shape.kind == "cylinder"]
-    assert sum(tube.size[1] for tube in tubes) == pytest.approx(size * (len(shortest_way(world.mdp())) - 1))
+    assert sum(tube.size[1] for tube in tubes) == pytest.approx(size * (len(shortest_path(world.mdp())) - 1))
     points = np.array([shape.position for body in recording.bodies for shape in body.shapes])
     assert in_picture(recording.camera, points)
 

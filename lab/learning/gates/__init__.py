@@ -1,4 +1,4 @@
-"""When a learner asks for advice, and when it stops: the gates, one file a family."""
+"""The gates: rules that decide when a learner asks for advice and when it stops. GATES is their table."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""The thesis's gate, which compares moving averages and rejects who misleads, and its combination with introspection."""
+"""CCRL, the thesis's gate, which compares moving averages and rejects misleading advisors; CCRL with introspection."""
 
 from math import inf
 
@@ -21,18 +21,17 @@ from lab.learning.settings import GateSettings
 class Ccrl(Gate):
     """Asks for whole episodes while improvement is too slow, and rejects an advisor that misleads (thesis fig. 6.2).
 
-    From episode X on it asks when current/previous mean > 1 - Lambda. It stops for good after more than 2K equal
-    results below the step limit, and never asks in the last episode, which shows what was learned. An episode that
-    was open for advice and is not better than the mean of the K before it is a mislead, also where the advisor's
-    limited view let it say nothing (listing); more than Omega of them reject the advisor.
+    From episode X on it asks if current/previous mean > 1 - Lambda. It stops for good after more than 2K equal results below the
+    step limit, and never asks in the last episode, which shows what was learned. An episode that was open for advice and was no
+    better than the mean of the K before it is a mislead, even if the advisor's limited view kept it from answering (listing);
+    more than Omega misleads reject the advisor.
 
-    Not in the thesis, whose episodes all begin in one state: where they begin in different ones, each count before is
-    moved by how much farther the goal is from where the judged episode began. How far that is, the learner knows from
-    its own walks alone: the fewest steps by which it has seen the goal reached from a state, parts of different walks
-    put together. Nobody tells it the shortest way, so that is too many at first, and where steps are left to chance, it
-    is the luckiest. A failed episode keeps its count. With one start nothing is moved. When to ask is decided by the
-    plain counts. `settings.spare_best`: an episode of the fewest steps known from its start is no mislead, for no
-    advice could have made it better; the thesis counts it.
+    Beyond the thesis, whose episodes all begin in one state: if episodes begin in different states, each earlier step count is
+    corrected by the difference in distance to the goal between its start and that of the judged episode. The distance of a
+    state is the fewest steps in which the learner has seen the goal reached from it, combined over all of its episodes; it is
+    an upper bound at first and, if steps are stochastic, the luckiest outcome. The counts of failed episodes are not
+    corrected, nor are the counts that decide when to ask. With `settings.spare_best`, an episode with the fewest known steps
+    from its start is no mislead, because no advice could have improved it; the thesis counts it as one.
     """
 
     def __init__(self, settings: GateSettings, episodes: int, max_steps: int, around: Surroundings | None = None):
@@ -41,17 +40,17 @@ class Ccrl(Gate):
         self._slow = Reason()
         self._last_result: float = 0
         self._equal_results = 0
-        self._starts: dict[int, int] = {}  # where each episode began
+        self._starts: dict[int, int] = {}  # the first state of each episode
         self._start = 0
-        self._walk = [0]  # the states that this episode left; only its first one where all begin in one
-        self._fewest: dict[int, float] = {}  # known steps to the goal
+        self._walk = [0]  # the states of this episode; only the first one if all episodes begin in one state
+        self._fewest: dict[int, float] = {}  # the fewest known steps to the goal, by state
 
     def begins(self, state: int) -> None:
-        """Another walk begins."""
+        """Starts recording the states of an episode."""
         self._start, self._walk = (state, []) if self.watches else (0, [0])
 
     def saw(self, s_tm1: int, a_tm1: int, r_t: float, discount_t: float, s_t: int, a_t: int) -> None:
-        """The walk goes on."""
+        """Records the state that was left."""
         self._walk.append(s_tm1)
 
     def opens(self, episode: int, steps: Steps) -> bool:
@@ -88,19 +87,19 @@ class Ccrl(Gate):
             self.rejected = self.misleads > self.settings.omega
 
     def _knows(self, result: float) -> None:
-        """Takes in how far the goal was from each state of the walk."""
+        """Updates the distance to the goal of each state of the episode."""
         left = result - len(self._walk) if result <= self.max_steps else inf
         for state in reversed(self._walk):
             left = self._fewest[state] = min(left + 1, self._fewest.get(state, inf))
 
     def _alike(self, steps: Steps) -> Steps:
-        """The K counts before the last one, as if they had begun where it began."""
-        found, here = [], self._fewest[self._start]
+        """The K step counts before the last one, corrected as if they had begun in its start."""
+        corrected, here = [], self._fewest[self._start]
         for i in range(len(steps) - 1 - self.settings.window, len(steps) - 1):
             start = self._starts.get(i, self._start)
             moved = start != self._start and here < inf and steps[i] <= self.max_steps
-            found.append(steps[i] - self._fewest[start] + here if moved else steps[i])
-        return found
+            corrected.append(steps[i] - self._fewest[start] + here if moved else steps[i])
+        return corrected
 
 
 class Combined(Ccrl):

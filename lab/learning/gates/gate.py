@@ -1,4 +1,4 @@
-"""What all gates have in common, and the two that look at nothing."""
+"""The base class of all gates, the rules that kernel and gates share, and the gates that decide at each step."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -10,7 +10,7 @@ from lab.learning.session_events import Improvement, Verdict
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.learning.updates.update import Update
 
-Steps = Sequence[float]  # whole numbers, unless the high level compares makespans
+Steps = Sequence[float]  # step counts of the finished episodes; for orders of transfers, their makespans [s]
 
 OPENS_NEVER, OPENS_ALWAYS, OPENS_FROM_X, OPENS_WHILE_SLOW, OPENS_WHILE_LONG = range(5)
 WEIGHS_NOTHING, WEIGHS_NOVELTY, WEIGHS_FADING, WEIGHS_SHAPING, WEIGHS_RELIABILITY, WEIGHS_WORTH, WEIGHS_TRUST = range(7)
@@ -18,8 +18,10 @@ ASKS_ALWAYS, ASKS_WHERE_ALIKE, ASKS_WHERE_APART, ASKS_BY_CHANCE, ASKS_WHERE_TABL
 
 
 class CompiledGate(NamedTuple):
-    """A gate by the rules that the kernel knows: which episodes it opens (OPENS_...), which steps of these it asks about
-    (ASKS_...), whether it judges episodes as CCRL does, and how it weighs what it is told (WEIGHS_...).
+    """A gate's form in the kernel.
+
+    opens: which episodes it opens (OPENS_...); asks: which of their steps it asks about (ASKS_...); judges: whether it judges
+    episodes as CCRL does; weighs: how it weighs answers (WEIGHS_...).
     """
 
     opens: int
@@ -52,7 +54,7 @@ def unsure(width: float, psi: float) -> bool:
 
 
 def improvement(steps: Steps, window: int) -> Improvement | None:
-    """The improvement of the step counts so far; None while fewer than two windows have ended."""
+    """The improvement of the last `window` steps over those before, None for fewer than 2 * window. Source: thesis eq. 6.1."""
     n = len(steps)
     if n < 2 * window:
         return None
@@ -60,7 +62,7 @@ def improvement(steps: Steps, window: int) -> Improvement | None:
     return Improvement(1.0 - current / previous, current, previous)
 
 
-# ---- gate -------------------------------------------------------------------------------------------------------------
+# ---- the base class -------------------------------------------------------------------------------------------------
 
 
 Values = Sequence[float]
@@ -68,11 +70,11 @@ Values = Sequence[float]
 
 @dataclass(frozen=True)
 class Surroundings:
-    """What a gate may be built with beside its settings.
+    """What a gate may use besides its settings.
 
-    draw: uniform numbers; learners: so many tables that learn as the learner does, each with start values of its own;
-    several_starts: episodes may begin in different states; values: what the learner knows of a state now
-    (`Update.gauge`); size: (S, A); learner: its settings.
+    draw: returns uniform numbers; learners: returns as many independent learners as asked for, with random start values;
+    several_starts: whether episodes may begin in different states; values: the learner's values of a state (`Update.gauge`);
+    size: (S, A); learner: the learner's settings.
     """
 
     draw: Draw
@@ -84,13 +86,25 @@ class Surroundings:
 
 
 class Gate:
-    """The base of all gates, and the gate "always": every step of every episode asks, and nothing is ever rejected.
+    """The base class of gates, and the gate "always", which asks about every step and rejects nobody.
 
-    A session calls `opens` before each episode, `begins` where it begins, `asks` before each step of an open one, `takes`
-    with what was answered, `saw` after each step (if `watches`), and `judges` after the episode. `steps` holds the step
-    counts of the finished episodes, a failed one as max_steps + 1. `why`: the reason of the last question; `verdict`: what
-    the gate makes of the episode that ended last, see `Verdict`. weighs: it is asked and given to take also where the
-    budget is spent.
+    A session calls `opens` before each episode, `begins` with its first state, `asks` before each step of an open episode,
+    `takes` with the answer, `saw` after each step (if `watches`), and `judges` after the episode. A subclass overrides what it
+    decides.
+
+    settings: of the gate; episodes, max_steps: of the session; around: what else a gate may use, None outside sessions.
+    watches: class attribute, whether `saw` is called; weighs: class attribute, whether `asks` and `takes` are also called when
+    the budget is spent.
+    misleads: episodes that misled; rejected: whether the advisor is rejected; converged: whether the gate has stopped asking for
+    good; why: the reason for the last question; verdict: on the last episode (`Verdict`).
+
+        >>> import lab
+        >>> class EveryOther(lab.Gate):
+        ...     '''Asks in every other episode.'''
+        ...     def opens(self, episode: int, steps: lab.Steps) -> bool:
+        ...         return episode % 2 == 0
+        >>> from lab.testing import check_gate
+        >>> check_gate(EveryOther)
     """
 
     watches = weighs = False
@@ -104,28 +118,29 @@ class Gate:
         self.verdict: Verdict = ""
 
     def opens(self, episode: int, steps: Steps) -> bool:
-        """Whether episode n (from 1) may ask for advice."""
+        """Whether episode n (from 1) may ask; steps: of the finished episodes, failed ones as max_steps + 1."""
         return True
 
     def begins(self, state: int) -> None:
-        """Hears in which state the episode begins."""
+        """Receives the first state of the episode."""
 
     def asks(self, state: int, values: Values) -> bool:
-        """Whether the learner asks in a state; `values` is what it knows there (`Update.gauge`)."""
+        """Whether the learner asks in a state; values: (A,), the learner's values there (`Update.gauge`)."""
         return True
 
     def takes(self, state: int, own: int, said: int | None) -> int:
-        """The action of a step of an open episode; own: the learner's choice; said: the answer, None where nothing was said.
+        """The action to carry out in a step of an open episode.
 
-        Called in each of its steps, whether it was asked about or not, also when the budget is spent.
+        own: the learner's choice; said: the answer, None if there is none. It is called in each step, asked about or not, and
+        also when the budget is spent if `weighs`.
         """
         return own if said is None else said
 
     def saw(self, s_tm1: int, a_tm1: int, r_t: float, discount_t: float, s_t: int, a_t: int) -> None:
-        """Hears of a step that was made, as the learner does (`Update.learn`)."""
+        """Receives a step after the learner has learned from it; the arguments are those of `Update.learn`."""
 
     def judges(self, steps: Steps, opened: bool) -> None:
-        """Assesses the episode that ended last, which was open for advice or not; may set `rejected`."""
+        """Judges the last episode; opened: whether it counts as advised. May set misleads, rejected, converged and verdict."""
 
 
 class Never(Gate):
@@ -139,11 +154,11 @@ class Never(Gate):
 GateClass = Callable[[GateSettings, int, int, Surroundings | None], Gate]
 
 
-# ---- per step ---------------------------------------------------------------------------------------------------------
+# ---- gates that decide at each step ---------------------------------------------------------------------------------
 
 
 class PerStep(Gate):
-    """From episode X on, whether to ask is decided at each step."""
+    """The base class of gates that open every episode from X on and decide at each step."""
 
     def opens(self, episode: int, steps: Steps) -> bool:
         """Every episode from X on may ask."""
@@ -151,6 +166,7 @@ class PerStep(Gate):
 
 
 def width_of(values: Values) -> float:
+    """The span of values: the highest minus the lowest."""
     return max(values) - min(values)
 
 
@@ -167,16 +183,16 @@ class Importance(PerStep):
     """Asks in each state whose values span at least Psi: there a wrong choice costs most (Torrey and Taylor 2013)."""
 
     def asks(self, state: int, values: Values) -> bool:
-        """Whether much depends on the choice."""
+        """Whether the values span at least Psi."""
         self.why = ValuesApart(width_of(values), self.settings.psi)
         return width_of(values) >= self.settings.psi
 
 
 class Random(PerStep):
-    """Asks in a random share of the steps: what any rule must beat."""
+    """Asks in a random share of the steps: the baseline for any rule."""
 
     def asks(self, state: int, values: Values) -> bool:
-        """Whether chance says so."""
+        """Whether this step is in the random share."""
         assert self.around is not None
         self.why = ByChance(self.settings.rate)
         return self.around.draw() < self.settings.rate

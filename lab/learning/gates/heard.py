@@ -1,6 +1,7 @@
-"""What gates keep that weigh what they are told: answers by state, where moves led, how advised episodes went.
+"""The record of gates that weigh advice: answers by state, outcomes of moves, results of advised episodes.
 
-The functions are written in the Python that numba compiles, too: gates hand them lists, the compiled kernel arrays.
+Rules of published gates that work on it follow: policy shaping, CLUE's reliability, and a table of the worth of asking. The
+functions are also compiled by numba: gates pass lists, the kernel arrays.
 """
 
 from collections.abc import MutableSequence, Sequence
@@ -11,7 +12,7 @@ from lab.learning.selection import exp_of
 from lab.learning.updates.update import towards
 
 NOTHING = -1
-GOAL, NOWHERE = -2, -3  # where a move led: to the goal; to another end, or to different places
+GOAL, NOWHERE = -2, -3  # outcomes of a move: the goal; another terminal state, or different states
 
 Cells = MutableSequence[int]
 Numbers = MutableSequence[float]
@@ -19,14 +20,15 @@ Numbers = MutableSequence[float]
 
 @dataclass
 class HeardNow:
-    """The numbers of what was heard; the kernel keeps them in a record of the same names.
+    """The scalars of the record; the kernel keeps them in a record with the same field names.
 
-    right, wrong: answers that the learner's own values bore out, or not. helped, won: episodes that followed advice, and those
-    of them that reached the goal; rate, steps, advised_share: running means of whether they did, how long they took, and the
-    share of their moves that were advised; own, own_rate, own_steps: of the others. several: episodes begin in different
-    states; uncertain: a move has led to different places. Of the episode under way: advised: it follows advice; moves,
-    advised_moves: all, and those on advice; followed: the last one was; last: its place in `led`; blame: that of a followed
-    move that ended the episode, -1: none; clock: moves of the session; since: when the moves that were all followed began.
+    right, wrong: answers that the learner's own values confirm, or contradict.
+    helped, won: advised episodes, and those of them that reached the goal; rate, steps, advised_share: their running means of
+    success, of steps, and of the share of advised moves; own, own_rate, own_steps: the same for the other episodes.
+    several: 1 if episodes begin in different states; uncertain: 1 if a move has led to different states.
+    Of the current episode: advised: 1 if it follows advice; moves, advised_moves: all, and those on advice; followed: 1 if the
+    last move was on advice; last: its number; blame: the number of an advised move that ended the episode, -1 for none.
+    clock: moves of the session; since: the clock at the start of the current run of advised moves.
     """
 
     right: float = 1.0
@@ -52,12 +54,13 @@ class HeardNow:
 
 
 class Heard(NamedTuple):
-    """What a session was told.
+    """The record of the advice in a session.
 
-    said (S,): the last answer in a state, -1 none; times (S * A,): how often each was given; blamed (S * A,): 1 where an answer
-    led round or to an end that is no goal; led (S * A,): the state that a move led to, -1 not made yet, GOAL or NOWHERE;
-    greedy (S,): the best action by the learner's values, -1 where it has not been; left (S,): when a state was left last
-    on advice; worth (S * 2,): what going on alone and asking are worth.
+    said (S,): the last answer in each state, -1 for none; times (S * A,): how often each action was the answer.
+    blamed (S * A,): 1 for answers that led into a loop or to a terminal state that is no goal.
+    led (S * A,): the state that each move led to, -1 if it was never made, or GOAL or NOWHERE.
+    greedy (S,): the learner's best action, -1 in states never visited; left (S,): the clock when a state was last left on advice.
+    worth (S * 2,): the values of acting alone and of asking.
     """
 
     said: Cells
@@ -71,14 +74,14 @@ class Heard(NamedTuple):
 
 
 def blank(states: int, actions: int) -> Heard:
-    """The record of a session in which nothing was heard yet."""
+    """An empty record."""
     said, greedy = [NOTHING] * states, [NOTHING] * states
     times, blamed, led = [0] * (states * actions), [0] * (states * actions), [NOTHING] * (states * actions)
     return Heard(said, times, blamed, led, greedy, [0] * states, [0.0] * (2 * states), HeardNow())
 
 
 def clear(heard: Heard, several: float) -> None:
-    """Another session begins."""
+    """Resets the record for another session; several: 1 if its episodes begin in different states."""
     for state in range(len(heard.said)):
         heard.said[state] = heard.greedy[state] = NOTHING
         heard.left[state] = 0
@@ -95,18 +98,18 @@ def clear(heard: Heard, several: float) -> None:
 
 
 def hear(heard: Heard, state: int, action: int) -> None:
-    """An answer is kept."""
+    """Records an answer."""
     heard.said[state] = action
     heard.times[state * (len(heard.led) // len(heard.said)) + action] += 1
 
 
 def answers(heard: Heard, state: int) -> int:
-    """How many answers were given in a state."""
+    """The number of answers recorded in a state."""
     actions = len(heard.led) // len(heard.said)
-    found = 0
+    total = 0
     for number in range(state * actions, (state + 1) * actions):
-        found += heard.times[number]
-    return found
+        total += heard.times[number]
+    return total
 
 
 def best_of(values: Sequence[float]) -> int:
@@ -118,13 +121,13 @@ def best_of(values: Sequence[float]) -> int:
     return best
 
 
-# Policy shaping
+# ---- policy shaping -------------------------------------------------------------------------------------------------
 
 
 def shaped(heard: Heard, state: int, values: Sequence[float], per_tau: float, odds: float, u: float) -> int:
-    """The action that u draws from the softmax of the values times odds ** (how often it was said in this state).
+    """The action that u selects from softmax probability times odds ** (how often the action was the answer in this state).
 
-    Source: Griffith et al. 2013, eq. 3, an answer being a "right" for its action.
+    Source: Griffith et al. 2013, eq. 3, where an answer counts as a "right" for its action.
     """
     actions, top, most = len(values), values[0], 0
     for action in range(actions):
@@ -132,37 +135,35 @@ def shaped(heard: Heard, state: int, values: Sequence[float], per_tau: float, od
     total = 0.0
     for action in range(actions):
         total += exp_of((values[action] - top) * per_tau) * odds ** (heard.times[state * actions + action] - most)
-    mark, below, found = u * total, 0.0, actions - 1
+    mark, below, chosen = u * total, 0.0, actions - 1
     for action in range(actions - 1):
         below += exp_of((values[action] - top) * per_tau) * odds ** (heard.times[state * actions + action] - most)
         if mark < below:
-            found = action
+            chosen = action
             break
-    return found
+    return chosen
 
 
-# Reliability, as CLUE estimates it
+# ---- reliability, as in CLUE ----------------------------------------------------------------------------------------
 
-EXPLORING, FOLLOWED_FROM = (
-    0.8,
-    0.25,
-)  # share of the episodes in which it explores; the least chance that an answer is right
+EXPLORING = 0.8  # the first share of the episodes, in which it explores
+FOLLOWED_FROM = 0.25  # the least probability that an answer is right
 
 
 def explores(episode: int, episodes: int, u: float) -> bool:
-    """Whether a step explores: with a chance that falls from 1 to 0 in the first 80 % of the episodes."""
+    """Whether a step explores: with a probability that falls linearly from 1 to 0 in the first 80 % of the episodes."""
     return u < 1.0 - (episode - 1) / (EXPLORING * episodes)
 
 
 def reliable(heard: Heard, actions: int) -> bool:
-    """Whether the answer is the likeliest action to be right, and likely enough."""
+    """Whether the answer is the most probable right action, with a probability of at least FOLLOWED_FROM."""
     now = heard.now
     trust = now.right / (now.right + now.wrong)
     return trust >= FOLLOWED_FROM and trust > (1.0 - trust) / (actions - 1)
 
 
 def borne_out(heard: Heard, state: int, values: Sequence[float]) -> None:
-    """The values of a state that was left: do they bear out what was said there?"""
+    """Counts whether the learner's values in a state confirm the answer there."""
     said = heard.said[state]
     if said != NOTHING:
         if values[said] >= values[best_of(values)]:
@@ -171,19 +172,19 @@ def borne_out(heard: Heard, state: int, values: Sequence[float]) -> None:
             heard.now.wrong += 1.0
 
 
-# Two levels: own choice or advice, by a table of their worth
+# ---- two levels: acting alone or asking, by their values ------------------------------------------------------------
 
-WANDERS = 0.05  # the share of the steps in which it tries the one that is worth less
+WANDERS = 0.05  # the share of the steps in which it tries the less valuable choice
 
 
 def asks_by_worth(heard: Heard, state: int, u: float) -> bool:
-    """Whether asking is worth as much here as going on alone, or chance tries the other."""
+    """Whether to ask: asking is worth at least as much as acting alone, or else exploration decides."""
     asking = heard.worth[2 * state + 1] >= heard.worth[2 * state]
     return asking if u >= WANDERS else not asking
 
 
 def learn_worth(heard: Heard, state: int, reward: float, discount: float, entered: int, alpha: float) -> None:
-    """Q-learning of the worth of the way that was gone: 0 alone, 1 on advice."""
+    """One Q-learning update of the value of the choice made in a state: acting alone (0) or on advice (1)."""
     at = 2 * state + (1 if heard.now.followed > 0.0 else 0)
     best = max(heard.worth[2 * entered], heard.worth[2 * entered + 1])
     heard.worth[at] = towards(heard.worth[at], reward + discount * best, alpha)

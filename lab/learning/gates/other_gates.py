@@ -1,4 +1,4 @@
-"""The gate that asks where several tables, learned side by side, disagree."""
+"""Two more gates: "cq", which asks while episodes are too long, and "uncertainty", which asks where an ensemble disagrees."""
 
 from collections.abc import Sequence
 
@@ -9,7 +9,7 @@ from lab.learning.updates.update import Update
 
 
 class ConstantPerformance(Gate):
-    """Asks for whole episodes while the mean of the last K is above a constant (CQ(lambda): Kartoun et al. 2006)."""
+    """Asks for whole episodes while the mean step count of the last K is above a constant (CQ(lambda): Kartoun et al. 2006)."""
 
     def opens(self, episode: int, steps: Steps) -> bool:
         """Whether performance is not good enough yet."""
@@ -21,15 +21,15 @@ class ConstantPerformance(Gate):
         return mean > settings.enough_steps
 
 
-# ---- uncertainty ------------------------------------------------------------------------------------------------------
+# ---- disagreement of an ensemble of tables --------------------------------------------------------------------------
 
 
 class Uncertainty(PerStep):
-    """Asks where an ensemble of tables disagrees: their values' standard deviation is at least `spread`.
+    """Asks where the standard deviation of the values of an ensemble of tables is at least `spread`.
 
-    Each table starts with values of its own within +-0.5 and learns as the learner does, each step with probability
-    1/2, or where steps are learned from together (`Update.chained`), each whole episode. The deviation is the root of
-    the mean variance over the actions. Source: da Silva et al. 2020 (RCMP), for tables.
+    Each table starts with random values within +-0.5 and learns by the learner's rule from each step with probability 1/2, or, if
+    that rule learns from connected steps (`Update.chained`), from each whole episode. The deviation is the root of the variance,
+    averaged over the actions. Source: da Silva et al. 2020 (RCMP), for tables.
     """
 
     watches = True
@@ -37,10 +37,10 @@ class Uncertainty(PerStep):
     def __init__(self, settings: GateSettings, episodes: int, max_steps: int, around: Surroundings | None = None):
         super().__init__(settings, episodes, max_steps, around)
         self._tables = [] if around is None else around.learners(settings.ensemble)
-        self._learning: list[Update] = []  # those with steps that belong together, that learn this episode
+        self._learning: list[Update] = []  # the tables with a chained rule that learn from this episode
 
     def begins(self, state: int) -> None:
-        """Each table begins the episode; where its steps belong together, it learns all of them or none."""
+        """Begins the episode for each table, and draws whether tables with a chained rule learn from it."""
         assert self.around is not None
         for table in self._tables:
             table.begin()
@@ -53,7 +53,7 @@ class Uncertainty(PerStep):
         return spread >= self.settings.spread
 
     def saw(self, s_tm1: int, a_tm1: int, r_t: float, discount_t: float, s_t: int, a_t: int) -> None:
-        """Each table learns the step, or not."""
+        """Lets each table learn from the step with probability 1/2, or as drawn for the episode."""
         assert self.around is not None
         draw = self.around.draw
         for table in self._tables:
@@ -61,7 +61,7 @@ class Uncertainty(PerStep):
                 table.learn(s_tm1, a_tm1, r_t, discount_t, s_t, a_t)
 
     def judges(self, steps: Steps, opened: bool) -> None:
-        """The episode is over: the tables learn what is learned at its end."""
+        """Ends the episode for each table."""
         for table in self._tables:
             table.end()
 

@@ -1,4 +1,4 @@
-"""Gates that keep what they are told and weigh it: the field's rules, and the lab's own, "earned-trust"."""
+"""Gates that record and weigh advice: the lab's own, "earned-trust" (its functions come first), and published ones."""
 
 from collections.abc import Sequence
 
@@ -9,14 +9,14 @@ from lab.learning.requests import ByChance, Reason, ToldSeldom, Trusted
 from lab.learning.selection import COLDEST, temperature
 from lab.learning.settings import GateSettings
 
-SURE = 1.0
-ANSWERS = 20  # in a state
-OWN = 3.0  # episodes of its own that it has judged itself by
+SURE = 1.0  # it asks until the lead of the most frequent answer exceeds this times the root of the number of answers
+ANSWERS = 20  # the most answers that it asks for in a state
+OWN = 3.0  # the fewest episodes without advice by which it judges itself
 RECENT = 0.3  # the weight of the last episode in a running mean
 
 
 def rehearsed(heard: Heard, start: int) -> int:
-    """The moves of the greedy way from a state to the goal by moves that were made, NOTHING where it is not known."""
+    """The length in moves of the greedy path from a state to the goal in the record of moves, NOTHING if it is unknown."""
     states, actions = len(heard.said), len(heard.led) // len(heard.said)
     state, moves = start, 0
     while moves < states:
@@ -34,7 +34,7 @@ def rehearsed(heard: Heard, start: int) -> int:
 
 
 def starts(heard: Heard, start: int, u: float) -> None:
-    """An episode begins: whether it follows advice (rules 3 and 4)."""
+    """Begins an episode in a state, and decides with the uniform number u whether it follows advice."""
     now = heard.now
     now.followed = now.moves = now.advised_moves = 0.0
     now.since = now.clock = now.clock + 1.0
@@ -53,18 +53,18 @@ def starts(heard: Heard, start: int, u: float) -> None:
 
 
 def favourite(heard: Heard, state: int) -> int:
-    """The answer that was given most often and is not blamed, NOTHING where there is none; ties: the lowest index."""
+    """The most frequent answer in a state that is not blamed, NOTHING if there is none; ties: the lowest index."""
     actions = len(heard.led) // len(heard.said)
-    found, most = NOTHING, 0
+    best, most = NOTHING, 0
     for action in range(actions):
         number = state * actions + action
         if heard.times[number] > most and heard.blamed[number] == 0:
-            found, most = action, heard.times[number]
-    return found
+            best, most = action, heard.times[number]
+    return best
 
 
 def wants(heard: Heard, state: int) -> bool:
-    """Whether to ask (rule 1)."""
+    """Whether to ask in a state: the episode follows advice and the answers so far do not agree clearly enough."""
     if heard.now.advised == 0.0:
         return False
     given = answers(heard, state)
@@ -83,7 +83,7 @@ def wants(heard: Heard, state: int) -> bool:
 
 
 def takes(heard: Heard, state: int, own: int) -> int:
-    """What is known of this state, or the learner's own choice."""
+    """The most frequent answer in this state if the episode follows advice and there is one, otherwise the learner's own."""
     if heard.now.advised == 0.0:
         return own
     said = favourite(heard, state)
@@ -92,7 +92,7 @@ def takes(heard: Heard, state: int, own: int) -> int:
 
 
 def saw(heard: Heard, number: int, entered: int, over: bool, values: Sequence[float]) -> None:
-    """Takes in a move; values: of the state that it left, after it was learned from."""
+    """Records a move; values: (A,), of the state that it left, after the learner has learned from it."""
     now, led = heard.now, heard.led
     actions = len(led) // len(heard.said)
     state = number // actions
@@ -119,7 +119,7 @@ def saw(heard: Heard, number: int, entered: int, over: bool, values: Sequence[fl
 
 
 def ended(heard: Heard, result: float, reached: bool, over: bool) -> None:
-    """An episode is over; result: its steps; over: it ended in a terminal state."""
+    """Ends an episode; result: its step count; over: whether it ended in a terminal state."""
     now = heard.now
     last = int(now.last)
     if reached:
@@ -142,11 +142,11 @@ def ended(heard: Heard, result: float, reached: bool, over: bool) -> None:
         now.own += 1.0
 
 
-# ---- weighing ---------------------------------------------------------------------------------------------------------
+# ---- the gates ------------------------------------------------------------------------------------------------------
 
 
 class Weighing(Gate):
-    """Keeps what it is told by state; asks about every step and follows what is said."""
+    """The base class of gates that record answers by state; it asks about every step and follows each answer."""
 
     watches = weighs = True
 
@@ -164,39 +164,39 @@ class Weighing(Gate):
         return True
 
     def asks(self, state: int, values: Values) -> bool:
-        """Whether to ask about this step, as `wants` has it; each step draws one uniform number."""
+        """Whether to ask about this step, as `wants` decides with one uniform number."""
         self._u = self._around.draw()
         return self.wants(state, self._u)
 
     def wants(self, state: int, u: float) -> bool:
-        """Whether to ask; u: a uniform number."""
+        """Whether to ask in a state; u: a uniform number in [0, 1)."""
         return True
 
     def takes(self, state: int, own: int, said: int | None) -> int:
-        """What is said is kept, and followed or not, as `weighed` has it."""
+        """The action that `weighed` decides on, after the answer is recorded."""
         if said is not None:
             heard.hear(self.heard, state, said)
         self.heard.now.followed = float(said is not None)
         return self.weighed(state, own, said)
 
     def weighed(self, state: int, own: int, said: int | None) -> int:
-        """The action, once what was said is kept."""
+        """The action to carry out; said: the answer, which is recorded already, None if there is none."""
         return own if said is None else said
 
     def saw(self, s_tm1: int, a_tm1: int, r_t: float, discount_t: float, s_t: int, a_t: int) -> None:
-        """A step was made and learned from; the next one follows advice only if `takes` says so."""
+        """Passes the step to `learns`; the next step counts as advised only if `takes` says so."""
         self.learns(s_tm1, a_tm1, r_t, discount_t, s_t)
         self.heard.now.followed = 0.0
 
     def learns(self, state: int, action: int, reward: float, discount: float, entered: int) -> None:
-        """What is made of a step; discount: 0 when it ended the episode."""
+        """Receives a step; discount: 0 if it ended the episode."""
 
 
 class Novelty(Weighing):
     """Asks in each state until it has been answered there once (advice novelty: Ilhan et al. 2021, for tables)."""
 
     def wants(self, state: int, u: float) -> bool:
-        """Whether nothing was said here yet."""
+        """Whether there is no answer for this state yet."""
         told = heard.answers(self.heard, state)
         self.why = ToldSeldom(told)
         return told == 0
@@ -210,17 +210,20 @@ class Fading(Weighing):
     """
 
     def wants(self, state: int, u: float) -> bool:
-        """Whether chance says so."""
+        """Whether this step is in the random share."""
         share = self.settings.fading ** (self.episode - 1)
         self.why = ByChance(share)
         return u < share
 
 
 class Shaping(Weighing):
-    """Asks about every step and draws from the learner's chances times what was said (Griffith et al. 2013, eq. 3)."""
+    """Asks about every step and draws from the product of the learner's probabilities and those of the advice.
+
+    Source: Griffith et al. 2013, eq. 3.
+    """
 
     def weighed(self, state: int, own: int, said: int | None) -> int:
-        """An action by both."""
+        """An action drawn from both."""
         learner = self._around.learner
         per_tau = 1.0 / max(COLDEST, temperature(self.episode, learner.beta, learner.exploration))
         odds = self.settings.consistency / (1.0 - self.settings.consistency)
@@ -228,51 +231,51 @@ class Shaping(Weighing):
 
 
 class Reliability(Weighing):
-    """Asks where it explores, once a state, and follows an advisor whose answers its own values bear out.
+    """Asks once per state, while it explores, and follows an advisor whose answers its own values confirm.
 
     Source: CLUE, Love, Ajoodha and Rosman 2022, with one advisor; its choice when it does not explore is the learner's.
     """
 
     def wants(self, state: int, u: float) -> bool:
-        """Whether it explores where nothing was said yet."""
+        """Whether this step explores and there is no answer for this state yet."""
         return heard.explores(self.episode, self.episodes, u) and self.heard.said[state] == heard.NOTHING
 
     def weighed(self, state: int, own: int, said: int | None) -> int:
-        """What was said here, now or before, where it explores and the advisor is reliable."""
+        """The answer for this state, if the step explores and the advisor is reliable, otherwise the learner's own choice."""
         kept = self.heard.said[state]
         explores = heard.explores(self.episode, self.episodes, self._u)
         follows = explores and kept != heard.NOTHING and heard.reliable(self.heard, self._around.size[1])
         return kept if follows else own
 
     def learns(self, state: int, action: int, reward: float, discount: float, entered: int) -> None:
-        """Whether the learner's values bear out what was said where it was."""
+        """Counts whether the learner's values confirm the answer for the state that it left."""
         heard.borne_out(self.heard, state, self._around.values(state))
 
 
 class TwoLevels(Weighing):
-    """Learns by Q-learning in each state whether asking or going on alone is worth more.
+    """Learns by Q-learning in each state whether asking or acting alone is worth more.
 
     Source: two-level Q-learning, Subramanian et al. 2023 (after ADMIRAL, 2022), with one learner and one advisor.
     """
 
     def wants(self, state: int, u: float) -> bool:
-        """Whether asking is worth as much here."""
+        """Whether asking is worth at least as much here, or exploration decides to ask."""
         return heard.asks_by_worth(self.heard, state, u)
 
     def learns(self, state: int, action: int, reward: float, discount: float, entered: int) -> None:
-        """What the way that was gone is worth."""
+        """Updates the value of the choice that was made."""
         heard.learn_worth(self.heard, state, reward, discount, entered, self._around.learner.alpha)
 
 
 class Trust(Weighing):
-    """Follows advice while it does better than going alone, and remembers it (see lab/learning/gates/py)."""
+    """Follows advice while advised episodes do better than the others, remembers it, and drops answers that lead into loops."""
 
     def __init__(self, settings: GateSettings, episodes: int, max_steps: int, around: Surroundings | None = None):
         super().__init__(settings, episodes, max_steps, around)
         self._over = False
 
     def begins(self, state: int) -> None:
-        """Whether this episode follows advice."""
+        """Decides whether this episode follows advice."""
         starts(self.heard, state, self._around.draw())
 
     def asks(self, state: int, values: Values) -> bool:
@@ -282,16 +285,16 @@ class Trust(Weighing):
         return wants(self.heard, state)
 
     def weighed(self, state: int, own: int, said: int | None) -> int:
-        """What is known of this state, or the learner's own choice."""
+        """The most frequent answer in this state if the episode follows advice and there is one, otherwise the learner's own."""
         return takes(self.heard, state, own)
 
     def learns(self, state: int, action: int, reward: float, discount: float, entered: int) -> None:
-        """Where the move led, and whether it led round."""
+        """Records the outcome of the move, and blames the answer if it led into a loop."""
         self._over = discount == 0.0
         number = state * self._around.size[1] + action
         saw(self.heard, number, entered, self._over, self._around.values(state))
 
     def judges(self, steps: Steps, opened: bool) -> None:
-        """How the episode went."""
+        """Records the result of the episode."""
         reached = steps[-1] <= self.max_steps
         ended(self.heard, float(steps[-1]), reached, self._over)

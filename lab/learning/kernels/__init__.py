@@ -1,1 +1,1 @@
-"""Whole sessions compiled with numba, many at once: what studies run."""
+"""Whole sessions compiled with numba, many at once, for studies."""

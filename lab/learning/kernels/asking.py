@@ -1,4 +1,7 @@
-"""The compiled forms of the gates, by their rules (`gates.gate_rules.CompiledGate`), and of the advisor who is asked."""
+"""The compiled forms of the gates, by their rules (`gates.gate.CompiledGate`), and of the advisor that answers.
+
+First come the gates that weigh advice and the advisor that holds back; then opening, judging, and the decision of a step.
+"""
 
 from functools import partial
 from typing import Any
@@ -33,17 +36,16 @@ _saw: Any = inlined(linked(weighing.saw, best_of=_best_of))
 _ended: Any = inner(weighing.ended)
 
 
-@partial(
-    without_refcounts, inline="always"
-)  # as source: a compiled function may not return arrays that it was not handed
+# Inlined as source, because a compiled function may not return arrays that are not its arguments.
+@partial(without_refcounts, inline="always")
 def _of_lane(h: Any, j: int) -> Any:
-    """What one lane was told."""
+    """The record of advice of one lane."""
     return _Heard(h.said[j], h.times[j], h.blamed[j], h.led[j], h.greedy[j], h.left[j], h.worth[j], h.now[j])
 
 
 @inlined
 def hears_nothing_yet(work: Any, hearing: Any, j: int) -> None:
-    """Another session begins in lane j."""
+    """Resets the record of advice of lane j for another session."""
     hearing.before[j] = heard.NOTHING
     for state in range(hearing.chose.shape[1]):
         hearing.chose[j, state] = heard.NOTHING
@@ -79,7 +81,7 @@ def wants(work: Any, hearing: Any, j: int, state: Any) -> bool:
 
 @inlined
 def takes(work: Any, hearing: Any, j: int, state: Any, own: Any, said: int) -> Any:
-    """`Gate.takes` of a gate that weighs; said: NOTHING where nothing was."""
+    """`Gate.takes` of a gate that weighs; said: the answer, NOTHING if there is none."""
     how, told, lanes = work.asking.gate.weighs, _of_lane(hearing.heard, j), work.lanes
     at, actions = np.int64(state), len(work.learning.actions)
     if said != heard.NOTHING:
@@ -101,14 +103,14 @@ def takes(work: Any, hearing: Any, j: int, state: Any, own: Any, said: int) -> A
 
 @inlined
 def _fill(work: Any, hearing: Any, j: int, state: Any) -> None:
-    """`Update.gauge` of a state in lane j."""
+    """Writes `Update.gauge` of a state in lane j to `hearing.values`."""
     for a in range(len(work.learning.actions)):
         hearing.values[j, a] = gauge(work, work.lanes.tables[j], state, a)
 
 
 @inlined
 def saw(work: Any, hearing: Any, j: int, state: Any, number: Any, entered: Any, reward: float, over: bool) -> None:
-    """`Gate.saw` of a gate that weighs, once a step of lane j was learned from."""
+    """`Gate.saw` of a gate that weighs, called after lane j has learned from a step."""
     how = work.asking.gate.weighs
     if how == rules.WEIGHS_NOTHING:
         return
@@ -134,7 +136,7 @@ def ended(work: Any, hearing: Any, j: int, steps: int, won: bool, over: bool) ->
 
 @inlined
 def answered(work: Any, hearing: Any, j: int, state: Any, own: Any) -> int:
-    """`TableAdvisor.advise`: what it says to lane j, NOTHING where it holds its tongue."""
+    """`TableAdvisor.advise`: the answer to lane j, NOTHING if there is none."""
     thresholds, last = work.thresholds, len(work.learning.actions) - 1
     known = np.int64(state)
     if hearing.late:
@@ -154,7 +156,7 @@ def answered(work: Any, hearing: Any, j: int, state: Any, own: Any) -> int:
     return int(heard.NOTHING) if action == expected else action
 
 
-# ---- asking -----------------------------------------------------------------------------------------------------------
+# ---- opening, judging, and the decision of a step -------------------------------------------------------------------
 
 
 _window_mean: Any = inner(rules.window_mean)
@@ -190,15 +192,14 @@ def opens(asking: Any, lane: Any, steps: Any, max_steps: int, rejected: bool) ->
 
 @inner
 def judge(asking: Any, lane: Any, steps: Any, count: Any) -> None:
-    """`Ccrl.judges` where all episodes begin in one state; steps (E,) are those of the lane's session."""
+    """`Ccrl.judges` if all episodes begin in the same state; steps (E,) are those of the lane's session."""
     episode, window = lane.episode, asking.window
     if not _judged(asking, lane, count):
         return
     result = steps[episode - 1]
     if _misled(result, _window_mean(steps, episode - 1, window)):
-        best = bool(
-            asking.spare_best and result <= asking.max_steps
-        )  # the fewest known steps: those of the best episode
+        # With one start the fewest known steps are those of the best episode.
+        best = bool(asking.spare_best and result <= asking.max_steps)
         if best:
             for i in range(episode - 1):
                 best = best and result <= steps[i]
@@ -208,7 +209,7 @@ def judge(asking: Any, lane: Any, steps: Any, count: Any) -> None:
 
 @inner
 def knows(lane: Any, steps: Any, walked: int, fewest: Any, walk: Any, max_steps: int) -> None:
-    """`Ccrl._knows`: how far the goal was from the states of the walk that is over."""
+    """`Ccrl._knows`: updates the distances to the goal of the states of the last episode."""
     result = steps[lane.episode - 1]
     left = float(result - walked) if result <= max_steps else np.inf
     for i in range(walked - 1, -1, -1):
@@ -218,7 +219,7 @@ def knows(lane: Any, steps: Any, walked: int, fewest: Any, walk: Any, max_steps:
 
 @inner
 def judge_moved(asking: Any, lane: Any, steps: Any, count: Any, fewest: Any, begun: Any) -> None:
-    """`Ccrl.judges` where episodes begin in different states: the counts before as if they had begun where it did."""
+    """`Ccrl.judges` if episodes begin in different states: earlier step counts are corrected by their starts."""
     episode, window = lane.episode, asking.window
     if not _judged(asking, lane, count):
         return
@@ -236,13 +237,14 @@ def judge_moved(asking: Any, lane: Any, steps: Any, count: Any, fewest: Any, beg
 
 @inlined
 def _judged(asking: Any, lane: Any, count: Any) -> bool:
-    """Whether the episode that is over is held against those before it."""
+    """Whether the last episode is compared with those before it."""
     may = asking.judge_unhelped or lane.helped > 0
     return bool(may and count.rejected_at_episode == 0 and lane.episode > asking.window)
 
 
 @inlined
 def _misleads(asking: Any, episode: int, count: Any) -> None:
+    """Counts a mislead, and rejects the advisor after more than Omega."""
     count.misleads += 1
     if count.misleads > asking.omega:
         count.rejected_at_episode = episode
@@ -250,7 +252,7 @@ def _misleads(asking: Any, episode: int, count: Any) -> None:
 
 @inlined
 def _deviation(work: Any, j: int, state: Any) -> float:
-    """gates.deviation of the values of lane j's ensemble in a state."""
+    """`gates.deviation` of the values of lane j's ensemble in a state."""
     actions, tables = len(work.learning.actions), work.lanes.others[j]
     count = len(tables)
     total = 0.0
@@ -284,7 +286,7 @@ def asks(work: Any, j: int, state: Any) -> bool:
 
 @inlined
 def advised(work: Any, j: int, state: Any) -> Any:
-    """The action that the advisor draws for lane j: `TableAdvisor`."""
+    """The action that the advisor draws for lane j (`TableAdvisor.advise`)."""
     thresholds, last = work.thresholds, len(work.learning.actions) - 1
     row = min(work.lanes.lane[j].episode, thresholds.shape[0]) - 1
     mark, action = draw(work.lanes.rng, j) * thresholds[row, state, last], np.uint64(0)
@@ -295,13 +297,13 @@ def advised(work: Any, j: int, state: Any) -> Any:
 
 @inlined
 def decided(work: Any, memories: Any, hearing: Any, j: int) -> Any:
-    """The action of lane j's next step and where it comes from: its own, of the way that it practises, or advised."""
+    """The action of lane j's next step and its source: its own choice, practice of the known path, or advice."""
     lanes, state = work.lanes, work.lanes.states[j]
     action, source = np.uint64(lanes.chosen[j]), np.int64(memory.OWN)
     if memories is not None:
         now = memories.now[j]
-        if now.practices > 0 and memories.way[j, state] != memory.NOTHING:
-            action, source = np.uint64(memories.way[j, state]), np.int64(memory.PRACTISED)
+        if now.practices > 0 and memories.path[j, state] != memory.NOTHING:
+            action, source = np.uint64(memories.path[j, state]), np.int64(memory.PRACTISED)
     if lanes.is_open[j]:
         lane = lanes.lane[j]
         if hearing is None:

@@ -1,7 +1,7 @@
-"""The compiled sessions whose values are sums of weights of tiles: on a table's steps, or on a world's physics.
+"""The compiled sessions with tile coding, on a table or in a continuous world.
 
-One session after the other, for its weights stay in the cache; each equals that of `session.Session` with the same
-uniform numbers. The gates and the advisor are those of `asking`, of which this is lane 0.
+Sessions run one after the other, so that the weights stay in the processor's cache; each equals `session.Session` with the same
+uniform numbers. Gates and advisor are those of `asking`, which sees this session as lane 0.
 """
 
 from typing import Any, NamedTuple
@@ -18,7 +18,7 @@ from lab.learning.tiles import TileArray
 from lab.learning.updates.linear import FAINT
 from lab.mdp import FloatArray
 
-TABLE = 0  # a world without physics, beside the numbers in `physics`
+TABLE = 0  # the number of a table; `physics` has those of the worlds
 SOFTMAX, EPSILON_GREEDY, GREEDY = range(3)
 
 _exp_of: Any = inlined(selection.exp_of)
@@ -30,7 +30,7 @@ _step_car, _step_acrobot, _step_pole = _steps
 
 
 class World(NamedTuple):
-    """Where steps are made: a world's number, its point x (D,), its cells, and its rewards; longer_is_better: see `Physics`."""
+    """The place of the steps: its number, the point x (D,), bounds and cells, rewards; longer_is_better: see `Physics`."""
 
     number: int
     x: FloatArray
@@ -43,11 +43,12 @@ class World(NamedTuple):
 
 
 class Linear(NamedTuple):
-    """The learner on tiles: weights (tiles * A,), active (S, T), and the traces.
+    """The learner with tile coding.
 
-    listed, strength (tiles * A,): which weights have a trace, and how strong; place: where each stands there, -1: nowhere;
-    traces (1,): how many; start: each weight at first; values (A,): room for those of a state; warm (E,): temperature or
-    epsilon.
+    active (S, T): the tiles of each cell; weights (tiles * A,).
+    listed, strength (tiles * A,): the weights with a trace, and their eligibilities; place (tiles * A,): the index of each
+    weight in `listed`, -1 if it has no trace; traces (1,): the number of traces.
+    values (A,): working space for the values of a state; warm (E,): temperature or epsilon by episode; start: of each weight.
     """
 
     active: TileArray
@@ -114,7 +115,7 @@ def _value(linear: Any, state: int, action: int) -> float:
 
 @inlined
 def _look(linear: Any, state: int) -> float:
-    """Sums up the values of a state; the best of them."""
+    """Writes the values of a state to `linear.values`; returns the best of them."""
     best = -np.inf
     for action in range(len(linear.values)):
         linear.values[action] = _value(linear, state, action)
@@ -139,7 +140,7 @@ def _greedy(values: Any, best: float, u: float) -> int:
 
 @inlined
 def _choose(work: Any, linear: Any, state: int) -> None:
-    """The learner's own choice in a state, into lane 0."""
+    """Writes the learner's own choice in a state to lane 0."""
     lanes, values, actions = work.lanes, linear.values, len(linear.values)
     warm = linear.warm[lanes.lane[0].episode - 1]
     best, low = _look(linear, state), np.inf
@@ -167,7 +168,7 @@ def _choose(work: Any, linear: Any, state: int) -> None:
 
 @inlined
 def _learn(linear: Any, state: int, action: int, reward: float, discount: float, entered: int, following: int) -> None:
-    """`updates.linear.OnTiles.learn` of one step; discount 0: the episode is over."""
+    """`updates.linear.OnTiles.learn` of one step; discount: 0 if the episode has ended."""
     actions, follow = len(linear.values), discount > 0.0
     best = _look(linear, entered)
     after = linear.values[following] if linear.on_policy else best
@@ -209,7 +210,7 @@ def _begin_session(work: Any, linear: Any, n: int) -> None:
 
 @inlined
 def _begin_episode(work: Any, linear: Any) -> None:
-    """Whether the next episode may ask; the traces of the last one are forgotten."""
+    """Begins the next episode: decides whether it may ask, and clears the traces."""
     lanes, sessions, asking = work.lanes, work.sessions, work.asking
     lane = lanes.lane[0]
     count = sessions.counts[lane.session]
@@ -225,7 +226,7 @@ def _begin_episode(work: Any, linear: Any) -> None:
 
 @inlined
 def _episode(work: Any, linear: Any, world: Any) -> None:
-    """`Session._walk`, and what is booked of it."""
+    """`Session._walk`, and the bookkeeping of the episode."""
     lanes, learning, problem, sessions = work.lanes, work.learning, work.problem, work.sessions
     lane = lanes.lane[0]
     state: Any = _start(work, world)
@@ -268,7 +269,7 @@ def _episode(work: Any, linear: Any, world: Any) -> None:
 
 @without_refcounts
 def run(work: Any, linear: Any, world: Any) -> None:
-    """All sessions, one after the other."""
+    """Runs all sessions, one after the other."""
     for n in range(len(work.sessions.seeds)):
         _begin_session(work, linear, n)
         for _ in range(len(linear.warm)):
@@ -281,9 +282,9 @@ def run(work: Any, linear: Any, world: Any) -> None:
 
 @without_refcounts
 def play(world: Any, policy: Any, starts: Any, most: int, moves: Any) -> None:
-    """The moves (N,) of a policy (S,) from each start (N, D), which is turned into the point where it ends.
+    """Writes the number of moves (N,) of a policy (S,) from starts (N, D) to `moves`, negated if the episode did not end.
 
-    Negative: they did not end the episode.
+    most: the limit of moves.
     """
     for n in range(len(starts)):
         for i in range(len(world.x)):

@@ -1,4 +1,4 @@
-"""What the compiled sessions work on: records of arrays and plain numbers."""
+"""The records of the compiled sessions, arrays and plain numbers; then the learners of the kernel, which work on them."""
 
 from dataclasses import fields
 from typing import Any, NamedTuple
@@ -14,11 +14,11 @@ from lab.learning.gates.heard import Heard, HeardNow
 from lab.learning.updates import tabular, update
 from lab.mdp import FloatArray
 
-LANES = 24
+LANES = 24  # sessions that the kernel runs side by side
 
 
 class ProblemArrays(NamedTuple):
-    """The problem; successor, reward: (S * A,) flat; `ends`: 0 goes on, 1 goal, 2 another terminal state."""
+    """The problem; successor, reward: (S * A,); ends (S,): 0 not terminal, 1 goal, 2 another terminal state."""
 
     successor: NDArray[np.int32]
     reward: FloatArray
@@ -29,9 +29,7 @@ class ProblemArrays(NamedTuple):
 
 
 class Learning(NamedTuple):
-    """The learner's settings, see `LearnerSettings`; actions: a tuple of A numbers, whose length the compiler knows, or an
-    array of them.
-    """
+    """The learner's settings, see `LearnerSettings`; actions: A numbers, in a tuple if the compiler is to know their count."""
 
     afterstate: bool
     alpha: float
@@ -62,7 +60,7 @@ class Asking(NamedTuple):
     max_steps: int
 
 
-# What each of the sessions under way remembers; session -1: none. `converged` as in `gates.Ccrl`.
+# The state of each running session; session -1: none. `converged` is that of `gates.Ccrl`.
 LANE = np.dtype(
     [(name, np.int64) for name in ("session", "episode", "is_open", "asked", "helped", "left")]
     + [(name, np.int64) for name in ("last_result", "equal_results", "converged")]
@@ -75,9 +73,9 @@ HEARD_NOW = np.dtype([(field.name, np.float64) for field in fields(HeardNow)])
 
 
 class Sessions(NamedTuple):
-    """What N sessions of E episodes begin with, and what came of them, as in `batch.Batch`.
+    """The inputs and results of N sessions of E episodes; the results are those of `batch.Batch`.
 
-    seeds (N,), per_tau (E,): one over the temperature; counts (N,) of COUNTS; kept (N, size): the tables, or of none.
+    seeds (N,); per_tau (E,): 1 / temperature; counts (N,) of COUNTS; kept (N, size): the tables, or (0, size) if not wanted.
     """
 
     seeds: NDArray[np.uint64]
@@ -89,9 +87,9 @@ class Sessions(NamedTuple):
 
 
 class Lanes(NamedTuple):
-    """The sessions under way, (LANES,) each, but values (A * LANES,), tables (LANES, size), others (LANES, K, size).
+    """The running sessions: (LANES,) each, but values (A * LANES,), tables (LANES, size), others (LANES, K, size).
 
-    Made by the caller and not in the kernel, where numba would compile all of np.zeros along.
+    The caller allocates them, because numba would otherwise have to compile np.zeros.
     """
 
     lane: NDArray[np.void]
@@ -109,10 +107,10 @@ class Lanes(NamedTuple):
 
 
 class Work(NamedTuple):
-    """All but the memories: where there are none, numba leaves out what needs them, if they are handed on by themselves.
+    """All records except the optional ones, which are arguments of their own: if one is None, numba leaves out its code.
 
-    The memories are an `advice_memory.Memory` with arrays (LANES, ...); `now` (LANES,) is of NOW. thresholds, region: as in
-    the advisor's `Advice`.
+    thresholds, region: those of the advisor's `Advice`. The optional memories are an `advice_memory.Memory` of arrays (LANES,
+    ...), with `now` (LANES,) of NOW.
     """
 
     problem: ProblemArrays
@@ -125,11 +123,11 @@ class Work(NamedTuple):
 
 
 class Hearing(NamedTuple):
-    """What gates that weigh what they are told keep, and advisors that are late or hold back; see `heard`, `Advice`.
+    """The data of gates that weigh advice and of advisors that are late or hold back; see `heard`, `Advice`.
 
-    heard: a `Heard` with arrays (LANES, ...), `now` (LANES,) is of HEARD_NOW; values (LANES, A): of the state under way;
-    u (LANES,): the uniform number of the step; before (LANES,): the state of the question before, -1: none; chose
-    (LANES, S): what the learner would have chosen when it last asked there, -1: it did not.
+    heard: a `Heard` of arrays (LANES, ...), with `now` (LANES,) of HEARD_NOW; values (LANES, A): of the current state;
+    u (LANES,): the uniform number of the step; before (LANES,): the state of the previous question, -1 for none;
+    chose (LANES, S): the learner's own choice when it last asked in a state, -1 if it never did.
     """
 
     heard: Heard
@@ -143,7 +141,7 @@ class Hearing(NamedTuple):
 
 
 class Chances(NamedTuple):
-    """The outcomes of the moves of a problem that is left to chance; (S * A, K) each: cumulated chance, state entered, reward."""
+    """The outcomes of stochastic moves, (S * A, K) each: cumulative probability, state entered, reward."""
 
     below: FloatArray
     entered: NDArray[np.int32]
@@ -151,10 +149,10 @@ class Chances(NamedTuple):
 
 
 class Walks(NamedTuple):
-    """What gates that judge know where episodes begin in different states, as `gates.Ccrl` does.
+    """The data of gates that judge episodes which begin in different states, see `gates.Ccrl`.
 
-    fewest (LANES, S): the known steps to the goal, inf where none are; walk (LANES, moves): the states that the episode left;
-    begun (LANES, E): where each episode began.
+    fewest (LANES, S): the fewest known steps to the goal, inf if unknown; walk (LANES, moves): the states of the episode;
+    begun (LANES, E): the first state of each episode.
     """
 
     fewest: FloatArray
@@ -162,7 +160,7 @@ class Walks(NamedTuple):
     begun: NDArray[np.int32]
 
 
-# ---- learners ---------------------------------------------------------------------------------------------------------
+# ---- the learners of the kernel -------------------------------------------------------------------------------------
 
 
 _exp_of: Any = inlined(selection.exp_of)
@@ -208,10 +206,10 @@ def learn(work: Any, table: Any, state: Any, at: Any, entered: Any, reward: floa
 
 @inlined
 def choose(work: Any) -> None:
-    """`selection.choose_softmax` in every lane at once; `widths` becomes how far the values span.
+    """`selection.choose_softmax` in every lane at once; writes `chosen`, and the span of the values to `widths`.
 
-    The values (A * LANES,) are used up: they become sums of weights. All of one action's lanes stay in registers, for the
-    compiler knows how many actions there are.
+    The values (A * LANES,) are overwritten by cumulative weights. The compiler knows the number of actions, so the lanes of one
+    action stay in registers.
     """
     lanes, afterstate = work.lanes, work.learning.afterstate
     values, widths, per_tau, chosen, rng = lanes.values, lanes.widths, lanes.per_tau, lanes.chosen, lanes.rng

@@ -1,8 +1,7 @@
 """The loop of the compiled sessions, many side by side.
 
-One session alone waits for its memory and its exponentials, 24 keep the processor busy. Each has uniform numbers of its
-own (`splitmix`), so its result depends on its seed and on nothing else, and equals that of `session.Session` with the
-same numbers.
+A single session would wait for memory and exponentials; 24 keep the processor busy. Each has its own stream of uniform numbers
+(`splitmix`), so its result depends on its seed alone, and equals that of `session.Session` with the same numbers.
 """
 
 from functools import partial
@@ -27,12 +26,11 @@ _moved: Any = inlined(memory.moved)
 _ended: Any = inner(memory.ended)
 
 
-@partial(
-    without_refcounts, inline="always"
-)  # as source: a compiled function may not return arrays that it was not handed
+# Inlined as source, because a compiled function may not return arrays that are not its arguments.
+@partial(without_refcounts, inline="always")
 def _of_lane(m: Any, j: int) -> Any:
     """The memory of one lane."""
-    known = m.led[j], m.way[j], m.came[j], m.queue[j]
+    known = m.led[j], m.path[j], m.came[j], m.queue[j]
     return _Memory(*known, m.on_walk[j], m.place[j], m.walk[j], m.advised[j], m.now[j])
 
 
@@ -57,7 +55,7 @@ def _begin_session(work: Any, hearing: Any, walks: Any, j: int, n: int) -> None:
 
 @inlined
 def _begin_episode(work: Any, memories: Any, hearing: Any, walks: Any, j: int) -> None:
-    """The next episode of lane j's session: whether it may ask, how warm it is, where it starts."""
+    """Begins the next episode of lane j: decides whether it may ask, sets its temperature and its start."""
     lanes, sessions, asking, starts = work.lanes, work.sessions, work.asking, work.problem.starts
     lane = lanes.lane[j]
     count, steps = sessions.counts[lane.session], sessions.steps[lane.session]
@@ -85,14 +83,14 @@ def _begin_episode(work: Any, memories: Any, hearing: Any, walks: Any, j: int) -
 
 @inlined
 def _begin(work: Any, memories: Any, hearing: Any, walks: Any, started: int) -> int:
-    """Begins an episode in each lane whose last one is over, and the next session where its last one is; how many began."""
+    """Begins the next episode, or session, in each lane whose last one has ended; returns how many sessions have begun."""
     lanes, seeds = work.lanes, work.sessions.seeds
     for j in range(LANES):
         if lanes.fresh[j]:
             lane = lanes.lane[j]
             lanes.fresh[j], lanes.moves[j], lanes.states[j] = False, 0, work.problem.starts[0]
             if lane.episode == len(work.sessions.per_tau):
-                lane.session = -1  # a lane without a session walks on, and nobody looks
+                lane.session = -1  # an idle lane keeps making steps, which are ignored
                 if started < len(seeds):
                     _begin_session(work, hearing, walks, j, started)
                     if memories is not None:
@@ -105,7 +103,7 @@ def _begin(work: Any, memories: Any, hearing: Any, walks: Any, started: int) -> 
 
 @inlined
 def _step(work: Any, memories: Any, hearing: Any, chances: Any, walks: Any, j: int) -> bool:
-    """Makes and learns one step of lane j; whether its episode is over."""
+    """Makes one step of lane j and learns from it; returns whether its episode has ended."""
     lanes, problem, learning = work.lanes, work.problem, work.learning
     state = lanes.states[j]
     action, source = decided(work, memories, hearing, j)
@@ -138,7 +136,7 @@ def _step(work: Any, memories: Any, hearing: Any, chances: Any, walks: Any, j: i
 
 @inlined
 def _end(work: Any, memories: Any, hearing: Any, walks: Any, j: int) -> int:
-    """Books the episode of lane j that is over; 1 if its session is over, too."""
+    """Records the last episode of lane j; returns 1 if its session has ended, too."""
     lanes, sessions, learning = work.lanes, work.sessions, work.learning
     lane, moves, won = lanes.lane[j], lanes.moves[j], work.problem.ends[lanes.states[j]] == 1
     lanes.fresh[j] = True
@@ -172,10 +170,10 @@ def _end(work: Any, memories: Any, hearing: Any, walks: Any, j: int) -> int:
 
 @without_refcounts
 def run(work: Any, memories: Any, hearing: Any, chances: Any, walks: Any) -> None:
-    """All sessions: each lane takes the next one when its own is over.
+    """Runs all sessions; each lane takes the next one when its own has ended.
 
-    memories None: nothing is remembered; hearing None: the gate weighs nothing, and the advisor speaks at once when asked;
-    chances None: every move is certain; walks None: no gate judges, or all episodes begin in one state.
+    memories: None without memory; hearing: None if the gate weighs no advice and the advisor answers at once; chances: None for
+    deterministic moves; walks: None if no gate judges, or if all episodes begin in one state.
     """
     started = over = 0
     fresh = True

@@ -1,6 +1,6 @@
-"""Worlds of continuous states whose physics are a few lines: stepped in the session and in the compiled kernel alike.
+"""Worlds with continuous states and simple physics, stepped both in sessions and in the compiled kernel.
 
-They are Gymnasium's, by its names, and make its steps; a world's row in PHYSICS says the rest.
+They have the names and the dynamics of Gymnasium's environments; PHYSICS is their table.
 """
 
 from collections.abc import Callable
@@ -14,12 +14,14 @@ from lab.learning.tiles import Bounds
 
 @dataclass(frozen=True)
 class Physics:
-    """A world of continuous states.
+    """A world with continuous states.
 
-    begin: turns uniform numbers into a start, step: makes a step, both in place; the latter says whether the episode is
-    over. number: by which the kernel knows it. axes: what a state is made of; bounds: its cells; tilings: that fit them.
-    limit: steps of an episode; threshold: a mean return that counts as solved; reward: of a step, last_reward: of one that
-    ends the episode. longer_is_better: such an end is no goal, and an episode is the better the longer it lasts.
+    name: Gymnasium's; number: the kernel's.
+    begin: turns uniform numbers into a start, in place; step: makes a step in place and returns whether the episode has ended.
+    axes: the names of the state's components; bounds: their ranges and cells; tilings: the number of tilings that suits them.
+    limit: the most steps of an episode; threshold: the mean return from which the world counts as solved.
+    reward: of a step; last_reward: of a step that ends the episode.
+    longer_is_better: the end of an episode is a failure, and longer episodes are better.
     """
 
     name: str

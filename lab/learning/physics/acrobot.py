@@ -1,4 +1,4 @@
-"""Two links that hang, driven at the joint between them alone, swing up. Source: Sutton 1996; Gymnasium's Acrobot-v1."""
+"""Acrobot: two hanging links, driven at the joint between them, swing up. Source: Sutton 1996; Gymnasium's Acrobot-v1."""
 
 from math import cos, pi, sin
 from typing import Any
@@ -7,15 +7,15 @@ FASTEST_1, FASTEST_2, STEP_S = 4 * pi, 9 * pi, 0.2
 
 
 def begin(x: Any) -> None:
-    """Turns uniform numbers into a start: nearly hanging down; x: both angles [rad], both speeds [rad/s]."""
+    """Turns uniform numbers into a start, nearly hanging down, in place; x: both angles [rad], both speeds [rad/s]."""
     for i in range(4):
         x[i] = -0.1 + 0.2 * x[i]
 
 
 def step(x: Any, action: int) -> bool:
-    """One step (Runge-Kutta 4) with a torque of -1, 0 or 1 N m, in place; whether the tip is a link above the bar.
+    """Makes one step (Runge-Kutta 4) with a torque of -1, 0 or 1 N m, in place; returns whether the tip is above the line.
 
-    Links of 1 m and 1 kg, with the accelerations of Sutton and Barto's book.
+    The links have 1 m and 1 kg; the accelerations are those of Sutton and Barto's book.
     """
     ka, kb, kda, kdb = 0.0, 0.0, 0.0, 0.0
     sum_a, sum_b, sum_da, sum_db = 0.0, 0.0, 0.0, 0.0

@@ -1,4 +1,4 @@
-"""A pole that is balanced on a cart. Source: Barto, Sutton and Anderson 1983; Gymnasium's CartPole-v1."""
+"""Cart-pole: a cart balances a pole. Source: Barto, Sutton and Anderson 1983; Gymnasium's CartPole-v1."""
 
 from math import cos, pi, sin
 from typing import Any
@@ -7,13 +7,13 @@ FARTHEST, STEEPEST, STEP_S = 2.4, 12 * 2 * pi / 360, 0.02
 
 
 def begin(x: Any) -> None:
-    """Turns uniform numbers into a start: nearly upright; x: place [m], speed [m/s], angle [rad], its speed [rad/s]."""
+    """Turns uniform numbers into a start, nearly upright, in place; x: place [m], speed [m/s], angle [rad], its speed [rad/s]."""
     for i in range(4):
         x[i] = -0.05 + 0.1 * x[i]
 
 
 def step(x: Any, action: int) -> bool:
-    """One step (Euler) with 10 N to the left (0) or to the right (1), in place; whether the pole has fallen, or the cart left."""
+    """Makes one Euler step with 10 N to the left (0) or right (1), in place; returns whether the pole fell or the cart left."""
     place, speed, angle, turning = x[0], x[1], x[2], x[3]
     push = 10.0 if action == 1 else -10.0
     cosine, sine = cos(angle), sin(angle)

@@ -1,4 +1,4 @@
-"""The cells of a world of continuous states, as the states of a problem."""
+"""The cells of a continuous world as the states of a table, which knows no transitions."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -12,13 +12,13 @@ from lab.mdp import TabularMDP
 
 @dataclass(frozen=True, eq=False)
 class CellTable(TabularMDP):
-    """The cells of a world of continuous states; where its steps lead, only the world itself knows."""
+    """The cells of a continuous world as a table; its transitions are placeholders, because only the world can make steps."""
 
     world: str = ""
 
     @classmethod
     def of(cls, physics: Physics) -> "CellTable":
-        """Every move stays where it is, nothing ends; the start is the middle of where episodes begin."""
+        """The table of a world: no move changes the state, no state is terminal; the start is the centre of all starts."""
         states, actions = int(np.prod(physics.bounds.shape)), len(physics.actions)
         stays = np.repeat(np.arange(states, dtype=np.int32)[:, None], actions, axis=1)
         no, middle = np.zeros(states, bool), [0.5] * len(physics.axes)
@@ -28,20 +28,20 @@ class CellTable(TabularMDP):
 
     @property
     def physics(self) -> Physics:
-        """The world itself."""
+        """The world."""
         return PHYSICS[self.world]
 
     @property
     def cells(self) -> tuple[int, ...]:
-        """Those of the world's bounds."""
+        """The shape of the grid of cells."""
         return self.physics.bounds.shape
 
     @cached_property
     def signature(self) -> str:
-        """As `TabularMDP.signature`, the world and its cells included."""
+        """The signature of the problem (see `TabularMDP.signature`), which includes the world and its cells."""
         return sha256(f"{self.world} {self.physics.bounds} {super().signature}".encode()).hexdigest()[:16]
 
     def state_label(self, state: int) -> str:
-        """The middle of a cell in words, such as "position -0.51, speed +0.003"."""
+        """The centre of a cell as text, such as "position -0.51, speed +0.003"."""
         named = zip(self.physics.axes, self.physics.bounds.centre(state), strict=True)
         return ", ".join(f"{axis} {value:+.3f}" for axis, value in named)

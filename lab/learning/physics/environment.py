@@ -1,4 +1,4 @@
-"""A world of continuous states as the place where the lab's learners act: its states are the numbers of its cells."""
+"""Continuous worlds as environments of the lab's learners, whose states are cells; drawings of them; settings that suit them."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -19,36 +19,36 @@ WIDTH, HEIGHT = 61, 9
 
 
 def drawn(name: str, point: Sequence[float]) -> str:
-    """The world of that name at a point; "" for one that has no picture."""
+    """The world of that name at a point as text; "" if it has no drawing."""
     return _mountain_car(*point) if name == "MountainCar-v0" else ""
 
 
 def _mountain_car(position: float, speed: float) -> str:
-    """The hill with the car and the flag, and which way it rolls how fast."""
+    """The hill with car and flag, and the car's direction and speed."""
     span = mountain_car.HIGH - mountain_car.LOW
     lines = [[" "] * WIDTH for _ in range(HEIGHT)]
     for column in range(WIDTH):
         lines[_row(mountain_car.LOW + span * column / (WIDTH - 1))][column] = "."
     for mark, place in (("F", mountain_car.FLAG), ("O", position)):
         lines[max(_row(place) - 1, 0)][round((place - mountain_car.LOW) / span * (WIDTH - 1))] = mark
-    way = "stands" if speed == 0.0 else f"rolls {'right' if speed > 0.0 else 'left'}, {abs(speed):.3f} a step"
-    said = f"O car at {position:+.2f}, {way}; F flag at {mountain_car.FLAG:+.2f}"
-    return "\n".join([*("".join(line).rstrip() for line in lines), said])
+    motion = "stands" if speed == 0.0 else f"rolls {'right' if speed > 0.0 else 'left'}, {abs(speed):.3f} a step"
+    caption = f"O car at {position:+.2f}, {motion}; F flag at {mountain_car.FLAG:+.2f}"
+    return "\n".join([*("".join(line).rstrip() for line in lines), caption])
 
 
 def _row(position: float) -> int:
-    """The line of the ground, from above."""
+    """The line of the ground, counted from above."""
     return round((1.0 - sin(3 * position)) / 2.0 * (HEIGHT - 2)) + 1
 
 
-# ---- as shapes ------------------------------------------------------------------------------------------------------
+# ---- drawings as shapes ---------------------------------------------------------------------------------------------
 
-Shape = dict[str, Any]  # a line's or an area's points [[x, y], ...], or a disc's x, y and r; and its kind
-# in a drawing that is 100 wide and 50 high; y runs down
+# The points [[x, y], ...] of a line or area, or x, y and r of a disc, and its kind; 100 wide, 50 high, y points down.
+Shape = dict[str, Any]
 
 
 def shapes(name: str, point: Sequence[float]) -> list[Shape]:
-    """The world of that name at a point, as lines, areas and discs of the kinds ground, goal, body and motion."""
+    """The world of that name at a point: lines, areas and discs of the kinds ground, goal, body and motion."""
     draw: dict[str, Callable[..., list[Shape]]] = {
         "MountainCar-v0": _car_shapes,
         "CartPole-v1": _pole_shapes,
@@ -75,7 +75,7 @@ def _on_hill(position: float) -> tuple[float, float]:
 
 
 def _car_shapes(position: float, speed: float) -> list[Shape]:
-    """The hill, the flag, the car on its wheels, and an arrow that is as long as it is fast."""
+    """The hill, the flag, the car, and an arrow whose length shows its speed."""
     ends = mountain_car.LOW, mountain_car.HIGH
     hill = [_on_hill(ends[0] + (ends[1] - ends[0]) * n / 60) for n in range(61)]
     x, y = _on_hill(position)
@@ -99,7 +99,7 @@ def _car_shapes(position: float, speed: float) -> list[Shape]:
 
 
 def _pole_shapes(place: float, speed: float, angle: float, turning: float) -> list[Shape]:
-    """The rail with its ends, the cart, the pole, and an arrow for the cart's speed."""
+    """The rail, the cart, the pole, and an arrow whose length shows the cart's speed."""
     x, y = 50.0 + 46.0 * place / cart_pole.FARTHEST, 40.0
     top = x + 30.0 * sin(angle), y - 30.0 * cos(angle)
     return [
@@ -111,7 +111,7 @@ def _pole_shapes(place: float, speed: float, angle: float, turning: float) -> li
 
 
 def _acrobot_shapes(angle: float, bend: float, speed: float, bending: float) -> list[Shape]:
-    """The bar that the tip is to reach, and both links."""
+    """The line that the tip has to reach, and both links."""
     elbow = 50.0 + 11.0 * sin(angle), 25.0 + 11.0 * cos(angle)
     tip = elbow[0] + 11.0 * sin(angle + bend), elbow[1] + 11.0 * cos(angle + bend)
     links = _line("body", (50.0, 25.0), elbow), _line("body", elbow, tip)
@@ -123,42 +123,42 @@ def _acrobot_shapes(angle: float, bend: float, speed: float, bending: float) -> 
     ]
 
 
-# ---- environment ------------------------------------------------------------------------------------------------------
+# ---- the environment ------------------------------------------------------------------------------------------------
 
 
-JUDGED = 200  # starts from which a policy is tried
-MASTERS = 8  # sessions alone, of the seeds 0, 1, ..., whose best table is what an advisor knows
-JUDGES_SEED = 0
-SOBER = -50.0
-GOOD_ENOUGH = 0.5  # of the starts: a policy that gets to the goal from fewer has no way there
+JUDGED = 200  # starts from which a policy is judged
+MASTERS = 8  # sessions without advice, with seeds 0, 1, ..., of which the best table is what advisors know
+JUDGES_SEED = 0  # of the starts
+SOBER = -50.0  # pessimistic start value in worlds with step costs, see `fitting`
+GOOD_ENOUGH = 0.5  # a policy that reaches the goal from a smaller share of the starts counts as missing it
 
 
 class PhysicsEnvironment:
-    """The `Environment` that a world of continuous states is. The learner sees the cell, the world goes on from the point."""
+    """The `Environment` of a continuous world: the learner sees the cell, and the world continues from the exact point."""
 
     def __init__(self, physics: Physics):
         self.physics, self.mdp = physics, CellTable.of(physics)
-        self.point: list[float] = []  # where the episode under way is
+        self.point: list[float] = []  # the exact state of the current episode
         self._known: dict[float, FloatArray] = {}
 
     def reset(self, episode: int, draw: Draw) -> int:
-        """Where the world lets episodes begin."""
+        """The cell of a start that the world draws."""
         self.point = [draw() for _ in self.physics.axes]
         self.physics.begin(self.point)
         return self.physics.bounds.number(self.point)
 
     def step(self, state: int, action: int, draw: Draw) -> Step:
-        """One step of the point."""
+        """The outcome of one step from the exact point."""
         over = self.physics.step(self.point, action)
         reward = self.physics.last_reward if over else self.physics.reward
         return Step(reward, self.physics.bounds.number(self.point), over, over and not self.physics.longer_is_better)
 
     def picture(self, state: int) -> str:
-        """The world in lines of text: as it is, or where the learner is not, as it would be in the middle of the cell."""
+        """The world as text, at the exact point if the learner is in this cell, otherwise at the centre of the cell."""
         return drawn(self.physics.name, self._shown(state))
 
     def shapes(self, state: int) -> list[Shape]:
-        """As `picture`, as lines, areas and discs in a drawing of 100 x 50: see `pictures.shapes`."""
+        """The same as lines, areas and discs: see the function `shapes`."""
         return shapes(self.physics.name, self._shown(state))
 
     def _shown(self, state: int) -> Sequence[float]:
@@ -166,14 +166,14 @@ class PhysicsEnvironment:
         return self.point if here else self.physics.bounds.centre(state)
 
     def values(self, discount: float) -> FloatArray:
-        """What the best of MASTERS sessions alone has learned, compiled: (S, A)."""
+        """The action values (S, A) of the best of MASTERS compiled sessions without advice."""
         if discount not in self._known:
             from lab.learning.batch import run_sessions
 
             learner = replace(fitting(self.physics), discount=discount)
             seeds = np.arange(MASTERS, dtype=np.uint64)
-            found = run_sessions(self, learner, GateSettings("never"), None, seeds, keep_tables=True)
-            best = min(found.q, key=lambda q: float(np.abs(self.played(q, self.physics.limit)).mean()) * self._better)
+            batch = run_sessions(self, learner, GateSettings("never"), None, seeds, keep_tables=True)
+            best = min(batch.q, key=lambda q: float(np.abs(self.played(q, self.physics.limit)).mean()) * self._better)
             best.flags.writeable = False
             self._known[discount] = best
         return self._known[discount]
@@ -183,7 +183,7 @@ class PhysicsEnvironment:
         return -1.0 if self.physics.longer_is_better else 1.0
 
     def played(self, q: FloatArray, most: int) -> Any:
-        """The moves (JUDGED,) of the greedy policy of a table from drawn starts, negative where they did not end it."""
+        """The number of moves (JUDGED,) of the greedy policy of a table from drawn starts, negated if the episode did not end."""
         from lab.learning.batch import play
 
         axes = len(self.physics.axes)
@@ -191,7 +191,7 @@ class PhysicsEnvironment:
         return play(self.mdp, q.argmax(axis=1), drawn, most)
 
     def judge(self, q: FloatArray, learner: LearnerSettings) -> Judged:
-        """From JUDGED drawn starts: the mean steps, nobody knows the fewest, and whether they reach the world's threshold."""
+        """The mean steps from JUDGED drawn starts, and whether the mean return reaches the threshold; the fewest are unknown."""
         physics, counted = self.physics, learner.count_start
         most = min(physics.limit, learner.max_steps - counted)
         moves = self.played(q, most)
@@ -206,10 +206,11 @@ class PhysicsEnvironment:
 
 
 def fitting(physics: Physics) -> LearnerSettings:
-    """How a world is learned alone: SARSA(lambda) on tiles with replacing traces; the numbers come from sessions in them.
+    """Settings that suit a world: SARSA(lambda) on tiles with replacing traces; the values were found by sessions in the worlds.
 
-    Where steps cost, every move is thought to be worth about half of an early way to the goal at first: with zeros whatever
-    was not tried yet looks better than what was shown. Source: Sutton and Barto 2018, example 10.1 and figure 12.10.
+    In worlds with step costs the start value is about half the cost of an early path to the goal: with start values of 0,
+    which are optimistic there, untried moves would look better than demonstrated ones. Source: Sutton and Barto 2018, example
+    10.1 and figure 12.10.
     """
     learner = LearnerSettings(
         "sarsa-lambda",

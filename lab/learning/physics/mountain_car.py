@@ -1,4 +1,4 @@
-"""A car that is too weak for its hill, and has to swing. Source: Moore 1990; Gymnasium's MountainCar-v0."""
+"""Mountain car: a car too weak for its hill has to swing up. Source: Moore 1990; Gymnasium's MountainCar-v0."""
 
 from math import cos
 from typing import Any
@@ -7,12 +7,12 @@ LOW, HIGH, FASTEST, FLAG = -1.2, 0.6, 0.07, 0.5
 
 
 def begin(x: Any) -> None:
-    """Turns uniform numbers into a start: the car stands in the valley; x: position, speed."""
+    """Turns uniform numbers into a start, in place: the car stands in the valley; x: position, speed."""
     x[0], x[1] = -0.6 + 0.2 * x[0], 0.0
 
 
 def step(x: Any, action: int) -> bool:
-    """One step to the left (0), of nothing (1) or to the right (2), in place; whether the car is at the flag."""
+    """Makes one step, accelerating left (0), not (1) or right (2), in place; returns whether the car is at the flag."""
     speed = x[1] + ((action - 1) * 0.001 + cos(3 * x[0]) * (-0.0025))
     speed = min(max(speed, -FASTEST), FASTEST)
     position = min(max(x[0] + speed, LOW), HIGH)
@@ -23,5 +23,5 @@ def step(x: Any, action: int) -> bool:
 
 
 def energy_rule(x: Any) -> int:
-    """Pushes the way the car rolls, so that each swing is higher."""
+    """The action that accelerates the car in its direction of motion, so that each swing is higher."""
     return 2 if x[1] >= 0.0 else 0

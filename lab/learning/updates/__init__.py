@@ -1,4 +1,4 @@
-"""The learners: update rules on action-value tables, one file a family."""
+"""The learners: update rules for action values, on a table or on tiles. UPDATES is their table, LINEAR that for tiles."""
 
 from collections.abc import Callable
 from typing import Any
@@ -28,31 +28,31 @@ def _adopted(name: str, thing: Any) -> Member[Learner]:
 
 
 _SHIPPED: dict[str, Member[Learner]] = {
-    "q": Member(QLearning, "Q-learning: what a move is worth is judged by the best move after it", ACTION_VALUES),
-    "sarsa": Member(Sarsa, "as q, but judged by the move that is really made next"),
+    "q": Member(QLearning, "Q-learning: the value of a move follows from the best move after it", ACTION_VALUES),
+    "sarsa": Member(Sarsa, "as q, but from the move that is actually made next"),
     "q-lambda": Member(WatkinsQLambda, "as q, with traces: each step corrects the moves before it, too"),
     "sarsa-lambda": Member(SarsaLambda, "as sarsa, with traces: each step corrects the moves before it, too"),
     "dyna-q": Member(
         DynaQ, "as q, and each step is followed by learning from earlier ones again, out of a model of them"
     ),
-    "monte-carlo": Member(MonteCarlo, "moves are judged by the whole rest of the episode"),
+    "monte-carlo": Member(MonteCarlo, "the value of a move follows from all rewards in the rest of the episode"),
     "afterstate": Member(
-        Afterstate, "learns what the states are worth that moves lead to, not the moves", STATE_VALUES
+        Afterstate, "learns values of the states that moves lead to, instead of values of moves", STATE_VALUES
     ),
 }
 UPDATES = Family("learners", _SHIPPED, _adopted)
 
 
 def update_of(settings: LearnerSettings, mdp: TabularMDP, q: FloatArray) -> Update:
-    """The learner that the settings name, on a table or on tiles; it begins with the values q (S, A)."""
+    """The learner that the settings name, on a table or on tiles, with the start values q (S, A)."""
     if settings.tilings > 1:
         return LINEAR[settings.learner](q, settings, mdp)
     return UPDATES[settings.learner].make(q.tolist(), settings, mdp)
 
 
 def scattered(settings: LearnerSettings, mdp: TabularMDP, draw: Draw, tables: int) -> list[Update]:
-    """So many learners as the settings name, whose start values are drawn within +-0.5."""
-    made = [update_of(settings, mdp, np.zeros(mdp.successor.shape)) for _ in range(tables)]
-    for one in made:
-        one.scatter(draw)
-    return made
+    """`tables` independent learners of the kind that the settings name, with start values drawn within +-0.5."""
+    learners = [update_of(settings, mdp, np.zeros(mdp.successor.shape)) for _ in range(tables)]
+    for learner in learners:
+        learner.scatter(draw)
+    return learners

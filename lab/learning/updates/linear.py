@@ -1,6 +1,6 @@
-"""Learners whose values are sums of weights of tiles: Q-learning and SARSA, with replacing or accumulating traces.
+"""Learners with tile coding: Q-learning and SARSA, with replacing or accumulating traces.
 
-The step size is shared out among the tilings. Source: Sutton and Barto 2018, section 12.7 and example 10.1.
+The step size is divided by the number of tilings. Source: Sutton and Barto 2018, section 12.7 and example 10.1.
 """
 
 from collections.abc import Sequence
@@ -15,26 +15,26 @@ from lab.learning.updates.tabular import is_greedy, q_target, sarsa_target
 from lab.learning.updates.update import Row, Update
 from lab.mdp import FloatArray, TabularMDP
 
-FAINT = 0.01  # an eligibility below this is dropped: the traces of thousands of tiles are not worth their time
+FAINT = 0.01  # lower eligibilities are dropped, which limits the number of traces
 
 
 class TileRows(Sequence[Row]):
-    """Action values that are summed up on lookup; weights (tiles * A,) is flat, a tile's actions side by side."""
+    """Action values, summed from the weights on lookup; weights: (tiles * A,), the actions of a tile side by side."""
 
     def __init__(self, coding: TileCoding, actions: int, weights: Row):
         self.coding, self.weights, self._actions = coding, weights, actions
         self._states = int(np.prod(coding.shape))
-        self._places: dict[int, list[int]] = {}  # of the states that were looked up
+        self._places: dict[int, list[int]] = {}  # cache of `places`
 
     def __len__(self) -> int:
         return self._states
 
     def places(self, state: int) -> list[int]:
-        """Where the weights of a state's tiles begin."""
-        found = self._places.get(state)
-        if found is None:
-            found = self._places[state] = [tile * self._actions for tile in self.coding.tiles_of(state)]
-        return found
+        """The indices at which the weights of a state's tiles begin."""
+        places = self._places.get(state)
+        if places is None:
+            places = self._places[state] = [tile * self._actions for tile in self.coding.tiles_of(state)]
+        return places
 
     @overload
     def __getitem__(self, state: int) -> Row: ...
@@ -45,7 +45,7 @@ class TileRows(Sequence[Row]):
             return [self[s] for s in range(*state.indices(len(self)))]
         weights, row = self.weights, []
         for action in range(self._actions):
-            total = 0.0  # one after the other, as the kernel adds them: newer Pythons' sum rounds otherwise
+            total = 0.0  # added one by one, as in the kernel; `sum` of newer Pythons rounds differently
             for place in self.places(state):
                 total += weights[place + action]
             row.append(total)
@@ -53,7 +53,7 @@ class TileRows(Sequence[Row]):
 
 
 class OnTiles(Update):
-    """What all of them do: an error moves the weights that led to it, each by its eligibility.
+    """The base class of learners with tile coding: an error changes each weight in proportion to its eligibility.
 
     Source: Sutton and Barto 2018, section 12.7 (binary features, replacing or accumulating traces).
     """
@@ -79,12 +79,12 @@ class OnTiles(Update):
         return rows.coding.values(np.array(rows.weights).reshape(rows.coding.count, -1))
 
     def scatter(self, draw: Draw) -> None:
-        """Every weight: a state's values lie within +-0.5, as in a table."""
+        """Draws every weight, so that the values of a state lie within +-0.5, as in a table."""
         weights, tilings = self._rows.weights, self._rows.coding.tilings
         weights[:] = [(draw() - 0.5) / tilings for _ in weights]
 
     def _spread(self, s_tm1: int, a_tm1: int, error: float, follow: bool) -> None:
-        """Moves every weight that led here by its eligibility; then lets the traces fade, or cuts them."""
+        """Changes every weight by its eligibility, then decays the traces (`follow`) or cuts them."""
         weights, traces, decay = self._rows.weights, self._traces, self._decay
         for place in self._rows.places(s_tm1):
             traces[place + a_tm1] = traces.get(place + a_tm1, 0.0) + 1.0 if self._growing else 1.0
@@ -103,7 +103,7 @@ class TileQLearning(OnTiles):
     """Q-learning, one step at a time."""
 
     def learn(self, s_tm1: int, a_tm1: int, r_t: float, discount_t: float, s_t: int, a_t: int) -> None:
-        """One update of the tiles of s."""
+        """Updates the weights of the tiles of s."""
         error = q_target(r_t, discount_t, self.q[s_t]) - self.q[s_tm1][a_tm1]
         self._spread(s_tm1, a_tm1, error, False)
 
@@ -114,7 +114,7 @@ class TileSarsa(OnTiles):
     lookahead = True
 
     def learn(self, s_tm1: int, a_tm1: int, r_t: float, discount_t: float, s_t: int, a_t: int) -> None:
-        """One update of the tiles of s."""
+        """Updates the weights of the tiles of s."""
         error = sarsa_target(r_t, discount_t, self.q[s_t], a_t) - self.q[s_tm1][a_tm1]
         self._spread(s_tm1, a_tm1, error, discount_t > 0.0)
 
@@ -125,14 +125,14 @@ class TileQLambda(OnTiles):
     lookahead = chained = decays = True
 
     def learn(self, s_tm1: int, a_tm1: int, r_t: float, discount_t: float, s_t: int, a_t: int) -> None:
-        """One update of every tile that led here."""
+        """Updates every weight with a trace."""
         q_t = self.q[s_t]
         error = q_target(r_t, discount_t, q_t) - self.q[s_tm1][a_tm1]
         self._spread(s_tm1, a_tm1, error, discount_t > 0.0 and is_greedy(q_t, a_t))
 
 
 class TileSarsaLambda(TileSarsa):
-    """SARSA(lambda): traces follow whatever is done."""
+    """SARSA(lambda): traces decay whatever the next action is."""
 
     chained = decays = True
 

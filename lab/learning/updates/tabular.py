@@ -1,4 +1,4 @@
-"""Learners on a table: Q-learning and Sarsa, their traces, whole episodes, planning, and afterstates."""
+"""Learners on a table: Q-learning, SARSA, Monte Carlo, Dyna-Q, afterstates, and Q(lambda) and SARSA(lambda) with traces."""
 
 from collections.abc import Sequence
 from typing import overload
@@ -23,7 +23,7 @@ class QLearning(OnTable):
     """One-step Q-learning: Q(s,a) += alpha (r + gamma max Q(s',.) - Q(s,a)). Source: thesis fig. 2.2."""
 
     def learn(self, s_tm1: int, a_tm1: int, r_t: float, discount_t: float, s_t: int, a_t: int) -> None:
-        """One update of Q(s, a)."""
+        """Updates Q(s, a)."""
         row = self.q[s_tm1]
         row[a_tm1] = towards(row[a_tm1], q_target(r_t, discount_t, self.q[s_t]), self._alpha)
 
@@ -34,18 +34,18 @@ class Sarsa(OnTable):
     lookahead = True
 
     def learn(self, s_tm1: int, a_tm1: int, r_t: float, discount_t: float, s_t: int, a_t: int) -> None:
-        """One update of Q(s, a)."""
+        """Updates Q(s, a)."""
         row = self.q[s_tm1]
         row[a_tm1] = towards(row[a_tm1], sarsa_target(r_t, discount_t, self.q[s_t], a_t), self._alpha)
 
 
-# ---- episode returns --------------------------------------------------------------------------------------------------
+# ---- Monte Carlo: learning from whole episodes ----------------------------------------------------------------------
 
 
 class MonteCarlo(OnTable):
     """First-visit Monte Carlo with a constant step: Q(s,a) += alpha (G - Q(s,a)) when the episode is over.
 
-    A broken-off episode counts as if the start value came after it: nothing, where that is 0.
+    A truncated episode is learned from as if the start value of the settings were its remaining return.
     Source: Sutton and Barto 1998, section 5.4.
     """
 
@@ -61,7 +61,7 @@ class MonteCarlo(OnTable):
         self._episode.clear()
 
     def learn(self, s_tm1: int, a_tm1: int, r_t: float, discount_t: float, s_t: int, a_t: int) -> None:
-        """Remembers the step."""
+        """Records the step."""
         self._after = self._settings.start_value if discount_t else 0.0
         self._episode.append((s_tm1, a_tm1, r_t))
 
@@ -70,21 +70,20 @@ class MonteCarlo(OnTable):
         outcome, returns = self._after, dict[tuple[int, int], float]()
         for state, action, reward in reversed(self._episode):
             outcome = reward + self._settings.discount * outcome
-            returns[state, action] = outcome  # the last one written is that of the first visit
+            returns[state, action] = outcome  # the last assignment is that of the first visit
         for (state, action), outcome in returns.items():
             self.q[state][action] = towards(self.q[state][action], outcome, self._alpha)
         self._episode.clear()
 
 
-# ---- planning ---------------------------------------------------------------------------------------------------------
+# ---- Dyna-Q: planning in a learned model ----------------------------------------------------------------------------
 
 
 class DynaQ(QLearning):
-    """Q-learning that learns from `planning` of the moves that it has seen again after each one.
+    """Q-learning that replays `planning` known moves from a learned model after each step.
 
-    Its model of the world holds what each move last led to, and is gone through in turn, the newest first; where steps are
-    left to chance, that is only the last outcome. Source: Sutton 1990, who draws these moves by chance; Sutton and Barto
-    1998, fig. 9.4.
+    The model holds the last outcome of each move, also if steps are stochastic; moves are replayed in turn, the newest first.
+    Source: Sutton 1990, who draws the moves at random; Sutton and Barto 1998, fig. 9.4.
     """
 
     def __init__(self, q: list[Row], settings: LearnerSettings, mdp: TabularMDP):
@@ -94,7 +93,7 @@ class DynaQ(QLearning):
         self._turn = 0
 
     def learn(self, s_tm1: int, a_tm1: int, r_t: float, discount_t: float, s_t: int, a_t: int) -> None:
-        """One update of Q(s, a), and of the values of earlier moves."""
+        """Updates Q(s, a), then the values of replayed moves."""
         learn, outcomes, moves = super().learn, self._outcomes, self._moves
         learn(s_tm1, a_tm1, r_t, discount_t, s_t, a_t)
         if (s_tm1, a_tm1) not in outcomes:
@@ -106,16 +105,16 @@ class DynaQ(QLearning):
             learn(state, action, *outcomes[state, action], a_t)
 
 
-# ---- afterstate -------------------------------------------------------------------------------------------------------
+# ---- afterstates: values of the states that moves lead to -----------------------------------------------------------
 
 
 def afterstate_value(step_reward: float, discount: float, v_t: float) -> float:
-    """r + gamma V(s'): a move is worth what the state after it is. Source: thesis App. VII; Sutton and Barto, 6.8."""
+    """r + gamma V(s'), the value of a move by that of the state after it. Source: thesis App. VII; Sutton and Barto, 6.8."""
     return step_reward + discount * v_t
 
 
 class AfterstateRows(Sequence[Row]):
-    """Action values read off a value per state: row s is r + gamma V(s') over the actions; zeros where episodes end."""
+    """Action values computed from state values: row s is r + gamma V(s') for each action, zeros in terminal states."""
 
     def __init__(self, mdp: TabularMDP, discount: float, values: Row):
         self.values = values
@@ -144,10 +143,10 @@ class AfterstateRows(Sequence[Row]):
 
 
 class Afterstate(Update):
-    """TD(0) on afterstates: V(s) += alpha (r + gamma V(s') - V(s)), s' being where the chosen action led.
+    """TD(0) on afterstates: V(s) += alpha (r + gamma V(s') - V(s)), where s' is the state that the chosen action led to.
 
-    A terminal state is worth 0 until it is first entered, then its reward. All ordinary moves must have one reward.
-    Raises BadInput where they do not, or where entering a terminal state is worth more from one side.
+    The value of a terminal state is 0 until it is first entered, then its reward. Raises BadInput unless all moves into
+    nonterminal states have the same reward, and all moves into a terminal state have the same reward, too.
     Source: thesis App. VII (the text speaks of Q(s,a), the listing keeps a value per state).
     """
 
@@ -164,11 +163,11 @@ class Afterstate(Update):
         return self._rows.after(state)
 
     def scatter(self, draw: Draw) -> None:
-        """Every state's value."""
+        """Draws every state's value within +-0.5."""
         self._values[:] = [draw() - 0.5 for _ in self._values]
 
     def learn(self, s_tm1: int, a_tm1: int, r_t: float, discount_t: float, s_t: int, a_t: int) -> None:
-        """One update of V(s); entering a terminal state shows its worth."""
+        """Updates V(s); entering a terminal state sets its value to the reward."""
         values = self._values
         target = afterstate_value(self._step_reward, self._discount, values[s_t])
         values[s_tm1] = towards(values[s_tm1], target, self._alpha)
@@ -177,7 +176,7 @@ class Afterstate(Update):
 
 
 def _values_behind(q: list[Row], mdp: TabularMDP, discount: float) -> Row:
-    """The values per state that a table of action values was read off; zeros for a table of zeros."""
+    """The state values from which a table of action values was computed; zeros for a table of zeros."""
     values = [0.0] * mdp.n_states
     if any(map(any, q)):
         for row, entered, over in zip(q, mdp.successor.tolist(), mdp.terminal.tolist(), strict=True):
@@ -187,19 +186,19 @@ def _values_behind(q: list[Row], mdp: TabularMDP, discount: float) -> Row:
     return values
 
 
-# ---- traces -----------------------------------------------------------------------------------------------------------
+# ---- eligibility traces ---------------------------------------------------------------------------------------------
 
 
-TRACE_FLOOR = 1e-6  # an eligibility below this moves no value noticeably, and dropping it keeps a step cheap
+TRACE_FLOOR = 1e-6  # lower eligibilities are dropped: they hardly change a value, and cost time
 
 
 def is_greedy(q_t: Row, a_t: int) -> bool:
-    """Whether a' is a best action of s'; a tie counts as best. Source: thesis fig. 2.3."""
+    """Whether a' is a best action of s', ties included. Source: thesis fig. 2.3."""
     return q_t[a_t] == max(q_t)
 
 
 class Traced(OnTable):
-    """A learner with eligibility traces: accumulating ones grow by 1 on a visit, replacing ones are set to 1.
+    """The base class of learners with eligibility traces: accumulating ones grow by 1 on a visit, replacing ones are set to 1.
 
     Source: Singh and Sutton 1996; thesis fig. 2.3.
     """
@@ -217,11 +216,11 @@ class Traced(OnTable):
         self._traces.clear()
 
     def _spread(self, s_tm1: int, a_tm1: int, error: float, follow: bool) -> None:
-        """Moves every value that led here by its eligibility; then lets the traces fade, or cuts them."""
+        """Changes every value by its eligibility, then decays the traces (`follow`) or cuts them."""
         row, traces, decay = self.q[s_tm1], self._traces, self._decay
         step = self._alpha * error
         key = s_tm1 * len(row) + a_tm1
-        earlier = traces.pop(key, None)  # put back last, so that the oldest traces stay in front
+        earlier = traces.pop(key, None)  # appended again, so that the oldest traces come first
         traces[key] = (row, a_tm1, earlier[2] + 1.0 if earlier and self._growing else 1.0)
         for trace_row, action, eligibility in traces.values():
             trace_row[action] += step * eligibility
@@ -239,16 +238,16 @@ class WatkinsQLambda(Traced):
     """Watkins's Q(lambda): traces are cut when the next action is not greedy. Source: thesis fig. 2.3."""
 
     def learn(self, s_tm1: int, a_tm1: int, r_t: float, discount_t: float, s_t: int, a_t: int) -> None:
-        """One update of every value that led here, by its eligibility."""
+        """Updates every value with a trace, by its eligibility."""
         q_t = self.q[s_t]
         error = q_target(r_t, discount_t, q_t) - self.q[s_tm1][a_tm1]
         self._spread(s_tm1, a_tm1, error, discount_t > 0.0 and is_greedy(q_t, a_t))
 
 
 class SarsaLambda(Traced):
-    """SARSA(lambda): traces follow whatever is done. Source: Sutton and Barto 1998, fig. 7.11."""
+    """SARSA(lambda): traces decay whatever the next action is. Source: Sutton and Barto 1998, fig. 7.11."""
 
     def learn(self, s_tm1: int, a_tm1: int, r_t: float, discount_t: float, s_t: int, a_t: int) -> None:
-        """One update of every value that led here, by its eligibility."""
+        """Updates every value with a trace, by its eligibility."""
         error = sarsa_target(r_t, discount_t, self.q[s_t], a_t) - self.q[s_tm1][a_tm1]
         self._spread(s_tm1, a_tm1, error, discount_t > 0.0)

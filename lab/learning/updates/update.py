@@ -1,6 +1,6 @@
-"""What a session asks of a learner, and what the learners that keep action values have in common.
+"""The base classes of learners: `Update`, the interface that a session uses, and `OnTable`, for those that keep action values.
 
-A table is a list of rows, one list of action values per state: in plain Python much faster than an array.
+A table is a list of rows, one list of action values per state, because plain Python reads lists much faster than arrays.
 """
 
 from collections.abc import Sequence
@@ -14,50 +14,65 @@ from lab.mdp import FloatArray, TabularMDP
 Row = list[float]
 Table = Sequence[Row]
 
-ACTION_VALUES, STATE_VALUES = range(2)  # the learners' forms that the kernel knows
+ACTION_VALUES, STATE_VALUES = range(2)  # the forms of learners in the kernel: what they keep a value of
 
 
 def towards(value: float, target: float, alpha: float) -> float:
-    """The value moved by the share alpha towards its target."""
+    """value + alpha * (target - value)."""
     return value + alpha * (target - value)
 
 
 class Update:
-    """What a session asks of a learner.
+    """The base class of learners, which a session creates with (q, settings, mdp) and calls in the order `begin`, `learn`, `end`.
 
-    lookahead: learning needs the next action chosen first; chained: a step is learned from together with those before
-    or after it in the episode, so that none of them may be left out; q: its action values now, `q[state][action]`.
+    lookahead: class attribute, whether `learn` needs the next action, as SARSA does; chained: class attribute, whether a step is
+    learned from together with others of its episode, so that none may be left out.
+    q: the current action values, `q[state][action]`; S rows of A floats.
+
+        >>> import lab
+        >>> class Slow(lab.Update):
+        ...     '''Q-learning with half of the learning rate.'''
+        ...     def __init__(self, q, settings, mdp):
+        ...         self.q, self.alpha = q, 0.5 * settings.alpha
+        ...     def learn(self, s_tm1, a_tm1, r_t, discount_t, s_t, a_t):
+        ...         target = r_t + discount_t * max(self.q[s_t])
+        ...         self.q[s_tm1][a_tm1] += self.alpha * (target - self.q[s_tm1][a_tm1])
+        >>> from lab.testing import check_learner
+        >>> check_learner(Slow)
     """
 
     lookahead = chained = False
     q: Table
 
     def begin(self) -> None:
-        """Starts an episode."""
+        """Begins an episode; by default does nothing."""
 
     def learn(self, s_tm1: int, a_tm1: int, r_t: float, discount_t: float, s_t: int, a_t: int) -> None:
-        """Learns from one step; discount_t is 0 when s_t is terminal; a_t matters only with `lookahead`."""
+        """Learns from the step from s_tm1 by action a_tm1 to s_t with reward r_t.
+
+        discount_t: 0 if s_t is terminal, otherwise gamma; a_t: the next action, 0 without `lookahead`.
+        """
         raise NotImplementedError
 
     def end(self) -> None:
-        """Ends an episode, whether it reached a terminal state or was broken off."""
+        """Ends an episode, terminated or truncated; by default does nothing."""
 
     def gauge(self, state: int) -> Row:
-        """The values whose width says how sure the learner is in a state (what introspection looks at)."""
+        """The values (A,) of a state whose span shows how sure the learner is there; gates read them."""
         return self.q[state]
 
     def table(self) -> FloatArray:
-        """The action values of all states, (S, A)."""
+        """The action values of all states, (S, A) float64."""
         return np.array(list(self.q), np.float64)
 
     def scatter(self, draw: Draw) -> None:
-        """Sets every value that it keeps to one drawn within +-0.5."""
+        """Draws every value within +-0.5; draw: returns uniform numbers in [0, 1)."""
         for row in self.q:
             row[:] = [draw() - 0.5 for _ in row]
 
 
 class OnTable(Update):
-    """What the learners that keep a value per state and action have in common."""
+    """The base class of learners that keep a value per state and action."""
 
     def __init__(self, q: list[Row], settings: LearnerSettings, mdp: TabularMDP):
         self.q: list[Row] = q
