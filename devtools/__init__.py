@@ -1,1 +1,1 @@
-"""What tries to break the lab for hours, and what measures it: `python -m devtools`; not part of the wheel."""
+"""The harness that tries to break the lab for hours, and tools that measure it: `python -m devtools`; not in the wheel."""

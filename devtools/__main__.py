@@ -1,6 +1,7 @@
-"""What breaks the lab: `python -m devtools PART... [--count N] [--seed N] [--workers N] [--out DIR]`, and a scoreboard.
+"""Try to break the lab: `python -m devtools PART... [--count N] [--seed N] [--workers N] [--out DIR]` prints a scoreboard.
 
-Needs an environment in which the lab can be imported. The same folder goes on where it was stopped; exit 1 if anything broke.
+It needs an environment in which the lab can be imported. With the same folder it continues where it stopped; exit 1 if
+anything broke.
 """
 
 from concurrent.futures import ThreadPoolExecutor, as_completed

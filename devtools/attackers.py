@@ -22,7 +22,7 @@ AT_ONCE = 400  # connections that an attacker holds
 
 
 class Attack:
-    """One attacker: where the page is, the token (used by those who may have it, and to see that nobody else gets in)."""
+    """One attacker: the page's port, and the token, for attacks with it and for checking that nobody gets in without it."""
 
     def __init__(self, port: int, token: str, seconds: float, seed: int, server: int) -> None:
         self.port, self.token, self.server = port, token, server
@@ -37,7 +37,7 @@ class Attack:
         return time.monotonic() < self.until_s
 
     def connect(self) -> socket.socket | None:
-        """A connection, or None where there is none to be had."""
+        """A connection, or None when the server accepts none."""
         self.tries += 1
         try:
             return socket.create_connection((HOST, self.port), timeout=ANSWER_S)
@@ -45,7 +45,7 @@ class Attack:
             return None
 
     def say(self, one: socket.socket, words: bytes) -> bool:
-        """Whether they could be said."""
+        """Whether the words could be sent."""
         try:
             one.sendall(words)
         except OSError:
@@ -73,7 +73,7 @@ class Attack:
 
 
 def matrix(attack: Attack) -> None:
-    """Every mix of method, path, token, host and origin, of which only what its own page would ask may come in."""
+    """Every combination of method, path, token, host and origin; only requests of the server's own page may get in."""
     for method, path, token, host, origin in cases(attack):
         shown = f"{path}?token={token}" if token is not None else path
         words = f"{method} {shown} HTTP/1.1\r\n" + (f"Host: {host}\r\n" if host else "")
@@ -119,7 +119,7 @@ def cases(attack: Attack) -> Iterator[tuple[str, str, str | None, str, str | Non
 
 
 def flood(attack: Attack, words: bytes = b"", again: bytes = b"") -> None:
-    """As many connections as can be had, each of which says something, and then a little more from time to time."""
+    """As many connections as possible, each of which sends something, and a little more from time to time."""
     held: list[tuple[socket.socket, Iterator[bytes]]] = []
     while attack.goes_on:
         one = socket.socket()
@@ -181,7 +181,7 @@ def garbage(attack: Attack) -> None:
 
 
 def spy(attack: Attack) -> None:
-    """Looks for the token in what another user may read of the process, and of its files (their folder: `home` below)."""
+    """Looks for the token in whatever another user can read of the process and its files (their folder: `home` below)."""
     process = Path(f"/proc/{attack.server}")
     for name in ("cmdline", "environ", "comm", "stat", "maps"):
         _look(attack, process / name)
@@ -269,7 +269,7 @@ def chatter(attack: Attack) -> None:
 
 
 def silent(attack: Attack) -> None:
-    """Pages that read nothing and ask for signs of life."""
+    """Pages that read nothing and send pings."""
     frames = (b"\x89\xfd\0\0\0\0" + bytes(125)) * 100
     ask = f"GET /frames?token={attack.token} HTTP/1.1\r\nHost: {HOST}:{attack.port}\r\nUpgrade: websocket\r\n"
     ask += "Connection: Upgrade\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Version: 13\r\n\r\n"

@@ -1,7 +1,7 @@
-"""Part `audits`: recorded runs into which something wrong is put, in their frames or in their schedule; the audit must name it.
+"""Part `audits`: violations are inserted into the frames or the schedule of recorded runs; the audit must name them.
 
 The runs are those of the tasks that ship, made by the real command. A number draws a run, a kind of violation, a part, a place
-and a time; what is put in is a matter of numpy alone. The runs themselves must pass.
+and a time; violations are inserted with numpy alone. The unchanged runs must pass.
 """
 
 from collections.abc import Callable
@@ -33,12 +33,12 @@ SHIFTS_S = (2.0, 30.0)
 
 
 class Impossible(Exception):
-    """A run has nothing that can be violated so."""
+    """Raised when a run has nothing to which this violation applies."""
 
 
 @dataclass(frozen=True)
 class Violated:
-    """Evidence with something wrong in it: about which part, "" for none alone, by which rules it may be found, and in words."""
+    """Evidence with a violation: the part ("": no single part), the rules that may find it, and the violation in words."""
 
     evidence: Evidence
     part: str
@@ -70,7 +70,7 @@ def worked(evidence: Evidence) -> list[tuple[PartSeen, Stay, float]]:
 
 
 def drawn(rng: np.random.Generator, found: list[Any]) -> Any:
-    """One of them."""
+    """A random element; Impossible when there is none."""
     if not found:
         raise Impossible
     return found[int(rng.integers(len(found)))]
@@ -284,7 +284,7 @@ def row_lost(evidence: Evidence, rng: np.random.Generator) -> Violated:
 
 
 def drifting(evidence: Evidence, rng: np.random.Generator) -> Violated:
-    """A part creeps while it stands, by no step that anybody would see."""
+    """A part drifts while it stands, by steps too small to be noticed."""
     stays = [(seen, stay) for seen in evidence.parts for stay in seen.stays if stay.seconds > 3 * HANDLING_S]
     seen, stay = drawn(rng, stays)
     own = copied(evidence)

@@ -1,4 +1,4 @@
-"""The lab's command run by the harness: how it ended, what it said, what it took."""
+"""The lab's command as run by the harness: its exit code, its output, its time and memory."""
 
 import os
 import re
@@ -23,7 +23,7 @@ CODES = (0, 1, 2, 130)
 
 @dataclass(frozen=True)
 class Ended:
-    """A command that is over: its exit code (minus the signal that killed it), what it printed, wall seconds, peak bytes."""
+    """A finished command: its exit code (minus the signal that killed it), output, wall time [s], and peak memory [bytes]."""
 
     code: int
     stdout: str

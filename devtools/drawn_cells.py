@@ -1,7 +1,7 @@
-"""Cells drawn from nothing, of all that a task file can say, laid out and measured as an engineer does who reads its pages.
+"""Random cells with every feature of a task file, laid out and measured as an engineer would do after reading the docs.
 
-Stations are set around the arm, and the sizes that follow from parts (of machines, of the workspace) are computed, until all are
-apart and within reach; nothing else is looked at, and what is in no layout keeps the last one.
+Stations are placed around the arm, and the sizes that follow from parts (of machines, of the workspace) are computed, until
+all stations are apart and within reach. Nothing else is checked; a cell without such a layout keeps the last one.
 """
 
 import json

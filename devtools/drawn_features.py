@@ -1,4 +1,4 @@
-"""What a drawn cell may have: each feature is a function that changes the tables of its task file, and says whether it could."""
+"""The features of drawn cells: each is a function that changes the tables of a task file, and returns whether it applied."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -52,7 +52,7 @@ def evenly(rng: Rng, ends: tuple[float, float]) -> float:
 
 
 def grip_force(cell: DrawnCell) -> bool:
-    """The file says how firmly the fingers press, at most."""
+    """The file limits the force of the fingers."""
     cell.robot["grip_force_n"] = evenly(cell.rng, FORCE_N)
     return True
 

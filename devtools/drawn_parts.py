@@ -1,4 +1,4 @@
-"""Kinds of parts drawn as a shop has them: boxes, cylinders and meshes of usual sizes and materials, with their mesh files."""
+"""Random kinds of parts: boxes, cylinders and meshes of usual sizes and materials, with their mesh files."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,7 @@
-"""Part `physics`: cells drawn of all that a task file can say; all is delivered and audited, or refused before any work.
+"""Part `physics`: random cells with every feature of a task file; all parts are delivered and audited, or the task is refused.
 
 Some are copies of the tasks that ship with other masses, frictions, grips, speeds and layouts. A refusal counts as held if the
-check of the task, which does no work, says the very same; whatever stops later, or leaves a part undelivered, broke.
+task's check, which carries nothing out, says the same; a run that stops later, or leaves a part undelivered, broke.
 """
 
 import json

@@ -1,7 +1,7 @@
-"""Part `kills`: commands that write are killed, at a drawn call of a drawn kind or at any time; then the next one comes.
+"""Part `kills`: commands that write are killed, at a drawn system call or at any time; then the next command runs.
 
-Nothing that was there is lost, what was kept is whole, going on (or doing it again) comes to what an undisturbed command comes
-to, and leaves nothing behind. What was left is an hour old when the next command comes.
+No earlier file is lost, every kept file is whole, and resuming (or repeating) the command gives the result of an undisturbed
+one and leaves no temporary files. The remains of the killed command are dated back an hour for the next one.
 """
 
 import random
@@ -72,13 +72,13 @@ def attempt(number: int, seed: int, room: Path) -> Outcome:
 
 @cache
 def known_as(name: str, room: Path) -> Undisturbed:
-    """What a command comes to when nobody disturbs it, read once."""
+    """The result of an undisturbed command, read once."""
     return undisturbed(name, room)
 
 
 @cache
 def forked_s(name: str, room: Path) -> float:
-    """How long a command takes when it is forked, looked at once."""
+    """The time [s] that a forked command takes, measured once."""
     home = fresh(own_folder(room, "forked"), room, WORKS[name])
     took_s = disturbed(home, WORKS[name].words, built(room), None, room, LONGEST_S, forked(built(room), room)).seconds
     shutil.rmtree(home.parent)

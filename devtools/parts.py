@@ -1,4 +1,4 @@
-"""What a part of the harness is: numbered attempts to break the lab, each with an outcome."""
+"""The parts of the harness: each makes numbered attempts to break the lab, with an outcome each."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -9,8 +9,8 @@ from pathlib import Path
 class Outcome:
     """How one attempt ended.
 
-    group: the row of the scoreboard that counts it; case: what was done, so that a reader can do it again; broke: what went
-    wrong, empty if the lab held; tries: how many things were tried in it; figures: anything measured.
+    group: the row of the scoreboard that counts it; case: what was done, so that a reader can repeat it; broke: what went
+    wrong, empty if the lab held; tries: the number of trials in it; figures: anything measured.
     """
 
     group: str

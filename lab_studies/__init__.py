@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class _In:
-    """A study's function in a module of this package, which is loaded when the study is run: what it needs takes a second.
+    """A study's function in a module of this package, loaded only when the study runs, because its libraries load slowly.
 
     given: what the function takes after the job and the reading.
     """

@@ -1,1 +1,1 @@
-"""Comparisons of our own, which the thesis does not print."""
+"""Our own comparisons, which are not in the thesis."""

@@ -1,4 +1,4 @@
-"""What advice costs: success against helped steps, for every gate with and without memory, and every kind of advisor."""
+"""The cost of advice: success against helped steps, for every gate with and without memory, and every kind of advisor."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
@@ -86,7 +86,7 @@ def advice_budget(job: Job, reading: Mapping[str, Any]) -> Findings:
 
 
 class Asked(NamedTuple):
-    """A cell: where the advisor sees the robot, and so on; of nobody the view is full."""
+    """A cell of the study: gate, advisor, view of the advisor (full for nobody), and memory."""
 
     world: str
     view: Literal["full", "limited"]
@@ -96,7 +96,7 @@ class Asked(NamedTuple):
 
 
 def settings() -> dict[Asked, tuple[AdviceSetting, ...]]:
-    """What is measured, a setting for each world of a cell; nobody: the gate never asks."""
+    """The measured settings by cell, one for each of its worlds; for nobody, the gate never asks."""
     cells: dict[Asked, tuple[AdviceSetting, ...]] = {}
     for place in PLACES:
         worlds = RANDOM_WORLDS if place == RANDOM else (place,)
@@ -114,7 +114,7 @@ def settings() -> dict[Asked, tuple[AdviceSetting, ...]]:
 
 
 def _outcomes(job: Job, cells: Mapping[Asked, tuple[AdviceSetting, ...]]) -> dict[Asked, AdviceOutcome]:
-    """What each cell came to; those of one world are kept in the job's folder."""
+    """The outcome of each cell; those of one world are kept in the job's folder."""
     single = {cell: ones[0] for cell, ones in cells.items() if cell.world != RANDOM}
     found = measured(job, list(single.values()))
     share = max(1, job.sessions // len(RANDOM_WORLDS))
@@ -155,7 +155,7 @@ def rows_of(cell: Asked, outcome: AdviceOutcome, table: str) -> list[Row]:
 
 
 def difference(one: AdviceOutcome, other: AdviceOutcome) -> tuple[float, float, float]:
-    """How much more often one setting's sessions succeed than another's, low and high end, in points.
+    """The difference of two settings' success rates with the low and the high end of its interval, in percentage points.
 
     Source: R. G. Newcombe, Statistics in Medicine 17 (1998), 873-890, method 10.
     """

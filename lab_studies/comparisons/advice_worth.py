@@ -1,4 +1,4 @@
-"""What an advisor's help is worth over nobody's: what a lesson of each skill of the toast task costs until it is solved."""
+"""The worth of an advisor's help: the cost of a lesson until it is solved, for each skill of the toast task and advisor."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -49,7 +49,7 @@ SCENE = (
 
 @dataclass(frozen=True)
 class Pupil:
-    """Which skill is learned, with whose advice."""
+    """The skill that is learned, and the advisor."""
 
     skill: str
     advisor: str
@@ -57,7 +57,7 @@ class Pupil:
 
 @dataclass(frozen=True, eq=False)
 class Cost:
-    """What N lessons took until they were solved, (N,) each; one that was never solved counts with all that it took."""
+    """The cost of N lessons until they were solved, (N,) each; a lesson that was never solved counts with its whole cost."""
 
     solved: NDArray[np.bool_]
     episodes: NDArray[np.int64]
@@ -125,7 +125,7 @@ def scene() -> Prepared:
 
 
 def taught(pupil: Pupil, *, lessons: int, seed: int) -> Cost:
-    """So many lessons of a skill with an advisor."""
+    """The cost of `lessons` lessons of a skill with an advisor."""
     problem = scene().problems[pupil.skill]
     how, advising = scene().task.subtask(problem.subtask), Advising.of([pupil.advisor])
     plan = LessonPlan(problem, how.learner, how.gate, TASK)
@@ -140,7 +140,7 @@ def taught(pupil: Pupil, *, lessons: int, seed: int) -> Cost:
 
 
 def joined(costs: Sequence[Cost]) -> Cost:
-    """The lessons of several skills as those of one."""
+    """The costs of several skills' lessons, joined."""
     return Cost(*(np.concatenate([getattr(one, name) for one in costs]) for name in Cost.__dataclass_fields__))
 
 
@@ -163,7 +163,7 @@ def rows_of(skill: str, advisor: str, found: Mapping[Pupil, Cost]) -> list[Row]:
 
 
 def saved_row(named: Row, of: Cost, alone: Cost) -> Row:
-    """By how much fewer moves a lesson takes than with nobody [%], with the interval of the difference of the means."""
+    """The moves that a lesson saves compared with nobody [%], with the interval of the difference of the means."""
     from scipy.stats import ttest_ind
 
     low, high = ttest_ind(alone.moves, of.moves, equal_var=False).confidence_interval(0.95)

@@ -1,4 +1,4 @@
-"""A person for runs that nobody really attends: does, some time after a stop, what the run asks for, and lets it go on."""
+"""A simulated person who attends a run: some time after a stop, it does what the run asks for, and lets it continue."""
 
 import re
 from collections.abc import Iterator
@@ -28,7 +28,7 @@ NO_ROOM = re.compile(r"presses on|too near to")  # then the part that is named s
 
 @dataclass
 class Attendant(Controls):
-    """Controls with a person at them who knows what the run says and what is to be seen, and nothing else.
+    """Controls with a person who knows only the run's messages and what is visible.
 
     asked: what the run said at each of its stops. did: what was done about it, in words.
     """
@@ -40,7 +40,7 @@ class Attendant(Controls):
     _stood: dict[str, tuple[Vector, Quaternion]] = field(default_factory=dict, repr=False)
 
     def on_floor(self, floor: Floor) -> None:
-        """Note where what is fixed stands on the floor that is attended, as its conditions have it."""
+        """Record the places of fixed bodies on the attended floor, from its conditions."""
         task = floor.scene.task
         fixed = [one.name for one in task.stations] + [one.name for one in task.obstacles]
         for body in [body for name in fixed for body in (name, f"{name}{MARKER}") if body in floor.world.names()]:
@@ -48,7 +48,7 @@ class Attendant(Controls):
             self._stood[body] = (float(x), float(y), float(z)), (float(i), float(j), float(k), float(w))
 
     def wait(self, timeout_s: float) -> None:
-        """Only the run's own time counts."""
+        """Return at once, because only the run's simulated time counts."""
 
     def before_step(self, floor: Floor) -> bool:
         """Put right what is asked for, once its time has come; whether anything in the scene was changed."""

@@ -1,4 +1,4 @@
-"""Learning that carries over: a policy learned on small cells of a family orders larger ones, beside every dispatching rule."""
+"""Transfer of learning: a policy learned on small cells of a family orders larger ones, compared with every dispatching rule."""
 
 import time
 from collections.abc import Iterable, Mapping, Sequence
@@ -43,7 +43,7 @@ POLICIES = "The policies stand beside this report (policy-....json): lab sequenc
 
 @dataclass(frozen=True)
 class Surveyed:
-    """What is known of a larger cell: the best cost and the bound, and the cost, moves and CPU seconds of each rule's run."""
+    """The reference of a larger cell: the best cost and the bound, and the cost, moves and CPU time [s] of each rule's run."""
 
     best: float
     bound: float
@@ -77,7 +77,7 @@ def carried_over(job: Job, reading: Mapping[str, Any]) -> Findings:
 
 
 def _kept(job: Job, kind: str, items: Sequence[Any], work: Any, read: Any) -> dict[Any, Any]:
-    """What `work`, a function of a module, makes of each item; what the folder holds of it is read, the rest is kept there."""
+    """The result of `work`, a module's function, for each item; results in the folder are read, new ones are kept there."""
     names = {_key(job, kind, one): one for one in items}
     done = job.kept_as(lambda entry: (names[entry["key"]], read(entry["found"])) if entry["key"] in names else None)
     left = [one for one in items if one not in done]
@@ -147,7 +147,7 @@ def rows_of(
 
 
 def decisions_per_s(deciders: Iterable[Decider], policy: CarriedPolicy) -> float:
-    """How many decisions a policy takes in a second of one core, over runs of these cells."""
+    """The decisions per second of one core that a policy takes in runs of these cells."""
     made, began = 0, time.process_time()
     for decider in deciders:
         for _ in range(REPEATS):

@@ -1,4 +1,4 @@
-"""Families of cells: small ones that a policy is learned on, and larger ones that it has not seen."""
+"""Families of cells: small cells on which a policy is learned, and larger cells on which it is tested."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -132,7 +132,7 @@ GROUPS: Mapping[str, Callable[[int, np.random.Generator], Cell]] = {
 
 
 def small_cells(family: str, count: int, seed: int) -> list[Cell]:
-    """As many small cells of a family as are asked for, drawn; of an unknown one: of all families in turn."""
+    """`count` drawn small cells of a family; for an unknown family, of all families in turn."""
     drawn = [SMALL[family]] if family in SMALL else [*SMALL.values()]
     rng = np.random.default_rng([seed, 2, [*SMALL].index(family) if family in SMALL else len(SMALL)])
     return [drawn[number % len(drawn)](rng) for number in range(count)]

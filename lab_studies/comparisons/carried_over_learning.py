@@ -1,4 +1,4 @@
-"""A carried-over policy is learned: weights of features, so that greedy runs of small cells cost less than the rules' do."""
+"""Learning of a carried-over policy: weights of features with which greedy runs of small cells cost less than the rules'."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -75,7 +75,7 @@ def learn_policy(
 
 
 class _School:
-    """The cells that are learned from, and what the best rule makes of each."""
+    """The training cells, and the best rule's cost of each."""
 
     def __init__(self, cells: Sequence[Cell], objective: str) -> None:
         self._deciders = [Decider(cell, objective) for cell in cells]
@@ -89,7 +89,7 @@ class _School:
         return total / len(chosen)
 
     def without_idle(self, weights: Floats) -> Floats:
-        """The weights, one after the other 0 where that, with those that are 0 already, makes no difference in any cell."""
+        """The weights, with those set to 0, one after the other, that make no difference in any cell."""
         costs = self._each(weights)
         for number in np.argsort(np.abs(weights)):
             without = weights.copy()
@@ -99,7 +99,7 @@ class _School:
         return weights
 
     def _each(self, weights: Floats) -> Floats:
-        """What the weights' runs cost in each cell."""
+        """The cost in each cell of the weights' runs."""
         return np.array([decider.costs(weights[None])[0] for decider in self._deciders])
 
 

@@ -1,4 +1,4 @@
-"""What skills that were learned in one scene are worth in changed ones, beside learning everything anew there."""
+"""The worth of skills learned in one scene in changed scenes, compared with learning everything anew there."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -41,7 +41,7 @@ CHECKS = (
 
 @dataclass(frozen=True)
 class Tally:
-    """What came of the skills of one scene that took the same way; wall_s: finding or learning them.
+    """The results of a scene's skills with the same source; wall_s: time [s] for finding or learning them.
 
     anew: episodes and helped steps from nothing.
     """
@@ -55,7 +55,7 @@ class Tally:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of one changed scene, by `WAYS`; the counts of skills are those of the checks.
+    """The results of one changed scene, by `WAYS`; the counts of skills are those of the checks.
 
     unsolved: skills without a way to the goal, found or learned here, and learned from nothing.
     """
@@ -71,7 +71,7 @@ class Outcome:
 
 
 def changed_scenes(job: Job, reading: Mapping[str, Any]) -> Findings:
-    """So many changed scenes, as many of each kind; the reading changes nothing here."""
+    """The results of changed scenes, equally many of each kind; the reading has no effect."""
     kinds = [*KINDS]
     scenes = [Scene(kinds[number % len(kinds)], number // len(kinds), job.seed) for number in range(job.sessions)]
     found = job.each(tried, scenes)
@@ -86,7 +86,7 @@ def changed_scenes(job: Job, reading: Mapping[str, Any]) -> Findings:
 
 @lru_cache(maxsize=1)
 def learned_here() -> tuple[Prepared, Known, Known]:
-    """The scene that is changed, what a run learns in it, and what each problem of it gives when it is learned from nothing.
+    """The original scene, the policies that a run learns in it, and those of each problem learned from scratch.
 
     Both by (sub-task, signature), and the same in each process.
     """
@@ -99,7 +99,7 @@ def learned_here() -> tuple[Prepared, Known, Known]:
 
 
 def tried(scene: Scene) -> Outcome:
-    """One changed scene, with what was learned before and from nothing."""
+    """The outcome of one changed scene, with the policies learned before and from scratch."""
     base, known, learned = learned_here()
     prepared, words, refused = surveyed(scene, base.task, base.layout, base.seed, base.order)
     problems = distinct(prepared)
@@ -140,7 +140,7 @@ def tried(scene: Scene) -> Outcome:
 
 
 def _from_nothing(prepared: Prepared, problem: Problem) -> Policy:
-    """What a problem gives to who knows nothing else."""
+    """The policy that is learned for a problem from scratch."""
     return taught(prepared, {}, [problem])[0].lesson.policy
 
 

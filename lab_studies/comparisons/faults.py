@@ -1,4 +1,4 @@
-"""Runs of drawn faults over all tasks in physics: is everything delivered, or does the run stop with a reason that is true?"""
+"""Runs with drawn faults over all tasks in physics: is everything delivered, or does the run stop with a true reason?"""
 
 import time
 from collections import Counter
@@ -64,9 +64,9 @@ class Setting:
 
 @dataclass(frozen=True)
 class Ran:
-    """What came of a run: one of CAME, and why; rows: its faults as `verdict` has them. Times in seconds.
+    """The outcome of a run: one of CAME, and why; rows: its faults, see `verdict`. Times in seconds.
 
-    asked: what it asked of the person who attended it, and did: what they did; both empty where nobody attended it.
+    asked: the requests to the person who attended the run; did: what they did. Both are empty for runs without a person.
     """
 
     came: str
@@ -85,7 +85,7 @@ class Ran:
 
 
 def faults(job: Job, reading: Mapping[str, Any]) -> Findings:
-    """As many runs as there are sessions, shared out over TASKS; the reading changes nothing here."""
+    """The results of as many runs as there are sessions, divided among TASKS; the reading has no effect."""
     names = [*TASKS]
     settings = [Setting(names[n % len(names)], job.seed + n) for n in range(job.sessions)]
     found = measured(job, settings)
@@ -118,7 +118,7 @@ def measured(job: Job, settings: Sequence[Setting]) -> dict[Setting, Ran]:
 
 
 class _TooLong(Exception):
-    """A run that does not end."""
+    """Raised to end a run that takes too long."""
 
 
 @dataclass
@@ -219,7 +219,7 @@ def _carried_out(setting: Setting, person: Attendant | None) -> Ran:
 
 
 def rows_of(by: str, groups: Mapping[str, Sequence[Ran]]) -> list[Row]:
-    """How many percent of each group's runs came to what, and how many of its faults were noticed."""
+    """For each group, the shares of outcomes of its runs [%], and the share of its faults that were noticed."""
     rows: list[Row] = []
     for name, runs in groups.items():
         if not runs:
@@ -241,7 +241,7 @@ def rows_of(by: str, groups: Mapping[str, Sequence[Ran]]) -> list[Row]:
 
 
 def in_short(runs: Sequence[Ran]) -> Row:
-    """How many runs came to what."""
+    """The numbers of runs by outcome."""
     came = Counter(ran.came for ran in runs)
     says: Row = {"runs": len(runs), **{name: came[name] for name in CAME}}
     says["delivered or attended percent"] = round(100 * (came["delivered"] + came["attended"]) / max(1, len(runs)), 2)

@@ -1,4 +1,4 @@
-"""Twenty parts that nobody here designed: models that pybullet_data ships, and trimesh's primitives, as parts of a task."""
+"""Twenty parts from elsewhere: models that pybullet_data ships, and trimesh's primitives, as parts of a task."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -70,7 +70,7 @@ MODELS = (
 
 
 def primitive(name: str) -> "Trimesh":
-    """One of trimesh's own, as large as its numbers say."""
+    """A primitive of trimesh, given by its name with its sizes."""
     from trimesh import creation
 
     made: dict[str, Callable[[], Any]] = {
@@ -129,7 +129,7 @@ def _stable(part: PartFields, folder: Path) -> tuple[float, float]:
 
 
 def at_rest(part: PartFields, folder: Path) -> tuple[float, float]:
-    """Roll and pitch [rad] in which a part is at rest that is set down on a plane as it `stands`."""
+    """The roll and pitch [rad] at which a part comes to rest when it is set down on a plane as it `stands`."""
     shape = shape_of(part, folder)
     with World() as world:
         world.box("floor", (1, 1, 0.02), (0, 0, -0.01), TABLE_RGBA)

@@ -1,4 +1,4 @@
-"""One part in a cell of two places half a metre apart: taken, carried, set down, so many times, as a task's parts are."""
+"""Trials of one part in a cell with two places half a metre apart: it is grasped, carried and placed as in a task."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -69,7 +69,7 @@ Place = tuple[float, float, float]  # x, y [m], yaw [rad]
 
 @dataclass(frozen=True)
 class Setting:
-    """So many poses of a model, by its name, drawn from a seed."""
+    """A number of poses of a model, given by its name, drawn from a seed."""
 
     model: str
     poses: int
@@ -78,7 +78,7 @@ class Setting:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of a model's poses.
+    """The results of a model's poses.
 
     refused: why it is not graspable, in the words that a task file's user reads. failures: of each pose, "" where it worked.
     edges_m: its extents as it stands. widths_m: across HEADINGS headings over half a turn, of the whole part.
@@ -93,7 +93,7 @@ class Outcome:
 
 
 def tried(setting: Setting) -> Outcome:
-    """A model in all its poses; none where its grip is refused."""
+    """The outcome of a model in all its poses; without poses if its grip is rejected."""
     model = next(one for one in MODELS if one.name == setting.model)
     rng = np.random.default_rng([setting.seed, MODELS.index(model)])
     with TemporaryDirectory(prefix="lab-grips-") as name:

@@ -1,4 +1,4 @@
-"""Where a gripper can take parts that nobody here designed is computed from their shape: does that hold in physics?"""
+"""Grips computed from the shapes of parts from elsewhere: do they hold in physics?"""
 
 from collections.abc import Mapping, Sequence
 from math import degrees
@@ -33,7 +33,7 @@ POSES = (
 
 
 def grips(job: Job, reading: Mapping[str, Any]) -> Findings:
-    """So many poses of each model; the reading changes nothing here."""
+    """The results of some poses of each model; the reading has no effect."""
     settings = [Setting(model.name, job.sessions, job.seed) for model in MODELS]
     found = {setting.model: outcome for setting, outcome in job.each(tried, settings).items()}
     rows = [one for name, outcome in found.items() for one in rows_of(name, outcome)]
@@ -63,7 +63,7 @@ def rows_of(name: str, outcome: Outcome) -> list[Row]:
 
 
 def in_short(found: Mapping[str, Outcome]) -> Row:
-    """How many models can be gripped, how many of their poses arrived, and which models do not always."""
+    """The number of models that can be gripped, the share of their poses that arrived, and the models that failed in some."""
     gripped = {name: outcome for name, outcome in found.items() if not outcome.refused}
     poses = [why for outcome in gripped.values() for why in outcome.failures]
     says: Row = {"parts": len(found), "graspable": len(gripped), "poses": len(poses)}

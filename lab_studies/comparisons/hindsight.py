@@ -1,4 +1,4 @@
-"""The best order of an episode whose times are known beforehand: what no policy can beat."""
+"""The best order of an episode with times known in advance, which bounds every policy."""
 
 from dataclasses import dataclass, replace
 
@@ -14,7 +14,7 @@ SECONDS = 10.0  # of CP-SAT for an episode; small cells take less
 
 @dataclass(frozen=True)
 class Hindsight:
-    """The cost of the best order of an episode, or where that is not proven a bound that none is below."""
+    """The cost of the best order of an episode, or a lower bound if that order is not proven."""
 
     cost: float
     proven: bool

@@ -1,4 +1,4 @@
-"""How fast sessions are: the compiled kernel, alone and with gates, beside rivals, all in one run on one core."""
+"""The speed of sessions: the compiled kernel, alone and with gates, compared with rivals, all in one run on one core."""
 
 import time
 from collections.abc import Callable, Mapping

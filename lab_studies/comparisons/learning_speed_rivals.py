@@ -1,4 +1,4 @@
-"""The rivals of the speed benchmark: one kind of session in other technologies, each as fast as we can write it there.
+"""The rivals of the speed benchmark: the same session in other technologies, each written to be as fast as we can.
 
 All learn as the thesis's listing does (App. VII), alone: a value for each state, zero at first; at s the softmax over
 loss + gamma V(s') of the six neighbours, temperature n**-beta in episode n; then V(s) += alpha (loss + gamma V(s') -

@@ -1,4 +1,4 @@
-"""AdviceBench: every rule of when to ask and whom to believe, beside every advisor, at every budget, in every problem."""
+"""AdviceBench: every rule of when to ask and whom to believe, with every advisor, at every budget, on every problem."""
 
 from collections.abc import Mapping, Sequence
 from functools import partial
@@ -80,7 +80,7 @@ def advice_bench(job: Job, reading: Mapping[str, Any]) -> Findings:
 
 
 def measured(job: Job, cases: Sequence[Case], rules: tuple[str, ...]) -> dict[Case, Outcomes]:
-    """What each case came to; what the job's folder holds is not run again."""
+    """The outcomes of each case; cases whose results are in the job's folder are not run again."""
     mark = [job.sessions, job.seed, *rules]
 
     def read(entry: Any) -> tuple[Case, Outcomes] | None:
@@ -124,7 +124,7 @@ def rows_of(name: str, found: Mapping[Case, Outcomes], advisors: Sequence[str], 
 
 
 def _shown(one: Outcome, nobody: Outcome, name: str) -> Row:
-    """What stands beside the gain."""
+    """The measures that are shown beside the gain."""
     later = _recovered(one, nobody, name), _recovered(nobody, nobody, name)
     return {
         "points": round(float(one.points.mean()), 2),
@@ -143,7 +143,7 @@ def _recovered(one: Outcome, nobody: Outcome, name: str) -> float | None:
 
 
 def in_short(rows: Sequence[Row], problems: Sequence[str], rules: Sequence[str]) -> tuple[Row, dict[str, bytes]]:
-    """Ranks and harm in the problems that were chosen on, and in those that were held out; with pictures."""
+    """The ranks and the harm on the problems used for development and on those held out; with pictures."""
     advised = [one for one in rows if one["rule"] != NOBODY]
     alone = {one["problem"]: one["points"] for one in rows if one["rule"] == NOBODY}
     scores: dict[str, dict[Cell, float]] = {rule: {} for rule in rules}

@@ -1,4 +1,4 @@
-"""Who advises in AdviceBench: skill models from expert to novice, and experts with a defect."""
+"""The advisors of AdviceBench: skill models from expert to novice, and experts with a defect."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -35,12 +35,12 @@ def wrong_there(of: Benched) -> Advice:
 
 
 def late(of: Benched) -> Advice:
-    """An expert that answers the question before."""
+    """An expert whose answer is for the previous question."""
     return replace(Advice.of(advice_chances(of.values, EXPERT)), late=True)
 
 
 def stuck(of: Benched) -> Advice:
-    """Says everywhere what is best at the start."""
+    """Gives everywhere the action that is best at the start."""
     always = int(of.values[of.mdp.start].argmax())
     return Advice.of(np.tile(np.eye(of.mdp.n_actions)[always], (of.mdp.n_states, 1)))
 
@@ -54,7 +54,7 @@ def drifting(of: Benched) -> Advice:
 
 
 def long_winded(of: Benched) -> Advice:
-    """Half of its answers are the best action, the others any that ends no episode in failure: it arrives, by detours."""
+    """Half of its answers are the best action, the others any action without failure: it arrives, but by detours."""
     best = advice_chances(of.values, EXPERT)
     mdp = of.mdp
     safe = (~(mdp.terminal & ~mdp.goal)[mdp.successor]).astype(np.float64)
@@ -85,9 +85,9 @@ ADVISORS: Mapping[str, Made] = {
 
 
 def advice_of(name: str, of: Benched) -> Advice:
-    """Of an advisor of the bench, or of any other that answers a question always alike, such as one that was recorded.
+    """The advice of an advisor of the bench, or of any other whose answer to a question is constant, such as a recorded one.
 
-    BadInput for a name that no advisor has, and for a record that is about another problem.
+    Raises BadInput for an unknown advisor, and for a record of another problem.
     """
     if name in ADVISORS:
         return ADVISORS[name](of)
@@ -108,7 +108,7 @@ def advice_of(name: str, of: Benched) -> Advice:
 
 
 def importance(of: Benched, share: float = 0.5) -> BoolArray:
-    """Where a teacher sees most at stake: the half of the states with the widest values (S,) bool (Torrey and Taylor 2013)."""
+    """Whether a state is important (S,) bool: of the half with the widest range of values (Torrey and Taylor 2013)."""
     live = ~of.mdp.terminal
     width: FloatArray = of.values.max(axis=1) - of.values.min(axis=1)
     wide: BoolArray = width >= np.quantile(width[live], 1.0 - share)

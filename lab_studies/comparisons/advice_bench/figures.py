@@ -17,7 +17,7 @@ LARGEST = 40.0  # points, where the colours of the gains end
 
 
 def distances(ranked: Ranks) -> bytes:
-    """Mean ranks, best first, each with a bar of the critical difference: what it reaches is not told apart."""
+    """Mean ranks, best first, each with a bar of the critical difference; ranks within it do not differ significantly."""
     rules = list(ranked.mean)
 
     def draw(figure: "Figure") -> None:
@@ -62,7 +62,7 @@ def _mean(rows: Sequence[Row], budget: str, rule: str, advisor: str) -> float:
 
 
 def worst_cells(rows: Sequence[Row], rules: Sequence[str], target: float) -> bytes:
-    """Of each rule the cell whose interval reaches lowest, and the target."""
+    """For each rule the cell with the lowest end of its interval, and the target."""
     lowest = {}
     for rule in rules:
         own = [one for one in rows if one["rule"] == rule]
@@ -86,7 +86,7 @@ def worst_cells(rows: Sequence[Row], rules: Sequence[str], target: float) -> byt
 
 
 def answers_and_gain(rows: Sequence[Row], rules: Sequence[str]) -> bytes:
-    """What a rule asks for and what it gains, by budget, means over all cells."""
+    """The answers that each rule uses and its gain, by budget, as means over all cells."""
 
     def draw(figure: "Figure") -> None:
         axes = figure.add_subplot()

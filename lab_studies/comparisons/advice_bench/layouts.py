@@ -1,4 +1,4 @@
-"""Problems of the field rebuilt as tables: MiniGrid's empty, door-key and lava layouts, and the order of toasts."""
+"""Known problems as tables: MiniGrid's empty, door-key and lava layouts, and the order of toasts."""
 
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
@@ -25,7 +25,7 @@ Leads = Callable[
 
 
 class At(NamedTuple):
-    """Where an agent of MiniGrid is: row, column, which of AHEAD it faces, whether it has the key and the door is open."""
+    """The state of a MiniGrid agent: row, column, heading (of AHEAD), whether it has the key and the door is open."""
 
     row: int
     column: int

@@ -1,4 +1,4 @@
-"""What AdviceBench is run on: problems with their learner, what their best policy makes of them, and problems of one's own."""
+"""The problems of AdviceBench with their learners and the results of their best policies; and problems of the user."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -34,7 +34,7 @@ class Benched:
 
     @property
     def place(self) -> TabularMDP | ChanceTable:
-        """What sessions are run in."""
+        """The table, or table with chances, in which sessions run."""
         return self.mdp if self.chances is None else self.chances
 
     @cached_property

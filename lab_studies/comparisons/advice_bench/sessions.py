@@ -1,4 +1,4 @@
-"""The sessions of AdviceBench: every rule of when to ask, beside one advisor, in one problem, at each budget."""
+"""The sessions of AdviceBench: every rule of when to ask, with one advisor, in one problem, at each budget."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -22,7 +22,7 @@ NOBODY, OURS = "nobody", "earned-trust"
 
 
 class Rule(NamedTuple):
-    """A rule of when to ask: the gate with its settings, and what the advisor itself holds back."""
+    """A rule of when to ask: the gate with its settings, and the states in which the advisor itself gives no answer."""
 
     gate: GateSettings
     important: bool = False  # it speaks only where most is at stake
@@ -67,7 +67,7 @@ class Case:
 
 
 class Outcome(NamedTuple):
-    """What N sessions came to: points (N,) of all episodes, last (N,) of the last ones, answers (N,); curve (BINS,) of points."""
+    """The results of N sessions: points (N,) of all episodes, last (N,) of the last, answers (N,); curve (BINS,) of points."""
 
     points: FloatArray
     last: FloatArray
