@@ -91,7 +91,7 @@ def _level(shape: PartShape, gripper: Gripper, friction: float, given: GripField
     if given is not None:
         raise BadInput(
             f"part '{shape.name}': grip is for a tool that hangs; here it is level, by robot.tool "
-            "or an approach = 'side': leave grip away"
+            "or an approach = 'side': remove grip"
         )
     laid = replace(shape, hull=shape.hull[:, [2, 1, 0]] * [1.0, 1.0, -1.0])  # x up, and its front, +x, below
     deep_m = max(laid.foot_m - PAD_M / 2, laid.height_m - gripper.depth_m + UNDER_PALM_M)  # the tips, behind the front
