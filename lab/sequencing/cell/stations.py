@@ -158,7 +158,7 @@ def check_layout(stations: Sequence[Station], products: Sequence[Product]) -> No
     inner |= {way.buffer for route in routes for stage in route for way in stage.ways if way.buffer}
     if ends & inner:
         raise BadInput(
-            f"station '{min(ends & inner)}' ends one route and is inside another; give each a station of its own"
+            f"station '{min(ends & inner)}' is an end of one route and inside another; give each a station of its own"
         )
 
 
