@@ -1,4 +1,4 @@
-"""Images: an overhead camera's picture of the world, and which pixel a point of the world falls on."""
+"""Simulated cameras, overhead and in the hand: their pictures of the world, and the pixel of each point of the world."""
 
 from dataclasses import dataclass, replace
 from functools import cache
@@ -148,7 +148,7 @@ class TableCamera(Camera):
         return picture[top : top + side, left : left + side]
 
 
-# ---- hand camera ------------------------------------------------------------------------------------------------------
+# ---- The camera in the hand -------------------------------------------------------------------------------------------
 
 
 AHEAD_M = 0.085  # along the tool's x axis
@@ -169,7 +169,7 @@ def hand_camera(tool: ToolPose) -> Camera:
 
 @cache
 def seen_corners(shape: PartShape) -> Array:
-    """Corners (n, 3) [m], from the middle of the part's foot, of the hull of what is seen of it."""
+    """The corners (n, 3) of the hull of a part's visible shapes, relative to the middle of its foot [m]."""
     from scipy.spatial import ConvexHull
 
     points = np.concatenate([_points(look) for look in shape.looks])

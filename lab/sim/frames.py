@@ -1,4 +1,4 @@
-"""Plain records of what is to be seen: bodies made of shapes, and where the bodies are at a time.
+"""Plain records for viewers: bodies made of shapes, and the poses of the bodies over time.
 
 Knows no simulator and no viewer: the simulator fills these, `lab/view/meshcat.py` shows them. Metres, seconds,
 quaternions xyzw.

@@ -1,4 +1,4 @@
-"""The meshes and URDFs of the cell, made with trimesh from the parameters below; `write(folder)` regenerates `assets/`."""
+"""The cell's meshes and URDFs, made with trimesh from the parameters below; `write(folder)` regenerates `assets/`."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
@@ -54,7 +54,7 @@ class Joint:
 
 @dataclass
 class Model:
-    """A URDF to be: its name and links, root first."""
+    """The description of a URDF: its name and its links, root first."""
 
     name: str
     links: list[Link] = field(default_factory=list)
@@ -180,7 +180,7 @@ def obj(mesh: "Trimesh") -> str:
     return "\n".join(lines) + "\n"
 
 
-# ---- models -----------------------------------------------------------------------------------------------------------
+# ---- The models of the cell -------------------------------------------------------------------------------------------
 
 
 SLICE = (0.12, 0.015, 0.12)  # [m] width, thickness, height

@@ -1,4 +1,4 @@
-"""What a library writes to the file descriptors themselves is kept off the terminal."""
+"""Keeps output that a library writes directly to the file descriptors off the terminal."""
 
 import os
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""A URDF is checked before PyBullet sees it: PyBullet loads negative masses, NaN inertia and garbage meshes in silence."""
+"""Reads and checks URDFs before PyBullet does, which silently loads negative masses, NaN inertias and broken meshes."""
 
 from collections.abc import Sequence
 from math import cos, sin
@@ -80,7 +80,7 @@ def _shape(path: Path, visual: Xml.Element) -> Shape | None:
 
 
 def meshes(path: Path) -> list[str]:
-    """The files that a URDF names as meshes, as it names them."""
+    """The mesh files that a URDF names, as written there."""
     return [mesh.get("filename", "") for mesh in read(path).iter("mesh")]
 
 

@@ -113,10 +113,10 @@ class World:
         self.steps += 1
 
     def pass_time(self, steps: int) -> None:
-        """Let the clock go on by so many steps in which nothing moves: no physics is simulated."""
+        """Advances the clock by `steps` physics steps without simulating them."""
         self.steps += steps
 
-    # ---- bodies -------------------------------------------------------------------------------------------------
+    # ---- Bodies -------------------------------------------------------------------------------------------------
 
     def load(
         self,
@@ -245,7 +245,7 @@ class World:
         return list(self._bodies)
 
     def looks(self, name: str) -> tuple[Shape, ...]:
-        """What is to be seen of a body that has no links."""
+        """The visible shapes of a body without links."""
         return self._bodies[name].looks.get("", ())
 
     def pose(self, name: str, link: str = "") -> tuple[Array, Array]:
@@ -264,7 +264,7 @@ class World:
             turn = self._turned(turn, self._p.invertTransform([0, 0, 0], list(entry.turn))[1])
         return position, turn
 
-    # ---- joints -------------------------------------------------------------------------------------------------
+    # ---- Joints -------------------------------------------------------------------------------------------------
 
     def joints(self, name: str, names: Sequence[str]) -> Array:
         """Joint positions [rad or m], shape (n,)."""
@@ -323,7 +323,7 @@ class World:
         )
         self._call("changeConstraint", gear, gearRatio=-1.0 / ratio, erp=0.1, maxForce=100)
 
-    # ---- questions ----------------------------------------------------------------------------------------------
+    # ---- Contacts, distances and pictures -----------------------------------------------------------------------
 
     def touch_anew(self, name: str, links: Sequence[str]) -> None:
         """Let the engine find anew, at its next step, where movable bodies touch these links of a body.
@@ -392,10 +392,10 @@ class World:
         rgba = np.frombuffer(bytes(pixels), np.uint8) if isinstance(pixels, tuple) else np.asarray(pixels, np.uint8)
         return rgba.reshape(height, width, 4)[:, :, :3]
 
-    # ---- what a viewer sees -------------------------------------------------------------------------------------
+    # ---- Records for viewers ------------------------------------------------------------------------------------
 
     def bodies(self) -> tuple[Body, ...]:
-        """How everything looks: one viewer body a link, named `body` or `body link`."""
+        """The bodies for a viewer, one per link, named `body` or `body link`."""
         return tuple(
             Body(_label(name, link), shapes)
             for name, entry in self._bodies.items()
@@ -404,11 +404,11 @@ class World:
         )
 
     def frame(self) -> Frame:
-        """Where everything is now."""
+        """The poses of all bodies now."""
         return Frame(self.time_s, self.poses())
 
     def poses(self) -> dict[str, Pose]:
-        """Where each body of `bodies` is now, by its name."""
+        """The pose of each body of `bodies` now, by name."""
         poses: dict[str, Pose] = {}
         for name, entry in self._bodies.items():
             for link, shapes in entry.looks.items():

@@ -32,14 +32,14 @@ def file_faults(cell: CellFields) -> Iterator[Fault]:
     yield from _track_faults(cell)
     yield from _chance_faults(cell)
     if cell.due_s is not None and cell.due_factor is not None:
-        yield Fault(("due_factor",), "due_s and due_factor: wanted is one of them, a time for each part or a rule")
+        yield Fault(("due_factor",), "due_s and due_factor: give one of them, a time for each part or a factor")
     for field, error in cell.sequencing.faults(due=cell.due_s is not None or cell.due_factor is not None):
         yield Fault(("sequencing", field), str(error))
 
 
 def _robot_faults(cell: CellFields) -> Iterator[Fault]:
     if (cell.robot is None) == (cell.robots is None):
-        yield Fault(("robot",), "robot and robots: wanted is one of them, the only one or a list, [] for none")
+        yield Fault(("robot",), "robot and robots: give one of them, the only robot or a list, [] for none")
     single: list[tuple[Loc, CellRobot]] = [] if cell.robot is None else [(("robot",), cell.robot)]
     for loc, robot in [*single, *((("robots", n), robot) for n, robot in enumerate(cell.robots or ()))]:
         for field, name in (("start", robot.start), *(("serves", name) for name in robot.serves or ())):
@@ -55,9 +55,9 @@ def _track_faults(cell: CellFields) -> Iterator[Fault]:
         return
     for table in ("travel", "loaded"):
         if getattr(cell, table):
-            yield Fault((table,), f"track and {table}: with a track, the times are those of the ways on it")
+            yield Fault((table,), f"track and {table}: with a track, its stretches give the times: remove one of them")
     if len(cell.built_robots) < 2:
-        yield Fault(("track",), "track: it is for several robots (robots); one alone is never in its own way")
+        yield Fault(("track",), "track: it is for several robots (robots): remove it")
     try:
         check_track(cell.track.built(), cell.station_names)
     except BadInput as error:
@@ -73,7 +73,7 @@ def _chance_faults(cell: CellFields) -> Iterator[Fault]:
 
 def _order_faults(cell: CellFields) -> Iterator[Fault]:
     if (cell.order is None) == (cell.parts is None):
-        yield Fault(("parts",), "order and parts: wanted is one of them, a product for each part or a number")
+        yield Fault(("parts",), "order and parts: give one of them, a product for each part or a number")
     if cell.parts is not None and len(cell.products) > 1:
         yield Fault(("parts",), f"parts = {cell.parts}: with several products an order is wanted, one for each part")
     count, field = (len(cell.order), "order") if cell.order is not None else (cell.parts or 0, "parts")

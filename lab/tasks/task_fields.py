@@ -111,7 +111,7 @@ class Process(Record):
             raise ValueError(
                 "by = 'robot': area_m is missing: the surface that the robot covers, such as area_m = [0.1, 0.08] [m]"
                 if self.area_m is None
-                else f"by = 'head': area_m = {list(self.area_m)} is only of by = 'robot': leave it away, or set by = 'robot'"
+                else f"by = 'head': area_m = {list(self.area_m)} is only for by = 'robot': remove it, or set by = 'robot'"
             )
         if not 2 <= self.grid[0] * self.grid[1] <= 12:
             raise ValueError(
@@ -231,7 +231,7 @@ class Station(Record):
             )
         for field in ("process", "at_most_s"):
             if getattr(self, field) is not None:
-                raise ValueError(f"machine '{self.name}' has batch = true and {field}: leave one of them away")
+                raise ValueError(f"machine '{self.name}' has batch = true and {field}: remove one of them")
         return self
 
     @model_validator(mode="after")

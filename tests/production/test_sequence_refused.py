@@ -89,7 +89,7 @@ def test_what_is_refused_at_once(lab: Lab, folder: Path, words: str, line: str, 
         ),
         (
             "--advisor expert --gate ia --method srl",
-            "gate 'ia' (--gate): it looks at a table of states, which sequencing has not; allowed here: ccrl, ",
+            "gate 'ia' (--gate): it needs a table of states, which sequencing does not have; allowed here: ccrl, ",
         ),
         (
             "--gate cclr",

@@ -370,7 +370,7 @@ class Cell:
         for part, at in enumerate(self.begin_at, 1):
             if at < len(self.laid_out) and self.laid_out[at].options and not self.positions[at].options:
                 where = f"begin of {self.part_name(part)} at '{self.names[self.positions[at].station]}'"
-                raise BadInput(f"{where}: no way that is open leads to an end of its routes, so it has to stay")
+                raise BadInput(f"{where}: no open path leads to an end of its routes: mark it as one that stays")
         for station, room in zip(self.stations, self.capacities, strict=True):
             held = sum(self.index(station.name) in self.positions[at].holds for at in self.begin_at)
             if held > room:
@@ -471,7 +471,7 @@ def _checked_table(
     missing = [pair for pair in needed if np.isnan(table[names.index(pair[0]), names.index(pair[1])])]
     for origin, target in missing:
         ways = [pair for pair in needed if pair[1] == target]
-        never = "; no time leads there: it cannot be reached" if len(ways) > 1 and set(ways) <= set(missing) else ""
+        never = "; no move leads there, so it cannot be reached" if len(ways) > 1 and set(ways) <= set(missing) else ""
         raise BadInput(f"{field} '{origin}' -> '{target}' is missing, but the route needs it{never}")
     table.setflags(write=False)
     return table

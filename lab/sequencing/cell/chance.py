@@ -132,9 +132,7 @@ def check_chance(cell: Cell, chance: Chance) -> None:
     check_robot_breaks(len(cell.robots), bool(cell.track), chance)
     if cell.batches and chance != NO_CHANCE:
         name = cell.names[min(cell.batches)]
-        raise BadInput(
-            f"station '{name}': batch = true, which times that are drawn do not know: leave one of them away"
-        )
+        raise BadInput(f"station '{name}': batch = true, which drawn times do not support: remove one of them")
 
 
 @dataclass(frozen=True)

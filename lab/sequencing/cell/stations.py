@@ -146,7 +146,9 @@ def check_layout(stations: Sequence[Station], products: Sequence[Product]) -> No
             _check_route(stations, route, one_of if len(products) == 1 else f"{one_of} of '{product.name}'")
             if route[0].station != product.routes[0][0].station:
                 starts = f"'{product.routes[0][0].station}' and '{route[0].station}'"
-                raise BadInput(f"product '{product.name}': its routes begin at {starts}; they must begin alike")
+                raise BadInput(
+                    f"product '{product.name}': its routes begin at {starts}; all must begin at the same station"
+                )
     if not products:
         raise BadInput("a cell needs at least one product")
     served = {station.name for station in stations if station.servers is not None}
@@ -155,7 +157,9 @@ def check_layout(stations: Sequence[Station], products: Sequence[Product]) -> No
     inner = {way.station for route in routes for stage in route[1:-1] for way in stage.ways}
     inner |= {way.buffer for route in routes for stage in route for way in stage.ways if way.buffer}
     if ends & inner:
-        raise BadInput(f"station '{min(ends & inner)}' is an end of one route and inside another; it can only be one")
+        raise BadInput(
+            f"station '{min(ends & inner)}' is an end of one route and inside another; give each a station of its own"
+        )
 
 
 def _check_stations(stations: Sequence[Station]) -> None:
@@ -196,9 +200,7 @@ def _check_batch(station: Station, where: str) -> None:
         )
     for name, given in (("servers", station.servers), ("at_most_s", station.at_most_s)):
         if given is not None:
-            raise BadInput(
-                f"{where}: batch = true and {name} = {given:g}; only one of them is possible: leave {name} away"
-            )
+            raise BadInput(f"{where}: batch = true and {name} = {given:g}; only one of them is possible: remove {name}")
 
 
 def _check_servers(station: Station, where: str) -> None:

@@ -237,23 +237,23 @@ def check_cyclic(cell: Cell, mix: Sequence[str]) -> None:
     """Raises BadInput for a cell that cyclic orders do not support, and for a mix with products that it does not make."""
     if cell.arrivals is not None:
         raise BadInput(
-            "--cyclic: parts arrive one by one in this cell; a cycle takes each when it wants: leave [arrivals] away"
+            "--cyclic: parts arrive one by one in this cell; in a cycle all wait at the start: remove [arrivals]"
         )
     if len(cell.robots) != 1:
-        raise BadInput(f"--cyclic: the cell has {counted(len(cell.robots), 'robot')}; a cycle is looked for with 1")
+        raise BadInput(f"--cyclic: the cell has {counted(len(cell.robots), 'robot')}; only cells with 1 are supported")
     for station in cell.stations:
         if station.servers is not None:
             raise BadInput(
                 f"--cyclic: station '{station.name}' has servers and a queue; in a cycle each part is worked on where and "
-                "when it is put down: leave servers away"
+                "when it is put down: remove servers"
             )
         if station.batch:
             raise BadInput(
-                f"--cyclic: station '{station.name}' has batch = true, which a cycle does not know: leave it away"
+                f"--cyclic: station '{station.name}' has batch = true, which a cycle does not support: remove it"
             )
     if cell.precedences:
         raise BadInput(
-            "--cyclic: parts have to wait for others in this cell, which a cycle does not know: leave --cyclic away"
+            "--cyclic: the cell has precedences between parts, which a cycle does not support: remove --cyclic"
         )
     if cell.begins is not None or cell.closed:
         raise BadInput("--cyclic: the work is in its middle, or a station is closed; a cycle needs the whole cell")

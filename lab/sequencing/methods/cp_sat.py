@@ -147,7 +147,7 @@ def check_no_batches(cell: Cell) -> None:
     if cell.batches:
         name = cell.names[min(cell.batches)]
         raise BadInput(
-            f"CP-SAT: station '{name}' has batch = true, which its model does not know: --method exact searches the shortest "
+            f"CP-SAT: station '{name}' has batch = true, which its model does not support: --method exact searches the shortest "
             "makespan, --method srl-time any objective"
         )
 

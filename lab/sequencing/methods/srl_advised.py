@@ -43,7 +43,7 @@ class AdvisedResult(LearnedSequence):
 def check_gate(gate: str) -> None:
     """Raises BadInput for a gate that does not judge whole episodes."""
     if gate not in FITTING and gate in GATES:
-        allowed = f"it looks at a table of states, which sequencing has not; allowed here: {', '.join(FITTING)}"
+        allowed = f"it needs a table of states, which sequencing does not have; allowed here: {', '.join(FITTING)}"
         raise BadInput(f"gate '{gate}' (--gate): {allowed}")
     if gate not in FITTING:
         raise unknown("gate", gate, FITTING, "--gate, for sequencing")

@@ -1,1 +1,1 @@
-"""Arms: which joints hold the tool where, and an arm in physics with its fingers."""
+"""Arms: their kinematics, the paths of their tools, and an arm with its fingers in physics."""

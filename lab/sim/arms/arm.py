@@ -1,4 +1,4 @@
-"""An arm: its URDF, its joints, its gripper, and which joints hold its tool where; those that ship, and any other."""
+"""The record of an arm: its URDF, joints and gripper, and its inverse and forward kinematics."""
 
 from dataclasses import dataclass, replace
 from math import cos, pi, sin
@@ -14,20 +14,20 @@ from lab.sim.arms.kinematics import ToolPose
 from lab.sim.arms.level_tool import LevelTool
 
 Array = NDArray[np.float64]
-_WAYS_ROUND = (0, 1, -1, 2, -2, 3, -3, 4, -4)  # half turns of the tool that are tried
+_WAYS_ROUND = (0, 1, -1, 2, -2, 3, -3, 4, -4)  # the half turns of the tool that are tried, in order
 _ASIDE = (0.0, 0.4, -0.4, 0.8, -0.8, 1.2, -1.2, 1.6, -1.6)  # [rad] off straight ahead, in which a level tool may wait
 
 
 class Kinematics(Protocol):
-    """How an arm bends between its first joint, which turns it, and its last, which turns its tool; see `NumericKinematics`."""
+    """The kinematics of an arm between its first joint, which turns it, and its last, which turns its tool."""
 
     @property
     def home(self) -> Array:
-        """Joints (k,) in which it waits, its tool down."""
+        """The joints (k,) in which it waits, its tool down."""
 
     @property
     def spins(self) -> tuple[float, float]:
-        """1 or -1 of the first and of the last joint: which way the tool turns with them, seen from above."""
+        """The signs, 1 or -1, of the tool's turn with the first and with the last joint, seen from above."""
 
     def bent(self, out: Array, up: Array) -> Array:
         """The joints (n, k) for a tool `out` (n,) [m] ahead of the first axis and `up` (n,) [m], at yaw 0; NaN: none."""
@@ -61,12 +61,12 @@ class Arm:
 
     @property
     def gripper(self) -> Gripper:
-        """What its fingers can take."""
+        """The dimensions of its gripper."""
         return replace(self.fingers.gripper, level=self.level is not None)
 
     @property
     def home(self) -> Array:
-        """Joints (k,) in which it waits, its tool down, or level with its wrist there."""
+        """The joints (k,) in which it waits, its tool hanging, or level with the wrist at the same place."""
         if self.level is None:
             return self.kinematics.home
         x, y, z, yaw = self.kinematics.tools(self.kinematics.home[None])[0].tolist()
@@ -87,7 +87,7 @@ class Arm:
         return None if np.isnan(joints[0]) else joints
 
     def inverse_each(self, poses: Array) -> Array:
-        """As `inverse`, of each of many poses x, y, z [m], yaw [rad] (n, 4) by itself: (n, k), NaN where there are none."""
+        """The joints (n, k) of `inverse` for each of many poses x, y, z [m], yaw [rad] (n, 4); NaN where there are none."""
         joints = self._bent(poses)
         last, low, high = joints[:, -1].copy(), self.lower[-1], self.upper[-1]
         best = np.full(len(joints), np.nan)
@@ -101,8 +101,8 @@ class Arm:
     def inverse_path(self, poses: Array, before: Array | None = None) -> Array:
         """The joints (n, k) along a path of poses (n, 4), the tool turning without jumps; NaN where there are none.
 
-        `before` (k,): the joints it comes from; its tool turns from there, if it can, the same way round. Where the last joint
-        cannot turn through all of the path, the tool goes all of it half a turn on.
+        before (k,): the joints before the path; the tool continues its turn from there if it can. If the last joint cannot turn
+        through the whole path, the tool is half a turn on along all of it.
         """
         joints = self._bent(poses)
         reached = ~np.isnan(joints[:, 0])
@@ -129,11 +129,11 @@ class Arm:
         return (self.kinematics if self.level is None else self.level).tools(joints)
 
     def is_half_on(self, joints: Array, pose: ToolPose) -> bool:
-        """Whether joints hold the tool half a turn on from the yaw of `pose`."""
+        """Whether the joints hold the tool half a turn on from the yaw of `pose`."""
         return abs((self.forward(joints).yaw - pose.yaw + pi) % (2 * pi) - pi) > pi / 2
 
     def reach_in_words(self, z: float) -> str:
-        """How near and how far the tool reaches at a height [m] ahead of the arm."""
+        """The nearest and farthest reach of the tool ahead of the arm at a height [m], in words."""
         out = np.arange(self.nearest_m, 3.0, 0.01)
         found = self.inverse_each(np.stack([out, 0 * out, 0 * out + z, 0 * out], axis=1))
         reached = out[~np.isnan(found[:, 0])]

@@ -1,4 +1,4 @@
-"""The arms that ship, and how any arm is made from its URDF: checked, given the marker that the camera looks for, measured."""
+"""The arms that ship, and the making of any arm from its URDF: it is checked, given the camera's marker, and measured."""
 
 from dataclasses import dataclass
 from functools import lru_cache
@@ -69,7 +69,7 @@ ARMS: dict[str, ArmModel] = {
 
 
 def arm_of(settings: RobotSettings, folder: Path = Path()) -> Arm:
-    """The arm that a task's [robot] means; a URDF file lies in `folder`, the task file's. BadInput says what is wrong with it."""
+    """The arm of a task's [robot]; folder: the task file's, for URDF files. Raises BadInput for an unsuitable one."""
     changed = 0
     path = Path()
     if settings.is_file:
@@ -86,7 +86,7 @@ def arm_of(settings: RobotSettings, folder: Path = Path()) -> Arm:
 
 
 def arm_named(name: str, tool: Literal["hanging", "level"] = "hanging") -> Arm:
-    """An arm that ships, as it comes."""
+    """The arm that ships under a name, with its default settings."""
     return arm_of(RobotSettings(model=name, tool=tool, start="anywhere"))
 
 
@@ -141,7 +141,7 @@ def _made(
 
 
 def _still(urdf: Urdf, moving: tuple[str, ...]) -> None:
-    """Joints that move neither the tool nor its fingers stay where they are at zero."""
+    """Fixes the joints that move neither the tool nor its fingers at zero."""
     for name, joint in urdf.joints.items():
         if name not in moving:
             joint.set("type", "fixed")
@@ -200,6 +200,6 @@ def _mount(root: Xml.Element, name: str, parent: str, child: str, place: tuple[s
 
 
 def _again(urdf: Urdf) -> Urdf:
-    """The tree of a URDF to which links were added."""
+    """The URDF indexed again after links were added."""
     carrying = {one.get("link", ""): joint for joint in urdf.root.findall("joint") for one in joint.findall("child")}
     return Urdf(urdf.path, urdf.root, carrying, urdf.foot)

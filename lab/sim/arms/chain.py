@@ -1,4 +1,4 @@
-"""A chain of joints as a URDF has it: where its end is for many joint positions at once, and how it moves with each joint.
+"""A chain of joints from a URDF: the poses of its end, and Jacobians, for many joint positions at once.
 
 Source: product of exponentials in body order, as in K. M. Lynch and F. C. Park, Modern Robotics, 2017, ch. 4 and 5.
 """
@@ -68,7 +68,7 @@ class Chain:
         return at, axes
 
     def jacobian(self, joints: Array) -> tuple[Array, Array, Array]:
-        """As `ends`, and how the end moves and turns with each joint: (n, 6, k), [m] then [rad], in the foot's axes."""
+        """The results of `ends`, and the Jacobian (n, 6, k) of the end, translation then rotation, in the foot's axes."""
         at, axes, origins, directions = self.along(joints)
         moved = np.cross(directions, at[:, None] - origins)
         moved[:, self.slides] = directions[:, self.slides]
@@ -76,12 +76,12 @@ class Chain:
         return at, axes, np.concatenate([moved, turned], axis=2).transpose(0, 2, 1)
 
     def middles(self, joints: Array) -> Array:
-        """Where the joints are on the whole (n, 3) [m]."""
+        """The mean position (n, 3) of the joints [m]."""
         _, _, origins, _ = self.along(joints)
         return np.asarray(origins.mean(axis=1))
 
     def along(self, joints: Array) -> tuple[Array, Array, Array, Array]:
-        """As `ends`, and where each joint is and along or about which it moves (n, k, 3), in the foot's frame."""
+        """The results of `ends`, and each joint's position and axis (n, k, 3), in the foot's frame."""
         n, k = joints.shape
         sines, cosines = np.sin(joints), np.cos(joints)
         at, axes = np.zeros((n, 3)), np.broadcast_to(np.eye(3), (n, 3, 3))

@@ -1,4 +1,4 @@
-"""Two fingers as a URDF has them: how far apart each stroke of their joints holds them, and what they can take in between."""
+"""Grippers of two fingers, measured from a URDF: their dimensions, and the opening for each stroke of their joints."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,7 +13,7 @@ from lab.sim.arms.chain import Chain
 from lab.sim.arms.foreign_urdf import Urdf, child
 from lab.sim.urdf_reader import floats, placed
 
-PAD_M = 0.011  # how far from the middle of a finger's pad, of 3 x 3 cm, friction resists turning
+PAD_M = 0.011  # effective radius at which the friction of a finger's pad, of 3 x 3 cm, resists turning
 
 
 @dataclass(frozen=True)
@@ -33,10 +33,10 @@ class Gripper:
     hand_m: tuple[float, float] = (0.0, 0.0)
 
 
-# ---- fingers ----------------------------------------------------------------------------------------------------------
+# ---- The joints of the fingers, and their measurement -----------------------------------------------------------------
 
 
-_STROKES = 65  # between all the way one way and all the way the other
+_STROKES = 65  # strokes that are measured between closed and open
 _MIMIC = {"multiplier": "1", "offset": "0"}
 _TIP_M = 0.02  # of a finger, from the tips up: what takes hold of things
 
@@ -65,7 +65,7 @@ class Fingers:
         return self.gripper.opening_m / 2
 
     def ratio(self, joint: str) -> float:
-        """How far a geared joint moves for 1 of its leader's."""
+        """The gear ratio of a joint to its leader."""
         own, leader = (np.diff(self.strokes[[0, -1], self.joints.index(n)])[0] for n in (joint, self.leaders[joint]))
         return float(own / leader)
 
@@ -79,7 +79,7 @@ class Fingers:
         return float(np.interp(joints[0], self.strokes[order, 0], self.openings[order]))
 
     def forces(self, force: float, opening: float) -> list[float]:
-        """What the driven joints' motors give [N or Nm] so that each finger presses with `force` [N] at an opening [m]."""
+        """The forces or torques of the driven joints [N or Nm] with which each finger presses with `force` [N]."""
         near = np.clip([opening - 0.002, opening + 0.002], self.openings[0], self.openings[-1])
         way = float(near[1] - near[0])
         moved = np.abs(self.at(float(near[1])) - self.at(float(near[0])))
@@ -113,7 +113,7 @@ def fingers_of(urdf: Urdf, named: tuple[str, ...], tool: str, tip: Array, openin
 
 
 class _Ends:
-    """The vertices of what the finger joints carry, seen from the finger tips' frame."""
+    """The vertices of the links that the finger joints carry, in the finger tips' frame."""
 
     def __init__(self, urdf: Urdf, names: tuple[str, ...], tool: str, tip: Array) -> None:
         self.urdf, self.names, self.tip = urdf, names, tip
@@ -224,7 +224,7 @@ def _multiplier(urdf: Urdf, name: str) -> float:
 
 
 def solid_vertices(link: Xml.Element) -> Array:
-    """The corners (n, 3) [m] of what a link has that is solid, in its own frame."""
+    """The corners (n, 3) [m] of a link's collision shapes, in its own frame."""
     found = [np.zeros((0, 3))]
     for collision in link.findall("collision"):
         frame = placed(collision.find("origin"))

@@ -1,6 +1,6 @@
-"""An arm's URDF from elsewhere as this lab's own: one tree, limits, masses, colours, and every mesh by its full path.
+"""Makes an arm's foreign URDF complete: one tree, limits, masses, colours, and meshes by their full paths.
 
-What physics could not make sense of is refused in one line; what only says less than it could is filled in.
+Errors that physics could not handle are refused in one line; missing values are filled in.
 """
 
 import os
@@ -129,7 +129,7 @@ def _check_limits(path: Path, joint: Xml.Element) -> None:
 
 
 def _straighten(joint: Xml.Element) -> None:
-    """Write a joint's quarter turns out: with 1.5708 a wrist would have to whirl where its axes fall together."""
+    """Rounds a joint's angles to exact quarter turns: with 1.5708, aligned wrist axes would make the wrist whirl."""
     origin = joint.find("origin")
     if origin is not None:
         turns = np.array(floats(origin, "rpy", "0 0 0"))
@@ -156,7 +156,7 @@ def _tree(path: Path, root: Xml.Element, links: Sequence[str]) -> tuple[dict[str
 
 
 def _fill_inertial(path: Path, link: Xml.Element, is_foot: bool, joint: Xml.Element | None) -> None:
-    """A frame, and a foot that does not say its mass, get a little; an inertia that no body has becomes one that is near."""
+    """Gives frames and a massless foot a small mass, and replaces an impossible inertia by one that is near."""
     name, mass = link.get("name", ""), link.find("inertial/mass")
     weightless = mass is None or finite(path, f"mass of link '{name}'", mass.get("value")) == 0.0
     is_frame = link.find("collision") is None and joint is not None and joint.get("type") == "fixed"
@@ -186,7 +186,7 @@ def _set_inertia(element: Xml.Element, tensor: "np.ndarray[tuple[int, ...], np.d
 
 
 def _find_meshes(path: Path, link: Xml.Element, folder: Path) -> None:
-    """Meshes by their full paths. What is only seen may be of a kind that nobody here reads: it is left out."""
+    """Replaces mesh names by full paths; visuals of unsupported formats are left out."""
     for piece in [one for one in link if one.tag in ("visual", "collision")]:
         mesh = piece.find("geometry/mesh")
         if mesh is None:
@@ -206,7 +206,7 @@ def _find_meshes(path: Path, link: Xml.Element, folder: Path) -> None:
 
 
 def _lighten(link: Xml.Element) -> None:
-    """What is seen of a link in too many triangles to be shown in a browser is seen as what is solid of it."""
+    """Replaces visuals with too many triangles for a browser by the link's collision shapes."""
     solids = [(one.find("origin"), one.find("geometry")) for one in link.findall("collision")]
     if _bytes(link.findall("collision")) > MOST_SEEN_BYTES or _bytes(link.findall("visual")) <= MOST_SEEN_BYTES:
         return
@@ -250,7 +250,7 @@ def written(root: Xml.Element, name: str) -> Path:
 
 @cache
 def _folder() -> TemporaryDirectory[str]:
-    """The folder, `lab-arms-` and this process's number; those that processes left which were killed are removed first."""
+    """The folder `lab-arms-` with this process's number; folders left by killed processes are removed first."""
     for left in Path(gettempdir()).glob("lab-arms-*-*"):
         with suppress(OSError, ValueError):
             if is_own_folder(left) and is_gone(int(left.name.split("-")[2])):

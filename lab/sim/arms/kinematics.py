@@ -52,7 +52,7 @@ class ToolPose:
 
 
 class ClosedForm:
-    """How the arm bends, between its first joint, which turns it, and its last, which turns its tool: exactly."""
+    """The exact kinematics of the arm between its first joint, which turns it, and its last, which turns its tool."""
 
     home: ClassVar[Array] = HOME
     spins: ClassVar[tuple[float, float]] = (1.0, -1.0)  # of the first and the last joint: how the tool turns with them

@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class LevelTool:
-    """How one arm's tool is held level; `chain` ends in the finger tips, wrist_m [m] is how far its wrist is behind them."""
+    """The kinematics of one arm's level tool. chain: ends in the finger tips; wrist_m: distance of the wrist behind them [m]."""
 
     chain: Chain
     wrist_m: float

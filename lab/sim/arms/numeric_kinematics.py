@@ -1,8 +1,8 @@
 """Joints for a vertical tool by Newton's method, for any arm whose first joint turns it and whose last turns its tool.
 
-What is left between these two depends on two numbers, how far out and how high the tool is. A table over both is made once,
-each place from its neighbours, so that all of it is one bending of the arm; a pose begins from its table's cell. Joints are
-thereby a function of the pose alone, and neighbouring poses have neighbouring joints.
+The joints between these two depend on two numbers, how far out and how high the tool is. A table over both is made once, each
+entry from its neighbours, so that all of it belongs to one branch of solutions; a pose starts from its table entry. So the joints
+are a function of the pose alone, and neighbouring poses have neighbouring joints.
 Source: damped least squares, Y. Nakamura and H. Hanafusa, 1986; a redundant arm stays near one posture, A. Liegeois, 1977.
 """
 
@@ -29,7 +29,7 @@ DOWN = np.array(
 
 
 class NumericKinematics:
-    """The bending of one arm: `chain` ends in the finger tips, x out of the gripper, y across it, where the fingers close."""
+    """The kinematics of one arm; chain: ends in the finger tips, x out of the gripper, y along which the fingers close."""
 
     def __init__(self, chain: Chain, name: str) -> None:
         """BadInput unless the first joint turns about the vertical and the last about the tool's own axis."""
@@ -58,7 +58,7 @@ class NumericKinematics:
         """The joints (k,) from which its table was made: the tool down, half-way out."""
         return self._begun[1]
 
-    # ---- questions ----------------------------------------------------------------------------------------------
+    # ---- Inverse and forward kinematics -------------------------------------------------------------------------
 
     def bent(self, out: Array, up: Array) -> Array:
         """The joints (n, k) for a tool `out` (n,) [m] ahead of the first joint's axis and `up` (n,) [m], at yaw 0; NaN: none."""
@@ -99,7 +99,7 @@ class NumericKinematics:
         cosine = (np.einsum("nij,nij->n", axes, wanted) - 1.0) / 2.0
         return np.linalg.norm(at - tools[:, :3], axis=1), np.arccos(np.clip(cosine, -1.0, 1.0))
 
-    # ---- the table ----------------------------------------------------------------------------------------------
+    # ---- The table of solutions ---------------------------------------------------------------------------------
 
     @cached_property
     def _table(self) -> tuple[Array, Array]:
@@ -138,7 +138,7 @@ class NumericKinematics:
 
     @cached_property
     def _begun(self) -> tuple[NDArray[np.int_], Array]:
-        """A place of the table and the joints there: of all bendings that are found, the one that stands highest."""
+        """The first entry of the table and its joints: of all solutions found, the one whose joints are highest."""
         reach, foot = self._stretch
         rng = np.random.default_rng(0)
         seeds = rng.uniform(self.chain.lower, self.chain.upper, (_SEEDS, self.count))

@@ -72,7 +72,7 @@ def _check_reached(joints: Array, poses: Array) -> None:
 
 
 def _turned_back(turn: float, first: Array, speed: float, acceleration: float) -> Array:
-    """Rows (n, k) that take the tool on the spot from `turn` [rad] by half turns to `first` (k,): its range ends there."""
+    """Rows (n, k) that turn the tool on the spot from `turn` [rad] by half turns to `first` (k,), where its range ends."""
     turns = timed([ToolPose(0.0, 0.0, 0.0, turn), ToolPose(0.0, 0.0, 0.0, first[-1])], speed, acceleration)[:, 3]
     rows = np.repeat(first[None], len(turns), axis=0)
     rows[:, -1] = turns
@@ -80,7 +80,7 @@ def _turned_back(turn: float, first: Array, speed: float, acceleration: float) -
 
 
 class MotionListener(Protocol):
-    """Who is told what a robot carries out, as it does; see `lab.export.recorder`."""
+    """A listener to the motions that a robot carries out; see `lab.export.recorder`."""
 
     def began(self, poses: Sequence[ToolPose], blend: float, way: Trajectory, before: Array) -> None:
         """The tool is about to follow `poses`, as planned; `before` (k,) [rad]: the joints it starts from."""
@@ -183,7 +183,7 @@ class Robot:
         self._lead(self.world.joints(NAME, self.arm.joints))
 
     def override(self, share: float) -> None:
-        """Move from now on with a share of speed and acceleration, as an operator's speed override."""
+        """Scales speed and acceleration from now on by a share, as an operator's speed override does."""
         self.speed, self.acceleration = share * self.speed, share * self.acceleration
 
     def follow(
@@ -221,7 +221,7 @@ class Robot:
             heard.ended()
 
     def _touch_anew(self) -> None:
-        """Have the contacts of what is held found anew when the tool has turned with it."""
+        """Lets the contacts of the held part be found anew after the tool has turned with it."""
         yaw = self.tool().yaw
         if abs((yaw - self._touched_at + pi) % (2 * pi) - pi) > _TOUCH_RAD:
             self._touched_at = yaw
@@ -261,7 +261,7 @@ class Robot:
             yield
 
     def lose(self) -> None:
-        """The fingers open by themselves, as when their air fails: who moves the arm still holds them to be closed."""
+        """Opens the fingers as when their air fails; the code that moves the arm still believes them closed."""
         self._let_go = True
         self._press(self.arm.fingers.at(self.arm.fingers.open_m), _OPENS_N)
 

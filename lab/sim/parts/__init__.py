@@ -1,1 +1,1 @@
-"""Parts: their shapes, and where a gripper takes them."""
+"""Parts: their shapes, their grips, and how firmly they are held."""

@@ -1,4 +1,4 @@
-"""Where a two-finger gripper takes a part: computed from the part's shape, or checked where a file gives it.
+"""The grip of a two-finger gripper on a part: computed from the part's shape, or checked where a file gives it.
 
 The fingers come straight down on both sides; those of a level tool come along the part's x axis, the palm behind it, which is
 as from above on the part laid on its front. A flat pad that closes on a convex body touches it where that is widest
@@ -50,9 +50,9 @@ class Grip:
 
 
 def grip_of(shape: PartShape, gripper: Gripper, friction: float, given: GripFields | None = None) -> Grip:
-    """Where the gripper takes a part that stands: where it is narrow, its sides do not slope, and it hangs well.
+    """The grip on a standing part: where it is narrow, its sides do not slope, and it hangs well.
 
-    BadInput, with the part's widths, for one that cannot be taken, and for a grip that was `given` and does not fit.
+    Raises BadInput, with the part's widths, for a part that cannot be gripped, and for a `given` grip that does not fit.
     """
     if gripper.level:
         return _level(shape, gripper, friction, given)
@@ -91,7 +91,7 @@ def _level(shape: PartShape, gripper: Gripper, friction: float, given: GripField
     if given is not None:
         raise BadInput(
             f"part '{shape.name}': grip is for a tool that hangs; here it is level, by robot.tool "
-            "or an approach = 'side': leave grip away"
+            "or an approach = 'side': remove grip"
         )
     laid = replace(shape, hull=shape.hull[:, [2, 1, 0]] * [1.0, 1.0, -1.0])  # x up, and its front, +x, below
     deep_m = max(laid.foot_m - PAD_M / 2, laid.height_m - gripper.depth_m + UNDER_PALM_M)  # the tips, behind the front
@@ -190,10 +190,10 @@ def _refusal(sections: "_Sections", gripper: Gripper, friction: float, slopes: l
 
 @dataclass(frozen=True)
 class _Pads:
-    """What two pads find that close on a part.
+    """The contact of two pads that close on a part.
 
-    width_m, middle_m: between them, and how far their middle is off the part's axis. passing_m: the opening that they need
-    on their way down. slope: how much the part slopes at them [rad], 0 where they touch it flat. flat: along a width.
+    width_m: between the pads; middle_m: their middle, relative to the part's axis. passing_m: the opening that they need on their
+    way down. slope: of the part's sides at the pads [rad], 0 where they touch flat. flat: whether they touch along a width.
     """
 
     width_m: float
@@ -240,7 +240,7 @@ class _Sections:
         return float(np.ptp(self.shape.hull[:, :2] @ _across(yaw)))
 
     def between(self, yaw: float, up_m: float, wide_m: float, most_m: float = inf) -> _Pads | None:
-        """What pads find at a heading, their tips at a height; None when nothing is between them, or more than `most_m`."""
+        """The contact of pads at a heading and a height; None when nothing is between them, or more than `most_m`."""
         top = self.shape.height_m
         above = self._profile(yaw, np.linspace(up_m, top - 1e-5, LEVELS), wide_m)
         if above is None or np.nanmax(above[..., 1]) - np.nanmin(above[..., 0]) > most_m:
@@ -271,7 +271,7 @@ class _Sections:
 
 
 def _across(yaw: float) -> Array:
-    """The way (2,) along which the fingers close."""
+    """The direction (2,) along which the fingers close."""
     return np.array([-sin(yaw), cos(yaw)])
 
 

@@ -51,7 +51,7 @@ class Load:
 
     @classmethod
     def of(cls, kind: Kind) -> "Load":
-        """What is held when a kind is carried."""
+        """The load of a carried kind."""
         mass_kg, moment, foot_m = 0.0, 0.0, 0.0
         for one in kind.stack():
             mass_kg += one.part.mass_kg
@@ -85,7 +85,7 @@ class Load:
         return min(self.held_n(usual, acceleration_m_s2), STRONGEST_N)
 
     def is_usual(self, force_n: float, acceleration_m_s2: float) -> bool:
-        """Whether it is so far from what may go wrong that physics need not be fine, and nobody has to try it."""
+        """Whether the load is so uncritical that neither fine physics nor a trial is needed."""
         strong = force_n >= MARGIN * self.needs_n(acceleration_m_s2)
         gentle = USUAL_KG[0] <= self.mass_kg <= USUAL_KG[1] and force_n <= GENTLE_N
         rides = self.carries * GRAVITY_M_S2 >= STAYS * acceleration_m_s2
@@ -106,7 +106,7 @@ def grip_force_n(robot: RobotSettings, load: Load) -> float:
 
 
 def with_force(robot: RobotSettings, load: Load) -> str:
-    """How a refusal begins: the field, its value, who gave it, and what it is to hold."""
+    """The beginning of a refusal: the field, its value and origin, and the load that it must hold."""
     force_n, given_n = grip_force_n(robot, load), robot.grip_force_n
     said = f"{force_n:.3g}, chosen for it" if given_n is None else f"{given_n:.3g}"
     if given_n is not None and force_n < given_n:

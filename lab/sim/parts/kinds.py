@@ -1,4 +1,4 @@
-"""The kinds of parts of a task as physics has them: their shapes, how a gripper holds them, what rides on a pallet."""
+"""The kinds of a task's parts in physics: their shapes, their grips, and the parts that ride on pallets."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -67,7 +67,7 @@ class Kind:
         return float(np.sqrt(across**2 @ self.shape.inertia_m2))
 
     def stack(self) -> "list[Kind]":
-        """What stands on one another, from the foot upwards: the part itself, or its pallet and the part."""
+        """The stack from the foot upwards: the part itself, or its pallet and the part."""
         return [self] if self.rider is None else [replace(self, name=self.part.name, rider=None), self.rider]
 
     def held_at(self, spot: Spot) -> ToolPose:
@@ -82,7 +82,7 @@ class Kind:
         return Spot(x, y, pose.z - self.grip.up_m, yaw)
 
     def turned_like(self, yaw: float, like: float) -> float:
-        """A tool's yaw for which the gripper holds the part just so, as near to `like` as can be [rad]."""
+        """The equivalent yaw of the tool that is nearest to `like` [rad]."""
         if not self.grip.period:
             return like
         half = self.grip.period / 2
@@ -120,7 +120,7 @@ def beside(at: Sequence[float], yaw: float, off: Sequence[float]) -> tuple[float
 
 
 def comes_as(part: Part) -> str:
-    """The kind as which a part comes and goes: itself, or on its pallet."""
+    """The name of the kind in which a part arrives and leaves: itself, or on its pallet."""
     return part.name if part.pallet is None else f"{part.name} on {part.pallet}"
 
 

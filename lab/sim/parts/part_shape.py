@@ -1,4 +1,4 @@
-"""A part's shape as physics and gripper have it: hull, how it stands, inertia, looks; from a record of a task file.
+"""The shape of a part for physics and gripper: hull, standing pose, inertia and looks, from a record of a task file.
 
 Physics knows a part as a box, a cylinder or a convex hull: hollows of a mesh are seen and weighed, not felt. A mesh that is
 a box is one, too: a box touches a flat side with four corners at once, a hull with one after the other.
@@ -65,9 +65,9 @@ class PartShape:
 
     @cached_property
     def inner(self) -> tuple[Array, float]:
-        """What an engine is told of a hull: corners (n, 3) [m], in principal axes, and the margin [m] that it adds around them.
+        """The hull shrunk by the engine's margin: corners (n, 3) [m], in principal axes, and the margin [m].
 
-        Flat sides are then felt where they are; edges are rounded by the margin.
+        Flat sides are then in contact where they really are; edges are rounded by the margin.
         """
         from scipy.spatial import ConvexHull, HalfspaceIntersection
 
@@ -129,7 +129,7 @@ def shape_of(part: PartFields, folder: Path) -> PartShape:
 
 
 def visual_arrays(looks: Sequence[Shape]) -> dict[str, Any]:
-    """What PyBullet's createVisualShapeArray takes for these, beside their kinds and places; unused entries are blank."""
+    """The arguments of PyBullet's createVisualShapeArray except kinds and places; unused entries are blank."""
     return {
         "halfExtents": [[edge / 2 for edge in one.size] if one.kind == "box" else [0.0] * 3 for one in looks],
         "radii": [one.size[0] if one.kind in ("cylinder", "sphere") else 0.0 for one in looks],
@@ -192,7 +192,7 @@ def _few(hull: Array) -> Array:
     return np.asarray(hull[np.unique(np.argmax(ways @ hull.T, axis=1))])
 
 
-# ---- files ----------------------------------------------------------------------------------------------------------
+# ---- Files of meshes and looks --------------------------------------------------------------------------------------
 
 
 def _found(part: PartFields, field: str, name: str, folder: Path) -> Path:
@@ -301,14 +301,14 @@ def _check_closed(where: str, mesh: "Trimesh") -> None:
     )
 
 
-# ---- part body --------------------------------------------------------------------------------------------------------
+# ---- A part's shapes in PyBullet --------------------------------------------------------------------------------------
 
 
 Call = Callable[..., Any]
 
 
 def solid_of(engine: Any, call: Call, shape: PartShape) -> int:
-    """The number of what is felt of a part; engine: PyBullet, `call` calls it by a function's name."""
+    """PyBullet's number of a part's collision shape; engine: the module; call: calls its function by name."""
     if shape.solid == "box":
         return int(call("createCollisionShape", engine.GEOM_BOX, halfExtents=[s / 2 for s in shape.size]))
     if shape.solid == "cylinder":
@@ -318,7 +318,7 @@ def solid_of(engine: Any, call: Call, shape: PartShape) -> int:
 
 
 def seen_of(engine: Any, call: Call, shape: PartShape) -> int:
-    """The number of what cameras see of a part; of meshes in text, which PyBullet cannot read, the first alone."""
+    """PyBullet's number of a part's visual shape; of meshes in text, which PyBullet cannot read, only the first is used."""
     back = engine.invertTransform([0, 0, 0], list(shape.turn))[1]
     places = [engine.multiplyTransforms([0, 0, 0], back, look.position, look.quaternion) for look in shape.looks]
     if (corners := text_corners(shape.looks[0].mesh)) is not None:

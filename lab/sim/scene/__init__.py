@@ -1,1 +1,1 @@
-"""A task's cell: where things stand, what is built there, and what blocks the tool."""
+"""A task's cell in physics: places, bodies, blocked cells, and checks before any work."""

@@ -1,4 +1,4 @@
-"""A scene -> the cells of a grid that are free, out of reach or blocked, and by what. Run it in a world of its own."""
+"""The survey of a grid in a scene: cells that are free, out of reach or blocked, and by what. It needs its own world."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -21,13 +21,13 @@ _AWAY = Spot(0.0, 0.0, -5.0, 0.0)
 
 @dataclass(frozen=True)
 class Survey:
-    """What stands in the way of each cell: `causes` has the grid's shape and holds '' (free), 'out of reach' or a body's name."""
+    """The result of a survey; causes: '' (free), 'out of reach' or the name of a blocking body, of the grid's shape."""
 
     causes: NDArray[np.str_]
 
     @property
     def blocked(self) -> NDArray[np.bool_]:
-        """The cells that the tool cannot be in, bool, the grid's shape."""
+        """A mask of the cells that the tool cannot enter, bool of the grid's shape."""
         return np.asarray(self.causes != "")
 
     def names(self, cells: Sequence[tuple[int, ...]]) -> list[str]:
@@ -36,7 +36,7 @@ class Survey:
 
 
 def in_the_way(causes: Sequence[str], station: str) -> str:
-    """What keeps the tool from a station, for an error; where that is its own body, what to change: it moves along with it."""
+    """The words of an error about bodies that block a station; for the station's own body, with the fields to change."""
     if [*causes] == [OUT_OF_REACH]:
         return OUT_OF_REACH
     named = ", ".join(f"{cause} itself" if cause == station else cause for cause in causes)
@@ -45,7 +45,7 @@ def in_the_way(causes: Sequence[str], station: str) -> str:
 
 
 class Surveyor:
-    """Puts the arm at one pose after the other in a scene and measures what is near; with or without a part in the fingers."""
+    """Places the arm at poses in a scene, with or without a part in the fingers, and measures distances to all bodies."""
 
     def __init__(self, scene: Scene, carried: str | None, *, clearance: float, ignore: Sequence[str] = ()) -> None:
         """carried: the kind in the fingers; `clearance` [m] is how far everything must stay away; `ignore` may be touched."""

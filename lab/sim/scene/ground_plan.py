@@ -36,7 +36,7 @@ class Block:
 
 @dataclass(frozen=True)
 class Ring:
-    """Where an arm's tool can be at one height: so far from its axis, and turned so far from ahead, clockwise and counter."""
+    """The reach of an arm's tool at one height: distances from its axis, and turns from ahead to both sides."""
 
     nearest_m: float
     farthest_m: float
@@ -98,7 +98,7 @@ class CameraCells:
 
 @dataclass(frozen=True)
 class Approach:
-    """Where a transfer to a station ends, and the middle of the cell that it comes from; None: there is no such cell."""
+    """The end of a transfer to a station, and the middle of the last cell before it; None: there is no such cell."""
 
     station: str
     at: XY
@@ -122,7 +122,7 @@ class GroundPlan:
     at_fault: frozenset[str] = frozenset()
 
 
-# ---- reach ------------------------------------------------------------------------------------------------------------
+# ---- The reach of an arm ----------------------------------------------------------------------------------------------
 
 
 Inverse = Callable[[ToolPose], NDArray[np.float64] | None]

@@ -1,6 +1,6 @@
-"""Whether the fingers hold what they carry, tried in physics before any work: taken up, swung, turned, set down.
+"""Trials in physics, before any work, of whether the fingers hold a part: it is taken up, swung, turned and set down.
 
-It is carried at least as far as the task carries it: what creeps between the fingers creeps all the way.
+It is carried at least as far as in the task, since a part that creeps between the fingers creeps all the way.
 """
 
 from collections.abc import Iterator, Sequence
@@ -102,7 +102,7 @@ class Trial(NamedTuple):
 
 @lru_cache(maxsize=64)
 def tried(trial: Trial) -> str:
-    """What went wrong with one part in a world of its own, "" for nothing, or where the arm has no room for the trial."""
+    """The failure of a trial, in a world of its own, in words; "" for none, and where the arm has no room for the trial."""
     place = _place(trial)
     if place is None:
         return ""
@@ -122,7 +122,7 @@ def tried(trial: Trial) -> str:
 
 
 def _place(trial: Trial) -> Spot | None:
-    """Where the part stands: ahead of the arm, where it reaches all of the way."""
+    """The spot of the part: ahead of the arm, where the arm reaches the whole path; None: there is none."""
     for out in OUT:
         spot = Spot(out, 0.0, FOOT_M, 0.0)
         if all(trial.arm.inverse(pose) is not None for pose in _way(trial, spot)):

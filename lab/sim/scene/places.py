@@ -1,4 +1,4 @@
-"""Where things stand in a task's cell: the spots for parts at each station, what room they take, what a seed lays out."""
+"""The places in a task's cell: the spots for parts at each station, the room that they take, and the layout of a seed."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -32,7 +32,7 @@ SPARE_SPOTS = 4  # so many spots of a station are reckoned with, however few par
 
 @dataclass(frozen=True)
 class Layout:
-    """What the seed decides: obstacle centres, and how far each part stands off its spot (x, y [m], yaw [rad])."""
+    """The layout drawn from a seed: obstacle centres, and each part's offset from its spot (x, y [m], yaw [rad])."""
 
     obstacles: tuple[tuple[float, float], ...]
     parts: tuple[tuple[float, float, float], ...]
@@ -128,7 +128,7 @@ class Places:
         return sorted(found, key=lambda at: (round(hypot(*at), 6), at))
 
     def pitch(self, station: Station) -> tuple[float, float]:
-        """From one spot to the next, along and across [m]: fingers come between parts, and the hand past those above its palm."""
+        """The distances from spot to spot, along and across [m], with room for fingers and hand between parts."""
         pitch_m = self._largest(
             station, BETWEEN_M, lambda kind: max(FINGERS_M, kind.finger_m - BETWEEN_M + FREE_M), 2.0
         )
@@ -220,13 +220,13 @@ class Places:
         return Rectangle(*at, (high[0] - low[0]) / 2, (high[1] - low[1]) / 2, yaw)
 
     def kept_free(self, parts: int) -> list[tuple[str, Rectangle]]:
-        """What no obstacle may stand on: the machines' bodies, and around the spots in use a part and the gripper; by station."""
+        """The areas without obstacles, by station: machines' bodies, and a part with the gripper around each spot in use."""
         kept = []
         for station in self.task.stations:
             if station.kind == "machine":
                 kept.append((station.name, self.body(station, parts)))
                 continue
-            # only where they start do parts stand off their spots: the robot sets them down on them
+            # parts stand off their spots only where they start, since the robot sets them down on the spots
             areas = [part.area[:2] for part in self.task.made if self.task.starts(part.name) == station.name]
             off_x, off_y = np.max(areas, axis=0).tolist() if areas else (0.0, 0.0)
             along, across = self.room(station)
@@ -323,7 +323,7 @@ class Places:
 
 
 def outermost(kinds: Sequence[Kind]) -> list[Kind]:
-    """The kinds than which no other reaches as far to all sides and up: who keeps clear of them keeps clear of all."""
+    """The kinds that no other kind exceeds in all directions; clearance of them is clearance of all kinds."""
     sizes = [(*kind.footprint_m(), kind.height_m) for kind in kinds]
     return [
         kind

@@ -16,7 +16,7 @@ from lab.sim.world import World
 from lab.tasks.task import Order, Task, part_name
 from lab.tasks.task_fields import CameraGrid, Obstacle, Station
 
-TABLE, MARKER = "table", " marker"  # the body that all stands on; how the names of markers end
+TABLE, MARKER = "table", " marker"  # the name of the table; the ending of markers' names
 TABLE_RGBA = (0.86, 0.85, 0.83, 1.0)
 TABLE_M, TABLE_MIDDLE_M = (2.2, 2.9, 0.04), (0.35, 0.0, -0.02)
 MARKER_ABOVE = 0.002  # [m] a marker's centre above what it lies on
@@ -94,7 +94,7 @@ class Scene:
 
 
 def pallet_of(name: str) -> str:
-    """What the pallet of a part is called."""
+    """The name of a part's pallet."""
     return f"{name}'s pallet"
 
 

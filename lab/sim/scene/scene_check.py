@@ -1,4 +1,4 @@
-"""What is wrong with a task's cell before anything is surveyed in it: reach, heights, and stations in each other's way."""
+"""Checks of a task's cell before it is surveyed: reach, heights, layers, and stations in each other's way."""
 
 from itertools import combinations, product
 from math import ceil, cos, hypot, pi, sin
@@ -187,7 +187,7 @@ def _check_in_bounds(station: Station, at: tuple[float, float], low: Vector, hig
 
 
 def longest_way_m(places: Places) -> float:
-    """How far a part is carried at most from one of its stations to another, cell by cell and around what is in the way [m]."""
+    """The longest path of a carried part between two of its stations, cell by cell and around obstacles [m]."""
     longest = 0.0
     for here, there in combinations(places.task.stations, 2):
         if set(places.task.kinds_at(here.name)) & set(places.task.kinds_at(there.name)):
@@ -280,7 +280,7 @@ def _check_turn(arm: Arm, station: Station, above: ToolPose) -> None:
 
 
 def check_apart(task: Task, parts: int) -> None:
-    """BadInput when two stations stand in each other's place, with so many parts under way."""
+    """Raises BadInput when two stations overlap, with the spots that so many parts need."""
     places = places_of(task)
     ground = {station.name: _ground(places, station, parts) for station in task.stations}
     for (one, here), (other, there) in combinations(ground.items(), 2):

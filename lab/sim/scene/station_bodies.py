@@ -1,4 +1,4 @@
-"""What stands at a station: a slab, a box, or a URDF or mesh file, put into the world and measured."""
+"""The bodies of stations: a slab, a box, or a URDF or mesh file, which is put into the world and measured."""
 
 from functools import cache
 from io import BytesIO

@@ -286,7 +286,7 @@ def _operations(product: CellProduct, index: Mapping[str, int], own: Mapping[str
     alike = len({len(route) for route in stages}) == 1 and prod(map(len, steps)) == len({*map(tuple, stages)})
     if len(stages) > 1 and not (alike and all(len(ways) == 1 for route in stages for ways in route)):
         raise BadInput(
-            f"product '{product.name}' as PyJobShop's JSON: its routes are no choice of machines step by step, which is wanted"
+            f"product '{product.name}' as PyJobShop's JSON: its routes must differ in the machine of each step only"
         )
     return [tuple((index[name], time) for name, time in step) for step in steps]
 
