@@ -23,6 +23,7 @@ from lab.sequencing.simulate.follow import simulate
 from lab.skills.prepared_scene import prepare
 from lab.tasks.task_file import load
 from lab.teaching.teacher import Teacher
+from lab.view.gantt import gantt
 from lab.workers import Workers
 
 if TYPE_CHECKING:
@@ -76,8 +77,6 @@ class RunResult:
     @cached_property
     def gantt(self) -> Picture:
         """The Gantt chart: thick bars show what was carried out, thin bars what was planned."""
-        from lab.view.gantt import gantt
-
         planned = simulate(self.report.taught.cell, self.report.sequenced.sequence)
         return Picture.drawn(lambda path: gantt(self.report.outcome.schedule, path, predicted=planned))
 
