@@ -10,6 +10,7 @@ from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
+from lab.advice.entries import read_journal
 from lab.errors import BadInput, unknown
 from lab.plugins.code_file import from_file
 from lab.plugins.family import Family, first_line, takes, wanted
@@ -131,8 +132,6 @@ def _person(name: AdvisorName, level: Level) -> "Advisor":
 
 
 def _recorded(name: AdvisorName, level: Level) -> "Advisor":
-    from lab.advice.entries import read_journal
-
     assert name.folder is not None
     journal = read_journal(name.folder, "--advisor")
     answers = journal.said()

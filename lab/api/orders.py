@@ -17,6 +17,7 @@ from lab.sequencing.search import SequenceResult
 from lab.sequencing.simulate.follow import simulate
 from lab.tasks.sequencing import Sequencing
 from lab.teaching.teacher import Teacher
+from lab.view.gantt import gantt
 
 if TYPE_CHECKING:
     import pandas
@@ -92,8 +93,6 @@ class OrderResult:
     @cached_property
     def gantt(self) -> Picture:
         """The Gantt chart of the best order."""
-        from lab.view.gantt import gantt
-
         schedule = simulate(self.cell, self.document["best_sequence"])
         return Picture.drawn(lambda path: gantt(schedule, path, due_s=self.cell.due_s))
 

@@ -19,9 +19,11 @@ from lab.production.run_advice import RunAdvice
 from lab.production.run_journal import RunJournal
 from lab.production.run_options import RunOptions, begun
 from lab.sequencing.cell.schedule import rows_of
+from lab.sequencing.simulate.follow import simulate
 from lab.skills.prepared_scene import prepare
 from lab.tasks.task_file import load
 from lab.teaching.teacher import Teacher
+from lab.view.gantt import gantt
 from lab.workers import Workers
 
 if TYPE_CHECKING:
@@ -75,9 +77,6 @@ class RunResult:
     @cached_property
     def gantt(self) -> Picture:
         """The Gantt chart: thick bars show what was carried out, thin bars what was planned."""
-        from lab.sequencing.simulate.follow import simulate
-        from lab.view.gantt import gantt
-
         planned = simulate(self.report.taught.cell, self.report.sequenced.sequence)
         return Picture.drawn(lambda path: gantt(self.report.outcome.schedule, path, predicted=planned))
 

@@ -8,8 +8,11 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from lab.api.pictures import Page
 from lab.errors import BadInput, counted
+from lab.mdp import shortest_path
+from lab.tasks.cell_file import CellFile
 from lab.tasks.grid_world import GridWorld
 from lab.tasks.task import Task
+from lab.tasks.task_file import load, load_any
 
 if TYPE_CHECKING:
     from lab.sim.frames import Recording
@@ -41,12 +44,9 @@ def show(
 @contextmanager
 def seen(what: str | Path | GridWorld | Task, asked: Asked) -> "Iterator[tuple[str, Recording]]":
     """The title of a task or world, and a recording of one frame; the meshes of a large world exist only within the block."""
-    from lab.mdp import shortest_path
     from lab.production.recorder import show_scene
     from lab.sim.scene.scene_check import check_scene
     from lab.skills.prepared_scene import lay_out
-    from lab.tasks.cell_file import CellFile
-    from lab.tasks.task_file import load, load_any
     from lab.view.rasterizer import Still
     from lab.view.world_bodies import WorldBodies
 

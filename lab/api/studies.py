@@ -12,6 +12,7 @@ from lab.learning.tuned_ranges import USUAL
 from lab.studies import checked, study_of
 from lab.studies.compared import Compared, compared
 from lab.studies.findings import Findings, Row
+from lab.studies.report import write_report
 from lab.studies.runner import Job
 from lab.studies.tuning import Tuning, tuned
 from lab.teaching.subjects import Teachable
@@ -48,8 +49,6 @@ class StudyResult:
 
     def report(self, path: Path | str) -> Path:
         """Writes the report, an HTML page without scripts that needs no network, and returns its path."""
-        from lab.studies.report import write_report
-
         write_report(Path(path), self.title, self.title, self.findings)
         return Path(path)
 

@@ -1,4 +1,4 @@
-"""Gymnasium both ways: its environments as problems to teach, ours as registered environments (`import lab.gym`)."""
+"""Gymnasium: its environments as problems of lessons, and the lab's problems as registered environments (`import lab.gym`)."""
 
 from lab.gym.environment_name import parse_name
 from lab.gym.our_environments import (

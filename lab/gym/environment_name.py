@@ -1,4 +1,4 @@
-"""From a word such as "gym:FrozenLake-v1?is_slippery=false" to the environment, or to one line that says what is wrong."""
+"""Names such as "gym:FrozenLake-v1?is_slippery=false": parsing them, making the environment, one-line errors."""
 
 import inspect
 import json
@@ -19,23 +19,23 @@ from lab.gym.our_environments import register
 
 PREFIX = "gym:"
 WANTED = "wanted gym:ID, or gym:ID?KEYWORD=VALUE&..., such as gym:FrozenLake-v1?is_slippery=false"
-OWN = ("render_mode", "disable_env_checker")  # what the lab itself says when it makes an environment
+OWN = ("render_mode", "disable_env_checker")  # keywords that the lab itself passes
 _CONSTANTS: dict[str, object] = {"true": True, "false": False, "null": None, "none": None}
-_LONGEST = 300  # characters of what somebody else's error says
+_LONGEST = 300  # the most characters of a foreign error's text
 
 Env = gymnasium.Env[Any, Any]
 
 
 @dataclass(frozen=True)
 class GymName:
-    """What `gymnasium.make` is given: an id, with its module before it if need be, and keyword arguments."""
+    """The arguments of `gymnasium.make`: an id, possibly "module:id", and keywords."""
 
     id: str
     options: Mapping[str, object]
 
     @property
     def module(self) -> str:
-        """The module that is imported to make it, "" when the id names none."""
+        """The module that is imported to make the environment, "" if the id names none."""
         return self.id.partition(":")[0] if ":" in self.id else ""
 
     def __str__(self) -> str:
@@ -44,14 +44,14 @@ class GymName:
 
 
 def names_environment(word: str) -> bool:
-    """Whether a word means a Gymnasium environment."""
+    """Whether a word names a Gymnasium environment."""
     return word.startswith(PREFIX)
 
 
 def parse_name(word: str, where: str) -> GymName:
-    """What "gym:ID?KEYWORD=VALUE&..." means: values are true, false, null, numbers, JSON's lists and strings, or plain text.
+    """The parsed name "gym:ID?KEYWORD=VALUE&...".
 
-    %20 and the like stand for characters that cannot be written in a query. Raises BadInput.
+    Values are true, false, null, numbers, JSON lists and strings, or plain text, URL-encoded. Raises BadInput, with `where`.
     """
     made, asked, query = word.removeprefix(PREFIX).partition("?")
     if not names_environment(word) or not made or not word.isprintable():
@@ -70,7 +70,7 @@ def parse_name(word: str, where: str) -> GymName:
 
 
 def _literal(text: str) -> object:
-    """A value as Python and JSON write it; any other text is itself."""
+    """The value of a Python constant or JSON text; any other text unchanged."""
     if text.lower() in _CONSTANTS:
         return _CONSTANTS[text.lower()]
     try:
@@ -80,12 +80,12 @@ def _literal(text: str) -> object:
 
 
 def quiet() -> "warnings.catch_warnings[None]":
-    """Keeps what Gymnasium and environments warn of from whoever uses the lab."""
+    """A context that suppresses the warnings of Gymnasium and of environments."""
     return warnings.catch_warnings(action="ignore")
 
 
 def make(name: GymName, where: str, render_mode: str | None = None) -> Env:
-    """The environment of that name; a module that it names is also looked for in the current folder. Raises BadInput."""
+    """The environment of that name, whose module may be in the current folder. Raises BadInput if it cannot be made."""
     register()
     mode = {} if render_mode is None else {"render_mode": render_mode}
     here = str(Path.cwd())
@@ -103,14 +103,14 @@ def make(name: GymName, where: str, render_mode: str | None = None) -> Env:
 
 
 def said(error: Exception) -> str:
-    """What an error of somebody else's says, in one line with its type."""
+    """The type and the text of a foreign error in one line."""
     text = " ".join(str(error).split())
     text = text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
     return f"{type(error).__name__}: {text}" if text else type(error).__name__
 
 
 def _refusal(name: GymName, where: str, error: Exception) -> BadInput:
-    """Why an environment cannot be made."""
+    """The error for an environment that cannot be made."""
     which = f"environment '{name}' ({where})"
     match error:
         case BadInput():
@@ -129,7 +129,7 @@ def _refusal(name: GymName, where: str, error: Exception) -> BadInput:
 
 
 def _discrete() -> list[str]:
-    """Ids whose states and actions are discrete as far as it is known: Gymnasium's toy texts, and those of others."""
+    """The registered ids that may be discrete: Gymnasium's toy-text environments, and those of other packages."""
     modules = {
         spec.id: str(getattr(spec.entry_point, "__module__", spec.entry_point)) for spec in gymnasium.registry.values()
     }
@@ -137,7 +137,7 @@ def _discrete() -> list[str]:
 
 
 def _keywords(name: GymName) -> list[str]:
-    """The keywords that the maker of an environment takes; none where it takes any, or cannot be asked."""
+    """The keywords that an environment takes; [] if it takes any, or if its signature cannot be read."""
     try:
         with quiet():
             maker: Any = gymnasium.spec(name.id.rpartition(":")[2]).entry_point

@@ -1,4 +1,4 @@
-"""A Gymnasium environment as the place where the lab's learners act, judged exactly where it brings a model along."""
+"""Gymnasium environments for the lab's learners: their tables and models, and an `Environment` that judges policies."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -17,22 +17,22 @@ from lab.learning.session import Session
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import FloatArray, TabularMDP
 
-STEPS_PROBED = 2000  # of a model, before it is believed
-STARTS_PROBED = 100  # resets, where an environment does not say where it begins
-_NEW_EPISODE = 200  # steps after which a probe begins again
+STEPS_PROBED = 2000  # random steps by which a model is verified
+STARTS_PROBED = 100  # resets by which the distribution of starts is estimated
+_NEW_EPISODE = 200  # steps after which the verification resets the environment
 
 Digits = tuple[tuple[str, int], ...]
 
 
 @dataclass(frozen=True)
 class Known:
-    """What an environment's actions and the digits of its states are called."""
+    """The names of an environment's actions, and names and sizes of the components of its states."""
 
     actions: tuple[str, ...] = ()
     digits: Digits = ()
 
 
-KNOWN = {  # by the class of the environment
+KNOWN = {  # class of the environment -> names
     "FrozenLakeEnv": Known(("left", "down", "right", "up")),
     "CliffWalkingEnv": Known(("up", "right", "down", "left")),
     "TaxiEnv": Known(
@@ -45,10 +45,10 @@ KNOWN = {  # by the class of the environment
 
 @dataclass(frozen=True, eq=False)
 class GymTable(TabularMDP):
-    """What is known of an environment's steps: the likeliest state entered and the mean reward, or nothing at all.
+    """The table of an environment: the likeliest outcome and the mean reward of each action; placeholders without a model.
 
-    environment: its id and keywords, so that two of which nothing is known are two problems. digits: the names and sizes
-    of what the number of a state is made of. box: the cells along the axes of a continuous space.
+    environment: its id and keywords, which distinguish tables without a model; digits: names and sizes of the components of a
+    state's number; box: the cells along the axes of a continuous space.
     """
 
     environment: str = ""
@@ -57,16 +57,16 @@ class GymTable(TabularMDP):
 
     @property
     def cells(self) -> tuple[int, ...]:
-        """Those of a box, or of a grid."""
+        """The shape of the box or of the grid."""
         return self.box or self.shape
 
     @cached_property
     def signature(self) -> str:
-        """As `TabularMDP.signature`, the environment included."""
+        """The signature of the problem (see `TabularMDP.signature`), which includes the environment."""
         return sha256(f"{self.environment} {super().signature}".encode()).hexdigest()[:16]
 
     def state_label(self, state: int) -> str:
-        """A state in words, such as "row 2, column 1, passenger 0, destination 3"."""
+        """A state as text, such as "row 2, column 1, passenger 0, destination 3"."""
         plain = super().state_label(state)
         if not self.digits:
             return plain
@@ -75,7 +75,7 @@ class GymTable(TabularMDP):
 
 
 def believed(live: NumberedEnvironment) -> TransitionModel | None:
-    """The model that the environment's table `P` makes, if it has one and steps taken at random are as it says."""
+    """The model in the environment's table `P`, None if it has none, or if random steps contradict it."""
     outcomes = getattr(live.inside, "P", None)
     if outcomes is None or len(live.states.sizes) != 1:
         return None
@@ -91,14 +91,14 @@ def believed(live: NumberedEnvironment) -> TransitionModel | None:
 
 
 def _sampled(live: NumberedEnvironment) -> FloatArray:
-    """How often episodes began in each state (S,), as a share."""
+    """The estimated distribution (S,) of the starts."""
     begun = [live.begin(seed) for seed in range(STARTS_PROBED)]
     shares: FloatArray = np.bincount(begun, minlength=live.states.count) / len(begun)
     return shares
 
 
 def _follows(live: NumberedEnvironment, model: TransitionModel) -> bool:
-    """Whether every one of many random steps is one that the model knows."""
+    """Whether STEPS_PROBED random steps agree with the model."""
     rng = np.random.default_rng(0)
     state, over = live.begin(0), False
     for number, action in enumerate(rng.integers(model.n_actions, size=STEPS_PROBED).tolist()):
@@ -114,7 +114,7 @@ def _follows(live: NumberedEnvironment, model: TransitionModel) -> bool:
 
 
 def table_of(live: NumberedEnvironment, model: TransitionModel | None) -> GymTable:
-    """The environment's states and actions by name, with its likeliest steps where there is a model."""
+    """The table of the environment, with the likeliest outcomes if there is a model."""
     states, actions = live.states.count, live.actions.count
     names: dict[str, Any] = {"action_labels": _labels(live), "environment": str(live.name), "digits": _digits(live)}
     names["box"] = live.states.sizes if isinstance(live.states, CellNumbering) else ()
@@ -152,7 +152,7 @@ def _digits(live: NumberedEnvironment) -> Digits:
 
 
 def _grid_shape(inside: Any, states: int) -> tuple[int, ...]:
-    """The shape of a grid that the states are, as the environment's own attributes say; () when they say none."""
+    """The shape of the grid of the states, according to the environment's attributes; () if there is none."""
     given = getattr(inside, "shape", None) or (getattr(inside, "nrow", 0), getattr(inside, "ncol", 0))
     try:
         shape = tuple(int(n) for n in given)
@@ -161,11 +161,11 @@ def _grid_shape(inside: Any, states: int) -> tuple[int, ...]:
     return shape if len(shape) in (2, 3) and prod(shape) == states else ()
 
 
-# ---- gym environment --------------------------------------------------------------------------------------------------
+# ---- the environment ------------------------------------------------------------------------------------------------
 
 
-MOST_STEPS = 10_000  # of an episode that is judged
-EPISODES_JUDGED = 200  # where no model says how good a policy is
+MOST_STEPS = 10_000  # of a judged episode
+EPISODES_JUDGED = 200  # seeded episodes by which a policy is judged without a model
 ALONE = LearnerSettings(learner="q", alpha=0.1, selection="epsilon-greedy", beta=0.3, episodes=5000)
 ON_TILES = LearnerSettings(
     "sarsa-lambda",
@@ -178,46 +178,45 @@ ON_TILES = LearnerSettings(
     beta=0.1,
     episodes=300,
 )
-NEAR = 0.01  # of the best return, and at least so much: as good as the best
+NEAR = 0.01  # relative and absolute tolerance of the best return
 
 
 class Played(NamedTuple):
-    """What a policy did in EPISODES_JUDGED episodes: its mean return, and the last steps of those that terminated."""
+    """The result of EPISODES_JUDGED episodes: the mean return, and (steps, last step) of those that terminated."""
 
     mean_return: float
     ends: list[tuple[int, Moved]]
 
     @property
     def best_end(self) -> float:
-        """The highest reward of a last step, -inf when there was none."""
+        """The highest reward of a last step, -inf if there is none."""
         return max([-np.inf, *(moved.reward for _, moved in self.ends)])
 
     def worth(self, best: float) -> Worth:
-        """Its worth when an end with the reward `best` is a goal, where the environment itself does not say."""
+        """The worth of the policy; an end with the reward `best` is a goal, unless the environment itself reports success."""
         won = [s for s, m in self.ends if (m.reward >= best - SAME_REWARD if m.success is None else m.success)]
         return Worth(self.mean_return, len(won) / EPISODES_JUDGED, sum(won) / len(won) if won else np.inf)
 
 
 class GymEnvironment:
-    """The `Environment` that a Gymnasium environment is: its own chance, seeded by the first draw of a session.
+    """The `Environment` of a Gymnasium environment, whose own generator is seeded by the first draw of a session.
 
-    model: what it brings along as its table `P`, when its steps are found to follow it, else None: the best that is
-    known is then what was learned alone (ALONE). A goal is reached where a step says so
-    (info["is_success"]), else where an episode terminates with the best reward that any of its ends has, or without a
-    model, has had so far in the session.
+    model: its verified table `P`, None if there is none; then the best known policy is one learned without advice (ALONE).
+    A goal is reached if a step says so (info["is_success"]); otherwise if the episode terminates with the best reward of any end,
+    without a model the best so far in the session.
     """
 
     def __init__(self, live: NumberedEnvironment):
         self.live = live
         self.model = believed(live)
         self.mdp: TabularMDP = table_of(live, self.model)
-        self._fresh = live.again()  # each session begins in a copy of it, whatever an environment keeps over its resets
+        self._fresh = live.again()  # copied for each session, because environments may keep state over resets
         self._state, self._best = -1, -np.inf
         self._known: dict[float, FloatArray] = {}
         self._best_played: dict[tuple[float, int], Played] = {}
 
     def reset(self, episode: int, draw: Draw) -> int:
-        """Where the environment begins; in episode 1 it is seeded."""
+        """The state in which the environment begins; episode 1 seeds it."""
         seed = None
         if episode == 1:
             seed, self._best, self.live = int(draw() * 2**32), -np.inf, self._fresh.again()
@@ -225,7 +224,7 @@ class GymEnvironment:
         return self._state
 
     def step(self, state: int, action: int, draw: Draw) -> Step:
-        """One step from where the last one led. Raises WorkFailed for what is no step, ValueError for another state."""
+        """The outcome of a step from the current state. Raises WorkFailed for an invalid step, ValueError for another state."""
         if state != self._state:
             raise ValueError(f"the environment is in state {self._state}, not in {state}")
         moved = self.live.step(action)
@@ -244,13 +243,13 @@ class GymEnvironment:
 
     @property
     def max_steps(self) -> int:
-        """The steps of an episode: its own limit, else as many as a walk through all its states may need."""
+        """The limit of steps of an episode: its own, otherwise one that allows for a walk through all states."""
         return self.live.limit or min(MOST_STEPS, max(200, 4 * self.mdp.n_states))
 
     def values(self, discount: float) -> FloatArray:
-        """The optimal action values (S, A): exact with a model, else learned alone in a second environment.
+        """The optimal action values (S, A): exact with a model, otherwise learned without advice in a copy.
 
-        Raises WorkFailed when they do not settle, and when learning alone found nothing to prefer.
+        Raises WorkFailed if they do not converge, or if learning found no difference between actions.
         """
         if discount not in self._known:
             known = self._learned_alone(discount) if self.model is None else self.model.optimal(discount)
@@ -271,13 +270,12 @@ class GymEnvironment:
         return result.q
 
     def judge(self, q: FloatArray, learner: LearnerSettings) -> Judged:
-        """Exact with a model, else from EPISODES_JUDGED seeded episodes; returns are compared without discount.
+        """The judgement: exact with a model, otherwise from EPISODES_JUDGED seeded episodes; returns are undiscounted.
 
-        final_steps, optimal_steps: the mean steps of the ways to the goal, rounded; final_steps None where the greedy
-        policy gets there less than half as often as the best one, optimal_steps None without a model. Solved: its mean
-        return is within 1 % (or 0.01) of that of the best policy for the learner's discount (where no model says which
-        that is, of the best known one that gets to a goal), or reaches the threshold that the environment is registered
-        with; keywords make it another one, with no threshold.
+        final_steps, optimal_steps: the mean steps to the goal, rounded; final_steps is None if the greedy policy reaches it less
+        than half as often as the best one, optimal_steps is None without a model. solved: the mean return is within 1 % (or 0.01)
+        of that of the best policy (without a model, of the best known one that reaches a goal), or it reaches the threshold
+        that the environment is registered with, if no keywords were given.
         """
         own, best = self._compared(q, learner)
         enough = own.reaches > 0.0 and (best is None or own.reaches >= 0.5 * best.reaches)
@@ -292,11 +290,11 @@ class GymEnvironment:
         if self.live.threshold is not None and own.mean_return >= self.live.threshold:
             return True
         if best is None or (self.model is None and not best.reaches):
-            return False  # nobody knows what is good here
+            return False  # no policy is known to be good
         return own.mean_return >= best.mean_return - NEAR * max(1.0, abs(best.mean_return))
 
     def _compared(self, q: FloatArray, learner: LearnerSettings) -> tuple[Worth, Worth | None]:
-        """What the greedy policy of a table brings, and what the best known one does, if any is known."""
+        """The worth of the greedy policy of a table, and that of the best known policy, None if there is none."""
         horizon = min(self.live.limit or MOST_STEPS, learner.max_steps - learner.count_start, MOST_STEPS)
         try:
             best = self.values(learner.discount).argmax(axis=1)
@@ -313,7 +311,7 @@ class GymEnvironment:
         return own.worth(top), None if known is None else known.worth(top)
 
     def _played(self, policy: Actions, horizon: int) -> Played:
-        """What a policy did in seeded episodes of a second environment."""
+        """The result of a policy in seeded episodes of a copy."""
         other, actions = self.live.again(), policy.tolist()
         returned, ends = 0.0, list[tuple[int, Moved]]()
         for seed in range(EPISODES_JUDGED):
@@ -329,8 +327,8 @@ class GymEnvironment:
 
 
 class _Unjudged(GymEnvironment):
-    """One in which a session only learns."""
+    """A Gymnasium environment without judgement, for learning only."""
 
     def judge(self, q: FloatArray, learner: LearnerSettings) -> Judged:
-        """No verdict."""
+        """An empty judgement."""
         return Judged(None, None, False)

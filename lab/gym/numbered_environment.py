@@ -1,4 +1,4 @@
-"""A Gymnasium environment under way: its states and actions as numbers, its errors as ours, its own picture of a state."""
+"""A running Gymnasium environment with numbered states and actions, the lab's errors, and its own pictures of states."""
 
 from collections.abc import Iterator
 from copy import deepcopy
@@ -13,19 +13,22 @@ from lab.gym.environment_name import GymName, make, quiet, said
 from lab.learning.tiles import Bounds
 
 SUPPORTED = "Discrete, MultiDiscrete, MultiBinary, and Tuple or Dict of these"
-MOST_AXES, CELLS = 4, {1: 64, 2: 64, 3: 32, 4: 24}  # of a box, along each axis
+MOST_AXES, CELLS = (
+    4,
+    {1: 64, 2: 64, 3: 32, 4: 24},
+)  # of a box: the most axes, and the cells along each axis by the number of axes
 
-Digit = tuple[int, int]  # how many values it has, and the first of them
+Digit = tuple[int, int]  # the number of its values, and the first value
 
 
 class Unsupported(Exception):
-    """A space that is not discrete."""
+    """Raised for a space that cannot be numbered."""
 
 
 class Numbering:
-    """The values of a space in order, the last digit running fastest; `sizes`: the values of each digit.
+    """The numbering of the values of a space by digits, of which the last varies fastest; a Discrete space has one.
 
-    A Discrete space is one digit. Raises Unsupported for a space that holds anything continuous, text or lists.
+    sizes: the number of values of each digit; count: of the space. Raises Unsupported unless the space is discrete.
     """
 
     def __init__(self, space: spaces.Space[Any]):
@@ -36,7 +39,7 @@ class Numbering:
         self._firsts = tuple(first for _, first in digits)
 
     def number(self, value: Any) -> int:
-        """The number of a value; raises ValueError for one that is not in the space."""
+        """The number of a value. Raises ValueError if it is not in the space."""
         total = 0
         for given, size, first in zip(_values(self._space, value), self.sizes, self._firsts, strict=True):
             digit = int(given) - first
@@ -52,9 +55,9 @@ class Numbering:
 
 
 class CellNumbering:
-    """The cells of a box with one axis, or of up to four, between its bounds: as `Numbering`.
+    """The numbering of the cells of a box of one to four axes between its bounds.
 
-    Raises Unsupported for another space, for more axes, and for bounds that are not finite.
+    Raises Unsupported for other spaces, for more axes, and for bounds that are not finite.
     """
 
     def __init__(self, space: spaces.Space[Any]):
@@ -69,14 +72,14 @@ class CellNumbering:
         self._type = space.dtype
 
     def number(self, value: Any) -> int:
-        """The number of the cell that a point lies in; raises ValueError for what is no point."""
+        """The number of the cell that contains a point. Raises ValueError if it is no point of the box."""
         point = np.asarray(value, np.float64)
         if point.shape != (len(self.sizes),) or not np.isfinite(point).all():
             raise ValueError(f"{value!r} is no point with {len(self.sizes)} finite numbers")
         return self._bounds.number(point.tolist())
 
     def value(self, number: int) -> Any:
-        """The middle of a cell."""
+        """The centre of a cell."""
         return np.array(self._bounds.centre(number), self._type)
 
 
@@ -100,7 +103,7 @@ def _parts(space: "spaces.Tuple[Any] | spaces.Dict") -> list[spaces.Space[Any]]:
 
 
 def _values(space: spaces.Space[Any], value: Any) -> Iterator[Any]:
-    """The values of the digits, as they stand in a value."""
+    """The digits of a value."""
     match space:
         case spaces.Discrete():
             yield value
@@ -115,7 +118,7 @@ def _values(space: spaces.Space[Any], value: Any) -> Iterator[Any]:
 
 
 def _built(space: spaces.Space[Any], digits: Iterator[int]) -> Any:
-    """The value that the next digits make."""
+    """The value that the next digits compose."""
     match space:
         case spaces.Discrete():
             return next(digits)
@@ -128,14 +131,14 @@ def _built(space: spaces.Space[Any], digits: Iterator[int]) -> Any:
             return np.array([next(digits) for _ in range(prod(shape))], space.dtype).reshape(shape)
 
 
-# ---- numbered environment ---------------------------------------------------------------------------------------------
+# ---- the environment ------------------------------------------------------------------------------------------------
 
 
 MAX_ENTRIES = 1_000_000  # states x actions
 
 
 class Moved(NamedTuple):
-    """What a step led to; success: whether the environment says that a goal is reached, None when it says nothing."""
+    """The outcome of a step; success: whether the environment reports a goal, None if it reports nothing."""
 
     reward: float
     state: int
@@ -145,11 +148,11 @@ class Moved(NamedTuple):
 
 
 class NumberedEnvironment:
-    """An environment that is stepped, and where its state can be set, a second one that is put where it is to be drawn.
+    """A running environment and, if its state can be set, a copy for drawing any state.
 
-    states, actions: the numbering of its spaces; first: a state that it begins in; limit: the steps of an episode, None
-    when it has no limit of its own; threshold: the mean return that counts as solved there, None when none is known for
-    these keywords. Raises BadInput when it cannot be made or reset, and for spaces that make no table.
+    states, actions: the numberings of its spaces; first: a state in which it begins; limit: the most steps of an episode, None
+    without a limit; threshold: the mean return that counts as solved, None if unknown for these keywords.
+    Raises BadInput if it cannot be made or reset, and for spaces without a table.
     """
 
     def __init__(self, name: GymName, where: str):
@@ -177,20 +180,20 @@ class NumberedEnvironment:
         self.threshold = None if spec is None or name.options else spec.reward_threshold
 
     def _own_limit(self) -> int | None:
-        """The limit that an environment keeps itself, as the lab's own do."""
+        """The limit that the environment applies itself, as the lab's own do; None if there is none."""
         limit = getattr(self.inside, "max_episode_steps", None)
         return limit if isinstance(limit, int) and limit > 0 else None
 
     def again(self) -> Self:
-        """Another one of the same, to play in without disturbing this one's episode."""
+        """A copy, whose episodes do not affect this one's."""
         try:
             return deepcopy(self)
-        except Exception:  # it holds what cannot be copied
+        except Exception:  # an attribute cannot be copied
             return type(self)(self.name, self._where)
 
     @property
     def inside(self) -> Any:
-        """The environment itself, without what Gymnasium wraps it in."""
+        """The environment without Gymnasium's wrappers."""
         return self._env.unwrapped
 
     def _numbered(self, kind: str, space: Any) -> Numbering:
@@ -200,7 +203,7 @@ class NumberedEnvironment:
             raise BadInput(f"{self.which}: its {kind} space is {space}: supported are {SUPPORTED}") from None
 
     def _cells(self) -> CellNumbering | None:
-        """Those of a box; None for another space. Raises BadInput for a box that has too many axes, or no bounds."""
+        """The numbering of a box by cells, None for other spaces. Raises BadInput if the box has too many axes, or no bounds."""
         space = self._env.observation_space
         if not isinstance(space, spaces.Box):
             return None
@@ -214,7 +217,7 @@ class NumberedEnvironment:
         return WorkFailed(f"{self.which}: {what}: {why}")
 
     def begin(self, seed: int | None) -> int:
-        """A new episode's first state; a seed begins all chance anew. Raises WorkFailed."""
+        """The first state of a new episode; a seed resets the generator. Raises WorkFailed."""
         try:
             with quiet():
                 observation, _ = self._env.reset(seed=seed)
@@ -224,7 +227,7 @@ class NumberedEnvironment:
         return self._state
 
     def step(self, action: int) -> Moved:
-        """One step. Raises WorkFailed for what is no step: an error, a state outside the space, a reward that is no number."""
+        """The outcome of a step. Raises WorkFailed on an error, and for states or rewards that are not allowed."""
         try:
             observation, reward, terminated, truncated, info = self._env.step(self._choices[action])
             entered, worth, success = self.states.number(observation), float(reward), info.get("is_success")
@@ -236,16 +239,16 @@ class NumberedEnvironment:
         return Moved(worth, entered, bool(terminated), bool(truncated), None if success is None else bool(success))
 
     def _placeable(self) -> Any:
-        """A copy to draw any state with, when its state is kept where Gymnasium's own toy texts keep it; else None."""
+        """A copy for drawing any state; None unless the state is the attribute `s`, as in Gymnasium's toy-text environments."""
         if len(self.states.sizes) != 1 or self.states.value(self.first) != getattr(self.inside, "s", None):
             return None
         try:
             return deepcopy(self.inside)
-        except Exception:  # it is drawn where it is
+        except Exception:  # only the current state is drawn then
             return None
 
     def picture(self, state: int) -> str:
-        """The environment's own text for a state, with escape codes for colours; "" when it draws none, or not this one."""
+        """The environment's text for a state, with escape codes for colours; "" if it cannot draw this state."""
         if not self._draws or (self._canvas is None and state != self._state):
             return ""
         canvas = self._canvas or self.inside
@@ -254,6 +257,6 @@ class NumberedEnvironment:
                 canvas.s, canvas.lastaction = self.states.value(state), None
             with quiet():
                 text = canvas.render()
-        except Exception:  # a picture that fails is no reason to end a session
+        except Exception:  # a failed picture does not end a session
             return ""
         return text.strip("\n") if isinstance(text, str) else ""

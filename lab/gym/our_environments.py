@@ -20,7 +20,7 @@ from lab.tasks.task import TAUGHT_WITH
 from lab.tasks.task_file import load, load_cell, load_world
 from lab.view.value_levels import GridPlanes
 
-ROOM = 10  # an episode in a cell may take so many times the decisions that its parts need at most
+ROOM = 10  # the limit of decisions of an episode in a cell, as a multiple of the most that its parts need
 METADATA: dict[str, Any] = {"render_modes": ["ansi"], "render_fps": 4}
 
 Info = dict[str, Any]
@@ -28,7 +28,7 @@ Places = NDArray[np.int64]
 
 
 class TableEnv(gymnasium.Env[Any, Any]):
-    """A problem in a table: the state's number is observed, info["is_success"] says whether a goal was reached.
+    """A tabular problem; observed is the number of the state, and info["is_success"] says whether it is a goal.
 
     P and initial_state_distrib, as in Gymnasium's own toy texts, hold the whole problem. Episodes are truncated after
     `max_episode_steps` moves; None: never.
@@ -46,7 +46,7 @@ class TableEnv(gymnasium.Env[Any, Any]):
 
     @cached_property
     def P(self) -> dict[int, dict[int, list[tuple[float, int, float, bool]]]]:
-        """What each action in each state leads to: chance, state, reward, whether the episode ends."""
+        """The outcomes of each action in each state: (probability, state, reward, whether the episode ends)."""
         mdp = self.mdp
         ends = mdp.terminal[mdp.successor] | mdp.terminal[:, None]
         rows = zip(mdp.successor.tolist(), mdp.reward.tolist(), ends.tolist(), strict=True)
@@ -57,19 +57,19 @@ class TableEnv(gymnasium.Env[Any, Any]):
 
     @property
     def initial_state_distrib(self) -> FloatArray:
-        """The chance (S,) of beginning in each state."""
+        """The distribution (S,) of the starts."""
         chances = np.zeros(self.mdp.n_states)
         chances[list(self.starts)] = 1.0 / len(self.starts)
         return chances
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[int, Info]:
-        """The start, or one of several."""
+        """The start, drawn if there are several, and info."""
         super().reset(seed=seed)
         self.s, self._moves = self.starts[int(self.np_random.integers(len(self.starts)))], 0
         return self.s, {"is_success": False}
 
     def step(self, action: int) -> tuple[int, float, bool, bool, Info]:
-        """The table's row."""
+        """The outcome in the table."""
         mdp, left = self.mdp, self.s
         self.s, self._moves = int(mdp.successor[left, action]), self._moves + 1
         terminated = bool(mdp.terminal[self.s])
@@ -118,15 +118,15 @@ class InsertEnv(TableEnv):
 
 
 class CellEnv(gymnasium.Env[Any, Any]):
-    """Which part the one robot of a cell moves next, so that all are finished early.
+    """The decision which part the single robot of a cell moves next, in order to finish all parts early.
 
-    An action is a decision of a sequence (see `lab.sequencing.simulate.run.Run`), counted from 0: the part, + the number of parts
-    for the second way it has. Observed: the position of each part on its route, part 1 first, and the robot's station;
-    what a machine still needs is not (info["ready_s"] says when each part may be picked). The reward is minus the
-    seconds that passed, so that the return is minus the makespan. info["action_mask"]: what is allowed now; anything
-    else changes nothing and costs as much as the slowest decision can (`penalty_s`), so that it never pays. A deadlock
-    ends the episode: its return, penalties aside, is then minus `stuck_cost`. chance: processing times and arrivals are
-    drawn anew in each episode.
+    Actions are decisions (see `lab.sequencing.simulate.run.Run`), counted from 0: the part, plus the number of parts for the
+    second option of its next transfer. Observed are the position of each part on its route, part 1 first, and the robot's
+    station, but not the remaining processing times; info["ready_s"] says when each part can be picked [s].
+    The reward is minus the time that passed [s], so the return is minus the makespan. info["action_mask"] says which actions are
+    allowed; any other action changes nothing and costs `penalty_s`, the duration of the slowest decision. A deadlock ends the
+    episode, whose return, apart from penalties, is then minus `stuck_cost`.
+    chance: if given, processing times and arrivals are drawn anew in each episode.
     """
 
     metadata = METADATA
@@ -151,13 +151,13 @@ class CellEnv(gymnasium.Env[Any, Any]):
         self._allowed = self._run.allowed()
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Places, Info]:
-        """All parts before their first station, the robot where it starts."""
+        """The observation and info with all parts before their first station and the robot at its start."""
         super().reset(seed=seed)
         self._begin(Episode(self.cell, self.chance, int(self.np_random.integers(1 << 63))))
         return self._observed(), self._info()
 
     def step(self, action: int) -> tuple[Places, float, bool, bool, Info]:
-        """The decision, carried out until the robot has set the part down."""
+        """The outcome of the decision, when the robot has set the part down."""
         run, decision = self._run, self._decisions[action]
         before_s, self._steps = run.now_s, self._steps + 1
         if decision in self._allowed:
@@ -172,11 +172,11 @@ class CellEnv(gymnasium.Env[Any, Any]):
         return self._observed(), reward, terminated, truncated, self._info()
 
     def action_masks(self) -> NDArray[np.int8]:
-        """Which actions are allowed now, (A,) of 0 and 1; under the name that learners with masks ask for."""
+        """The allowed actions, (A,) int8 of 0 and 1; the name is the one that learners with masks use."""
         return np.array([decision in self._allowed for decision in self._decisions], np.int8)
 
     def render(self) -> str | None:
-        """Where the robot and each part are, and when parts may be picked."""
+        """The positions of robot and parts, and when parts can be picked, as text; None unless the render mode is "ansi"."""
         if self.render_mode != "ansi":
             return None
         run, cell = self._run, self.cell
@@ -197,7 +197,7 @@ class CellEnv(gymnasium.Env[Any, Any]):
 
 
 def _slowest_s(cell: Cell) -> float:
-    """What no decision exceeds unless times are drawn: the longest of all that a robot may do or wait for [s]."""
+    """An upper bound [s] on the duration of a decision, for times that are not drawn."""
     travel_s = sum(float(np.nanmax(table, initial=0.0)) for table in (cell.empty_s, cell.loaded_s))
     service_s = max((option.service_s for place in cell.positions for option in place.options), default=0.0)
     process_s = max(place.processing_s or 0.0 for place in cell.positions)
@@ -232,7 +232,7 @@ ENVIRONMENTS: dict[str, tuple[type[TableEnv] | type[CellEnv], dict[str, Any]]] =
 
 
 def register() -> None:
-    """Registers every environment of ENVIRONMENTS that is not registered yet."""
+    """Registers the environments of ENVIRONMENTS that are not registered yet."""
     for name, (made, keywords) in ENVIRONMENTS.items():
         if name not in gymnasium.registry:
             gymnasium.register(name, f"{__name__}:{made.__name__}", kwargs=keywords)

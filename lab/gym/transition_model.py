@@ -1,4 +1,4 @@
-"""Problems whose steps are left to chance, in tables: what each action may lead to, the best that can be had, exactly."""
+"""Models of stochastic problems as tables of outcomes: optimal values, and the exact worth of policies."""
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
@@ -12,16 +12,16 @@ from numpy.typing import NDArray
 from lab.errors import WorkFailed
 from lab.mdp import MAX_SWEEPS, BoolArray, FloatArray, IntArray
 
-SETTLED = 1e-12  # changes of a value, and chances, below this are none
+SETTLED = 1e-12  # changes of values, and probabilities, below this count as 0
 SAME_REWARD = 1e-9
 
-Transition = tuple[float, int, float, bool]  # chance, state entered, reward, the episode is over
+Transition = tuple[float, int, float, bool]  # probability, state entered, reward, whether the episode ends
 Transitions = Mapping[int, Mapping[int, Sequence[Transition]]]  # [state][action], as Gymnasium's toy texts hold it
-Actions = NDArray[np.int64]  # (S,) the one that a policy takes in each state
+Actions = NDArray[np.int64]  # (S,) the action of a policy in each state
 
 
 class Worth(NamedTuple):
-    """What a policy brings: its mean return (not discounted), the chance of a goal, the mean steps of the way to one."""
+    """The worth of a policy: the undiscounted mean return, the probability of reaching a goal, the mean steps to it."""
 
     mean_return: float
     reaches: float
@@ -29,15 +29,15 @@ class Worth(NamedTuple):
 
 
 class TransitionModel:
-    """A problem left to chance: its outcomes side by side, and the chance (S,) of starting in each state.
+    """A stochastic problem: the outcomes of all actions, and the distribution (S,) of the starts.
 
-    live (S,) bool: states in which an episode can go on; terminal (S,) bool: those it can only end in, and
-    those that hold an ended one; best: the highest reward of a step that ends an episode, -inf when none does; goal (S,)
-    bool: terminal states entered with it; certain: no step is left to chance.
+    live: (S,) bool, the states in which an episode can continue; terminal: (S,) bool, the states in which episodes end, and
+    absorbing states; best: the highest reward of a step that ends an episode, -inf if there is none; goal: (S,) bool, the
+    terminal states entered with that reward; certain: whether all steps are deterministic.
     """
 
     def __init__(self, outcomes: Transitions, starts: FloatArray, n_actions: int):
-        """Raises KeyError, IndexError, TypeError or ValueError when the outcomes are none of such a problem."""
+        """Raises KeyError, IndexError, TypeError or ValueError if the outcomes do not form such a problem."""
         self.starts, self.n_states, self.n_actions = starts, len(starts), n_actions
         rows = [
             (state * n_actions + action, *outcome)
@@ -61,8 +61,8 @@ class TransitionModel:
         self.goal = np.zeros(self.n_states, bool)
         self.goal[self._entered[wins]] = True
         self.goal &= self.terminal
-        self._wins = self._summed(wins.astype(np.float64))  # (S, A) the chance of a goal at this very step
-        self.gain = self._summed(self._reward)  # (S, A) the reward to be expected
+        self._wins = self._summed(wins.astype(np.float64))  # (S, A) the probability that this step reaches a goal
+        self.gain = self._summed(self._reward)  # (S, A) the expected reward
         self.gain[self.terminal] = 0.0
 
     def _check(self) -> None:
@@ -80,7 +80,7 @@ class TransitionModel:
         return np.bincount(self._row, self._chance * values, size).reshape(self.n_states, -1).astype(np.float64)
 
     def _live(self) -> BoolArray:
-        """The states that can be reached without an end, those of the start among them."""
+        """The states that can be reached without ending the episode, starts included."""
         goes = ~self._over
         origin, entered = self._row[goes] // self.n_actions, self._entered[goes]
         live = self.starts > 0.0
@@ -91,13 +91,13 @@ class TransitionModel:
 
     @cached_property
     def certain(self) -> bool:
-        """Whether each action of a state that can be met has one outcome."""
+        """Whether each action has one outcome in each reachable state."""
         met = self.live[self._row // self.n_actions]
         keys = np.stack([self._row, self._entered, self._over], axis=1)[met]
         return len(np.unique(keys, axis=0)) == len(np.unique(self._row[met]))
 
     def allows(self, state: int, action: int, entered: int, reward: float, over: bool) -> bool:
-        """Whether a step that was seen is one that the model knows."""
+        """Whether an observed step is an outcome of the model."""
         row = state * self.n_actions + action
         first, end = np.searchsorted(self._row, (row, row + 1))
         those = slice(int(first), int(end))
@@ -105,10 +105,10 @@ class TransitionModel:
         return bool((same & (np.abs(self._reward[those] - reward) <= SAME_REWARD)).any())
 
     def likeliest(self) -> IntArray:
-        """The state (S, A) that each action most likely leads to; a terminal one leads to itself.
+        """The most probable successor (S, A) of each action; terminal states lead to themselves.
 
-        Of several that are equally likely it is the middle one in the model's order: where an agent slips, Gymnasium
-        lists the intended move between the two slips.
+        Of equally probable ones it is the middle one in the model's order, because Gymnasium lists the intended move of a
+        slippery step between the two slips.
         """
         likeliest: IntArray = np.repeat(np.arange(self.n_states, dtype=np.int32)[:, None], self.n_actions, axis=1)
         steps = zip(self._row.tolist(), self._entered.tolist(), self._chance.tolist(), strict=True)
@@ -123,7 +123,7 @@ class TransitionModel:
 
     @cached_property
     def _onward(self) -> Any:
-        """The chances (S * A, S) of going on in a state, as a scipy.sparse array."""
+        """The probabilities (S * A, S) of continuing in each state, as a scipy.sparse array."""
         from scipy.sparse import csr_array
 
         goes = ~self._over & ~self.terminal[self._row // self.n_actions]
@@ -131,7 +131,7 @@ class TransitionModel:
         return csr_array((self._chance[goes], (self._row[goes], self._entered[goes])), shape=size)
 
     def optimal(self, discount: float) -> FloatArray:
-        """The optimal action values (S, A) by value iteration; 0 in terminal states. WorkFailed when they do not settle."""
+        """The optimal action values (S, A) by value iteration, 0 in terminal states. Raises WorkFailed if they diverge."""
         q: FloatArray = self.gain
         for _ in range(MAX_SWEEPS):
             updated = self.gain + discount * (self._onward @ q.max(axis=1)).reshape(q.shape)
@@ -142,7 +142,7 @@ class TransitionModel:
         raise WorkFailed(f"value iteration with discount {discount} did not settle in {MAX_SWEEPS} sweeps")
 
     def worth(self, policy: Actions, horizon: int) -> Worth:
-        """What following a policy (S,) brings in episodes of at most so many steps."""
+        """The worth of a policy (S,) in episodes of at most `horizon` steps."""
         states = np.arange(self.n_states)
         goes = self._onward[states * self.n_actions + policy].T.tocsr()  # (S, S), to state row from state column
         gain, wins = self.gain[states, policy], self._wins[states, policy]

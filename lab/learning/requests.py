@@ -183,7 +183,9 @@ class AdviceRequest(Request):
         >>> import lab
         >>> def advise(request: lab.AdviceRequest) -> int | None:
         ...     return request.mdp.action_labels.index("right") if request.step == 1 else None
-        >>> lab.teach(lab.grid((3, 3), [[0] * 3] * 3, (0, 0), (2, 2), None, ("up", "down", "left", "right")), advisor=advise)
+        >>> board = lab.grid((3, 3), [[0] * 3] * 3, (0, 0), (2, 2), None, ("up", "down", "left", "right"))
+        >>> lab.teach(board, advisor=advise, gate="always", episodes=20).session.helped_steps
+        20
     """
 
     mdp: TabularMDP

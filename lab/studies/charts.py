@@ -1,6 +1,6 @@
-"""What the pictures of several studies share: bars by group, curves with intervals, and a legend below.
+"""Chart elements of several studies: grouped bars, curves with intervals, and a legend below the plots.
 
-What the thesis prints stands beside what was measured as a hollow diamond. The same data gives the same bytes.
+Hollow diamonds mark the values that the thesis prints. The same data gives the same bytes.
 """
 
 from collections.abc import Mapping, Sequence
@@ -34,11 +34,11 @@ PRINTED: dict[str, Any] = {
 def bars(
     groups: Sequence[str], lines: Mapping[str, Sequence[Row]], ylabel: str, *, xlabel: str = "", label: str = ""
 ) -> bytes:
-    """Bars of several series side by side as SVG, group by group, such as settings by the advisor's tau.
+    """An SVG picture of grouped bars, such as settings (series) by the advisor's tau (groups).
 
-    lines: for each series a row for each group, whose value, interval and printed figure may be None; label: the name
-    of what is written on a bar, such as "rank". Raises BadInput for lines that do not fit the groups and for more than
-    six series. Source: thesis tables 9.2-9.5, figs. 9.7-9.13.
+    lines: for each series a row per group, whose value, interval and printed figure may be None; label: the key of the text on a
+    bar, such as "rank". Raises BadInput if the rows do not fit the groups, and for more than six series.
+    Source: thesis tables 9.2-9.5, figs. 9.7-9.13.
     """
     if not 1 <= len(lines) <= len(SERIES):
         raise BadInput(f"picture of {len(lines)} series: allowed 1 to {len(SERIES)}")
@@ -69,7 +69,7 @@ def bars(
 
 
 def curve(axes: "Axes", rows: Sequence[Row], by: str, look: Look) -> None:
-    """The values of rows against one of their settings, and a band for their intervals."""
+    """Draws the values of rows over one of their settings, with a band for the intervals."""
     colour, marker, name = look
     x, y = [one[by] for one in rows], [one["value"] for one in rows]
     low, high = ([(one["ci95"] or [one["value"]] * 2)[end] for one in rows] for end in (0, 1))
@@ -78,7 +78,7 @@ def curve(axes: "Axes", rows: Sequence[Row], by: str, look: Look) -> None:
 
 
 def legend_below(figure: "Figure", handles: Mapping[str, "Artist"] | None = None) -> None:
-    """One legend of all plots below them, name -> what is drawn, in as many columns as fit; None: whatever has a name."""
+    """Draws one legend below all plots, in as many columns as fit; handles: by name, None for all artists with labels."""
     if handles is None:
         found = [axes.get_legend_handles_labels() for axes in figure.axes]
         handles = {name: handle for some, names in found for handle, name in zip(some, names, strict=True)}
@@ -88,7 +88,7 @@ def legend_below(figure: "Figure", handles: Mapping[str, "Artist"] | None = None
 
 
 def _top(one: Row) -> float:
-    """The highest that is drawn of a row."""
+    """The greatest height that is drawn for a row."""
     heights = (one["value"], *(one["ci95"] or ()), one["thesis"])
     return max((float(height) for height in heights if height is not None), default=0.0)
 

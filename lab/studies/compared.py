@@ -1,4 +1,4 @@
-"""Settings of learner, gate and advisor compared in one problem: many sessions each, all settings with the same chances."""
+"""Comparison of settings of learner, gate and advisor in one problem: many sessions each, with the same seeds for all."""
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
@@ -45,12 +45,12 @@ if TYPE_CHECKING:
 Result = tuple[Row, "Sessions"]
 COLOURS = (BLUE, ORANGE, GREEN, RED, PURPLE, SKY, GREY)
 DASHES = ("-", "--", ":", "-.")
-MOST_CURVES = 12  # more cannot be told apart
-MOST_DOTS = 60  # lines of text of a picture
+MOST_CURVES = 12  # more could not be distinguished
+MOST_DOTS = 60  # lines of a picture
 
 
 def figures(results: Sequence[Result]) -> dict[str, bytes]:
-    """By caption, as SVG; of many settings the first, which the caption says."""
+    """SVG pictures by caption; if there are many settings, of the best ones."""
     ranked = sorted(results, key=lambda one: (-one[1].solved.mean(), one[1].mean_steps.mean()))
     most = "" if len(ranked) <= MOST_DOTS else f", the best {MOST_DOTS} of {len(ranked)} settings"
     several = "" if len(ranked) <= MOST_CURVES else f", the best {MOST_CURVES} of {len(ranked)} settings"
@@ -61,14 +61,14 @@ def figures(results: Sequence[Result]) -> dict[str, bytes]:
 
 
 def words(named: Row, among: Sequence[Row]) -> str:
-    """A setting by what differs among several: "ccrl, expert, psi 0.1"."""
+    """A setting in words, by the options that differ among several: "ccrl, expert, psi 0.1"."""
     varies = [name for name in named if len({repr(one[name]) for one in among}) > 1] or [*named][:1]
     plain = ("advisor", "gate", "learner", "selection")
     return ", ".join(str(named[name]) if name in plain else f"{name} {named[name]}" for name in varies)
 
 
 def _dots(results: Sequence[Result]) -> bytes:
-    """A line a setting, a column a measure."""
+    """A picture with a line per setting and a column per measure."""
     names = [words(named, [other for other, _ in results]) for named, _ in results]
 
     def draw(figure: "Figure") -> None:
@@ -113,12 +113,12 @@ def _curves(results: Sequence[Result]) -> bytes:
     return picture_bytes(draw, 8.0, 4.2)
 
 
-# ---- compared sessions ------------------------------------------------------------------------------------------------
+# ---- the sessions of a setting --------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, eq=False)
 class Sessions:
-    """What N sessions of E episodes came to: curve (E,) the mean steps of each episode; the others (N,), one a session."""
+    """The results of N sessions of E episodes: curve (E,), the mean steps by episode; all others (N,), by session."""
 
     curve: FloatArray
     solved: BoolArray
@@ -130,12 +130,12 @@ class Sessions:
     rejected: BoolArray
 
     def to_json(self) -> dict[str, list[float]]:
-        """Plain lists."""
+        """The arrays as lists of floats, by name."""
         return {name: np.asarray(value, np.float64).tolist() for name, value in vars(self).items()}
 
     @classmethod
     def from_json(cls, record: Mapping[str, list[float]], sessions: int) -> "Sessions":
-        """What `to_json` wrote of so many sessions. Raises KeyError, TypeError or ValueError for anything else."""
+        """The results that `to_json` wrote. Raises KeyError, TypeError or ValueError for anything else."""
         kinds = {"solved": np.bool_, "rejected": np.bool_}
         found: dict[str, Any] = {
             name: np.array(record[name], kinds.get(name, np.float64)) for name in cls.__dataclass_fields__
@@ -145,7 +145,7 @@ class Sessions:
         return cls(**found)
 
 
-# ---- compared ---------------------------------------------------------------------------------------------------------
+# ---- the comparison -------------------------------------------------------------------------------------------------
 
 
 MOST_SETTINGS = 1000
@@ -160,9 +160,9 @@ MEASURES = (
 
 @dataclass(frozen=True)
 class Compared:
-    """What is compared: a problem (see `lab.teaching.subjects`), advisors, and values of settings by name.
+    """A comparison: the problem (see `lab.teaching.subjects`), the advisors, and the values of settings by name.
 
-    Each combination is a setting. Raises BadInput for an empty list and for more than MOST_SETTINGS combinations.
+    Each combination is one `Setting`. Raises BadInput for an empty list and for more than MOST_SETTINGS combinations.
     """
 
     problem: Teachable
@@ -189,7 +189,7 @@ class Compared:
 
 @dataclass(frozen=True, eq=False)
 class Setting:
-    """One combination: an advisor, and a value of each setting that is given."""
+    """One combination: an advisor, and a value for each of the compared settings."""
 
     of: Compared
     advisor: str | Advisor | Ask
@@ -197,19 +197,22 @@ class Setting:
 
     @property
     def named(self) -> Row:
-        """What the rows call it."""
+        """The combination by name, for rows."""
         values = {name: value.__name__ if isinstance(value, type) else value for name, value in self.values}
         return {"advisor": str(Advising.of([self.advisor])), **values}
 
     def subject(self) -> Subject:
-        """What is learned, with this setting's values. BadInput for a value that cannot be."""
+        """The subject with this setting's values. Raises BadInput for an invalid value."""
         subject = subject_from(self.of.problem, self.of.task, self.of.sight)
         subject.settings = subject.settings.changed("--", **dict(self.values))
         return subject
 
 
 def compared(what: Compared, job: Job) -> Findings:
-    """The sessions of every setting, those that the job's folder holds read from it. BadInput before any of them is run."""
+    """The findings from the sessions of every setting; those in the job's folder are not repeated.
+
+    Raises BadInput for an invalid value before any session is run.
+    """
     settings = list(what.settings())
     for setting in settings:
         setting.subject()
@@ -232,7 +235,7 @@ def compared(what: Compared, job: Job) -> Findings:
 
 
 def sessions_of(setting: Setting, sessions: int, seed: int, stream: int | None = None) -> Sessions:
-    """So many sessions of a setting: compiled where learner, gate and advisor are, else one by one; stream: other chances."""
+    """The results of sessions of a setting, compiled if learner, gate and advisor are; stream: selects other seeds."""
     for kind, word in setting.of.files.values():
         take(FAMILIES[kind], word)
     subject, problem = setting.subject(), prepared(setting.of, seed)
@@ -262,7 +265,7 @@ def sessions_of(setting: Setting, sessions: int, seed: int, stream: int | None =
 def _alone(
     environment: Environment, learner: LearnerSettings, gate: GateSettings, advising: Advising, seed: int
 ) -> tuple[bool, NDArray[np.int64], FloatArray, int, int, int]:
-    """One session in the readable loop: rejected, steps (E,), q (S, A), helped steps, requests, misleads."""
+    """(rejected, steps (E,), q (S, A), helped steps, requests, misleads) of one session that is not compiled."""
     rng = np.random.default_rng(seed)
     advisor = advising.gather(environment, learner, rng)
     one = Session(environment, learner, gate, advisor, rng).run()
@@ -272,7 +275,7 @@ def _alone(
 
 
 def rows_of(named: Row, found: Sessions) -> list[Row]:
-    """The measures of one setting."""
+    """The rows of one setting, one per measure."""
     return [
         share_row(named, "solved_percent", found.solved),
         mean_row(named, "mean_steps", found.mean_steps),
@@ -283,7 +286,7 @@ def rows_of(named: Row, found: Sessions) -> list[Row]:
 
 
 def in_short(results: "Iterator[tuple[Row, Sessions]] | Any") -> Row:
-    """The setting that solves the most, of these the one with the least mean steps."""
+    """The summary: the setting that solves most sessions, of equal ones the one with the fewest mean steps."""
     named, best = max(results, key=lambda one: (one[1].solved.mean(), -one[1].mean_steps.mean()))
     what = ", ".join(f"{name} {value}" for name, value in named.items())
     return {"best": what, "best solves [%]": round(100 * float(best.solved.mean()), 1)}
@@ -295,14 +298,14 @@ def _surveyed(problem: str, task: str | None, sight: str | None, seed: int) -> P
 
 
 def prepared(what: Compared, seed: int) -> Problem:
-    """The problem, surveyed once in this process where it has a name."""
+    """The problem; one with a name is surveyed once per process."""
     if isinstance(what.problem, str):
         return _surveyed(what.problem, what.task, what.sight, seed)
     return subject_from(what.problem, what.task, what.sight).prepare(seed)
 
 
 def key_of(setting: Setting, problem: Problem, job: Job) -> str:
-    """What names a setting's sessions among those that are kept."""
+    """The key of a setting's sessions in the job's folder."""
     how = setting.subject().settings
     region = None if setting.of.sight is None else setting.of.sight
     whole: list[Any] = [__version__, problem.mdp.signature, region, setting.named, vars(how.learner), vars(how.gate)]

@@ -1,4 +1,4 @@
-"""A study's rows as one self-contained page, with what the thesis prints beside them, and as a CSV file."""
+"""The report of a study: its rows, beside the printed values, as a self-contained HTML page and as a CSV file."""
 
 import csv
 import json
@@ -20,19 +20,26 @@ Line = tuple[tuple[str, Any], ...]  # some settings of a row
 
 RESULTS = ("measure", "value", "ci95", "thesis", *JUDGED, "lab_version")  # every other key of a row is a setting
 COLUMNS = ("measure", "value", "ci95_low", "ci95_high", "thesis", *JUDGED, "lab_version")  # in a CSV file
-WHERE_KNOWN = JUDGED[1:]  # columns that stand there only if a row has them
-TABLE_KEYS = ("table", "environment", "case", "world", "view", "problem")  # rows that agree in these are one table
+WHERE_KNOWN = JUDGED[1:]  # columns that are written only if a row has them
+TABLE_KEYS = (
+    "table",
+    "environment",
+    "case",
+    "world",
+    "view",
+    "problem",
+)  # rows with equal values here are in one table
 METHOD_KEYS = ("gate", "method", "name")
 SYMBOLS = {"beta": "β", "tau": "τ", "lambda_threshold": "Λ", "omega": "Ω", "psi": "Ψ"}
 LARGEST = 10  # differences that are listed
 MARKS = {True: ("in", "✓", "inside"), False: ("out", "✗", "outside"), None: ("", "–", "nothing printed")}
-SIGNS = {"within_errors": "e", "used": "u", "easy": "n"}  # behind a printed figure
+SIGNS = {"within_errors": "e", "used": "u", "easy": "n"}  # shown behind a printed figure
 TEMPLATE = Path(__file__).with_name("report.html")
 
 
 @dataclass(frozen=True)
 class TableCell:
-    """A cell of a table: its text, what stands small behind it, and whether a printed figure agrees; span: a headline."""
+    """A cell of a table: its text, small text behind it, whether a printed figure agrees; span: columns of a headline."""
 
     text: str
     kind: str = "number"
@@ -59,9 +66,9 @@ class Table:
 
 
 def write_report(path: Path, title: str, name: str, found: Findings) -> None:
-    """Write one HTML file that needs neither network nor scripts; beside `path` first, then renamed.
+    """Writes the HTML page, which needs neither network nor scripts, atomically.
 
-    Raises BadInput for a figure that is neither SVG nor PNG, WorkFailed when the file cannot be written.
+    Raises BadInput for a figure that is neither SVG nor PNG, WorkFailed if the file cannot be written.
     """
     from jinja2 import Environment, StrictUndefined
 
@@ -86,10 +93,10 @@ def write_report(path: Path, title: str, name: str, found: Findings) -> None:
 
 
 def write_rows(path: Path, rows: Sequence[Row]) -> None:
-    """Write rows as CSV: all settings, then COLUMNS with the lab's version; beside `path` first, then renamed.
+    """Writes rows as CSV, atomically: all settings, then COLUMNS, with the lab's version.
 
-    Numbers and true/false as in JSON, None as nothing, text as it is.
-    Raises BadInput for a value that is none of these, WorkFailed when the file cannot be written.
+    Numbers and booleans are written as in JSON, None as an empty cell, text unchanged.
+    Raises BadInput for other values, WorkFailed if the file cannot be written.
     """
     settings = dict.fromkeys(key for row in rows for key in row if key not in RESULTS)
     taken = [name for name in settings if name in COLUMNS]
@@ -109,7 +116,7 @@ def write_rows(path: Path, rows: Sequence[Row]) -> None:
 def _cell(name: str, value: Any) -> str:
     """A value as the text of a CSV cell."""
     plain = value.item() if hasattr(value, "item") else value  # numpy's numbers
-    if plain is None or (isinstance(plain, str) and "\r" not in plain):  # which Python's writer would not quote
+    if plain is None or (isinstance(plain, str) and "\r" not in plain):  # a carriage return would not be quoted
         return plain or ""
     if not isinstance(plain, int | float) or not isfinite(plain):
         raise BadInput(f"study rows: {name} = {value!r}; allowed: plain text, finite numbers, true, false, null")
@@ -117,7 +124,7 @@ def _cell(name: str, value: Any) -> str:
 
 
 def write_file(path: Path, text: str) -> None:
-    """Write a file of a study, and its folder; WorkFailed when that cannot be."""
+    """Writes a file of a study and creates its folder. Raises WorkFailed if it cannot be written."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         files.write_whole(path, text.encode(errors="backslashreplace"))
@@ -126,7 +133,7 @@ def write_file(path: Path, text: str) -> None:
 
 
 def _apart(rows: Sequence[Row]) -> Table | None:
-    """Agreement by both rules, counted apart for cells that were used to choose, that were not, and easy ones."""
+    """The table of agreement by both rules, for rows used to choose settings, for other rows, and for easy ones."""
     parts = counts([dict(row) for row in rows if row.get("within") is not None])
     lines = [
         [TableCell(name, ""), *(TableCell(share_within(of, judged)) for judged in ("within", "within_errors"))]
@@ -137,7 +144,7 @@ def _apart(rows: Sequence[Row]) -> Table | None:
 
 
 def _agreement(rows: Sequence[Row]) -> Table | None:
-    """How many cells agree with the thesis: one line a table and method, one column a measure."""
+    """The table of how many rows agree with the thesis: a line per table and method, a column per measure."""
     compared = [row for row in rows if row.get("within") is not None]
     if not compared:
         return None
@@ -164,7 +171,7 @@ def _shares(rows: Sequence[Row], measures: Sequence[str]) -> list[TableCell]:
 
 
 def _largest(rows: Sequence[Row]) -> Table:
-    """The differences from print that are the largest beside what is allowed."""
+    """The table of the largest differences from printed values, relative to what is allowed."""
     compared = [row for row in rows if _known(row.get("value")) and _known(row.get("thesis"))]
     lines = [
         [
@@ -186,7 +193,7 @@ def _excess(row: Row) -> float:
 
 
 def _tables(rows: Sequence[Row]) -> list[Table]:
-    """All cells: a table for each world and view (or case), a line for each combination of the other settings."""
+    """The tables of all rows: one for each world and view (or case), with a line per combination of the other settings."""
     tables: dict[Line, list[Row]] = {}
     for row in rows:
         tables.setdefault(_settings(row, [key for key in TABLE_KEYS if row.get(key) is not None]), []).append(row)
@@ -194,7 +201,7 @@ def _tables(rows: Sequence[Row]) -> list[Table]:
 
 
 def _all_cells(place: Line, rows: Sequence[Row]) -> Table:
-    """One table; settings that never vary in it stand in its caption."""
+    """One table; its caption names the settings that do not vary in it."""
     names = dict.fromkeys(key for row in rows for key, _ in _settings(row) if key not in TABLE_KEYS)
     varying = [name for name in names if len({_text(row.get(name)) for row in rows}) > 1]
     measures = dict.fromkeys((row["measure"] for row in rows), False)
@@ -236,7 +243,7 @@ def _result(row: Row, printed: bool) -> list[TableCell]:
 
 
 def _signs(row: Row) -> str:
-    """What else is said of a printed figure, a letter each: see report.html."""
+    """Letters for further judgements of a printed figure, see report.html."""
     return " ".join(sign for name, sign in SIGNS.items() if row.get(name))
 
 
@@ -246,7 +253,7 @@ def _settings(row: Row, names: Iterable[str] | None = None) -> Line:
 
 
 def _source(caption: str, picture: bytes) -> str:
-    """A picture as the address of an image."""
+    """A picture as a data URL."""
     start = picture[:200].lstrip()
     kind = "png" if start.startswith(b"\x89PNG") else "svg+xml" if start.startswith((b"<?xml", b"<svg")) else None
     if kind is None:
@@ -285,7 +292,7 @@ def _known(value: Any) -> bool:
 
 
 def _number(value: float | None) -> str:
-    """A measured number for reading, with two to four digits."""
+    """A measured number as text with two to four digits."""
     if value is None or not isfinite(value):
         return "–" if value != inf else "∞"
     size = abs(value)

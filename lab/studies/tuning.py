@@ -1,4 +1,4 @@
-"""Settings of learner and gate tuned to a problem, and what that gains over its own on seeds that were not seen."""
+"""Tuning of the settings of learner and gate to a problem, and the gain over its own settings on unseen seeds."""
 
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -30,15 +30,15 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-BATCH = 8  # trials that are asked for at once, whatever the number of workers
+BATCH = 8  # trials per round, whatever the number of workers
 Values = dict[str, Any]
-# a rung and the settings that are still in it -> their costs, None for settings that cannot be
+# (rung, settings that are still in it) -> their costs, None for invalid settings
 Measure = Callable[[int, Sequence[Values]], list[float | None]]
 
 
 @dataclass(frozen=True)
 class Trial:
-    """Settings that were tried: their cost on each rung that they reached; pruned: they did not reach the last."""
+    """One trial: its settings, their cost on each rung that they reached, and whether they were pruned before the last."""
 
     number: int
     values: Values
@@ -49,11 +49,11 @@ class Trial:
 def search(
     ranges: Mapping[str, Range], first: Values, trials: int, seed: int, rungs: int, measure: Measure
 ) -> tuple[list[Trial], dict[str, float]]:
-    """Trials in order, and the importance of each setting for the cost (shares of 1; empty where it cannot be told).
+    """(trials, importances): the trials in order, and the importance of each setting (shares of 1; empty if unknown).
 
-    first: the settings of the first trial. On each rung but the last a trial is given up when it does worse than the median
-    of those that came to the end. Source of the sampler: Bergstra et al., NIPS 24 (2011); of the importances: Watanabe et al.,
-    IJCAI 2023. Raises BadInput without Optuna.
+    first: the settings of the first trial. On each rung but the last a trial is pruned if it is worse than the median of the
+    finished ones. Source of the sampler: Bergstra et al., NIPS 24 (2011); of the importances: Watanabe et al.,
+    IJCAI 2023. Raises BadInput if Optuna is not installed.
     """
     optuna = _optuna()
     kinds = {name: _distribution(optuna, allowed) for name, allowed in ranges.items()}
@@ -114,11 +114,11 @@ def _importances(optuna: Any, study: Any) -> dict[str, float]:
     return {name: float(share) for name, share in found.items()}
 
 
-# ---- tuning figures ---------------------------------------------------------------------------------------------------
+# ---- the figures ----------------------------------------------------------------------------------------------------
 
 
 def figures(trials: Sequence[Trial], importances: Mapping[str, float], gained: FloatArray) -> dict[str, bytes]:
-    """By caption, as SVG; gained (N,): of each unseen session."""
+    """SVG pictures by caption; gained: (N,), the gain of each unseen session."""
     found = {"Gain of each session over the problem's own settings, on unseen seeds": _gain(gained)}
     if importances:
         found["Which settings the cost hangs on"] = _importance(importances)
@@ -167,13 +167,13 @@ def _history(trials: Sequence[Trial]) -> bytes:
     return picture_bytes(draw, 6.5, 3.2)
 
 
-# ---- tuning -----------------------------------------------------------------------------------------------------------
+# ---- a tuning and its findings --------------------------------------------------------------------------------------
 
 
 FAMILIES: dict[str, Mapping[str, Any]] = {"learner": UPDATES, "gate": GATES, "selection": SELECTIONS}
-SHARES = (9, 3, 1)  # of the sessions of a trial that each rung has, one in so many: the last one has all
+SHARES = (9, 3, 1)  # each rung has the sessions of a trial divided by this; the last one has all
 UNSEEN = 400  # sessions of the comparison at the end
-UNSEEN_STREAM = 1_000_000  # their seeds are drawn apart from those of the rungs
+UNSEEN_STREAM = 1_000_000  # the stream of their seeds, apart from those of the rungs
 FILE = "settings.toml"
 OBJECTIVE = (
     "cost: the mean steps of a session's episodes (the area under the learning curve), a failed one as the step limit + 1; a "
@@ -184,9 +184,9 @@ OBJECTIVE = (
 
 @dataclass(frozen=True)
 class Tuning:
-    """What is tuned: a problem (see `lab.teaching.subjects`), who advises, settings that are held, and those looked for.
+    """A tuning: the problem (see `lab.teaching.subjects`), the advisor, settings with fixed values, the settings to tune.
 
-    Raises BadInput for a setting that cannot be tuned, is held as well, or is named twice, and for too few trials.
+    Raises BadInput for a setting that cannot be tuned, is also held, or is named twice, and for fewer than one trial.
     """
 
     problem: Teachable
@@ -210,20 +210,21 @@ class Tuning:
 
     @property
     def ranges(self) -> dict[str, Range]:
-        """Where each setting is looked for."""
+        """The search range of each setting."""
         return {name: RANGES[name] or tuple(sorted(FAMILIES[name])) for name in self.over}
 
     def setting(self, values: Values) -> Setting:
-        """These values beside those that are held."""
+        """The setting with these values and the held ones."""
         what = Compared(self.problem, (self.advisor,), {}, self.task, self.sight)
         return Setting(what, self.advisor, tuple({**self.held, **values}.items()))
 
 
 def tuned(what: Tuning, job: Job) -> Findings:
-    """Trials, then the best against the problem's own settings on seeds that it did not see; written beside, settings.toml.
+    """The findings: the trials, and the best one compared with the problem's own settings on unseen seeds.
 
-    job.sessions: of a trial that is not given up. What the job's folder holds is not run again, so that the same command goes
-    on, also with more trials. Raises BadInput for what does not fit, and WorkFailed where the folder cannot be written.
+    job.sessions: of a trial that is not pruned. Sessions in the job's folder are not repeated, so the same command continues,
+    also with more trials; settings.toml is written there. Raises BadInput for unsuitable settings, WorkFailed if a file cannot be
+    written.
     """
     own = what.setting({}).subject().settings
     plain = vars(own.learner) | vars(own.gate)
@@ -260,23 +261,23 @@ def costs(found: Sessions, limit: int) -> FloatArray:
 
 
 def _within(value: Any, allowed: Range) -> Any:
-    """A value, or what lies nearest to it among those that are tried."""
+    """The value, or the nearest one in the search range."""
     if isinstance(allowed, Span):
         return type(allowed.low)(min(max(value, allowed.low), allowed.high))
     return value if value in allowed else allowed[0]
 
 
 class _Kept:
-    """Sessions of settings, read from the job's folder where they are there."""
+    """The sessions of settings, which are read from the job's folder if they are there."""
 
     def __init__(self, what: Tuning, job: Job):
         own = what.setting({})
         self.job, self.problem = job, prepared(own.of, job.seed)
-        key_of(own, self.problem, job)  # BadInput here for an advisor or a value that cannot be, not after the trials
+        key_of(own, self.problem, job)  # raises BadInput for an invalid advisor or value before any trial
         self.entries: dict[str, Any] = job.kept_as(lambda entry: (str(entry["key"]), entry))
 
     def sessions(self, settings: Sequence[Setting], sessions: int, stream: int) -> list[Sessions | None]:
-        """So many of each setting, all with the chances of that stream; None for a setting that cannot be."""
+        """The sessions of each setting, with the seeds of that stream; None for an invalid setting."""
         found: dict[str, Sessions | None] = {}
         keys: list[str] = []
         left: list[Setting] = []
@@ -303,7 +304,7 @@ class _Kept:
 
 
 def settings_text(what: Tuning, values: Values) -> str:
-    """The settings as a task file takes them: tables that are pasted into it, in place of the same names there."""
+    """The settings as TOML tables for a task file."""
     where = ""
     if isinstance(what.problem, str):
         problem = prepared(what.setting({}).of, 0)

@@ -19,6 +19,7 @@ from lab.teaching.lesson_plan import Interrupted, Lesson, LessonPlan
 from lab.teaching.teacher import Teacher, check_name
 from lab.toolbox.policy import Policy
 from lab.toolbox.registry import Toolbox
+from lab.view.plots import learning_curves
 
 
 class Subject(Protocol):
@@ -168,8 +169,6 @@ def document_of(problem: Problem, lesson: Lesson, teacher: Teacher) -> dict[str,
 
 
 def _draw_curve(name: str, policy: Policy, out: Path) -> dict[str, str]:
-    from lab.view.plots import learning_curves
-
     out.mkdir(parents=True, exist_ok=True)
     learning_curves({name: policy}, out / "learning-curve.png")
     return {"learning_curve": str(out / "learning-curve.png")}

@@ -16,6 +16,7 @@ from lab.tasks.task_file import load, names_of
 from lab.teaching.lesson import Subject
 from lab.teaching.lesson_options import LessonOptions
 from lab.toolbox.policy import Policy
+from lab.view.plots import values_seen
 
 
 @dataclass
@@ -54,8 +55,6 @@ class SkillSubject(Subject):
 
     def draw(self, policy: Policy, out: Path) -> dict[str, str]:
         """Draws the values over the picture that the problem was read from, if there is one."""
-        from lab.view.plots import values_seen
-
         assert self.scene is not None
         skill = self.scene.skillset.skills[self.skill]
         photo, path = skill.photo(), out / f"{skill.subtask}-value-map.png"

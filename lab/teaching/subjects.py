@@ -16,6 +16,7 @@ from lab.teaching.lesson_options import LessonOptions
 from lab.teaching.skill_subject import SkillSubject
 from lab.teaching.world_subject import WorldSubject
 from lab.toolbox.policy import Policy
+from lab.view.plots import grid_values
 
 if TYPE_CHECKING:
     from lab.teaching.kept_session import KeptSession
@@ -43,8 +44,6 @@ class TableSubject(Subject):
         mdp, path = self.problem.mdp, out / "value-map.png"
         if len(mdp.shape) != 2 or mdp.coverage_shape:
             return {}
-        from lab.view.plots import grid_values
-
         grid_values(policy.q, mdp, path)
         return {"value_map": str(path)}
 

@@ -11,6 +11,7 @@ from lab.tasks.task_file import load_world
 from lab.teaching.lesson import Subject
 from lab.teaching.lesson_options import LessonOptions
 from lab.toolbox.policy import Policy
+from lab.view.plots import grid_values
 
 SIGHTS = ("full", "limited")
 
@@ -55,8 +56,6 @@ class WorldSubject(Subject):
         """Draws the values of a world with two axes, and the greedy path."""
         if len(self.world.shape) != 2:
             return {}
-        from lab.view.plots import grid_values
-
         path = out / "value-map.png"
         grid_values(policy.q, self.world.mdp(), path)
         return {"value_map": str(path)}

@@ -181,7 +181,7 @@ def _fact(name: str, value: object) -> str:
 
 def _use(policy: Policy, telling: Telling) -> str:
     state = f"state {policy.start}"
-    return f"""Into a toolbox, from where `lab run` takes it for its own problem, and for others in which its path is free and short:
+    return f"""Into a toolbox, where `lab run` finds it for its own problem, and for others in which its path is free and short:
 
 ```sh
 {telling.bring_in}

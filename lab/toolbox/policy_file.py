@@ -9,6 +9,8 @@ from typing import Annotated, Any
 
 import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError, create_model
+from safetensors import SafetensorError
+from safetensors.numpy import load, save
 
 from lab.errors import BadInput
 from lab.files import json_of
@@ -21,8 +23,6 @@ _METADATA = tuple(field.name for field in fields(Policy) if field.name not in _T
 
 def encode(policy: Policy) -> bytes:
     """The bytes of a policy's file; the same policy always gives the same bytes."""
-    from safetensors.numpy import save
-
     metadata = {name: json.dumps(getattr(policy, name), allow_nan=False) for name in _METADATA}
     tensors = {name: np.ascontiguousarray(getattr(policy, name)) for name in _TENSORS}
     return _ordered(save(tensors, {"format": FORMAT, **metadata}))
@@ -30,8 +30,6 @@ def encode(policy: Policy) -> bytes:
 
 def decode(content: bytes, where: str) -> Policy:
     """The policy in these bytes, completely checked. Raises BadInput, which names the file `where`, if anything is wrong."""
-    from safetensors import SafetensorError
-
     try:
         tensors, metadata = _read(content)
         held: dict[str, Any] = tensors | _read_metadata(metadata)
@@ -72,8 +70,6 @@ def _header(content: bytes) -> dict[str, Any]:
 
 
 def _read(content: bytes) -> tuple[dict[str, np.ndarray[Any, Any]], dict[str, str]]:
-    from safetensors.numpy import load
-
     tensors: dict[str, np.ndarray[Any, Any]] = load(content)
     header = _header(content)
     metadata = header.get("__metadata__") or {}

@@ -10,6 +10,8 @@ from secrets import token_hex
 from threading import Thread
 from typing import Any, TypeVar
 
+from platformdirs import user_cache_dir, user_data_dir
+
 from lab.errors import BadInput, WorkFailed
 from lab.files import write_whole
 from lab.optional import optional
@@ -45,8 +47,6 @@ class RemotePlace:
     alone = False
 
     def __init__(self, address: str) -> None:
-        from platformdirs import user_cache_dir, user_data_dir
-
         self._protocol, _, path = address.partition("://")
         self.address = f"{self._protocol}://{path.rstrip('/')}"
         self.folder, self.cache = (

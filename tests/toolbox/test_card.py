@@ -68,7 +68,7 @@ def test_it_tells_what_was_learned_where_and_how(learned: Policy) -> None:
         "| states | 3, a grid of 3 |",
         "| actions | 2: left, right |",
         "| learned in | toast, seed 0 |",
-        "| its way | 2 steps, the shortest takes 2: solved |",
+        "| its path | 2 steps, the shortest takes 2: solved |",
         "| learner | q, alpha 0.95, max_steps 20 |",
         "| gate (when it asks) | ccrl |",
         "| advisor | expert: asked in 1 episode of 4, 3 helped steps |",
@@ -98,7 +98,7 @@ def test_it_tells_of_one_that_came_from_another_and_reaches_nothing(make_policy:
     )
     text = card(lost, telling())
     for line in (
-        "| its way | it does not reach the goal, the shortest takes 3: not solved |",
+        "| its path | it does not reach the goal, the shortest takes 3: not solved |",
         "| warm-started from | insert@1a2b |",
         "| learned in | toast, three cubes, seed 0 |",
         "| states | 4 |",
