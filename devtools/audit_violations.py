@@ -17,7 +17,7 @@ from devtools.commands import environment, lab
 from devtools.parts import Outcome, Part
 from lab.audit.audit import audit, kept_evidence
 from lab.audit.evidence import SLACK_S, Evidence
-from lab.audit.stays import PartSeen, Stay
+from lab.audit.stays import PartStays, Stay
 from lab.production.run_options import kept_task
 
 TASKS = (
@@ -52,7 +52,7 @@ def copied(evidence: Evidence) -> Evidence:
     return replace(evidence, tracks=tracks, rows=[dict(row) for row in evidence.rows])
 
 
-def worked(evidence: Evidence) -> list[tuple[PartSeen, Stay, float]]:
+def worked(evidence: Evidence) -> list[tuple[PartStays, Stay, float]]:
     """The stays of claimed parts in machines that work for a time, and for how long they do [s]."""
     found = []
     for seen in evidence.parts:
@@ -133,14 +133,14 @@ def station_swapped(evidence: Evidence, rng: np.random.Generator) -> Violated:
     return _swapped(copied(evidence), seen, one, other)
 
 
-def _stages(evidence: Evidence, seen: PartSeen, stay: Stay) -> bool:
+def _stages(evidence: Evidence, seen: PartStays, stay: Stay) -> bool:
     """Whether a stay is at a stage of the part's only route, and the only one there."""
     routes = evidence.task.part(seen.kind).routes
     own = sum(one.station == stay.station for one in seen.stays)
     return len(routes) == 1 and own == 1 and stay.station in [stage.station for stage in routes[0]]
 
 
-def _swapped(evidence: Evidence, seen: PartSeen, one: Stay, other: Stay) -> Violated:
+def _swapped(evidence: Evidence, seen: PartStays, one: Stay, other: Stay) -> Violated:
     tracks, body = evidence.tracks, evidence.tracks.number(seen.name)
     here, there = (stay.frames(evidence.tracks) for stay in (one, other))
     at, elsewhere = tracks.poses[here, body][-1].copy(), tracks.poses[there, body][0].copy()

@@ -262,15 +262,15 @@ def _checked(path: Path) -> object:
 
 
 def _instance(path: Path) -> object:
-    from lab.tasks.instances import Asked, is_instance, read_instance
+    from lab.tasks.instances import InstanceRequest, is_instance, read_instance
     from lab.tasks.task_file import load_any
 
     beside = path.parent
     if path.name.startswith("jobs") or path.name == "layout.csv":
-        return read_instance(beside / "jobs.csv", Asked(beside / "layout.csv", None, "7:1")).cell()
+        return read_instance(beside / "jobs.csv", InstanceRequest(beside / "layout.csv", None, "7:1")).cell()
     if path.name.startswith("phillips"):
         return read_instance(
-            beside / "phillips-unger-tanks.csv", Asked(beside / "phillips-unger-empty.csv", None, None)
+            beside / "phillips-unger-tanks.csv", InstanceRequest(beside / "phillips-unger-empty.csv", None, None)
         ).cell()
     return read_instance(path).cell() if is_instance(path) else load_any(str(path))
 

@@ -39,7 +39,7 @@ class _Lost(Exception):
     """A task has no result from its worker: it could not be pickled, or the worker has ended."""
 
 
-class Task(Generic[Result]):
+class WorkerTask(Generic[Result]):
     """A submitted function call; `result` makes the call in this process if no worker has begun it, or if its worker was lost."""
 
     def __init__(self, work: Callable[..., Result], arguments: Sequence[Any], packed: Packed | None = None) -> None:
@@ -75,7 +75,7 @@ class Workers:
 
     def __init__(self, count: int | None = 1, first: Callable[[], object] | None = None) -> None:
         self._others, self._first = (count or cores()) - 1, first
-        self._handed_out: SimpleQueue[Task[Any] | None] = SimpleQueue()
+        self._handed_out: SimpleQueue[WorkerTask[Any] | None] = SimpleQueue()
         self._processes: list[subprocess.Popen[bytes]] = []
         self._listener: Listener | None = None
 
@@ -102,8 +102,8 @@ class Workers:
             self._listener.close()
             self._listener = None
 
-    def begin(self, work: Callable[..., Result], *arguments: Any) -> Task[Result]:
-        """The submitted task, which a worker begins as soon as one is free. What the call raises, `Task.result` raises."""
+    def begin(self, work: Callable[..., Result], *arguments: Any) -> WorkerTask[Result]:
+        """The submitted task, which a worker begins as soon as one is free. What the call raises, `WorkerTask.result` raises."""
         return self._submitted(work, arguments, self._pack(work))
 
     def each(self, work: Callable[[Item], Result], items: Sequence[Item]) -> Iterator[Result]:
@@ -131,10 +131,12 @@ class Workers:
         except Exception:  # pickle raises many kinds of errors
             return None
 
-    def _submitted(self, work: Callable[..., Result], arguments: Sequence[Any], packed: bytes | None) -> Task[Result]:
+    def _submitted(
+        self, work: Callable[..., Result], arguments: Sequence[Any], packed: bytes | None
+    ) -> WorkerTask[Result]:
         """A task, put into the queue of the workers if function and arguments can be pickled."""
         sent = None if packed is None else self._pack(arguments)
-        task = Task(work, arguments, None if packed is None or sent is None else (packed, sent))
+        task = WorkerTask(work, arguments, None if packed is None or sent is None else (packed, sent))
         if task.packed is not None:
             self._handed_out.put(task)
         return task

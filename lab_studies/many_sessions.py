@@ -14,8 +14,8 @@ from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import NO_CHANCE, Chance
 from lab.sequencing.cell.objectives import MAKESPAN, check_objective
 from lab.sequencing.methods import session_kernels
-from lab.sequencing.methods.monte_carlo import MonteCarlo
-from lab.sequencing.methods.session_kernels import Found, session_arrays, value_table
+from lab.sequencing.methods.monte_carlo import MonteCarloAverage
+from lab.sequencing.methods.session_kernels import SessionOutcomes, session_arrays, value_table
 from lab.sequencing.methods.session_readable import SessionLearner, learn
 from lab.sequencing.methods.srl import Srl
 from lab.sequencing.methods.state_keys import Keys
@@ -24,7 +24,7 @@ from lab.sequencing.simulate import kernels
 from lab.sequencing.simulate.cell_arrays import Floats, Ints, cell_arrays, most_moves, run_arrays
 
 METHODS: Mapping[str, type[SessionLearner]] = MappingProxyType(
-    {kind.name: kind for kind in (Srl, MonteCarlo, SessionLearner)}
+    {kind.name: kind for kind in (Srl, MonteCarloAverage, SessionLearner)}
 )
 CHUNK = 2**20  # episodes at once: what their costs take is 8 MiB
 MOST_ROWS = 2**22  # a table that may need more rows grows as it is filled, session by session
@@ -103,7 +103,7 @@ def _chunk(cell: Cell, kind: type[SessionLearner], search: Search, seeds: NDArra
     """Some sessions, with all their costs."""
     keys, moves = kind.keys(cell, search.settings), most_moves(cell)
     if keys is None or min(keys.size, search.episodes * moves) > MOST_ROWS:
-        found = Found.room(len(seeds), search.episodes, moves)
+        found = SessionOutcomes.room(len(seeds), search.episodes, moves)
         for n, seed in enumerate(seeds.tolist()):
             learned = learn(cell, replace(search, on_episode=None), seed, kind)
             found.costs[n], found.ends[n] = learned.log.costs, (learned.log.best_cost, learned.final_cost)
@@ -115,10 +115,12 @@ def _chunk(cell: Cell, kind: type[SessionLearner], search: Search, seeds: NDArra
     return Sessions(found.ends[:, 0], found.ends[:, 1], _convergence(found.costs), found.sequences, found.costs)
 
 
-def _together(cell: Cell, learner: SessionLearner, search: Search, keys: Keys, seeds: NDArray[np.uint64]) -> Found:
+def _together(
+    cell: Cell, learner: SessionLearner, search: Search, keys: Keys, seeds: NDArray[np.uint64]
+) -> SessionOutcomes:
     """Sessions in one compiled call."""
     moves, epsilons = most_moves(cell), [learner.epsilon(episode) for episode in range(1, search.episodes + 1)]
-    found = Found.room(len(seeds), search.episodes, moves)
+    found = SessionOutcomes.room(len(seeds), search.episodes, moves)
     work = session_arrays(cell, value_table(keys.size, search.episodes * moves, learner.first))
     session_kernels.advance(learner.learning(cell, keys), work, seeds, np.array(epsilons), 1, found)
     learner.check(float(found.costs.min()))

@@ -33,7 +33,7 @@ Name = Annotated[str, MaxLen(1000), Predicate(str.isprintable)]
 
 
 @dataclass(frozen=True)
-class Session:
+class SessionEntry:
     """The head of a journal: how the session was started.
 
     words: the options of the command, by name; problem, signature: of the problem; lab: the version that wrote it; learner, gate:
@@ -84,10 +84,10 @@ class Closed:
     saved_as: str
 
 
-Entry = Session | Answer | Undone | Closed | Event
+Entry = SessionEntry | Answer | Undone | Closed | Event
 
 KINDS: dict[str, type[Any]] = {
-    "session": Session,
+    "session": SessionEntry,
     "request": AdviceRequested,
     "answer": Answer,
     "advice": AdviceGiven,
@@ -120,7 +120,7 @@ class Read:
     """A journal that was read: its head, its entries, the size of its complete lines, and an incomplete last line."""
 
     path: Path
-    session: Session
+    session: SessionEntry
     entries: tuple[Entry, ...]
     whole_bytes: int
     cut: str = ""
@@ -185,12 +185,12 @@ def read_journal(folder: Path, where: str) -> Read:
                 _refuse_schema(line, path, where)
             why = " ".join(str(error).split())[:160]
             raise BadInput(f"journal '{path}' ({where}): line {number}: {line[:60]!r}: {why}") from None
-    if not entries or not isinstance(entries[0], Session):
+    if not entries or not isinstance(entries[0], SessionEntry):
         raise BadInput(f"journal '{path}' ({where}): it does not begin with a session: no journal of lab teach")
     if entries[0].schema != SCHEMA:
         _refuse_schema(raw.split(b"\n", 1)[0], path, where)
     for number, entry in enumerate(entries[1:], start=2):
-        if isinstance(entry, Session) or (isinstance(entry, Closed) and number < len(entries)):
+        if isinstance(entry, SessionEntry) or (isinstance(entry, Closed) and number < len(entries)):
             raise BadInput(f"journal '{path}' ({where}): line {number}: a second session in one journal")
     cut = raw[complete_bytes:].decode("utf-8", "replace")
     return Read(path, entries[0], tuple(entries[1:]), complete_bytes, cut)

@@ -14,7 +14,7 @@ from lab.advice.entries import (
     Closed,
     Entry,
     Read,
-    Session,
+    SessionEntry,
     Undone,
     is_unbegun,
     line_of,
@@ -53,7 +53,7 @@ class Journal:
     _unsafe: bool = False  # an answer may not be on the disk yet
 
     @classmethod
-    def begin(cls, folder: Path, session: Session) -> "Journal":
+    def begin(cls, folder: Path, session: SessionEntry) -> "Journal":
         """A new journal in a folder, which is created. Raises BadInput if it cannot be, or if it holds a journal."""
         path = folder / FILE
         journal = cls(path)

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from lab.advice.entries import Answer, Entry
-from lab.advice.trust import Difference, Pair, Skill, differences, skill_of, worse
+from lab.advice.trust import Difference, Pair, SkillEstimate, differences, skill_of, worse
 from lab.errors import counted
 from lab.learning.session_events import (
     AdviceEnded,
@@ -46,7 +46,7 @@ class Voice:
     overruled: int
     unheard: int
     against_best: int | None
-    skill: Skill | None
+    skill: SkillEstimate | None
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ class Receipt:
     sent_back: int
     against_best: int | None
     differences: tuple[Difference, ...]
-    skill: Skill | None
+    skill: SkillEstimate | None
     voices: tuple[Voice, ...]
     notices: tuple[str, ...]
     yours: bool = False

@@ -4,7 +4,7 @@ An answer is good if it leads nearer to the goal along the paths made so far. It
 episode without success, leaves the known paths, leads no nearer, or closes a loop of advised moves. An answer that nobody has
 tried is neither, so an advisor that is seldom followed is judged mostly where it agrees with others, which flatters it. All
 answers are judged by the paths known now: when a shorter one is found, old answers are judged anew.
-`Skill` and everything below it know the optimal values; everything above knows only the moves that were made.
+`SkillEstimate` and everything below it know the optimal values; everything above knows only the moves that were made.
 """
 
 from collections import Counter, deque
@@ -134,7 +134,7 @@ def is_good(good: int, bad: int) -> bool:
 
 
 @dataclass(frozen=True)
-class Skill:
+class SkillEstimate:
     """The estimate of an advisor's tau (thesis eq. 9.1) within TAUS: 95 % interval, nearest of SKILL_TAUS, number of answers."""
 
     tau: float
@@ -149,7 +149,7 @@ class Skill:
         return f"tau {self.tau:.3g} ({self.low:.3g} to {self.high:.3g}, from {self.answers} answers): {word}"
 
 
-def skill_of(answers: Sequence[Pair], values: FloatArray) -> Skill | None:
+def skill_of(answers: Sequence[Pair], values: FloatArray) -> SkillEstimate | None:
     """The maximum-likelihood tau of answers drawn from a softmax over values (S, A), with its likelihood interval.
 
     Only states count in which the actions differ in value; None for fewer than FEWEST of them. Source: thesis eq. 9.1.
@@ -178,7 +178,7 @@ def skill_of(answers: Sequence[Pair], values: FloatArray) -> Skill | None:
     )
     word = min(SKILL_TAUS, key=lambda name: abs(log(SKILL_TAUS[name]) - best))
     tau, lowest, highest = (TAUS[ends.index(at)] if at in ends else exp(at) for at in (best, low, high))
-    return Skill(tau, lowest, highest, word, len(below))
+    return SkillEstimate(tau, lowest, highest, word, len(below))
 
 
 @dataclass(frozen=True)

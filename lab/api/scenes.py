@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from lab.sim.frames import Recording
 
 
-class Asked(NamedTuple):
+class SceneRequest(NamedTuple):
     """The options that say which scene of a task is shown: --toasts, --parts and --seed."""
 
     toasts: int | None = None
@@ -36,13 +36,13 @@ def show(
     """
     from lab.view.meshcat import replay_html
 
-    with seen(what, Asked(toasts, parts, seed)) as (title, recording), TemporaryDirectory() as folder:
+    with seen(what, SceneRequest(toasts, parts, seed)) as (title, recording), TemporaryDirectory() as folder:
         path = replay_html(recording, Path(folder) / "scene.html", title=title)
         return Page(path.read_text(encoding="utf-8"))
 
 
 @contextmanager
-def seen(what: str | Path | GridWorld | Task, asked: Asked) -> "Iterator[tuple[str, Recording]]":
+def seen(what: str | Path | GridWorld | Task, asked: SceneRequest) -> "Iterator[tuple[str, Recording]]":
     """The title of a task or world, and a recording of one frame; the meshes of a large world exist only within the block."""
     from lab.production.recorder import show_scene
     from lab.sim.scene.scene_check import check_scene

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from math import atan2, cos, sin
 from typing import Any
 
-from lab.audit.stays import PartSeen, parts_seen
+from lab.audit.stays import PartStays, parts_seen
 from lab.audit.tracks import Array, BodyTracks
 from lab.tasks.task import Order, Task
 from lab.tasks.task_fields import Stage
@@ -48,7 +48,7 @@ class Evidence:
     claimed: Collection[str]
     struck: Sequence[Struck] = ()
     planned: Sequence[dict[str, Any]] = ()
-    parts: list[PartSeen] = field(init=False)
+    parts: list[PartStays] = field(init=False)
 
     def __post_init__(self) -> None:
         self.parts = parts_seen(self.task, self.order, self.tracks)

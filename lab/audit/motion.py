@@ -7,7 +7,7 @@ from math import hypot
 import numpy as np
 
 from lab.audit.evidence import Evidence, Finding
-from lab.audit.stays import Mask, PartSeen, Stay, gap_of, pallet_of
+from lab.audit.stays import Mask, PartStays, Stay, gap_of, pallet_of
 from lab.audit.tracks import Array, BodyTracks, Numbers, in_frame, on_grid
 
 LEANS = 0.97  # cosine of the largest tilt, fourteen degrees, of a part at a station along its route
@@ -23,7 +23,7 @@ SEVERAL_FRAMES = 3  # consecutive frames required where a single frame may be a 
 BETWEEN_M = 0.002  # largest overlap of two parts, the resolution of the recording
 
 
-def stood(evidence: Evidence, seen: PartSeen) -> Iterator[Finding]:
+def stood(evidence: Evidence, seen: PartStays) -> Iterator[Finding]:
     """Findings on how a part stood: upright, its foot supported, still between transfers, and on a station's only spot."""
     tracks, body = evidence.tracks, evidence.tracks.number(seen.name)
     for number, stay in enumerate(seen.stays):
@@ -43,7 +43,7 @@ def stood(evidence: Evidence, seen: PartSeen) -> Iterator[Finding]:
                 yield Finding("stood", seen.name, stay.station, stay.start_s, words)
 
 
-def _shifted(evidence: Evidence, seen: PartSeen, stay: Stay, places: Array) -> Iterator[Finding]:
+def _shifted(evidence: Evidence, seen: PartStays, stay: Stay, places: Array) -> Iterator[Finding]:
     """A finding if the part moved during a stay, other than while the gripper releases or grasps it."""
     tracks, last_s = evidence.tracks, float(evidence.tracks.times_s[-1])
     start_s = stay.start_s + (TAKES_S if stay.start_s > tracks.times_s[0] else 0.0)
@@ -58,7 +58,7 @@ def _shifted(evidence: Evidence, seen: PartSeen, stay: Stay, places: Array) -> I
         yield Finding("stood", seen.name, stay.station, at_s, words)
 
 
-def in_hand(evidence: Evidence, seen: PartSeen) -> Iterator[Finding]:
+def in_hand(evidence: Evidence, seen: PartStays) -> Iterator[Finding]:
     """Findings on a moving or lifted part: the robot's hand holds it, moves with it, and is no faster than the robot."""
     tracks, body = evidence.tracks, evidence.tracks.number(seen.name)
     steps_m, spans_s = np.linalg.norm(np.diff(tracks.poses[:, body, :3], axis=0), axis=1), np.diff(tracks.times_s)

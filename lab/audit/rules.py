@@ -12,7 +12,7 @@ import numpy as np
 
 from lab.audit.evidence import SLACK_S, Evidence, Finding, turned
 from lab.audit.motion import TAKES_S, in_hand, in_one_another, lasting, one_gripper, stood
-from lab.audit.stays import HIGH_M, LOW_M, PartSeen, Stay, floor_of, pallet_of
+from lab.audit.stays import HIGH_M, LOW_M, PartStays, Stay, floor_of, pallet_of
 from lab.audit.tracks import Array, Numbers
 from lab.tasks.task_fields import Process, Stage
 
@@ -45,13 +45,13 @@ def findings(evidence: Evidence) -> list[Finding]:
 # ---- the route of one part -------------------------------------------------------------------------------------------
 
 
-def _route(evidence: Evidence, seen: PartSeen) -> list[Finding]:
+def _route(evidence: Evidence, seen: PartStays) -> list[Finding]:
     """The findings on a part's stays, by the route that gives the fewest."""
     found = [list(_along(evidence, seen, route)) for route in evidence.task.part(seen.kind).routes]
     return min(found, key=len)
 
 
-def _along(evidence: Evidence, seen: PartSeen, route: Sequence[Stage]) -> Iterator[Finding]:
+def _along(evidence: Evidence, seen: PartStays, route: Sequence[Stage]) -> Iterator[Finding]:
     """Findings where a part did not visit a route's stations in order, for long enough, and without any other."""
     stays, place, before = seen.stays, 0, ""
     for stage in route:
@@ -84,14 +84,14 @@ def _repeated(between: Sequence[Stay], before: str, stage: Stage) -> bool:
     return all(one.station in (before, stage.station) for one in between)
 
 
-def _covered_in(evidence: Evidence, seen: PartSeen, stage: Stage, stay: Stay) -> Iterator[Finding]:
+def _covered_in(evidence: Evidence, seen: PartStays, stage: Stage, stay: Stay) -> Iterator[Finding]:
     """Findings where, during a stay, head or hand did not cover what the stage asks for."""
     if evidence.work_s(seen.kind, stage) is not None:
         yield from _covered(evidence, seen, stage.station, stay)
     yield from _served(evidence, seen, stage, stay)
 
 
-def _times(evidence: Evidence, seen: PartSeen, stage: Stage, stay: Stay, work_s: float) -> Iterator[Finding]:
+def _times(evidence: Evidence, seen: PartStays, stage: Stage, stay: Stay, work_s: float) -> Iterator[Finding]:
     """Findings where a stay is shorter than the processing time, or exceeds the window after it."""
     where, rows = stage.station, evidence.own_rows(seen.name, "process")
     own = [
@@ -115,7 +115,7 @@ def _times(evidence: Evidence, seen: PartSeen, stage: Stage, stay: Stay, work_s:
         yield Finding("window", seen.name, where, done_s + at_most_s, words)
 
 
-def _covered(evidence: Evidence, seen: PartSeen, where: str, stay: Stay) -> Iterator[Finding]:
+def _covered(evidence: Evidence, seen: PartStays, where: str, stay: Stay) -> Iterator[Finding]:
     """Findings where the head did not rest in front of each cell of the part's side for the process's time."""
     tracks, name = evidence.tracks, evidence.task.station(where).process
     head, body = tracks.number(f"{where} head"), tracks.number(seen.name)
@@ -128,7 +128,7 @@ def _covered(evidence: Evidence, seen: PartSeen, where: str, stay: Stay) -> Iter
     yield from _missed(evidence, seen, "process", where, grid)
 
 
-def _served(evidence: Evidence, seen: PartSeen, stage: Stage, stay: Stay) -> Iterator[Finding]:
+def _served(evidence: Evidence, seen: PartStays, stage: Stage, stay: Stay) -> Iterator[Finding]:
     """Findings where the hand did not rest over each cell of a service's area for its time, while the part was there."""
     task, tracks, where = evidence.task, evidence.tracks, stage.station
     process = None if stage.service is None else task.processes[stage.service]
@@ -154,7 +154,7 @@ class _Grid(NamedTuple):
     frames: Numbers
 
 
-def _missed(evidence: Evidence, seen: PartSeen, rule: str, where: str, grid: _Grid) -> Iterator[Finding]:
+def _missed(evidence: Evidence, seen: PartStays, rule: str, where: str, grid: _Grid) -> Iterator[Finding]:
     """A finding on the cells over which the point did not rest for the process's time."""
     shape, times_s = grid.process.grid, evidence.tracks.times_s[grid.frames]
     rests_s = np.where(np.linalg.norm(np.diff(grid.at, axis=0), axis=1) < RESTS_M, np.diff(times_s), 0.0)
@@ -171,7 +171,7 @@ def _overlap(row: dict[str, Any], stay: Stay) -> float:
     return float(max(0.0, min(row["end_s"], stay.end_s) - max(row["start_s"], stay.start_s)))
 
 
-def _end(evidence: Evidence, seen: PartSeen) -> Iterator[Finding]:
+def _end(evidence: Evidence, seen: PartStays) -> Iterator[Finding]:
     """Findings where a part does not finally stand at the end of a route: upright, on a spot of the file, on its pallet."""
     task, tracks, end_s = evidence.task, evidence.tracks, float(evidence.tracks.times_s[-1])
     ends = [route[-1].station for route in task.part(seen.kind).routes]
@@ -193,7 +193,7 @@ def _end(evidence: Evidence, seen: PartSeen) -> Iterator[Finding]:
             yield Finding("end", seen.name, last, end_s, f"does not stand on its pallet in the end at '{last}'")
 
 
-def _place(evidence: Evidence, seen: PartSeen, last: str, body: int) -> Iterator[str]:
+def _place(evidence: Evidence, seen: PartStays, last: str, body: int) -> Iterator[str]:
     """What is wrong with the final place of a part, or of its pallet `body`, at a station whose places the file gives."""
     station, tracks = evidence.task.station(last), evidence.tracks
     x, y = evidence.off_pose(last, tracks.inside(tracks.number(last), tracks.poses[:, body, :3])[-1])
@@ -313,7 +313,7 @@ def batches(evidence: Evidence) -> Iterator[Finding]:
 MOVES = ("carry", "pallet")
 
 
-def told(evidence: Evidence, seen: PartSeen) -> Iterator[Finding]:
+def told(evidence: Evidence, seen: PartStays) -> Iterator[Finding]:
     """Findings where a part's measured rows and its stays differ, or it was carried without a row."""
     carries = evidence.own_rows(seen.name, "carry")
     for row in carries:
@@ -341,7 +341,7 @@ def told(evidence: Evidence, seen: PartSeen) -> Iterator[Finding]:
             yield Finding("schedule", seen.name, after.station, before.end_s, words)
 
 
-def _stood_at(seen: PartSeen, station: str, at_s: float) -> bool:
+def _stood_at(seen: PartStays, station: str, at_s: float) -> bool:
     return any(
         stay.station == station and stay.start_s - SLACK_S <= at_s <= stay.end_s + SLACK_S for stay in seen.stays
     )

@@ -39,7 +39,7 @@ class Stay:
 
 
 @dataclass(frozen=True, eq=False)
-class PartSeen:
+class PartStays:
     """One part as the frames show it, with its stays in order.
 
     at (n,): the number of the station at which it stands at each frame, -1 for none. occupies (n,): the same for the part
@@ -54,7 +54,7 @@ class PartSeen:
     carried: Mask
 
 
-def parts_seen(task: Task, order: Order, tracks: BodyTracks) -> list[PartSeen]:
+def parts_seen(task: Task, order: Order, tracks: BodyTracks) -> list[PartStays]:
     """Each part of an order as the frames show it, part 1 first; a part that was not recorded has no stays."""
     return [_seen(task, part_name(order, number), kind, tracks) for number, kind in enumerate(order, start=1)]
 
@@ -64,11 +64,11 @@ def pallet_of(name: str) -> str:
     return f"{name}'s pallet"
 
 
-def _seen(task: Task, name: str, kind: str, tracks: BodyTracks) -> PartSeen:
+def _seen(task: Task, name: str, kind: str, tracks: BodyTracks) -> PartStays:
     body, part = tracks.number(name), task.part(kind)
     nowhere = np.full(len(tracks.times_s), -1)
     if body < 0:
-        return PartSeen(name, kind, (), nowhere, nowhere, np.zeros(len(tracks.times_s), dtype=bool))
+        return PartStays(name, kind, (), nowhere, nowhere, np.zeros(len(tracks.times_s), dtype=bool))
     foot_m = shape_of(part, task.folder).foot_m
     heights = [0.0]
     if part.pallet is not None:
@@ -78,7 +78,7 @@ def _seen(task: Task, name: str, kind: str, tracks: BodyTracks) -> PartSeen:
     occupies, carrier = at, tracks.number(pallet_of(name))
     if part.pallet is not None and carrier >= 0:
         occupies = np.where(at >= 0, at, _stands_at(task, tracks, carrier, pallet.foot_m, [0.0]))
-    return PartSeen(name, kind, _stays(task, tracks, at), at, occupies, _carried(tracks, body, at))
+    return PartStays(name, kind, _stays(task, tracks, at), at, occupies, _carried(tracks, body, at))
 
 
 def _stands_at(task: Task, tracks: BodyTracks, body: int, foot_m: float, heights: Sequence[float]) -> NDArray[np.int64]:

@@ -8,7 +8,7 @@ if TYPE_CHECKING:
     from lab.advice.advisors import ADVISORS, PEOPLE, AdvisorName
     from lab.advice.entries import Read, read_journal
     from lab.advice.panel import ASKED, DECISIONS
-    from lab.api.scenes import Asked as SceneAsked
+    from lab.api.scenes import SceneRequest as SceneAsked
     from lab.api.scenes import seen
     from lab.audit.audit import audit, kept_evidence
     from lab.export import FORMATS
@@ -67,7 +67,7 @@ if TYPE_CHECKING:
     from lab.tasks.cell_file import CellFile, toml_of
     from lab.tasks.grid_world import write_random
     from lab.tasks.instances import INSTANCES, pyjobshop
-    from lab.tasks.instances import Asked as InstanceAsked
+    from lab.tasks.instances import InstanceRequest as InstanceAsked
     from lab.tasks.new_task import MACHINE, file_of, new_task
     from lab.tasks.record import write_whole as write_task_text
     from lab.tasks.robot_fields import MODELS
@@ -130,7 +130,7 @@ TABLE = {
     "lab.advice.advisors": ("AdvisorName", "ADVISORS", "PEOPLE"),
     "lab.advice.entries": ("Read", "read_journal"),
     "lab.advice.panel": ("ASKED", "DECISIONS"),
-    "lab.api.scenes": ("Asked as SceneAsked", "seen"),
+    "lab.api.scenes": ("SceneRequest as SceneAsked", "seen"),
     "lab.audit.audit": ("audit", "kept_evidence"),
     "lab.export": ("FORMATS",),
     "lab.export.commands": ("Path as Lines",),
@@ -184,7 +184,7 @@ TABLE = {
     "lab.studies.tuning": ("FILE", "tuned", "Tuning"),
     "lab.tasks.cell_file": ("CellFile", "toml_of"),
     "lab.tasks.grid_world": ("write_random",),
-    "lab.tasks.instances": ("Asked as InstanceAsked", "INSTANCES", "pyjobshop"),
+    "lab.tasks.instances": ("InstanceRequest as InstanceAsked", "INSTANCES", "pyjobshop"),
     "lab.tasks.new_task": ("file_of", "MACHINE", "new_task"),
     "lab.tasks.record": ("write_whole as write_task_text",),
     "lab.tasks.robot_fields": ("MODELS",),

@@ -10,7 +10,7 @@ from math import ceil, pi, radians
 
 import numpy as np
 
-from lab.export.program import Action, Array, Motion, Press, Program, Transfer
+from lab.export.program import Action, Array, Motion, Press, Program, ProgramTransfer
 from lab.sim.arms.kinematics import ToolPose
 from lab.sim.arms.robot import GRIP_STEPS
 from lab.sim.arms.tool_path import COUNTED, bending, roundings, timed, way_of
@@ -30,7 +30,7 @@ START_PERCENT = 10.0  # of the joints' speed, for the move to a job's start, as 
 
 
 @dataclass(frozen=True)
-class Joint:
+class JointMove:
     """A move of all joints (k,) [rad] together, with a share of their speed [%]."""
 
     joints: tuple[float, ...]
@@ -51,7 +51,7 @@ class Path:
 
 
 @dataclass(frozen=True)
-class Grip:
+class GripperOutput:
     """Sets the gripper's output."""
 
     closed: bool
@@ -100,11 +100,11 @@ class Payload:
     mass_kg: float
 
 
-Command = Joint | Path | Grip | Pause | Await | Start | Reset | Check | Payload
+Command = JointMove | Path | GripperOutput | Pause | Await | Start | Reset | Check | Payload
 
 
 @dataclass(frozen=True)
-class Job:
+class TransferJob:
     """The commands of one transfer, in order; ways: the uninterrupted motions that each `Path` stands for."""
 
     words: str
@@ -112,7 +112,7 @@ class Job:
     ways: tuple[tuple[Motion, ...], ...] = ()
 
 
-def jobs_of(program: Program) -> list[Job]:
+def jobs_of(program: Program) -> list[TransferJob]:
     """The jobs of a program, one for each transfer; actions after the last transfer, as of a failed run, are one more job."""
     jobs, left, transfers = [], list(program.carried.actions), program.carried.transfers
     for number, transfer in enumerate(transfers):
@@ -125,7 +125,7 @@ def jobs_of(program: Program) -> list[Job]:
     return jobs
 
 
-def _more_of_batch(program: Program, transfer: Transfer, following: Sequence[Transfer]) -> set[str]:
+def _more_of_batch(program: Program, transfer: ProgramTransfer, following: Sequence[ProgramTransfer]) -> set[str]:
     """The batch machines whose next transfer continues this one: it, too, loads the machine, or it, too, unloads it."""
     continued = set()
     for name in program.carried.batches:
@@ -136,8 +136,8 @@ def _more_of_batch(program: Program, transfer: Transfer, following: Sequence[Tra
 
 
 def _job(
-    program: Program, actions: Sequence[Action], transfer: Transfer | None, more: Collection[str] = frozenset()
-) -> Job:
+    program: Program, actions: Sequence[Action], transfer: ProgramTransfer | None, more: Collection[str] = frozenset()
+) -> TransferJob:
     machines = program.carried.machines
     found: list[Command] = []
     ways: list[tuple[Motion, ...]] = []
@@ -151,7 +151,7 @@ def _job(
         if not way:
             return
         if not ways:
-            found.append(Joint(tuple(map(float, program.joints[way[0].first]))))
+            found.append(JointMove(tuple(map(float, program.joints[way[0].first]))))
         ways.append(way)
         found.append(_path(program, way))
         if taken and transfer is not None and transfer.waits_for is not None and transfer.waits_for not in more:
@@ -168,7 +168,7 @@ def _job(
             continue
         lead()
         if isinstance(action, Press):
-            found += [Grip(action.closed), Pause(GRIP_S)]
+            found += [GripperOutput(action.closed), Pause(GRIP_S)]
             if transfer is not None:
                 found += [Check(), Payload(transfer.mass_kg)] if action.closed else [Payload(0.0)]
                 taken = action.closed and wait is None
@@ -182,7 +182,7 @@ def _job(
         and transfer.target not in more
     ):
         found.append(Start(machines.index(transfer.target) + 1, transfer.target))
-    return Job("not finished" if transfer is None else transfer.words, tuple(found), tuple(ways))
+    return TransferJob("not finished" if transfer is None else transfer.words, tuple(found), tuple(ways))
 
 
 def _path(program: Program, way: Sequence[Motion]) -> Path:

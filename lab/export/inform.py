@@ -60,7 +60,7 @@ class Dout:
 
 
 @dataclass(frozen=True)
-class Wait:
+class InformWait:
     """Waits for an input to be on, or off."""
 
     input: int
@@ -121,7 +121,7 @@ class Comment:
         return f"'{self.text}"
 
 
-Instruction = MoveJ | MoveL | Dout | Wait | Pulse | PauseIfOff | Timer | Call | Comment
+Instruction = MoveJ | MoveL | Dout | InformWait | Pulse | PauseIfOff | Timer | Call | Comment
 _INSTRUCTIONS: dict[
     str, tuple[str, Callable[..., Instruction]]
 ] = {  # first word -> pattern of the whole line, and its class
@@ -131,7 +131,7 @@ _INSTRUCTIONS: dict[
         lambda c, unit, v, level: MoveL(int(c), unit, float(v), int(level)),
     ),
     "DOUT": (r"DOUT OT#\((\d{1,4})\) (ON|OFF)", lambda n, on: Dout(int(n), on == "ON")),
-    "WAIT": (r"WAIT IN#\((\d{1,4})\)=(ON|OFF)", lambda n, on: Wait(int(n), on == "ON")),
+    "WAIT": (r"WAIT IN#\((\d{1,4})\)=(ON|OFF)", lambda n, on: InformWait(int(n), on == "ON")),
     "PULSE": (rf"PULSE OT#\((\d{{1,4}})\) T=({_NUMBER})", lambda n, seconds: Pulse(int(n), float(seconds))),
     "PAUSE": (r"PAUSE IF IN#\((\d{1,4})\)=OFF", lambda n: PauseIfOff(int(n))),
     "TIMER": (rf"TIMER T=({_NUMBER})", lambda seconds: Timer(float(seconds))),
@@ -140,7 +140,7 @@ _INSTRUCTIONS: dict[
 
 
 @dataclass(frozen=True)
-class Position:
+class InformPosition:
     """Six pulses, or x, y, z [mm] and Rx, Ry, Rz [degrees] with the manipulator's type (8,), see ///RCONF."""
 
     numbers: tuple[float, ...]
@@ -155,7 +155,7 @@ class InformJob:
     name: str
     comment: str
     date: str
-    positions: tuple[Position, ...]
+    positions: tuple[InformPosition, ...]
     instructions: tuple[Instruction, ...]
 
     def text(self) -> str:
@@ -178,7 +178,7 @@ class InformJob:
         return "".join(f"{line}\r\n" for line in lines)
 
 
-def _written(position: Position) -> list[str]:
+def _written(position: InformPosition) -> list[str]:
     if position.configuration is None:
         return [str(int(pulses)) for pulses in position.numbers]
     millimetres, degrees = position.numbers[:3], position.numbers[3:]
@@ -234,9 +234,9 @@ def read_job(text: str, where: str) -> InformJob:
     return InformJob(name, comment, date, tuple(positions), tuple(instructions))
 
 
-def _read_positions(lines: _Lines, count: int) -> list[Position]:
+def _read_positions(lines: _Lines, count: int) -> list[InformPosition]:
     tool, pulses = _read_sort(lines)
-    found: list[Position] = []
+    found: list[InformPosition] = []
     configuration: tuple[int, ...] | None = None
     number = r"-?\d{1,9}" if pulses else _NUMBER
     while len(found) < count:
@@ -254,7 +254,7 @@ def _read_positions(lines: _Lines, count: int) -> list[Position]:
         numbers = lines.matched(at, f"C{len(found):05d}= and six {'pulses' if pulses else 'numbers'}")[1]
         if not pulses and configuration is None:
             raise lines.fault("a position before any ///RCONF")
-        found.append(Position(tuple(map(float, numbers.split(","))), configuration, tool))
+        found.append(InformPosition(tuple(map(float, numbers.split(","))), configuration, tool))
     return found
 
 

@@ -19,14 +19,14 @@ from lab.export.commands import (
     Await,
     Check,
     Command,
-    Grip,
-    Job,
-    Joint,
+    GripperOutput,
+    JointMove,
     Path,
     Pause,
     Payload,
     Reset,
     Start,
+    TransferJob,
     jobs_of,
     step_between,
 )
@@ -38,14 +38,14 @@ from lab.export.inform import (
     Comment,
     Dout,
     InformJob,
+    InformPosition,
+    InformWait,
     Instruction,
     MoveJ,
     MoveL,
     PauseIfOff,
-    Position,
     Pulse,
     Timer,
-    Wait,
     read_job,
 )
 from lab.export.program import GRIPPER, PULSE_S, Array, Options, Program, done_input, reset_output, start_output
@@ -105,15 +105,17 @@ class _Writer:
     options: Options
     tools: Mapping[float, int] = field(default_factory=lambda: {0.0: 0})
     tool: int = 0
-    positions: list[Position] = field(default_factory=list)
+    positions: list[InformPosition] = field(default_factory=list)
     instructions: list[Instruction] = field(default_factory=list)
     joints: Array | None = None
     pose: Array | None = None  # (4,)
 
-    def job(self, name: str, job: Job) -> InformJob:
+    def job(self, name: str, job: TransferJob) -> InformJob:
         before: Command | None = None
         for command in job.commands:
-            if not (isinstance(command, Pause) and isinstance(before, Grip)):  # which the gripper's jobs contain
+            if not (
+                isinstance(command, Pause) and isinstance(before, GripperOutput)
+            ):  # which the gripper's jobs contain
                 self._add(command)
             before = command
         if len(self.positions) > MOST_POSITIONS:
@@ -123,21 +125,24 @@ class _Writer:
         return InformJob(name, comment, self.options.date, tuple(self.positions), tuple(self.instructions))
 
     def _add(self, command: Command) -> None:
-        if isinstance(command, Joint):
+        if isinstance(command, JointMove):
             self.joints = np.array(command.joints)
             self.pose = _tool(self.arm, self.joints)
             self.instructions.append(MoveJ(self._at(self.pose, self.joints), command.percent))
         elif isinstance(command, Path):
             self._follow(command)
-        elif isinstance(command, Grip):
+        elif isinstance(command, GripperOutput):
             self.instructions.append(Call("CLOSE" if command.closed else "OPEN"))
         elif isinstance(command, Await):
-            self.instructions += [Comment(f"{command.station} done"[:MOST_TEXT]), Wait(done_input(command.machine))]
+            self.instructions += [
+                Comment(f"{command.station} done"[:MOST_TEXT]),
+                InformWait(done_input(command.machine)),
+            ]
         elif isinstance(command, Start | Reset):
             starts = isinstance(command, Start)
             output = start_output(command.machine) if starts else reset_output(command.machine)
             comment = Comment(f"{'start' if starts else 'reset'} {command.station}"[:MOST_TEXT])
-            self.instructions += [comment, Pulse(output, PULSE_S), Wait(done_input(command.machine), on=False)]
+            self.instructions += [comment, Pulse(output, PULSE_S), InformWait(done_input(command.machine), on=False)]
         elif isinstance(command, Check):
             self.instructions.append(PauseIfOff(GRIPPER))
         elif isinstance(command, Payload):
@@ -164,11 +169,11 @@ class _Writer:
         """The number of a new position."""
         if self.options.positions == "pulse":
             pulses = joints * np.array(PULSES[self.arm.name])
-            self.positions.append(Position(tuple(float(round(p)) for p in pulses), None, self.tool))
+            self.positions.append(InformPosition(tuple(float(round(p)) for p in pulses), None, self.tool))
         else:
             x, y, z = (1000.0 * (pose[:3] - [0.0, 0.0, self.arm.base_up_m])).tolist()
             yaw = round(degrees(_wrapped(pose[3])), 2)
-            self.positions.append(Position((x, y, z, 180.0, 0.0, yaw), _configuration(joints), self.tool))
+            self.positions.append(InformPosition((x, y, z, 180.0, 0.0, yaw), _configuration(joints), self.tool))
         return len(self.positions) - 1
 
 
@@ -247,12 +252,12 @@ class _Reader:
             if isinstance(step, MoveJ):
                 joints = self._joints(job.positions[step.c], f"job {job.name}, C{step.c:05d}")
                 self.pose = _tool(self.arm, joints)
-                self.found.append(Joint(tuple(joints.tolist()), step.percent))
+                self.found.append(JointMove(tuple(joints.tolist()), step.percent))
             elif isinstance(step, Dout) and step.output == GRIPPER:
-                self.found.append(Grip(step.on))
+                self.found.append(GripperOutput(step.on))
             elif isinstance(step, Timer):
                 self.found.append(Pause(step.seconds))
-            elif isinstance(step, Wait) and step.on:
+            elif isinstance(step, InformWait) and step.on:
                 self.found.append(Await(step.input - done_input(0)))
             elif isinstance(step, Pulse):
                 machine = step.output // 2
@@ -292,13 +297,13 @@ class _Reader:
             self.found.append(Path(np.array(self.points), np.array(self.roundings), np.array(self.speeds)))
             self.points, self.roundings, self.speeds = [], [], []
 
-    def _tool(self, position: Position) -> Array:
+    def _tool(self, position: InformPosition) -> Array:
         x, y, z, rx, ry, rz = position.numbers
         if abs(abs(rx) - 180.0) > 0.01 or abs(ry) > 0.01:
             raise BadInput(f"Rx = {rx}, Ry = {ry}: the lab's tool points straight down, Rx = 180 and Ry = 0")
         return np.array([x / 1000.0, y / 1000.0, z / 1000.0 + self.arm.base_up_m, radians(rz)])
 
-    def _joints(self, position: Position, where: str) -> Array:
+    def _joints(self, position: InformPosition, where: str) -> Array:
         """The joints of a position: from its pulses, or from the tool's pose and whether T is half a turn from zero."""
         if position.configuration is None:
             if self.arm.name not in PULSES:

@@ -7,13 +7,25 @@ from math import ceil, radians
 import numpy as np
 
 from lab.errors import BadInput
-from lab.export.commands import Await, Check, Command, Grip, Joint, Path, Pause, Payload, Reset, Start, jobs_of
+from lab.export.commands import (
+    Await,
+    Check,
+    Command,
+    GripperOutput,
+    JointMove,
+    Path,
+    Pause,
+    Payload,
+    Reset,
+    Start,
+    jobs_of,
+)
 from lab.export.program import Array, Program
 from lab.export.recorder import SEEN_EVERY, tips
 from lab.export.timed import TimedPoints
 from lab.sim.arms.arm import Arm
 from lab.sim.arms.kinematics import ToolPose
-from lab.sim.arms.robot import NAME, Robot
+from lab.sim.arms.robot import NAME, RobotArm
 from lab.sim.arms.tool_path import YAW_ARM
 from lab.sim.parts.holding import USUAL_N
 from lab.sim.world import TIME_STEP, World
@@ -25,7 +37,7 @@ _AT_REST_RAD = 1e-3  # two points far apart in time whose joints differ by less 
 
 
 @dataclass(frozen=True)
-class Deviation:
+class ToolDeviation:
     """The largest deviations of the played tool from the run's [m], [rad]: along the paths, and at rest at their ends.
 
     motions: the number of paths compared; poses: the number of points on them. run_off_m: the largest deviation of the
@@ -56,13 +68,13 @@ class Deviation:
         return self.max_m <= MOST_M and self.max_rad <= MOST_RAD
 
 
-def deviation(program: Program, played: "list[Command] | TimedPoints") -> Deviation:
+def deviation(program: Program, played: "list[Command] | TimedPoints") -> ToolDeviation:
     """The deviation of what is `played` from the run. BadInput unless it has the run's paths, outputs and waits in order."""
     arm, robot = program.arm, program.carried.robot
     jobs = jobs_of(program)
     wanted = [command for job in jobs for command in job.commands]
     if isinstance(played, TimedPoints):
-        wanted = [command for command in wanted if isinstance(command, Await | Grip)]
+        wanted = [command for command in wanted if isinstance(command, Await | GripperOutput)]
     if signals(played, program) != signals(wanted, program):
         raise BadInput("what was read back has other gripper outputs or waits than the run")
     if isinstance(played, TimedPoints):
@@ -80,7 +92,7 @@ def deviation(program: Program, played: "list[Command] | TimedPoints") -> Deviat
         worst = np.maximum(worst, [*along, rest[0].max(), rest[1].max()])
         poses += len(seen)
     along_m, along_rad, at_rest_m, at_rest_rad = worst.tolist()
-    return Deviation(along_m, along_rad, at_rest_m, at_rest_rad, len(motions), poses, run_off(program))
+    return ToolDeviation(along_m, along_rad, at_rest_m, at_rest_rad, len(motions), poses, run_off(program))
 
 
 def signals(played: "Sequence[Command] | TimedPoints", program: Program) -> list[str]:
@@ -90,12 +102,12 @@ def signals(played: "Sequence[Command] | TimedPoints", program: Program) -> list
         told: list[Command] = []
         for point in played.points:
             told += [Await(machines.index(point.waits_for) + 1)] if point.waits_for in machines else []
-            told.append(Grip(point.closed))
+            told.append(GripperOutput(point.closed))
         played = told
     for command in played:
         if isinstance(command, Await):
             found.append(f"wait for input {command.machine}")
-        elif isinstance(command, Grip) and command.closed != closed:
+        elif isinstance(command, GripperOutput) and command.closed != closed:
             closed = command.closed
             found.append("close" if closed else "open")
         elif isinstance(command, Start | Reset):
@@ -107,13 +119,15 @@ def signals(played: "Sequence[Command] | TimedPoints", program: Program) -> list
     return found
 
 
-def _compared_by_time(program: Program, played: Array) -> Deviation:
+def _compared_by_time(program: Program, played: Array) -> ToolDeviation:
     if not len(program.seen):
-        return Deviation(0.0, 0.0, 0.0, 0.0, 0, 0, 0.0)
+        return ToolDeviation(0.0, 0.0, 0.0, 0.0, 0, 0, 0.0)
     far, turned = _gaps(program.seen, played)
     ends = [motion.seen_last - 1 for motion in program.motions if motion.complete]
     at_rest = (float(far[ends].max()), float(turned[ends].max())) if ends else (0.0, 0.0)
-    return Deviation(float(far.max()), float(turned.max()), *at_rest, len(program.motions), len(far), run_off(program))
+    return ToolDeviation(
+        float(far.max()), float(turned.max()), *at_rest, len(program.motions), len(far), run_off(program)
+    )
 
 
 def run_off(program: Program) -> float:
@@ -130,11 +144,11 @@ def run_off(program: Program) -> float:
 def play(commands: Sequence[Command], arm: Arm, settings: RobotSettings) -> list[Array]:
     """The tool's poses on each `Path` (n, 7), see `Program.seen`, one row per physics step, when the arm plays alone."""
     with World() as world:
-        robot = Robot(world, arm, settings.speed_m_s, settings.acceleration_m_s2, settings.grip_force_n or USUAL_N)
+        robot = RobotArm(world, arm, settings.speed_m_s, settings.acceleration_m_s2, settings.grip_force_n or USUAL_N)
         ways: list[Array] = []
         stood = False
         for command in commands:
-            if isinstance(command, Joint):
+            if isinstance(command, JointMove):
                 target = np.array(command.joints)
                 if not stood:
                     robot.hold(target)
@@ -145,14 +159,14 @@ def play(commands: Sequence[Command], arm: Arm, settings: RobotSettings) -> list
                 poses = [ToolPose(*point) for point in command.points.tolist()]
                 way = robot.follow(poses, blend=(2.0 * command.roundings).tolist())
                 ways.append(_run(world, way, robot))
-            elif isinstance(command, Grip):
+            elif isinstance(command, GripperOutput):
                 _run(world, robot.grip() if command.closed else robot.release())
             elif isinstance(command, Pause):
                 _run(world, robot.rest(min(HOLD_STEPS, ceil(command.seconds / TIME_STEP))))
         return ways
 
 
-def _run(world: World, motion: Iterator[None], robot: Robot | None = None) -> Array:
+def _run(world: World, motion: Iterator[None], robot: RobotArm | None = None) -> Array:
     """The tool's poses (n, 7) while a motion is carried out, the first one included; empty without a robot."""
     seen = [] if robot is None else [_link(world, robot.arm)]
     for _ in motion:
@@ -166,7 +180,7 @@ def _link(world: World, arm: Arm) -> Array:
     return np.concatenate(world.pose(NAME, arm.tool_link))
 
 
-def _joint_motion(robot: Robot, target: Array, percent: float) -> Iterator[None]:
+def _joint_motion(robot: RobotArm, target: Array, percent: float) -> Iterator[None]:
     """Move all joints together and evenly, with a share of their speed; no steps if they are there already."""
     here = robot.world.joints(NAME, robot.arm.joints)
     seconds = float(np.max(np.abs(target - here) / (robot.arm.speed * percent / 100.0)))
@@ -185,7 +199,7 @@ def play_timed(played: TimedPoints, arm: Arm, settings: RobotSettings, at_s: Arr
     joints = np.array([point.joints for point in played.points])
     wanted = np.rint(at_s / TIME_STEP).astype(int)
     with World() as world:
-        robot = Robot(world, arm, settings.speed_m_s, settings.acceleration_m_s2, settings.grip_force_n or USUAL_N)
+        robot = RobotArm(world, arm, settings.speed_m_s, settings.acceleration_m_s2, settings.grip_force_n or USUAL_N)
         robot.hold(joints[0])
         seen: dict[int, Array] = {}
         rests = _rests(times, joints)

@@ -109,7 +109,7 @@ class Press(Record):
     closed: bool
 
 
-class Rest(Record):
+class ArmRest(Record):
     """The arm stays, as over a cell that it covers."""
 
     what: Literal["rest"] = "rest"
@@ -117,10 +117,10 @@ class Rest(Record):
     seconds: At
 
 
-Action = Annotated[Motion | Press | Rest, Field(discriminator="what")]
+Action = Annotated[Motion | Press | ArmRest, Field(discriminator="what")]
 
 
-class Transfer(Record):
+class ProgramTransfer(Record):
     """One move of the sequence: the robot leaves `start`, reaches the part at `origin`, sets it down at `target`.
 
     waits_for: the machine that must have finished before the part is taken out; None: none. mass_kg: of what is carried, a
@@ -145,7 +145,7 @@ class Transfer(Record):
         return f"{what}: {self.origin} to {self.target}"
 
 
-class Carried(Record):
+class ProgramDocument(Record):
     """The content of `program.json`; its row numbers refer to the arrays of `trajectory.npz`.
 
     folder: of an arm that is a URDF file. batches: the machines that process all parts in them together.
@@ -158,7 +158,7 @@ class Carried(Record):
     folder: str
     machines: tuple[str, ...]
     batches: tuple[str, ...] = ()
-    transfers: tuple[Transfer, ...]
+    transfers: tuple[ProgramTransfer, ...]
     actions: tuple[Action, ...]
 
 
@@ -170,7 +170,7 @@ class Program:
     finger tips' pose in physics at times seen_at_s (m,): x, y, z [m] and quaternion xyzw, x out of the gripper, y across it.
     """
 
-    carried: Carried
+    carried: ProgramDocument
     at_s: Array
     joints: Array
     closed: NDArray[np.bool_]
@@ -211,7 +211,7 @@ class Program:
             if not path.is_file():
                 raise BadInput(f"'{folder}' (RUN): no {path.name} in it; give the folder of a `lab run` (its --out)")
         try:
-            carried = Carried.model_validate_json(read_limited(paths[0], MAX_TEXT_BYTES))
+            carried = ProgramDocument.model_validate_json(read_limited(paths[0], MAX_TEXT_BYTES))
         except OSError as error:
             raise BadInput(f"'{paths[0]}': {error.strerror or error}") from None
         except ValidationError as error:

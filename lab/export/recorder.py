@@ -5,10 +5,10 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from lab.export.program import Action, Array, Carried, Motion, Press, Program, Rest, Transfer
+from lab.export.program import Action, ArmRest, Array, Motion, Press, Program, ProgramDocument, ProgramTransfer
 from lab.sequencing.cell.schedule import Move
 from lab.sim.arms.kinematics import ToolPose
-from lab.sim.arms.robot import NAME, Robot, Trajectory
+from lab.sim.arms.robot import NAME, RobotArm, Trajectory
 from lab.sim.world import TIME_STEP
 from lab.tasks.task import Task
 
@@ -18,7 +18,7 @@ SEEN_EVERY = 2  # physics steps between two records of the tool: 120 a simulated
 class MotionRecorder:
     """A `MotionListener` that records the joint targets of each physics step of a motion, and the tool's real poses."""
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, robot: RobotArm) -> None:
         """Start recording: times begin at 0 now, and the robot reports to this listener from now on."""
         self._robot, self._zero = robot, robot.world.steps
         self._actions: list[Action] = []
@@ -60,7 +60,7 @@ class MotionRecorder:
     def rested(self, steps: int) -> None:
         """Record a rest."""
         self._close(complete=False)
-        self._actions.append(Rest(at_s=self._steps * TIME_STEP, seconds=steps * TIME_STEP))
+        self._actions.append(ArmRest(at_s=self._steps * TIME_STEP, seconds=steps * TIME_STEP))
 
     def _see(self) -> None:
         position, turn = self._robot.world.pose(NAME, self._robot.arm.tool_link)
@@ -101,7 +101,7 @@ class MotionRecorder:
         self._close(complete=False)
         arm = self._robot.arm
         machines = tuple(station.name for station in task.stations if station.kind == "machine")
-        carried = Carried(
+        carried = ProgramDocument(
             task=task.name,
             seed=seed,
             robot=task.robot,
@@ -144,9 +144,9 @@ def _mass_kg(task: Task, part: str, *, on_pallet: bool) -> float:
     return own.mass_kg + (masses.get(own.pallet or "", 0.0) if on_pallet else 0.0)
 
 
-def _transfer(move: Move, part: str, machines: Sequence[str], task: Task) -> Transfer:
+def _transfer(move: Move, part: str, machines: Sequence[str], task: Task) -> ProgramTransfer:
     waits = move.origin in machines and move.carries == "part"
-    return Transfer(
+    return ProgramTransfer(
         part=part,
         carries=move.carries,
         start=move.start,

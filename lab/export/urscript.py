@@ -18,8 +18,8 @@ from lab.export.commands import (
     Await,
     Check,
     Command,
-    Grip,
-    Joint,
+    GripperOutput,
+    JointMove,
     Path,
     Pause,
     Payload,
@@ -65,7 +65,7 @@ def write(program: Program, options: Options) -> dict[str, str]:
     acceleration = program.carried.robot.acceleration_m_s2
     tool_m = float(np.linalg.norm(arm.tip[:3, 3]))
     lines = [f"set_tcp({_pose_text((0.0, 0.0, tool_m), (0.0, 0.0, 0.0))})", f"set_digital_out({GRIPPER}, False)"]
-    writer = _Writer(arm, acceleration, lines)
+    writer = _ScriptWriter(arm, acceleration, lines)
     for number, job in enumerate(jobs_of(program), start=1):
         lines.append(f"# {number}: {job.words}")
         for command in job.commands:
@@ -75,7 +75,7 @@ def write(program: Program, options: Options) -> dict[str, str]:
 
 
 @dataclass
-class _Writer:
+class _ScriptWriter:
     """Writes commands as text, and keeps the tool's pose along the way."""
 
     arm: Arm
@@ -84,7 +84,7 @@ class _Writer:
     pose: Array | None = None
 
     def add(self, command: Command) -> None:
-        if isinstance(command, Joint):
+        if isinstance(command, JointMove):
             pose = self.arm.forward(np.array(command.joints))
             self.pose = np.array([pose.x, pose.y, pose.z, pose.yaw])
             self.lines.append(f"movej({self._text(self.pose)}, a={JOINT_ACCELERATION:.3f}, v={JOINT_SPEED:.3f})")
@@ -97,7 +97,7 @@ class _Writer:
                 v = _tool_speed(step_between(self.pose, pose), float(command.speeds[number]))
                 self.lines.append(f"movel({self._text(pose)}, a={self.acceleration:.3f}, v={v:.5f}, r={rounded:.4f})")
                 self.pose = pose
-        elif isinstance(command, Grip):
+        elif isinstance(command, GripperOutput):
             self.lines.append(f"set_digital_out({GRIPPER}, {command.closed})")
         elif isinstance(command, Pause):
             self.lines.append(f"sleep({command.seconds:.3f})")
@@ -161,11 +161,11 @@ def read(files: Mapping[str, str], arm: Arm) -> list[Command]:
     if len(files) != 1:
         raise BadInput(f"wanted one URScript file, found {', '.join(files) or 'none'}")
     ((name, text),) = files.items()
-    return _Reader(arm, name).read(text)
+    return _ScriptReader(arm, name).read(text)
 
 
 @dataclass
-class _Reader:
+class _ScriptReader:
     """Reads line by line, and keeps the tool's pose along the way."""
 
     arm: Arm
@@ -222,13 +222,13 @@ class _Reader:
         if np.isnan(joints[0]):
             raise self._fault(f"out of reach of arm '{self.arm.name}'")
         self.pose = pose
-        self.found.append(Joint(tuple(joints.tolist())))
+        self.found.append(JointMove(tuple(joints.tolist())))
 
     def joint_list(self, match: "re.Match[str]") -> None:
         joints = np.array([float(number) for number in match[1].split(", ")])
         pose = self.arm.forward(joints)
         self.pose = np.array([pose.x, pose.y, pose.z, pose.yaw])
-        self.found.append(Joint(tuple(joints.tolist())))
+        self.found.append(JointMove(tuple(joints.tolist())))
 
     def straight(self, match: "re.Match[str]") -> None:
         if self.pose is None:
@@ -243,7 +243,7 @@ class _Reader:
         number, on = int(match[1]), match[2] == "True"
         machine = number // 2
         if number == GRIPPER:
-            self.found.append(Grip(on))
+            self.found.append(GripperOutput(on))
         elif on:
             self.found.append(Start(machine) if number == start_output(machine) else Reset(machine))
 
@@ -256,15 +256,15 @@ class _Reader:
         return np.array([x, y, z + self.arm.base_up_m, 2.0 * atan2(ry, rx)])
 
 
-_Act = Callable[[_Reader, "re.Match[str]"], None]
+_Act = Callable[[_ScriptReader, "re.Match[str]"], None]
 _LINES: dict[str, list[tuple[str, _Act]]] = {  # first word -> patterns of the whole line, and what each does
     "set_tcp": [(rf"set_tcp\({_POSE}\)", lambda reader, match: None)],
     "movej": [
-        (rf"movej\({_POSE}, a=({_NUMBER}), v=({_NUMBER})\)", _Reader.joint_pose),
-        (rf"movej\({_JOINTS}, a=({_NUMBER}), v=({_NUMBER})\)", _Reader.joint_list),
+        (rf"movej\({_POSE}, a=({_NUMBER}), v=({_NUMBER})\)", _ScriptReader.joint_pose),
+        (rf"movej\({_JOINTS}, a=({_NUMBER}), v=({_NUMBER})\)", _ScriptReader.joint_list),
     ],
-    "movel": [(rf"movel\({_POSE}, a=({_NUMBER}), v=({_NUMBER}), r=({_NUMBER})\)", _Reader.straight)],
-    "set_digital_out": [(r"set_digital_out\((\d{1,2}), (True|False)\)", _Reader.output)],
+    "movel": [(rf"movel\({_POSE}, a=({_NUMBER}), v=({_NUMBER}), r=({_NUMBER})\)", _ScriptReader.straight)],
+    "set_digital_out": [(r"set_digital_out\((\d{1,2}), (True|False)\)", _ScriptReader.output)],
     "set_payload": [
         (rf"set_payload\(({_NUMBER})\)", lambda reader, match: reader.found.append(Payload(float(match[1]))))
     ],

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from lab.errors import WorkFailed
-from lab.gym.numbered_environment import CellNumbering, Moved, NumberedEnvironment
+from lab.gym.numbered_environment import CellNumbering, NumberedEnvironment, NumberedStep
 from lab.gym.transition_model import SAME_REWARD, Actions, TransitionModel, Worth
 from lab.learning.environment import Judged, Step
 from lab.learning.selection import Draw
@@ -25,7 +25,7 @@ Digits = tuple[tuple[str, int], ...]
 
 
 @dataclass(frozen=True)
-class Known:
+class KnownEnvironment:
     """The names of an environment's actions, and names and sizes of the components of its states."""
 
     actions: tuple[str, ...] = ()
@@ -33,13 +33,13 @@ class Known:
 
 
 KNOWN = {  # class of the environment -> names
-    "FrozenLakeEnv": Known(("left", "down", "right", "up")),
-    "CliffWalkingEnv": Known(("up", "right", "down", "left")),
-    "TaxiEnv": Known(
+    "FrozenLakeEnv": KnownEnvironment(("left", "down", "right", "up")),
+    "CliffWalkingEnv": KnownEnvironment(("up", "right", "down", "left")),
+    "TaxiEnv": KnownEnvironment(
         ("south", "north", "east", "west", "pick-up", "drop-off"),
         (("row", 5), ("column", 5), ("passenger", 5), ("destination", 4)),
     ),
-    "BlackjackEnv": Known(("stick", "hit"), (("sum", 32), ("dealer", 11), ("ace", 2))),
+    "BlackjackEnv": KnownEnvironment(("stick", "hit"), (("sum", 32), ("dealer", 11), ("ace", 2))),
 }
 
 
@@ -135,8 +135,8 @@ def table_of(live: NumberedEnvironment, model: TransitionModel | None) -> GymTab
     )
 
 
-def _known(live: NumberedEnvironment) -> Known:
-    return KNOWN.get(type(live.inside).__name__, Known())
+def _known(live: NumberedEnvironment) -> KnownEnvironment:
+    return KNOWN.get(type(live.inside).__name__, KnownEnvironment())
 
 
 def _labels(live: NumberedEnvironment) -> tuple[str, ...]:
@@ -185,7 +185,7 @@ class Played(NamedTuple):
     """The result of EPISODES_JUDGED episodes: the mean return, and (steps, last step) of those that terminated."""
 
     mean_return: float
-    ends: list[tuple[int, Moved]]
+    ends: list[tuple[int, NumberedStep]]
 
     @property
     def best_end(self) -> float:
@@ -231,7 +231,7 @@ class GymEnvironment:
         self._state = moved.state
         return Step(moved.reward, moved.state, moved.terminated, self._reached(moved), moved.truncated)
 
-    def _reached(self, moved: Moved) -> bool:
+    def _reached(self, moved: NumberedStep) -> bool:
         if moved.success is not None or not moved.terminated:
             return bool(moved.success)
         self._best = max(self._best, moved.reward) if self.model is None else self.model.best
@@ -313,7 +313,7 @@ class GymEnvironment:
     def _played(self, policy: Actions, horizon: int) -> Played:
         """The result of a policy in seeded episodes of a copy."""
         other, actions = self.live.again(), policy.tolist()
-        returned, ends = 0.0, list[tuple[int, Moved]]()
+        returned, ends = 0.0, list[tuple[int, NumberedStep]]()
         for seed in range(EPISODES_JUDGED):
             state = other.begin(seed)
             for step in range(1, horizon + 1):

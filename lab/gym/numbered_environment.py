@@ -137,7 +137,7 @@ def _built(space: spaces.Space[Any], digits: Iterator[int]) -> Any:
 MAX_ENTRIES = 1_000_000  # states x actions
 
 
-class Moved(NamedTuple):
+class NumberedStep(NamedTuple):
     """The outcome of a step; success: whether the environment reports a goal, None if it reports nothing."""
 
     reward: float
@@ -226,7 +226,7 @@ class NumberedEnvironment:
             raise self._failed("it cannot be reset", said(error)) from error
         return self._state
 
-    def step(self, action: int) -> Moved:
+    def step(self, action: int) -> NumberedStep:
         """The outcome of a step. Raises WorkFailed on an error, and for states or rewards that are not allowed."""
         try:
             observation, reward, terminated, truncated, info = self._env.step(self._choices[action])
@@ -236,7 +236,9 @@ class NumberedEnvironment:
         if not isfinite(worth):
             raise self._failed(f"its step from {self._state} with action {action}", f"a reward of {worth}")
         self._state = entered
-        return Moved(worth, entered, bool(terminated), bool(truncated), None if success is None else bool(success))
+        return NumberedStep(
+            worth, entered, bool(terminated), bool(truncated), None if success is None else bool(success)
+        )
 
     def _placeable(self) -> Any:
         """A copy for drawing any state; None unless the state is the attribute `s`, as in Gymnasium's toy-text environments."""

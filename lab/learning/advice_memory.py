@@ -85,7 +85,7 @@ class Memory(NamedTuple):
     now: Now
 
 
-class Move(NamedTuple):
+class RememberedMove(NamedTuple):
     """A move: its number (state * A + action), its source (OWN, ASKED or PRACTISED) and the state entered.
 
     over: the state entered is terminal; reached: it is a goal.
@@ -181,7 +181,7 @@ def plan(memory: Memory, start: int) -> None:
         now.practices = now.best
 
 
-def moved(memory: Memory, move: Move) -> None:
+def moved(memory: Memory, move: RememberedMove) -> None:
     """Updates model, walk and trust after a move (rules 2 and 3)."""
     now, at, led = memory.now, memory.now.at, memory.led
     number, source, entered, over, reached = move
@@ -267,7 +267,7 @@ class Recall:
 
     def moved(self, state: int, action: int, entered: int, over: bool, reached: bool) -> None:
         """Records the last chosen move, which counts as the learner's own unless `chosen` or `asked` marked it otherwise."""
-        moved(self.memory, Move(state * self._actions + action, self._source, entered, over, reached))
+        moved(self.memory, RememberedMove(state * self._actions + action, self._source, entered, over, reached))
         self._source = OWN
 
     def ended(self, moves: int | None, helped: int) -> Iterator[Event]:

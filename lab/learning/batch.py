@@ -149,7 +149,9 @@ def _hearing(mdp: TabularMDP, asking: records.Asking, advice: Advice | None) -> 
     )
 
 
-def _walks(mdp: TabularMDP, asking: records.Asking, learning: records.Learning, episodes: int) -> records.Walks | None:
+def _walks(
+    mdp: TabularMDP, asking: records.Asking, learning: records.CompiledLearner, episodes: int
+) -> records.Walks | None:
     """The arrays for gates that judge episodes which begin in different states; None otherwise."""
     if not asking.gate.judges or len(mdp.starts) < 2:
         return None
@@ -214,14 +216,16 @@ def _on_tiles(mdp: TabularMDP, learner: LearnerSettings, work: records.Work) -> 
     return _batch(sessions.steps, sessions.guided, sessions.counts, q)
 
 
-def _world(mdp: TabularMDP) -> linear_loop.World:
+def _world(mdp: TabularMDP) -> linear_loop.LinearWorld:
     if not isinstance(mdp, CellTable):
         none, cells = np.zeros(1), np.ones(1, np.int64)
-        return linear_loop.World(linear_loop.TABLE, none, none, none, cells, 0.0, 0.0, False)
+        return linear_loop.LinearWorld(linear_loop.TABLE, none, none, none, cells, 0.0, 0.0, False)
     physics, bounds = mdp.physics, mdp.physics.bounds
     ends, cells = (np.array(bounds.low), np.array(bounds.high)), np.array(bounds.shape)
     rewards = physics.reward, physics.last_reward
-    return linear_loop.World(physics.number, np.zeros(len(cells)), *ends, cells, *rewards, physics.longer_is_better)
+    return linear_loop.LinearWorld(
+        physics.number, np.zeros(len(cells)), *ends, cells, *rewards, physics.longer_is_better
+    )
 
 
 def play(mdp: CellTable, policy: NDArray[np.int64], drawn: FloatArray, most: int) -> NDArray[np.int64]:
@@ -236,10 +240,10 @@ def play(mdp: CellTable, policy: NDArray[np.int64], drawn: FloatArray, most: int
     return moves
 
 
-def _sessions(learner: LearnerSettings, seeds: NDArray[np.uint64], size: int, keep: bool) -> records.Sessions:
+def _sessions(learner: LearnerSettings, seeds: NDArray[np.uint64], size: int, keep: bool) -> records.KernelSessions:
     shape = (len(seeds), learner.episodes)
     warm = [selection.temperature(n, learner.beta, learner.exploration) for n in range(1, learner.episodes + 1)]
-    return records.Sessions(
+    return records.KernelSessions(
         seeds=np.asarray(seeds, np.uint64),
         per_tau=1.0 / np.array(warm),
         steps=np.zeros(shape, np.int32),
@@ -286,13 +290,13 @@ def _problem(mdp: TabularMDP, learner: LearnerSettings) -> records.ProblemArrays
     return records.ProblemArrays(mdp.successor.flatten(), mdp.reward.flatten(), arrival, ends, starts, step_reward)
 
 
-def _learning(mdp: TabularMDP, learner: LearnerSettings) -> records.Learning:
+def _learning(mdp: TabularMDP, learner: LearnerSettings) -> records.CompiledLearner:
     given = vars(learner) | {
         "afterstate": _is_afterstate(learner),
         "max_moves": learner.max_steps - learner.count_start,
         "actions": (0,) * mdp.n_actions,
     }
-    return records.Learning(**{name: given[name] for name in records.Learning._fields})
+    return records.CompiledLearner(**{name: given[name] for name in records.CompiledLearner._fields})
 
 
 def _asking(gate: GateSettings, somebody: bool, max_steps: int) -> records.Asking:
@@ -302,7 +306,7 @@ def _asking(gate: GateSettings, somebody: bool, max_steps: int) -> records.Askin
     return records.Asking(**{name: given[name] for name in records.Asking._fields})
 
 
-def _action_values(mdp: TabularMDP, learning: records.Learning, tables: FloatArray) -> FloatArray:
+def _action_values(mdp: TabularMDP, learning: records.CompiledLearner, tables: FloatArray) -> FloatArray:
     """Tables as (N, S, A) action values, zeros in terminal states."""
     if not learning.afterstate:
         return tables.reshape(-1, *mdp.successor.shape)

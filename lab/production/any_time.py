@@ -20,7 +20,7 @@ Session = Callable[[Search, int], SequenceResult]  # given the search and the se
 
 
 @dataclass(frozen=True)
-class Found:
+class SearchResults:
     """The results of a search. sessions: at least one; method: what found them; known: what no order can beat.
 
     stopped_by: "Ctrl-C", "seconds" or "gap", where the search was cut short; None where it came to its end.
@@ -74,7 +74,7 @@ def looked_for(
     tell: Tell,
     limits: Limits = NO_LIMITS,
     began: Callable[[Reference | None], SequencingBegan] | None = None,
-) -> Found:
+) -> SearchResults:
     """What so many sessions find, and what is proven of the best order, unless the method's answer needs no proof beside it.
 
     A bound is known within a second, for small cells the optimum. limits: a session ends when its order is within their gap,
@@ -114,7 +114,7 @@ def looked_for(
 
 
 @uninterrupted
-def _found(heard: Sequence[_Heard], best: Shared, method: str, stopped_by: str) -> Found:
+def _found(heard: Sequence[_Heard], best: Shared, method: str, stopped_by: str) -> SearchResults:
     """The results of the sessions; where none has found an order, the best one that is known from elsewhere."""
     found = [result for one in heard if (result := one.result())]
     if not best.sequence:
@@ -128,7 +128,7 @@ def _found(heard: Sequence[_Heard], best: Shared, method: str, stopped_by: str) 
         raise not_in_time(best.cell, method, best.bound)
     if not found:
         found, method = [SequenceResult(best.sequence, best.cost, (best.cost,))], best.found_by
-    return Found(found, method, _known(best), stopped_by or None)
+    return SearchResults(found, method, _known(best), stopped_by or None)
 
 
 def _known(best: Shared) -> Reference:

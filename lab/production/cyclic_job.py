@@ -20,7 +20,7 @@ from lab.sequencing.methods.exact import optimum
 from lab.skills.prepared_scene import prepare
 from lab.tasks.cell_file import CellFile, order_from_word, toast_case
 from lab.tasks.grid_world import GridWorld
-from lab.tasks.instances import Asked
+from lab.tasks.instances import InstanceRequest
 from lab.tasks.task import Task
 from lab.tasks.task_file import load_beside
 from lab.teaching.events import PhaseBegan
@@ -36,7 +36,7 @@ MAX_EXPANDED = 50_000  # states, for the best finite order
 @dataclass(frozen=True)
 class CyclicOptions:
     """What is asked for: which parts enter in a cycle, as `lab sequence` names an order, and how many at the most; the seed;
-    see `Asked`."""
+    see `InstanceRequest`."""
 
     case: str | None = None
     toasts: int | None = None
@@ -61,7 +61,7 @@ def cyclic_named(name: str, wanted: CyclicOptions, teacher: Teacher, files: dict
     case = wanted.case
     if case is not None and name == "toast":
         name, case = toast_case(case), None
-    loaded, case = load_beside(name, Asked(wanted.layout, wanted.robots, case))
+    loaded, case = load_beside(name, InstanceRequest(wanted.layout, wanted.robots, case))
     if isinstance(loaded, GridWorld):
         raise BadInput(f"{name}: it is a world, there is nothing to sequence: learn it with lab teach {name}")
     mix, own = _mix(loaded, case, wanted)

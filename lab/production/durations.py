@@ -23,7 +23,7 @@ from lab.sim.world import TIME_STEP, World, engine
 from lab.skills import Skill
 from lab.skills.prepared_scene import Prepared, precedences
 from lab.skills.skill import Status, stand_below
-from lab.skills.skillset import Carried, Pair, SkillSet, products, stations, ways_of
+from lab.skills.skillset import CarriedPath, Pair, SkillSet, products, stations, ways_of
 from lab.tasks.task import Order, Task
 from lab.toolbox.policy import Policy
 from lab.toolbox.registry import Toolbox
@@ -33,11 +33,11 @@ RECORDS = "durations"  # the kind of record in the toolbox
 LONGEST_S = 86_400.0  # of a move or a process
 AWAY_M = 5.0  # from its station, where a part is in nobody's way
 
-Way = Pair | Carried
+Way = Pair | CarriedPath
 
 
 class TimedMove(NamedTuple):
-    """How long the robot took in a run [s] from one station to another, with something in the gripper (`Carried`) or without."""
+    """How long the robot took in a run [s] from one station to another: empty, or with something in the gripper (`CarriedPath`)."""
 
     way: Way
     seconds: float
@@ -52,7 +52,7 @@ class Durations:
     """
 
     empty_s: dict[Pair, float]
-    loaded_s: dict[Carried, float]
+    loaded_s: dict[CarriedPath, float]
     process_s: dict[str, float]
     service_s: dict[Pair, float] = field(default_factory=dict)
     sim_s: float = 0.0
@@ -118,7 +118,7 @@ class Durations:
 
 
 def _word(way: Way) -> str:
-    return f"{way[0]} > {way[1]}" + (f" with {way.kind}" if isinstance(way, Carried) else "")
+    return f"{way[0]} > {way[1]}" + (f" with {way.kind}" if isinstance(way, CarriedPath) else "")
 
 
 def _service(own: Pair) -> str:
@@ -141,13 +141,13 @@ def _times(record: Mapping[str, Any], table: str, wanted: set[str]) -> dict[str,
 
 
 @dataclass(frozen=True)
-class Trial:
+class TimingTrial:
     """What is timed in one world of its own: a way with a part and the process behind it, empty ways, or a service.
 
     at: a skill that takes parts up or sets them down, on the spots of its station that the order uses.
     """
 
-    loaded: Carried | None = None
+    loaded: CarriedPath | None = None
     process: bool = False
     empty: tuple[Pair, ...] = ()
     service: Pair | None = None
@@ -155,22 +155,24 @@ class Trial:
     spots: tuple[Spot, ...] = ()
 
 
-def trials(prepared: Prepared) -> list[Trial]:
+def trials(prepared: Prepared) -> list[TimingTrial]:
     """What times every move once, and its ends on every spot that the order uses; each trial can be made beside the others."""
     skillset, timed = prepared.skillset, set[str]()
     ends = dict.fromkeys(skill for leg in skillset.legs.values() for skill in leg if skill.station and skill.kind)
     used = ((skill, spots_in_use(prepared, skill)) for skill in ends)
     made = [
-        Trial(at=skill.name, spots=spots)
+        TimingTrial(at=skill.name, spots=spots)
         for skill, spots in used
         if {*spots} != {prepared.surveys.places.spots(prepared.task.station(skill.station), skill.kind)[0]}
     ]
     for way in skillset.legs:
-        made.append(Trial(loaded=way, process=bool(skillset.processes[way.target]) and way.target not in timed))
+        made.append(TimingTrial(loaded=way, process=bool(skillset.processes[way.target]) and way.target not in timed))
         timed.add(way.target)
-    made += [Trial(service=own) for own, skills in skillset.services.items() if skills]
+    made += [TimingTrial(service=own) for own, skills in skillset.services.items() if skills]
     origins = dict.fromkeys(origin for origin, _ in skillset.travels)
-    return made + [Trial(empty=tuple(pair for pair in skillset.travels if pair[0] == origin)) for origin in origins]
+    return made + [
+        TimingTrial(empty=tuple(pair for pair in skillset.travels if pair[0] == origin)) for origin in origins
+    ]
 
 
 def spots_in_use(prepared: Prepared, skill: Skill) -> tuple[Spot, ...]:
@@ -194,7 +196,7 @@ def measure(
         for carried in found.loaded_s:
             found.loaded_s[carried] += sum(whole.more_s.get(skill.name, 0.0) for skill in skillset.legs[carried])
         for way, seconds in (found.loaded_s | found.empty_s).items():
-            tell(f"{_word(way)}, {'loaded' if isinstance(way, Carried) else 'empty'}", seconds)
+            tell(f"{_word(way)}, {'loaded' if isinstance(way, CarriedPath) else 'empty'}", seconds)
         for station, seconds in found.process_s.items():
             tell(skillset.processes[station][-1].name, seconds)
         for own, seconds in found.service_s.items():
@@ -203,7 +205,7 @@ def measure(
     return replace(whole, more_s={})
 
 
-def carried_out(prepared: Prepared, trial: Trial) -> Durations:
+def carried_out(prepared: Prepared, trial: TimingTrial) -> Durations:
     """What one trial times [s]; WorkFailed when a move does not succeed."""
     skillset = prepared.skillset
     with World() as world:

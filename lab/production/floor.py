@@ -8,7 +8,7 @@ from time import perf_counter
 
 from lab.errors import WorkFailed
 from lab.production.controls import Controls, StopKind, StopRecord, StopsChanged, unwritten
-from lab.production.machine import Machine, Work
+from lab.production.machine import Machine, MachineWork
 from lab.production.recorder import Recorder, Viewer, extras_of
 from lab.sim.arms.kinematics import ToolPose
 from lab.sim.arms.robot import NAME
@@ -301,19 +301,19 @@ class Floor:
             return f"{StopKind.PROTECTIVE} stop: {too_hard}"
         return ""
 
-    def begin(self, station: str, part: str, seconds: float) -> Work:
+    def begin(self, station: str, part: str, seconds: float) -> MachineWork:
         """Let a machine begin with a part: with its learned process, or for so long [s]."""
         skills = self.skillset.processes[station]
         work = self.machines[station].begin(part, self.now_s, seconds, skills[0] if skills else None)
         self.again(work)
         return work
 
-    def again(self, work: Work) -> None:
+    def again(self, work: MachineWork) -> None:
         """Let a machine carry its process out, from the beginning."""
         if work.skill is not None:
             work.start(self.bench, self.skillset.policies[work.skill.name])
 
-    def work_on(self, part: str) -> Work | None:
+    def work_on(self, part: str) -> MachineWork | None:
         """What the machine that a part stands in does with it, or has done; None where it stands in none."""
         return next((m.works[part] for m in self.machines.values() if part in m.works), None)
 

@@ -11,7 +11,7 @@ PATIENCE, PATIENCE_S = 1.0, 10.0  # a machine may be late by this share of its t
 
 
 @dataclass
-class Work:
+class MachineWork:
     """What a machine, `station`, does with one part.
 
     begun_s: since when [s]; expected_s: when it should be done [s]; until_s: when it is done by the clock [s]; of a learned
@@ -64,14 +64,14 @@ class Machine:
     station: str
     share: float = 1.0
     fails: bool = False
-    works: dict[str, Work] = field(default_factory=dict)
+    works: dict[str, MachineWork] = field(default_factory=dict)
     _due: float = field(default=0.0, repr=False)  # steps of its process
 
-    def begin(self, part: str, now_s: float, seconds: float, skill: Skill | None = None) -> Work:
-        """Begin to work on a part: for `seconds` [s], or with the process, which `Work.start` then carries out."""
+    def begin(self, part: str, now_s: float, seconds: float, skill: Skill | None = None) -> MachineWork:
+        """Begin to work on a part: for `seconds` [s], or with the process, which `MachineWork.start` then carries out."""
         own = None if skill is None else skill.aim(part)
         until_s = NEVER if self.fails else now_s + (seconds * self.share if skill is None else 0.0)
-        self.works[part] = Work(self.station, part, now_s, now_s + seconds, until_s, own)
+        self.works[part] = MachineWork(self.station, part, now_s, now_s + seconds, until_s, own)
         return self.works[part]
 
     @property

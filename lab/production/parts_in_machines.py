@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from lab.production.floor import Floor
-from lab.production.machine import NEVER, Work
+from lab.production.machine import NEVER, MachineWork
 from lab.production.perception import look, moved_off
 from lab.production.recorder import burnt_name, finish_name
 from lab.production.run_state import RunState
@@ -61,7 +61,7 @@ class PartsInMachines:
     floor: Floor
     state: RunState
 
-    def work_on(self, part: int) -> Work | None:
+    def work_on(self, part: int) -> MachineWork | None:
         """What the machine that a part stands in does with it, or has done; None where it stands in none."""
         return self.floor.work_on(self.state.name(part))
 

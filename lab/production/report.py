@@ -49,7 +49,7 @@ from lab.view.meshcat import replay_html
 from lab.view.plots import learning_curves, values_seen
 from lab.view.scene_data import Mark, Story
 from lab.vision import write_picture
-from lab.workers import Task, Workers
+from lab.workers import Workers, WorkerTask
 
 LEAST_WAIT_S = 0.5  # that is worth a word
 FILES = {
@@ -220,7 +220,7 @@ class Report:
         return measured_period(self.rhythm, planned, self.outcome.schedule)
 
 
-Drawn = dict[str, Task[bytes]]  # PNG files by their names in FILES, drawn or being drawn
+Drawn = dict[str, WorkerTask[bytes]]  # PNG files by their names in FILES, drawn or being drawn
 
 
 def begin_pictures(prepared: Prepared, taught: Taught, workers: Workers) -> Drawn:
@@ -247,7 +247,7 @@ def write_files(
     report: Report,
     out: Path,
     drawn: Drawn | None = None,
-    scene: Task[dict[str, Any]] | None = None,
+    scene: WorkerTask[dict[str, Any]] | None = None,
     workers: Workers | None = None,
 ) -> None:
     """Write what there is of `FILES` to `out`, all at once at the end: none is ever half written, none is left of a run before.
@@ -314,7 +314,7 @@ def _write_numbers(report: Report, paths: dict[str, Path], predicted: Schedule) 
 
 
 def _pictures(
-    report: Report, paths: dict[str, Path], predicted: Schedule, drawn: Drawn, scene: Task[dict[str, Any]] | None
+    report: Report, paths: dict[str, Path], predicted: Schedule, drawn: Drawn, scene: WorkerTask[dict[str, Any]] | None
 ) -> Iterator[tuple[tuple[str, ...], Callable[[], object]]]:
     """What else this run has, and what writes it; what other processes draw comes last."""
 
@@ -338,7 +338,7 @@ def _pictures(
         yield (name,), partial(_write_picture, paths[name], picture)
 
 
-def _write_picture(path: Path, picture: Task[bytes]) -> None:
+def _write_picture(path: Path, picture: WorkerTask[bytes]) -> None:
     path.write_bytes(picture.result())
 
 

@@ -28,7 +28,7 @@ from lab.skills.prepared_scene import Prepared
 from lab.teaching.events import PhaseBegan, PlanMade, RecordSkipped
 from lab.teaching.teacher import Teacher
 from lab.view.scene_data import describe
-from lab.workers import Task, Workers
+from lab.workers import Workers, WorkerTask
 
 
 def run(
@@ -69,7 +69,7 @@ def run(
         faults += draw(prepared.task, prepared.order, conditions.fault_seed, planned.makespan_s)
 
     # carried out in physics
-    described, watch = list[Task[dict[str, Any]]](), conditions.on_floor
+    described, watch = list[WorkerTask[dict[str, Any]]](), conditions.on_floor
 
     def on_floor(floor: Floor) -> None:
         """Begin to describe the scene for the replay: reading its meshes takes longer than all else for that."""

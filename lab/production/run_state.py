@@ -10,7 +10,7 @@ from lab.sequencing.cell.schedule import Move
 from lab.sequencing.simulate.run import Run, Windowless
 from lab.sim.parts.kinds import Spot
 from lab.sim.scene.scene import pallet_of
-from lab.skills.skillset import Carried
+from lab.skills.skillset import CarriedPath
 
 LOOK_S = 1.0  # between two looks at the table
 
@@ -34,7 +34,7 @@ class UnderWay:
     picked: when it reached its part, was served and took it up for the first time; None: not yet.
     """
 
-    what: tuple[str, Carried]
+    what: tuple[str, CarriedPath]
     start: str
     leave_s: float
     reach_s: float = 0.0
@@ -115,7 +115,7 @@ class RunState:
     right_s: float = -LOOK_S
     finished: dict[int, float] = field(default_factory=dict)
     waiting: set[str] = field(default_factory=set)
-    brought: dict[str, tuple[Carried, float]] = field(default_factory=dict)
+    brought: dict[str, tuple[CarriedPath, float]] = field(default_factory=dict)
     served: set[str] = field(default_factory=set)
     left_s: dict[str, float] = field(default_factory=dict)
     to_put_back: list[int] = field(default_factory=list)

@@ -14,7 +14,7 @@ from lab.errors import BadInput, unknown
 from lab.interrupts import uninterrupted
 from lab.learning.requests import Ask
 from lab.learning.settings import GateSettings
-from lab.production.any_time import CTRL_C, Found, looked_for
+from lab.production.any_time import CTRL_C, SearchResults, looked_for
 from lab.production.order import NOBODY, KeepOrder, OrderAdvice, advised_session
 from lab.sequencing import SEQUENCERS, carried_reaction, check_method, find_sequence
 from lab.sequencing.cell.cell import EVERY_PLAN, Cell
@@ -35,7 +35,7 @@ from lab.sequencing.simulate.several import replicate
 from lab.statistics import interval
 from lab.tasks.cell_file import CellFile, order_from_word, toast_case
 from lab.tasks.grid_world import GridWorld
-from lab.tasks.instances import Asked
+from lab.tasks.instances import InstanceRequest
 from lab.tasks.sequencing import Sequencing, read_policy, search_for
 from lab.tasks.task import Task
 from lab.tasks.task_file import load_beside
@@ -56,7 +56,7 @@ class SequencingOptions:
     """What `lab sequence` is asked for; None: as the file says. advisor: who may be asked which part to move next.
 
     keep: gives the journal of what people say, by default one that is not written. durations: those of a task's moves
-    (`Durations.to_json`), None: they are measured. layout, robots: beside an instance file (see `Asked`).
+    (`Durations.to_json`), None: they are measured. layout, robots: beside an instance file (see `InstanceRequest`).
     policy: the file that the method `carried` decides by; None: what ships. seconds, gap: when to end early (see `Limits.of`).
     """
 
@@ -110,7 +110,7 @@ def sequenced_named(
     """
     if case is not None and name == "toast":
         name, case = toast_case(case), None
-    loaded, case = load_beside(name, Asked(wanted.layout, wanted.robots, case))
+    loaded, case = load_beside(name, InstanceRequest(wanted.layout, wanted.robots, case))
     if isinstance(loaded, GridWorld):
         raise BadInput(f"{name}: it is a world, there is nothing to sequence: learn it with lab teach {name}")
     _check_names(wanted, loaded.sequencing)
@@ -240,7 +240,7 @@ def _sessions(
 
 
 @uninterrupted
-def _document(cell: Cell, search: Search, looked: Found, wanted: SequencingOptions) -> dict[str, Any]:
+def _document(cell: Cell, search: Search, looked: SearchResults, wanted: SequencingOptions) -> dict[str, Any]:
     found, known, method = looked.sessions, looked.known, looked.method
     timed, same_times = search.objective == MAKESPAN, search.chance == NO_CHANCE  # a lucky draw is no success
     # What was found in drawn times is judged by the means, too.

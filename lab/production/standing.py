@@ -18,7 +18,7 @@ from lab.skills.free_way import by_free_cells
 from lab.skills.place import let_go, release_pose
 from lab.skills.sight import SkillFailed
 from lab.skills.skill import UPRIGHT, Bench
-from lab.skills.skillset import Carried, SkillSet
+from lab.skills.skillset import CarriedPath, SkillSet
 from lab.skills.surveys import NEAR_SHAPE, NEAR_STEP_M, Surveys
 
 ASTRAY_M = 0.15  # a part this near to a spot of a station is taken up by the station's own way
@@ -28,7 +28,12 @@ ASIDE_M = 0.03  # around a part that is set aside on the table
 
 
 def free_spot(
-    bench: Bench, name: str, way: Carried, standing: Mapping[str, Spot], taken: Collection[Spot], lying: Collection[str]
+    bench: Bench,
+    name: str,
+    way: CarriedPath,
+    standing: Mapping[str, Spot],
+    taken: Collection[Spot],
+    lying: Collection[str],
 ) -> Spot:
     """The first free spot at the target of a way: not taken, and with nothing that lies on it. Raises Trouble.
 
@@ -59,7 +64,9 @@ def _carries(bench: Bench, body: str, spot: Spot, lying: Collection[str]) -> boo
     return body not in lying and bench.stands(body, spot, DELIVERED_M)
 
 
-def spots_aside(bench: Bench, surveys: Surveys, name: str, way: Carried, spot_of: Mapping[str, Spot]) -> Iterator[Spot]:
+def spots_aside(
+    bench: Bench, surveys: Surveys, name: str, way: CarriedPath, spot_of: Mapping[str, Spot]
+) -> Iterator[Spot]:
     """Spots on which a part in the gripper may be set down for now: the one from which it was taken up, unless a machine would
     begin with it there, then free places on the table, the nearest first."""
     scene, own = bench.scene, bench.scene.bodies_of(name, way.kind)
@@ -143,7 +150,7 @@ def _standing_in(scene: Scene, room: Rectangle, above_m: float, bodies: Collecti
     return ""
 
 
-def station_near(bench: Bench, body: str, way: Carried, skillset: SkillSet) -> str:
+def station_near(bench: Bench, body: str, way: CarriedPath, skillset: SkillSet) -> str:
     """The station at which a part stands, origin or target of its way; the origin when it stands at neither."""
     at, places = bench.part_pose(body), bench.scene.places
     for station in (way.origin, way.target):

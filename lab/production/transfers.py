@@ -20,7 +20,7 @@ from lab.sim.world import TIME_STEP
 from lab.skills import Skill
 from lab.skills.free_way import by_free_cells
 from lab.skills.skill import Status
-from lab.skills.skillset import Carried, ways_of
+from lab.skills.skillset import CarriedPath, ways_of
 from lab.teaching.events import MoveBegan, MoveMade, PartDone, SkillBegan
 
 BEGINS_M = 0.05  # a tool this near to where a skill begins need not be brought there
@@ -127,10 +127,10 @@ class Transfers:
         self.state.place, now_s = "", self.floor.now_s
         for skill in skills:
             self._do(skill.aim(body), body, station)
-        self.state.under_way = UnderWay((body, Carried(station, station, kind)), station, now_s, smooth=False)
+        self.state.under_way = UnderWay((body, CarriedPath(station, station, kind)), station, now_s, smooth=False)
         return self.set_aside()
 
-    def _begin(self, name: str, way: Carried, ahead: int) -> UnderWay:
+    def _begin(self, name: str, way: CarriedPath, ahead: int) -> UnderWay:
         """The times of the move, which begins now or was interrupted. A part that was on its way to another station then, and is
         still in the gripper, left its origin when it was taken up."""
         state = self.state
@@ -147,7 +147,7 @@ class Transfers:
         self.floor.tell(MoveBegan(number, number - 1 + ahead, name, state.place, way.origin, way.target, now_s))
         return move
 
-    def _finish(self, sequence: Sequence[int], way: Carried, spot: Spot, move: UnderWay) -> None:
+    def _finish(self, sequence: Sequence[int], way: CarriedPath, spot: Spot, move: UnderWay) -> None:
         """The part stands where it was to be brought: all that knows of it is told."""
         state = self.state
         decision, *following = sequence
@@ -178,15 +178,15 @@ class Transfers:
 
     # ---- ways and spots ------------------------------------------------------------------------------------------
 
-    def way(self, part: int, option: Option) -> Carried:
+    def way(self, part: int, option: Option) -> CarriedPath:
         """From where to where an option leads, and what the gripper then holds."""
         names, own = self.state.cell.names, self.floor.skillset.task.part(self.state.cell.order[part - 1])
         origin, target = names[option.origin], names[option.target]
         if option.carries == "pallet":
-            return Carried(origin, target, str(own.pallet))
+            return CarriedPath(origin, target, str(own.pallet))
         return next(way for way in ways_of(own) if way[:2] == (origin, target) and way.kind != own.pallet)
 
-    def _spot_for(self, part: int, way: Carried) -> Spot:
+    def _spot_for(self, part: int, way: CarriedPath) -> Spot:
         """Where to set it down: where its pallet waits for it, or the first spot on which nothing stands."""
         state = self.state
         scene, name = self.floor.scene, state.name(part)
@@ -224,7 +224,7 @@ class Transfers:
             raise Trouble(why, station=station, held=self.floor.was_held)
         self.state.place = station
 
-    def _stay_above(self, sequence: Sequence[int], way: Carried, move: UnderWay) -> None:
+    def _stay_above(self, sequence: Sequence[int], way: CarriedPath, move: UnderWay) -> None:
         """Wait with what is in the gripper, so that what follows is not left too long in the machine that it comes to."""
         option = self.state.plan.option(sequence[0])
         assert option is not None
@@ -249,7 +249,7 @@ class Transfers:
             look(self.floor, self.state)  # the part may have been taken away meanwhile
             self.state.served.add(name)
 
-    def _take_up(self, name: str, way: Carried, spot: Spot) -> None:
+    def _take_up(self, name: str, way: CarriedPath, spot: Spot) -> None:
         """Take a part up: by the way of the station that it stands near to, or of its own where it stands astray."""
         bench, skillset, body = self.floor.bench, self.floor.skillset, self.floor.scene.body_of(name, way.kind)
         if self.floor.world.dark and moved_off(self.floor, name, self.state.spot_of.get(name)):
@@ -266,7 +266,7 @@ class Transfers:
             self.machines.fetched(name, near)
         assert bench.held == body
 
-    def _bring(self, way: Carried, spot: Spot, move: UnderWay, sequence: Sequence[int] = ()) -> None:
+    def _bring(self, way: CarriedPath, spot: Spot, move: UnderWay, sequence: Sequence[int] = ()) -> None:
         """Carry what is in the gripper to its target and set it down; from a station near the target, that is all.
 
         sequence: what is still to be done, this first; above the target the robot waits as long as that wants.

@@ -86,7 +86,7 @@ def nearest_goal(mdp: TabularMDP, cell: tuple[int, ...]) -> tuple[int, ...] | No
 
 
 @dataclass(frozen=True)
-class Picture:
+class TextPicture:
     """A picture as lines of text, its legend, and the range of cells on each axis that is cut: (axis, low, high).
 
     is_fixed: an environment's own drawing, whose height cannot be changed.
@@ -104,7 +104,7 @@ class Picture:
         return max((line.cell_len for line in self.lines), default=0)
 
 
-def picture_of(request: AdviceRequest, marks: Marks, width: int, height: int) -> Picture | None:
+def picture_of(request: AdviceRequest, marks: Marks, width: int, height: int) -> TextPicture | None:
     """The environment's own drawing, or the grid around the robot, in `width` columns and `height` lines; None without either.
 
     An environment's drawing is cut in width only. Slices of a space run along axis 2, the robot's slice in the middle.
@@ -115,7 +115,7 @@ def picture_of(request: AdviceRequest, marks: Marks, width: int, height: int) ->
         lines = list(drawn.split("\n", allow_blank=True))
         for line in lines:
             line.truncate(width)
-        return Picture(lines, is_fixed=True)
+        return TextPicture(lines, is_fixed=True)
     return (
         _GridDrawing(request, marks).fitting(width, height) if request.mdp.shape or request.mdp.coverage_shape else None
     )
@@ -207,7 +207,7 @@ class _GridDrawing:
             whole -= 1  # an odd number: as many layers below as above
         return window(self.layer, self.layers, whole), min(self.columns, width // 2)
 
-    def fitting(self, width: int, height: int) -> Picture:
+    def fitting(self, width: int, height: int) -> TextPicture:
         """The picture with the slices that fit into `width` columns and `height` lines."""
         layers, room = self._room(width)
         titled = self.layers > 1
@@ -221,7 +221,9 @@ class _GridDrawing:
         lines = [Text(" " * GAP).join(side) for side in zip(*blocks, strict=True)]
         seen = {str(mark) for plane in planes.values() for mark in plane.ravel()}
         hides_goal = self.goal is not None and not seen & {"G"}
-        return Picture(lines, self._legend(seen), self._shown(rows, columns, layers if titled else None), hides_goal)
+        return TextPicture(
+            lines, self._legend(seen), self._shown(rows, columns, layers if titled else None), hides_goal
+        )
 
     def _block(self, plane: Plane, layer: int | None) -> list[Text]:
         rows = [Text.assemble(*((f" {mark}", STYLES.get(str(mark), "dim")) for mark in row)) for row in plane]
@@ -259,7 +261,7 @@ class StateWords(Protocol):
     def moves_in_words(self) -> tuple[str, ...]: ...
 
 
-class View(NamedTuple):
+class GridAxes(NamedTuple):
     """A view: which axis runs across and which up; mirrored: whether the first cell across is on the right."""
 
     title: str
@@ -268,17 +270,17 @@ class View(NamedTuple):
     is_mirrored: bool = False
 
 
-def views_of(mdp: TabularMDP) -> tuple[View, ...]:
+def views_of(mdp: TabularMDP) -> tuple[GridAxes, ...]:
     """The views from above and from the front, chosen by the names of the moves; () for other problems."""
     pairs = [mdp.action_labels[n : n + 2] for n in range(0, 6, 2)] if len(mdp.shape) > 2 else []
     if pairs == [("left", "right"), ("backward", "forward"), ("down", "up")]:
-        return View("from above", 0, 1), View("from the front", 0, 2)
+        return GridAxes("from above", 0, 1), GridAxes("from the front", 0, 2)
     if pairs == [("lower", "higher"), ("backward", "forward"), ("in", "out")]:
-        return View("from above", 2, 1, is_mirrored=True), View("from the front", 2, 0, is_mirrored=True)
+        return GridAxes("from above", 2, 1, is_mirrored=True), GridAxes("from the front", 2, 0, is_mirrored=True)
     return ()
 
 
-def both_views(request: AdviceRequest, marks: Marks, width: int, height: int) -> Picture | None:
+def both_views(request: AdviceRequest, marks: Marks, width: int, height: int) -> TextPicture | None:
     """The views side by side in `width` columns and `height` lines; None when there are none."""
     views = views_of(request.mdp)
     if not views:
@@ -291,13 +293,13 @@ def both_views(request: AdviceRequest, marks: Marks, width: int, height: int) ->
     if seen & {*marks.arrows, "*"}:
         legend.append("arrow or *: the learner's own choice")
     shown = dict(part for one in drawn for part in one.cut)
-    return Picture(lines, ", ".join(legend), tuple((axis, *ends) for axis, ends in sorted(shown.items())))
+    return TextPicture(lines, ", ".join(legend), tuple((axis, *ends) for axis, ends in sorted(shown.items())))
 
 
 class _Drawing:
     """One view: its lines, the marks in it, and the axes that are cut."""
 
-    def __init__(self, request: AdviceRequest, marks: Marks, view: View, width: int, height: int) -> None:
+    def __init__(self, request: AdviceRequest, marks: Marks, view: GridAxes, width: int, height: int) -> None:
         mdp, axes = request.mdp, (view.across, view.upright)
         here = mdp.state_cell(request.state)
         across, upright = (
@@ -337,7 +339,7 @@ def _entered(request: AdviceRequest) -> tuple[int, ...]:
     return request.mdp.state_cell(int(request.mdp.successor[request.state, request.own]))
 
 
-def _choice(request: AdviceRequest, marks: Marks, view: View) -> str:
+def _choice(request: AdviceRequest, marks: Marks, view: GridAxes) -> str:
     """The mark of the learner's own move: an arrow if it lies in the view's plane, else a star."""
     axis, is_further = request.own // 2, request.own % 2
     if axis == view.upright:

@@ -11,7 +11,7 @@ from lab.learning.requests import AdviceRequest, Request, Standing, TooSlow
 from lab.learning.session_events import EpisodeEnded
 from lab.learning.settings import GateSettings
 from lab.mdp import TabularMDP
-from lab.seat.grid_text import Marks, Picture, StateWords, nearest_goal, points_by_name
+from lab.seat.grid_text import Marks, StateWords, TextPicture, nearest_goal, points_by_name
 from lab.view.value_levels import is_map
 
 GOAL, OBSTACLE, DEAD_END, NOWHERE = "to the goal", "into an obstacle", "to an end that is no goal", "nowhere"
@@ -175,7 +175,7 @@ def _listed(parts: Sequence[str]) -> str:
     return f"{', '.join(parts[:-1])} and {parts[-1]}" if len(parts) > 1 else parts[0]
 
 
-def beyond(request: AdviceRequest, picture: Picture, brief: bool = False) -> str:
+def beyond(request: AdviceRequest, picture: TextPicture, brief: bool = False) -> str:
     """What the picture does not show: cells outside it, axes that are not drawn, and the direction of a hidden goal."""
     mdp = request.mdp
     cell = mdp.state_cell(request.state)
@@ -188,7 +188,7 @@ def beyond(request: AdviceRequest, picture: Picture, brief: bool = False) -> str
     return f"{text[:1].upper()}{text[1:]}." if text else ""
 
 
-def shown_in_words(request: AdviceRequest, picture: Picture, brief: bool = False) -> str:
+def shown_in_words(request: AdviceRequest, picture: TextPicture, brief: bool = False) -> str:
     """The ranges of cells that the picture shows; "" when it shows all."""
     mdp = request.mdp
     said = [f"{_range(axis_name(mdp, a), low, high)} {_of(mdp, a, brief)}" for a, low, high in picture.shown]

@@ -102,7 +102,7 @@ class SrlSettings:
             raise BadInput(f"beta = {self.beta}: allowed are finite numbers from 0")
 
 
-class Watched(Protocol):
+class WatchedSearch(Protocol):
     """The limits that a search checks while it runs; implemented by `methods.shared.Shared`."""
 
     def look(self) -> None:
@@ -124,7 +124,7 @@ class Search:
     settings: SrlSettings = field(default_factory=SrlSettings)
     on_episode: OnEpisode | None = None
     policy: "CarriedPolicy | None" = None
-    shared: Watched | None = None
+    shared: WatchedSearch | None = None
 
     def __post_init__(self) -> None:
         if self.episodes < 1:
@@ -135,7 +135,7 @@ class Search:
         check_objective(self.objective, cell)
 
     def look(self) -> None:
-        """Ends the search at a limit (see `Watched.look`)."""
+        """Ends the search at a limit (see `WatchedSearch.look`)."""
         if self.shared is not None:
             self.shared.look()
 

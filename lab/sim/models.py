@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Part:
+class LinkShape:
     """A visible and, unless `ghost`, solid piece of a link: a mesh, or a box or cylinder of `size` [m] at `at` [m]."""
 
     color: Rgba
@@ -34,12 +34,12 @@ class Link:
 
     name: str
     mass: float
-    parts: Sequence[Part]
-    joint: "Joint | None" = None
+    parts: Sequence[LinkShape]
+    joint: "UrdfJoint | None" = None
 
 
 @dataclass(frozen=True)
-class Joint:
+class UrdfJoint:
     """A joint at `at` [m] on `parent`, turning about or sliding along `axis` within [lower, upper] [rad or m]."""
 
     name: str
@@ -53,7 +53,7 @@ class Joint:
 
 
 @dataclass
-class Model:
+class UrdfModel:
     """The description of a URDF: its name and its links, root first."""
 
     name: str
@@ -100,7 +100,7 @@ def _numbers(values: Iterable[float]) -> str:
     return " ".join(f"{round(float(v), 6) + 0.0:g}" for v in values)
 
 
-def _geometry(parent: Xml.Element, part: Part, mesh_file: str) -> None:
+def _geometry(parent: Xml.Element, part: LinkShape, mesh_file: str) -> None:
     Xml.SubElement(parent, "origin", xyz=_numbers(part.at), rpy="0 0 0")
     shape = Xml.SubElement(parent, "geometry")
     if part.mesh is not None:
@@ -109,7 +109,7 @@ def _geometry(parent: Xml.Element, part: Part, mesh_file: str) -> None:
         Xml.SubElement(shape, "box", size=_numbers(part.size))
 
 
-def _solid(part: Part) -> "Trimesh":
+def _solid(part: LinkShape) -> "Trimesh":
     size = part.size
     return part.mesh if part.mesh is not None else box((size[0], size[1], size[2]), part.at)
 
@@ -127,7 +127,7 @@ def _inertial(element: Xml.Element, link: Link) -> None:
     )
 
 
-def _joint(root: Xml.Element, link: Link, joint: Joint) -> None:
+def _joint(root: Xml.Element, link: Link, joint: UrdfJoint) -> None:
     element = Xml.SubElement(root, "joint", name=joint.name, type=joint.kind)
     Xml.SubElement(element, "parent", link=joint.parent)
     Xml.SubElement(element, "child", link=link.name)
@@ -144,7 +144,7 @@ def _joint(root: Xml.Element, link: Link, joint: Joint) -> None:
     )
 
 
-def urdf(model: Model) -> tuple[str, dict[str, str]]:
+def urdf(model: UrdfModel) -> tuple[str, dict[str, str]]:
     """The URDF text of `model`, and the OBJ text of each mesh it names by file name."""
     root = Xml.Element("robot", name=model.name)
     meshes: dict[str, str] = {}
@@ -205,15 +205,15 @@ MARKER_MAGENTA, MARKER_CYAN, MARKER_GREEN = (0.95, 0.0, 0.95, 1.0), (0.0, 0.85, 
 FURNACE_FLOOR, FURNACE_ROOF = 0.12, 0.36  # [m] how high its hearth is, and its roof
 
 
-def _turning(number: int, parent: str, at: Vector, axis: Vector) -> Joint:
+def _turning(number: int, parent: str, at: Vector, axis: Vector) -> UrdfJoint:
     limits = (float(arm.LOWER[number]), float(arm.UPPER[number]))
-    return Joint(arm.JOINTS[number], "revolute", parent, at, axis, limits, float(arm.SPEED[number]))
+    return UrdfJoint(arm.JOINTS[number], "revolute", parent, at, axis, limits, float(arm.SPEED[number]))
 
 
-def robot() -> Model:
+def robot() -> UrdfModel:
     """The six-axis arm with its two-finger gripper (an approximate model of the UP6 class, see kinematics)."""
     fingers = (_finger(name, side) for name, side in (("finger_left", 1.0), ("finger_right", -1.0)))
-    return Model("robot", [*_shoulder(), *_forearm(), _tool(), *fingers])
+    return UrdfModel("robot", [*_shoulder(), *_forearm(), _tool(), *fingers])
 
 
 def _shoulder() -> list[Link]:
@@ -232,9 +232,9 @@ def _shoulder() -> list[Link]:
         cylinder(0.055, 0.17, elbow, "y"),
     )
     return [
-        Link("base", 40.0, [Part(GRAPHITE, mesh=base)]),
-        Link("turret", 30.0, [Part(BLUE, mesh=turret)], _turning(0, "base", (0, 0, 0.25), (0, 0, 1))),
-        Link("upper_arm", 18.0, [Part(WHITE, mesh=upper)], _turning(1, "turret", shoulder, (0, 1, 0))),
+        Link("base", 40.0, [LinkShape(GRAPHITE, mesh=base)]),
+        Link("turret", 30.0, [LinkShape(BLUE, mesh=turret)], _turning(0, "base", (0, 0, 0.25), (0, 0, 1))),
+        Link("upper_arm", 18.0, [LinkShape(WHITE, mesh=upper)], _turning(1, "turret", shoulder, (0, 1, 0))),
     ]
 
 
@@ -245,9 +245,9 @@ def _forearm() -> list[Link]:
     roll = hull(cylinder(0.062, 0.02, (0.0, 0, 0), "x"), cylinder(0.045, 0.02, (half - root - 0.04, 0, 0), "x"))
     wrist = join(cylinder(0.047, 0.085, (0, 0, 0), "y"), cylinder(0.034, 0.075, (0.0375, 0, 0), "x"))
     return [
-        Link("forearm", 12.0, [Part(BLUE, mesh=fore)], _turning(2, "upper_arm", elbow, (0, 1, 0))),
-        Link("roll", 5.0, [Part(WHITE, mesh=roll)], _turning(3, "forearm", (root, 0, arm.ELBOW_UP), (1, 0, 0))),
-        Link("wrist", 2.0, [Part(GRAPHITE, mesh=wrist)], _turning(4, "roll", (half - root, 0, 0), (0, 1, 0))),
+        Link("forearm", 12.0, [LinkShape(BLUE, mesh=fore)], _turning(2, "upper_arm", elbow, (0, 1, 0))),
+        Link("roll", 5.0, [LinkShape(WHITE, mesh=roll)], _turning(3, "forearm", (root, 0, arm.ELBOW_UP), (1, 0, 0))),
+        Link("wrist", 2.0, [LinkShape(GRAPHITE, mesh=wrist)], _turning(4, "roll", (half - root, 0, 0), (0, 1, 0))),
     ]
 
 
@@ -262,70 +262,75 @@ def _tool() -> Link:
     marker = cylinder(MARKER_RADIUS, MARKER_THICK, (marker_x, 0, MARKER_OUT), "x")
     bar = (0.008, 0.018, MARKER_OUT - MARKER_RADIUS)
     parts = [
-        Part(GRAPHITE, mesh=palm),
-        Part(STEEL, bar, (marker_x + 0.006, 0, bar[2] / 2), ghost=True),
-        Part(MARKER_MAGENTA, mesh=marker, ghost=True),
+        LinkShape(GRAPHITE, mesh=palm),
+        LinkShape(STEEL, bar, (marker_x + 0.006, 0, bar[2] / 2), ghost=True),
+        LinkShape(MARKER_MAGENTA, mesh=marker, ghost=True),
     ]
     return Link("tool", 1.2, parts, _turning(5, "wrist", (arm.FLANGE, 0, 0), (1, 0, 0)))
 
 
 def _finger(name: str, side: float) -> Link:
     """One finger that slides outwards on its side, with rubber inside."""
-    pad = Part(STEEL, FINGER, (FINGER[0] / 2, side * FINGER[1] / 2, 0))
-    rubber = Part(RUBBER, (0.03, 0.0016, 0.028), (FINGER[0] - 0.016, side * 0.0008, 0), ghost=True)
+    pad = LinkShape(STEEL, FINGER, (FINGER[0] / 2, side * FINGER[1] / 2, 0))
+    rubber = LinkShape(RUBBER, (0.03, 0.0016, 0.028), (FINGER[0] - 0.016, side * 0.0008, 0), ghost=True)
     root, open_m = (arm.TOOL - FINGER[0], 0, 0), FINGER_OPEN + 0.008
     return Link(
-        name, 0.08, [pad, rubber], Joint(name, "prismatic", "tool", root, (0, side, 0), (0.0, open_m), 0.2, 200.0)
+        name, 0.08, [pad, rubber], UrdfJoint(name, "prismatic", "tool", root, (0, side, 0), (0.0, open_m), 0.2, 200.0)
     )
 
 
-def toaster() -> Model:
+def toaster() -> UrdfModel:
     """A toaster with a real slot: floor, two walls and two ends around it, as separate boxes, for a mesh would be filled."""
     (length, width, height), (slot_length, slot_width) = TOASTER, TOASTER_SLOT
     wall, end, up = (width - slot_width) / 2, (length - slot_length) / 2, height - TOASTER_FLOOR
-    parts = [Part(STEEL, (length, width, TOASTER_FLOOR), (0, 0, TOASTER_FLOOR / 2))]
+    parts = [LinkShape(STEEL, (length, width, TOASTER_FLOOR), (0, 0, TOASTER_FLOOR / 2))]
     for side in (1.0, -1.0):
-        parts.append(Part(STEEL, (length, wall, up), (0, side * (slot_width + wall) / 2, TOASTER_FLOOR + up / 2)))
-        parts.append(Part(STEEL, (end, slot_width, up), (side * (slot_length + end) / 2, 0, TOASTER_FLOOR + up / 2)))
-    parts.append(Part(GRAPHITE, (length + 0.006, width + 0.006, 0.012), (0, 0, 0.006), ghost=True))
-    parts.append(Part(GRAPHITE, (0.014, 0.030, 0.010), (length / 2 + 0.007, 0.02, 0.066), ghost=True))
-    return Model("toaster", [Link("toaster", 2.0, parts)])
+        parts.append(LinkShape(STEEL, (length, wall, up), (0, side * (slot_width + wall) / 2, TOASTER_FLOOR + up / 2)))
+        parts.append(
+            LinkShape(STEEL, (end, slot_width, up), (side * (slot_length + end) / 2, 0, TOASTER_FLOOR + up / 2))
+        )
+    parts.append(LinkShape(GRAPHITE, (length + 0.006, width + 0.006, 0.012), (0, 0, 0.006), ghost=True))
+    parts.append(LinkShape(GRAPHITE, (0.014, 0.030, 0.010), (length / 2 + 0.007, 0.02, 0.066), ghost=True))
+    return UrdfModel("toaster", [Link("toaster", 2.0, parts)])
 
 
-def furnace() -> Model:
+def furnace() -> UrdfModel:
     """A furnace that is open towards its negative x axis: hearth, back, two sides and a roof; parts stand over its origin."""
     length, width, wall, middle = 0.16, 0.26, 0.02, 0.01
     up = FURNACE_ROOF - FURNACE_FLOOR
     walls = [((wall, width), (middle + (length - wall) / 2, 0.0))]
     walls += [((length - wall, wall), (middle - wall / 2, side * (width - wall) / 2)) for side in (1.0, -1.0)]
-    parts = [Part(GRAPHITE, (length, width, FURNACE_FLOOR), (middle, 0, FURNACE_FLOOR / 2))]
-    parts += [Part(STEEL, (*size, up), (*at, FURNACE_FLOOR + up / 2)) for size, at in walls]
-    parts.append(Part(STEEL, (length, width, wall), (middle, 0, FURNACE_ROOF + wall / 2)))
-    return Model("furnace", [Link("furnace", 20.0, parts)])
+    parts = [LinkShape(GRAPHITE, (length, width, FURNACE_FLOOR), (middle, 0, FURNACE_FLOOR / 2))]
+    parts += [LinkShape(STEEL, (*size, up), (*at, FURNACE_FLOOR + up / 2)) for size, at in walls]
+    parts.append(LinkShape(STEEL, (length, width, wall), (middle, 0, FURNACE_ROOF + wall / 2)))
+    return UrdfModel("furnace", [Link("furnace", 20.0, parts)])
 
 
-def applier() -> Model:
+def applier() -> UrdfModel:
     """The butter applier: a groove with a low back rest that a slice stands in, and a head that slides across and up."""
     groove, lip = SLICE[1] + 0.005, 0.012
     span = SLICE[0] + 0.06
     parts = [
-        Part(STEEL, (span, 0.34, APPLIER_FLOOR), (0, -0.07, APPLIER_FLOOR / 2)),
-        Part(STEEL, (SLICE[0], lip, 0.05), (0, (groove + lip) / 2, APPLIER_FLOOR + 0.025)),
-        Part(STEEL, (SLICE[0], lip, APPLIER_LIP), (0, -(groove + lip) / 2, APPLIER_FLOOR + APPLIER_LIP / 2)),
-        Part(GRAPHITE, (span, 0.03, 0.02), (0, NOZZLE_OUT - 0.06, APPLIER_FLOOR + 0.01), ghost=True),
+        LinkShape(STEEL, (span, 0.34, APPLIER_FLOOR), (0, -0.07, APPLIER_FLOOR / 2)),
+        LinkShape(STEEL, (SLICE[0], lip, 0.05), (0, (groove + lip) / 2, APPLIER_FLOOR + 0.025)),
+        LinkShape(STEEL, (SLICE[0], lip, APPLIER_LIP), (0, -(groove + lip) / 2, APPLIER_FLOOR + APPLIER_LIP / 2)),
+        LinkShape(GRAPHITE, (span, 0.03, 0.02), (0, NOZZLE_OUT - 0.06, APPLIER_FLOOR + 0.01), ghost=True),
     ]
-    slide_x = Joint(
+    slide_x = UrdfJoint(
         "head_x", "prismatic", "applier", (0, NOZZLE_OUT - 0.06, APPLIER_FLOOR), (1, 0, 0), (-0.06, 0.06), 0.5
     )
-    slide_z = Joint("head_z", "prismatic", "column", (0, 0.03, 0), (0, 0, 1), (0.0, 0.14), 0.5)
-    column = [Part(WHITE, (0.03, 0.022, 0.16), (0, 0, 0.08))]
-    head = [Part(BLUE, (0.04, 0.03, 0.034), (0, 0, 0)), Part(STEEL, (0.012, 0.018, 0.012), (0, 0.024, 0), ghost=True)]
-    return Model(
+    slide_z = UrdfJoint("head_z", "prismatic", "column", (0, 0.03, 0), (0, 0, 1), (0.0, 0.14), 0.5)
+    column = [LinkShape(WHITE, (0.03, 0.022, 0.16), (0, 0, 0.08))]
+    head = [
+        LinkShape(BLUE, (0.04, 0.03, 0.034), (0, 0, 0)),
+        LinkShape(STEEL, (0.012, 0.018, 0.012), (0, 0.024, 0), ghost=True),
+    ]
+    return UrdfModel(
         "applier", [Link("applier", 3.0, parts), Link("column", 0.4, column, slide_x), Link("head", 0.2, head, slide_z)]
     )
 
 
-def bread() -> Model:
+def bread() -> UrdfModel:
     """A slice of bread that stands: solid as a box, seen as a loaf's profile with a crust."""
     width, thick, height = SLICE
 
@@ -340,10 +345,10 @@ def bread() -> Model:
         return hull(trimesh.Trimesh([(x, y, z) for x, z in outline for y in (-depth / 2, depth / 2)]))
 
     seen = [
-        Part(CRUST, mesh=profile(0.0, thick), ghost=True),
-        Part(CRUMB, mesh=profile(0.007, thick + 0.0008), ghost=True),
+        LinkShape(CRUST, mesh=profile(0.0, thick), ghost=True),
+        LinkShape(CRUMB, mesh=profile(0.007, thick + 0.0008), ghost=True),
     ]
-    return Model("slice", [Link("slice", SLICE_KG, [Part(CRUST, SLICE, hidden=True), *seen])])
+    return UrdfModel("slice", [Link("slice", SLICE_KG, [LinkShape(CRUST, SLICE, hidden=True), *seen])])
 
 
 MODELS = {"robot": robot, "toaster": toaster, "applier": applier, "furnace": furnace, "slice": bread}

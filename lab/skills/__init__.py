@@ -6,12 +6,12 @@ from lab.plugins.family import Family, wanted
 from lab.skills.cover import Cover
 from lab.skills.grasp import Grasp
 from lab.skills.insert import Insert
-from lab.skills.place import Place
+from lab.skills.place import PlacePart
 from lab.skills.skill import Skill
 from lab.skills.transfer import Transfer
 
 # in the order in which they handle a part, followed by what machines do
-_SHIPPED: dict[str, type[Skill]] = {skill.subtask: skill for skill in (Grasp, Transfer, Insert, Place, Cover)}
+_SHIPPED: dict[str, type[Skill]] = {skill.subtask: skill for skill in (Grasp, Transfer, Insert, PlacePart, Cover)}
 
 
 def _adopted(name: str, thing: Any) -> type[Skill]:
@@ -22,4 +22,4 @@ def _adopted(name: str, thing: Any) -> type[Skill]:
 
 SKILLS = Family("skills", _SHIPPED, _adopted)
 
-__all__ = ["SKILLS", "Cover", "Grasp", "Insert", "Place", "Skill", "Transfer"]
+__all__ = ["SKILLS", "Cover", "Grasp", "Insert", "PlacePart", "Skill", "Transfer"]

@@ -40,7 +40,7 @@ INDEX = "pictures.json"
 
 
 @dataclass(frozen=True)
-class Placed:
+class PicturedTask:
     """The content of a picture: the task with its machine and stacks as placed, and the gripper's position [m]."""
 
     task: Task
@@ -181,7 +181,7 @@ def _mat_picture(mat: Mat, camera: Camera, lens: Lens, number: int, rng: np.rand
 # ---- the scene of one picture ----------------------------------------------------------------------------------------
 
 
-def _drawn(task: Task, station: str, rng: np.random.Generator) -> Placed:
+def _drawn(task: Task, station: str, rng: np.random.Generator) -> PicturedTask:
     """A random placement of machine, stacks of cubes and gripper: each near the middle of its own cell, well apart."""
     place = task.station(station)
     grid = settings_of(place)
@@ -215,10 +215,10 @@ def _drawn(task: Task, station: str, rng: np.random.Generator) -> Placed:
     )
     made = tuple(Obstacle(name=f"stack {n}", position_m=at) for n, at in enumerate(stacks, start=1))
     layout = Layout(tuple(stacks), ())
-    return Placed(task.model_copy(update={"stations": stations, "obstacles": made}), layout, gripper)
+    return PicturedTask(task.model_copy(update={"stations": stations, "obstacles": made}), layout, gripper)
 
 
-def _markers(placed: Placed, station: str, grid: CameraGrid) -> list[tuple[str, tuple[float, float, float]]]:
+def _markers(placed: PicturedTask, station: str, grid: CameraGrid) -> list[tuple[str, tuple[float, float, float]]]:
     """Each marker's kind and the centre of its upper side (x, y, z) [m]."""
     upper = models.MARKER_THICK / 2
     x, y, z = marker_of(placed.task.station(station), grid)

@@ -24,7 +24,7 @@ GOAL = (2, 2, 0)
 NEAR_M = 0.012  # largest distance from its spot at which a part counts as standing on it
 
 
-class Place(AroundPart):
+class PlacePart(AroundPart):
     """Set a part down at one station; a state is the tool's position relative to the spot (x, y, z)."""
 
     subtask: ClassVar[str] = "place"
@@ -35,7 +35,7 @@ class Place(AroundPart):
     carries = True
 
     @classmethod
-    def on_carry(cls, task: Task, kind: str, origin: str, target: str) -> "Place | None":
+    def on_carry(cls, task: Task, kind: str, origin: str, target: str) -> "PlacePart | None":
         """The skill that sets the part down at the target; None for a target with a camera's grid (see `Insert`)."""
         return None if task.station(target).grid is not None else cls(task, kind, target)
 

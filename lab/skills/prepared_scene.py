@@ -11,7 +11,7 @@ import numpy as np
 
 from lab.errors import BadInput, LabError, counted
 from lab.learning.problem import Problem
-from lab.sequencing.cell.precedence import Precedence, Step
+from lab.sequencing.cell.precedence import Precedence, RouteStep
 from lab.sim.parts.kinds import Spot
 from lab.sim.scene.places import Layout, Places
 from lab.sim.scene.scene_check import check_apart, check_scene, places_of
@@ -72,7 +72,7 @@ def _put_on(places: Places, station: Station, order: Order) -> Iterator[Preceden
                         f"part '{kind}': routes: they end at '{station.name}', where parts stand on parts, or at '{other}': "
                         "which of its parts will be there is not planned: wanted one end, or no layers there"
                     )
-            yield Precedence(parts, Step(station.name), of, Step(station.name), tuple(needs))
+            yield Precedence(parts, RouteStep(station.name), of, RouteStep(station.name), tuple(needs))
 
 
 def _taken_off(places: Places, station: Station, order: Order) -> Iterator[Precedence]:
@@ -84,7 +84,7 @@ def _taken_off(places: Places, station: Station, order: Order) -> Iterator[Prece
         of = tuple(part for part, own in below.items() if level in own)
         parts = tuple(part for part, spot in stand.items() if spot.z == level)
         if of:
-            yield Precedence(parts, Step(station.name, leaves=True), of, Step(station.name, leaves=True))
+            yield Precedence(parts, RouteStep(station.name, leaves=True), of, RouteStep(station.name, leaves=True))
 
 
 def _from_file(task: Task, order: Order) -> Iterator[Precedence]:
@@ -100,8 +100,8 @@ def _from_file(task: Task, order: Order) -> Iterator[Precedence]:
             )
         needs = tuple(range(1, len(parts) + 1)) if rule.count == "each" else ()
         steps = (
-            Step(rule.station, rule.step == "leaves"),
-            Step(rule.of_station or rule.station, rule.of_step == "leaves"),
+            RouteStep(rule.station, rule.step == "leaves"),
+            RouteStep(rule.of_station or rule.station, rule.of_step == "leaves"),
         )
         yield Precedence(parts, steps[0], of, steps[1], needs)
 

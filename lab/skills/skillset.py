@@ -21,7 +21,7 @@ WINDOW_MARGIN_S = 1.0  # by which a planned window is shorter than the task's
 NO_SERVICE: Mapping[tuple[str, str], float] = {}
 
 
-class Carried(NamedTuple):
+class CarriedPath(NamedTuple):
     """A transport by the robot: from one station to another, and the kind that it carries (see `Scene.kinds`)."""
 
     origin: str
@@ -42,7 +42,7 @@ class SkillSet:
     task: Task
     moves: NeededMoves
     skills: dict[str, Skill] = field(default_factory=dict)
-    legs: dict[Carried, Skills] = field(default_factory=dict)
+    legs: dict[CarriedPath, Skills] = field(default_factory=dict)
     travels: dict[Pair, Skills] = field(default_factory=dict)
     picks: dict[Pair, Skills] = field(default_factory=dict)
     processes: dict[str, Skills] = field(default_factory=dict)
@@ -78,7 +78,7 @@ class SkillSet:
                 made.services[part.name, stage.station] = found
         return made
 
-    def _add_leg(self, way: Carried) -> None:
+    def _add_leg(self, way: CarriedPath) -> None:
         rest = self._pick(way.kind, way.origin)
         self.legs[way] = rest + self._own(
             kind.on_carry(self.task, way.kind, way.origin, way.target) for kind in SKILLS.values()
@@ -101,16 +101,16 @@ def check_names(task: Task) -> None:
             raise unknown("sub-task", name, SKILLS, f"task '{task.name}': subtasks")
 
 
-def ways_of(part: Part) -> dict[Carried, None]:
+def ways_of(part: Part) -> dict[CarriedPath, None]:
     """Every transport of a part of a kind, or of its pallet, along its routes and through buffers, in that order."""
-    transports: dict[Carried, None] = {}
+    transports: dict[CarriedPath, None] = {}
     for route in part.routes:
         for before, stage, after in zip(route, route[1:], [*route[2:], None], strict=False):
             kind = part.name if stage.pallet or before.pallet else comes_as(part)
             for origin, target in _legs(before, stage):
-                transports[Carried(origin, target, kind)] = None
+                transports[CarriedPath(origin, target, kind)] = None
             if stage.pallet and after is not None:
-                transports[Carried(before.station, after.station, str(part.pallet))] = None
+                transports[CarriedPath(before.station, after.station, str(part.pallet))] = None
     return transports
 
 

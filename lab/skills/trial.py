@@ -21,7 +21,7 @@ def trial_of(prepared: Prepared) -> Callable[[Problem, Policy], str | None]:
     return trial
 
 
-class Trial(NamedTuple):
+class SkillTrial(NamedTuple):
     """The outcome of carrying a skill out once: why it failed (None: it succeeded), and its simulated duration [s]."""
 
     failure: str | None
@@ -33,7 +33,7 @@ def try_out(prepared: Prepared, skill: Skill, policy: Policy) -> str | None:
     return carry_out(prepared, skill, policy).failure
 
 
-def carry_out(prepared: Prepared, skill: Skill, policy: Policy, off: Sequence[float] = NOT_OFF) -> Trial:
+def carry_out(prepared: Prepared, skill: Skill, policy: Policy, off: Sequence[float] = NOT_OFF) -> SkillTrial:
     """The outcome of carrying a skill out once in physics; `off`: displacement of the part, see `Skill.begin`."""
     with World() as world:
         bench = Bench(Scene(world, prepared.task, (), prepared.surveys.layout))
@@ -44,4 +44,4 @@ def carry_out(prepared: Prepared, skill: Skill, policy: Policy, off: Sequence[fl
         began = world.steps
         while skill.step() is Status.RUNNING:
             world.step()
-        return Trial(None if skill.status is Status.SUCCESS else skill.reason, (world.steps - began) * TIME_STEP)
+        return SkillTrial(None if skill.status is Status.SUCCESS else skill.reason, (world.steps - began) * TIME_STEP)

@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-Result = tuple[Row, "Sessions"]
+Result = tuple[Row, "ComparedSessions"]
 COLOURS = (BLUE, ORANGE, GREEN, RED, PURPLE, SKY, GREY)
 DASHES = ("-", "--", ":", "-.")
 MOST_CURVES = 12  # more could not be distinguished
@@ -117,7 +117,7 @@ def _curves(results: Sequence[Result]) -> bytes:
 
 
 @dataclass(frozen=True, eq=False)
-class Sessions:
+class ComparedSessions:
     """The results of N sessions of E episodes: curve (E,), the mean steps by episode; all others (N,), by session."""
 
     curve: FloatArray
@@ -134,7 +134,7 @@ class Sessions:
         return {name: np.asarray(value, np.float64).tolist() for name, value in vars(self).items()}
 
     @classmethod
-    def from_json(cls, record: Mapping[str, list[float]], sessions: int) -> "Sessions":
+    def from_json(cls, record: Mapping[str, list[float]], sessions: int) -> "ComparedSessions":
         """The results that `to_json` wrote. Raises KeyError, TypeError or ValueError for anything else."""
         kinds = {"solved": np.bool_, "rejected": np.bool_}
         found: dict[str, Any] = {
@@ -162,7 +162,7 @@ MEASURES = (
 class Compared:
     """A comparison: the problem (see `lab.teaching.subjects`), the advisors, and the values of settings by name.
 
-    Each combination is one `Setting`. Raises BadInput for an empty list and for more than MOST_SETTINGS combinations.
+    Each combination is one `ComparedSetting`. Raises BadInput for an empty list and for more than MOST_SETTINGS combinations.
     """
 
     problem: Teachable
@@ -180,15 +180,15 @@ class Compared:
         if most > MOST_SETTINGS:
             raise BadInput(f"{most} settings to compare: allowed are {MOST_SETTINGS}")
 
-    def settings(self) -> "Iterator[Setting]":
+    def settings(self) -> "Iterator[ComparedSetting]":
         """All combinations, the first name varying slowest."""
         for values in product(*self.values.values()):
             for advisor in self.advisors:
-                yield Setting(self, advisor, tuple(zip(self.values, values, strict=True)))
+                yield ComparedSetting(self, advisor, tuple(zip(self.values, values, strict=True)))
 
 
 @dataclass(frozen=True, eq=False)
-class Setting:
+class ComparedSetting:
     """One combination: an advisor, and a value for each of the compared settings."""
 
     of: Compared
@@ -218,8 +218,8 @@ def compared(what: Compared, job: Job) -> Findings:
         setting.subject()
     problem = prepared(what, job.seed)
     keys = {key_of(setting, problem, job): setting for setting in settings}
-    done: dict[str, Sessions] = job.kept_as(
-        lambda entry: (entry["key"], Sessions.from_json(entry, job.sessions)) if entry["key"] in keys else None
+    done: dict[str, ComparedSessions] = job.kept_as(
+        lambda entry: (entry["key"], ComparedSessions.from_json(entry, job.sessions)) if entry["key"] in keys else None
     )
     left = [key for key in keys if key not in done]
     job.progress(len(done), len(keys))
@@ -234,7 +234,7 @@ def compared(what: Compared, job: Job) -> Findings:
     return Findings(rows, in_short(results.values()), figures([*results.values()]), (MEASURES,))
 
 
-def sessions_of(setting: Setting, sessions: int, seed: int, stream: int | None = None) -> Sessions:
+def sessions_of(setting: ComparedSetting, sessions: int, seed: int, stream: int | None = None) -> ComparedSessions:
     """The results of sessions of a setting, compiled if learner, gate and advisor are; stream: selects other seeds."""
     for kind, word in setting.of.files.values():
         take(FAMILIES[kind], word)
@@ -257,7 +257,7 @@ def sessions_of(setting: Setting, sessions: int, seed: int, stream: int | None =
         counts = tuple(np.array([one[n] for one in alone]) for n in range(3, 6))
     solved = np.array([environment.judge(table, how.learner).solved for table in q])
     helped, requests, misleads = (np.asarray(one, np.float64) for one in counts)
-    return Sessions(
+    return ComparedSessions(
         steps.mean(axis=0), solved, steps.mean(axis=1), steps[:, -1].astype(float), helped, requests, misleads, rejected
     )
 
@@ -274,7 +274,7 @@ def _alone(
     return one.rejected_at_episode is not None, one.steps, one.q, one.helped_steps, one.requests, one.misleads
 
 
-def rows_of(named: Row, found: Sessions) -> list[Row]:
+def rows_of(named: Row, found: ComparedSessions) -> list[Row]:
     """The rows of one setting, one per measure."""
     return [
         share_row(named, "solved_percent", found.solved),
@@ -285,7 +285,7 @@ def rows_of(named: Row, found: Sessions) -> list[Row]:
     ]
 
 
-def in_short(results: "Iterator[tuple[Row, Sessions]] | Any") -> Row:
+def in_short(results: "Iterator[tuple[Row, ComparedSessions]] | Any") -> Row:
     """The summary: the setting that solves most sessions, of equal ones the one with the fewest mean steps."""
     named, best = max(results, key=lambda one: (one[1].solved.mean(), -one[1].mean_steps.mean()))
     what = ", ".join(f"{name} {value}" for name, value in named.items())
@@ -304,7 +304,7 @@ def prepared(what: Compared, seed: int) -> Problem:
     return subject_from(what.problem, what.task, what.sight).prepare(seed)
 
 
-def key_of(setting: Setting, problem: Problem, job: Job) -> str:
+def key_of(setting: ComparedSetting, problem: Problem, job: Job) -> str:
     """The key of a setting's sessions in the job's folder."""
     how = setting.subject().settings
     region = None if setting.of.sight is None else setting.of.sight

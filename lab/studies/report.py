@@ -51,7 +51,7 @@ class TableCell:
 
 
 @dataclass(frozen=True)
-class Table:
+class ReportTable:
     """A table of the page: the names of its columns and its lines."""
 
     caption: str
@@ -132,7 +132,7 @@ def write_file(path: Path, text: str) -> None:
         raise WorkFailed(f"study report '{path}' cannot be written: {error.strerror or error}") from None
 
 
-def _apart(rows: Sequence[Row]) -> Table | None:
+def _apart(rows: Sequence[Row]) -> ReportTable | None:
     """The table of agreement by both rules, for rows used to choose settings, for other rows, and for easy ones."""
     parts = counts([dict(row) for row in rows if row.get("within") is not None])
     lines = [
@@ -140,10 +140,10 @@ def _apart(rows: Sequence[Row]) -> Table | None:
         for name, of in parts.items()
         if of
     ]
-    return Table("", ["cells", "by the rule", "within both sampling errors"], lines) if lines else None
+    return ReportTable("", ["cells", "by the rule", "within both sampling errors"], lines) if lines else None
 
 
-def _agreement(rows: Sequence[Row]) -> Table | None:
+def _agreement(rows: Sequence[Row]) -> ReportTable | None:
     """The table of how many rows agree with the thesis: a line per table and method, a column per measure."""
     compared = [row for row in rows if row.get("within") is not None]
     if not compared:
@@ -155,7 +155,7 @@ def _agreement(rows: Sequence[Row]) -> Table | None:
         groups.setdefault(_settings(row, keys), []).append(row)
     lines = [[*_texts(line), *_shares(group, measures)] for line, group in groups.items() if keys]
     total = [TableCell("all", span=len(keys))] if keys else []
-    return Table(
+    return ReportTable(
         "", [*map(_name, keys), *map(_measure, measures), "all"], [*lines, total + _shares(compared, measures)]
     )
 
@@ -170,7 +170,7 @@ def _shares(rows: Sequence[Row], measures: Sequence[str]) -> list[TableCell]:
     return cells
 
 
-def _largest(rows: Sequence[Row]) -> Table:
+def _largest(rows: Sequence[Row]) -> ReportTable:
     """The table of the largest differences from printed values, relative to what is allowed."""
     compared = [row for row in rows if _known(row.get("value")) and _known(row.get("thesis"))]
     lines = [
@@ -184,7 +184,7 @@ def _largest(rows: Sequence[Row]) -> Table:
         for row in sorted(compared, key=_excess, reverse=True)[:LARGEST]
         if row["value"] != row["thesis"]
     ]
-    return Table("", ["cell", "measure", "measured", "printed", "difference", "times what is allowed"], lines)
+    return ReportTable("", ["cell", "measure", "measured", "printed", "difference", "times what is allowed"], lines)
 
 
 def _excess(row: Row) -> float:
@@ -192,7 +192,7 @@ def _excess(row: Row) -> float:
     return difference / room if room else inf if difference else 0.0
 
 
-def _tables(rows: Sequence[Row]) -> list[Table]:
+def _tables(rows: Sequence[Row]) -> list[ReportTable]:
     """The tables of all rows: one for each world and view (or case), with a line per combination of the other settings."""
     tables: dict[Line, list[Row]] = {}
     for row in rows:
@@ -200,7 +200,7 @@ def _tables(rows: Sequence[Row]) -> list[Table]:
     return [_all_cells(place, group) for place, group in tables.items()]
 
 
-def _all_cells(place: Line, rows: Sequence[Row]) -> Table:
+def _all_cells(place: Line, rows: Sequence[Row]) -> ReportTable:
     """One table; its caption names the settings that do not vary in it."""
     names = dict.fromkeys(key for row in rows for key, _ in _settings(row) if key not in TABLE_KEYS)
     varying = [name for name in names if len({_text(row.get(name)) for row in rows}) > 1]
@@ -223,7 +223,7 @@ def _all_cells(place: Line, rows: Sequence[Row]) -> Table:
         ]
         for (line, _), cells in lines.items()
     ]
-    return Table(_words(fixed), head, body)
+    return ReportTable(_words(fixed), head, body)
 
 
 def _result(row: Row, printed: bool) -> list[TableCell]:

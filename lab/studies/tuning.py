@@ -19,7 +19,7 @@ from lab.learning.updates import UPDATES
 from lab.mdp import FloatArray
 from lab.optional import optional
 from lab.statistics import interval
-from lab.studies.compared import Compared, Sessions, Setting, key_of, prepared, sessions_of
+from lab.studies.compared import Compared, ComparedSessions, ComparedSetting, key_of, prepared, sessions_of
 from lab.studies.findings import Findings, Row, mean_row, row, share_row
 from lab.studies.report import write_file
 from lab.studies.runner import Job
@@ -213,10 +213,10 @@ class Tuning:
         """The search range of each setting."""
         return {name: RANGES[name] or tuple(sorted(FAMILIES[name])) for name in self.over}
 
-    def setting(self, values: Values) -> Setting:
+    def setting(self, values: Values) -> ComparedSetting:
         """The setting with these values and the held ones."""
         what = Compared(self.problem, (self.advisor,), {}, self.task, self.sight)
-        return Setting(what, self.advisor, tuple({**self.held, **values}.items()))
+        return ComparedSetting(what, self.advisor, tuple({**self.held, **values}.items()))
 
 
 def tuned(what: Tuning, job: Job) -> Findings:
@@ -228,7 +228,7 @@ def tuned(what: Tuning, job: Job) -> Findings:
     """
     own = what.setting({}).subject().settings
     plain = vars(own.learner) | vars(own.gate)
-    kept = _Kept(what, job)
+    kept = _KeptSessions(what, job)
     ranges = what.ranges
     first = {name: _within(plain[name], allowed) for name, allowed in ranges.items()}
     limit = own.learner.max_steps + 1
@@ -255,7 +255,7 @@ def tuned(what: Tuning, job: Job) -> Findings:
     return _findings(trials, importances, best, (before, after), limit)
 
 
-def costs(found: Sessions, limit: int) -> FloatArray:
+def costs(found: ComparedSessions, limit: int) -> FloatArray:
     """The cost of each session, (N,)."""
     return found.mean_steps * found.solved + limit * ~found.solved
 
@@ -267,7 +267,7 @@ def _within(value: Any, allowed: Range) -> Any:
     return value if value in allowed else allowed[0]
 
 
-class _Kept:
+class _KeptSessions:
     """The sessions of settings, which are read from the job's folder if they are there."""
 
     def __init__(self, what: Tuning, job: Job):
@@ -276,11 +276,13 @@ class _Kept:
         key_of(own, self.problem, job)  # raises BadInput for an invalid advisor or value before any trial
         self.entries: dict[str, Any] = job.kept_as(lambda entry: (str(entry["key"]), entry))
 
-    def sessions(self, settings: Sequence[Setting], sessions: int, stream: int) -> list[Sessions | None]:
+    def sessions(
+        self, settings: Sequence[ComparedSetting], sessions: int, stream: int
+    ) -> list[ComparedSessions | None]:
         """The sessions of each setting, with the seeds of that stream; None for an invalid setting."""
-        found: dict[str, Sessions | None] = {}
+        found: dict[str, ComparedSessions | None] = {}
         keys: list[str] = []
-        left: list[Setting] = []
+        left: list[ComparedSetting] = []
         for one in settings:
             try:
                 key = f"{key_of(one, self.problem, replace(self.job, sessions=sessions))}-{stream}"
@@ -291,7 +293,7 @@ class _Kept:
             if key in found:
                 continue
             try:
-                found[key] = Sessions.from_json(self.entries[key], sessions)
+                found[key] = ComparedSessions.from_json(self.entries[key], sessions)
             except (KeyError, TypeError, ValueError, OverflowError):
                 found[key] = None
                 left.append(one)
@@ -327,7 +329,11 @@ def _toml(value: Any) -> str:
 
 
 def _findings(
-    trials: Sequence[Trial], importances: Mapping[str, float], best: Trial, pair: tuple[Sessions, Sessions], limit: int
+    trials: Sequence[Trial],
+    importances: Mapping[str, float],
+    best: Trial,
+    pair: tuple[ComparedSessions, ComparedSessions],
+    limit: int,
 ) -> Findings:
     before, after = pair
     gained = costs(before, limit) - costs(after, limit)

@@ -18,112 +18,120 @@ MAX_SERVED = 5000  # the same limit in cells with servers or several robots
 SHOWN = 3  # missing moves that one message names
 
 
-class Fault(NamedTuple):
+class FileFault(NamedTuple):
     """A fault: the path to the value in the file, and the message."""
 
     loc: Loc
     message: str
 
 
-def file_faults(cell: CellFields) -> Iterator[Fault]:
+def file_faults(cell: CellFields) -> Iterator[FileFault]:
     """The faults of everything except stations, routes and times: order, robots' starts, due times, names of methods."""
     yield from _order_faults(cell)
     yield from _robot_faults(cell)
     yield from _track_faults(cell)
     yield from _chance_faults(cell)
     if cell.due_s is not None and cell.due_factor is not None:
-        yield Fault(("due_factor",), "due_s and due_factor: give one of them, a time for each part or a factor")
+        yield FileFault(("due_factor",), "due_s and due_factor: give one of them, a time for each part or a factor")
     for field, error in cell.sequencing.faults(due=cell.due_s is not None or cell.due_factor is not None):
-        yield Fault(("sequencing", field), str(error))
+        yield FileFault(("sequencing", field), str(error))
 
 
-def _robot_faults(cell: CellFields) -> Iterator[Fault]:
+def _robot_faults(cell: CellFields) -> Iterator[FileFault]:
     if (cell.robot is None) == (cell.robots is None):
-        yield Fault(("robot",), "robot and robots: give one of them, the only robot or a list, [] for none")
+        yield FileFault(("robot",), "robot and robots: give one of them, the only robot or a list, [] for none")
     single: list[tuple[Loc, CellRobot]] = [] if cell.robot is None else [(("robot",), cell.robot)]
     for loc, robot in [*single, *((("robots", n), robot) for n, robot in enumerate(cell.robots or ()))]:
         for field, name in (("start", robot.start), *(("serves", name) for name in robot.serves or ())):
             if name not in cell.station_names:
                 where = ".".join(str(word) for word in (*loc, field))
-                yield Fault((*loc, field), str(unknown("station", name, cell.station_names, where)))
+                yield FileFault((*loc, field), str(unknown("station", name, cell.station_names, where)))
         if [other.name for other in cell.robots or ()].count(robot.name) > 1:
-            yield Fault((*loc, "name"), f"robot '{robot.name}': the name is used twice; every robot needs its own")
+            yield FileFault((*loc, "name"), f"robot '{robot.name}': the name is used twice; every robot needs its own")
 
 
-def _track_faults(cell: CellFields) -> Iterator[Fault]:
+def _track_faults(cell: CellFields) -> Iterator[FileFault]:
     if cell.track is None:
         return
     for table in ("travel", "loaded"):
         if getattr(cell, table):
-            yield Fault((table,), f"track and {table}: with a track, its stretches give the times: remove one of them")
+            yield FileFault(
+                (table,), f"track and {table}: with a track, its stretches give the times: remove one of them"
+            )
     if len(cell.built_robots) < 2:
-        yield Fault(("track",), "track: it is for several robots (robots): remove it")
+        yield FileFault(("track",), "track: it is for several robots (robots): remove it")
     try:
         check_track(cell.track.built(), cell.station_names)
     except BadInput as error:
-        yield Fault(("track", "stretches"), str(error))
+        yield FileFault(("track", "stretches"), str(error))
 
 
-def _chance_faults(cell: CellFields) -> Iterator[Fault]:
+def _chance_faults(cell: CellFields) -> Iterator[FileFault]:
     try:
         check_robot_breaks(len(cell.built_robots), cell.track is not None, cell.stochastic.built())
     except BadInput as error:
-        yield Fault(("stochastic", "robot_breaks_every_s"), str(error))
+        yield FileFault(("stochastic", "robot_breaks_every_s"), str(error))
 
 
-def _order_faults(cell: CellFields) -> Iterator[Fault]:
+def _order_faults(cell: CellFields) -> Iterator[FileFault]:
     if (cell.order is None) == (cell.parts is None):
-        yield Fault(("parts",), "order and parts: give one of them, a product for each part or a number")
+        yield FileFault(("parts",), "order and parts: give one of them, a product for each part or a number")
     if cell.parts is not None and len(cell.products) > 1:
-        yield Fault(("parts",), f"parts = {cell.parts}: with several products an order is wanted, one for each part")
+        yield FileFault(
+            ("parts",), f"parts = {cell.parts}: with several products an order is wanted, one for each part"
+        )
     count, field = (len(cell.order), "order") if cell.order is not None else (cell.parts or 0, "parts")
     if not 1 <= count <= MAX_PARTS:
-        yield Fault((field,), f"an order of {count} parts: allowed are 1 to {MAX_PARTS}")
+        yield FileFault((field,), f"an order of {count} parts: allowed are 1 to {MAX_PARTS}")
     for number, name in enumerate(cell.order or ()):
         if name not in cell.names:
             where = f"part {number + 1} of the order"
-            yield Fault(("order", number), str(unknown("product", name, cell.names, where)))
+            yield FileFault(("order", number), str(unknown("product", name, cell.names, where)))
 
 
-def layout_faults(cell: CellFields) -> Iterator[Fault]:
+def layout_faults(cell: CellFields) -> Iterator[FileFault]:
     """The faults of stations and routes: inconsistent ones, machines without a time, stations on no route."""
     stages = list(cell.stages())
     served = len(cell.built_robots) != 1 or any(station.servers is not None for station in cell.stations)
     most = MAX_SERVED if served else MAX_STAGES
     if len(stages) > most:
-        yield Fault(("products",), f"{len(stages)} stages on all routes together: allowed are up to {most}")
+        yield FileFault(("products",), f"{len(stages)} stages on all routes together: allowed are up to {most}")
     try:
         check_layout(cell.built_stations, cell.built_products)
     except BadInput as error:
-        yield Fault(loc_of(cell, str(error)) or _bad_stage(cell), str(error))
+        yield FileFault(loc_of(cell, str(error)) or _bad_stage(cell), str(error))
     reached = {robot.start for robot in cell.built_robots} | {
         name for _, stage in stages for name in (stage.station, stage.buffer)
     }
     timeless = {one.name for one in cell.stations if one.kind == "machine" and one.processing_s is None}
     for loc, stage in stages:
         if stage.station in timeless and stage.processing_s is None:
-            yield Fault(loc, f"machine '{stage.station}' has no processing_s, and neither has this stage of a route")
+            yield FileFault(
+                loc, f"machine '{stage.station}' has no processing_s, and neither has this stage of a route"
+            )
     for number, station in enumerate(cell.stations):
         if station.name not in reached:
-            yield Fault(("stations", number, "name"), f"station '{station.name}' cannot be reached: it is on no route")
+            yield FileFault(
+                ("stations", number, "name"), f"station '{station.name}' cannot be reached: it is on no route"
+            )
 
 
-def travel_faults(cell: CellFields) -> Iterator[Fault]:
+def travel_faults(cell: CellFields) -> Iterator[FileFault]:
     """The faults of the tables of times: unknown stations, and times for staying."""
     names = cell.station_names
     for field, table in (("travel", cell.travel), ("loaded", cell.loaded)):
         for origin, row in table.items():
             if origin not in names:
-                yield Fault((field, origin), str(unknown("station", origin, names, field)))
+                yield FileFault((field, origin), str(unknown("station", origin, names, field)))
             for target, time_s in row.items():
                 loc = (field, origin, target)
                 if target not in names:
-                    yield Fault(loc, str(unknown("station", target, names, f"{field} from '{origin}'")))
+                    yield FileFault(loc, str(unknown("station", target, names, f"{field} from '{origin}'")))
                 if target == origin and time_s > 0:
-                    yield Fault(loc, f"{field} '{origin}' -> '{target}' = {time_s:g}: staying takes 0 s")
+                    yield FileFault(loc, f"{field} '{origin}' -> '{target}' = {time_s:g}: staying takes 0 s")
 
 
-def missing_times(cell: CellFields, parts: int) -> Iterator[Fault]:
+def missing_times(cell: CellFields, parts: int) -> Iterator[FileFault]:
     """The moves without a time that a sequence of `parts` parts may need, or a station that no time leads to.
 
     The cell must be free of the faults above.
@@ -142,12 +150,12 @@ def missing_times(cell: CellFields, parts: int) -> Iterator[Fault]:
             some = ", ".join(f"'{origin}' -> '{target}'" for origin, target in into[:SHOWN])
             more = f" and {len(into) - SHOWN} more" if len(into) > SHOWN else ""
             unreached = f"station '{name}' cannot be reached: there is no travel time {some}{more}"
-            yield Fault(("stations", number, "name"), unreached)
+            yield FileFault(("stations", number, "name"), unreached)
     (origin, target), why = next(iter(lacking.items()))
     only = f"; no other time leads to '{target}'" if sum(pair[1] == target for pair in ways) == 1 else ""
     more = f" (and {len(lacking) - 1} more are missing)" if len(lacking) > 1 else ""
     missing = f"travel time '{origin}' -> '{target}' is missing: the robot may have to {why}{only}{more}"
-    yield Fault(("travel", origin) if cell.track is None else ("track", "stretches"), missing)
+    yield FileFault(("travel", origin) if cell.track is None else ("track", "stretches"), missing)
 
 
 def loc_of(cell: CellFields, message: str) -> Loc:

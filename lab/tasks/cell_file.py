@@ -16,7 +16,7 @@ from lab.sequencing.cell.cell import MAX_PARTS, Cell
 from lab.sequencing.cell.chance import Chance
 from lab.sequencing.cell.routes import positions_of
 from lab.sequencing.cell.stations import ROBOT, UNLIMITED, Arrivals, Begins
-from lab.tasks.cell_faults import Fault, file_faults, layout_faults, loc_of, missing_times, travel_faults
+from lab.tasks.cell_faults import FileFault, file_faults, layout_faults, loc_of, missing_times, travel_faults
 from lab.tasks.cell_fields import CellFields, CellStage, Times
 from lab.tasks.task_faults import fields_at
 from lab.tasks.toml_text import TomlText, explain, finding
@@ -91,7 +91,7 @@ class CellFile(CellFields):
         found.cell()
         return found
 
-    def _cell_or_fault(self, order: Sequence[str] | int | None) -> Cell | Fault:
+    def _cell_or_fault(self, order: Sequence[str] | int | None) -> Cell | FileFault:
         """The cell, or the first fault; each kind of fault is searched only when all kinds before it are absent."""
         for faults in (file_faults, layout_faults, travel_faults):
             if (fault := next(faults(self), None)) is not None:
@@ -102,7 +102,7 @@ class CellFile(CellFields):
         try:
             return self._built(parts)
         except BadInput as error:
-            return Fault(loc_of(self, str(error)), str(error))
+            return FileFault(loc_of(self, str(error)), str(error))
 
     def _built(self, parts: tuple[str, ...]) -> Cell:
         arrivals, due_s = self.arrivals, self.due_s

@@ -115,7 +115,7 @@ class Around(NamedTuple):
     turn_rad: float
 
 
-class Placed(NamedTuple):
+class PlacedStation(NamedTuple):
     """A station in a layout: its middle x, y [m], and its parts' spots relative to that [m].
 
     lists_spots: whether the file lists the spots; else the station has its default rows, a little closer together than these.
@@ -289,7 +289,7 @@ def heights_m(new: NewTask) -> tuple[float, float]:
     return SMALLEST_M, round(MACHINE_HIGH_M + 2 * tallest + OVER_M, 3)
 
 
-def layouts(new: NewTask, around: Around, between_m: float | None = None) -> Iterator[tuple[Placed, ...]]:
+def layouts(new: NewTask, around: Around, between_m: float | None = None) -> Iterator[tuple[PlacedStation, ...]]:
     """Layouts of the stations on an arc around the arm, in the order of the route, the widest first; empty when none fits.
 
     between_m: the gap between parts of a station [m]; None: the default of stations.
@@ -316,11 +316,11 @@ def does_not_fit(new: NewTask, around: Around) -> BadInput:
     )
 
 
-def _stations(new: NewTask, between_m: float | None = None) -> list[Placed]:
+def _stations(new: NewTask, between_m: float | None = None) -> list[PlacedStation]:
     """The stations in the order of the route, before they are laid out: all at the arm's foot."""
     pitch = [foot + (between_m or BETWEEN_M) for foot in new.foot_m]
 
-    def placed(name: str, kind: str, capacity: int) -> Placed:
+    def placed(name: str, kind: str, capacity: int) -> PlacedStation:
         columns = min(COLUMNS, capacity) if kind == "storage" else 1
         rows = ceil(capacity / columns)
         at = product(range(columns), range(rows))
@@ -328,17 +328,17 @@ def _stations(new: NewTask, between_m: float | None = None) -> list[Placed]:
         spots = [((c - (columns - 1) / 2) * pitch[0], (r - first) * pitch[1]) for c, r in at]
         spots = sorted(spots, key=lambda spot: (round(hypot(*spot), 6), spot))[:capacity]
         lists_spots = capacity > 1 and (between_m is not None or kind == "machine")
-        return Placed(name, kind, capacity, 0.0, 0.0, tuple(spots), lists_spots)
+        return PlacedStation(name, kind, capacity, 0.0, 0.0, tuple(spots), lists_spots)
 
     return [placed(name, kind, capacity) for name, (kind, capacity) in new.stations.items()]
 
 
-def _reached(one: Placed, around: Around) -> bool:
+def _reached(one: PlacedStation, around: Around) -> bool:
     far = [hypot(one.x + x, one.y + y) for x, y in one.spots]
     return around.nearest_m + EDGE_M <= min(far) and max(far) <= around.farthest_m - EDGE_M
 
 
-def _apart(placed: Sequence[Placed], foot: tuple[float, float], gap: float) -> bool:
+def _apart(placed: Sequence[PlacedStation], foot: tuple[float, float], gap: float) -> bool:
     for one, other in combinations(placed, 2):
         (along, across), (length, width) = one.half_m(foot), other.half_m(foot)
         if abs(one.x - other.x) < along + length + gap and abs(one.y - other.y) < across + width + gap:

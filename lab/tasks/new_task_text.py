@@ -11,7 +11,7 @@ from lab.tasks.new_task import (
     Around,
     NewPart,
     NewTask,
-    Placed,
+    PlacedStation,
     heights_m,
 )
 from lab.tasks.robot_fields import MODELS
@@ -20,7 +20,7 @@ COLORS = ((0.62, 0.42, 0.22), (0.25, 0.45, 0.70), (0.35, 0.60, 0.35), (0.80, 0.6
 FINISHES = ((0.70, 0.42, 0.16), (0.85, 0.30, 0.20), (0.20, 0.40, 0.55), (0.45, 0.55, 0.20))
 
 
-def text_of(new: NewTask, placed: Sequence[Placed], around: Around, opening_m: float | None = None) -> str:
+def text_of(new: NewTask, placed: Sequence[PlacedStation], around: Around, opening_m: float | None = None) -> str:
     """The task file; `opening_m`: the fingers open no farther, None: all the way."""
     parts = "\n".join(_part(new, part, number) for number, part in enumerate(new.parts))
     stations = "\n".join(_station(new, one) for one in placed)
@@ -75,7 +75,7 @@ routes = [[
 """
 
 
-def _workspace(new: NewTask, placed: Sequence[Placed], around: Around) -> str:
+def _workspace(new: NewTask, placed: Sequence[PlacedStation], around: Around) -> str:
     low = round(heights_m(new)[1] - CELL_M / 2, 3)
     ahead = max(hypot(one.x, one.y) for one in placed)  # the way from one side to the other leads there
     lower, shape = [], []
@@ -95,7 +95,7 @@ shape = [{shape[0]}, {shape[1]}, {LEVELS}]
 """
 
 
-def _station(new: NewTask, one: Placed) -> str:
+def _station(new: NewTask, one: PlacedStation) -> str:
     lines = [
         "[[stations]]",
         f'name = "{one.name}"',

@@ -201,7 +201,7 @@ HEADS = {
 }
 
 
-class Table(NamedTuple):
+class SchemaTable(NamedTuple):
     """A table of a file: its heading on the page, and its schema."""
 
     heading: str
@@ -235,9 +235,9 @@ def page_of(kind: str) -> str:
     return "\n".join(lines)
 
 
-def tables_of(schema: Schema) -> list[Table]:
+def tables_of(schema: Schema) -> list[SchemaTable]:
     """The tables of a kind of file, each once, in the order of the keys that hold them; the whole file first."""
-    found = [Table("The file itself", schema)]
+    found = [SchemaTable("The file itself", schema)]
     seen: set[str] = set()
 
     def walk(above: str, properties: Schema) -> None:
@@ -248,7 +248,7 @@ def tables_of(schema: Schema) -> list[Table]:
             seen.add(name)
             path = f"{above}{key}"
             own = {"[]": f"`[[{path}]]`", "{}": f"`[{path}.NAME]`", "": f"`[{path}]`"}.get(many, f"A stage of `{path}`")
-            found.append(Table(own, schema[TABLES][name]))
+            found.append(SchemaTable(own, schema[TABLES][name]))
             walk(path + {"{}": ".NAME."}.get(many, "."), schema[TABLES][name]["properties"])
 
     walk("", schema["properties"])

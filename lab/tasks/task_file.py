@@ -13,7 +13,7 @@ from lab.errors import BadInput, shortened, unknown
 from lab.files import tasks_folder
 from lab.tasks.cell_file import CellFile
 from lab.tasks.grid_world import RANDOM, GridWorld, from_text, from_words
-from lab.tasks.instances import SUFFIXES, Asked, is_instance, read_instance, takes_case
+from lab.tasks.instances import SUFFIXES, InstanceRequest, is_instance, read_instance, takes_case
 from lab.tasks.record import MAX_SHORT_BYTES, Record, read_text
 from lab.tasks.task import Task
 from lab.tasks.task_faults import fields_at, loc_of, refusal, within
@@ -111,7 +111,7 @@ def load_any(word: str, wanted: FileKind | None = None) -> Task | CellFile | Gri
     return _task(toml) if kind == "task" else _checked(GridWorld, toml)
 
 
-def load_beside(word: str, asked: Asked) -> tuple[Task | CellFile | GridWorld, str | None]:
+def load_beside(word: str, asked: InstanceRequest) -> tuple[Task | CellFile | GridWorld, str | None]:
     """The task, cell or world of a word with the given options, and the --case if it names an order; else None.
 
     A layout fits instance files only; robots fit these and cells. Raises BadInput for other combinations.
@@ -131,7 +131,7 @@ def load_beside(word: str, asked: Asked) -> tuple[Task | CellFile | GridWorld, s
     return found, asked.case
 
 
-def load_cell_beside(word: str, asked: Asked) -> CellFile:
+def load_cell_beside(word: str, asked: InstanceRequest) -> CellFile:
     """The cell of a word with the given options; raises BadInput for anything else, and for a --case that names no instance."""
     found, case = load_beside(word, asked)
     if not isinstance(found, CellFile):

@@ -10,13 +10,13 @@ from annotated_types import Ge
 
 from lab import __version__
 from lab.advice.advisors import AdvisorName
-from lab.advice.entries import MAX_BYTES, Read, Session
+from lab.advice.entries import MAX_BYTES, Read, SessionEntry
 from lab.advice.journal import Journal
 from lab.advice.order_level import signature_of
 from lab.errors import BadInput
 from lab.files import json_of, read_limited
 from lab.sequencing.cell.cell import Cell
-from lab.tasks.instances import Asked
+from lab.tasks.instances import InstanceRequest
 from lab.tasks.record import write_whole
 from lab.teaching.kept_session import SessionInFolder, check_same, claimed, kept_journal, read_session
 from lab.teaching.lesson_options import SessionOptions, whole_path
@@ -74,9 +74,9 @@ class OrderOptions(SessionOptions):
         return asdict(self) | {"task": whole_path(self.task)} | whole
 
     @property
-    def beside(self) -> Asked:
+    def beside(self) -> InstanceRequest:
         """The options that apply to an instance file."""
-        return Asked(None if self.layout is None else Path(self.layout), self.robots, self.case)
+        return InstanceRequest(None if self.layout is None else Path(self.layout), self.robots, self.case)
 
 
 class OrderSession(SessionInFolder):
@@ -118,7 +118,7 @@ class OrderSession(SessionInFolder):
             self.folder = claimed(self._toolbox, name, Path.mkdir)
             if self._durations is not None:
                 write_whole(self.folder / DURATIONS, json.dumps(dict(self._durations), indent=1) + "\n")
-            head = Session(self.options.to_json(), name, signature, __version__, command="sequence")
+            head = SessionEntry(self.options.to_json(), name, signature, __version__, command="sequence")
             self.journal = Journal.begin(self.folder, head)
         elif read.session.signature != signature:
             raise BadInput(

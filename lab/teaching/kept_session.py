@@ -10,7 +10,7 @@ from shlex import quote
 from typing import Any, TypeVar
 
 from lab import __version__
-from lab.advice.entries import FILE, Read, Session, is_unbegun, line_of, read_journal
+from lab.advice.entries import FILE, Read, SessionEntry, is_unbegun, line_of, read_journal
 from lab.advice.journal import Journal
 from lab.advice.receipt import Receipt, receipt
 from lab.errors import BadInput, WorkFailed
@@ -132,7 +132,7 @@ class NewSession(SessionInFolder):
         if plan.begins_from is not None:
             begun = FolderPlace(self.folder / BEGUN)
             begun.write(f"{slug(plan.begins_from.name)}{SUFFIX}", encode(plan.begins_from))
-        head = Session(
+        head = SessionEntry(
             self.options.to_json(),
             problem.name,
             problem.mdp.signature,

@@ -27,7 +27,7 @@ class FileState(NamedTuple):
     stamp: str
 
 
-class Place(Protocol):
+class FilePlace(Protocol):
     """The storage of a toolbox: files by name, such as "versions/insert/0001-1a2b3c4d5e6f.safetensors".
 
     address: as for --toolbox; folder: local, for files that are never remote; cache: local, for files that can be made again;
@@ -202,7 +202,7 @@ class FolderPlace:
                 left.unlink(missing_ok=True)
 
     def tidy(self, older_s: float) -> list[str]:
-        """Removes drafts, also those of linked sessions, and folders of sessions that never began; see `Place.tidy`."""
+        """Removes drafts, also those of linked sessions, and folders of sessions that never began; see `FilePlace.tidy`."""
         gone, until_s = [], time.time() - older_s
         found = list[Path]()
         with suppress(OSError):  # a folder may be removed meanwhile

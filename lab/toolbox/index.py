@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from lab.errors import BadInput
 from lab.files import read_limited, write_whole
 from lab.toolbox import deferred
-from lab.toolbox.folder_place import FileState, Place
+from lab.toolbox.folder_place import FilePlace, FileState
 from lab.toolbox.names import SUFFIX, VERSIONS, hash_of
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ class Index:
     use it at once, because it is written atomically and a row counts only while the stamp of its file is unchanged.
     """
 
-    def __init__(self, place: Place) -> None:
+    def __init__(self, place: FilePlace) -> None:
         self._place = place
         self._rows: dict[str, Row] | None = None
         self._stamps: dict[str, str] = {}

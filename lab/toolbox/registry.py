@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from lab.errors import BadInput, WorkFailed, unknown
 from lab.files import json_of
 from lab.toolbox import deferred
-from lab.toolbox.folder_place import FolderPlace, Place, read_file
+from lab.toolbox.folder_place import FilePlace, FolderPlace, read_file
 from lab.toolbox.index import Index, Key, KnownPolicies, Row
 from lab.toolbox.names import SUFFIX, TRASH, VERSIONS, default_address, hash_of, is_address, slug
 
@@ -30,7 +30,7 @@ def file_of(kind: str, key: str) -> str:
     return f"{FOLDER}/{slug(kind)}/{slug(key)}{_SUFFIX}"
 
 
-def save(place: Place, kind: str, key: str, record: dict[str, Any]) -> None:
+def save(place: FilePlace, kind: str, key: str, record: dict[str, Any]) -> None:
     """Writes a record. Raises BadInput if it has no JSON form."""
     try:
         whole = {"kind": kind, "key": key, "hash": _hash(record), "record": record}
@@ -40,7 +40,7 @@ def save(place: Place, kind: str, key: str, record: dict[str, Any]) -> None:
     place.write(file_of(kind, key), text.encode())
 
 
-def load(place: Place, kind: str, key: str) -> dict[str, Any] | None:
+def load(place: FilePlace, kind: str, key: str) -> dict[str, Any] | None:
     """The record of that kind and key, None if there is none. Raises BadInput if its file is damaged or was edited."""
     file = file_of(kind, key)
     folder, _, name = file.rpartition("/")
@@ -51,7 +51,7 @@ def load(place: Place, kind: str, key: str) -> dict[str, Any] | None:
     return record if (whole["kind"], whole["key"]) == (kind, key) else None
 
 
-def faults(place: Place) -> dict[str, str]:
+def faults(place: FilePlace) -> dict[str, str]:
     """The fault of each record's file by name, "" for sound ones."""
     found = {}
     for folder in place.folders(FOLDER):
@@ -66,7 +66,7 @@ def faults(place: Place) -> dict[str, str]:
     return found
 
 
-def _read(place: Place, file: str) -> dict[str, Any]:
+def _read(place: FilePlace, file: str) -> dict[str, Any]:
     try:
         whole = json_of(place.read(file))
     except (BadInput, ValueError, RecursionError) as error:
@@ -373,7 +373,7 @@ class Toolbox:
         raise BadInput(f"unknown policy '{name}' ({where}): {hint}lab toolbox list names all {len(named)} policies")
 
 
-def _place_of(where: Path | str | None) -> Place:
+def _place_of(where: Path | str | None) -> FilePlace:
     """The place that a folder or an address names, default the user's own."""
     text = default_address() if where is None else str(where)
     if text.startswith("file://"):

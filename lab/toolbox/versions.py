@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 from lab.errors import BadInput, WorkFailed
 from lab.files import json_of
-from lab.toolbox.folder_place import Place
+from lab.toolbox.folder_place import FilePlace
 from lab.toolbox.names import LOG, SUFFIX, TRASH, VERSIONS, hash_of
 from lab.toolbox.policy import Policy
 from lab.toolbox.policy_file import decode, encode, unreadable
@@ -139,7 +139,7 @@ class Versions:
     "trash/STEM.safetensors" the removed policy. A file that was copied there by hand becomes a version before it is replaced.
     """
 
-    def __init__(self, place: Place, stem: str) -> None:
+    def __init__(self, place: FilePlace, stem: str) -> None:
         self._place = place
         self.in_use_file = f"{stem}{SUFFIX}"
         self.trash_file = f"{TRASH}/{stem}{SUFFIX}"

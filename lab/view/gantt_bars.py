@@ -16,7 +16,7 @@ NARROWEST_INCH, WIDEST_INCH, MOVE_INCH = 12.0, 60.0, 0.36
 
 
 @dataclass(frozen=True)
-class Look:
+class ActivityStyle:
     """The look of a kind of activity: text in the legend, colour (None: the product's, mixed with white), hatch, text colour."""
 
     says: str
@@ -27,16 +27,16 @@ class Look:
 
 
 # in the legend's order
-LOOKS: dict[str, Look] = {
-    "carry": Look("carried by the robot", BLUE, ink="white"),
-    "process": Look("in process", None),
-    "blocked": Look("processed, not fetched yet", None, "...", 0.45),
-    "store": Look("in a buffer", None, None, 0.22),
-    "outside": Look("not begun, or finished", "#C9C9C9"),
-    "pallet": Look("robot carries an empty pallet", "#A68CC9", "////"),
-    "empty": Look("robot moves empty", SKY),
-    "service": Look("robot serves a machine", DARK_GREY, ink="white"),
-    "wait": Look("robot idle", PALE_GREY, "////"),
+LOOKS: dict[str, ActivityStyle] = {
+    "carry": ActivityStyle("carried by the robot", BLUE, ink="white"),
+    "process": ActivityStyle("in process", None),
+    "blocked": ActivityStyle("processed, not fetched yet", None, "...", 0.45),
+    "store": ActivityStyle("in a buffer", None, None, 0.22),
+    "outside": ActivityStyle("not begun, or finished", "#C9C9C9"),
+    "pallet": ActivityStyle("robot carries an empty pallet", "#A68CC9", "////"),
+    "empty": ActivityStyle("robot moves empty", SKY),
+    "service": ActivityStyle("robot serves a machine", DARK_GREY, ink="white"),
+    "wait": ActivityStyle("robot idle", PALE_GREY, "////"),
 }
 
 

@@ -20,7 +20,7 @@ Apart = Callable[[Floats, Floats], Floats]
 
 
 @dataclass(frozen=True, eq=False)
-class Track:
+class KeyframeTrack:
     """Keys of one property: `times_s` (k,) seconds since the first frame, `values` (k, width)."""
 
     times_s: Floats
@@ -28,17 +28,17 @@ class Track:
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class BodyMotion:
     """The motion of one body; properties that never change are None (position, rotation) or empty (steps)."""
 
     start: tuple[float, ...]
-    position: Track | None
-    quaternion: Track | None
+    position: KeyframeTrack | None
+    quaternion: KeyframeTrack | None
     colors: tuple[tuple[float, Rgba], ...]  # (seconds since the first frame, colour from then on)
     visible: tuple[tuple[float, bool], ...]
 
 
-def motions(recording: Recording) -> dict[str, Motion]:
+def motions(recording: Recording) -> dict[str, BodyMotion]:
     """The motion of every body, with as few keys as stay within 0.2 mm and 0.2 degrees of every frame."""
     times, last = _times(recording)
     return {body.name: _motion(recording, body.name, times, last) for body in recording.bodies}
@@ -51,7 +51,7 @@ def _times(recording: Recording) -> tuple[Floats, list[int]]:
     return unique - unique[:1], rows.tolist()
 
 
-def _motion(recording: Recording, name: str, times: Floats, rows: list[int]) -> Motion:
+def _motion(recording: Recording, name: str, times: Floats, rows: list[int]) -> BodyMotion:
     poses = np.full((max(len(times), 1), 7), np.nan)
     colors: list[tuple[float, Rgba]] = []
     visible: list[tuple[float, bool]] = []
@@ -64,7 +64,7 @@ def _motion(recording: Recording, name: str, times: Floats, rows: list[int]) -> 
             visible.append((float(times[row]), bool(frame.visible[name])))
     poses = _held(poses)
     places, turns = poses[:, :3], continuous(poses[:, 3:])
-    return Motion(
+    return BodyMotion(
         start=(*places[0].tolist(), *turns[0].tolist()),
         position=_track(times, places, lerp, distance, POSITION_TOLERANCE_M),
         quaternion=_track(times, turns, slerp, angle, ANGLE_TOLERANCE_RAD),
@@ -89,7 +89,7 @@ def continuous(quaternions: Floats) -> Floats:
     return np.asarray(units * np.concatenate(([1.0], np.cumprod(flips)))[:, None])
 
 
-def _track(times: Floats, values: Floats, between: Between, apart: Apart, tolerance: float) -> Track | None:
+def _track(times: Floats, values: Floats, between: Between, apart: Apart, tolerance: float) -> KeyframeTrack | None:
     """The keys from which the interpolation `between` stays within `tolerance` of all values, measured by `apart`.
 
     None when nothing moves.
@@ -102,7 +102,7 @@ def _track(times: Floats, values: Floats, between: Between, apart: Apart, tolera
     kept = sparse(len(times), off, tolerance)
     if len(kept) < 2 or (len(kept) == 2 and apart(values[-1:], values[:1])[0] <= tolerance):
         return None
-    return Track(times[kept], values[kept])
+    return KeyframeTrack(times[kept], values[kept])
 
 
 def sparse(count: int, off: Callable[[int, int], Floats], tolerance: float) -> list[int]:

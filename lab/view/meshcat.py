@@ -20,12 +20,12 @@ from typing import TYPE_CHECKING, Any, Self
 from lab import files
 from lab.errors import BadInput, WorkFailed, unknown
 from lab.sim.frames import Body, Frame, Recording, Viewpoint
-from lab.view.keyframes import Motion, Track, motions
+from lab.view.keyframes import BodyMotion, KeyframeTrack, motions
 from lab.view.scene_data import Json, Story, describe, pack
 
 if TYPE_CHECKING:  # the server loads starlette and uvicorn, which only a served page needs
     from lab.view.server import File, Server
-    from lab.view.server_page import Panel
+    from lab.view.server_page import ScenePanel
 
 HERE = Path(__file__).parent
 GANTT_SCRIPT = HERE / "gantt.js"
@@ -47,7 +47,7 @@ class LiveView:
     dropped unless there is a panel, and leaving the context never takes longer than about 3 s.
     """
 
-    _panel: "Panel | None" = None
+    _panel: "ScenePanel | None" = None
 
     def __init__(self, port: int = 0, *, title: str = "Teaching lab, live", replay: Path | None = None) -> None:
         self._wanted, self._title, self._replay = port, title, replay
@@ -164,7 +164,7 @@ def replay_html(
     title: str = "Teaching lab",
     story: "Story | None" = None,
     scene: "Json | None" = None,
-    tracks: "Mapping[str, Motion] | None" = None,
+    tracks: "Mapping[str, BodyMotion] | None" = None,
 ) -> Path:
     """Write the recording as one HTML file, a player that needs no network; returns `path`.
 
@@ -199,9 +199,9 @@ def replay_html(
     return Path(path)
 
 
-def _motion(motion: "Motion") -> dict[str, Any]:
+def _motion(motion: "BodyMotion") -> dict[str, Any]:
 
-    def packed(track: "Track | None") -> dict[str, str] | None:
+    def packed(track: "KeyframeTrack | None") -> dict[str, str] | None:
         return None if track is None else {"times": pack(track.times_s), "values": pack(track.values)}
 
     return {

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from lab.vision import GridView, View
 
 
-class Places(NamedTuple):
+class MapMarks(NamedTuple):
     """The content of a map's cells (row, column): the greedy path, blocked cells (rows, columns) bool, start and goal."""
 
     route: Sequence[tuple[int, int]] = ()
@@ -26,7 +26,7 @@ class Places(NamedTuple):
     goal: tuple[int, int] | None = None
 
 
-NOTHING = Places()
+NOTHING = MapMarks()
 
 
 class Curve(Protocol):
@@ -77,7 +77,7 @@ def value_map(
     path: Path,
     *,
     corners: ArrayLike | None = None,
-    places: Places = NOTHING,
+    places: MapMarks = NOTHING,
 ) -> None:
     """Plot values (rows, columns) of grid cells, such as max_a Q, half-transparent over a picture (H, W, 3) RGB, or alone.
 
@@ -118,7 +118,7 @@ def grid_values(q: FloatArray, mdp: TabularMDP, path: Path) -> None:
     states, _, _ = greedy_path(q, mdp, mdp.n_states)
     route = [divmod(state, columns) for state in states]
     blocked = (mdp.terminal & ~mdp.goal).reshape(mdp.shape)
-    places = Places(route, blocked, divmod(mdp.start, columns), divmod(goal, columns))
+    places = MapMarks(route, blocked, divmod(mdp.start, columns), divmod(goal, columns))
     value_map(q.max(axis=1).reshape(rows, columns), None, path, places=places)
 
 
@@ -148,7 +148,7 @@ def values_seen(q: FloatArray, mdp: TabularMDP, picture: NDArray[np.uint8], seen
         picture,
         path,
         corners=cell_corners(seen.view),
-        places=Places(
+        places=MapMarks(
             route=[(cell[0], cell[1]) for cell in cells],
             blocked=(mdp.terminal & ~mdp.goal).reshape(mdp.shape),
             start=seen.start,
@@ -190,7 +190,7 @@ def _draw_curve(axes: "Axes", policy: Curve) -> None:
     axes.grid()
 
 
-def _draw_places(axes: "Axes", crossings: NDArray[np.float64], walls: NDArray[np.bool_], places: Places) -> None:
+def _draw_places(axes: "Axes", crossings: NDArray[np.float64], walls: NDArray[np.bool_], places: MapMarks) -> None:
     """Draw blocked cells, the greedy path, start and goal on a value map."""
     from matplotlib.collections import PolyCollection
 

@@ -29,7 +29,7 @@ INK: Rgba = (0.20, 0.24, 0.29, 1.0)
 
 
 @dataclass(frozen=True)
-class Spot:
+class FloorSpot:
     """A station: its middle on the floor [m], its rotation [rad] (0: its front faces the viewer at -y), and its kind.
 
     kind: "machine", "store" (a table), or "tile" (a place on the floor for `parts` parts).
@@ -104,7 +104,7 @@ class Spot:
 
 def laid_out(
     kinds: Mapping[str, str], places_m: Mapping[str, tuple[float, float]], parts: int, around: bool, wide: float
-) -> dict[str, Spot]:
+) -> dict[str, FloorSpot]:
     """A spot for each station, by name: at its given place, on a ring around an arm, or in rows from the back.
 
     places_m are scaled so that no two stations overlap; stations without a place stand in a row in front. parts: their
@@ -112,7 +112,7 @@ def laid_out(
     """
     names = [name for name, kind in kinds.items() if kind != "tile"]
     said = {name: places_m[name] for name in names if name in places_m}
-    tile = Spot("", 0.0, 0.0, 0.0, "tile", parts).edges[0]
+    tile = FloorSpot("", 0.0, 0.0, 0.0, "tile", parts).edges[0]
     at: dict[str, tuple[float, float, float]] = {}
     if said:
         xy = np.array(list(said.values()))
@@ -136,10 +136,10 @@ def laid_out(
     left, right = (side(x for x, _, _ in at.values()) for side in (min, max))
     middle = sum(side(y for _, y, _ in at.values()) for side in (min, max)) / 2
     aside = WIDE_M / 2 + tile / 2 + 0.55
-    found = {name: Spot(name, *at[name], kinds[name], parts) for name in names}
+    found = {name: FloorSpot(name, *at[name], kinds[name], parts) for name in names}
     for name, x in (("start", left - aside), ("finished", right + aside)):
         if kinds.get(name) == "tile":
-            found[name] = Spot(name, x, middle, 0.0, "tile", parts)
+            found[name] = FloorSpot(name, x, middle, 0.0, "tile", parts)
     return found
 
 
@@ -149,7 +149,7 @@ class Carrier(Protocol):
     bodies: tuple[Body, ...]
     handling: float  # share of a transport's time for grasping a part; setting it down takes as long
 
-    def way(self, start: "Stop", end: "Stop") -> FloatArray:
+    def way(self, start: "CarrierStop", end: "CarrierStop") -> FloatArray:
         """The points (n, 4) of its hand: the share of the time, 0 to 1, and x, y, z [m]."""
 
     def poses(self, hands: FloatArray) -> dict[str, FloatArray]:
@@ -157,10 +157,10 @@ class Carrier(Protocol):
 
 
 @dataclass(frozen=True)
-class Stop:
+class CarrierStop:
     """A stop of a carrier: the station, and the point of its hand, the middle of a part [m]."""
 
-    spot: Spot
+    spot: FloorSpot
     hand: Vector
 
 
@@ -179,12 +179,12 @@ class Vehicle:
         label = Shape("label", (0.11,), None, INK, (0.0, -0.28, 0.02), text=name)
         self.bodies: tuple[Body, ...] = (Body(self.name, (deck, *wheels, label)),)
 
-    def dock(self, spot: Spot) -> Vector:
+    def dock(self, spot: FloorSpot) -> Vector:
         """The middle [m] of a part on the vehicle when it stands in front of a station."""
         front = -spot.edges[1] / 2 - 0.28
         return spot.at(self._aside, front, CARRIER_M + PART_M / 2)
 
-    def way(self, start: Stop, end: Stop) -> FloatArray:
+    def way(self, start: CarrierStop, end: CarrierStop) -> FloatArray:
         """The path along the aisle, across between two stations, and along the other aisle; see `Carrier.way`."""
         one, other = np.array(self.dock(start.spot)), np.array(self.dock(end.spot))
         points = [one, other]
@@ -200,12 +200,12 @@ class Vehicle:
         return {self.name: poses}
 
 
-class Arm:
+class PlanarArm:
     """An arm in the middle of the floor: two links that turn in a plane, and a tool that moves up and down."""
 
     handling = 0.0
 
-    def __init__(self, name: str, spots: Sequence[Spot]) -> None:
+    def __init__(self, name: str, spots: Sequence[FloorSpot]) -> None:
         reach = max((hypot(spot.x, spot.y) + 0.3 for spot in spots), default=1.0)
         self._link = max(0.55 * reach, 0.4)
         link, high = self._link, HAND_M
@@ -229,7 +229,7 @@ class Arm:
             Body("tool", tuple(tool)),
         )
 
-    def way(self, start: Stop, end: Stop) -> FloatArray:
+    def way(self, start: CarrierStop, end: CarrierStop) -> FloatArray:
         """The path up, around the middle, and down; see `Carrier.way`."""
         share = np.linspace(0.0, 1.0, 25)
         over = np.clip((share - 0.12) / 0.76, 0.0, 1.0)

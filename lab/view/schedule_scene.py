@@ -17,9 +17,20 @@ from lab.tasks.schedule_table import ScheduleTable, TimedRow
 from lab.view.camera_placement import camera_for
 from lab.view.canvas import seconds
 from lab.view.gantt_bars import PRODUCTS, mixed
-from lab.view.keyframes import Motion, Track, continuous
+from lab.view.keyframes import BodyMotion, KeyframeTrack, continuous
 from lab.view.scene_data import Story
-from lab.view.schedule_floor import IDLE, INK, PART_M, WORKS, Arm, Carrier, Spot, Stop, Vehicle, laid_out
+from lab.view.schedule_floor import (
+    IDLE,
+    INK,
+    PART_M,
+    WORKS,
+    Carrier,
+    CarrierStop,
+    FloorSpot,
+    PlanarArm,
+    Vehicle,
+    laid_out,
+)
 
 START, FINISHED = (
     "start",
@@ -35,12 +46,12 @@ _CLOSE_S = 1e-9
 Keys = list[tuple[float, Vector]]
 
 
-class Scene(NamedTuple):
+class ScheduleScene(NamedTuple):
     """The arguments of `replay_html`: bodies, their motions, the story beside them, and the initial speed."""
 
     title: str
     recording: Recording
-    tracks: dict[str, Motion]
+    tracks: dict[str, BodyMotion]
     story: Story
     speed: float
 
@@ -68,7 +79,7 @@ class _Move(NamedTuple):
     row: TimedRow | None
 
 
-def scene_of(table: ScheduleTable, name: str) -> Scene:
+def scene_of(table: ScheduleTable, name: str) -> ScheduleScene:
     """The scene of a schedule with this name."""
     rows = _whole(table.rows)
     last_s = max(row.end_s for row in rows)
@@ -88,19 +99,19 @@ def scene_of(table: ScheduleTable, name: str) -> Scene:
     for own in _by_place(stays.values()).values():
         _place(own, floor)
     carriers: dict[str, Carrier] = {
-        vehicle: Arm(vehicle, [*floor.values()])
+        vehicle: PlanarArm(vehicle, [*floor.values()])
         if around
         else Vehicle(number, vehicle, len(moves), bool(table.places_m))
         for number, vehicle in enumerate(moves)
     }
-    tracks = dict[str, Motion]()
+    tracks = dict[str, BodyMotion]()
     bodies = list[Body]()
     for number, spot in enumerate(floor.values()):
         busy = [row for row in rows if row.vehicle is None and row.origin == spot.name and row.kind != "blocked"]
         for body in spot.bodies(number):
             bodies.append(body)
             steps = _steps(busy) if body.name.startswith("lamp") else ()
-            tracks[body.name] = Motion(spot.pose, None, None, steps, ())
+            tracks[body.name] = BodyMotion(spot.pose, None, None, steps, ())
     for vehicle, carrier in carriers.items():
         bodies += carrier.bodies
         tracks |= _carrier_tracks(carrier, moves[vehicle], stays, floor)
@@ -125,7 +136,7 @@ def scene_of(table: ScheduleTable, name: str) -> Scene:
     title = f"{name}: {', '.join(counts)}, {seconds(last_s)}"
     speed = 2.0 ** max(-1, ceil(log2(max(last_s, _CLOSE_S) / WATCHED_S)))
     camera = camera_for(_seen(floor.values()), -radians(75.0 if around else 90.0), radians(50.0), wide)
-    return Scene(title, Recording(tuple(bodies), frames, camera), tracks, story, speed)
+    return ScheduleScene(title, Recording(tuple(bodies), frames, camera), tracks, story, speed)
 
 
 def _whole(rows: Sequence[TimedRow]) -> list[TimedRow]:
@@ -231,7 +242,7 @@ def _by_place(stays: Iterable[Sequence[_Stay]]) -> dict[tuple[str, bool], list[_
     return found
 
 
-def _place(stays: Sequence[_Stay], floor: Mapping[str, Spot]) -> None:
+def _place(stays: Sequence[_Stay], floor: Mapping[str, FloorSpot]) -> None:
     """Assign to each stay the first free place of its station."""
     until_s = list[float]()
     for stay in sorted(stays, key=lambda one: one.begin_s):
@@ -244,8 +255,8 @@ def _place(stays: Sequence[_Stay], floor: Mapping[str, Spot]) -> None:
 
 
 def _carrier_tracks(
-    carrier: Carrier, moves: Sequence[_Move], stays: Mapping[str, Sequence[_Stay]], floor: Mapping[str, Spot]
-) -> dict[str, Motion]:
+    carrier: Carrier, moves: Sequence[_Move], stays: Mapping[str, Sequence[_Stay]], floor: Mapping[str, FloorSpot]
+) -> dict[str, BodyMotion]:
     stops = [_stops(move, moves[k + 1 :][:1], stays, floor) for k, move in enumerate(moves)]
     times, hands = list[float](), list[FloatArray]()
     for k, (move, (start, end)) in enumerate(zip(moves, stops, strict=True)):
@@ -255,7 +266,7 @@ def _carrier_tracks(
         times += at_s.tolist()
         hands += [*way[:, 1:]]
     poses = carrier.poses(np.array(hands))
-    held = {body.name: Motion((0.0,) * 6 + (1.0,), None, None, (), ()) for body in carrier.bodies}
+    held = {body.name: BodyMotion((0.0,) * 6 + (1.0,), None, None, (), ()) for body in carrier.bodies}
     return held | {name: _motion_of(times, own[:, :3], continuous(own[:, 3:])) for name, own in poses.items()}
 
 
@@ -268,17 +279,17 @@ def _carried(
 
 
 def _stops(
-    move: _Move, following: Sequence[_Move], stays: Mapping[str, Sequence[_Stay]], floor: Mapping[str, Spot]
-) -> tuple[Stop, Stop]:
+    move: _Move, following: Sequence[_Move], stays: Mapping[str, Sequence[_Stay]], floor: Mapping[str, FloorSpot]
+) -> tuple[CarrierStop, CarrierStop]:
     """The stops between which the hand moves; an empty carrier moves to the next part, if it is there already."""
     if move.row is not None:
         before, after = _around(move.row, stays)
-        return Stop(floor[before.station], before.at), Stop(floor[after.station], after.at)
+        return CarrierStop(floor[before.station], before.at), CarrierStop(floor[after.station], after.at)
     start, end = floor[move.origin], floor[move.target]
     hand = end.place(0, True)
     if following and following[0].row is not None and following[0].origin == move.target:
         hand = _around(following[0].row, stays)[0].at
-    return Stop(start, start.place(0, True)), Stop(end, hand)
+    return CarrierStop(start, start.place(0, True)), CarrierStop(end, hand)
 
 
 def _around(row: TimedRow, stays: Mapping[str, Sequence[_Stay]]) -> tuple[_Stay, _Stay]:
@@ -288,7 +299,7 @@ def _around(row: TimedRow, stays: Mapping[str, Sequence[_Stay]]) -> tuple[_Stay,
     return own[number - 1], own[number]
 
 
-def _part_keys(stays: Sequence[_Stay], carriers: Mapping[str, Carrier], floor: Mapping[str, Spot]) -> Keys:
+def _part_keys(stays: Sequence[_Stay], carriers: Mapping[str, Carrier], floor: Mapping[str, FloorSpot]) -> Keys:
     """The positions of a part by time."""
     keys: Keys = [(0.0, stays[0].at)]
     for before, after in pairwise(stays):
@@ -296,7 +307,9 @@ def _part_keys(stays: Sequence[_Stay], carriers: Mapping[str, Carrier], floor: M
         keys.append((begin_s, before.at))
         if after.by is not None:
             carrier = carriers[after.by.vehicle or ""]
-            way = carrier.way(Stop(floor[before.station], before.at), Stop(floor[after.station], after.at))
+            way = carrier.way(
+                CarrierStop(floor[before.station], before.at), CarrierStop(floor[after.station], after.at)
+            )
             times, points = _carried(carrier, begin_s, end_s, way, True)
             keys += [(at_s, (x, y, z)) for at_s, (x, y, z) in zip(times.tolist(), points.tolist(), strict=True)]
         elif before.station != after.station:
@@ -309,19 +322,21 @@ def _part_keys(stays: Sequence[_Stay], carriers: Mapping[str, Carrier], floor: M
     return keys
 
 
-def _motion(keys: Keys) -> Motion:
+def _motion(keys: Keys) -> BodyMotion:
     places = np.array([at for _, at in keys])
     return _motion_of([at_s for at_s, _ in keys], places, np.tile([0.0, 0.0, 0.0, 1.0], (len(keys), 1)))
 
 
-def _motion_of(times: Sequence[float], places: FloatArray, turns: FloatArray) -> Motion:
+def _motion_of(times: Sequence[float], places: FloatArray, turns: FloatArray) -> BodyMotion:
     """The motion through these points; of times that a page cannot distinguish, the last one counts."""
     at_s = np.asarray(times, dtype=np.float32).astype(np.float64)
     last = np.append(np.diff(at_s) > 0, True)
     at_s, places, turns = at_s[last], places[last], turns[last]
     moves, turned = np.ptp(places, axis=0).max() > 0, np.ptp(turns, axis=0).max() > 0
     start = (*places[0].tolist(), *turns[0].tolist())
-    return Motion(start, Track(at_s, places) if moves else None, Track(at_s, turns) if turned else None, (), ())
+    return BodyMotion(
+        start, KeyframeTrack(at_s, places) if moves else None, KeyframeTrack(at_s, turns) if turned else None, (), ()
+    )
 
 
 def _steps(rows: Sequence[TimedRow]) -> tuple[tuple[float, Rgba], ...]:
@@ -378,7 +393,7 @@ def _captions(rows: Sequence[TimedRow]) -> Iterable[tuple[float, str]]:
         yield at_s, f"{'; '.join(words[:3])}{more}"
 
 
-def _seen(spots: Iterable[Spot]) -> FloatArray:
+def _seen(spots: Iterable[FloorSpot]) -> FloatArray:
     """The points (n, 3) [m] that the picture must contain: stations, their names, and vehicles in front of them."""
     ends = [(spot, spot.edges[0] / 2 + 0.1) for spot in spots]
     return np.array(

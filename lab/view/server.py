@@ -26,7 +26,16 @@ from uvicorn import Server as Uvicorn
 
 from lab.errors import BadInput, WorkFailed
 from lab.operating_system import keep_port
-from lab.view.server_page import BACKLOG, PAUSE_S, LimitedConnection, LimitedSocket, News, Page, Panel, quiet_when_full
+from lab.view.server_page import (
+    BACKLOG,
+    PAUSE_S,
+    LimitedConnection,
+    LimitedSocket,
+    News,
+    PageQueue,
+    ScenePanel,
+    quiet_when_full,
+)
 
 ADDRESS = "127.0.0.1"
 HOSTS = ("127.0.0.1", "localhost")  # also through a forwarded port; requests to other host names are rejected
@@ -59,12 +68,12 @@ class Server:
     Raises BadInput for a port that is taken or not allowed.
     """
 
-    def __init__(self, port: int, files: Mapping[str, File], token: str, panel: Panel | None = None) -> None:
+    def __init__(self, port: int, files: Mapping[str, File], token: str, panel: ScenePanel | None = None) -> None:
         self._socket = _listen(port)
         self.port: int = self._socket.getsockname()[1]
         self.connected = threading.Event()
         self._files, self._token, self._panel = files, token, panel
-        self._pages: set[Page] = set()
+        self._pages: set[PageQueue] = set()
         self._opened = 0
         self._known = News()
         self._thread = threading.Thread(target=lambda: asyncio.run(self._serve()), name="live view", daemon=True)
@@ -178,7 +187,7 @@ class Server:
             return
         await socket.accept()
         self._opened += 1
-        page = Page(self._opened, socket, self._panel)
+        page = PageQueue(self._opened, socket, self._panel)
         page.offer(self._known)
         if self._panel is not None:
             self._panel.joined(page.number)
@@ -197,7 +206,7 @@ class Server:
                 self._panel.left(page.number)
                 self._wake()
 
-    async def _hear(self, page: "Page") -> None:
+    async def _hear(self, page: "PageQueue") -> None:
         while True:
             heard = await page.socket.receive()
             if heard["type"] == "websocket.disconnect":

@@ -121,7 +121,7 @@ class News:
         return f'{scene}"frame": {json.dumps(frame)}'
 
 
-class Panel(Protocol):
+class ScenePanel(Protocol):
     """The content of a page beside the scene, and the receiver of its messages; called only in the server's thread.
 
     files: HTML that is inserted into the page, style sheets, and scripts in the order in which they run.
@@ -145,10 +145,10 @@ class Panel(Protocol):
         """The JSON members that this page has not received yet; "" for none."""
 
 
-class Page:
+class PageQueue:
     """The pending news of one page, and the task that sends them; `last`: the connection is closed after them."""
 
-    def __init__(self, number: int, socket: WebSocket, panel: Panel | None) -> None:
+    def __init__(self, number: int, socket: WebSocket, panel: ScenePanel | None) -> None:
         self.number, self.socket, self._panel = number, socket, panel
         self.wake, self.last = asyncio.Event(), False
         self.sending: asyncio.Task[None]

@@ -88,7 +88,7 @@ _ARROWS = {"left": (-1, 0), "right": (1, 0), "up": (0, -1), "down": (0, 1), "for
 _SIGNS = {"down": r"$\otimes$", "up": r"$\odot$", "turn right": "$↻$", "turn left": "$↺$"}  # where forward is up
 
 
-class Learned(NamedTuple):
+class LearnedValues(NamedTuple):
     """The drawn properties of each state (S,): value and index of its best action, whether it was visited or is terminal."""
 
     values: FloatArray
@@ -113,7 +113,7 @@ def value_levels(policy: Policy, path: Path) -> None:
         raise BadInput(f"value map of '{policy.name}': a grid with up to {MAX_CELLS} cells a level is needed")
     planes = Planes(policy.shape, is_map(policy))
     ends = policy.ends
-    learned = Learned(policy.q.max(axis=1), policy.q.argmax(axis=1), policy.visits.sum(axis=1) > 0, ends)
+    learned = LearnedValues(policy.q.max(axis=1), policy.q.argmax(axis=1), policy.visits.sum(axis=1) > 0, ends)
     start = tuple(int(i) for i in np.unravel_index(policy.start, policy.shape))
     levels = _chosen(planes, learned, planes.layer(start))
     columns = policy.shape[3] if len(policy.shape) == 4 else -(-len(levels) // -(-len(levels) // _IN_A_ROW))
@@ -138,7 +138,7 @@ def value_levels(policy: Policy, path: Path) -> None:
         figure.legend(handles=_legend(policy, learned), loc="outside lower center", ncols=4)
 
 
-def _chosen(planes: Planes, learned: Learned, first: int) -> list[int]:
+def _chosen(planes: Planes, learned: LearnedValues, first: int) -> list[int]:
     """The levels to draw, in order: that of the start, those with a goal, then the most visited ones."""
     visits = np.array([planes.plane(learned.visited, level).sum() for level in range(planes.layers)])
     goals = np.array([(planes.plane(learned.ends, level) == GOAL).any() for level in range(planes.layers)])
@@ -161,7 +161,7 @@ class Pen(NamedTuple):
     labels: tuple[str, ...]
     scale: tuple[float, float]
 
-    def draw_level(self, axes: "Axes", learned: Learned, level: int) -> "QuadMesh":
+    def draw_level(self, axes: "Axes", learned: LearnedValues, level: int) -> "QuadMesh":
         """Draw one level's colours and signs; returns the mesh of its colours."""
         values, best, visited, ends = (self.planes.plane(table, level) for table in learned)
         seen = visited & (ends == ON)
@@ -217,7 +217,7 @@ def _one_colour(colour: str) -> "ListedColormap":
     return ListedColormap([colour])
 
 
-def _legend(policy: Policy, learned: Learned) -> list["Line2D"]:
+def _legend(policy: Policy, learned: LearnedValues) -> list["Line2D"]:
     """The legend of the signs that are not plain arrows."""
     from matplotlib.lines import Line2D
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from lab.errors import BadInput
 from lab.sequencing.cell.cell import Cell
 from lab.tasks.cell_file import CellFile, order_from_word
-from lab.tasks.instances import Asked, is_instance, read_instance
+from lab.tasks.instances import InstanceRequest, is_instance, read_instance
 from lab.tasks.task_file import load_cell
 
 FOLDER = Path(__file__).with_name("instances")
@@ -72,7 +72,7 @@ def cell_file(instance: Instance) -> CellFile:
     path = shipped if shipped.is_file() else Path(instance.file)
     if path.is_file() and is_instance(path):
         layout = FOLDER / instance.layout if instance.layout else None
-        return read_instance(path, Asked(layout, instance.robots, instance.case or None))
+        return read_instance(path, InstanceRequest(layout, instance.robots, instance.case or None))
     file = load_cell(instance.file)
     if not instance.case:
         return file

@@ -14,7 +14,7 @@ from lab.advice.advisors import (
     make_advisor,
     named,
 )
-from lab.advice.entries import FILE, Session
+from lab.advice.entries import FILE, SessionEntry
 from lab.advice.journal import Journal
 from lab.advice.order_level import OrderLevel
 from lab.advice.table_level import TableLevel
@@ -179,7 +179,7 @@ def test_a_skill_needs_a_tau_above_zero(tau: float | list[float]) -> None:
 
 def recorded(folder: Path, mdp: TabularMDP, said: list[tuple[int, int | None]]) -> str:
     """A session in which this was advised, (state, action); its name as an advisor."""
-    journal = Journal.begin(folder, Session({}, "board", mdp.signature, "test"))
+    journal = Journal.begin(folder, SessionEntry({}, "board", mdp.signature, "test"))
     for step, (state, action) in enumerate(said, start=1):
         journal.tell(AdviceGiven(1, step, state, action, 0))
     journal.close()

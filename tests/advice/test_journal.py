@@ -20,7 +20,7 @@ from lab.advice.entries import (
     Answer,
     Closed,
     Entry,
-    Session,
+    SessionEntry,
     Undone,
     entry_of,
     line_of,
@@ -41,7 +41,7 @@ from lab.mdp import TabularMDP, grid
 
 LEARNER = LearnerSettings(episodes=30, max_steps=20)
 GATE = GateSettings(first_episode=4, window=2, omega=50)
-HEAD = Session({"subtask": "board"}, "board", "0123456789abcdef", "test")
+HEAD = SessionEntry({"subtask": "board"}, "board", "0123456789abcdef", "test")
 
 
 def board() -> TabularMDP:
@@ -331,7 +331,7 @@ def test_the_reader_never_fails_but_in_words(tmp_path_factory: pytest.TempPathFa
 
 
 def test_a_recording_advises_by_state_and_only_about_its_problem(tmp_path: Path) -> None:
-    head = Session(HEAD.words, "board", board().signature, "test")
+    head = SessionEntry(HEAD.words, "board", board().signature, "test")
     journal = Journal.begin(tmp_path, head)
     lesson(journal, person)
     journal.close()

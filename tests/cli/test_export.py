@@ -13,7 +13,7 @@ from lab.export.recorder import MotionRecorder
 from lab.sequencing.cell.schedule import Move
 from lab.sim.arms.arm_models import arm_of
 from lab.sim.arms.kinematics import ToolPose
-from lab.sim.arms.robot import Robot
+from lab.sim.arms.robot import RobotArm
 from lab.sim.world import World
 from lab.tasks.task_file import load
 
@@ -37,7 +37,7 @@ def carried_out(folder: Path, task_name: str) -> None:
     """A run's folder with what `lab export` needs: one way down, and the gripper closed."""
     task, high = load(task_name), ToolPose(0.5, 0.1, 0.3, 0.0)
     with World() as world:
-        robot = Robot(world, arm_of(task.robot), 0.5, 2.0, 25.0)
+        robot = RobotArm(world, arm_of(task.robot), 0.5, 2.0, 25.0)
         robot.stand(high)
         recorder = MotionRecorder(robot)
         for motion in (robot.follow([high.shifted(dz=-0.1)]), robot.grip()):

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from lab.advice.entries import FILE, Session, line_of
+from lab.advice.entries import FILE, SessionEntry, line_of
 from lab.toolbox.policy import Policy
 from lab.toolbox.registry import Toolbox
 
@@ -115,7 +115,7 @@ def test_no_escape_code_of_a_file_reaches_the_terminal(
 def keep(folder: Path, advisor: str) -> None:
     """The journal of a session that has only begun."""
     folder.mkdir(parents=True)
-    head = Session({"subtask": "maze.toml", "advisors": [advisor]}, "maze", "0a", "0.1")
+    head = SessionEntry({"subtask": "maze.toml", "advisors": [advisor]}, "maze", "0a", "0.1")
     (folder / FILE).write_text(line_of(head) + "\n", encoding="utf-8")
 
 

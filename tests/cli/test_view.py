@@ -10,12 +10,12 @@ from urllib.request import urlopen
 
 import pytest
 
-from lab.api.scenes import Asked
+from lab.api.scenes import SceneRequest
 from lab.cli.view import serve, write_page
 from lab.errors import BadInput
 
 Lab = Callable[..., Any]  # the fixture of tests/conftest.py; it returns a Ran
-ONE = Asked(1, None, 0)
+ONE = SceneRequest(1, None, 0)
 
 
 def looked_at(what: str) -> tuple[str, str]:
@@ -51,7 +51,7 @@ def test_what_is_neither_a_task_nor_a_run(tmp_path: Path) -> None:
     with pytest.raises(BadInput, match=r"holds no replay.html: give the folder of a run"):
         serve(str(tmp_path), ONE, 0, lambda url, hint: None)
     with pytest.raises(BadInput, match=r"^51 toasts"):
-        serve("toast", Asked(51, None, 0), 0, lambda url, hint: None)
+        serve("toast", SceneRequest(51, None, 0), 0, lambda url, hint: None)
 
 
 def data(file: str) -> Any:
@@ -105,8 +105,8 @@ def test_a_page_that_cannot_be_written(tmp_path: Path, lab: Lab) -> None:
 
 
 def test_the_scene_of_a_task_holds_the_parts_that_are_asked_for() -> None:
-    from lab.api.scenes import Asked, seen
+    from lab.api.scenes import SceneRequest, seen
 
-    with seen("breakfast", Asked(None, "slice=1,cup=1", 0)) as (title, recording):
+    with seen("breakfast", SceneRequest(None, "slice=1,cup=1", 0)) as (title, recording):
         parts = {body.name for body in recording.bodies if body.name.startswith(("slice", "cup"))}
     assert (title, parts) == ("Two toasts and a cup of coffee to a tray", {"slice 1", "cup 2"})

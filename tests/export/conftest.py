@@ -12,7 +12,7 @@ from lab.export.recorder import MotionRecorder
 from lab.sequencing.cell.schedule import Move
 from lab.sim.arms.arm_models import arm_of
 from lab.sim.arms.kinematics import ToolPose
-from lab.sim.arms.robot import Robot
+from lab.sim.arms.robot import RobotArm
 from lab.sim.parts.holding import USUAL_N
 from lab.sim.world import World
 from lab.tasks.task_file import load
@@ -32,7 +32,7 @@ def carried_out(arm: str = "up6") -> Program:
     task = load(ARMS[arm])
     with World() as world:
         settings = task.robot
-        robot = Robot(
+        robot = RobotArm(
             world, arm_of(settings), settings.speed_m_s, settings.acceleration_m_s2, settings.grip_force_n or USUAL_N
         )
         assert robot.stand(HIGH)

@@ -13,8 +13,8 @@ from lab.export.commands import (
     WITHIN_M,
     Await,
     Check,
-    Grip,
-    Joint,
+    GripperOutput,
+    JointMove,
     Path,
     Pause,
     Payload,
@@ -68,11 +68,11 @@ def test_straight_pieces_keep_to_any_way_and_turn_the_short_way_round(corners: n
 
 def test_two_transfers_become_two_jobs(up6: Program) -> None:
     first, second = jobs_of(up6)
-    grips, lets_go = [Grip, Pause, Check, Payload], [Grip, Pause, Payload]
-    assert [type(command) for command in first.commands] == [Joint, Path, *grips, Path, *lets_go, Start]
+    grips, lets_go = [GripperOutput, Pause, Check, Payload], [GripperOutput, Pause, Payload]
+    assert [type(command) for command in first.commands] == [JointMove, Path, *grips, Path, *lets_go, Start]
     assert first.commands[-1] == Start(1, "toaster")
-    assert [type(command) for command in second.commands] == [Joint, Path, Await, Pause, Path, Pause, Start]
-    assert [command.closed for command in first.commands if isinstance(command, Grip)] == [True, False]
+    assert [type(command) for command in second.commands] == [JointMove, Path, Await, Pause, Path, Pause, Start]
+    assert [command.closed for command in first.commands if isinstance(command, GripperOutput)] == [True, False]
     assert second.commands[2] == Await(1, "toaster")
     assert [command.mass_kg for command in first.commands if isinstance(command, Payload)] == [0.04, 0.0]
     assert [command.seconds for command in second.commands if isinstance(command, Pause)] == pytest.approx([1.0, 0.25])
@@ -81,7 +81,7 @@ def test_two_transfers_become_two_jobs(up6: Program) -> None:
 def test_a_job_begins_where_the_arm_is_and_a_way_ends_where_it_was_to(up6: Program) -> None:
     first, _ = jobs_of(up6)
     start, down = first.commands[:2]
-    assert isinstance(start, Joint)
+    assert isinstance(start, JointMove)
     assert isinstance(down, Path)
     assert start.joints == pytest.approx(tuple(up6.joints[0]))
     assert down.points == pytest.approx(np.array([[0.5, 0.1, 0.15, 0.0]]), abs=1e-3)
@@ -97,7 +97,7 @@ def test_motions_that_lead_nowhere_are_left_out(up6: Program) -> None:
     cut = Program(up6.carried.model_copy(update={"actions": actions}), *_arrays(up6))
     assert [sum(len(job.ways) for job in jobs_of(one)) for one in (up6, cut)] == [len(motions), len(motions) - 1]
     words = [type(command) for command in jobs_of(cut)[0].commands]
-    assert words == [Grip, Pause, Check, Payload, Joint, Path, Grip, Pause, Payload, Start]
+    assert words == [GripperOutput, Pause, Check, Payload, JointMove, Path, GripperOutput, Pause, Payload, Start]
 
 
 def test_a_corner_is_one_pose_with_its_rounding(up6: Program) -> None:
@@ -170,7 +170,7 @@ def test_a_machine_is_reset_once_its_part_is_out(up6: Program) -> None:
     carried = up6.carried.model_copy(update={"actions": tuple(actions), "transfers": (first, second)})
     job = jobs_of(Program(carried, *_arrays(up6)))[1]
     words = [type(command) for command in job.commands]
-    assert words == [Joint, Path, Await, Pause, Grip, Pause, Check, Payload, Path, Reset, Pause, Start]
+    assert words == [JointMove, Path, Await, Pause, GripperOutput, Pause, Check, Payload, Path, Reset, Pause, Start]
     assert job.commands[9] == Reset(1, "toaster")
 
 

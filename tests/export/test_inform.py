@@ -13,12 +13,12 @@ from lab.export.inform import (
     Comment,
     Dout,
     InformJob,
+    InformPosition,
+    InformWait,
     Instruction,
     MoveJ,
     MoveL,
-    Position,
     Timer,
-    Wait,
     read_job,
 )
 
@@ -27,14 +27,14 @@ JOB = InformJob(
     "slice 1: plate to toaster",
     "2026/11/22 21:00",
     (
-        Position((500.0, -100.0, 300.0, 180.0, 0.0, 90.0), (0, 0, 0, 0, 0, 0, 0, 0)),
-        Position((500.0, -100.0, 150.5, 180.0, 0.0, 90.0), (0, 0, 0, 0, 0, 0, 0, 0)),
-        Position((500.0, -100.0, 300.0, 180.0, 0.0, 90.0), (0, 0, 0, 0, 1, 0, 0, 0)),
+        InformPosition((500.0, -100.0, 300.0, 180.0, 0.0, 90.0), (0, 0, 0, 0, 0, 0, 0, 0)),
+        InformPosition((500.0, -100.0, 150.5, 180.0, 0.0, 90.0), (0, 0, 0, 0, 0, 0, 0, 0)),
+        InformPosition((500.0, -100.0, 300.0, 180.0, 0.0, 90.0), (0, 0, 0, 0, 1, 0, 0, 0)),
     ),
     (
         MoveJ(0, 10.0),
         Comment("toaster done"),
-        Wait(1),
+        InformWait(1),
         MoveL(1, "V", 250.0, 0),
         Call("CLOSE"),
         Timer(0.5),
@@ -88,7 +88,7 @@ def test_the_thesiss_own_job_is_read() -> None:
     text += "C00002=-32661,-208,4629,-1195,-1475,8985\n//INST\n///DATE 2055/03/01 22:24\n///ATTR SC,RW\n///GROUP1 RB1\n"
     text += "NOP\nMOVJ C00000 VJ=10.00\nMOVJ C00001 VJ=10.00\nCALL JOB:CLOSE\nTIMER T=1.00\nMOVJ C00002 VJ=10.00\nEND\n"
     job = read_job(text, "POLICY1.JBI")
-    assert job.positions[1] == Position((-32661.0, -2931.0, -11835.0, -1207.0, 6782.0, 9085.0))
+    assert job.positions[1] == InformPosition((-32661.0, -2931.0, -11835.0, -1207.0, 6782.0, 9085.0))
     assert job.instructions == (MoveJ(0, 10.0), MoveJ(1, 10.0), Call("CLOSE"), Timer(1.0), MoveJ(2, 10.0))
     assert job.text() == text.replace("\n", "\r\n")
 
@@ -101,8 +101,8 @@ def scaled(digits: int, most: int) -> st.SearchStrategy[float]:
 names = st.from_regex(r"[A-Z0-9][A-Z0-9_-]{0,7}", fullmatch=True)
 words = st.text(st.characters(min_codepoint=32, max_codepoint=126), max_size=32).map(str.strip)
 bits = st.tuples(*[st.integers(0, 1)] * 8)
-rectangular = st.builds(Position, st.tuples(*[scaled(3, 5000)] * 3, *[scaled(2, 180)] * 3), bits)
-pulses = st.builds(Position, st.tuples(*[st.integers(-999_999, 999_999).map(float)] * 6))
+rectangular = st.builds(InformPosition, st.tuples(*[scaled(3, 5000)] * 3, *[scaled(2, 180)] * 3), bits)
+pulses = st.builds(InformPosition, st.tuples(*[st.integers(-999_999, 999_999).map(float)] * 6))
 
 
 @st.composite
@@ -111,7 +111,7 @@ def jobs(draw: Any) -> InformJob:
     number, positive = st.integers(0, 9999), scaled(2, 600).map(abs)
     kinds: list[st.SearchStrategy[Instruction]] = [
         st.builds(Dout, number, st.booleans()),
-        st.builds(Wait, number),
+        st.builds(InformWait, number),
         st.builds(Timer, positive),
         st.builds(Call, names),
         st.builds(Comment, words),

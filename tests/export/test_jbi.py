@@ -11,19 +11,19 @@ from hypothesis import strategies as st
 
 from lab.errors import BadInput
 from lab.export import jbi
-from lab.export.commands import Await, Grip, Job, Joint, Path, Pause, jobs_of
+from lab.export.commands import Await, GripperOutput, JointMove, Path, Pause, TransferJob, jobs_of
 from lab.export.inform import (
     Call,
     Comment,
     Dout,
     InformJob,
+    InformPosition,
+    InformWait,
     MoveJ,
     MoveL,
     PauseIfOff,
-    Position,
     Pulse,
     Timer,
-    Wait,
     read_job,
 )
 from lab.export.program import Options, Program
@@ -60,7 +60,7 @@ def test_the_grip_and_the_way_down_by_hand(up6: Program) -> None:
     assert job.instructions[2:5] == (Call("CLOSE"), PauseIfOff(1), Comment("TOOL 1: 0.040 KG"))
     assert {position.tool for position in job.positions[:2]} == {0}
     assert {position.tool for position in job.positions[2:]} == {1}
-    start = (Comment("start toaster"), Pulse(2, 0.5), Wait(2, on=False))
+    start = (Comment("start toaster"), Pulse(2, 0.5), InformWait(2, on=False))
     assert job.instructions[-5:] == (Call("OPEN"), Comment("TOOL 0: 0.000 KG"), *start)
 
 
@@ -68,9 +68,14 @@ def test_a_wait_comes_before_what_is_done_at_the_machine_and_a_turn_is_timed_in_
     """A quarter turn; the wait; a rest of 1 s that stands for it in the run; another quarter turn; a rest of 0.25 s."""
     job = read_back(jbi.write(up6, Options()))["M002.JBI"]
     moves = [step for step in job.instructions if isinstance(step, MoveL)]
-    at = job.instructions.index(Wait(2))
-    assert job.instructions[at - 1 : at + 2] == (Comment("toaster done"), Wait(2), Timer(1.0))
-    assert job.instructions[-4:] == (Timer(0.25), Comment("start butter_applier"), Pulse(4, 0.5), Wait(3, on=False))
+    at = job.instructions.index(InformWait(2))
+    assert job.instructions[at - 1 : at + 2] == (Comment("toaster done"), InformWait(2), Timer(1.0))
+    assert job.instructions[-4:] == (
+        Timer(0.25),
+        Comment("start butter_applier"),
+        Pulse(4, 0.5),
+        InformWait(3, on=False),
+    )
     assert [(move.unit, move.level) for move in moves[-1:]] == [("VR", 0)]
     assert job.positions[moves[-1].c].numbers[5] == pytest.approx(-180.0, abs=0.02)
 
@@ -85,18 +90,18 @@ def test_a_way_comes_back_within_what_is_written(begin: ToolPose, end: ToolPose,
     turn = (end.yaw - begin.yaw + pi / 2) % pi - pi / 2
     points = np.array([[end.x, end.y, end.z, begin.yaw + turn]])
     commands = (
-        Joint(tuple(joints.tolist())),
+        JointMove(tuple(joints.tolist())),
         Path(points, np.zeros(1), np.full(1, speed)),
-        Grip(True),
+        GripperOutput(True),
         Pause(0.3),
         Await(2, "mill"),
     )
     options = Options("pulse" if positions == "pulse" else "rectan", DATE)
     close = InformJob("CLOSE", "", DATE, (), (Dout(1, True), Timer(0.3)))
-    job = jbi._Writer(UP6, options).job("M001", Job("one", commands))
+    job = jbi._Writer(UP6, options).job("M001", TransferJob("one", commands))
     start, way, *rest = jbi.read({"a": job.text(), "b": close.text()}, UP6)
-    assert rest == [Grip(True), Pause(0.3), Await(2)]
-    assert isinstance(start, Joint)
+    assert rest == [GripperOutput(True), Pause(0.3), Await(2)]
+    assert isinstance(start, JointMove)
     assert isinstance(way, Path)
     there = UP6.forward(np.array(start.joints))
     assert (there.x, there.y, there.z) == pytest.approx((begin.x, begin.y, begin.z), abs=2e-5)
@@ -113,10 +118,12 @@ def test_a_tool_that_is_wound_up_stays_so() -> None:
     assert joints is not None
     for turn in (-160.0, 200.0, -200.0, 160.0):
         joints[-1] = np.radians(turn)
-        written = jbi._Writer(UP6, Options(date=DATE)).job("M001", Job("", (Joint(tuple(joints.tolist())),)))
+        written = jbi._Writer(UP6, Options(date=DATE)).job(
+            "M001", TransferJob("", (JointMove(tuple(joints.tolist())),))
+        )
         assert written.positions[0].configuration == (0, 0, 0, 0, int(abs(turn) > 180), 0, 0, 0)
         (read,) = jbi.read({"a": written.text()}, UP6)
-        assert isinstance(read, Joint)
+        assert isinstance(read, JointMove)
         assert read.joints == pytest.approx(joints, abs=2e-4)
 
 
@@ -134,14 +141,14 @@ def test_arms_of_other_makers_are_refused_unless_any_will_do() -> None:
     assert jbi.write(panda, Options(any_arm=True))
 
 
-def job_of(name: str, *steps: object, positions: tuple[Position, ...] = ()) -> str:
+def job_of(name: str, *steps: object, positions: tuple[InformPosition, ...] = ()) -> str:
     return InformJob(name, "", DATE, positions, steps).text()  # type: ignore[arg-type]
 
 
 FLAT = (0, 0, 0, 0, 0, 0, 0, 0)
-NEAR = Position((500.0, 0.0, 300.0, 180.0, 0.0, 0.0), FLAT)
-FAR = Position((5000.0, 0.0, 300.0, 180.0, 0.0, 0.0), FLAT)
-LEANING = Position((500.0, 0.0, 300.0, 170.0, 0.0, 0.0), FLAT)
+NEAR = InformPosition((500.0, 0.0, 300.0, 180.0, 0.0, 0.0), FLAT)
+FAR = InformPosition((5000.0, 0.0, 300.0, 180.0, 0.0, 0.0), FLAT)
+LEANING = InformPosition((500.0, 0.0, 300.0, 170.0, 0.0, 0.0), FLAT)
 WRONG = [
     ([job_of("A", Call("B"))], "job 'B' is called, but is in none of the files"),
     ([job_of("A"), job_of("B")], "wanted one job that no other calls, found A, B"),

@@ -8,7 +8,7 @@ import pytest
 from lab.errors import BadInput
 from lab.export import jbi, trajectory_csv
 from lab.export.commands import Path
-from lab.export.inform import Position, read_job
+from lab.export.inform import InformPosition, read_job
 from lab.export.play import apart, deviation
 from lab.export.program import Options, Program
 
@@ -47,7 +47,7 @@ def moved(files: dict[str, str], name: str, at: int, mm: float) -> dict[str, str
     job = read_job(files[name], name)
     x, y, z, *turn = job.positions[at].numbers
     positions = [*job.positions]
-    positions[at] = Position((x, y, z + mm, *turn), job.positions[at].configuration)
+    positions[at] = InformPosition((x, y, z + mm, *turn), job.positions[at].configuration)
     changed = type(job)(job.name, job.comment, job.date, tuple(positions), job.instructions)
     return files | {name: changed.text()}
 
@@ -65,7 +65,7 @@ def test_a_turn_that_is_2_degrees_off_is_found_out(up6: Program) -> None:
     job = read_job(files["M002.JBI"], "M002.JBI")
     *place, turn = job.positions[-1].numbers
     wrong = type(job)(
-        job.name, "", job.date, (*job.positions[:-1], Position((*place, turn + 2.0), (0,) * 8)), job.instructions
+        job.name, "", job.date, (*job.positions[:-1], InformPosition((*place, turn + 2.0), (0,) * 8)), job.instructions
     )
     off = deviation(up6, jbi.read(files | {"M002.JBI": wrong.text()}, up6.arm))
     assert off.at_rest_rad == pytest.approx(radians(2.0), abs=radians(0.1))

@@ -8,11 +8,11 @@ import pytest
 
 from lab.export import FORMATS
 from lab.export.play import deviation
-from lab.export.program import Motion, Options, Press, Program, Rest
+from lab.export.program import ArmRest, Motion, Options, Press, Program
 from lab.export.recorder import SEEN_EVERY, MotionRecorder, tips
 from lab.sim.arms.arm_models import arm_named
 from lab.sim.arms.kinematics import ToolPose
-from lab.sim.arms.robot import GRIP_STEPS, Robot
+from lab.sim.arms.robot import GRIP_STEPS, RobotArm
 from lab.sim.world import TIME_STEP, World
 from lab.tasks.task_file import load
 
@@ -21,14 +21,14 @@ HIGH = ToolPose(0.5, 0.1, 0.3, 0.0)
 
 
 @pytest.fixture
-def robot() -> Iterator[Robot]:
+def robot() -> Iterator[RobotArm]:
     with World() as world:
-        robot = Robot(world, UP6, 0.5, 2.0, 25.0)
+        robot = RobotArm(world, UP6, 0.5, 2.0, 25.0)
         robot.stand(HIGH)
         yield robot
 
 
-def run(robot: Robot, motion: Iterable[None]) -> int:
+def run(robot: RobotArm, motion: Iterable[None]) -> int:
     steps = 0
     for _ in motion:
         robot.world.step()
@@ -40,7 +40,7 @@ def written(recorder: MotionRecorder) -> Program:
     return recorder.program(load("toast"), 0, [], "slice {}".format)
 
 
-def test_every_target_is_written_down_with_when_it_is_reached(robot: Robot) -> None:
+def test_every_target_is_written_down_with_when_it_is_reached(robot: RobotArm) -> None:
     recorder = MotionRecorder(robot)
     low = HIGH.shifted(dz=-0.1)
     steps = run(robot, robot.follow([low]))
@@ -55,7 +55,7 @@ def test_every_target_is_written_down_with_when_it_is_reached(robot: Robot) -> N
     assert not program.closed.any()
 
 
-def test_the_tool_is_seen_on_its_way_and_when_it_is_at_rest(robot: Robot) -> None:
+def test_the_tool_is_seen_on_its_way_and_when_it_is_at_rest(robot: RobotArm) -> None:
     recorder = MotionRecorder(robot)
     run(robot, robot.follow([HIGH.shifted(dy=-0.2)]))
     program, tool = written(recorder), robot.tool()
@@ -75,7 +75,7 @@ def test_tips_stand_where_the_tip_is_in_its_link() -> None:
     )
 
 
-def test_the_gripper_and_rests_are_written_down_with_their_times(robot: Robot) -> None:
+def test_the_gripper_and_rests_are_written_down_with_their_times(robot: RobotArm) -> None:
     recorder = MotionRecorder(robot)
     run(robot, robot.grip())
     run(robot, robot.rest(24))
@@ -83,14 +83,14 @@ def test_the_gripper_and_rests_are_written_down_with_their_times(robot: Robot) -
     program = written(recorder)
     grip, rest, motion = program.carried.actions
     assert grip == Press(at_s=0.0, closed=True)
-    assert rest == Rest(at_s=GRIP_STEPS * TIME_STEP, seconds=24 * TIME_STEP)
+    assert rest == ArmRest(at_s=GRIP_STEPS * TIME_STEP, seconds=24 * TIME_STEP)
     assert isinstance(motion, Motion)
     assert motion.at_s == pytest.approx((GRIP_STEPS + 24) * TIME_STEP)
     assert program.closed.all()
 
 
 @pytest.mark.parametrize("after", ["a motion", "a grip", "nothing"])
-def test_a_motion_that_is_broken_off_is_written_down_as_far_as_it_came(robot: Robot, after: str) -> None:
+def test_a_motion_that_is_broken_off_is_written_down_as_far_as_it_came(robot: RobotArm, after: str) -> None:
     """As by an emergency stop: 30 steps of a motion, then the arm stays, and goes on with something else, or not."""
     recorder = MotionRecorder(robot)
     run(robot, islice(robot.follow([HIGH.shifted(dy=-0.3)]), 30))
@@ -113,7 +113,7 @@ def test_a_motion_that_is_broken_off_is_written_down_as_far_as_it_came(robot: Ro
     assert [one.complete for one in written(recorder).motions[1:]] == [True] * (after == "a motion")
 
 
-def test_a_target_that_is_set_in_the_very_step_of_a_stop_is_none(robot: Robot) -> None:
+def test_a_target_that_is_set_in_the_very_step_of_a_stop_is_none(robot: RobotArm) -> None:
     recorder = MotionRecorder(robot)
     motion = robot.follow([HIGH.shifted(dy=-0.3)])
     run(robot, islice(motion, 30))
@@ -127,7 +127,7 @@ def test_a_target_that_is_set_in_the_very_step_of_a_stop_is_none(robot: Robot) -
 
 
 @pytest.mark.parametrize("name", FORMATS)
-def test_a_run_that_was_stopped_is_exported_with_its_stop(robot: Robot, name: str) -> None:
+def test_a_run_that_was_stopped_is_exported_with_its_stop(robot: RobotArm, name: str) -> None:
     """An emergency stop at full speed; the arm stays for a while, and goes on to somewhere else."""
     recorder = MotionRecorder(robot)
     run(robot, islice(robot.follow([HIGH.shifted(dy=-0.4)]), 120))
@@ -141,7 +141,7 @@ def test_a_run_that_was_stopped_is_exported_with_its_stop(robot: Robot, name: st
     assert (off.motions, off.near_enough) == (ways, True), off
 
 
-def test_a_motion_that_was_never_driven_is_none(robot: Robot) -> None:
+def test_a_motion_that_was_never_driven_is_none(robot: RobotArm) -> None:
     recorder = MotionRecorder(robot)
     motion = robot.follow([HIGH.shifted(dy=-0.3)])
     del motion
@@ -152,7 +152,7 @@ def test_writing_down_changes_nothing() -> None:
     joints = []
     for heard in (False, True):
         with World() as world:
-            robot = Robot(world, UP6, 0.5, 2.0, 25.0)
+            robot = RobotArm(world, UP6, 0.5, 2.0, 25.0)
             robot.stand(HIGH)
             if heard:
                 MotionRecorder(robot)

@@ -8,7 +8,7 @@ import pytest
 
 from lab.errors import BadInput
 from lab.export import urscript
-from lab.export.commands import Await, Grip, Joint, Path, Pause, Payload
+from lab.export.commands import Await, GripperOutput, JointMove, Path, Pause, Payload
 from lab.export.program import Options, Program
 from lab.sim.arms.arm_models import arm_named
 from lab.sim.arms.kinematics import ToolPose
@@ -34,8 +34,8 @@ run_toast()
 
 def test_a_program_by_hand_is_understood() -> None:
     start, way, *rest = urscript.read({"a": TEXT}, UP6)
-    assert rest == [Grip(True), Pause(0.3), Payload(0.1), Await(2)]
-    assert isinstance(start, Joint)
+    assert rest == [GripperOutput(True), Pause(0.3), Payload(0.1), Await(2)]
+    assert isinstance(start, JointMove)
     assert start.joints == pytest.approx(UP6.inverse(ToolPose(0.5, 0.1, 0.3, 0.0)), abs=1e-5)
     assert isinstance(way, Path)
     assert way.points == pytest.approx(np.array([[0.5, 0.1, 0.15, 0.0], [0.5, 0.1, 0.15, pi / 2]]), abs=1e-5)
@@ -49,8 +49,8 @@ def test_joints_may_stand_for_the_pose_where_a_way_begins() -> None:
     listed = f"[{', '.join(f'{joint:.6f}' for joint in joints)}]"
     text = re.sub(r"movej\(p\[.*?\]", f"movej({listed}", TEXT)
     by_pose, by_joints = (urscript.read({"a": one}, UP6)[0] for one in (TEXT, text))
-    assert isinstance(by_pose, Joint)
-    assert isinstance(by_joints, Joint)
+    assert isinstance(by_pose, JointMove)
+    assert isinstance(by_joints, JointMove)
     assert by_joints.joints == pytest.approx(by_pose.joints, abs=1e-5)
 
 

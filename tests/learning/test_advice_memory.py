@@ -36,7 +36,7 @@ def fresh() -> Memory:
 def goes(kept: Memory, state: int, entered: int, source: int, action: int | None = None) -> None:
     """A move by the action of the entered state's number, or by another."""
     number = state * STATES + (entered if action is None else action)
-    memory.moved(kept, memory.Move(number, source, entered, entered >= GOAL, entered == GOAL))
+    memory.moved(kept, memory.RememberedMove(number, source, entered, entered >= GOAL, entered == GOAL))
 
 
 def walk(kept: Memory, episode: int, moves: list[tuple[int, int]], gate: bool = True) -> bool:

@@ -12,7 +12,7 @@ from lab.production.composer import Conditions, Production, carry_out
 from lab.production.controls import RESET_FIRST
 from lab.production.durations import Durations, cell_of, measure
 from lab.production.floor import AT_REST_STEPS, SKIPPED_STEPS, Floor, Hooks
-from lab.production.machine import Work
+from lab.production.machine import MachineWork
 from lab.production.outcome import Outcome
 from lab.production.parts_in_machines import watch_machines
 from lab.production.run_state import RunState
@@ -353,7 +353,7 @@ def test_a_slice_set_down_beside_its_spot_on_the_last_plate_is_taken_up_again_an
     assert floor.bench.stands("slice 1", ground.state.spot_of["slice 1"], 0.012)
 
 
-def at_butter(ground: Ground, surveys: Surveys) -> Work:
+def at_butter(ground: Ground, surveys: Surveys) -> MachineWork:
     """Slice 1 and the robot are at the butter applier, which begins with it."""
     floor, state = ground.floor, ground.state
     for decision in (1, 1):  # plate to toaster, toaster to butter_applier

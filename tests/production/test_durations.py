@@ -18,13 +18,13 @@ from lab.sim.scene.places import Layout
 from lab.sim.scene.scene_check import places_of
 from lab.skills import Grasp
 from lab.skills.prepared_scene import Prepared
-from lab.skills.skillset import Carried, SkillSet
+from lab.skills.skillset import CarriedPath, SkillSet
 from lab.skills.surveys import Surveys
 from lab.tasks.task import Order, Task
 from lab.tasks.task_file import load
 from lab.toolbox.policy import Policy
 
-AB, BC = Carried("a", "b", "nut"), Carried("b", "c", "tray")
+AB, BC = CarriedPath("a", "b", "nut"), CarriedPath("b", "c", "tray")
 ALONE = (Grasp(load("toast"), "slice", "plate"),)  # a skill, whichever
 SKILLS = SkillSet(
     load("toast"),
@@ -114,7 +114,7 @@ def test_kinds_that_share_a_way_share_the_mean_of_its_parts() -> None:
     task, order = load("breakfast"), ("slice", "cup", "slice")
     skills = SkillSet.of(task, order)
     loaded = {way: 16.0 if way.kind == "cup" else 10.0 for way in skills.legs}
-    shared = Carried("plate", "tray", "slice"), Carried("plate", "tray", "cup")
+    shared = CarriedPath("plate", "tray", "slice"), CarriedPath("plate", "tray", "cup")
     cell = cell_of(
         task,
         Durations(dict.fromkeys(skills.travels, 1.0), loaded | dict(zip(shared, (10.0, 16.0), strict=True)), {}),

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from lab.errors import WorkFailed
-from lab.production import order_learning
 from lab.production.order_learning import BOUND_ALONE, UNBOUNDED, Beside, OrderLearning, bound_shares
+from lab.sequencing.methods.srl_time import srl_time
 from lab.sequencing.search import Reference, Search, SequenceResult
 from lab.tasks.task_file import load_cell
 
@@ -90,12 +90,12 @@ def test_a_session_that_finds_no_order_without_its_bound_says_so(folder: Path, m
     def nothing(*_: object, **__: object) -> SequenceResult:
         raise WorkFailed("no order")
 
-    monkeypatch.setattr(order_learning, "srl_time", nothing)
+    monkeypatch.setattr("lab.production.order_learning.srl_time", nothing)
     _, without = bound_shares(load_cell("oven.toml").cell(), "srl-time", Search(5), 0)
     assert without == Beside(UNBOUNDED, None, None)
 
 
 def test_both_draw_what_session_0_of_the_seed_draws(folder: Path) -> None:
     cell = load_cell("oven.toml").cell()
-    found = order_learning.srl_time(cell, Search(5), np.random.default_rng([7, 2, 0]), bounded=False)
+    found = srl_time(cell, Search(5), np.random.default_rng([7, 2, 0]), bounded=False)
     assert bound_shares(cell, "srl-time", Search(5), 7)[1].cost == found.cost

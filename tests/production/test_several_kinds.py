@@ -12,7 +12,7 @@ from lab.sequencing.cell.schedule import Move
 from lab.sequencing.methods.exact import optimum
 from lab.sim.frames import Recording
 from lab.skills.prepared_scene import Prepared, prepare
-from lab.skills.skillset import Carried, SkillSet
+from lab.skills.skillset import CarriedPath, SkillSet
 from lab.tasks.task_file import load
 from lab.teaching.events import Event, MoveMade
 from lab.teaching.lesson_plan import LessonPlan
@@ -29,8 +29,8 @@ def test_kinds_that_share_a_way_share_its_mean_time() -> None:
     order = task.ordered(None, "slice=1,cup=1")
     skills = SkillSet.of(task, order)
     loaded = dict.fromkeys(skills.legs, 3.0)
-    assert Carried("toaster", "tray", "slice") in loaded
-    loaded |= {Carried("toaster", "tray", "slice"): 4.0, Carried("toaster", "tray", "cup"): 6.0}
+    assert CarriedPath("toaster", "tray", "slice") in loaded
+    loaded |= {CarriedPath("toaster", "tray", "slice"): 4.0, CarriedPath("toaster", "tray", "cup"): 6.0}
     cell = cell_of(task, Durations(dict.fromkeys(skills.travels, 1.0), loaded, {}), order)
     ways = {(a, b): float(cell.loaded_s[cell.index(a), cell.index(b)]) for a, b, _ in loaded}
     assert ways.pop(("toaster", "tray")) == 5.0

@@ -10,10 +10,10 @@ from lab.production.trouble import Trouble
 from lab.sim.parts.kinds import Spot
 from lab.sim.world import World
 from lab.skills.prepared_scene import lay_out
-from lab.skills.skillset import Carried, SkillSet
+from lab.skills.skillset import CarriedPath, SkillSet
 from lab.tasks.task_file import load
 
-WAY = Carried("labeller", "pallet", "box")
+WAY = CarriedPath("labeller", "pallet", "box")
 
 
 @pytest.fixture

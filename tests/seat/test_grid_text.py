@@ -12,7 +12,7 @@ from rich.console import Console
 from lab.learning.requests import AdviceRequest
 from lab.learning.session_events import Improvement
 from lab.mdp import TabularMDP, coverage, grid
-from lab.seat.grid_text import Marks, Picture, bracketed, direction_of, picture_of, safe_ansi, window
+from lab.seat.grid_text import Marks, TextPicture, bracketed, direction_of, picture_of, safe_ansi, window
 from lab.view.value_levels import GridPlanes
 
 CUBE = ("left", "right", "backward", "forward", "down", "up")
@@ -58,13 +58,13 @@ def picture(asked: AdviceRequest) -> list[str]:
     return [*(line.plain.strip() for line in found.lines if "level" not in line.plain), found.legend]
 
 
-def fitting(asked: AdviceRequest, width: int, height: int) -> Picture:
+def fitting(asked: AdviceRequest, width: int, height: int) -> TextPicture:
     found = picture_of(asked, Marks(), width, height)
     assert found is not None
     return found
 
 
-def plain(found: Picture) -> list[str]:
+def plain(found: TextPicture) -> list[str]:
     return [line.plain for line in found.lines]
 
 

@@ -10,7 +10,7 @@ import pytest
 from lab.errors import BadInput, WorkFailed
 from lab.sequencing import SEQUENCERS, find_sequence
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.cell.precedence import Precedence, Step
+from lab.sequencing.cell.precedence import Precedence, RouteStep
 from lab.sequencing.cell.stations import Product, Robot, Stage, Station, one_robot
 from lab.sequencing.cyclic.cycle import check_cyclic
 from lab.sequencing.methods.cp_sat import cp_sat
@@ -32,7 +32,7 @@ def kit(order: tuple[str, ...] = ("lid", "box"), *precedences: Precedence) -> Ce
     return Cell((IN, MILL, TRAY), (LID, BOX), order, second, second, one_robot("in"), precedences=precedences)
 
 
-ON_TOP = Precedence((1,), Step("tray"), (2,), Step("tray"))  # the lid, part 1, onto the box, part 2
+ON_TOP = Precedence((1,), RouteStep("tray"), (2,), RouteStep("tray"))  # the lid, part 1, onto the box, part 2
 
 
 def test_a_lid_waits_for_its_box() -> None:
@@ -49,7 +49,7 @@ def test_a_lid_waits_for_its_box() -> None:
 
 
 def test_the_lower_part_leaves_last() -> None:
-    below = Precedence((1,), Step("in", leaves=True), (2,), Step("in", leaves=True))
+    below = Precedence((1,), RouteStep("in", leaves=True), (2,), RouteStep("in", leaves=True))
     run = Run(kit(("box", "box"), below))
     assert run.allowed() == (2,)
     run.move(2)
@@ -59,7 +59,9 @@ def test_the_lower_part_leaves_last() -> None:
 
 
 def test_counts_say_how_many_the_next_one_needs() -> None:
-    cell = kit(("lid", "lid", "box", "box"), Precedence((1, 2), Step("tray"), (3, 4), Step("tray"), needs=(1, 2)))
+    cell = kit(
+        ("lid", "lid", "box", "box"), Precedence((1, 2), RouteStep("tray"), (3, 4), RouteStep("tray"), needs=(1, 2))
+    )
     run = Run(cell)
     run.move(3), run.move(3)
     assert run.allowed() == (1, 2, 4)  # whichever lid comes first
@@ -72,7 +74,7 @@ def test_counts_say_how_many_the_next_one_needs() -> None:
     [
         (replace(ON_TOP, parts=(3,)), "there is no part 3"),
         (replace(ON_TOP, parts=()), "wanted one or more"),
-        (replace(ON_TOP, step=Step("mill")), "lid 1 does not come to 'mill' on every route"),
+        (replace(ON_TOP, step=RouteStep("mill")), "lid 1 does not come to 'mill' on every route"),
         (replace(ON_TOP, needs=(2,)), "there are 1 parts to wait for"),
         (replace(ON_TOP, needs=(1, 1)), "wanted 1 counts that do not fall"),
     ],
@@ -103,7 +105,7 @@ def test_the_rest_of_a_run_waits_on() -> None:
 
 
 def test_a_part_that_is_lost_lies_on_nothing_any_more() -> None:
-    below = Precedence((1,), Step("in", leaves=True), (2,), Step("in", leaves=True))
+    below = Precedence((1,), RouteStep("in", leaves=True), (2,), RouteStep("in", leaves=True))
     rest = rest_of(Run(kit(("box", "box"), below)), Mishaps(lost=frozenset({2}))).cell
     assert rest is not None
     assert Run(rest).allowed() == (1,)
@@ -180,7 +182,7 @@ def as_cell(cell: Drawn) -> Cell:
     products = {r: Product(f"p{n}", (tuple(Stage(names[s]) for s in r),)) for n, r in enumerate(routes)}
     empty, loaded = (np.array(table) * (1 - np.eye(4)) for table in (cell.empty, cell.loaded))
     waits = [
-        Precedence((a + 1,), Step(names[cell.routes[a][k]]), (b + 1,), Step(names[cell.routes[b][j]]))
+        Precedence((a + 1,), RouteStep(names[cell.routes[a][k]]), (b + 1,), RouteStep(names[cell.routes[b][j]]))
         for a, k, b, j in cell.waits
     ]
     return Cell(

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 import pytest
 
 from lab.sim.arms.arm_models import arm_named
-from lab.sim.arms.robot import Robot
+from lab.sim.arms.robot import RobotArm
 from lab.sim.world import World
 from lab.tasks.task import Task
 from lab.tasks.task_file import load
@@ -54,6 +54,6 @@ def world() -> Iterator[World]:
 
 
 @pytest.fixture
-def robot(world: World) -> Robot:
+def robot(world: World) -> RobotArm:
     """The arm, alone in `world`."""
-    return Robot(world, arm_named("up6"), speed=0.5, acceleration=2.0, grip_force=25.0)
+    return RobotArm(world, arm_named("up6"), speed=0.5, acceleration=2.0, grip_force=25.0)

@@ -7,7 +7,7 @@ from lab.errors import BadInput
 from lab.mdp import grid
 from lab.sim.arms.kinematics import ToolPose
 from lab.sim.scene.places import Layout
-from lab.skills import Grasp, Place
+from lab.skills import Grasp, PlacePart
 from lab.skills.around_part import SIDEWAYS, entry_cell, from_above, nearest_start
 from lab.skills.grasp import ACTIONS
 from lab.skills.surveys import NEAR_SHAPE, Surveys, near_pose
@@ -71,7 +71,7 @@ def test_no_room_beside_the_slice_is_bad_input_that_names_what_is_in_the_way(tas
     x, y, _ = task.station("toaster_buffer").pose
     near = Obstacle(name="pillar", position_m=(x, y - 0.06), cubes=3)
     surveys = Surveys(task.changed(obstacles=(near,)), ORDER, Layout((near.position_m,), ()))
-    for skill in (Grasp(surveys.task, "slice", "toaster_buffer"), Place(surveys.task, "slice", "toaster_buffer")):
+    for skill in (Grasp(surveys.task, "slice", "toaster_buffer"), PlacePart(surveys.task, "slice", "toaster_buffer")):
         with pytest.raises(
             BadInput, match=rf"^{skill.name}: no room for gripper and part; in the way: pillar: move that, or say spots"
         ):
@@ -83,7 +83,7 @@ def test_a_station_in_its_own_way_is_not_told_to_be_moved(task: Task, layout: La
     own = {"body": "box", "size_m": (0.3, 0.3, 0.12), "floor_m": 0.02}
     stations = tuple(s.model_copy(update=own) if s.name == "toaster_buffer" else s for s in task.stations)
     surveys = Surveys(task.changed(stations=stations), ORDER, layout)
-    for skill in (Grasp(surveys.task, "slice", "toaster_buffer"), Place(surveys.task, "slice", "toaster_buffer")):
+    for skill in (Grasp(surveys.task, "slice", "toaster_buffer"), PlacePart(surveys.task, "slice", "toaster_buffer")):
         with pytest.raises(BadInput) as told:
             skill.setup(surveys)
         assert str(told.value) == (
@@ -121,4 +121,4 @@ def test_from_the_side_the_moves_are_called_as_they_go(task: Task, layout: Layou
 
 def test_kinds_are_named_where_there_are_several(task: Task, breakfast: Task) -> None:
     assert Grasp(task, "slice", "plate").name == "grasp at plate"
-    assert Place(breakfast, "cup", "tray").name == "place cup at tray"
+    assert PlacePart(breakfast, "cup", "tray").name == "place cup at tray"

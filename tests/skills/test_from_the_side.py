@@ -9,8 +9,8 @@ from lab.errors import BadInput
 from lab.files import tasks_folder
 from lab.learning.problem import Problem
 from lab.sim.arms.kinematics import ToolPose
-from lab.sim.models import Link, Model, urdf
-from lab.sim.models import Part as Piece
+from lab.sim.models import Link, UrdfModel, urdf
+from lab.sim.models import LinkShape as Piece
 from lab.sim.scene.blocked_cells import Surveyor
 from lab.sim.scene.places import Layout
 from lab.sim.scene.scene import TABLE, Scene
@@ -41,7 +41,7 @@ approach = "{approach}"
 def cell(folder: Path, approach: str, roof_m: float = ROOF) -> Task:
     """Breakfast with its coffee machine under a hood that is open towards the arm, and no tank behind it."""
     boxes = [FLOOR, BACK, *SIDES, ((0.20, 0.30, 0.02), (0.08, 0, roof_m))]
-    text, _ = urdf(Model("hood", [Link("hood", 5.0, [Piece(GREY, size, at) for size, at in boxes])]))
+    text, _ = urdf(UrdfModel("hood", [Link("hood", 5.0, [Piece(GREY, size, at) for size, at in boxes])]))
     (folder / "hood.urdf").write_text(text)
     shipped = (tasks_folder() / "breakfast.toml").read_text()
     shipped = shipped.replace('model = "up6"', 'model = "up6"\ntool = "hanging"')

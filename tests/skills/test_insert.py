@@ -10,7 +10,7 @@ from lab.errors import BadInput
 from lab.learning.problem import Problem
 from lab.mdp import greedy_path
 from lab.sim.scene.places import Layout
-from lab.skills import Insert, Place
+from lab.skills import Insert, PlacePart
 from lab.skills.insert import ACTIONS, IN_SLOT_M, SEEN_WITHIN_M
 from lab.skills.skill import Bench, Skill, Status
 from lab.skills.surveys import Surveys
@@ -132,7 +132,7 @@ def test_from_elsewhere_it_first_comes_to_the_start(
     """As when it is tried again: from above the toaster, the gripper hides the toaster's marker from the camera."""
     insert = Insert(surveys.task, "slice", "toaster")
     policy = optimal(insert.setup(surveys))
-    bench = stage(Place(surveys.task, "slice", "toaster"))
+    bench = stage(PlacePart(surveys.task, "slice", "toaster"))
     assert run(insert, bench, policy) is Status.SUCCESS, insert.reason
 
 

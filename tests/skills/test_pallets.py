@@ -9,7 +9,7 @@ import pytest
 
 from lab.learning.problem import Problem
 from lab.sim.scene.scene import pallet_of
-from lab.skills import Grasp, Place, Transfer
+from lab.skills import Grasp, PlacePart, Transfer
 from lab.skills.skill import Bench, Skill, Status
 from lab.skills.surveys import Surveys
 from lab.tasks.task import Task
@@ -79,7 +79,7 @@ def test_a_part_is_lifted_off_and_its_pallet_stays(fms: Task, cell: Surveys, rea
 def test_a_part_is_set_down_on_its_pallet(
     kind: str, station: str, fms: Task, cell: Surveys, ready: Ready, run: Run
 ) -> None:
-    place = Place(fms, kind, station)
+    place = PlacePart(fms, kind, station)
     bench, policy = ready(place)
     assert run(place, bench, policy) is Status.SUCCESS, place.reason
     name = f"{kind} 1"
@@ -94,7 +94,7 @@ def test_a_pallet_that_stands_elsewhere_is_where_its_part_is_set_down(
     fms: Task, cell: Surveys, ready: Ready, run: Run
 ) -> None:
     """Within what setting it down leaves, 8 mm aside: the rook stands in the pallet's middle, not in the spot's."""
-    place = Place(fms, "rook", "lathe-1-out")
+    place = PlacePart(fms, "rook", "lathe-1-out")
     bench, policy = ready(place)
     spot = cell.places.spots(fms.station("lathe-1-out"))[0]
     bench.scene.world.put(PALLET, (spot.x + 0.008, spot.y, spot.z + 0.010))
@@ -104,7 +104,7 @@ def test_a_pallet_that_stands_elsewhere_is_where_its_part_is_set_down(
 
 def test_a_pallet_is_set_down_with_its_part_and_goes_on_empty(fms: Task, cell: Surveys, ready: Ready, run: Run) -> None:
     for kind, station in ((ON, "lathe-1-in"), ("pallet", "lathe-1-out")):
-        place = Place(fms, kind, station)
+        place = PlacePart(fms, kind, station)
         bench, policy = ready(place)
         assert run(place, bench, policy) is Status.SUCCESS, place.reason
         assert bench.stands(PALLET, cell.places.spots(fms.station(station))[0], 0.003)
@@ -113,7 +113,7 @@ def test_a_pallet_is_set_down_with_its_part_and_goes_on_empty(fms: Task, cell: S
 
 
 def test_a_part_stands_in_a_machine_without_its_pallet(fms: Task, cell: Surveys, ready: Ready, run: Run) -> None:
-    place = Place(fms, "sign", "mill")
+    place = PlacePart(fms, "sign", "mill")
     bench, policy = ready(place)
     assert "sign 1's pallet" not in bench.scene.kind_of
     assert run(place, bench, policy) is Status.SUCCESS, place.reason
@@ -146,7 +146,7 @@ def test_a_part_that_falls_off_on_the_way_is_missed(ready: Ready) -> None:
 
 
 def test_a_part_that_falls_off_as_its_pallet_is_set_down_is_missed(fms: Task, ready: Ready) -> None:
-    place = Place(fms, ON, "lathe-1-in")
+    place = PlacePart(fms, ON, "lathe-1-in")
     bench, policy = ready(place)
     place.start(bench, policy)
     while place.step() is Status.RUNNING:

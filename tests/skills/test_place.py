@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lab.learning.problem import Problem
-from lab.skills import Place
+from lab.skills import PlacePart
 from lab.skills.camera_grids import RELEASE_ABOVE
 from lab.skills.place import ACTIONS, GOAL, release_pose
 from lab.skills.skill import Bench, Skill, Status
@@ -24,7 +24,7 @@ SLICE = "slice 1"
 def test_a_slice_is_set_down_and_left_standing(
     station: str, surveys: Surveys, task: Task, stage: Stage, optimal: PolicyOf, run: Run
 ) -> None:
-    place = Place(surveys.task, "slice", station)
+    place = PlacePart(surveys.task, "slice", station)
     policy = optimal(place.setup(surveys))
     bench = stage(place)
     assert run(place, bench, policy) is Status.SUCCESS, place.reason
@@ -41,7 +41,7 @@ def test_a_slice_is_set_down_and_left_standing(
 def test_it_goes_to_the_spot_it_is_told(
     surveys: Surveys, task: Task, stage: Stage, optimal: PolicyOf, run: Run
 ) -> None:
-    place = Place(surveys.task, "slice", "finished_plate")
+    place = PlacePart(surveys.task, "slice", "finished_plate")
     policy = optimal(place.setup(surveys))
     chosen = surveys.places.spots(task.station("finished_plate"))[5]
     bench = stage(place.aim(SLICE, chosen))
@@ -56,7 +56,7 @@ def test_it_goes_to_the_spot_it_is_told(
 def test_with_an_empty_gripper_there_is_nothing_to_place(
     surveys: Surveys, stage: Stage, optimal: PolicyOf, run: Run
 ) -> None:
-    place = Place(surveys.task, "slice", "toaster_buffer")
+    place = PlacePart(surveys.task, "slice", "toaster_buffer")
     policy = optimal(place.setup(surveys))
     bench = stage(place)
     bench.held = None
@@ -67,7 +67,7 @@ def test_with_an_empty_gripper_there_is_nothing_to_place(
 def test_a_slice_that_falls_over_does_not_count_as_placed(
     surveys: Surveys, stage: Stage, optimal: PolicyOf, run: Run
 ) -> None:
-    place = Place(surveys.task, "slice", "toaster_buffer")
+    place = PlacePart(surveys.task, "slice", "toaster_buffer")
     policy = optimal(place.setup(surveys))
     bench = stage(place)
     place.start(bench, policy)
@@ -80,7 +80,7 @@ def test_a_slice_that_falls_over_does_not_count_as_placed(
 
 
 def test_the_problem_ends_at_the_spot_and_begins_above_it(surveys: Surveys) -> None:
-    mdp = Place(surveys.task, "slice", "toaster_buffer").setup(surveys).mdp
+    mdp = PlacePart(surveys.task, "slice", "toaster_buffer").setup(surveys).mdp
     assert mdp.action_labels == ACTIONS
     assert [mdp.state_cell(int(s)) for s in np.flatnonzero(mdp.goal)] == [GOAL]
     assert {mdp.state_cell(s)[2] for s in mdp.starts} == {mdp.shape[2] - 1}
@@ -88,7 +88,7 @@ def test_the_problem_ends_at_the_spot_and_begins_above_it(surveys: Surveys) -> N
 
 def test_it_lets_go_where_the_slice_not_the_tool_is_over_the_spot(surveys: Surveys, task: Task, stage: Stage) -> None:
     """A slice that hangs 1 cm along its width and 1 cm low is let go 1 cm to the other side and 1 cm higher."""
-    bench = stage(Place(surveys.task, "slice", "toaster_buffer"))
+    bench = stage(PlacePart(surveys.task, "slice", "toaster_buffer"))
     world, tool = bench.scene.world, bench.scene.robot.tool()
     position, turn = world.pose(SLICE)
     spot = surveys.places.spots(task.station("toaster_buffer"))[0]

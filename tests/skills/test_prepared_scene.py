@@ -5,12 +5,12 @@ from typing import Any
 import pytest
 
 from lab.errors import BadInput
-from lab.sequencing.cell.precedence import Precedence, Step
+from lab.sequencing.cell.precedence import Precedence, RouteStep
 from lab.skills.prepared_scene import precedences
 from lab.tasks.task import Task
 from lab.tasks.task_file import load
 
-TRAY, PALLET = Step("tray"), Step("pallet", leaves=True)
+TRAY, PALLET = RouteStep("tray"), RouteStep("pallet", leaves=True)
 
 
 def changed(task: str, **fields: Any) -> Task:
@@ -84,9 +84,14 @@ def test_a_file_says_what_has_to_wait() -> None:
     order = ("box", "box", "lid", "lid")
     derived = precedences(load("kit"), order)
     labelled = with_after(of_station="labeller", of_step="leaves", count="all")
-    assert precedences(labelled, order) == (*derived, Precedence((3, 4), TRAY, (1, 2), Step("labeller", leaves=True)))
+    assert precedences(labelled, order) == (
+        *derived,
+        Precedence((3, 4), TRAY, (1, 2), RouteStep("labeller", leaves=True)),
+    )
     each = with_after(station="magazine", step="leaves", of_station="tray")
-    assert precedences(each, order)[1:] == (Precedence((3, 4), Step("magazine", leaves=True), (1, 2), TRAY, (1, 2)),)
+    assert precedences(each, order)[1:] == (
+        Precedence((3, 4), RouteStep("magazine", leaves=True), (1, 2), TRAY, (1, 2)),
+    )
 
 
 @pytest.mark.parametrize(

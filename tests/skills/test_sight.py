@@ -10,7 +10,7 @@ from lab.learning.problem import Problem
 from lab.sim.scene.places import Layout
 from lab.sim.scene.scene import Scene
 from lab.sim.world import World
-from lab.skills import Grasp, Place
+from lab.skills import Grasp, PlacePart
 from lab.skills.skill import Bench, Skill, Status
 from lab.skills.surveys import Surveys
 from lab.tasks.task import Task
@@ -74,7 +74,7 @@ def test_an_empty_slot_is_not_taken_for_a_slice(seeing: Surveys, stage: Stage, o
 
 
 def test_what_is_set_down_is_looked_at(seeing: Surveys, stage: Stage, optimal: PolicyOf, run: Run) -> None:
-    place = Place(seeing.task, "slice", "finished_plate").aim(SLICE)
+    place = PlacePart(seeing.task, "slice", "finished_plate").aim(SLICE)
     policy = optimal(place.setup(seeing))
     bench = stage(place)
     assert run(place, bench, policy) is Status.SUCCESS, place.reason

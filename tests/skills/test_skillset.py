@@ -9,9 +9,9 @@ from lab.errors import BadInput
 from lab.production.durations import Durations, cell_of
 from lab.sim.arms.arm_models import arm_named
 from lab.sim.parts.kinds import kinds_of
-from lab.skills import SKILLS, Insert, Place, Transfer
+from lab.skills import SKILLS, Insert, PlacePart, Transfer
 from lab.skills.cover import CoverPlace
-from lab.skills.skillset import Carried, SkillSet, products, stations, ways_of
+from lab.skills.skillset import CarriedPath, SkillSet, products, stations, ways_of
 from lab.skills.surveys import INSERT
 from lab.tasks.task import Order, Task
 from lab.tasks.task_fields import Stage
@@ -68,7 +68,7 @@ def test_the_crew_for_one_toast_is_what_its_way_needs(task: Task) -> None:
 def test_every_needed_move_has_its_skills(task: Task, toasts: int) -> None:
     skillset = SkillSet.of(task, slices(toasts))
     assert {skill.subtask for skill in skillset.skills.values()} == set(SKILLS)
-    assert set(skillset.legs) == {Carried(*pair, "slice") for pair in skillset.moves.loaded}
+    assert set(skillset.legs) == {CarriedPath(*pair, "slice") for pair in skillset.moves.loaded}
     for (origin, target, _), leg in skillset.legs.items():
         grasp, transfer, arrive = leg
         assert grasp.name == f"grasp at {origin}"
@@ -78,7 +78,7 @@ def test_every_needed_move_has_its_skills(task: Task, toasts: int) -> None:
         if target == "toaster":
             assert (transfer.target, type(arrive)) == (INSERT, Insert)
         else:
-            assert (transfer.target, type(arrive)) == (target, Place)
+            assert (transfer.target, type(arrive)) == (target, PlacePart)
         assert arrive.name.endswith(f" at {target}")
     for origin, target in skillset.moves.empty:
         assert [skill.name for skill in skillset.travels[origin, target]] == [f"transfer {origin} to {target}"]
@@ -120,19 +120,19 @@ def test_two_machines_for_the_same_are_two_ways_through_two_grids() -> None:
 def test_a_part_with_a_pallet_is_carried_on_it_and_lifted_off_and_its_pallet_is_brought_on(fms: Task) -> None:
     """A sign's route is incoming, mill-in, mill, mill-out, outgoing; at the mill it is lifted off its pallet."""
     assert list(ways_of(fms.part("sign"))) == [
-        Carried("incoming", "mill-in", "sign on pallet"),
-        Carried("mill-in", "mill", "sign"),
-        Carried("mill-in", "mill-out", "pallet"),
-        Carried("mill", "mill-out", "sign"),
-        Carried("mill-out", "outgoing", "sign on pallet"),
+        CarriedPath("incoming", "mill-in", "sign on pallet"),
+        CarriedPath("mill-in", "mill", "sign"),
+        CarriedPath("mill-in", "mill-out", "pallet"),
+        CarriedPath("mill", "mill-out", "sign"),
+        CarriedPath("mill-out", "outgoing", "sign on pallet"),
     ]
 
 
 def test_ways_lead_through_buffers_too(task: Task) -> None:
     assert list(ways_of(task.part("slice")))[:3] == [
-        Carried("plate", "toaster", "slice"),
-        Carried("plate", "toaster_buffer", "slice"),
-        Carried("toaster_buffer", "toaster", "slice"),
+        CarriedPath("plate", "toaster", "slice"),
+        CarriedPath("plate", "toaster_buffer", "slice"),
+        CarriedPath("toaster_buffer", "toaster", "slice"),
     ]
 
 

@@ -13,7 +13,7 @@ from lab.errors import BadInput
 from lab.learning.batch import run_sessions
 from lab.learning.gates import GATES
 from lab.learning.members import Member
-from lab.studies.compared import Compared, Setting, compared, sessions_of, words
+from lab.studies.compared import Compared, ComparedSetting, compared, sessions_of, words
 from lab.studies.runner import STORE, Job
 from lab.tasks.grid_world import from_rows
 
@@ -21,7 +21,7 @@ WORLD = from_rows("S..\n.#.\n..G", "small", "test")
 SHORT: dict[str, Any] = {"episodes": [8]}
 
 
-def one(what: Compared) -> Setting:
+def one(what: Compared) -> ComparedSetting:
     (setting,) = what.settings()
     return setting
 

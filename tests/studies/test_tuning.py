@@ -12,7 +12,7 @@ import lab
 from lab.errors import BadInput
 from lab.learning.settings import SETTINGS
 from lab.learning.tuned_ranges import RANGES, USUAL, Span
-from lab.studies.compared import Sessions
+from lab.studies.compared import ComparedSessions
 from lab.studies.findings import Findings, those
 from lab.studies.runner import STORE, Job
 from lab.studies.tuning import FILE, Tuning, costs, settings_text, tuned
@@ -49,7 +49,7 @@ def test_every_range_lies_in_what_is_allowed_and_holds_the_default() -> None:
 def test_an_unsolved_session_costs_the_limit_as_a_whole() -> None:
     zeros = np.zeros(2)
     solved, five, none = np.array([True, False]), np.full(2, 5.0), np.zeros(2, bool)
-    found = Sessions(zeros, solved, five, zeros, zeros, zeros, zeros, none)
+    found = ComparedSessions(zeros, solved, five, zeros, zeros, zeros, zeros, none)
     assert costs(found, 201).tolist() == [5.0, 201.0]
 
 

@@ -19,7 +19,7 @@ from lab.tasks.new_task import (
     NewMachine,
     NewPart,
     NewTask,
-    Placed,
+    PlacedStation,
     file_of,
     heights_m,
     layouts,
@@ -216,7 +216,7 @@ def test_all_spots_are_reached_and_no_two_stations_meet(new: NewTask, between_m:
         assert apart(one, other, new.foot_m) >= min(GAPS_M) - 1e-9
 
 
-def apart(one: Placed, other: Placed, foot: tuple[float, float]) -> float:
+def apart(one: PlacedStation, other: PlacedStation, foot: tuple[float, float]) -> float:
     """Between the rectangles around two stations, along the axis on which they are farther apart."""
     (along, across), (length, width) = one.half_m(foot), other.half_m(foot)
     return max(abs(one.x - other.x) - along - length, abs(one.y - other.y) - across - width)

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from lab.advice.advising import Advising
-from lab.advice.entries import FILE, Answer, Session, read_journal
+from lab.advice.entries import FILE, Answer, SessionEntry, read_journal
 from lab.advice.journal import Journal
 from lab.advice.receipt import SILENT
 from lab.errors import BadInput
@@ -307,7 +307,7 @@ def test_a_replay_of_what_was_broken_off_ends_there(tmp_path: Path, maze: Path) 
 def test_a_kept_evening_is_given_to_another_gate(tmp_path: Path, maze: Path) -> None:
     """What was said once is said again where it was said; elsewhere the learner hears nothing, and holds it against nobody."""
     signature = load_world(str(maze)).mdp().signature
-    journal = Journal.begin(tmp_path / "lesson", Session({}, "maze", signature, "test"))
+    journal = Journal.begin(tmp_path / "lesson", SessionEntry({}, "maze", signature, "test"))
     journal.tell(AdviceGiven(1, 1, 0, 3, 0))  # from the start to the right
     journal.close()
     name = f"recorded:{tmp_path / 'lesson'}"

@@ -7,14 +7,14 @@ from typing import Any
 
 import pytest
 
-from lab.advice.entries import FILE, Session, line_of, read_journal
+from lab.advice.entries import FILE, SessionEntry, line_of, read_journal
 from lab.errors import BadInput
 from lab.teaching.kept_session import KeptSession
 from lab.teaching.session_list import session_rows
 from lab.toolbox.names import SESSIONS
 from lab.toolbox.registry import Toolbox
 
-HEAD = line_of(Session({"subtask": "maze.toml", "advisors": ["novice", "expert"], "seed": 3}, "maze", "0a", "0.1"))
+HEAD = line_of(SessionEntry({"subtask": "maze.toml", "advisors": ["novice", "expert"], "seed": 3}, "maze", "0a", "0.1"))
 Damage = Callable[[dict[str, Any]], dict[str, Any]]
 
 

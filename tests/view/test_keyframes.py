@@ -9,9 +9,9 @@ from lab.sim.frames import IDENTITY, Body, Frame, Pose, Recording, Shape
 from lab.view.keyframes import (
     ANGLE_TOLERANCE_RAD,
     POSITION_TOLERANCE_M,
+    BodyMotion,
     Floats,
-    Motion,
-    Track,
+    KeyframeTrack,
     angle,
     continuous,
     motions,
@@ -25,15 +25,15 @@ def at(x: float, yaw: float = 0.0) -> Pose:
     return (x, 0.0, 0.0, 0.0, 0.0, float(np.sin(yaw / 2)), float(np.cos(yaw / 2)))
 
 
-def motion(*frames: Frame) -> Motion:
+def motion(*frames: Frame) -> BodyMotion:
     return motions(Recording((BODY,), list(frames)))["slice"]
 
 
-def moves(times: list[float], poses: list[Pose]) -> Motion:
+def moves(times: list[float], poses: list[Pose]) -> BodyMotion:
     return motion(*(Frame(time, {"slice": pose}) for time, pose in zip(times, poses, strict=True)))
 
 
-def played(track: Track | None, times: list[float], start: Floats) -> Floats:
+def played(track: KeyframeTrack | None, times: list[float], start: Floats) -> Floats:
     """What the page shows of a track at these times: linear for places, slerp for turns."""
     if track is None:
         return np.tile(start, (len(times), 1))

@@ -10,7 +10,7 @@ import pytest
 
 from lab.errors import BadInput
 from lab.view.canvas import ORANGE, RED
-from lab.view.plots import Places, cell_corners, learning_curves, value_map
+from lab.view.plots import MapMarks, cell_corners, learning_curves, value_map
 from lab.vision import plain_view
 
 
@@ -35,7 +35,7 @@ def draw_values(path: Path) -> None:
     blocked = np.zeros((3, 4), dtype=np.bool_)
     blocked[1, 1] = True
     route = [(0, 0), (0, 1), (0, 2), (1, 2)]
-    places = Places(route, blocked, goal=(1, 2))
+    places = MapMarks(route, blocked, goal=(1, 2))
     value_map(np.arange(12.0).reshape(3, 4), picture, path, corners=corners, places=places)
 
 
@@ -115,7 +115,7 @@ def test_value_map_without_a_picture(tmp_path: Path) -> None:
     [
         (np.zeros(4), {}, r"shape \(4,\)"),
         (np.zeros((2, 2)), {"corners": np.zeros((2, 2, 2))}, r"corners \(2, 2, 2\)"),
-        (np.zeros((2, 2)), {"places": Places(blocked=np.zeros((3, 2)))}, r"blocked \(3, 2\)"),
+        (np.zeros((2, 2)), {"places": MapMarks(blocked=np.zeros((3, 2)))}, r"blocked \(3, 2\)"),
     ],
 )
 def test_shapes_that_do_not_fit(tmp_path: Path, values: np.ndarray, options: dict[str, Any], says: str) -> None:

@@ -10,7 +10,7 @@ from lab.tasks.schedule_table import read_schedule
 from lab.view.meshcat import replay_html
 from lab.view.replay_file import Replay, read_replay
 from lab.view.schedule_floor import CARRIER_M, HIGH_M, PART_M, WORKS
-from lab.view.schedule_scene import Scene, scene_of
+from lab.view.schedule_scene import ScheduleScene, scene_of
 
 SHOP = "job,machine,start,end\nA,saw,0,30\nB,saw,30,50\nA,mill,40,60\n"
 AGV = "job,machine,agv,from,to,start,end\nA,,v1,load,saw,0,20\nA,saw,,,,20,50\nA,,v1,saw,out,60,80\n"
@@ -22,7 +22,7 @@ class Shown:
 
     def __init__(self, text: str, folder: Path) -> None:
         (folder / "plan.csv").write_text(text)
-        self.scene: Scene = scene_of(read_schedule([folder / "plan.csv"]), "plan")
+        self.scene: ScheduleScene = scene_of(read_schedule([folder / "plan.csv"]), "plan")
         page = replay_html(self.scene.recording, folder / "plan.html", story=self.scene.story, tracks=self.scene.tracks)
         self.replay: Replay = read_replay(page)
         self.names = [body.name for body in self.scene.recording.bodies]

@@ -11,7 +11,7 @@ from lab.errors import BadInput
 from lab.toolbox.policy import GOAL, ON, OUT, Policy
 from lab.view import value_levels as levels
 from lab.view.canvas import ORANGE, RED
-from lab.view.value_levels import Learned, Planes, can_be_drawn, value_levels
+from lab.view.value_levels import LearnedValues, Planes, can_be_drawn, value_levels
 
 MakePolicy = Callable[..., Policy]
 SPACE = ("left", "right", "backward", "forward", "down", "up")
@@ -81,7 +81,7 @@ def test_of_too_many_levels_those_with_the_ends_and_the_most_visited_are_drawn(m
     """A column of six levels of one cell: the start is in level 1, the goal in 4; visited is 3, too."""
     monkeypatch.setattr(levels, "MAX_LEVELS", 3)
     ends = np.array([0, 0, 0, 0, GOAL, 0], np.uint8)
-    learned = Learned(np.zeros(6), np.zeros(6, np.int64), np.array([0, 0, 0, 1, 0, 0], bool), ends)
+    learned = LearnedValues(np.zeros(6), np.zeros(6, np.int64), np.array([0, 0, 0, 1, 0, 0], bool), ends)
     assert levels._chosen(Planes((1, 1, 6), False), learned, 1) == [1, 3, 4]
 
 

@@ -29,7 +29,7 @@ _begin_car, _begin_acrobot, _begin_pole = _begins
 _step_car, _step_acrobot, _step_pole = _steps
 
 
-class World(NamedTuple):
+class LinearWorld(NamedTuple):
     """The place of the steps: its number, the point x (D,), bounds and cells, rewards; longer_is_better: see `Physics`."""
 
     number: int

@@ -28,7 +28,7 @@ class ProblemArrays(NamedTuple):
     step_reward: float
 
 
-class Learning(NamedTuple):
+class CompiledLearner(NamedTuple):
     """The learner's settings, see `LearnerSettings`; actions: A numbers, in a tuple if the compiler is to know their count."""
 
     afterstate: bool
@@ -72,7 +72,7 @@ NOW = np.dtype([(field.name, np.int64) for field in fields(Now)])
 HEARD_NOW = np.dtype([(field.name, np.float64) for field in fields(HeardNow)])
 
 
-class Sessions(NamedTuple):
+class KernelSessions(NamedTuple):
     """The inputs and results of N sessions of E episodes; the results are those of `batch.Batch`.
 
     seeds (N,); per_tau (E,): 1 / temperature; counts (N,) of COUNTS; kept (N, size): the tables, or (0, size) if not wanted.
@@ -114,11 +114,11 @@ class Work(NamedTuple):
     """
 
     problem: ProblemArrays
-    learning: Learning
+    learning: CompiledLearner
     asking: Asking
     thresholds: FloatArray
     region: NDArray[np.bool_]
-    sessions: Sessions
+    sessions: KernelSessions
     lanes: Lanes
 
 

@@ -17,7 +17,7 @@ from lab.learning.kernels.asking import decided, judge, judge_moved, knows, open
 from lab.learning.kernels.records import LANES, choose, draw, learn
 
 _Memory: Any = memory.Memory
-_Move: Any = memory.Move
+_Move: Any = memory.RememberedMove
 _clear: Any = inner(memory.clear)
 _remembers: Any = inner(memory.opens)
 _starts: Any = inlined(memory.starts)

@@ -22,7 +22,7 @@ OPERATOR = "operator"
 
 
 @dataclass(frozen=True)
-class Command:
+class OperatorCommand:
     """A command: its arguments as they are typed ("": none), what it does, and when it is done.
 
     how: "at once", whatever goes on; "by hand", a motion of the arm, when nothing moves, also in a pause; "in turn", when
@@ -145,36 +145,40 @@ def _order(rest: str) -> tuple[int, ...]:
     return tuple(int(word) for word in words)
 
 
-COMMANDS: dict[str, Command] = {
-    "parts": Command("slice=2,cup=1", "choose how many parts of each kind; lays the scene out anew", "in turn", _parts),
-    "policy": Command("", "find or learn the skills, time them, and find the best order", "in turn", _nothing),
-    "run": Command("", "carry the plan out from where it stands", "in turn", _nothing),
-    "pause": Command("", "stop when the move under way has ended", "at once", _nothing),
-    "step": Command("", "carry one move out, then pause", "at once", _nothing),
-    "go": Command("", "go on after a pause or a protective stop", "at once", _nothing),
-    "stop": Command("", "emergency stop: the arm holds at once, until it is reset", "at once", _nothing),
-    "reset": Command("", "release the emergency stop; then go", "at once", _nothing),
-    "speed": Command("1|4|max", "simulated seconds per second", "at once", _speed),
-    "jog": Command("+x 10", "move the tool so many mm along +x -x +y -y +z or -z", "by hand", _jog),
-    "rotate": Command(
+COMMANDS: dict[str, OperatorCommand] = {
+    "parts": OperatorCommand(
+        "slice=2,cup=1", "choose how many parts of each kind; lays the scene out anew", "in turn", _parts
+    ),
+    "policy": OperatorCommand("", "find or learn the skills, time them, and find the best order", "in turn", _nothing),
+    "run": OperatorCommand("", "carry the plan out from where it stands", "in turn", _nothing),
+    "pause": OperatorCommand("", "stop when the move under way has ended", "at once", _nothing),
+    "step": OperatorCommand("", "carry one move out, then pause", "at once", _nothing),
+    "go": OperatorCommand("", "go on after a pause or a protective stop", "at once", _nothing),
+    "stop": OperatorCommand("", "emergency stop: the arm holds at once, until it is reset", "at once", _nothing),
+    "reset": OperatorCommand("", "release the emergency stop; then go", "at once", _nothing),
+    "speed": OperatorCommand("1|4|max", "simulated seconds per second", "at once", _speed),
+    "jog": OperatorCommand("+x 10", "move the tool so many mm along +x -x +y -y +z or -z", "by hand", _jog),
+    "rotate": OperatorCommand(
         "15", "turn the gripper so many degrees", "by hand", lambda rest: _number(rest, MOST_DEGREES, "degrees")
     ),
-    "move": Command(
+    "move": OperatorCommand(
         "plate|300 -100 450", "move the tool straight over a station, or to x y z in mm", "by hand", _place
     ),
-    "open": Command("", "open the gripper", "by hand", _nothing),
-    "close": Command("", "close the gripper", "by hand", _nothing),
-    "home": Command("", "bring the arm home, over everything", "by hand", _nothing),
-    "grasp": Command("", "take up the part that is nearest to the gripper, wherever that is", "by hand", _nothing),
-    "order": Command("1 2 1 3", "make this sequence the plan, checked move by move", "in turn", _order),
-    "learn": Command("NAME", "learn a skill, or a family of skills, and keep it", "in turn", _name),
-    "execute": Command("NAME [PART]", "carry one skill out now", "by hand", _name),
-    "lead": Command(
+    "open": OperatorCommand("", "open the gripper", "by hand", _nothing),
+    "close": OperatorCommand("", "close the gripper", "by hand", _nothing),
+    "home": OperatorCommand("", "bring the arm home, over everything", "by hand", _nothing),
+    "grasp": OperatorCommand(
+        "", "take up the part that is nearest to the gripper, wherever that is", "by hand", _nothing
+    ),
+    "order": OperatorCommand("1 2 1 3", "make this sequence the plan, checked move by move", "in turn", _order),
+    "learn": OperatorCommand("NAME", "learn a skill, or a family of skills, and keep it", "in turn", _name),
+    "execute": OperatorCommand("NAME [PART]", "carry one skill out now", "by hand", _name),
+    "lead": OperatorCommand(
         "NAME|end|drop", "what you do by hand from now on shows a skill; end: learn from it", "by hand", _name
     ),
-    "status": Command("", "say where everything stands", "console", _nothing),
-    "help": Command("", "list the commands", "console", _nothing),
-    "quit": Command("", "keep everything and leave", "console", _nothing),
+    "status": OperatorCommand("", "say where everything stands", "console", _nothing),
+    "help": OperatorCommand("", "list the commands", "console", _nothing),
+    "quit": OperatorCommand("", "keep everything and leave", "console", _nothing),
 }
 
 

@@ -16,7 +16,7 @@ class Refused(Exception):
 
 
 @dataclass(frozen=True)
-class Answer:
+class PageAnswer:
     """An answer to a question, by its number: an action, one of WORDS, or the actions of a whole path."""
 
     question: int
@@ -33,7 +33,7 @@ class Wish:
 
 
 @dataclass(frozen=True)
-class Layer:
+class LayerChoice:
     """The page requests a layer of the grid; None: the robot's."""
 
     layer: int | None
@@ -47,13 +47,13 @@ class Pace:
 
 
 @dataclass(frozen=True)
-class Command:
+class PageCommand:
     """The page gives the run a command, in the language of `lab.production.operation.commands`."""
 
     words: str
 
 
-Message = Answer | Wish | Layer | Pace | Command
+Message = PageAnswer | Wish | LayerChoice | Pace | PageCommand
 
 
 def understood(message: str | bytes) -> Message:
@@ -67,21 +67,21 @@ def understood(message: str | bytes) -> Message:
     match said:
         case {"answer": {"question": int(number), "action": int(action), **rest}, **more} if not (rest or more):
             if not isinstance(number, bool) and not isinstance(action, bool):
-                return Answer(number, action)
+                return PageAnswer(number, action)
         case {"answer": {"question": int(number), "word": str(word), **rest}, **more} if not (rest or more):
             if not isinstance(number, bool) and word in WORDS:
-                return Answer(number, None, word)
+                return PageAnswer(number, None, word)
         case {"answer": {"question": int(number), "path": list(path), **rest}, **more} if not (rest or more):
             if not isinstance(number, bool) and 0 < len(path) <= MOST_MOVES and all(type(move) is int for move in path):
-                return Answer(number, path[0], path=tuple(path))
+                return PageAnswer(number, path[0], path=tuple(path))
         case {"seat": "take" | "give" as wish, **more} if not more:
             return Wish(wish)
         case {"replay": str(word), **more} if not more and word in REPLAY_WORDS:
             return Pace(word)
         case {"command": str(words), **more} if not more and words.strip() and words.isprintable():
-            return Command(words)
+            return PageCommand(words)
         case {"layer": int() | None as layer, **more} if not more and not isinstance(layer, bool):
-            return Layer(layer)
+            return LayerChoice(layer)
     raise Refused("That was no message of this page: it is ignored.")
 
 

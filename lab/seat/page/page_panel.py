@@ -14,14 +14,24 @@ from lab.production.operation.commands import OPERATOR
 from lab.seat.grid_text import ARROWS, direction_of
 from lab.seat.page.page_console import ONLOOKER, STOP, held_of
 from lab.seat.page.page_console import PARTS as RUN_PARTS
-from lab.seat.page.page_messages import Answer, Chair, Command, Layer, Message, Pace, Refused, Wish, understood
-from lab.seat.page.page_state import PARTS, Known, Pending, layer_of
+from lab.seat.page.page_messages import (
+    Chair,
+    LayerChoice,
+    Message,
+    Pace,
+    PageAnswer,
+    PageCommand,
+    Refused,
+    Wish,
+    understood,
+)
+from lab.seat.page.page_state import PARTS, PageContent, Pending, layer_of
 from lab.view.meshcat import GANTT_SCRIPT
 
 SLICE_EVERY_S = 0.1  # least time between two messages with a layer's values
 RUN_EVERY_S = 0.1  # least time between two messages with the status of a run
 SLICE_SHARE = 30  # computing a layer's values takes at most one part in so many of the time
-CLOSED = Answer(0, None, "closed")
+CLOSED = PageAnswer(0, None, "closed")
 LISTEN_S = 0.2  # longest uninterrupted wait, so that Ctrl-C is noticed
 
 
@@ -61,12 +71,12 @@ class SeatPanel:
     def __init__(self, title: str) -> None:
         self.guard = threading.RLock()
         self.lock = threading.Condition(self.guard)  # a condition on the same lock, for waiting
-        self.known = Known(title)
+        self.known = PageContent(title)
         self.chair = Chair()
         self.on_word: Callable[[str], None] | None = None
         self.on_pace: Callable[[str], None] | None = None
         self.on_quit: Callable[[], None] | None = None
-        self._answer: Answer | None = None
+        self._answer: PageAnswer | None = None
         self._ended = False
         self._pages: dict[int, _Seen] = {}
         self._texts: dict[str, tuple[int, str]] = {}  # part, or layer -> its version and its JSON
@@ -94,7 +104,7 @@ class SeatPanel:
                 self.known.changed("question")
             return waited
 
-    def wait(self, pending: Pending) -> Answer | None:
+    def wait(self, pending: Pending) -> PageAnswer | None:
         """The answer to a question, or CLOSED after the server has ended; None after the question's time."""
         with self.lock:
             while self._answer is None:
@@ -149,7 +159,7 @@ class SeatPanel:
         word = ""
         try:
             meant = understood(message)
-            if isinstance(meant, Command):
+            if isinstance(meant, PageCommand):
                 self._command(page, meant)
                 return
             with self.lock:
@@ -160,7 +170,7 @@ class SeatPanel:
         if word and self.on_word is not None:
             self.on_word(word)
 
-    def _command(self, page: int, meant: Command) -> None:
+    def _command(self, page: int, meant: PageCommand) -> None:
         """Pass a command to the run, without the lock, which the receiver of the result takes as well."""
         console, first = self.known.console, meant.words.split()[0].lower()
         if console is None:
@@ -182,7 +192,7 @@ class SeatPanel:
 
     def _do(self, page: int, meant: Message) -> str:
         """The terminal's word for the answer to a question that somebody else waits for; "" for all other messages."""
-        if isinstance(meant, Layer):
+        if isinstance(meant, LayerChoice):
             self._pages[page].layer, self._pages[page].layer_version = meant.layer, 0
             return ""
         if isinstance(meant, Pace):
@@ -193,7 +203,7 @@ class SeatPanel:
         if isinstance(meant, Wish):
             self.chair.wish(page, meant)
             return ""
-        assert isinstance(meant, Answer)
+        assert isinstance(meant, PageAnswer)
         pending = self._checked(page, meant)
         self._answer = meant
         self.known.pending = None
@@ -201,7 +211,7 @@ class SeatPanel:
         self.lock.notify_all()
         return word_of(pending.request, meant) if pending.offered else ""
 
-    def _checked(self, page: int, answer: Answer) -> Pending:
+    def _checked(self, page: int, answer: PageAnswer) -> Pending:
         """The question that an answer belongs to. Raises Refused for a wrong answer, or a page that may not answer."""
         pending = self.known.pending
         if self.chair.holder != page:
@@ -296,7 +306,7 @@ def _finite(value: Any) -> Any:
     return None if isinstance(value, float) and not isfinite(value) else value
 
 
-def word_of(request: Request, answer: Answer) -> str:
+def word_of(request: Request, answer: PageAnswer) -> str:
     """An answer as typed at a terminal: the label of an action, the number of a move, the word itself, or a path."""
     if answer.word or answer.action is None:
         return answer.word

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from lab.seat.event_text import PARTS_DONE, run_text
 from lab.seat.page.page_console import bars_of, changed_by
-from lab.seat.page.page_state import MOST_LINES, Known, Progress, ShownLesson
+from lab.seat.page.page_state import MOST_LINES, PageContent, Progress, ShownLesson
 from lab.sequencing.search import EpisodeSequenced
 from lab.teaching.events import (
     ORDER,
@@ -17,7 +17,7 @@ from lab.teaching.events import (
 )
 
 
-def hear_run(known: Known, event: Event) -> None:
+def hear_run(known: PageContent, event: Event) -> None:
     """Take over an event of a run: as a line in the panel, a move, or the cost of a sequencer's episode."""
     if known.console is not None:
         known.console.hear(event)

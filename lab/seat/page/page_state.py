@@ -1,6 +1,6 @@
 """The state of the teaching page, and the functions that write it as one JSON document in parts.
 
-Nothing here waits, sends or draws. PARTS lists the document's parts; `Known.since` finds those that have changed. Events
+Nothing here waits, sends or draws. PARTS lists the document's parts; `PageContent.since` finds those that have changed. Events
 of a lesson are taken over at the end of the file.
 """
 
@@ -35,7 +35,7 @@ MOST = 400  # blocks of episodes that a page draws
 
 
 @dataclass
-class Curve:
+class CostCurve:
     """The costs of episodes in blocks of `per`: of each block the mean, the least, and the number of guided episodes.
 
     best: the least cost of all, and the first episode with it, counted from 1; None before the first episode.
@@ -109,7 +109,7 @@ class Pending:
 
 
 @dataclass
-class Notice:
+class LessonNotice:
     """A message about a lesson, and how often it came in a row; tone: see `Told`."""
 
     text: str
@@ -130,8 +130,8 @@ class ShownLesson:
     proven: bool = True  # whether `optimal` is the optimum, not only a bound
     method: str = ""  # of a sequencer
     learned: tuple[str, ...] = ()  # how the order was learned, in words
-    curve: Curve = field(default_factory=Curve)
-    notices: deque[Notice] = field(default_factory=lambda: deque(maxlen=MOST_NOTICES))
+    curve: CostCurve = field(default_factory=CostCurve)
+    notices: deque[LessonNotice] = field(default_factory=lambda: deque(maxlen=MOST_NOTICES))
     text: SessionText = field(default_factory=SessionText)
     requests: int = 0  # episodes in which it asked
     taken: int = 0
@@ -159,7 +159,7 @@ class ShownLesson:
         if last is not None and last.text == told.text:
             last.times += 1
         else:
-            self.notices.append(Notice(told.text, told.tone))
+            self.notices.append(LessonNotice(told.text, told.tone))
 
 
 @dataclass(frozen=True)
@@ -173,7 +173,7 @@ class Progress:
 
 
 @dataclass
-class Known:
+class PageContent:
     """Everything that the page may show. `changed` marks parts as changed; versions ensure that nothing is sent twice."""
 
     title: str
@@ -215,7 +215,7 @@ class Known:
         return [part for part in PARTS if self.versions.get(part, 1) > seen.get(part, 0)]
 
 
-def _lesson(known: Known, now_s: float) -> Json:
+def _lesson(known: PageContent, now_s: float) -> Json:
     learning, gate = known.learning, known.learning.gate
     return {
         "title": learning.title,
@@ -232,16 +232,16 @@ def _lesson(known: Known, now_s: float) -> Json:
     }
 
 
-def _place(known: Known, now_s: float) -> Json | None:
+def _place(known: PageContent, now_s: float) -> Json | None:
     return None if known.learning.mdp is None else place_of(known.learning.mdp)
 
 
-def _robot(known: Known, now_s: float) -> list[int] | None:
+def _robot(known: PageContent, now_s: float) -> list[int] | None:
     mdp, state = known.learning.mdp, known.learning.state
     return None if mdp is None or state is None else spot(mdp, state)
 
 
-def _question(known: Known, now_s: float) -> Json | None:
+def _question(known: PageContent, now_s: float) -> Json | None:
     pending = known.pending
     if pending is None:
         return None
@@ -254,7 +254,7 @@ def _question(known: Known, now_s: float) -> Json | None:
     }
 
 
-def _standing(known: Known, now_s: float) -> Json:
+def _standing(known: PageContent, now_s: float) -> Json:
     learning = known.learning
     gate = learning.gate
     means = improvement([*learning.lately], gate.window) if gate is not None else None
@@ -276,7 +276,7 @@ def _standing(known: Known, now_s: float) -> Json:
     }
 
 
-PARTS: dict[str, Callable[[Known, float], Any]] = {
+PARTS: dict[str, Callable[[PageContent, float], Any]] = {
     "lesson": _lesson,
     "place": _place,
     "robot": _robot,
@@ -296,7 +296,7 @@ PARTS: dict[str, Callable[[Known, float], Any]] = {
 }
 
 
-def layer_of(known: Known, layer: int | None = None) -> Json | None:
+def layer_of(known: PageContent, layer: int | None = None) -> Json | None:
     """The marks and values of a layer's cells, by default of the robot's layer; None when there is no grid."""
     learning, mdp = known.learning, known.learning.mdp
     place = None if mdp is None else place_of(mdp)

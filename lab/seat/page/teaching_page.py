@@ -19,7 +19,7 @@ from lab.seat.event_text import Told
 from lab.seat.grid_text import StateWords
 from lab.seat.page.page_console import PARTS as RUN_PARTS
 from lab.seat.page.page_console import Console, bars_of, made_until
-from lab.seat.page.page_messages import Answer
+from lab.seat.page.page_messages import PageAnswer
 from lab.seat.page.page_panel import CLOSED, SeatPanel
 from lab.seat.page.page_question import said_of
 from lab.seat.page.page_run import hear_run
@@ -235,7 +235,7 @@ class SeatPage(LiveView):
             self._server.wake()
 
 
-def _said(pending: Pending, answer: Answer | None) -> int | None:
+def _said(pending: Pending, answer: PageAnswer | None) -> int | None:
     """The action of an answer; raises AdvisorLeft, Undo or KeyboardInterrupt, see `SeatPage.ask`."""
     if answer is None:
         raise AdvisorLeft(f"no answer within {pending.wait_s:g} s")

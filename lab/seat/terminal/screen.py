@@ -10,7 +10,7 @@ from rich.text import Text
 
 from lab.learning.requests import AdviceRequest
 from lab.seat import request_text
-from lab.seat.grid_text import GAP, Marks, Picture, StateWords, both_views, picture_of
+from lab.seat.grid_text import GAP, Marks, StateWords, TextPicture, both_views, picture_of
 from lab.seat.terminal.typed_answer import example, letters
 
 Parts = dict[str, list[Text]]
@@ -87,7 +87,9 @@ def _head(request: AdviceRequest, width: int, known: StateWords | None) -> list[
     return folded([title if len(title) <= width else f"{step.capitalize()} {at}"], width, "bold")
 
 
-def _beside_views(request: AdviceRequest, marks: Marks, views: Picture, known: StateWords, width: int) -> list[Text]:
+def _beside_views(
+    request: AdviceRequest, marks: Marks, views: TextPicture, known: StateWords, width: int
+) -> list[Text]:
     """The views with the moves on their right if there is room, else below; the learner's lines below both."""
     panel = width - views.width - GAP
     keys = {action: letter for letter, action in letters(request.mdp).items()}
@@ -118,7 +120,7 @@ def _joined(pictured: Sequence[Text], numbers: Sequence[Text], column: int) -> l
     return lines
 
 
-def _beside(request: AdviceRequest, marks: Marks, whole: Picture, width: int, height: int) -> list[Text]:
+def _beside(request: AdviceRequest, marks: Marks, whole: TextPicture, width: int, height: int) -> list[Text]:
     """The picture with the numbers on its right and its legend below it."""
     panel = width - whole.width - GAP
     texts = [request_text.choice(request, marks), "", *request_text.progress(request), request_text.standing(request)]
@@ -130,7 +132,7 @@ def _beside(request: AdviceRequest, marks: Marks, whole: Picture, width: int, he
     return lines + notes + folded([note] * bool(note), width)
 
 
-def _below(request: AdviceRequest, marks: Marks, whole: Picture | None, width: int, height: int) -> list[Text]:
+def _below(request: AdviceRequest, marks: Marks, whole: TextPicture | None, width: int, height: int) -> list[Text]:
     """The picture with the numbers below it; numbers are dropped if the picture would have too few rows."""
     brief = width < BRIEF
     parts: Parts = {
@@ -141,7 +143,7 @@ def _below(request: AdviceRequest, marks: Marks, whole: Picture | None, width: i
         "progress": folded(request_text.progress(request, brief), width, "dim"),
         "standing": folded([request_text.standing(request, brief)], width, "dim"),
     }
-    whole = whole or Picture([])
+    whole = whole or TextPicture([])
     if whole.is_fixed and len(whole.lines) + len(parts["moves"]) > height:
         return [*whole.lines, *_all(parts)]  # it scrolls in any case
     picture = whole
@@ -161,8 +163,8 @@ def _all(parts: Parts) -> list[Text]:
 
 
 def _under_its_note(
-    request: AdviceRequest, marks: Marks, whole: Picture, parts: Parts, width: int, height: int
-) -> Picture:
+    request: AdviceRequest, marks: Marks, whole: TextPicture, parts: Parts, width: int, height: int
+) -> TextPicture:
     """The picture that fits beside the numbers and its own note, which is the longer the less the picture shows."""
     picture, parts["note"] = whole, []
     for _ in range(4):

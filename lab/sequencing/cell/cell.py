@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lab.errors import BadInput, unknown
-from lab.sequencing.cell.precedence import Precedence, Rule, Step, check_precedences, made_in, signatures
+from lab.sequencing.cell.precedence import Precedence, RouteStep, Rule, check_precedences, made_in, signatures
 from lab.sequencing.cell.routes import (
     NeededMoves,
     Position,
@@ -341,8 +341,8 @@ class Cell:
     def _check_precedences(self) -> None:
         if not is_serial(self.laid_out, self.robots):
             raise BadInput("precedences: they are for cells of one robot, and machines without servers")
-        steps = [Step(name, leaves) for name in self.names for leaves in (False, True)]
-        does = dict[str, list[Step]]()
+        steps = [RouteStep(name, leaves) for name in self.names for leaves in (False, True)]
+        does = dict[str, list[RouteStep]]()
         for part, start in enumerate(self.starts, 1):
             own = sorted(reached_from(self.laid_out, {start}))
             ends = {place for place in own if not self.laid_out[place].options}

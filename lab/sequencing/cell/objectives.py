@@ -11,7 +11,7 @@ MAKESPAN = "makespan"
 WITH_DUE_TIMES = ("mean-tardiness", "tardy-parts")
 
 
-class Run(Protocol):
+class ObservedRun(Protocol):
     """The values of a run that objectives use; implemented by `lab.sequencing.simulate.run.Run`."""
 
     cell: Cell
@@ -25,27 +25,27 @@ class Run(Protocol):
         """Whether every part is finished."""
 
 
-def _makespan(run: Run) -> float:
+def _makespan(run: ObservedRun) -> float:
     """When the last part is finished [s]."""
     return run.end_s
 
 
-def _mean_tardiness(run: Run) -> float:
+def _mean_tardiness(run: ObservedRun) -> float:
     """The mean tardiness of the parts; an early part counts 0 [s]."""
     return sum(_late_s(run)) / run.cell.parts
 
 
-def _tardy_parts(run: Run) -> float:
+def _tardy_parts(run: ObservedRun) -> float:
     """The number of parts that are finished later than due."""
     return float(sum(late > 0 for late in _late_s(run)))
 
 
-def _robot_idle(run: Run) -> float:
+def _robot_idle(run: ObservedRun) -> float:
     """The total time that the robot waits, at machines and for arrivals [s]."""
     return run.waited_s
 
 
-def _machine_idle(run: Run) -> float:
+def _machine_idle(run: ObservedRun) -> float:
     """The idle time of all places of the routes' machines from time 0 to the makespan, added up [s]."""
     return machine_places(run.cell) * run.end_s - run.processed_s
 
@@ -59,7 +59,7 @@ def machine_places(cell: Cell) -> int:
 
 
 # name -> function(run) of a finished run
-OBJECTIVES: dict[str, Callable[[Run], float]] = {
+OBJECTIVES: dict[str, Callable[[ObservedRun], float]] = {
     MAKESPAN: _makespan,
     "mean-tardiness": _mean_tardiness,
     "tardy-parts": _tardy_parts,
@@ -84,7 +84,7 @@ def check_built_in(name: str, who: str) -> None:
         raise BadInput(f"objective '{name}': {who} has no rule for it, only for {', '.join(BUILT_IN)}")
 
 
-def cost(run: Run, objective: str) -> float:
+def cost(run: ObservedRun, objective: str) -> float:
     """The objective's value of a run; for a deadlock `stuck_cost`, which is more than that of any finished run."""
     return OBJECTIVES[objective](run) if run.done else stuck_cost(run.cell, objective)
 
@@ -96,6 +96,6 @@ def stuck_cost(cell: Cell, objective: str) -> float:
     return 10.0 * cell.longest_s * (machine_places(cell) if objective == "machine-idle" else 1.0) + 1.0
 
 
-def _late_s(run: Run) -> list[float]:
+def _late_s(run: ObservedRun) -> list[float]:
     due_s = run.cell.due_s or (0.0,) * run.cell.parts
     return [max(0.0, (end or 0.0) - due) for end, due in zip(run.finished_s, due_s, strict=True)]

@@ -9,7 +9,7 @@ from lab.sequencing.cell.routes import Option, Position, reached_from
 
 
 @dataclass(frozen=True)
-class Step:
+class RouteStep:
     """A transfer on a part's route: the one that brings it to a station or, with `leaves`, the one that takes it away."""
 
     station: str
@@ -29,9 +29,9 @@ class Precedence:
     """
 
     parts: tuple[int, ...]
-    step: Step
+    step: RouteStep
     of: tuple[int, ...]
-    of_step: Step
+    of_step: RouteStep
     needs: tuple[int, ...] = ()
 
     @property
@@ -75,7 +75,9 @@ def signatures(precedences: Sequence[Precedence], parts: int) -> list[tuple[tupl
     return [tuple((part in one.parts, part in one.of) for one in precedences) for part in range(1, parts + 1)]
 
 
-def made_in(positions: Sequence[Position], own: Collection[int], step: Step, names: Sequence[str]) -> frozenset[int]:
+def made_in(
+    positions: Sequence[Position], own: Collection[int], step: RouteStep, names: Sequence[str]
+) -> frozenset[int]:
     """The positions of a product in which its part has made a step."""
     ways = [way for place in own for way in positions[place].options if way.carries == "part"]
     at = [names[way.origin] if step.leaves else names[way.target] for way in ways]
@@ -88,7 +90,7 @@ def check_precedences(
     precedences: Sequence[Precedence],
     names: Sequence[str],
     part_names: Sequence[str],
-    steps: Mapping[str, Collection[Step]],
+    steps: Mapping[str, Collection[RouteStep]],
 ) -> None:
     """Raises BadInput for a precedence with invalid parts, stations or counts; steps: those on every route of each product."""
     for one in precedences:

@@ -18,7 +18,7 @@ class Stretch:
     seconds: float
 
 
-class Held(NamedTuple):
+class HeldStretch(NamedTuple):
     """A stretch (by number) on a path, and from when until when it is held after the start, at speed 1 [s]."""
 
     stretch: int
@@ -26,7 +26,7 @@ class Held(NamedTuple):
     until_s: float
 
 
-Way = tuple[Held, ...]
+Way = tuple[HeldStretch, ...]
 
 
 def check_track(track: Sequence[Stretch], names: Sequence[str]) -> None:
@@ -69,7 +69,7 @@ def ways_on(track: Sequence[Stretch], names: Sequence[str]) -> Mapping[tuple[int
             found[start, here] = way
             for there, n, seconds in beside[here]:
                 if there not in reached:
-                    held = Held(n, at_s, at_s + seconds)
+                    held = HeldStretch(n, at_s, at_s + seconds)
                     heappush(ahead, (at_s + seconds, count + 1, (*by, n), there, (*way, held)))
     return found
 

@@ -16,7 +16,7 @@ from lab.sequencing.simulate.waits import Arc, earliest
 NEAR_S = 1e-3  # the most by which slack may shorten a period that is also feasible without slack
 
 
-class Timed(NamedTuple):
+class TimedCycle(NamedTuple):
     """The shortest period [s], and the earliest begin of each move in it, counted from the first move.
 
     recurs: the number of cycles that the critical circuit of constraints spans. When all moves are made as early as possible,
@@ -50,7 +50,7 @@ def arcs_of(line: Line, order: Sequence[int], wraps: Sequence[int], slack_s: flo
             yield Arc(span.pick, span.drop, -work_s - span.most_s - slack_s, -periods)
 
 
-def shortest_period(line: Line, order: Sequence[int], wraps: Sequence[int]) -> Timed | None:
+def shortest_period(line: Line, order: Sequence[int], wraps: Sequence[int]) -> TimedCycle | None:
     """The shortest period in which the order can be repeated; None when it cannot be repeated in any.
 
     Latest picks have the same tolerance as in the simulation (`SLACK_S`).
@@ -61,7 +61,7 @@ def shortest_period(line: Line, order: Sequence[int], wraps: Sequence[int]) -> T
     return exact or slack
 
 
-def _shortest(arcs: Sequence[Arc], first: int) -> Timed | None:
+def _shortest(arcs: Sequence[Arc], first: int) -> TimedCycle | None:
     """The shortest period in which all constraints hold; None: there is none.
 
     It begins with too short a period and increases it to the ratio of a violated circuit of constraints (Newton's method on the
@@ -74,7 +74,7 @@ def _shortest(arcs: Sequence[Arc], first: int) -> Timed | None:
     while True:
         begin_s, broken = earliest(arcs, moves, first, period_s)
         if not broken:
-            return Timed(period_s, tuple(begin_s), recurs)
+            return TimedCycle(period_s, tuple(begin_s), recurs)
         least_s, periods = sum(arc.least_s for arc in broken), sum(arc.periods for arc in broken)
         if periods <= 0 or least_s / periods <= period_s:
             return None
@@ -92,8 +92,8 @@ class Cycle:
     """A cycle: the order of the line's moves, the first at time 0, and the period [s].
 
     begin_s: by move, when the robot begins it (with its service) in the period. wraps: by stay, how many cycles begin while a
-    part stays. recurs: see `Timed`. bound_s: a lower bound of the period of all cycles with as many parts; proven: whether no
-    period is shorter than this one, within some microseconds.
+    part stays. recurs: see `TimedCycle`. bound_s: a lower bound of the period of all cycles with as many parts; proven: whether
+    no period is shorter than this one, within some microseconds.
     """
 
     line: Line
@@ -182,7 +182,7 @@ def best_cycle(cell: Cell, mix: Sequence[str], time_limit_s: float = TIME_LIMIT_
     return found.cycle
 
 
-class Found(NamedTuple):
+class ShortestCycle(NamedTuple):
     """The result of a search for cycles. cycle: the shortest one found; None: none.
 
     above_s: a lower bound of the periods searched [s]; inf: no cycle exists. proven: whether no cycle is shorter than the one
@@ -196,7 +196,7 @@ class Found(NamedTuple):
 
 def shortest(
     cell: Cell, mix: Sequence[str], time_limit_s: float, seed: int, least_s: float = 0.0, below_s: float = inf
-) -> Found:
+) -> ShortestCycle:
     """The shortest cycle of a mix with a period below `below_s`; least_s: a known lower bound of the period.
 
     cell: must have the times of its one robot (`at_speed`).
@@ -227,10 +227,10 @@ def shortest(
                 best = Cycle(line, timed.period_s, timed.begin_s, answer.order, answer.wraps, timed.recurs)
         above_s = min(above_s, bound_s)
     if best is None:
-        return Found(None, above_s, above_s >= below_s - resolution_s)
+        return ShortestCycle(None, above_s, above_s >= below_s - resolution_s)
     proven = best.period_s - above_s <= resolution_s
     bound_s = best.period_s if proven else above_s
-    return Found(replace(best, bound_s=bound_s, proven=proven), bound_s, proven)
+    return ShortestCycle(replace(best, bound_s=bound_s, proven=proven), bound_s, proven)
 
 
 def check_cyclic(cell: Cell, mix: Sequence[str]) -> None:

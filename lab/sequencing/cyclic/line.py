@@ -29,7 +29,7 @@ class CycleMove:
 
 
 @dataclass(frozen=True)
-class Span:
+class LineSpan:
     """The time from the drop of one move to the begin of a later move of the same part, both by number.
 
     least_s, most_s: the limits of that time, with all periods in between counted [s].
@@ -63,15 +63,15 @@ class Line:
         )
 
     @cached_property
-    def stays(self) -> tuple[Span, ...]:
+    def stays(self) -> tuple[LineSpan, ...]:
         """The stays of parts between two consecutive moves, each of 0 s or more."""
         ends = zip(self.moves[:-1], self.moves[1:], strict=True)
-        return tuple(Span(n, n + 1) for n, (one, then) in enumerate(ends) if one.slot == then.slot)
+        return tuple(LineSpan(n, n + 1) for n, (one, then) in enumerate(ends) if one.slot == then.slot)
 
     @cached_property
-    def needs(self) -> tuple[Span, ...]:
+    def needs(self) -> tuple[LineSpan, ...]:
         """The processing times before picks, and the latest picks after them."""
-        found = list[Span]()
+        found = list[LineSpan]()
         begun: tuple[int, float] | None = None
         for number, move in enumerate(self.moves):
             at = self.cell.positions[move.place]
@@ -83,7 +83,7 @@ class Line:
             if begun is not None and move.option.waits:
                 drop, least_s = begun
                 most_s = inf if at.at_most_s is None else least_s + at.at_most_s - move.option.service_s
-                found.append(Span(drop, number, least_s, most_s))
+                found.append(LineSpan(drop, number, least_s, most_s))
         return tuple(found)
 
     @cached_property

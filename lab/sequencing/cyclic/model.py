@@ -6,7 +6,7 @@ from math import ceil, floor, gcd, inf, isfinite
 from typing import Any, NamedTuple
 
 from lab.sequencing.cell.ways import TICKS_PER_S
-from lab.sequencing.cyclic.line import Line, Span
+from lab.sequencing.cyclic.line import Line, LineSpan
 from lab.sequencing.methods.cp_sat_solver import cp_model
 
 TICKS = round(TICKS_PER_S)
@@ -17,7 +17,7 @@ FINE = (10**4, 840)
 NEAR = 1e-3  # tolerance of sums of times, in units
 
 
-class Answer(NamedTuple):
+class CycleSolution(NamedTuple):
     """The solver's result for a line. above_s: a lower bound of the period [s]; inf: no cycle exists.
 
     order, wraps: of the best cycle found, as in `cycle.arcs_of`; empty: none was found.
@@ -93,7 +93,7 @@ class CycleModel:
         self._add_turns()
         self.model.minimize(self._period)
 
-    def solve(self, time_limit_s: float, seed: int) -> Answer:
+    def solve(self, time_limit_s: float, seed: int) -> CycleSolution:
         """The best cycle that is found within the time limit [s], and a lower bound of the period."""
         solver = cp_model.CpSolver()
         solver.parameters.max_time_in_seconds = time_limit_s
@@ -101,15 +101,15 @@ class CycleModel:
         solver.parameters.random_seed = seed
         status = solver.solve(self.model)
         if status == cp_model.INFEASIBLE:
-            return Answer(inf if self._longest >= self.line.longest_s * self.unit else self._longest / self.unit)
+            return CycleSolution(inf if self._longest >= self.line.longest_s * self.unit else self._longest / self.unit)
         # Begins rounded down satisfy all constraints with the period rounded up, which is longer by less than one unit.
         above_s = (solver.best_objective_bound - 1) / self.unit
         if status not in (cp_model.OPTIMAL, cp_model.FEASIBLE):
-            return Answer(above_s)
+            return CycleSolution(above_s)
         numbers = range(len(self.line.moves))
         before = {pair: one if isinstance(one, int) else solver.value(one) for pair, one in self._before.items()}
         order = sorted(numbers, key=lambda move: sum(before[other, move] for other in numbers))
-        return Answer(above_s, tuple(order), tuple(solver.value(wraps) for wraps in self._wraps))
+        return CycleSolution(above_s, tuple(order), tuple(solver.value(wraps) for wraps in self._wraps))
 
     def _down(self, time_s: float) -> int:
         return floor(time_s * self.unit + NEAR)
@@ -133,7 +133,7 @@ class CycleModel:
             self.model.add(ahead >= first_s).only_enforce_if(literal)
             self.model.add(self._period - ahead >= second_s).only_enforce_if(literal)
 
-    def _most(self, stay: Span) -> int:
+    def _most(self, stay: LineSpan) -> int:
         """The largest number of cycles that may begin while a part stays."""
         cell, moves = self.line.cell, self.line.moves
         room = min(cell.capacities[station] for station in cell.positions[moves[stay.pick].place].holds)
@@ -142,7 +142,7 @@ class CycleModel:
         inside_s = max((s.least_s for s in self.line.needs if s.drop <= stay.drop and s.pick >= stay.pick), default=0.0)
         return min(room, 2 + ceil(inside_s / max(self.least_s, 1e-9)))
 
-    def _within(self, span: Span) -> None:
+    def _within(self, span: LineSpan) -> None:
         """Adds the processing time before a pick, and its latest time."""
         inside = [n for n, stay in enumerate(self.line.stays) if span.drop < stay.pick <= span.pick]
         if len(inside) == 1:
@@ -153,7 +153,7 @@ class CycleModel:
         self.model.add(total == sum(self._wraps[n] for n in inside))
         self._lasts(span, total, most)
 
-    def _lasts(self, span: Span, wraps: cp_model.IntVar, most_wraps: int) -> None:
+    def _lasts(self, span: LineSpan, wraps: cp_model.IntVar, most_wraps: int) -> None:
         apart = self._begin[span.pick] - self._begin[span.drop] - self._work[span.drop]
         for times in range(most_wraps + 1):
             these = self._is(wraps, times)

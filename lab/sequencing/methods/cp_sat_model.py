@@ -11,10 +11,10 @@ from lab.sequencing.cell.objectives import MAKESPAN, WITH_DUE_TIMES, machine_pla
 from lab.sequencing.cell.routes import entry
 from lab.sequencing.cell.ways import Way, distances, follows, ways_of
 from lab.sequencing.methods.cp_sat_solver import Solution, cp_model
-from lab.sequencing.methods.cp_sat_times import Timed, Times, longest, timed
+from lab.sequencing.methods.cp_sat_times import TimedMove, Times, longest, timed
 
 
-class Task(NamedTuple):
+class MoveTask(NamedTuple):
     """A move that one part may make: whether it does, and when the robot begins it, its waiting over, and drops.
 
     waits: whether the robot has to wait before; None: it never does.
@@ -54,7 +54,7 @@ class Model:
         self._longest = known[-1].drop if objective == MAKESPAN and known else most
         self._holds = [[s in place.holds for place in cell.positions] for s in range(len(cell.stations))]
         self._distances = distances(cell, self.times.per_s)
-        self._tasks: list[Task] = []
+        self._tasks: list[MoveTask] = []
         self._arcs: dict[tuple[int, int], cp_model.IntVar] = {}
         self._come: dict[tuple[int, int], cp_model.IntVar] = {}
         self._travels: list[cp_model.LinearExpr] = []
@@ -85,7 +85,7 @@ class Model:
             decisions.append(entry(task.part + 1, task.way.option.choice, self.cell.parts))
         return tuple(decisions)
 
-    def _suggest(self, known: Sequence[Timed]) -> None:
+    def _suggest(self, known: Sequence[TimedMove]) -> None:
         """Give the solver a sequence to begin with."""
         tasks = {(task.part, task.way): number for number, task in enumerate(self._tasks, 1)}
         hints = dict.fromkeys([*self._arcs.values(), *self._come.values()], 0)
@@ -109,7 +109,7 @@ class Model:
 
     def _add_part(self, part: int) -> None:
         """Adds the part's path from its start to an end: one option of each position that it comes to."""
-        reached, own = [self.cell.begin_at[part]], list[Task]()
+        reached, own = [self.cell.begin_at[part]], list[MoveTask]()
         for place in reached:
             self._come[part, place] = self._moment(f"come {part} {place}")
             for way in self._ways:
@@ -129,7 +129,7 @@ class Model:
                 self.model.add(self._first[part] == task.begin).only_enforce_if(task.done)
                 self.model.add(self._taken[part] == task.drop).only_enforce_if(task.done)
 
-    def _task(self, part: int, way: Way) -> Task:
+    def _task(self, part: int, way: Way) -> MoveTask:
         """The optional move of a part: it begins when the part is ready, or when the robot arrives if that is later.
 
         In a cell with time windows it may also begin later, and the robot may hold the part before it drops it.
@@ -150,7 +150,7 @@ class Model:
         if self.cell.has_windows:
             drop, least = self._moment("drop"), drop
             self.model.add(drop >= least).only_enforce_if(done)
-        return Task(part, way, done, begin, drop, waits)
+        return MoveTask(part, way, done, begin, drop, waits)
 
     def _ready(self, part: int, way: Way) -> cp_model.LinearExprT | None:
         """When the part is ready to be picked; None: it always is by the time the robot arrives."""
@@ -230,7 +230,7 @@ class Model:
         return visits
 
     def _visit(
-        self, brings: list[Task], takes: list[Task], inside: bool
+        self, brings: list[MoveTask], takes: list[MoveTask], inside: bool
     ) -> tuple[cp_model.IntVar, cp_model.IntVar, cp_model.IntVar]:
         """A visit's presence, begin and end. inside: the part is there before all moves, and stays if no move takes it."""
         here, begin, leave = self.model.new_bool_var("here"), self._moment("from"), self._moment("until")
@@ -246,7 +246,7 @@ class Model:
             self.model.add(leave == task.drop).only_enforce_if(task.done)
         return here, begin, leave
 
-    def _least(self, brings: list[Task], takes: list[Task]) -> cp_model.LinearExpr:
+    def _least(self, brings: list[MoveTask], takes: list[MoveTask]) -> cp_model.LinearExpr:
         """How long a visit lasts at least: the moves that begin and end it, and the processing."""
         waits = all(task.way.option.waits for task in takes)
         process = [self.times.processing(task.way.option.to) if waits else 0 for task in brings]
@@ -340,7 +340,7 @@ class Model:
             return self._add_late(ends, objective)
         return 1.0 / self.times.per_s
 
-    def _add_late(self, ends: Sequence[Task], objective: str) -> float:
+    def _add_late(self, ends: Sequence[MoveTask], objective: str) -> float:
         due = [self.times.whole(due_s) for due_s in self.cell.due_s or ()]
         if objective == "tardy-parts":
             late = [self.model.new_bool_var("late") for _ in due]

@@ -20,7 +20,7 @@ from lab.sequencing.methods.cp_sat_times import Times
 from lab.sequencing.simulate.follow import follow
 
 
-class Step(NamedTuple):
+class ShopStep(NamedTuple):
     """A part's step from one stop to the next: a robot's trip, if the machine is another one, and a server's work there.
 
     A stop is a position where a part begins, has been worked on, or is finished. trip: one option for each robot; empty: the part
@@ -36,7 +36,7 @@ class Shop(NamedTuple):
     """The steps that the parts of a cell may take. steps: by stop; layers: for each part, the sets of stops that it may reach
     after 0, 1, ... operations."""
 
-    steps: Mapping[int, tuple[Step, ...]]
+    steps: Mapping[int, tuple[ShopStep, ...]]
     layers: tuple[tuple[tuple[int, ...], ...], ...]
 
     @property
@@ -53,7 +53,7 @@ def shop_of(cell: Cell, objective: str) -> Shop | None:
     full = any(0 < room < cell.parts for room in _rooms(cell))
     if more or full or not alike or objective not in (MAKESPAN, *WITH_DUE_TIMES):
         return None
-    steps, layers = dict[int, tuple[Step, ...]](), list[tuple[tuple[int, ...], ...]]()
+    steps, layers = dict[int, tuple[ShopStep, ...]](), list[tuple[tuple[int, ...], ...]]()
     for start in cell.begin_at:
         found: list[tuple[int, ...]] = [(start,)]
         while any(cell.positions[stop].options for stop in found[-1]):
@@ -77,21 +77,21 @@ def _rooms(cell: Cell) -> list[int]:
     return [cell.capacities[station] for station in {s for place in cell.positions for s in place.holds}]
 
 
-def _steps(cell: Cell, stop: int) -> tuple[Step, ...] | None:
+def _steps(cell: Cell, stop: int) -> tuple[ShopStep, ...] | None:
     """The steps from a stop; None: one of its options does not occur in a shop."""
-    found, trips = list[Step](), defaultdict[tuple[int, int], list[Option]](list)
+    found, trips = list[ShopStep](), defaultdict[tuple[int, int], list[Option]](list)
     for way in cell.positions[stop].options:
         if way.if_full is not None or way.carries == "pallet":
             return None
         if way.robot == SERVER:
-            found.append(Step(way.to, (), way))
+            found.append(ShopStep(way.to, (), way))
         else:
             trips[way.target, way.to].append(way)
     for (_, to), ways in trips.items():
         works = cell.positions[to].options
         if any(work.robot != SERVER for work in works) or (works and cell.positions[to].processing_s):
             return None
-        found += [Step(work.to, tuple(ways), work) for work in works] or [Step(to, tuple(ways), None)]
+        found += [ShopStep(work.to, tuple(ways), work) for work in works] or [ShopStep(to, tuple(ways), None)]
     return tuple(found)
 
 
@@ -99,13 +99,13 @@ class _Operation(NamedTuple):
     """A part's operation from one layer to the next. takes: a literal by stop and step; at: a literal by the stop reached."""
 
     part: int
-    takes: dict[tuple[int, Step], cp_model.IntVar]
+    takes: dict[tuple[int, ShopStep], cp_model.IntVar]
     at: dict[int, cp_model.IntVar]
     depart: cp_model.IntVar
     begin: cp_model.IntVar
     end: cp_model.IntVar
 
-    def trips(self) -> dict[Step, cp_model.IntVar]:
+    def trips(self) -> dict[ShopStep, cp_model.IntVar]:
         """The literal of each step that needs a robot."""
         return {step: taken for (_, step), taken in self.takes.items() if step.trip}
 
@@ -158,7 +158,7 @@ class ShopModel:
             free = one.end
         return free
 
-    def _carried(self, step: Step) -> int:
+    def _carried(self, step: ShopStep) -> int:
         return self.times.work(step.trip[0]) if step.trip else 0
 
     def _worked(self, stop: int) -> int:

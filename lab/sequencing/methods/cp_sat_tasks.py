@@ -22,7 +22,7 @@ class Team(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Task:
+class PartTask:
     """A task with a part at a position: a robot of a team carries it on, or a server of a station works on it.
 
     options: one for each robot of the team. begin: when the service before the pick, or the server's work, begins. left: when the
@@ -46,7 +46,7 @@ class Task:
         return self.options[0]
 
 
-class Least:
+class LeastTimes:
     """Least times by position, in units.
 
     stay: from a part's arrival there until it may leave. head: from the start of its routes until it arrives. tail: from its
@@ -108,7 +108,7 @@ def possible_tasks(cell: Cell) -> int:
     return sum(tasks[place] for at in cell.begin_at for place in ahead[at])
 
 
-Follows = tuple[Task, Task, tuple[cp_model.LiteralT, ...]]
+Follows = tuple[PartTask, PartTask, tuple[cp_model.LiteralT, ...]]
 
 
 class Tasks:
@@ -122,19 +122,19 @@ class Tasks:
 
     def __init__(self, cell: Cell, model: cp_model.CpModel, times: Times, horizon: int) -> None:
         self.cell, self.model, self.times, self.horizon = cell, model, times, horizon
-        self.least, self.teams = Least(cell, times), teams_of(cell)
+        self.least, self.teams = LeastTimes(cell, times), teams_of(cell)
         options = [way for at in cell.positions for way in at.options]
         self._ahead = {at: reached_from(cell.positions, {at}) for at in set(cell.begin_at)}
         self.blocking = [s for s in range(len(cell.stations)) if self._may_be_full(s)]
         self.ranked = bool(self.blocking) or cell.arrivals is not None or any(o.if_full is not None for o in options)
-        self.all: list[Task] = []
+        self.all: list[PartTask] = []
         self.follows, self.frees, self.brings = list[Follows](), list[Follows](), list[Follows]()
         self._ready: dict[tuple[int, int], cp_model.LinearExprT] = {}
         self._certain: set[tuple[int, int]] = set()  # (part, place): wherever it may go, it comes there
         for part in cell.unfinished:
             self._add(part - 1)
 
-    def of(self, part: int) -> list[Task]:
+    def of(self, part: int) -> list[PartTask]:
         """The tasks of one part."""
         return [task for task in self.all if task.part == part]
 
@@ -142,7 +142,7 @@ class Tasks:
         """A time of the model."""
         return self.model.new_int_var(0, self.horizon, name)
 
-    def after(self, task: Task, before: Task, *when: cp_model.LiteralT, begun: bool = False) -> None:
+    def after(self, task: PartTask, before: PartTask, *when: cp_model.LiteralT, begun: bool = False) -> None:
         """Puts a task after another one in the list of decisions, and its begin after the other's end, if all literals hold.
 
         begun: the task need only begin after the other's begin.
@@ -159,7 +159,7 @@ class Tasks:
 
     def _add(self, part: int) -> None:
         cell, start = self.cell, self.cell.begin_at[part]
-        reached, into = [start], defaultdict[int, list[Task]](list)
+        reached, into = [start], defaultdict[int, list[PartTask]](list)
         self._ready[part, start] = self._first_ready(part)
         left = defaultdict[int, int](int)  # options into a position that have no task yet
         for place in self._ahead[start]:
@@ -182,10 +182,10 @@ class Tasks:
                     self._ready[part, task.option.to] = self._ready_at(part, task.option.to, into[task.option.to])
                     reached.append(task.option.to)
 
-    def _ready_at(self, part: int, place: int, into: Sequence[Task]) -> cp_model.LinearExprT:
+    def _ready_at(self, part: int, place: int, into: Sequence[PartTask]) -> cp_model.LinearExprT:
         """When a part may leave the position that the tasks `into` bring it to."""
 
-        def ready(task: Task) -> cp_model.LinearExprT:
+        def ready(task: PartTask) -> cp_model.LinearExprT:
             if self.cell.positions[place].processing_s is None:
                 return self._ready[part, task.place]
             return task.end if task.option.robot == SERVER else task.end + self.times.processing(place)
@@ -197,7 +197,7 @@ class Tasks:
             self.model.add(common == ready(task)).only_enforce_if(task.done)
         return common
 
-    def _leaving(self, part: int, place: int) -> list[Task]:
+    def _leaving(self, part: int, place: int) -> list[PartTask]:
         at, found = self.cell.positions[place], list[tuple[Option, ...]]()
         for way in at.options:
             alike = [team for team in self.teams if team.able(way)]
@@ -209,7 +209,7 @@ class Tasks:
                 found.append((way,))
         return [self._task(part, place, options, len(found) == 1) for options in found]
 
-    def _task(self, part: int, place: int, options: tuple[Option, ...], only: bool) -> Task:
+    def _task(self, part: int, place: int, options: tuple[Option, ...], only: bool) -> PartTask:
         model, option, at = self.model, options[0], self.cell.positions[place]
         start, takes = self.cell.begin_at[part], self.least.takes(option)
         certain = only and (place == start or (part, place) in self._certain)
@@ -238,7 +238,7 @@ class Tasks:
         if rank is not None and option.robot != SERVER and isinstance(end, cp_model.IntVar):
             put = model.new_int_var(0, most, "put")
             model.add(put >= rank)
-        return Task(part, place, options, done, begin, left, end, rank, put)
+        return PartTask(part, place, options, done, begin, left, end, rank, put)
 
     def _first_ready(self, part: int) -> cp_model.LinearExprT:
         """When a part may leave the place where it begins."""
@@ -268,12 +268,12 @@ def _same(option: Option) -> tuple[int, int]:
 Nodes = Sequence[tuple[int, int, cp_model.LiteralT]]
 
 
-class Visit(NamedTuple):
+class PartVisit(NamedTuple):
     """A part's visit to a station: the task that brings it (None: it begins there) and the tasks that may take it away."""
 
     part: int
-    bring: Task | None
-    takes: tuple[Task, ...]
+    bring: PartTask | None
+    takes: tuple[PartTask, ...]
 
 
 def add_chains(model: cp_model.CpModel, nodes: Nodes, most: int, chains: int) -> None:
@@ -296,19 +296,19 @@ def add_rooms(tasks: Tasks) -> None:
             _add_full(tasks, task, task.option.if_full)
 
 
-def _visits(tasks: Tasks, station: int) -> list[Visit]:
+def _visits(tasks: Tasks, station: int) -> list[PartVisit]:
     """Every visit of a part to a station; a route may lead to it more than once, and each visit has its own leaving tasks."""
-    positions, found = tasks.cell.positions, list[Visit]()
+    positions, found = tasks.cell.positions, list[PartVisit]()
     holds = [station in place.holds for place in positions]
 
-    def visit(part: int, bring: Task | None, begin: int) -> Visit:
+    def visit(part: int, bring: PartTask | None, begin: int) -> PartVisit:
         there, ahead = {begin}, [begin]
         while ahead:
             more = {way.to for way in positions[ahead.pop()].options if holds[way.to]} - there
             there |= more
             ahead += more
         takes = tuple(t for t in tasks.of(part) if t.place in there and not holds[t.option.to])
-        return Visit(part, bring, takes)
+        return PartVisit(part, bring, takes)
 
     for part, begin in enumerate(tasks.cell.begin_at):
         if holds[begin]:
@@ -318,7 +318,7 @@ def _visits(tasks: Tasks, station: int) -> list[Visit]:
     return found
 
 
-def _add_room(tasks: Tasks, station: int, visits: Sequence[Visit]) -> None:
+def _add_room(tasks: Tasks, station: int, visits: Sequence[PartVisit]) -> None:
     """Gives each place of a station to one part after the other: the next is dropped after the one before was taken out."""
     model, nodes = tasks.model, list[tuple[int, int, cp_model.LiteralT]]()
     for number, visit in enumerate(visits, 1):
@@ -340,7 +340,7 @@ def _add_room(tasks: Tasks, station: int, visits: Sequence[Visit]) -> None:
     add_chains(model, nodes, len(visits), tasks.cell.capacities[station])
 
 
-def _add_full(tasks: Tasks, task: Task, station: int) -> None:
+def _add_full(tasks: Tasks, task: PartTask, station: int) -> None:
     """Allows a task into a buffer only when the station ahead is full, counting parts that are on their way there."""
     model, inside = tasks.model, list[cp_model.IntVar]()
     for visit in _visits(tasks, station):

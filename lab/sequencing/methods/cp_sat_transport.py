@@ -15,7 +15,7 @@ from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import MAKESPAN, WITH_DUE_TIMES, cost, machine_places
 from lab.sequencing.cell.routes import SERVER, choice_of, entry, part_of
 from lab.sequencing.methods.cp_sat_solver import Solution, cp_model
-from lab.sequencing.methods.cp_sat_tasks import Follows, Task, Tasks, Team, add_chains, add_rooms
+from lab.sequencing.methods.cp_sat_tasks import Follows, PartTask, Tasks, Team, add_chains, add_rooms
 from lab.sequencing.methods.cp_sat_times import Times
 from lab.sequencing.methods.cp_sat_track import Track
 from lab.sequencing.simulate.follow import follow, spoils, steps
@@ -31,7 +31,7 @@ class Tours(NamedTuple):
     """
 
     team: Team
-    tasks: list[Task]
+    tasks: list[PartTask]
     arcs: Arcs
     firsts: Arcs
 
@@ -99,7 +99,7 @@ class TransportModel:
         return min(runs, key=lambda one: one[1])[0]
 
     @staticmethod
-    def _picked(solver: Solution) -> Callable[[Task], tuple[int, int]]:
+    def _picked(solver: Solution) -> Callable[[PartTask], tuple[int, int]]:
         """The sort key of a task by when its part leaves its place."""
         value = solver.value
         return lambda task: (value(task.begin if task.option.robot == SERVER else task.left), value(task.end))
@@ -123,11 +123,11 @@ class TransportModel:
         return tuple(found), cost(follow(self.cell, found) if self.cell.has_windows else run, self._objective)
 
     def _in_order(
-        self, solver: Solution, more: Sequence[Follows], when: Callable[[Task], tuple[int, int]]
+        self, solver: Solution, more: Sequence[Follows], when: Callable[[PartTask], tuple[int, int]]
     ) -> tuple[int, ...]:
         """The decisions sorted by `when` within the precedences `follows` and `more`; empty: these contain a cycle."""
         number = {task: n for n, task in enumerate(self.tasks.all) if solver.boolean_value(task.done)}
-        robot = dict[Task, int]()
+        robot = dict[PartTask, int]()
         for team, tasks, arcs, firsts in self._tours:
             free = list(team.robots)
             for tour in _routes(solver, arcs):
@@ -135,7 +135,7 @@ class TransportModel:
                 own = next(one for one in free if not starts or self._start(one) == starts[0])
                 free.remove(own)
                 robot |= {tasks[node - 1]: own for node in tour}
-        order = TopologicalSorter[Task](dict.fromkeys(number, ()))
+        order = TopologicalSorter[PartTask](dict.fromkeys(number, ()))
         for before, task, literals in (*self.tasks.follows, *more):
             if all(solver.boolean_value(literal) for literal in literals):
                 order.add(task, before)
@@ -143,7 +143,7 @@ class TransportModel:
             order.prepare()
         except CycleError:
             return ()
-        ready, found = list[tuple[int, int, int, Task]](), list[int]()
+        ready, found = list[tuple[int, int, int, PartTask]](), list[int]()
         while order.is_active():
             for task in order.get_ready():
                 heappush(ready, (*when(task), number[task], task))
@@ -161,8 +161,8 @@ class TransportModel:
 
     def _suggest(self, known: dict[tuple[int, int, int], tuple[int, int]]) -> None:
         """Give the solver a sequence to begin with."""
-        hints, last = dict[int, tuple[cp_model.IntVar, int]](), dict[int, Task]()
-        follows, begins = set[tuple[Task | None, Task | None]](), set[tuple[int, Task]]()
+        hints, last = dict[int, tuple[cp_model.IntVar, int]](), dict[int, PartTask]()
+        follows, begins = set[tuple[PartTask | None, PartTask | None]](), set[tuple[int, PartTask]]()
         for rank, ((part, place, choice), (begin, _)) in enumerate(known.items()):
             for task in self.tasks.all:
                 if (task.part, task.place) != (part, place):
@@ -243,7 +243,7 @@ class TransportModel:
     def _start(self, robot: int) -> int:
         return self.cell.index(self.cell.robots[robot].start)
 
-    def _gap(self, task: Task, then: Task, alone: bool) -> int | None:
+    def _gap(self, task: PartTask, then: PartTask, alone: bool) -> int | None:
         """The least time between two tasks of a robot that the part itself requires; None: they cannot follow each other."""
         if task.part != then.part:
             return 0
@@ -253,7 +253,7 @@ class TransportModel:
             return None
         return gap + (least.stay[then.place] if then.option.waits else 0)
 
-    def _last(self, tasks: Sequence[Task], arcs: Arcs) -> list[cp_model.LinearExprT]:
+    def _last(self, tasks: Sequence[PartTask], arcs: Arcs) -> list[cp_model.LinearExprT]:
         """When each robot has done all its tasks: the end of its last one, 0 where it has none."""
         ends = list[cp_model.LinearExprT]()
         for number, task in enumerate(tasks, 1):
@@ -263,7 +263,9 @@ class TransportModel:
                 ends.append(end)
         return ends
 
-    def _arc(self, arcs: Arcs, left: int, then: int, before: Task | None, task: Task, gap: int) -> cp_model.IntVar:
+    def _arc(
+        self, arcs: Arcs, left: int, then: int, before: PartTask | None, task: PartTask, gap: int
+    ) -> cp_model.IntVar:
         """The literal that a robot or server does one task right after another, or as its first, at least `gap` later."""
         done = arcs[left, then] = self.model.new_bool_var("follows")
         free = gap if before is None else before.end + gap
@@ -272,13 +274,13 @@ class TransportModel:
             self.tasks.after(task, before, done)
         return done
 
-    def _chain(self, tasks: Sequence[Task], arcs: Arcs, chains: int) -> None:
+    def _chain(self, tasks: Sequence[PartTask], arcs: Arcs, chains: int) -> None:
         """Puts every task that is done into one of at most `chains` chains of these arcs."""
         nodes: list[tuple[int, int, cp_model.LiteralT]] = [(left, then, arc) for (left, then), arc in arcs.items()]
         nodes += [(number, number, ~task.done) for number, task in enumerate(tasks, 1)]
         add_chains(self.model, nodes, len(tasks), chains)
 
-    def _span(self, task: Task) -> cp_model.IntervalVar:
+    def _span(self, task: PartTask) -> cp_model.IntervalVar:
         size = self.tasks.least.takes(task.option)
         return self.model.new_optional_interval_var(task.begin, size, task.begin + size, task.done, "works")
 

@@ -19,7 +19,7 @@ class MonteCarloResult(LearnedSequence):
     q: Table
 
 
-class MonteCarlo(GreedyLearner):
+class MonteCarloAverage(GreedyLearner):
     """Q is the average return of the episodes in which a pair was visited; before the first visit it is 1, as in the listing.
 
     The initial values are optimistic: no return of the thesis's cells comes near 1, so the greedy choice tries new pairs first.
@@ -48,5 +48,5 @@ def monte_carlo(cell: Cell, search: Search, rng: np.random.Generator) -> MonteCa
     as in `srl`. Raises BadInput for an objective that the cell lacks data for, and for a makespan of 0 s;
     WorkFailed when every episode ended in a deadlock. Source: thesis ch. 7.6 and its listing (Q = 1 at the start).
     """
-    learned = learn(cell, search, drawn_seed(rng), MonteCarlo)
+    learned = learn(cell, search, drawn_seed(rng), MonteCarloAverage)
     return MonteCarloResult(*learned.log.found(cell), learned.final_cost, learned.table)

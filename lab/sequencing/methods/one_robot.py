@@ -24,7 +24,7 @@ from lab.sequencing.simulate.follow import simulate
 from lab.sequencing.simulate.run import Run
 
 if TYPE_CHECKING:
-    from lab.sequencing.methods.one_robot_kernels import Work
+    from lab.sequencing.methods.one_robot_kernels import RobotWork
 
 TIME_LIMIT_S = 60.0
 FIRST_WIDTH = (
@@ -87,7 +87,7 @@ def one_robot(cell: Cell, time_limit_s: float = TIME_LIMIT_S, shared: Shared | N
         raise BadInput(f"search of one robot's tours: not for {reason}")
     begin, times = perf_counter(), Times(cell, shortest=0)
     shared = Shared(cell, MAKESPAN) if shared is None else shared
-    search = _Search(cell, times)
+    search = _SequenceSearch(cell, times)
     width, states = FIRST_WIDTH, 0
     while True:
         passed, kept = search.widen(width, begin + time_limit_s, shared.look)
@@ -103,7 +103,7 @@ def one_robot(cell: Cell, time_limit_s: float = TIME_LIMIT_S, shared: Shared | N
     return OneRobot(cost, search.sequence, min(bound, cost), states, perf_counter() - begin, times.rounded_s)
 
 
-class _Search:
+class _SequenceSearch:
     """The best value and sequence so far, and the bound, in the units of `times`."""
 
     def __init__(self, cell: Cell, times: Times) -> None:
@@ -122,20 +122,20 @@ class _Search:
         """
         kernels, work, parts = self._kernels, self._work, len(self._work.counts)
         none, zero = np.full(1, -1, np.int64), np.zeros(1, np.int64)
-        layer = kernels.Layer(zero, none, zero, work.ready.reshape(1, parts), zero, np.zeros((1, 3), np.int64))
+        layer = kernels.SearchLayer(zero, none, zero, work.ready.reshape(1, parts), zero, np.zeros((1, 3), np.int64))
         made, cut, states = list[NDArray[np.int64]](), kernels.FAR, 0
         for _ in range(int(work.counts.sum())):
             look()
             if self.sequence and perf_counter() > until_s:
                 return False, states
-            layer = kernels.Layer(*kernels.expand(work, self._rest, layer, self._start, self.best))
+            layer = kernels.SearchLayer(*kernels.expand(work, self._rest, layer, self._start, self.best))
             order = np.lexsort((layer.ready.sum(1), layer.now, layer.last, layer.code))
             kept = order[kernels.needed(work, layer, order)]
             if len(kept) > width:
                 rank = np.lexsort((layer.now[kept], layer.bound[kept]))
                 cut = min(cut, int(layer.bound[kept[rank[width]]]))
                 kept = kept[rank[:width]]
-            layer = kernels.Layer(*(array[kept] for array in layer))
+            layer = kernels.SearchLayer(*(array[kept] for array in layer))
             made.append(layer.made)
             states += len(kept)
         if len(layer.code):
@@ -225,8 +225,8 @@ def _sizes(cell: Cell) -> int:
     return size
 
 
-def _work_of(cell: Cell, times: Times) -> "Work":
-    from lab.sequencing.methods.one_robot_kernels import Work
+def _work_of(cell: Cell, times: Times) -> "RobotWork":
+    from lab.sequencing.methods.one_robot_kernels import RobotWork
 
     routes = [_ways(cell, part) for part in range(cell.parts)]
     counts = np.array([sum(way.robot != SERVER for way in route) for route in routes], np.int64)
@@ -250,4 +250,4 @@ def _work_of(cell: Cell, times: Times) -> "Work":
     least = np.array(distances(cell, times.per_s), np.int64)
     ready = np.array([times.whole(seconds) for seconds in cell.begin_s], np.int64)
     weight = np.cumprod(np.concatenate([[1], counts[:-1] + 1])).astype(np.int64)
-    return Work(counts, at, process, carry, empty, least, queues, ready, tail, weight)
+    return RobotWork(counts, at, process, carry, empty, least, queues, ready, tail, weight)

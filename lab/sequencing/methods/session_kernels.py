@@ -57,7 +57,7 @@ class Method(NamedTuple):
     rules: LearningRules
 
 
-class Learning(NamedTuple):
+class LearningSetup(NamedTuple):
     """The cell in which sessions learn, the same cell without chance, and the method."""
 
     cell: CellArrays
@@ -65,7 +65,7 @@ class Learning(NamedTuple):
     method: Method
 
 
-class Found(NamedTuple):
+class SessionOutcomes(NamedTuple):
     """The results of N sessions of E episodes of up to L moves.
 
     costs, complete (N, E): of each episode. sequences (N, L): the best decisions so far, then zeros. ends (N, 2): the cost of
@@ -78,7 +78,7 @@ class Found(NamedTuple):
     ends: Floats
 
     @classmethod
-    def room(cls, sessions: int, episodes: int, moves: int) -> "Found":
+    def room(cls, sessions: int, episodes: int, moves: int) -> "SessionOutcomes":
         """Empty arrays for the results."""
         shape = sessions, episodes
         ends = np.zeros((sessions, 2))

@@ -70,10 +70,10 @@ class SessionLearner:
             offset=0.0 if search.objective == MAKESPAN else 1.0,
         )
 
-    def learning(self, cell: Cell, keys: Keys) -> arrays.Learning:
+    def learning(self, cell: Cell, keys: Keys) -> arrays.LearningSetup:
         """The parameters of the compiled session in a cell; keys: those of its settings."""
         there = cell_arrays(cell, self._search.objective, self._search.chance)
-        return arrays.Learning(there, cell_arrays(cell, self._search.objective), arrays.Method(keys, self.rules))
+        return arrays.LearningSetup(there, cell_arrays(cell, self._search.objective), arrays.Method(keys, self.rules))
 
     def epsilon(self, episode: int) -> float:
         """The probability of a random decision in an episode, numbered from 1."""
@@ -117,7 +117,7 @@ class GreedyLearner(SessionLearner):
 
 
 @dataclass(frozen=True)
-class Learned:
+class LearnedSession:
     """The results of a session: its episodes, the final greedy policy's cost, and the values."""
 
     log: Log
@@ -151,7 +151,7 @@ class _Session:
     guide: Guide = field(default_factory=Guide)
 
 
-def learn(cell: Cell, search: Search, seed: int, kind: type[SessionLearner]) -> Learned:
+def learn(cell: Cell, search: Search, seed: int, kind: type[SessionLearner]) -> LearnedSession:
     """The results of a session; it is compiled unless its states do not fit in 63 bits. seed: 0 to 2**64 - 1.
 
     Raises BadInput for an objective that the cell lacks data for, and for a cost of 0 where the learner needs 1 / T.
@@ -165,7 +165,7 @@ def learn(cell: Cell, search: Search, seed: int, kind: type[SessionLearner]) -> 
 
 def learn_readably(
     cell: Cell, search: Search, seed: int, kind: type[SessionLearner], guide: Guide | None = None
-) -> Learned:
+) -> LearnedSession:
     """`learn` in Python, one move after the other; a guide may replace every decision and is told each episode's cost."""
     learner = kind(search)
     session = _Session(cell, search, learner, stream(seed), Values(learner.first))
@@ -182,7 +182,7 @@ def learn_readably(
         session.guide.ends(value)
     session.guide = Guide()
     run, _, _ = walk(session, Episode(cell), 0.0, learns=False)
-    return Learned(noted, cost(run, search.objective), session.values.table())
+    return LearnedSession(noted, cost(run, search.objective), session.values.table())
 
 
 def walk(session: _Session, times: Episode, epsilon: float, learns: bool) -> tuple[Run, list[int], list[Key]]:
@@ -220,7 +220,7 @@ def episode_seed(seed: int, episode: int) -> int:
     return int(uniform(~seed & MASK, episode) * 2.0**53)
 
 
-def learn_compiled(cell: Cell, search: Search, seed: int, kind: type[SessionLearner], keys: Keys) -> Learned:
+def learn_compiled(cell: Cell, search: Search, seed: int, kind: type[SessionLearner], keys: Keys) -> LearnedSession:
     """`learn`, compiled; keys: those of its settings."""
     learner, noted, longest = kind(search), Log(search), most_moves(cell)
     learning = learner.learning(cell, keys)
@@ -230,14 +230,14 @@ def learn_compiled(cell: Cell, search: Search, seed: int, kind: type[SessionLear
     for first in range(1, search.episodes + 1, BLOCK):
         numbers = range(first, min(first + BLOCK, search.episodes + 1))
         work = _with_room(work, keys, len(numbers) * longest)
-        found = arrays.Found.room(1, len(numbers), longest)
+        found = arrays.SessionOutcomes.room(1, len(numbers), longest)
         epsilons = np.array([learner.epsilon(episode) for episode in numbers])
         session_kernels.advance(learning, work, seeds, epsilons, first, found)
         sequence, final_cost = tuple(found.sequences[found.sequences > 0].tolist()), float(found.ends[0, 1])
         for value, done in zip(found.costs[0].tolist(), found.complete[0].tolist(), strict=True):
             learner.check(value)
             noted.note(sequence, value, done)
-    return Learned(noted, final_cost, _table(keys, work.memory))
+    return LearnedSession(noted, final_cost, _table(keys, work.memory))
 
 
 def _with_room(work: arrays.SessionArrays, keys: Keys, rows: int) -> arrays.SessionArrays:

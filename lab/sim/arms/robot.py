@@ -98,7 +98,7 @@ class MotionListener(Protocol):
         """The arm is about to stay for so many physics steps."""
 
 
-class Robot:
+class RobotArm:
     """The arm in a world. Its motions are generators: each `next` sets the targets of one physics step."""
 
     def __init__(

@@ -13,7 +13,7 @@ from typing import NamedTuple
 from lab.errors import BadInput, WorkFailed
 from lab.sim.arms.arm import Arm
 from lab.sim.arms.kinematics import ToolPose
-from lab.sim.arms.robot import Robot
+from lab.sim.arms.robot import RobotArm
 from lab.sim.parts.holding import SLOW, Load, check_friction, grip_force_n, needs_fine, with_force
 from lab.sim.parts.kinds import Kind, Spot
 from lab.sim.world import World
@@ -67,7 +67,7 @@ def _lost(
         force_n = grip_force_n(robot, load)
         if load.is_usual(force_n, robot.acceleration_m_s2) and not robot.is_file:
             continue
-        if went := tried(Trial(arm, kind, force_n, robot.speed_m_s, robot.acceleration_m_s2, fine, laps, turn_rad)):
+        if went := tried(HoldTrial(arm, kind, force_n, robot.speed_m_s, robot.acceleration_m_s2, fine, laps, turn_rad)):
             yield kind, went
 
 
@@ -84,7 +84,7 @@ def _gentler(
     return None
 
 
-class Trial(NamedTuple):
+class HoldTrial(NamedTuple):
     """A kind that an arm takes up with a force [N], moving as fast [m/s] and speeding up as much [m/s2] as in its task.
 
     laps: how often it is carried from side to side, round a corner, and turned, by turn_rad.
@@ -101,13 +101,13 @@ class Trial(NamedTuple):
 
 
 @lru_cache(maxsize=64)
-def tried(trial: Trial) -> str:
+def tried(trial: HoldTrial) -> str:
     """The failure of a trial, in a world of its own, in words; "" for none, and where the arm has no room for the trial."""
     place = _place(trial)
     if place is None:
         return ""
     with World() as world:
-        robot = Robot(world, trial.arm, trial.speed_m_s, trial.acceleration_m_s2, trial.force_n, trial.fine)
+        robot = RobotArm(world, trial.arm, trial.speed_m_s, trial.acceleration_m_s2, trial.force_n, trial.fine)
         bodies = _built(world, trial.kind, place)
         hand = _Hand(world, robot, trial.kind, bodies[0])
         robot.stand(_way(trial, place)[0])
@@ -121,7 +121,7 @@ def tried(trial: Trial) -> str:
         return _ended(world, trial.kind, bodies, place)
 
 
-def _place(trial: Trial) -> Spot | None:
+def _place(trial: HoldTrial) -> Spot | None:
     """The spot of the part: ahead of the arm, where the arm reaches the whole path; None: there is none."""
     for out in OUT:
         spot = Spot(out, 0.0, FOOT_M, 0.0)
@@ -130,7 +130,7 @@ def _place(trial: Trial) -> Spot | None:
     return None
 
 
-def _way(trial: Trial, spot: Spot) -> list[ToolPose]:
+def _way(trial: HoldTrial, spot: Spot) -> list[ToolPose]:
     """The tool poses: at the part, above it, to one side, to the other and round a corner, turned above it."""
     at = trial.kind.held_at(spot)
     up = at.shifted(dz=LIFT_M)
@@ -156,7 +156,7 @@ class _Hand:
     """The fingers and the part between them."""
 
     world: World
-    robot: Robot
+    robot: RobotArm
     kind: Kind
     body: str
     low_m: float = 0.0  # of the part's middle under the tool when it was taken

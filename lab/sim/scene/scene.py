@@ -6,7 +6,7 @@ from math import cos, sin
 from lab.sim import models
 from lab.sim.arms.arm_models import arm_of
 from lab.sim.arms.kinematics import ToolPose
-from lab.sim.arms.robot import Robot
+from lab.sim.arms.robot import RobotArm
 from lab.sim.frames import Rgba, Vector
 from lab.sim.parts.holding import Load, grip_force_n, needs_fine
 from lab.sim.parts.kinds import Kind, Spot, beside, comes_as, kinds_of
@@ -40,7 +40,7 @@ class Scene:
         robot = task.robot
         self.grips_n = {name: grip_force_n(robot, Load.of(kind)) for name, kind in self.kinds.items()}
         firmest_n, fine = max(self.grips_n.values()), needs_fine(robot, self.kinds.values())
-        self.robot = Robot(world, arm, robot.speed_m_s, robot.acceleration_m_s2, firmest_n, fine)
+        self.robot = RobotArm(world, arm, robot.speed_m_s, robot.acceleration_m_s2, firmest_n, fine)
         self.stops_at_n = robot.force_limit_n or max(STOPS_AT_N, STOPS_AT_GRIPS * firmest_n)
         for station in task.stations:
             self._build_station(station)

@@ -7,38 +7,47 @@ from pathlib import Path
 
 from lab.errors import BadInput
 from lab.tasks.cell_file import CellFile
-from lab.tasks.instances.source import Asked, Source
+from lab.tasks.instances.source import InstanceRequest, Source
 from lab.tasks.instances.taillard import BLOCKS
 from lab.tasks.record import MAX_SHORT_BYTES, read_text
 
-__all__ = ["INSTANCES", "SUFFIXES", "Asked", "Format", "format_of", "is_instance", "read_instance", "takes_case"]
+__all__ = [
+    "INSTANCES",
+    "SUFFIXES",
+    "InstanceFormat",
+    "InstanceRequest",
+    "format_of",
+    "is_instance",
+    "read_instance",
+    "takes_case",
+]
 
 SUFFIXES = (".csv", ".dzn", ".yaml", ".yml", ".json", ".jsp", ".jssp", ".fjs")  # of files that are instances
 
 
 @dataclass(frozen=True)
-class Format:
+class InstanceFormat:
     """A format: its description, the module of this package that reads it, and the file endings that decide unclear content."""
 
     help: str
     module: str
     suffixes: tuple[str, ...] = ()
 
-    def read(self, source: Source, asked: Asked) -> CellFile:
+    def read(self, source: Source, asked: InstanceRequest) -> CellFile:
         """The cell of a file of this format; imports its module. Raises BadInput, with file and line, for a damaged file."""
         cell: CellFile = import_module(f"{__name__}.{self.module}").read(source, asked)
         return cell
 
 
 INSTANCES = {
-    "jsplib": Format("job shops of JSPLIB and the OR-Library, text", "jsplib", (".jsp", ".jssp")),
-    "taillard": Format("Taillard's job shops, text: times, then machines", "taillard"),
-    "fjsplib": Format("flexible job shops of FJSPLIB, text", "fjsplib", (".fjs",)),
-    "bilge-ulusoy": Format("job sets of Bilge and Ulusoy, CSV; --case SET:LAYOUT, such as 7:1", "bilge_ulusoy"),
-    "phillips-unger": Format("tanks of a hoist line, CSV; --layout: its empty moves", "phillips_unger"),
-    "hoist": Format("hoist lines as MiniZinc data", "dzn", (".dzn",)),
-    "jobshoplab": Format("JobShopLab's job shops with vehicles, YAML", "jobshoplab", (".yaml", ".yml")),
-    "pyjobshop": Format("PyJobShop's JSON, without breaks and deadlines", "pyjobshop", (".json",)),
+    "jsplib": InstanceFormat("job shops of JSPLIB and the OR-Library, text", "jsplib", (".jsp", ".jssp")),
+    "taillard": InstanceFormat("Taillard's job shops, text: times, then machines", "taillard"),
+    "fjsplib": InstanceFormat("flexible job shops of FJSPLIB, text", "fjsplib", (".fjs",)),
+    "bilge-ulusoy": InstanceFormat("job sets of Bilge and Ulusoy, CSV; --case SET:LAYOUT, such as 7:1", "bilge_ulusoy"),
+    "phillips-unger": InstanceFormat("tanks of a hoist line, CSV; --layout: its empty moves", "phillips_unger"),
+    "hoist": InstanceFormat("hoist lines as MiniZinc data", "dzn", (".dzn",)),
+    "jobshoplab": InstanceFormat("JobShopLab's job shops with vehicles, YAML", "jobshoplab", (".yaml", ".yml")),
+    "pyjobshop": InstanceFormat("PyJobShop's JSON, without breaks and deadlines", "pyjobshop", (".json",)),
 }
 
 
@@ -54,15 +63,15 @@ def is_instance(path: Path) -> bool:
     return re.match(r"\s*(#[^\n]*[^\n.#SG][^\n]*\n\s*)*([0-9]|[Nn]b\b)", start) is not None
 
 
-def takes_case(path: Path, asked: Asked) -> bool:
+def takes_case(path: Path, asked: InstanceRequest) -> bool:
     """Whether --case names one of several instances in a file and its layouts, instead of an order of parts."""
     return asked.layout is not None or format_of(_source(path)) == "bilge-ulusoy"
 
 
-def read_instance(path: Path, asked: Asked | None = None) -> CellFile:
+def read_instance(path: Path, asked: InstanceRequest | None = None) -> CellFile:
     """The cell of an instance file of any format; raises BadInput, with file and line, for a damaged file."""
     source = _source(path)
-    return INSTANCES[format_of(source)].read(source, asked or Asked())
+    return INSTANCES[format_of(source)].read(source, asked or InstanceRequest())
 
 
 def _source(path: Path) -> Source:

@@ -8,13 +8,13 @@ from lab.sequencing.cell.cell import MAX_PARTS
 from lab.tasks.cell_file import CellFile
 from lab.tasks.instances.job_shop import JobShop, case_parts, cell_of_shop, in_layout
 from lab.tasks.instances.layout import csv_rows, read_layout
-from lab.tasks.instances.source import MOST_OPERATIONS, Asked, Source
+from lab.tasks.instances.source import MOST_OPERATIONS, InstanceRequest, Source
 
 HEADER = ("set", "job", "operation", "machine", "time")
 Rows = Mapping[tuple[int, int], tuple[str, float, int]]  # (job, operation) -> machine, time, line
 
 
-def read(source: Source, asked: Asked) -> CellFile:
+def read(source: Source, asked: InstanceRequest) -> CellFile:
     """The cell of one job set, in one layout: --case SET:LAYOUT, such as 7:1, or EX71. BadInput, with file and line."""
     sets = _sets(source)
     which, place = case_parts(asked.case)

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from lab.tasks.cell_file import CellFile
 from lab.tasks.instances.hoist import LOAD, PARTS, UNLOAD, HoistLine, cell_of_line
-from lab.tasks.instances.source import MOST_MACHINES, Asked, Source
+from lab.tasks.instances.source import MOST_MACHINES, InstanceRequest, Source
 
 NO_MOST = 9999  # the value in these files for a stay without limit
 NAMES = {  # quantity -> its names in the files
@@ -113,7 +113,7 @@ def _value(source: Source, name: Token, words: list[Token]) -> Value:
     return Value(tuple(rows), first.line)
 
 
-def read(source: Source, asked: Asked) -> CellFile:
+def read(source: Source, asked: InstanceRequest) -> CellFile:
     """The cell of a hoist line; BadInput, with file and line, for data without one, for several hoists and copied tanks."""
     data = _Data(source, values(source))
     tanks = data.count("tanks", None, MOST_MACHINES)

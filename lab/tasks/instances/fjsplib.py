@@ -4,10 +4,10 @@ from collections.abc import Sequence
 
 from lab.tasks.cell_file import CellFile
 from lab.tasks.instances.job_shop import JobShop, Operation, cell_of_shop
-from lab.tasks.instances.source import MOST_OPERATIONS, Asked, Source
+from lab.tasks.instances.source import MOST_OPERATIONS, InstanceRequest, Source
 
 
-def read(source: Source, asked: Asked) -> CellFile:
+def read(source: Source, asked: InstanceRequest) -> CellFile:
     """The cell of a text in this format, with machines numbered from 1; raises BadInput, with file and line, for others."""
     rows = [*source.rows()]
     jobs, machines = source.shape(rows[0])

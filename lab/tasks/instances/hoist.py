@@ -11,7 +11,7 @@ from lab.errors import BadInput
 from lab.tasks.cell_file import CellFile
 from lab.tasks.instances.job_shop import built
 from lab.tasks.instances.layout import csv_rows, read_layout
-from lab.tasks.instances.source import MOST_MACHINES, Asked, Source
+from lab.tasks.instances.source import MOST_MACHINES, InstanceRequest, Source
 
 LOAD, UNLOAD = "load", "unload"
 PARTS = 4  # the default number of parts of a finite order
@@ -35,7 +35,7 @@ class HoistLine:
     parts: int = PARTS
 
 
-def cell_of_line(source: Source, line: HoistLine, asked: Asked) -> CellFile:
+def cell_of_line(source: Source, line: HoistLine, asked: InstanceRequest) -> CellFile:
     """The cell of a hoist line; raises BadInput for several hoists, which would meet on their common track."""
     if asked.robots not in (None, 1):
         wanted = "wanted 1: hoists share a track, and the lab's robots do not hinder each other"
@@ -66,7 +66,7 @@ def cell_of_line(source: Source, line: HoistLine, asked: Asked) -> CellFile:
 HEADER = ("tank", "soak_min", "soak_max", "move_from_previous")
 
 
-def read(source: Source, asked: Asked) -> CellFile:
+def read(source: Source, asked: InstanceRequest) -> CellFile:
     """The cell of a file with a row for each tank, in the order of the parts' path, and a last row "unload".
 
     Raises BadInput, with file and line, for any other.

@@ -9,8 +9,8 @@ from pydantic import ValidationError
 from lab.errors import BadInput
 from lab.sequencing.cell.stations import ROBOT
 from lab.tasks.cell_file import CellFile
-from lab.tasks.instances.layout import Layout, read_layout
-from lab.tasks.instances.source import MOST_OPERATIONS, Asked, Source
+from lab.tasks.instances.layout import TravelTimes, read_layout
+from lab.tasks.instances.source import MOST_OPERATIONS, InstanceRequest, Source
 from lab.tasks.toml_text import explain
 
 IN = "in"  # the station where jobs wait in a shop without travel times
@@ -34,7 +34,7 @@ class JobShop:
     due: tuple[float, ...] | None = None
 
 
-def cell_of_shop(source: Source, shop: JobShop, asked: Asked) -> CellFile:
+def cell_of_shop(source: Source, shop: JobShop, asked: InstanceRequest) -> CellFile:
     """The cell of a job shop; machines take the layout's names, in its order. Raises BadInput for a layout that does not fit."""
     if asked.layout is None:
         if asked.robots is not None:
@@ -56,7 +56,7 @@ def case_parts(case: str | None) -> tuple[str | None, str | None]:
     return None, case.strip()
 
 
-def in_layout(source: Source, shop: JobShop, layout: Layout, robots: int) -> CellFile:
+def in_layout(source: Source, shop: JobShop, layout: TravelTimes, robots: int) -> CellFile:
     """The cell of a job shop in a layout, with `robots` identical vehicles that start where the jobs do."""
     if layout.start is None:
         raise Source(layout.path, "").refusal(None, "a station LU (or load, in, in-buf), where jobs and vehicles begin")

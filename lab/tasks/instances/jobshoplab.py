@@ -15,8 +15,8 @@ import yaml
 from lab.sequencing.cell.cell import MAX_PARTS
 from lab.tasks.cell_file import CellFile
 from lab.tasks.instances.job_shop import JobShop, Operation, in_layout
-from lab.tasks.instances.layout import Layout
-from lab.tasks.instances.source import MOST_MACHINES, MOST_OPERATIONS, Asked, Source
+from lab.tasks.instances.layout import TravelTimes
+from lab.tasks.instances.source import MOST_MACHINES, MOST_OPERATIONS, InstanceRequest, Source
 
 MAX_YAML = 100_000  # bytes; the safe reader takes seconds for more
 MOST_VEHICLES = 50
@@ -89,7 +89,7 @@ def _parsed(source: Source) -> _Yaml:
     return _Yaml(source, node)
 
 
-def read(source: Source, asked: Asked) -> CellFile:
+def read(source: Source, asked: InstanceRequest) -> CellFile:
     """The cell of such a file; raises BadInput, with file and line, for a damaged one and for outages, tools and drawn times."""
     config = _parsed(source).need("instance_config")
     for key in _LEFT_OUT:
@@ -149,7 +149,7 @@ def _jobs(source: Source, spec: _Yaml) -> tuple[int, list[list[Operation]], list
     return machines, found, [line for line, _ in rows[1:]]
 
 
-def _travel(source: Source, spec: _Yaml, machines: int) -> Layout:
+def _travel(source: Source, spec: _Yaml, machines: int) -> TravelTimes:
     """The matrix of travel times without the output buffer; the input buffer is called in-buf."""
     rows = list(spec.table())
     head = [_station(name) for name in rows[0][1].split("|")] if rows else []
@@ -169,7 +169,7 @@ def _travel(source: Source, spec: _Yaml, machines: int) -> Layout:
         raise source.refusal(rows[-1][0], f"{len(head)} rows of times", len(travel))
     end = BUFFERS["output"]
     used = {a: {b: time for b, time in row.items() if b != end} for a, row in travel.items() if a != end}
-    return Layout(source.path, _ordered([name for name in head if name != end]), used)
+    return TravelTimes(source.path, _ordered([name for name in head if name != end]), used)
 
 
 def _ordered(names: Sequence[str]) -> tuple[str, ...]:

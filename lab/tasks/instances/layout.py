@@ -17,7 +17,7 @@ _MOST_ROWS = 100_000
 
 
 @dataclass(frozen=True)
-class Layout:
+class TravelTimes:
     """Travel times of a vehicle: from -> to -> time. `names` are the stations in the file's order."""
 
     path: Path
@@ -53,7 +53,7 @@ def csv_rows(source: Source) -> Iterator[tuple[int, list[str]]]:
         raise source.refusal(reader.line_num, f"CSV: {error}") from None
 
 
-def read_layout(path: Path, case: str | None = None) -> Layout:
+def read_layout(path: Path, case: str | None = None) -> TravelTimes:
     """The travel times of a file; case: the name of one of several layouts. Raises BadInput, with file and line."""
     source = Source(path, read_text(path))
     rows = csv_rows(source)
@@ -69,7 +69,7 @@ def read_layout(path: Path, case: str | None = None) -> Layout:
     names = tuple(dict.fromkeys(name for origin, row in travel.items() for name in (origin, *row)))
     if not names:
         raise source.refusal(None, "travel times: there is none")
-    return Layout(path, names, travel)
+    return TravelTimes(path, names, travel)
 
 
 def _listed(

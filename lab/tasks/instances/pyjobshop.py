@@ -12,7 +12,7 @@ from lab.sequencing.cell.cell import MAX_PARTS
 from lab.tasks.cell_fields import CellProduct
 from lab.tasks.cell_file import CellFile
 from lab.tasks.instances.job_shop import JobShop, Operation, cell_of_shop
-from lab.tasks.instances.source import MOST_MACHINES, MOST_OPERATIONS, MOST_TIME, Asked, Source, json_line
+from lab.tasks.instances.source import MOST_MACHINES, MOST_OPERATIONS, MOST_TIME, InstanceRequest, Source, json_line
 
 NEVER = 2**25  # PyJobShop's value for no deadline; larger values count as none, too
 LISTS = {"jobs": MAX_PARTS, "resources": MOST_MACHINES, "tasks": 20_000, "modes": 200_000}
@@ -56,7 +56,7 @@ class _Json:
         return self.value
 
 
-def read(source: Source, asked: Asked) -> CellFile:
+def read(source: Source, asked: InstanceRequest) -> CellFile:
     """The cell of such a document; raises BadInput, with file and line, for a damaged one and for unsupported features."""
     try:
         raw = json.loads(source.text)

@@ -18,7 +18,7 @@ _TIME = re.compile(r"[0-9]{1,9}(\.[0-9]{0,9})?")
 
 
 @dataclass(frozen=True)
-class Asked:
+class InstanceRequest:
     """The options that go with an instance file; None: not given.
 
     layout: the file of travel times. robots: the number of identical robots. case: the name of one of the file's instances.

@@ -2,12 +2,12 @@
 
 from lab.tasks.cell_file import CellFile
 from lab.tasks.instances.job_shop import JobShop, Operation, cell_of_shop
-from lab.tasks.instances.source import MOST_OPERATIONS, Asked, Source
+from lab.tasks.instances.source import MOST_OPERATIONS, InstanceRequest, Source
 
 BLOCKS = ("times", "machines")
 
 
-def read(source: Source, asked: Asked) -> CellFile:
+def read(source: Source, asked: InstanceRequest) -> CellFile:
     """The cell of a text in this format, with or without words between the blocks; raises BadInput, with file and line."""
     rows = [(line, words) for line, words in source.rows() if words[0][0].isdigit() or words[0][0] in "-+."]
     if not rows:

@@ -9,12 +9,12 @@ from hypothesis import strategies as st
 from lab.seat.page.page_messages import (
     MAX_CHARS,
     MOST_MOVES,
-    Answer,
     Chair,
-    Command,
-    Layer,
+    LayerChoice,
     Message,
     Pace,
+    PageAnswer,
+    PageCommand,
     Refused,
     Wish,
     understood,
@@ -24,17 +24,17 @@ from lab.seat.page.page_messages import (
 @pytest.mark.parametrize(
     ("message", "meant"),
     [
-        ({"answer": {"question": 3, "action": 0}}, Answer(3, 0)),
-        ({"answer": {"question": 3, "word": "skip"}}, Answer(3, None, "skip")),
-        ({"answer": {"question": 3, "word": "undo"}}, Answer(3, None, "undo")),
-        ({"answer": {"question": 3, "path": [3, 1, 3]}}, Answer(3, 3, path=(3, 1, 3))),
-        ({"answer": {"question": 3, "path": [0] * MOST_MOVES}}, Answer(3, 0, path=(0,) * MOST_MOVES)),
+        ({"answer": {"question": 3, "action": 0}}, PageAnswer(3, 0)),
+        ({"answer": {"question": 3, "word": "skip"}}, PageAnswer(3, None, "skip")),
+        ({"answer": {"question": 3, "word": "undo"}}, PageAnswer(3, None, "undo")),
+        ({"answer": {"question": 3, "path": [3, 1, 3]}}, PageAnswer(3, 3, path=(3, 1, 3))),
+        ({"answer": {"question": 3, "path": [0] * MOST_MOVES}}, PageAnswer(3, 0, path=(0,) * MOST_MOVES)),
         ({"replay": "step"}, Pace("step")),
-        ({"command": "jog +x 10"}, Command("jog +x 10")),
+        ({"command": "jog +x 10"}, PageCommand("jog +x 10")),
         ({"seat": "take"}, Wish("take")),
         ({"seat": "give"}, Wish("give")),
-        ({"layer": 4}, Layer(4)),
-        ({"layer": None}, Layer(None)),
+        ({"layer": 4}, LayerChoice(4)),
+        ({"layer": None}, LayerChoice(None)),
     ],
 )
 def test_what_a_page_says_is_understood(message: object, meant: object) -> None:
@@ -98,7 +98,7 @@ def test_a_command_is_one_printable_line(words: str) -> None:
     except Refused:
         assert not words.strip() or not words.isprintable() or len(words) > MAX_CHARS // 8
     else:
-        assert meant == Command(words)
+        assert meant == PageCommand(words)
 
 
 def test_the_first_page_has_the_seat() -> None:

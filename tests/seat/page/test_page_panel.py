@@ -13,7 +13,7 @@ from lab.mdp import TabularMDP, grid
 from lab.production.controls import Controls, Held, StopKind
 from lab.production.operation.desk import RunDesk
 from lab.production.run_journal import RunJournal
-from lab.seat.page.page_messages import Answer
+from lab.seat.page.page_messages import PageAnswer
 from lab.seat.page.page_panel import SeatPanel, plain_json, word_of
 from lab.seat.page.page_run import hear_run
 from lab.seat.page.page_state import PARTS, Pending, ShownLesson, hear
@@ -130,7 +130,7 @@ def test_what_is_not_finite_is_null() -> None:
 
 def test_the_terminal_hears_labels(panel: SeatPanel, mdp: TabularMDP) -> None:
     request = AdviceRequest(mdp=mdp, q=[[0.0] * 4] * 3, state=0, episode=1, step=1, own=2, allowed=range(mdp.n_actions))
-    assert [word_of(request, one) for one in (Answer(1, 3), Answer(1, None, "undo"))] == ["right", "undo"]
+    assert [word_of(request, one) for one in (PageAnswer(1, 3), PageAnswer(1, None, "undo"))] == ["right", "undo"]
     words: list[str] = []
     panel.on_word = words.append
     number = panel.pose(Pending(request, offered=True)).number

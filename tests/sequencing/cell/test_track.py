@@ -8,7 +8,7 @@ import pytest
 from lab.errors import BadInput
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.stations import Product, Robot, Stage, Station
-from lab.sequencing.cell.track import Held, Stretch, travel_s, ways_on
+from lab.sequencing.cell.track import HeldStretch, Stretch, travel_s, ways_on
 from lab.sequencing.simulate.run import Run
 
 NAMES = ("in", "a", "b", "out")
@@ -34,8 +34,8 @@ def line(**changes: Any) -> Cell:
 
 def test_ways_are_the_shortest_and_say_when_each_stretch_is_held() -> None:
     ways = ways_on(LINE, NAMES)
-    assert ways[0, 2] == (Held(0, 0.0, 10.0), Held(1, 10.0, 15.0))
-    assert ways[2, 0] == (Held(1, 0.0, 5.0), Held(0, 5.0, 15.0))
+    assert ways[0, 2] == (HeldStretch(0, 0.0, 10.0), HeldStretch(1, 10.0, 15.0))
+    assert ways[2, 0] == (HeldStretch(1, 0.0, 5.0), HeldStretch(0, 5.0, 15.0))
     assert ways[1, 1] == ()
     around = (*LINE, Stretch("in", "out", 12.0))
     assert [held.stretch for held in ways_on(around, NAMES)[0, 2]] == [0, 1]  # 15 s; by out it would be 22 s

@@ -6,7 +6,7 @@ import pytest
 
 from lab.errors import BadInput
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.cyclic.line import Span, away_s, lines
+from lab.sequencing.cyclic.line import LineSpan, away_s, lines
 
 CellMaker = Callable[..., Cell]
 
@@ -20,7 +20,7 @@ def test_each_way_is_a_line(toast_cell: CellMaker) -> None:
 def test_what_processing_asks_for(oven_cell: CellMaker) -> None:
     (line,) = lines(oven_cell(), ("toast",))
     assert [(move.place, move.work_s) for move in line.moves] == [(0, 2.0), (1, 2.0)]
-    assert line.needs == (Span(0, 1, 10.0),)
+    assert line.needs == (LineSpan(0, 1, 10.0),)
     assert line.holds == {1: (0,)}
 
 
@@ -29,7 +29,7 @@ def test_a_pallet_does_not_hide_the_processing(fms_cell: CellMaker) -> None:
     (line,) = lines(fms_cell("SS"), ("sign",))
     carries = [move.option.carries for move in line.moves]
     assert carries == ["part", "part", "pallet", "part", "part"]
-    assert Span(1, 3, 600.0) in line.needs
+    assert LineSpan(1, 3, 600.0) in line.needs
     assert line.moves[3].work_s == 240.0 + 25.0
 
 

@@ -16,7 +16,7 @@ from lab.sequencing.cell.objectives import OBJECTIVES, stuck_cost
 from lab.sequencing.methods.session_readable import (
     BLOCK,
     ROWS,
-    Learned,
+    LearnedSession,
     SessionLearner,
     learn,
     learn_compiled,
@@ -31,7 +31,7 @@ CellMaker = Callable[..., Cell]
 SEED = 2**64 - 59
 
 
-def assert_same(one: Learned, other: Learned) -> None:
+def assert_same(one: LearnedSession, other: LearnedSession) -> None:
     assert one.log.costs == pytest.approx(other.log.costs)
     assert one.log.best == other.log.best
     assert one.log.best_cost == pytest.approx(other.log.best_cost)
@@ -41,7 +41,7 @@ def assert_same(one: Learned, other: Learned) -> None:
         assert row == pytest.approx(other.table[state]), state
 
 
-def compiled(cell: Cell, search: Search, kind: type[SessionLearner]) -> Learned:
+def compiled(cell: Cell, search: Search, kind: type[SessionLearner]) -> LearnedSession:
     keys = kind.keys(cell, search.settings)
     assert keys is not None
     return learn_compiled(cell, search, SEED, kind, keys)

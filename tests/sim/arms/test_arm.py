@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from lab.sim.arms.arm import Arm
 from lab.sim.arms.arm_models import ARMS, arm_named
 from lab.sim.arms.kinematics import ToolPose
-from lab.sim.arms.robot import Robot
+from lab.sim.arms.robot import RobotArm
 from lab.sim.world import World
 
 names = st.sampled_from(sorted(ARMS))
@@ -112,7 +112,7 @@ def test_physics_has_the_tool_where_the_formulas_say(name: str) -> None:
     arm = arm_named(name)
     rng = np.random.default_rng(3)
     with World() as world:
-        robot = Robot(world, arm, 0.5, 2.0, 25.0)
+        robot = RobotArm(world, arm, 0.5, 2.0, 25.0)
         for turn, share, z, yaw in rng.uniform([-2.9, 0.0, 0.05, -3.2], [2.9, 1.0, 0.5, 3.2], (60, 4)):
             pose = pose_of(arm, turn, share, z, yaw)
             assert robot.stand(pose)

@@ -10,7 +10,7 @@ import pytest
 from lab.errors import BadInput
 from lab.sim.arms.arm_models import ARMS, arm_named, arm_of
 from lab.sim.arms.kinematics import ToolPose
-from lab.sim.arms.robot import NAME, Robot
+from lab.sim.arms.robot import NAME, RobotArm
 from lab.sim.world import World
 from lab.tasks.robot_fields import MODELS, RobotSettings
 
@@ -71,7 +71,7 @@ def test_an_arm_of_ones_own_holds_its_tool_where_it_should(tmp_path: Path) -> No
     assert arm.fingers.links == (("finger_b",), ("finger_a",)) or arm.fingers.links == (("finger_a",), ("finger_b",))
     pose = ToolPose(0.45, -0.2, 0.3, 0.4)
     with World() as world:
-        robot = Robot(world, arm, 0.5, 2.0, 25.0)
+        robot = RobotArm(world, arm, 0.5, 2.0, 25.0)
         assert robot.stand(pose)
         tool = robot.tool()
         assert (tool.x, tool.y, tool.z, tool.yaw) == pytest.approx((0.45, -0.2, 0.3, 0.4), abs=1e-4)

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from lab.files import assets_folder
 from lab.sim.arms.arm_models import ARMS, arm_named
 from lab.sim.arms.kinematics import ToolPose
-from lab.sim.arms.robot import NAME, Robot
+from lab.sim.arms.robot import NAME, RobotArm
 from lab.sim.models import SLICE
 from lab.sim.parts.part_shape import shape_of
 from lab.sim.world import World
@@ -51,7 +51,7 @@ def test_every_gripper_holds_a_slice_that_is_swung_about(name: str) -> None:
     """By friction alone; held still afterwards it creeps by less than 0.5 mm in a second."""
     arm = arm_named(name)
     with World() as world:
-        robot = Robot(world, arm, 0.5, 2.0, 25.0)
+        robot = RobotArm(world, arm, 0.5, 2.0, 25.0)
         pose = ToolPose(0.5, 0.2, 0.25, 0.1)
         robot.stand(pose)
         world.box("table", (0.6, 1.0, 0.1), (0.6, 0.0, pose.z - 0.09 - 0.05), (1, 1, 1, 1))
@@ -87,7 +87,7 @@ def test_fingers_that_close_from_wide_open_leave_a_light_box_where_it_stands(
     size, up_m, (x, y) = (0.0387, 0.0324, 0.073), 0.0388, (0.1845, 0.493)
     fields = PartFields.model_validate({"name": "box", "shape": "box", "size_m": size, "mass_kg": 0.0458})
     with World() as world:
-        robot = Robot(world, arm_named(name), 0.6, 1.5, 25.0, fine=True)
+        robot = RobotArm(world, arm_named(name), 0.6, 1.5, 25.0, fine=True)
         pose = ToolPose(x, y, 0.25, 0.0)
         assert robot.stand(pose)
         middle = (x, y, pose.z - up_m + size[2] / 2)

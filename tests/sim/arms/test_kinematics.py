@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from lab.sim.arms import kinematics as arm
 from lab.sim.arms.arm_models import arm_named
 from lab.sim.arms.kinematics import ToolPose
-from lab.sim.arms.robot import Robot
+from lab.sim.arms.robot import RobotArm
 
 inverse, forward = arm_named("up6").inverse, arm_named("up6").forward
 turns = st.floats(-2.9, 2.9)  # [rad] within the S axis
@@ -82,7 +82,7 @@ def test_local_moves_go_along_the_turned_axes() -> None:
     assert ToolPose(1, 2, 3, 4).shifted(0.5, dyaw=-1) == ToolPose(1.5, 2, 3, 3)
 
 
-def test_pybullet_holds_the_tool_where_the_formulas_say(robot: Robot) -> None:
+def test_pybullet_holds_the_tool_where_the_formulas_say(robot: RobotArm) -> None:
     rng = np.random.default_rng(7)
     checked = 0
     while checked < 150:

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from lab.sim.arms.arm import Arm
 from lab.sim.arms.arm_models import ARMS, arm_named
 from lab.sim.arms.kinematics import ToolPose
-from lab.sim.arms.robot import NAME, Robot
+from lab.sim.arms.robot import NAME, RobotArm
 from lab.sim.urdf_reader import rotation
 from lab.sim.world import World
 
@@ -59,7 +59,7 @@ def test_physics_has_the_level_tool_where_the_formulas_say(name: str) -> None:
     arm = arm_named(name, "level")
     rng = np.random.default_rng(3)
     with World() as world:
-        robot = Robot(world, arm, 0.5, 2.0, 25.0)
+        robot = RobotArm(world, arm, 0.5, 2.0, 25.0)
         for turn, share, z, yaw in rng.uniform([-1.0, 0.0, 0.25, -0.2], [1.0, 1.0, 0.35, 0.2], (30, 4)):
             pose = pose_of(arm, turn, share, z, yaw)
             assert robot.stand(pose)

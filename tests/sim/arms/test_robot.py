@@ -15,7 +15,7 @@ from lab.sim.arms import kinematics
 from lab.sim.arms.arm import Arm
 from lab.sim.arms.arm_models import arm_named
 from lab.sim.arms.kinematics import ToolPose
-from lab.sim.arms.robot import NAME, Robot, Trajectory, plan
+from lab.sim.arms.robot import NAME, RobotArm, Trajectory, plan
 from lab.sim.arms.tool_path import YAW_ARM
 from lab.sim.models import FINGER_OPEN, SLICE
 from lab.sim.parts.part_shape import shape_of
@@ -139,7 +139,7 @@ def test_a_way_out_of_reach_is_refused_with_the_place() -> None:
         plan(UP6, [ToolPose(0.5, -0.1, 0.3), ToolPose(-0.5, 0.1, 0.3)], 0.5, 2.0)  # through its own foot
 
 
-def test_the_arm_comes_to_rest_where_it_was_sent(robot: Robot, world: World) -> None:
+def test_the_arm_comes_to_rest_where_it_was_sent(robot: RobotArm, world: World) -> None:
     goal = ToolPose(0.6, -0.4, 0.2, 0.5)
     count = steps(world, robot.follow([ToolPose(0.8, 0.2, 0.35), goal], blend=0.05))
     at = robot.tool()
@@ -148,7 +148,7 @@ def test_the_arm_comes_to_rest_where_it_was_sent(robot: Robot, world: World) -> 
     assert 0 < count * TIME_STEP < 5
 
 
-def test_targets_never_jump_from_one_motion_to_the_next(robot: Robot, world: World) -> None:
+def test_targets_never_jump_from_one_motion_to_the_next(robot: RobotArm, world: World) -> None:
     """Also where something keeps the arm a little off them: the tool is told to go from where it is held."""
     told: list[np.ndarray] = [UP6.home, UP6.home]  # in each physics step
     drive, step = world.drive, world.step
@@ -170,7 +170,7 @@ def test_targets_never_jump_from_one_motion_to_the_next(robot: Robot, world: Wor
     assert hardest(UP6, np.array(told)) <= robot.acceleration * (1 + 1e-6)
 
 
-def test_an_arm_that_was_moved_goes_on_from_where_it_is(robot: Robot, world: World) -> None:
+def test_an_arm_that_was_moved_goes_on_from_where_it_is(robot: RobotArm, world: World) -> None:
     steps(world, robot.follow([ToolPose(0.6, -0.2, 0.3)]))
     moved = inverse(ToolPose(0.6, 0.2, 0.3))
     assert moved is not None
@@ -180,7 +180,7 @@ def test_an_arm_that_was_moved_goes_on_from_where_it_is(robot: Robot, world: Wor
     assert robot.tool().y == pytest.approx(0.2, abs=1e-3)
 
 
-def test_a_slower_path_takes_longer(robot: Robot, world: World) -> None:
+def test_a_slower_path_takes_longer(robot: RobotArm, world: World) -> None:
     goals = [ToolPose(0.6, -0.4, 0.3), ToolPose(0.6, 0.4, 0.3)]
     steps(world, robot.follow(goals[:1]))
     fast = steps(world, robot.follow(goals[1:]))
@@ -188,13 +188,13 @@ def test_a_slower_path_takes_longer(robot: Robot, world: World) -> None:
     assert 1.8 < slow / fast < 2.0
 
 
-def test_a_target_out_of_reach_stops_the_motion_before_it_begins(robot: Robot, world: World) -> None:
+def test_a_target_out_of_reach_stops_the_motion_before_it_begins(robot: RobotArm, world: World) -> None:
     with pytest.raises(WorkFailed, match="cannot reach"):
         next(iter(robot.follow([ToolPose(2.0, 0.0, 0.3)])))
     assert not robot.stand(ToolPose(2.0, 0.0, 0.3))
 
 
-def test_the_fingers_close_together_and_open_again(robot: Robot, world: World) -> None:
+def test_the_fingers_close_together_and_open_again(robot: RobotArm, world: World) -> None:
     steps(world, robot.follow([ToolPose(0.6, 0.0, 0.3)]))
     steps(world, robot.grip())
     was_closed, closed = robot.closed, world.joints(NAME, FINGERS)
@@ -207,7 +207,7 @@ def test_the_fingers_close_together_and_open_again(robot: Robot, world: World) -
     assert opened[0] == pytest.approx(opened[1], abs=1e-3)
 
 
-def test_friction_alone_holds_a_slice_that_is_swung_about(robot: Robot, world: World) -> None:
+def test_friction_alone_holds_a_slice_that_is_swung_about(robot: RobotArm, world: World) -> None:
     """Lifted and held still it does not creep; swung through 1 m, turned, and held it slides by millimetres at most."""
     angle = 0.4
     pose = ToolPose(0.7 * cos(angle), 0.7 * sin(angle), 0.3, 0.1)
@@ -234,7 +234,7 @@ def test_the_fingers_do_not_push_what_they_turn_out_of_their_middle(turn: float)
     can = shape_of(PartFields(name="can", shape="cylinder", size_m=(0.036, 0.09), mass_kg=0.08), assets_folder())
     at, held = ToolPose(0.7, 0.0, 0.123), ToolPose(0.7, 0.0, 0.173)
     with World() as world:
-        robot = Robot(world, arm_named("up6"), 0.5, 2.0, 12.0, fine=True)
+        robot = RobotArm(world, arm_named("up6"), 0.5, 2.0, 12.0, fine=True)
         world.box("table", (0.4, 0.4, 0.1), (0.7, 0.0, 0.05), (1.0, 1.0, 1.0, 1.0))
         world.part("can", can, 0.08, 0.8, (0.7, 0.0, 0.1 + can.foot_m))
         robot.stand(at)
@@ -244,7 +244,7 @@ def test_the_fingers_do_not_push_what_they_turn_out_of_their_middle(turn: float)
         assert world.pose("can")[0][:2] == pytest.approx((0.7, 0.0), abs=0.002)
 
 
-def _hangs(robot: Robot, world: World) -> np.ndarray:
+def _hangs(robot: RobotArm, world: World) -> np.ndarray:
     """Where the slice's middle is as the tool sees it [m]."""
     tool, at = robot.tool(), world.pose("slice")[0] - (robot.tool().x, robot.tool().y, robot.tool().z)
     c, s = cos(tool.yaw), sin(tool.yaw)

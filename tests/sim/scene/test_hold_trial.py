@@ -9,7 +9,7 @@ from lab.sim.arms.arm_models import arm_of
 from lab.sim.parts.holding import Load, grip_force_n, needs_fine
 from lab.sim.parts.kinds import kinds_of
 from lab.sim.scene import hold_trial
-from lab.sim.scene.hold_trial import Trial, held, tried
+from lab.sim.scene.hold_trial import HoldTrial, held, tried
 from lab.tasks.robot_fields import RobotSettings
 from lab.tasks.task import Task
 from lab.tasks.task_file import load
@@ -58,7 +58,7 @@ def test_a_small_box_does_not_creep(size_m: tuple[float, float, float]) -> None:
     arm, robot = arm_of(task.robot), task.robot
     kind = kinds_of(task.changed(parts=(part, *task.parts[1:])), arm.gripper)[part.name]
     force_n = grip_force_n(robot, Load.of(kind))
-    assert tried(Trial(arm, kind, force_n, 0.5, 2.0, needs_fine(robot, [kind]), laps=2)) == ""
+    assert tried(HoldTrial(arm, kind, force_n, 0.5, 2.0, needs_fine(robot, [kind]), laps=2)) == ""
 
 
 def test_a_slice_that_slips_when_it_is_swung_is_refused() -> None:
@@ -74,8 +74,8 @@ def test_what_happened_is_told(task: Task) -> None:
     """Fingers that hardly press let the slice slide as it is lifted."""
     arm = arm_of(task.robot)
     kind = kinds_of(task, arm.gripper)["slice"]
-    assert tried(Trial(arm, kind, 25.0, 0.5, 2.0)) == ""
-    assert tried(Trial(arm, kind, 0.05, 0.5, 2.0, fine=True)) == "it is lost while it is lifted"
+    assert tried(HoldTrial(arm, kind, 25.0, 0.5, 2.0)) == ""
+    assert tried(HoldTrial(arm, kind, 0.05, 0.5, 2.0, fine=True)) == "it is lost while it is lifted"
 
 
 @pytest.mark.parametrize(
@@ -90,13 +90,13 @@ def test_what_is_held_does_not_creep_however_far_it_is_carried(
     parts = tuple(one.model_copy(update={"mass_kg": mass_kg, "friction": friction}) for one in task.parts)
     arm = arm_of(task.robot)
     kind = kinds_of(task.changed(parts=parts), arm.gripper)["slice"]
-    assert tried(Trial(arm, kind, force_n, speed, acceleration, fine=True, laps=3)) == ""
+    assert tried(HoldTrial(arm, kind, force_n, speed, acceleration, fine=True, laps=3)) == ""
 
 
 def test_it_is_tried_for_as_far_as_the_task_carries_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    task, seen = load("toast"), list[Trial]()
+    task, seen = load("toast"), list[HoldTrial]()
 
-    def nothing_wrong(trial: Trial) -> str:
+    def nothing_wrong(trial: HoldTrial) -> str:
         seen.append(trial)
         return ""
 
@@ -114,7 +114,7 @@ def test_a_gentler_force_with_which_all_are_held_is_chosen_or_named(monkeypatch:
     """As with bricks from a mesh: 22.5 N let them creep, 11 N held them. A force that the file gives is not changed."""
     tries = list[float]()
 
-    def creeps(trial: Trial) -> str:
+    def creeps(trial: HoldTrial) -> str:
         tries.append(trial.force_n)
         return "" if trial.force_n < 12.0 else "it slips by 9 mm while it is swung"
 
@@ -142,4 +142,4 @@ def test_a_level_tool_that_does_not_turn_with_a_part_holds_a_round_one_from_a_me
     kind = kinds_of(task.changed(parts=(crucible,)), arm.gripper)[crucible.name]
     hull = replace(kind, shape=replace(kind.shape, solid="mesh", size=()))
     force_n = grip_force_n(task.robot, Load.of(hull))
-    assert tried(Trial(arm, hull, force_n, 0.4, 1.5, fine=True, laps=2, turn_rad=0.0)) == ""
+    assert tried(HoldTrial(arm, hull, force_n, 0.4, 1.5, fine=True, laps=2, turn_rad=0.0)) == ""

@@ -7,7 +7,7 @@ import pytest
 
 from lab.errors import BadInput
 from lab.tasks.cell_file import CellFile
-from lab.tasks.instances import Asked, read_instance
+from lab.tasks.instances import InstanceRequest, read_instance
 
 LAYOUT = "from,to,time\nLU,M1,6\nLU,M2,8\nM1,LU,12\nM1,M2,6\nM2,LU,10\nM2,M1,6\n"  # the way back is another one
 
@@ -21,7 +21,7 @@ def layout(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def read(tmp_path: Path) -> Callable[..., CellFile]:
-    def of(text: str, name: str = "mine", asked: Asked | None = None) -> CellFile:
+    def of(text: str, name: str = "mine", asked: InstanceRequest | None = None) -> CellFile:
         path = tmp_path / name
         path.write_text(text)
         return read_instance(path, asked)
@@ -33,7 +33,7 @@ def read(tmp_path: Path) -> Callable[..., CellFile]:
 def refused(read: Callable[..., CellFile]) -> Callable[..., str]:
     """The refusal of a text, without the folder."""
 
-    def of(text: str, name: str = "mine", asked: Asked | None = None) -> str:
+    def of(text: str, name: str = "mine", asked: InstanceRequest | None = None) -> str:
         with pytest.raises(BadInput) as caught:
             read(text, name, asked)
         message = str(caught.value)

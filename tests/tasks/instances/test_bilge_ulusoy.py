@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from lab.tasks.cell_file import CellFile
-from lab.tasks.instances import Asked
+from lab.tasks.instances import InstanceRequest
 
 JOBS = "set,job,operation,machine,time\n7,1,1,M1,8\n7,1,2,M2,16\n7,2,1,M2,20\n8,1,1,M1,3\n"
 
@@ -17,7 +17,7 @@ def test_a_case_names_set_and_layout(read: Callable[..., CellFile], tmp_path: Pa
     pairs = [(a, b) for a in ("LU", "M1", "M2") for b in ("LU", "M1", "M2") if a != b]
     rows = [f"{n},{a},{b},{n * 10 + len(a + b)}" for n in (1, 2) for a, b in pairs]
     layouts.write_text("\n".join(["layout,from,to,time", *rows]))
-    file = read(JOBS, "jobs.csv", Asked(layouts, 2, case))
+    file = read(JOBS, "jobs.csv", InstanceRequest(layouts, 2, case))
     cell = file.cell()
     assert file.name == "EX71"
     assert (cell.order, len(cell.robots)) == (("job1", "job2"), 2)
@@ -42,11 +42,11 @@ def test_a_case_names_set_and_layout(read: Callable[..., CellFile], tmp_path: Pa
 def test_a_damaged_file_is_refused_with_its_line(
     refused: Callable[..., str], layout: Path, old: str, new: str, case: str | None, expected: str
 ) -> None:
-    assert refused(JOBS.replace(old, new, 1), "jobs.csv", Asked(layout, 2, case)) == f"jobs.csv: {expected}"
+    assert refused(JOBS.replace(old, new, 1), "jobs.csv", InstanceRequest(layout, 2, case)) == f"jobs.csv: {expected}"
 
 
 def test_a_layout_of_other_machines_is_refused(refused: Callable[..., str], tmp_path: Path) -> None:
     other = tmp_path / "other.csv"
     other.write_text("from,to,time\nA,M1,2\n")
-    said = refused(JOBS, "jobs.csv", Asked(other, 1, "7:1"))
+    said = refused(JOBS, "jobs.csv", InstanceRequest(other, 1, "7:1"))
     assert "wanted a" in said

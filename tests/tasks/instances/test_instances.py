@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from lab.errors import BadInput
 from lab.tasks.cell_file import toml_of
-from lab.tasks.instances import INSTANCES, Asked, format_of, is_instance, read_instance, takes_case
+from lab.tasks.instances import INSTANCES, InstanceRequest, format_of, is_instance, read_instance, takes_case
 from lab.tasks.instances.source import Source
 from lab.tasks.toml_text import TomlText
 
@@ -39,7 +39,7 @@ def test_a_format_is_told_by_its_content(tmp_path: Path, name: str, ending: str)
     path = tmp_path / f"mine.{ending}"
     path.write_text(TEXTS[name])
     assert format_of(Source(path, TEXTS[name])) == name
-    assert takes_case(path, Asked()) == (name == "bilge-ulusoy")
+    assert takes_case(path, InstanceRequest()) == (name == "bilge-ulusoy")
 
 
 @pytest.mark.parametrize("name", [name for name in TEXTS if name != "phillips-unger"])
@@ -99,7 +99,7 @@ def test_a_damaged_file_is_read_or_refused_in_one_line(
     if layout is not None and times is not None:
         layout.write_text(times)
     try:
-        file = read_instance(path, Asked(layout, robots))
+        file = read_instance(path, InstanceRequest(layout, robots))
     except BadInput as error:
         refusal = str(error)
     else:

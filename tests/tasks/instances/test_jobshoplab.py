@@ -5,7 +5,7 @@ from collections.abc import Callable
 import pytest
 
 from lab.tasks.cell_file import CellFile
-from lab.tasks.instances import Asked
+from lab.tasks.instances import InstanceRequest
 
 TEXT = """title: InstanceConfig
 instance_config:
@@ -34,7 +34,7 @@ def test_vehicles_begin_at_the_machines_and_jobs_end_with_their_last_operation(r
     ways = [[stage.station for stage in product.routes[0]] for product in cell.products]
     assert ways == [["in-buf", "m-0", "m-1"], ["in-buf", "m-1", "m-0"]]
     assert cell.loaded_s[cell.index("in-buf"), cell.index("m-1")] == 5.0
-    assert len(read(TEXT, "two.yaml", Asked(robots=1)).cell().robots) == 1
+    assert len(read(TEXT, "two.yaml", InstanceRequest(robots=1)).cell().robots) == 1
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from lab.sequencing import find_sequence
 from lab.sequencing.cell.stations import UNLIMITED
 from lab.sequencing.search import Search
 from lab.tasks.cell_file import CellFile
-from lab.tasks.instances import Asked
+from lab.tasks.instances import InstanceRequest
 
 TWO = "# two jobs\n2 2\n0 3  1 2\n1 4  0 1\n"
 
@@ -32,11 +32,11 @@ def test_without_a_layout_the_jobs_go_on_by_themselves(read: Callable[..., CellF
 
 
 def test_with_a_layout_vehicles_carry_them(read: Callable[..., CellFile], layout: Path) -> None:
-    cell = read(TWO, "two.txt", Asked(layout)).cell()
+    cell = read(TWO, "two.txt", InstanceRequest(layout)).cell()
     assert [robot.start for robot in cell.robots] == ["LU"]
     assert cell.loaded_s[cell.index("M1"), cell.index("LU")] == 12.0
     assert cell.loaded_s[cell.index("LU"), cell.index("M1")] == 6.0
-    several = read(TWO, "two.txt", Asked(layout, robots=3)).cell()
+    several = read(TWO, "two.txt", InstanceRequest(layout, robots=3)).cell()
     assert [robot.name for robot in several.robots] == ["robot 1", "robot 2", "robot 3"]
 
 
@@ -63,4 +63,4 @@ def test_a_damaged_file_is_refused_with_its_line(refused: Callable[..., str], te
 
 
 def test_robots_need_travel_times(refused: Callable[..., str]) -> None:
-    assert refused(TWO, "two.jsp", Asked(robots=2)).endswith("it has no travel times: give --layout FILE")
+    assert refused(TWO, "two.jsp", InstanceRequest(robots=2)).endswith("it has no travel times: give --layout FILE")

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 from lab.errors import BadInput
-from lab.tasks.instances import Asked, pyjobshop, read_instance
+from lab.tasks.instances import InstanceRequest, pyjobshop, read_instance
 
 SPITE = [
     "-1",
@@ -147,7 +147,7 @@ def main(count: int, seed: int = 0) -> None:
             for one in filter(None, (name, beside)):
                 text = damaged(sound[one], chance) if one == spoilt else sound[one]
                 (Path(folder) / one).write_bytes(text.encode(errors="replace"))
-            asked = Asked(None if beside is None else Path(folder) / beside)
+            asked = InstanceRequest(None if beside is None else Path(folder) / beside)
             begun = time.perf_counter()
             try:
                 read_instance(Path(folder) / name, asked)
