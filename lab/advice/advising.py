@@ -9,8 +9,7 @@ from lab.advice.advisors import PEOPLE, AdvisorName, RecordedAdvisor, make_advis
 from lab.advice.entries import Read, read_journal
 from lab.advice.journal import Journal
 from lab.advice.panel import Panel, PanelSettings, members_of
-from lab.advice.policy_advisor import PolicyAdvisor
-from lab.advice.table_level import TableLevel
+from lab.advice.table_level import PolicyAdvisor, TableLevel
 from lab.errors import BadInput
 from lab.learning.environment import Environment
 from lab.learning.requests import Advisor, Ask

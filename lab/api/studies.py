@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from lab.api.options import Advisors, OneAdvisor, data_frame, several
 from lab.api.pictures import Picture
-from lab.learning.tuned_ranges import USUAL
+from lab.learning.settings import USUAL
 from lab.studies import checked, study_of
 from lab.studies.compared import Compared, compared
 from lab.studies.findings import Findings, Row

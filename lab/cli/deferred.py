@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from lab.learning.gates import GATES
     from lab.learning.requests import Ask, Request
     from lab.learning.selection import SELECTIONS
-    from lab.learning.tuned_ranges import USUAL
+    from lab.learning.settings import USUAL
     from lab.learning.updates import UPDATES
     from lab.plugins.code_file import is_file_word, take
     from lab.production import load_run
@@ -94,10 +94,9 @@ if TYPE_CHECKING:
     from lab.view.canvas import check_picture
     from lab.view.cell_plan import draw_cell
     from lab.view.cyclic_summary import cyclic_summary
-    from lab.view.escaping_console import EscapingConsole
     from lab.view.meshcat import LiveView, replay_html
     from lab.view.movie import write_movie
-    from lab.view.progress import counting
+    from lab.view.progress import EscapingConsole, counting
     from lab.view.schedule_scene import scene_of
     from lab.view.summary import (
         audit_summary,
@@ -141,7 +140,7 @@ TABLE = {
     "lab.learning.gates": ("GATES",),
     "lab.learning.requests": ("Ask", "Request"),
     "lab.learning.selection": ("SELECTIONS",),
-    "lab.learning.tuned_ranges": ("USUAL",),
+    "lab.learning.settings": ("USUAL",),
     "lab.learning.updates": ("UPDATES",),
     "lab.plugins.code_file": ("is_file_word", "take"),
     "lab.production": ("load_run",),
@@ -209,10 +208,9 @@ TABLE = {
     "lab.view.canvas": ("check_picture",),
     "lab.view.cell_plan": ("draw_cell",),
     "lab.view.cyclic_summary": ("cyclic_summary",),
-    "lab.view.escaping_console": ("EscapingConsole",),
+    "lab.view.progress": ("counting", "EscapingConsole"),
     "lab.view.meshcat": ("LiveView", "replay_html"),
     "lab.view.movie": ("write_movie",),
-    "lab.view.progress": ("counting",),
     "lab.view.schedule_scene": ("scene_of",),
     "lab.view.summary": (
         "audit_summary",

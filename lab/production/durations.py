@@ -37,7 +37,7 @@ Way = Pair | CarriedPath
 
 
 class TimedMove(NamedTuple):
-    """How long the robot took in a run [s] from one station to another: empty, or with something in the gripper (`CarriedPath`)."""
+    """How long the robot took in a run [s] from one station to another: empty, or with a part in the gripper (`CarriedPath`)."""
 
     way: Way
     seconds: float

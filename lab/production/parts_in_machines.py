@@ -9,9 +9,8 @@ from lab.production.perception import look, moved_off
 from lab.production.recorder import burnt_name, finish_name
 from lab.production.run_state import RunState
 from lab.production.trouble import Trouble
-from lab.sequencing.simulate.follow import closes
+from lab.sequencing.simulate.follow import closes, waits_of
 from lab.sequencing.simulate.run import NO_WAIT, Wait, branch
-from lab.sequencing.simulate.waits import waits_of
 from lab.sim.world import TIME_STEP
 from lab.skills import Skill
 from lab.skills.skillset import WINDOW_MARGIN_S

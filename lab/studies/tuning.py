@@ -13,8 +13,7 @@ from lab.advice.advising import Advising
 from lab.errors import BadInput, counted, unknown
 from lab.learning.gates import GATES
 from lab.learning.selection import SELECTIONS
-from lab.learning.settings import SETTINGS, LearnerSettings
-from lab.learning.tuned_ranges import RANGES, USUAL, Range, Span
+from lab.learning.settings import RANGES, SETTINGS, USUAL, LearnerSettings, Range, Span
 from lab.learning.updates import UPDATES
 from lab.mdp import FloatArray
 from lab.optional import optional

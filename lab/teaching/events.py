@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from lab.advice.journal import Journal
-from lab.advice.policy_advisor import PolicyAdvisor
+from lab.advice.table_level import PolicyAdvisor
 from lab.learning import session_events as session
 from lab.learning.problem import Problem
 from lab.learning.requests import Advisor, Request

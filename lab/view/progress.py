@@ -1,12 +1,31 @@
 """Progress in one line of text: a progress bar, and a learning curve of a few characters."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from itertools import pairwise
 from statistics import mean
 
-from rich.console import Console
+from rich.console import Console, ConsoleOptions, RenderableType
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.segment import Segment
+
+from lab.errors import escaped
+
+
+class EscapingConsole(Console):
+    """A rich console that prints unprintable characters as escapes; only rich's own control codes reach the terminal."""
+
+    def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
+        """The segments of a renderable, with unprintable characters escaped."""
+        for segment in super().render(renderable, options):
+            if segment.control is None and not segment.text.isprintable():
+                yield Segment(escaped(segment.text), segment.style)
+            else:
+                yield segment
+
+
+# ---- progress ---------------------------------------------------------------------------------------------------------
+
 
 BARS = "▁▂▃▄▅▆▇█"
 PLAIN_BARS = "_.-:=+*#"

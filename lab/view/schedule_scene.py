@@ -14,11 +14,10 @@ from lab.mdp import FloatArray
 from lab.sequencing.cell.schedule import Activity, Schedule
 from lab.sim.frames import Body, Frame, Recording, Rgba, Shape, Vector
 from lab.tasks.schedule_table import ScheduleTable, TimedRow
-from lab.view.camera_placement import camera_for
 from lab.view.canvas import seconds
 from lab.view.gantt_bars import PRODUCTS, mixed
 from lab.view.keyframes import BodyMotion, KeyframeTrack, continuous
-from lab.view.scene_data import Story
+from lab.view.scene_data import Story, camera_for
 from lab.view.schedule_floor import (
     IDLE,
     INK,

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from lab.mdp import FloatArray
 from lab.sim.frames import IDENTITY, Body, Frame, Quaternion, Recording, Rgba, Shape, Vector, Viewpoint
 from lab.tasks.grid_world import GridWorld
-from lab.view.camera_placement import camera_for, corners, vector
+from lab.view.scene_data import camera_for, corners, vector
 
 WORLD_M = 2.0  # [m] longest side of a drawn world
 MOST_BOXES = 400  # obstacles up to which each is a box of its own; more become one mesh

@@ -10,8 +10,7 @@ import lab
 from lab.advice.advising import Advising
 from lab.advice.advisors import PYTHON, AdvisorName, RecordedAdvisor, make_advisor
 from lab.advice.order_level import OrderLevel
-from lab.advice.policy_advisor import PolicyAdvisor, advice_of
-from lab.advice.table_level import LimitedView, TableLevel
+from lab.advice.table_level import LimitedView, PolicyAdvisor, TableLevel, advice_of
 from lab.errors import BadInput
 from lab.learning.environment import TableEnvironment
 from lab.learning.requests import AdviceRequest

@@ -25,7 +25,7 @@ from lab.learning.session_events import (
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.learning.updates import UPDATES
 from lab.mdp import FloatArray, Rewards, TabularMDP, coverage, greedy_path, grid, optimal_values
-from lab.testing.learning import EARLY, SHORT, board, check_advisor, check_gate, check_learner, check_session, session
+from lab.testing.contracts import EARLY, SHORT, board, check_advisor, check_gate, check_learner, check_session, session
 
 WHOLE_WAYS = ("q-lambda", "sarsa-lambda", "monte-carlo", "dyna-q")  # with lambda 1 they learn a whole way at once
 

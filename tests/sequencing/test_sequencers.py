@@ -19,7 +19,7 @@ from lab.sequencing.methods.exact import optimum
 from lab.sequencing.search import Search, SequenceResult
 from lab.sequencing.simulate.follow import follow, simulate
 from lab.sequencing.simulate.run import Run
-from lab.testing.sequencing import check_order
+from lab.testing.contracts import check_order
 
 CellMaker = Callable[..., Cell]
 NAMES = sorted(SEQUENCERS)

@@ -10,8 +10,7 @@ import pytest
 
 import lab
 from lab.errors import BadInput
-from lab.learning.settings import SETTINGS
-from lab.learning.tuned_ranges import RANGES, USUAL, Span
+from lab.learning.settings import RANGES, SETTINGS, USUAL, Span
 from lab.studies.compared import ComparedSessions
 from lab.studies.findings import Findings, those
 from lab.studies.runner import STORE, Job

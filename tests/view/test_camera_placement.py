@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from lab.mdp import FloatArray
 from lab.sim.frames import Viewpoint
-from lab.view.camera_placement import camera_for
+from lab.view.scene_data import camera_for
 
 InPicture = Callable[[Viewpoint, FloatArray], bool]  # the fixture of tests/conftest.py
 coordinate = st.floats(-3.0, 3.0)

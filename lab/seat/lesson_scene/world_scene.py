@@ -1,10 +1,10 @@
 """The scene of a grid world: the robot is a ball on a board (two axes) or in a room (three)."""
 
 from lab.mdp import TabularMDP
-from lab.seat.lesson_scene.episode_trail import STEP_S, EpisodeTrail, upright
+from lab.seat.lesson_scene.skill_scene import STEP_S, EpisodeTrail, upright
 from lab.sim.frames import Body, Frame, Rgba, Shape, Vector
 from lab.tasks.grid_world import GridWorld
-from lab.view.camera_placement import vector
+from lab.view.scene_data import vector
 from lab.view.world_bodies import BALL_M, BLUE, FLAT, WorldBodies
 
 SHADE: Rgba = (0.30, 0.36, 0.46, 0.55)

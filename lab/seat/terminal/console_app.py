@@ -22,7 +22,7 @@ from lab.production.operation.commands import COMMANDS, Done, help_lines
 from lab.production.operation.desk import Desk
 from lab.seat.terminal.console_view import plain_lines, view
 from lab.seat.terminal.screen import folded
-from lab.view.escaping_console import EscapingConsole
+from lab.view.progress import EscapingConsole
 
 if TYPE_CHECKING:
     from prompt_toolkit.application import Application

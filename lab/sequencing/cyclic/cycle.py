@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 from lab.errors import BadInput, WorkFailed, counted
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cyclic.line import CycleMove, Line, at_speed, away_s, lines
+from lab.sequencing.simulate.follow import Arc, earliest
 from lab.sequencing.simulate.run import SLACK_S
-from lab.sequencing.simulate.waits import Arc, earliest
 
 NEAR_S = 1e-3  # the most by which slack may shorten a period that is also feasible without slack
 

@@ -15,9 +15,8 @@ from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import MAKESPAN, WITH_DUE_TIMES, cost, machine_places
 from lab.sequencing.cell.routes import SERVER, choice_of, entry, part_of
 from lab.sequencing.methods.cp_sat_solver import Solution, cp_model
-from lab.sequencing.methods.cp_sat_tasks import Follows, PartTask, Tasks, Team, add_chains, add_rooms
+from lab.sequencing.methods.cp_sat_tasks import Follows, PartTask, Tasks, Team, Track, add_chains, add_rooms
 from lab.sequencing.methods.cp_sat_times import Times
-from lab.sequencing.methods.cp_sat_track import Track
 from lab.sequencing.simulate.follow import follow, spoils, steps
 from lab.sequencing.simulate.run import Run, Windowless
 

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from lab.errors import BadInput
-from lab.learning.batch import run_sessions
-from lab.learning.chance_table import ChanceTable
+from lab.learning.batch import ChanceTable, run_sessions
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.learning.simulated_advice import Advice, advice_chances
 from lab.mdp import FloatArray, TabularMDP, optimal_values

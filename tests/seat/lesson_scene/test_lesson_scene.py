@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from lab.learning.problem import Problem
 from lab.mdp import FloatArray, TabularMDP, grid
 from lab.seat.lesson_scene import LessonScene, SkillScene, WorldScene, lesson_scene_of
-from lab.seat.lesson_scene.episode_trail import TRAIL
+from lab.seat.lesson_scene.skill_scene import TRAIL
 from lab.sim.arms.arm_models import arm_named
 from lab.sim.arms.kinematics import TOOL, ToolPose
 from lab.sim.frames import Frame, Recording, Viewpoint

@@ -8,7 +8,7 @@ import pytest
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cyclic.cycle import shortest_period
 from lab.sequencing.cyclic.line import Line, lines
-from lab.sequencing.simulate.waits import Arc, earliest
+from lab.sequencing.simulate.follow import Arc, earliest
 
 CellMaker = Callable[..., Cell]
 

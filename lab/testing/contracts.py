@@ -1,7 +1,10 @@
-"""The contracts of learners, gates and advisors, tested in sessions on small boards."""
+"""What every member of a family is held to, ours and yours: a function for each family, an AssertionError that says why."""
 
+import json
 from collections.abc import Callable
 from dataclasses import asdict, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -15,8 +18,29 @@ from lab.learning.session_events import AdviceRequested, EpisodeEnded, Event
 from lab.learning.session_result import SessionResult
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.learning.updates import UPDATES, Update
-from lab.mdp import TabularMDP, greedy_path, grid
-from lab.testing.requirement import require
+from lab.mdp import TabularMDP, greedy_path, grid, optimal_values, shortest_steps
+from lab.sequencing import SEQUENCERS, Find, find_sequence
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.methods.exact import optimum
+from lab.sequencing.search import EpisodeSequenced, Search, SequenceResult
+from lab.sequencing.simulate.follow import simulate
+from lab.skills import SKILLS, Skill
+from lab.studies import STUDIES, Run, Study, carried_out
+from lab.studies.runner import Job
+from lab.tasks.task_file import load, load_cell
+from lab.teaching.lesson_options import LessonOptions
+from lab.teaching.skill_subject import SkillSubject
+from lab.toolbox.policy import Origin, Policy
+
+
+def require(holds: bool, otherwise: str) -> None:
+    """Raises an AssertionError with the text `otherwise` unless `holds`, also if Python runs without assertions (-O)."""
+    if not holds:
+        raise AssertionError(otherwise)
+
+
+# ---- learning ---------------------------------------------------------------------------------------------------------
+
 
 EARLY = GateSettings(first_episode=5, window=2)
 SHORT = LearnerSettings(episodes=60, max_steps=30)
@@ -110,3 +134,85 @@ def check_session(learner: str, gate: str, memory: bool = False) -> None:
     require(
         result.final_steps == (len(path[1]) if path[2] else None), f"{what}: final_steps is not that of the greedy path"
     )
+
+
+# ---- sequencing -------------------------------------------------------------------------------------------------------
+
+
+NEAR_S = 1e-5
+SMALL = ("toast-case-1", "toast-case-2", "toast-case-3")
+
+
+def check_sequencer(method: str | Find) -> None:
+    """Tests a method, given by name or as a function of cell, search and generator, on two toasts in each cell of the thesis."""
+    name = method if isinstance(method, str) else SEQUENCERS.use(method.__name__, method)
+    for cell in SMALL:
+        check_order(name, load_cell(cell).cell(2), seed=1)
+
+
+def check_order(name: str, cell: Cell, seed: int) -> SequenceResult:
+    """The result of a method for a cell, tested: feasible, consistent with its events, and not below the optimum."""
+    seen: list[EpisodeSequenced] = []
+    result = find_sequence(cell, name, Search(20, on_episode=seen.append), seed)
+    cost, what = simulate(cell, result.sequence).makespan_s, f"method '{name}', seed {seed}"
+    require(abs(cost - result.cost) <= NEAR_S, f"{what}: its order takes {cost} s, it says {result.cost}")
+    best = optimum(cell).cost
+    require(result.cost >= best - NEAR_S, f"{what}: {result.cost} s is below the proven optimum, {best} s")
+    require(result.cost == min(result.episode_costs), f"{what}: its cost is not that of its best episode")
+    told = tuple(event.cost for event in seen)
+    require(told == result.episode_costs, f"{what}: {len(told)} episodes told, {len(result.episode_costs)} counted")
+    return result
+
+
+# ---- skills -----------------------------------------------------------------------------------------------------------
+
+
+def check_skill(skill: str | type[Skill], task: str = "toast") -> None:
+    """Tests a skill, given by sub-task or class, in a task that needs it: PyBullet carries it out with the optimal table."""
+    subtask = skill if isinstance(skill, str) else skill.subtask
+    if not isinstance(skill, str) and subtask not in SKILLS:
+        SKILLS.adopted(subtask, skill, "check_skill")
+        try:
+            check_skill(subtask, task)
+        finally:
+            del SKILLS[subtask]
+        return
+    require(bool(SKILLS[subtask].help), f"skill '{subtask}': it has no `help`")
+    subject, again = (SkillSubject.of(LessonOptions(subtask), load(task)) for _ in range(2))
+    problem = subject.prepare(0)
+    mdp, what = problem.mdp, f"skill '{problem.name}' of '{task}'"
+    require(problem.subtask == subtask, f"{what}: its problem is of '{problem.subtask}'")
+    require(again.prepare(0).mdp.signature == mdp.signature, f"{what}: the same scene gives another problem")
+    require(shortest_steps(mdp) > 0, f"{what}: it begins at its goal")
+    q = optimal_values(mdp, 0.99)
+    for start in (mdp.start, *mdp.starts):
+        require(
+            greedy_path(q, mdp, mdp.n_states, start)[2],
+            f"{what}: no path to the goal leads from {mdp.state_label(start)}",
+        )
+    learner, gate = LearnerSettings(episodes=1, max_steps=1), GateSettings("never")
+    result = Session(problem.environment or mdp, learner, gate, None, np.random.default_rng(0)).run()
+    policy = Policy.of(result, mdp, learner, gate, Origin("best", subtask, task, "none", 0))
+    failure = subject.tried(problem, replace(policy, q=q, solved=True))
+    require(failure is None, f"{what}: in physics: {failure}")
+
+
+# ---- studies ----------------------------------------------------------------------------------------------------------
+
+
+def check_study(study: str | Study | Run) -> None:
+    """Tests a study, given by name, as a `Study`, or as a function of a job and a reading, with its fewest sessions."""
+    if isinstance(study, str):
+        tested, name = STUDIES[study], study
+    else:
+        tested = study if isinstance(study, Study) else Study(study.__name__, study, least=2)
+        name = tested.title
+    first, again = (tested.run(Job(tested.least, seed=1), {}) for _ in range(2))
+    require(bool(first.rows), f"study '{name}': it has no rows")
+    for row in first.rows:
+        require({"measure", "value"} <= {*row}, f"study '{name}': a row has no measure or value: {row}")
+        json.dumps(row, allow_nan=False)
+    require(first.rows == again.rows, f"study '{name}': the same seed gives other rows")
+    with TemporaryDirectory() as folder:
+        document = carried_out(tested, "study", Job(tested.least, seed=1), Path(folder) / "out")
+        require(all(Path(file).is_file() for file in document["files"].values()), f"study '{name}': a file is missing")

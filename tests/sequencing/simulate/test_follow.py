@@ -15,9 +15,8 @@ from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.stations import UNLIMITED, Arrivals, Product, Robot, Stage, Station
 from lab.sequencing.methods.cp_sat import cp_sat
 from lab.sequencing.methods.exact import optimum
-from lab.sequencing.simulate.follow import follow, simulate, waits_in
+from lab.sequencing.simulate.follow import follow, simulate, waits_in, waits_of, waits_of_several
 from lab.sequencing.simulate.run import NO_WAIT, Run, Wait, Windowless
-from lab.sequencing.simulate.waits import waits_of, waits_of_several
 
 Cells = Callable[..., SearchStrategy[Cell]]
 

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from lab.errors import BadInput
-from lab.learning.batch import run_sessions
-from lab.learning.chance_table import ChanceTable, Outcome
+from lab.learning.batch import ChanceTable, Outcome, run_sessions
 from lab.learning.gates import GATES
 from lab.learning.requests import AdviceRequest
 from lab.learning.session import Session
