@@ -29,10 +29,8 @@ def ctrl_c_is_heard() -> Iterator[None]:
     Windows has no interval timer: there it is raised wherever Python handles it.
     """
     has_timer = hasattr(signal, "setitimer")
-    if (
-        not has_timer or signal.getsignal(signal.SIGINT) is not signal.default_int_handler
-    ):  # another handler is set, or Ctrl-C is ignored
-        yield
+    if not has_timer or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        yield  # another handler is set, or Ctrl-C is ignored
         return
     main_frame = sys._getframe(2)
     looks = 0
