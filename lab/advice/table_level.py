@@ -58,7 +58,7 @@ def advice_of(policy: Policy, mdp: TabularMDP) -> IntArray:
     speaks = (own_state >= 0) & visited[own_state] & ~mdp.terminal
     said = np.where(speaks, named[policy.q.argmax(axis=1)][own_state], SILENT).astype(np.int32)
     if not (said != SILENT).any():
-        raise BadInput("it has visited in none of this problem's states")
+        raise BadInput("it has visited none of this problem's states")
     return said
 
 
@@ -89,7 +89,7 @@ def policy_of(name: str, toolbox: Toolbox | None) -> Policy:
     return version.policy
 
 
-# ---- table level ------------------------------------------------------------------------------------------------------
+# ---- advice on the actions of a table ---------------------------------------------------------------------------------
 
 
 MOST_BYTES = 10_000_000

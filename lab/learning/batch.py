@@ -74,7 +74,7 @@ class ChanceTable(TableEnvironment):
         return self._best
 
 
-# ---- batch ------------------------------------------------------------------------------------------------------------
+# ---- many sessions at once --------------------------------------------------------------------------------------------
 
 
 CHOICES = {"softmax": linear_loop.SOFTMAX, "epsilon-greedy": linear_loop.EPSILON_GREEDY, "greedy": linear_loop.GREEDY}

@@ -39,7 +39,7 @@ def require(holds: bool, otherwise: str) -> None:
         raise AssertionError(otherwise)
 
 
-# ---- learning ---------------------------------------------------------------------------------------------------------
+# ---- the contracts of gates, learners and advisors --------------------------------------------------------------------
 
 
 EARLY = GateSettings(first_episode=5, window=2)
@@ -136,7 +136,7 @@ def check_session(learner: str, gate: str, memory: bool = False) -> None:
     )
 
 
-# ---- sequencing -------------------------------------------------------------------------------------------------------
+# ---- the contract of sequencing methods -------------------------------------------------------------------------------
 
 
 NEAR_S = 1e-5
@@ -164,7 +164,7 @@ def check_order(name: str, cell: Cell, seed: int) -> SequenceResult:
     return result
 
 
-# ---- skills -----------------------------------------------------------------------------------------------------------
+# ---- the contract of skills -------------------------------------------------------------------------------------------
 
 
 def check_skill(skill: str | type[Skill], task: str = "toast") -> None:
@@ -197,7 +197,7 @@ def check_skill(skill: str | type[Skill], task: str = "toast") -> None:
     require(failure is None, f"{what}: in physics: {failure}")
 
 
-# ---- studies ----------------------------------------------------------------------------------------------------------
+# ---- the contract of studies ------------------------------------------------------------------------------------------
 
 
 def check_study(study: str | Study | Run) -> None:

@@ -51,7 +51,7 @@ def vector(values: FloatArray) -> Vector:
     return (x, y, z)
 
 
-# ---- scene data -------------------------------------------------------------------------------------------------------
+# ---- the scene for the viewer -----------------------------------------------------------------------------------------
 
 
 MarkKind = Literal["fault", "trouble", "stop", "lost", "operator"]

@@ -87,7 +87,7 @@ def quiet_when_full(loop: asyncio.AbstractEventLoop, told: dict[str, Any]) -> No
         loop.default_exception_handler(told)
 
 
-# ---- server page ------------------------------------------------------------------------------------------------------
+# ---- pages and their queues -------------------------------------------------------------------------------------------
 
 
 PAUSE_S = 1 / 60  # between two messages to a page

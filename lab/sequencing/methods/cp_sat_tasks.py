@@ -358,7 +358,7 @@ def _add_full(tasks: Tasks, task: PartTask, station: int) -> None:
     model.add(sum(inside) >= tasks.cell.capacities[station]).only_enforce_if(task.done)
 
 
-# ---- cp sat track -----------------------------------------------------------------------------------------------------
+# ---- the track of the robots ------------------------------------------------------------------------------------------
 
 
 class Track:

@@ -174,7 +174,7 @@ def _wait(move: _Timed, at_s: Sequence[float]) -> Wait:
     return Wait(begin_s + later_s - earliest_s, held_s - later_s)
 
 
-# ---- follow -----------------------------------------------------------------------------------------------------------
+# ---- sequences carried out, and their waits ---------------------------------------------------------------------------
 
 
 def waits_in(start: Run, sequence: Sequence[int]) -> tuple[Wait, ...]:
