@@ -8,6 +8,7 @@ Triangle Scan Conversion using 2D Homogeneous Coordinates, 1997.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import radians, tan
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -112,17 +113,11 @@ class Rasterizer:
                 weights, face_at, near = self._nearest(at, faces, self._camera, *self._size, behind=near)
                 corners = self._faces[faces]
                 lit = _linear(colours[self._mesh_of_face[faces], :3])
+                directions = np.stack([self._from_lamp, np.array(FROM_WINDOW), np.array(GROUND_LIGHT)])
                 _shade(
-                    face_at,
-                    near,
-                    weights,
-                    at[corners],
-                    normals[corners],
-                    np.concatenate([lit, alpha[faces, None]], axis=1),
-                    self._eye,
-                    np.stack([self._from_lamp, np.array(FROM_WINDOW), np.array(GROUND_LIGHT)]),
-                    self._lamp,
-                    shadows,
+                    Seen(face_at, near, weights),
+                    Corners(at[corners], normals[corners], np.concatenate([lit, alpha[faces, None]], axis=1)),
+                    Lighting(self._eye, directions, self._lamp, shadows),
                     drawn,
                 )
         height, width = self._size[0] // FINER, self._size[1] // FINER
@@ -211,23 +206,39 @@ def fill(weights: Floats, boxes: Whole, face_at: Whole, near: Floats) -> None:
                     face_at[y, x] = face
 
 
-def shade(
-    face_at: Whole,
-    near: Floats,
-    weights: Floats,
-    places: Floats,
-    normals: Floats,
-    colours: Floats,
-    eye: Floats,
-    lights: Floats,
-    lamp: Floats,
-    shadows: Floats,
-    drawn: Floats,
-) -> None:
-    """Blend each pixel's shaded colour into `drawn`. places, normals (faces, 3, 3); colours (faces, 4), linear.
+class Seen(NamedTuple):
+    """The nearest face of each pixel (h, w), how near it is (h, w), and the weights of its corners (faces, 3, 3)."""
 
-    lights (3, 3): the direction of the lamp, the direction of the window, and the light reflected from the ground.
+    face_at: Whole
+    near: Floats
+    weights: Floats
+
+
+class Corners(NamedTuple):
+    """The faces' corners: places and normals (faces, 3, 3), and the faces' colours (faces, 4), linear."""
+
+    places: Floats
+    normals: Floats
+    colours: Floats
+
+
+class Lighting(NamedTuple):
+    """The eye (3,); lights (3, 3): the directions to the lamp and to the window, and what comes back from below.
+
+    lamp: the lamp's camera; shadows: what it sees.
     """
+
+    eye: Floats
+    lights: Floats
+    lamp: Floats
+    shadows: Floats
+
+
+def shade(seen: Seen, corners: Corners, lighting: Lighting, drawn: Floats) -> None:
+    """Blends the light of each pixel over `drawn` (h, w, 3), in place."""
+    face_at, near, weights = seen
+    places, normals, colours = corners
+    eye, lights, lamp, shadows = lighting
     for y in range(len(near)):
         for x in range(near.shape[1]):
             face = face_at[y, x]

@@ -11,7 +11,7 @@ from lab.sequencing.cell.objectives import MAKESPAN, WITH_DUE_TIMES, machine_pla
 from lab.sequencing.cell.routes import entry
 from lab.sequencing.cell.ways import Way, distances, follows, ways_of
 from lab.sequencing.methods.cp_sat_solver import Solution, cp_model
-from lab.sequencing.methods.cp_sat_times import TimedMove, Times, longest, timed
+from lab.sequencing.methods.cp_sat_times import ScheduledMove, Times, longest, timed
 
 
 class MoveTask(NamedTuple):
@@ -85,7 +85,7 @@ class Model:
             decisions.append(entry(task.part + 1, task.way.option.choice, self.cell.parts))
         return tuple(decisions)
 
-    def _suggest(self, known: Sequence[TimedMove]) -> None:
+    def _suggest(self, known: Sequence[ScheduledMove]) -> None:
         """Give the solver a sequence to begin with."""
         tasks = {(task.part, task.way): number for number, task in enumerate(self._tasks, 1)}
         hints = dict.fromkeys([*self._arcs.values(), *self._come.values()], 0)

@@ -77,7 +77,7 @@ class Times:
         return self.whole(self._cell.positions[place].processing_s or 0.0)
 
 
-class TimedMove(NamedTuple):
+class ScheduledMove(NamedTuple):
     """A move of a sequence: the part (from 0), its option, when it begins after any wait, and when it drops [units]."""
 
     part: int
@@ -86,9 +86,9 @@ class TimedMove(NamedTuple):
     drop: int
 
 
-def timed(cell: Cell, times: Times, ways: Sequence[Way], sequence: Sequence[int]) -> list[TimedMove]:
+def timed(cell: Cell, times: Times, ways: Sequence[Way], sequence: Sequence[int]) -> list[ScheduledMove]:
     """The moves of a sequence with the model's integer times."""
-    run, moves, now = Run(cell), list[TimedMove](), 0
+    run, moves, now = Run(cell), list[ScheduledMove](), 0
     ready, coming = [times.whole(seconds) for seconds in cell.begin_s], [part - 1 for part in cell.coming]
     intervals = [times.whole(seconds) for seconds in cell.arrivals.interval_s] if cell.arrivals else [0] * cell.parts
     clock = cell.arrivals is None or cell.arrivals.after == "clock"
@@ -108,7 +108,7 @@ def timed(cell: Cell, times: Times, ways: Sequence[Way], sequence: Sequence[int]
         if cell.positions[option.to].processing_s is not None:
             ready[part] = now + times.processing(option.to)
         run.move(decision, wait)
-        moves.append(TimedMove(part, way, begin, now))
+        moves.append(ScheduledMove(part, way, begin, now))
     return moves
 
 

@@ -24,7 +24,7 @@ from lab.sequencing.simulate.follow import simulate
 from lab.sequencing.simulate.run import Run
 
 if TYPE_CHECKING:
-    from lab.sequencing.methods.one_robot_kernels import RobotWork
+    from lab.sequencing.methods.one_robot_kernels import CellWork
 
 TIME_LIMIT_S = 60.0
 FIRST_WIDTH = (
@@ -225,8 +225,8 @@ def _sizes(cell: Cell) -> int:
     return size
 
 
-def _work_of(cell: Cell, times: Times) -> "RobotWork":
-    from lab.sequencing.methods.one_robot_kernels import RobotWork
+def _work_of(cell: Cell, times: Times) -> "CellWork":
+    from lab.sequencing.methods.one_robot_kernels import CellWork
 
     routes = [_ways(cell, part) for part in range(cell.parts)]
     counts = np.array([sum(way.robot != SERVER for way in route) for route in routes], np.int64)
@@ -250,4 +250,4 @@ def _work_of(cell: Cell, times: Times) -> "RobotWork":
     least = np.array(distances(cell, times.per_s), np.int64)
     ready = np.array([times.whole(seconds) for seconds in cell.begin_s], np.int64)
     weight = np.cumprod(np.concatenate([[1], counts[:-1] + 1])).astype(np.int64)
-    return RobotWork(counts, at, process, carry, empty, least, queues, ready, tail, weight)
+    return CellWork(counts, at, process, carry, empty, least, queues, ready, tail, weight)

@@ -17,7 +17,7 @@ FAR = 1 << 40
 Whole = NDArray[np.int64]
 
 
-class RobotWork(NamedTuple):
+class CellWork(NamedTuple):
     """The work of a cell as arrays, times in units.
 
     counts (part,): moves of each part. at, process, carry, tail (part, n): after n moves, the part's station, its processing
@@ -40,7 +40,7 @@ class RobotWork(NamedTuple):
 
 
 @compiled
-def machine_bound(work: RobotWork, c: Whole, ready: Whole, now: int, here: int) -> int:
+def machine_bound(work: CellWork, c: Whole, ready: Whole, now: int, here: int) -> int:
     """A lower bound of the end by each machine's remaining work: heads, work and the least tail (Carlier 1982)."""
     counts, at, process, carry = work.counts, work.at, work.process, work.carry
     worst, most = 0, int(counts.sum())
@@ -73,7 +73,7 @@ def machine_bound(work: RobotWork, c: Whole, ready: Whole, now: int, here: int) 
 
 
 @compiled
-def least_rest(work: RobotWork) -> Whole:
+def least_rest(work: CellWork) -> Whole:
     """A table (code, part) of the least time from the robot's drop of that part until the end, if no part were in process.
 
     It is the best tour through all moves left, by dynamic programming (Held and Karp 1962, with each part's moves in order). The
@@ -106,7 +106,7 @@ def least_rest(work: RobotWork) -> Whole:
 
 
 @compiled
-def queue_at(work: RobotWork, c: Whole, ready: Whole, part: int, now: int) -> Whole:
+def queue_at(work: CellWork, c: Whole, ready: Whole, part: int, now: int) -> Whole:
     """The parts in the queue of the machine that a part's next move leads to, in order, as far as unfinished at a time."""
     queue, n = np.empty(len(c), np.int64), 0
     machine = work.at[part, c[part] + 1]
@@ -123,7 +123,7 @@ def queue_at(work: RobotWork, c: Whole, ready: Whole, part: int, now: int) -> Wh
 
 
 @compiled
-def put(work: RobotWork, c: Whole, ready: Whole, part: int, now: int, queue: Whole, place: int) -> None:
+def put(work: CellWork, c: Whole, ready: Whole, part: int, now: int, queue: Whole, place: int) -> None:
     """Inserts `part`, dropped now, after `place` parts of the queue and updates `ready` of it and of the parts behind it."""
     end = now if place == 0 else ready[queue[place - 1]]
     end += work.process[part, c[part]]
@@ -134,7 +134,7 @@ def put(work: RobotWork, c: Whole, ready: Whole, part: int, now: int, queue: Who
 
 
 @compiled
-def bound(work: RobotWork, rest: Whole, code: int, last: int, now: int, c: Whole, ready: Whole) -> int:
+def bound(work: CellWork, rest: Whole, code: int, last: int, now: int, c: Whole, ready: Whole) -> int:
     """A lower bound of the end of a state."""
     here, least, all_done, most = work.at[last, c[last]], FAR, True, now + rest[code, last]
     for i in range(len(c)):
@@ -164,7 +164,7 @@ class SearchLayer(NamedTuple):
 
 @compiled
 def expand(
-    work: RobotWork, rest: Whole, layer: SearchLayer, start: int, below: int
+    work: CellWork, rest: Whole, layer: SearchLayer, start: int, below: int
 ) -> tuple[Whole, Whole, Whole, Whole, Whole, Whole]:
     """The fields of the layer of all successors whose bound is below a value; start: the robot's first station.
 
@@ -216,7 +216,7 @@ def _longer(array: Whole, rows: int) -> Whole:
 
 
 @compiled
-def needed(work: RobotWork, layer: SearchLayer, order: Whole) -> NDArray[np.bool_]:
+def needed(work: CellWork, layer: SearchLayer, order: Whole) -> NDArray[np.bool_]:
     """A mask of the states that no earlier state dominates, in an order that groups equal codes and last parts.
 
     A state dominates another one if none of its times is later and the queues have the unfinished parts of both in one order.
@@ -241,7 +241,7 @@ def needed(work: RobotWork, layer: SearchLayer, order: Whole) -> NDArray[np.bool
 
 
 @compiled
-def _as_good(work: RobotWork, layer: SearchLayer, c: Whole, x: int, y: int) -> bool:
+def _as_good(work: CellWork, layer: SearchLayer, c: Whole, x: int, y: int) -> bool:
     one, other, now = layer.ready[x], layer.ready[y], layer.now[y]
     if layer.now[x] > now:
         return False
