@@ -38,8 +38,7 @@ class Session:
     function that returns uniform numbers; q0: (S, A), the start values, default the learner's start value.
     An advised action is carried out and learned from like the learner's own choice. If the advisor has a method `followed`, it is
     called with the `Walked` record after each open episode.
-    Raises BadInput for an unknown learner, selection or gate, for a q0 that does not fit and for an answer that is no action, and
-    NoPath.
+    Raises BadInput for an unknown learner, selection or gate, an unfit q0 and an answer that is no action, and NoPath.
     """
 
     def __init__(
