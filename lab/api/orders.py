@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     import pandas
 
 
-class OrderKeywords(TypedDict, total=False):
+class OrderOptions(TypedDict, total=False):
     """The options of `lab sequence`, by their names there; the default of each is the value in the file."""
 
     case: str
@@ -105,7 +105,7 @@ class OrderResult:
 
 
 def sequence(
-    cell: str | Path | Cell, *, seed: int = 0, toolbox: ToolboxOrPlace = None, **options: Unpack[OrderKeywords]
+    cell: str | Path | Cell, *, seed: int = 0, toolbox: ToolboxOrPlace = None, **options: Unpack[OrderOptions]
 ) -> OrderResult:
     """The best order of the robot's transfers that a method finds, with a lower bound on the cost of any order.
 
@@ -121,7 +121,7 @@ def sequence(
         >>> order.proven, order.cost == order.bound, order.rows()[0]["start_s"]
         (True, True, 0.0)
     """
-    given = checked(options, OrderKeywords, "lab.sequence")
+    given = checked(options, OrderOptions, "lab.sequence")
     case, toasts = given.pop("case", None), given.pop("toasts", None)
     wanted = SequencingOptions(seed=seed, **given)
     if isinstance(cell, Cell):

@@ -76,7 +76,7 @@ if TYPE_CHECKING:
     from lab.tasks.task import Task
     from lab.tasks.task_file import describe, is_path, load, load_any, load_cell_beside, shipped
     from lab.teaching.events import told_to, unheard
-    from lab.teaching.kept_order import OrderOptions, OrderSession, kept_order
+    from lab.teaching.kept_order import OrderSession, OrderSessionOptions, kept_order
     from lab.teaching.kept_order import gone_on as order_gone_on
     from lab.teaching.kept_session import KeptSession, check_new
     from lab.teaching.lesson import replay as replay_session
@@ -192,7 +192,7 @@ TABLE = {
     "lab.tasks.task": ("Task",),
     "lab.tasks.task_file": ("describe", "is_path", "load", "load_any", "load_cell_beside", "shipped"),
     "lab.teaching.events": ("told_to", "unheard"),
-    "lab.teaching.kept_order": ("kept_order", "gone_on as order_gone_on", "OrderOptions", "OrderSession"),
+    "lab.teaching.kept_order": ("kept_order", "gone_on as order_gone_on", "OrderSessionOptions", "OrderSession"),
     "lab.teaching.kept_session": ("check_new", "KeptSession"),
     "lab.teaching.lesson": ("replay as replay_session", "teach as teach_session"),
     "lab.teaching.lesson_options": ("DEFAULT_ADVISORS", "LessonOptions"),

@@ -30,10 +30,10 @@ OF_A_CYCLE = ("task", "case", "toasts", "parts", "seed", "layout", "robots")
 
 
 def cyclic_found(
-    given: "deferred.OrderOptions", toolbox: str | None, files: dict[str, Path], parts_per_cycle: int | None
+    given: "deferred.OrderSessionOptions", toolbox: str | None, files: dict[str, Path], parts_per_cycle: int | None
 ) -> dict[str, Any]:
     """The document of the shortest cycle; BadInput for options of the search for an order, which do not apply to cycles."""
-    none = asdict(deferred.OrderOptions())
+    none = asdict(deferred.OrderSessionOptions())
     for name, value in asdict(given).items():
         if name not in OF_A_CYCLE and value != none[name]:
             said = "" if value is True else f" {value}"
@@ -164,7 +164,7 @@ def sequence(
 
     A person's advice is kept: --resume continues the session, lab replay shows it again.
     """
-    given = deferred.OrderOptions(
+    given = deferred.OrderSessionOptions(
         task=task or "",
         case=case,
         toasts=toasts,

@@ -12,7 +12,7 @@ from lab.production.order import OrderAdvice, Ordered, person_of
 from lab.production.run_journal import RunJournal, SessionKept
 from lab.sequencing.cell.cell import Cell
 from lab.teaching.events import ORDER
-from lab.teaching.kept_order import OrderOptions, OrderSession, kept_order
+from lab.teaching.kept_order import OrderSession, OrderSessionOptions, kept_order
 from lab.teaching.kept_session import KeptSession, NewSession, SessionInFolder
 from lab.teaching.lesson_options import LessonOptions
 from lab.teaching.lesson_plan import MAX_SESSIONS, LessonPlan
@@ -91,7 +91,7 @@ class RunAdvice:
         return OrderAdvice(self.given, person_of(self.options.advisors), self.gate, people, keep, *cyclic)
 
     def _new_order(self, durations: Mapping[str, Any]) -> OrderSession:
-        options = OrderOptions(
+        options = OrderSessionOptions(
             task=str(self.options.task),
             toasts=self.options.toasts,
             method="srl",

@@ -26,7 +26,7 @@ DURATIONS = "durations.json"  # beside the journal of a run's order
 
 
 @dataclass(frozen=True)
-class OrderOptions(SessionOptions):
+class OrderSessionOptions(SessionOptions):
     """The options of `lab sequence` that a session depends on; None or empty if not given."""
 
     command = "sequence"
@@ -51,7 +51,7 @@ class OrderOptions(SessionOptions):
     seconds: float | None = None
     gap: float | None = None
 
-    def complete(self) -> "OrderOptions":
+    def complete(self) -> "OrderSessionOptions":
         """The options themselves. Raises BadInput if they name nothing to sequence."""
         if not self.task:
             raise BadInput("nothing to sequence (TASK): name a task or a cell, or go on with --resume DIR")
@@ -84,7 +84,7 @@ class OrderSession(SessionInFolder):
 
     def __init__(
         self,
-        options: OrderOptions,
+        options: OrderSessionOptions,
         toolbox: Toolbox,
         read: Read | None = None,
         *,
@@ -92,7 +92,7 @@ class OrderSession(SessionInFolder):
         durations: Mapping[str, Any] | None = None,
     ) -> None:
         """durations: for a new session of a run, those that the run plans with; they are stored beside the journal."""
-        self.options: OrderOptions = options
+        self.options: OrderSessionOptions = options
         self._durations = durations
         self.read = read
         self._toolbox, self._read_only = toolbox, read_only
@@ -132,12 +132,12 @@ class OrderSession(SessionInFolder):
 
 def kept_order(folder: Path, where: str, toolbox: Toolbox, *, read_only: bool = False) -> OrderSession:
     """A stored session of `lab sequence`. Raises BadInput for anything else."""
-    read, options = read_session(folder, where, OrderOptions)
+    read, options = read_session(folder, where, OrderSessionOptions)
     return OrderSession(options, toolbox, read, read_only=read_only)
 
 
-def gone_on(given: OrderOptions, folder: Path, toolbox: Toolbox) -> OrderSession:
+def gone_on(given: OrderSessionOptions, folder: Path, toolbox: Toolbox) -> OrderSession:
     """The session that --resume names. Raises BadInput if it has ended, and for further options."""
-    read, options = read_session(folder, "--resume", OrderOptions)
+    read, options = read_session(folder, "--resume", OrderSessionOptions)
     check_same(given, read)
     return OrderSession(options, toolbox, read)

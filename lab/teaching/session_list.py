@@ -6,12 +6,12 @@ from typing import Any
 
 from lab.advice.entries import FILE, read_journal
 from lab.errors import BadInput
-from lab.teaching.kept_order import OrderOptions
+from lab.teaching.kept_order import OrderSessionOptions
 from lab.teaching.lesson_options import LessonOptions
 from lab.toolbox.names import SESSIONS
 from lab.toolbox.registry import Toolbox
 
-_OPTIONS = (LessonOptions, OrderOptions)
+_OPTIONS = (LessonOptions, OrderSessionOptions)
 
 
 def session_rows(toolbox: Toolbox) -> list[dict[str, Any]]:
