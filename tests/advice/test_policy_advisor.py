@@ -77,7 +77,7 @@ def test_where_nothing_matches_it_is_refused(mdp: TabularMDP, why: str) -> None:
 
 def test_where_it_has_never_been_it_is_refused() -> None:
     policy = learned()
-    with pytest.raises(BadInput, match="in none of this problem's states"):
+    with pytest.raises(BadInput, match="none of this problem's states"):
         advice_of(replace(policy, visits=np.zeros_like(policy.visits)), lab.world(WIDE).mdp())
 
 
