@@ -92,7 +92,7 @@ ADVISORS, LEARNERS, GATES = (
             "teach no.txt",
             f"no task file 'no.txt': give a file that exists, .toml or .txt, or what ships; known: {SHIPPED}",
         ),
-        ("teach world-1 --task toast", "task 'toast' (--task): the world 'world-1' belongs to no task: leave --task"),
+        ("teach world-1 --task toast", "task 'toast' (--task): the world 'world-1' belongs to no task: remove --task"),
         ("teach world-1 --sight half", "unknown sight 'half' (--sight): known: full, limited"),
         (
             "teach world-1 --learner afterstat",

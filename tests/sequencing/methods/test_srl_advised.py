@@ -109,7 +109,7 @@ def test_what_cannot_be(toast_cell: CellMaker) -> None:
     cell = toast_cell("I", 2)
     with pytest.raises(BadInput, match="the advisor named 7: allowed 1, 2"):
         learned(cell, Person(lambda request: 7), gate="always")
-    with pytest.raises(BadInput, match=r"gate 'ia' .--gate.: it looks at a table of states"):
+    with pytest.raises(BadInput, match=r"gate 'ia' .--gate.: .*table of states"):
         check_gate("ia")
     with pytest.raises(BadInput, match=r"unknown gate 'ccrrl'.*did you mean 'ccrl'"):
         learned(cell, "none", gate="ccrrl")
