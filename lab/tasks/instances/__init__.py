@@ -44,7 +44,7 @@ INSTANCES = {
     "taillard": InstanceFormat("Taillard's job shops, text: times, then machines", "taillard"),
     "fjsplib": InstanceFormat("flexible job shops of FJSPLIB, text", "fjsplib", (".fjs",)),
     "bilge-ulusoy": InstanceFormat("job sets of Bilge and Ulusoy, CSV; --case SET:LAYOUT, such as 7:1", "bilge_ulusoy"),
-    "phillips-unger": InstanceFormat("tanks of a hoist line, CSV; --layout: its empty moves", "phillips_unger"),
+    "phillips-unger": InstanceFormat("tanks of a hoist line, CSV; --layout: its empty moves", "hoist"),
     "hoist": InstanceFormat("hoist lines as MiniZinc data", "dzn", (".dzn",)),
     "jobshoplab": InstanceFormat("JobShopLab's job shops with vehicles, YAML", "jobshoplab", (".yaml", ".yml")),
     "pyjobshop": InstanceFormat("PyJobShop's JSON, without breaks and deadlines", "pyjobshop", (".json",)),
