@@ -174,7 +174,7 @@ def test_a_failed_piece_of_work_ends_with_1(lab: Lab, monkeypatch: pytest.Monkey
         ("run", "lab.skills.prepared_scene.prepare", ""),
         ("run", "lab.production.run.run", "; what was learned is kept; go on with: lab run --resume toast-run"),
         ("teach insert", "lab.teaching.skill_subject.load", ""),
-        ("view toast", "lab.tasks.task_file.load_any", ""),
+        ("view toast", "lab.api.scenes.load_any", ""),
     ],
 )
 def test_ctrl_c_ends_with_130(lab: Lab, monkeypatch: pytest.MonkeyPatch, words: str, where: str, said: str) -> None:
