@@ -87,7 +87,7 @@ def test_a_precedence_that_cannot_be_is_refused(wrong: Precedence, said: str) ->
 
 def test_what_does_not_know_precedences_says_so() -> None:
     cell = kit(("lid", "box"), ON_TOP)
-    with pytest.raises(BadInput, match="--cyclic: .*precedences"):
+    with pytest.raises(BadInput, match=r"--cyclic: .*precedences"):
         check_cyclic(cell, ("box",))
     with pytest.raises(BadInput, match="precedences: they are for cells of one robot"):
         replace(cell, robots=(Robot("a", "in"), Robot("b", "in")))
