@@ -20,8 +20,9 @@ def main() -> None:
             os.open(os.devnull, os.O_RDWR)
             setattr(sys, name, open(number, "w" if number else "r", closefd=False))  # noqa: SIM115
     try:
-        from lab.cli.interrupt import ctrl_c_is_heard
+        from lab.cli.interrupt import ctrl_c_is_heard, ignore_ctrl_c
 
+        atexit.register(ignore_ctrl_c)  # what was printed stands; it no longer makes a killed process of a finished one
         with ctrl_c_is_heard():
             from lab.cli.app import called
 

@@ -68,6 +68,11 @@ def ctrl_c_is_heard() -> Iterator[None]:
             signal.signal(number, handler)
 
 
+def ignore_ctrl_c() -> None:
+    """Ctrl-C does nothing from now on: for a process that is about to end."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
 def _must_end(frame: "FrameType | None", last: "FrameType") -> bool:
     """Whether a frame, or one of its callers up to `last`, must not be interrupted.
 
