@@ -3,22 +3,19 @@
 The step size is divided by the number of tilings. Source: Sutton and Barto 2018, section 12.7 and example 10.1.
 """
 
-from collections.abc import Sequence
-from typing import overload
-
 import numpy as np
 
 from lab.learning.selection import Draw
 from lab.learning.settings import LearnerSettings
 from lab.learning.tiles import TileCoding
 from lab.learning.updates.tabular import is_greedy, q_target, sarsa_target
-from lab.learning.updates.update import Row, Update
+from lab.learning.updates.update import ComputedRows, Row, Update
 from lab.mdp import FloatArray, TabularMDP
 
 FAINT = 0.01  # lower eligibilities are dropped, which limits the number of traces
 
 
-class TileRows(Sequence[Row]):
+class TileRows(ComputedRows):
     """Action values, summed from the weights on lookup; weights: (tiles * A,), the actions of a tile side by side."""
 
     def __init__(self, coding: TileCoding, actions: int, weights: Row):
@@ -36,13 +33,8 @@ class TileRows(Sequence[Row]):
             places = self._places[state] = [tile * self._actions for tile in self.coding.tiles_of(state)]
         return places
 
-    @overload
-    def __getitem__(self, state: int) -> Row: ...
-    @overload
-    def __getitem__(self, state: slice) -> list[Row]: ...
-    def __getitem__(self, state: int | slice) -> Row | list[Row]:
-        if isinstance(state, slice):
-            return [self[s] for s in range(*state.indices(len(self)))]
+    def row(self, state: int) -> Row:
+        """The action values (A,) of a state."""
         weights, row = self.weights, []
         for action in range(self._actions):
             total = 0.0  # added one by one, as in the kernel; `sum` of newer Pythons rounds differently

@@ -1,11 +1,8 @@
 """Learners on a table: Q-learning, SARSA, Monte Carlo, Dyna-Q, afterstates, and Q(lambda) and SARSA(lambda) with traces."""
 
-from collections.abc import Sequence
-from typing import overload
-
 from lab.learning.selection import Draw
 from lab.learning.settings import LearnerSettings
-from lab.learning.updates.update import OnTable, Row, Update, towards
+from lab.learning.updates.update import ComputedRows, OnTable, Row, Update, towards
 from lab.mdp import TabularMDP
 
 
@@ -113,7 +110,7 @@ def afterstate_value(step_reward: float, discount: float, v_t: float) -> float:
     return step_reward + discount * v_t
 
 
-class AfterstateRows(Sequence[Row]):
+class AfterstateRows(ComputedRows):
     """Action values computed from state values: row s is r + gamma V(s') for each action, zeros in terminal states."""
 
     def __init__(self, mdp: TabularMDP, discount: float, values: Row):
@@ -125,13 +122,8 @@ class AfterstateRows(Sequence[Row]):
     def __len__(self) -> int:
         return len(self._successor)
 
-    @overload
-    def __getitem__(self, state: int) -> Row: ...
-    @overload
-    def __getitem__(self, state: slice) -> list[Row]: ...
-    def __getitem__(self, state: int | slice) -> Row | list[Row]:
-        if isinstance(state, slice):
-            return [self[s] for s in range(*state.indices(len(self)))]
+    def row(self, state: int) -> Row:
+        """The action values (A,) of a state."""
         if self._over[state]:
             return [0.0] * len(self._successor[state])
         reward, discount, values = self._step_reward, self._discount, self.values

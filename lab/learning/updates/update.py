@@ -3,7 +3,9 @@
 A table is a list of rows, one list of action values per state, because plain Python reads lists much faster than arrays.
 """
 
+from abc import abstractmethod
 from collections.abc import Sequence
+from typing import overload
 
 import numpy as np
 
@@ -13,6 +15,24 @@ from lab.mdp import FloatArray, TabularMDP
 
 Row = list[float]
 Table = Sequence[Row]
+
+
+class ComputedRows(Sequence[Row]):
+    """The base class of tables whose rows are computed on lookup, from less than a value per state and action."""
+
+    @abstractmethod
+    def row(self, state: int) -> Row:
+        """The action values (A,) of a state."""
+
+    @overload
+    def __getitem__(self, state: int) -> Row: ...
+    @overload
+    def __getitem__(self, state: slice) -> list[Row]: ...
+    def __getitem__(self, state: int | slice) -> Row | list[Row]:
+        if isinstance(state, slice):
+            return [self.row(s) for s in range(*state.indices(len(self)))]
+        return self.row(state)
+
 
 ACTION_VALUES, STATE_VALUES = range(2)  # the forms of learners in the kernel: what they keep a value of
 

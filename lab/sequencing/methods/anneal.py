@@ -7,18 +7,18 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lab.learning.compiled import inner, without_refcounts
+from lab.learning.compiled import without_refcounts
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import drawn_seed
 from lab.sequencing.methods.priorities import (
     OrderArrays,
     Orders,
     Priorities,
-    carried_out,
     changed,
     copied,
     drawn,
     most_choices,
+    tried,
 )
 from lab.sequencing.search import Log, Search, SequenceResult
 from lab.sequencing.simulate.cell_arrays import Floats, Ints
@@ -39,29 +39,14 @@ class AnnealArrays(NamedTuple):
     stream: NDArray[np.uint64]
 
 
-@inner
-def annealed(cell: Any, run: Any, work: Any, choices: int, temperature: float) -> float:
-    """The cost of the neighbour that one step tries; a lower bound of it where its simulation was cut off as too long."""
-    copied(work.parts, work.choices, work.tried.parts, work.tried.choices)
-    changed(work.tried, work.stream, choices)
-    limit = work.cost[0] - temperature * np.log(1.0 - drawn(work.stream))
-    value = carried_out(cell, run, work.tried, limit)
-    if value <= limit:
-        work.cost[0] = value
-        copied(work.tried.parts, work.tried.choices, work.parts, work.choices)
-        if value < work.cost[1] and run.whole[1] == 0:
-            work.cost[1] = value
-            for i in range(len(work.best)):
-                work.best[i] = work.tried.sequence[i]
-    return value
-
-
 @without_refcounts
 def annealed_session(cell: Any, run: Any, work: Any, costs: Any, temperature: float) -> None:
     """Makes N steps at a temperature in the objective's unit and writes their costs into `costs` (N,)."""
     choices = most_choices(cell)
     for n in range(len(costs)):
-        costs[n] = annealed(cell, run, work, choices, temperature)
+        copied(work.parts, work.choices, work.tried.parts, work.tried.choices)
+        changed(work.tried, work.stream, choices)
+        costs[n] = tried(cell, run, work, work.cost[0] - temperature * np.log(1.0 - drawn(work.stream)))
 
 
 # ---- The method, and an annealing that can be resumed -----------------------------------------------------------------

@@ -167,6 +167,24 @@ def copied(parts: Any, choices: Any, into_parts: Any, into_choices: Any) -> None
 
 
 @inner
+def tried(cell: Any, run: Any, work: Any, limit: float) -> float:
+    """The cost of the list `work.tried`, which becomes the current list if its cost is at most `limit`.
+
+    Where its simulation is cut off as too long, a lower bound of the cost. A list that ends the work and is better than the
+    incumbent becomes that. work: with `tried`, `parts`, `choices`, `best` and `cost` as in `AnnealArrays`.
+    """
+    value = carried_out(cell, run, work.tried, limit)
+    if value <= limit:
+        work.cost[0] = value
+        copied(work.tried.parts, work.tried.choices, work.parts, work.choices)
+        if value < work.cost[1] and run.whole[1] == 0:
+            work.cost[1] = value
+            for i in range(len(work.best)):
+                work.best[i] = work.tried.sequence[i]
+    return float(value)
+
+
+@inner
 def most_choices(cell: Any) -> int:
     """The largest number of choices that a part may have."""
     most = 1

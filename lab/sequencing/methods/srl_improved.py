@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from lab.learning.compiled import inner, without_refcounts
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import drawn_seed
-from lab.sequencing.methods.priorities import OrderArrays, Orders, carried_out, changed, copied, drawn
+from lab.sequencing.methods.priorities import OrderArrays, Orders, carried_out, changed, copied, drawn, tried
 from lab.sequencing.search import LearnedSequence, Log, Search
 from lab.sequencing.simulate.cell_arrays import Floats, Ints, moves_each
 
@@ -100,31 +100,17 @@ def _learn(learned: Any, alpha: float) -> None:
         learned.ways[entry, learned.choices[i]] += alpha
 
 
-@inner
-def _try(cell: Any, run: Any, learned: Any, limit: float) -> float:
-    """The cost of the list in `tried`, which becomes the current list if its cost is at most `limit`."""
-    value = carried_out(cell, run, learned.tried, limit)
-    if value <= limit:
-        learned.cost[0] = value
-        copied(learned.tried.parts, learned.tried.choices, learned.parts, learned.choices)
-        if value < learned.cost[1] and run.whole[1] == 0:
-            learned.cost[1] = value
-            for i in range(len(learned.best)):
-                learned.best[i] = learned.tried.sequence[i]
-    return float(value)
-
-
 @without_refcounts
 def lesson(cell: Any, run: Any, learned: Any, costs: Any, alpha: float, temperature: float) -> None:
     """One lesson: draws a list, improves it by N - 1 neighbours, learns from it, and writes the N costs into `costs` (N,)."""
     _listed(learned, True)
     learned.cost[0] = np.inf
-    costs[0] = _try(cell, run, learned, np.inf)
+    costs[0] = tried(cell, run, learned, np.inf)
     for n in range(1, len(costs)):
         copied(learned.parts, learned.choices, learned.tried.parts, learned.tried.choices)
         changed(learned.tried, learned.stream, learned.ways.shape[1])
         warm = temperature * (1.0 - n / len(costs))
-        costs[n] = _try(cell, run, learned, learned.cost[0] - warm * np.log(1.0 - drawn(learned.stream)))
+        costs[n] = tried(cell, run, learned, learned.cost[0] - warm * np.log(1.0 - drawn(learned.stream)))
     if learned.cost[1] < np.inf:  # otherwise every sequence so far ended in a deadlock
         _learn(learned, alpha * np.exp((learned.cost[1] - learned.cost[0]) / max(1e-9, temperature)))
 
