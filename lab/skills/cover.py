@@ -16,7 +16,8 @@ from lab.sim.scene.scene import Scene
 from lab.sim.scene.station_bodies import HEAD_JOINTS, HEAD_LINK
 from lab.sim.world import TIME_STEP, Array, World
 from lab.skills.sight import SkillFailed
-from lab.skills.skill import Bench, Skill, learned_path, plain
+from lab.skills.skill import Bench, Skill, learned_path
+from lab.skills.state_words import plain
 from lab.skills.surveys import Surveys
 from lab.tasks.task import Task
 from lab.tasks.task_fields import Process, Stage

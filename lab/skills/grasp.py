@@ -9,7 +9,8 @@ from lab.sim.arms.kinematics import ToolPose
 from lab.skills.around_part import SLOW, AroundPart
 from lab.skills.free_way import FAR_M, by_free_cells, look_at
 from lab.skills.sight import SkillFailed
-from lab.skills.skill import Bench, plain
+from lab.skills.skill import Bench
+from lab.skills.state_words import plain
 from lab.tasks.task import Task
 
 if TYPE_CHECKING:

@@ -17,7 +17,8 @@ from lab.sim.parts.kinds import Spot
 from lab.skills.free_way import by_free_cells, look_at
 from lab.skills.place import let_go, release_pose
 from lab.skills.sight import SkillFailed
-from lab.skills.skill import Bench, Photo, Skill, learned_path, no_path_error, plain
+from lab.skills.skill import Bench, Photo, Skill, learned_path, no_path_error
+from lab.skills.state_words import plain
 from lab.skills.surveys import SurveyName, Surveys
 from lab.tasks.task import Task
 from lab.tasks.task_fields import Obstacle

@@ -13,7 +13,8 @@ from lab.skills.around_part import SLOW, AroundPart
 from lab.skills.camera_grids import RELEASE_ABOVE
 from lab.skills.free_way import look_at
 from lab.skills.sight import SkillFailed
-from lab.skills.skill import Bench, plain
+from lab.skills.skill import Bench
+from lab.skills.state_words import plain
 from lab.tasks.task import Task
 
 if TYPE_CHECKING:

@@ -8,7 +8,8 @@ from lab.learning.problem import Problem
 from lab.mdp import NoPath, grid
 from lab.sim.arms.kinematics import ToolPose
 from lab.skills.sight import SkillFailed
-from lab.skills.skill import Bench, Skill, learned_path, no_path_error, plain
+from lab.skills.skill import Bench, Skill, learned_path, no_path_error
+from lab.skills.state_words import plain
 from lab.skills.surveys import SurveyName, Surveys, grid_of, way_to
 from lab.tasks.task import Task
 

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lab.skills import SKILLS, Skill
-from lab.skills.skill import away_in_words, size_in_words
+from lab.skills.state_words import away_in_words, size_in_words
 from lab.skills.surveys import Surveys
 
 Make = Callable[[str], Skill]

@@ -16,7 +16,7 @@ from lab.mdp import TabularMDP, distances
 from lab.sim.arms.kinematics import ToolPose
 from lab.sim.world import Array
 from lab.skills import Skill
-from lab.skills.skill import away_in_words
+from lab.skills.state_words import away_in_words
 from lab.teaching.lesson_plan import Lesson
 
 OUTSIDE = -1  # of the problem's grid
