@@ -125,7 +125,7 @@ def sequence(
     ] = "ccrl",
     seconds: Annotated[
         float | None,
-        typer.Option("--seconds", help="End after this time [s] with the incumbent and its bound."),
+        typer.Option("--seconds", help="End after so many seconds, with the incumbent and its bound."),
     ] = None,
     gap: Annotated[
         float | None,

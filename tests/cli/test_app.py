@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from rich.text import Text
 
 from lab import __version__
 from lab.cli.app import COMMANDS, Command, loaded
@@ -30,6 +31,14 @@ def test_every_command_has_help_with_an_example(lab: Lab, words: str) -> None:
     assert COMMANDS[words].example.startswith(f"lab {words}")
     assert f"Example: {COMMANDS[words].example}" in " ".join(ran.out.split())
     assert "--json" in ran.out
+
+
+@pytest.mark.parametrize("words", COMMANDS)
+def test_nothing_in_a_help_text_is_taken_for_markup(words: str) -> None:
+    """A unit such as [s] is a style to rich, which leaves it out."""
+    for param in loaded(words).params:
+        text = getattr(param, "help", None) or ""
+        assert Text.from_markup(text).plain == text, param.name
 
 
 def test_the_help_of_a_group_says_of_a_command_what_its_own_help_begins_with() -> None:
