@@ -48,7 +48,9 @@ def replay(
         Path | None,
         typer.Option("--movie", help="Draw a run as a movie into this .gif or .webp file; no display is needed."),
     ] = None,
-    seconds: Annotated[float, typer.Option("--seconds", min=1.0, max=60.0, help="Length of the movie in seconds.")] = 15.0,
+    seconds: Annotated[
+        float, typer.Option("--seconds", min=1.0, max=60.0, help="Length of the movie in seconds.")
+    ] = 15.0,
     audit: Annotated[
         bool,
         typer.Option(
