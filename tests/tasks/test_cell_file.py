@@ -16,7 +16,7 @@ from lab.sequencing.cell.stations import Arrivals
 from lab.sequencing.methods.exact import optimum
 from lab.sequencing.search import SrlSettings
 from lab.sequencing.simulate.follow import simulate
-from lab.tasks.cell_file import TOAST_CASES, CellFile, order_from_word, toast_case
+from lab.tasks.cell_file import TOAST_CASES, CellFile, order_from_word, toast_case, toml_of
 from lab.tasks.task_file import load_cell, names_of
 from lab.tasks.toml_text import TomlText
 
@@ -259,3 +259,35 @@ def test_a_case_of_the_toast_cell_is_a_file(word: str) -> None:
 @pytest.mark.parametrize("word", ["", "IIII", "0", "4", "RSR"])
 def test_another_case_lists_the_three(word: str) -> None:
     assert refusal(lambda: toast_case(word)).endswith("known: I, II, III")
+
+
+# ---- cell toml --------------------------------------------------------------------------------------------------------
+
+
+def again(file: CellFile) -> CellFile:
+    return CellFile.checked(TomlText.parsed(Path("mine.toml"), toml_of(file)))
+
+
+@pytest.mark.parametrize("name", names_of("cell"))
+def test_what_ships_reads_as_the_same(name: str) -> None:
+    file = load_cell(name)
+    assert again(file).model_dump() == file.model_dump()
+
+
+def test_names_with_spaces_setups_and_no_robot() -> None:
+    raw = {
+        "name": "no robot",
+        "title": 'a "title" \\ of one',
+        "order": ["red part", "blue part"],
+        "robots": [],
+        "release_s": [0.5, 1e-7],
+        "stations": [
+            {"name": "in", "kind": "storage", "capacity": "unlimited"},
+            {"name": "the saw", "kind": "machine", "capacity": "unlimited", "servers": 1, "processing_s": 3,
+             "setup_s": {"red part": {"blue part": 2.25}}},
+        ],
+        "products": [{"name": name, "routes": [["in", "the saw"]]} for name in ("red part", "blue part")],
+    }  # fmt: skip
+    file = CellFile.model_validate(raw)
+    assert again(file).model_dump() == file.model_dump()
+    assert again(file).cell().setups[1] == {("red part", "blue part"): 2.25}

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from lab.sim.frames import Shape, Viewpoint
-from lab.view.rasterizer import BACKGROUND, Floats, Mesh, Rasterizer
+from lab.sim.frames import IDENTITY, Body, Frame, Shape, Viewpoint
+from lab.view.rasterizer import BACKGROUND, Floats, Mesh, Rasterizer, Still
 from lab.view.scene_data import corners_of
 
 RED, GREEN = (1.0, 0.0, 0.0, 1.0), (0.0, 1.0, 0.0, 1.0)
@@ -71,3 +71,18 @@ def test_points_to_look_at_fill_the_picture(x: int, y: int) -> None:
     red = np.argwhere(np.ptp(picture, axis=2) > 0.1)
     assert np.ptp(red[:, 0]) > 0.8 * SIZE[1] or np.ptp(red[:, 1]) > 0.8 * SIZE[0]
     assert red.min() > 0
+
+
+# ---- still ------------------------------------------------------------------------------------------------------------
+
+
+def test_it_keeps_what_was_shown_last() -> None:
+    one, other = (Body(name, (Shape("sphere", (0.1,)),)) for name in ("one", "other"))
+    still = Still()
+    still.show([one])
+    still.update(Frame(0.0, {"one": IDENTITY}))
+    still.show([other])
+    still.update(Frame(1.0, {"other": IDENTITY}))
+    still.recording.check()
+    assert still.recording.bodies == (other,)
+    assert [frame.time_s for frame in still.recording.frames] == [1.0]

@@ -1,15 +1,22 @@
 """Bodies as the page's JSON."""
 
 import base64
+import json
+from collections.abc import Callable
+from math import radians, tan
 from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
+from hypothesis import given
+from hypothesis import strategies as st
 
 from lab.errors import BadInput
+from lab.mdp import FloatArray
+from lab.sequencing.cell.schedule import Activity, Schedule
 from lab.sim.frames import Body, Shape, Viewpoint
-from lab.view.scene_data import describe, read_mesh
+from lab.view.scene_data import MARKS, Mark, Story, camera_for, describe, read_mesh
 
 
 @pytest.fixture(params=["part.stl", "part.obj"])
@@ -89,3 +96,66 @@ def test_a_comment_in_latin_1_is_no_fault(tmp_path: Path) -> None:
 def test_two_bodies_of_one_name_are_refused() -> None:
     with pytest.raises(BadInput, match="used twice"):
         describe([Body("a", ()), Body("a", ())], Viewpoint())
+
+
+# ---- story ------------------------------------------------------------------------------------------------------------
+
+
+CARRY = Activity("robot", "carry", 1, "plate", "toaster", 1.00049, 4.0)
+TOASTS = Activity("toaster", "process", 1, "toaster", "toaster", 4.0, 64.0)
+SLICE = Activity("slice 1", "process", 1, "toaster", "toaster", 4.0, 64.0)
+MEASURED = Schedule((CARRY,), (TOASTS,), (SLICE,), 64.0, (1,))
+
+
+def test_a_story_has_the_rows_of_robot_and_machines_and_all_else_in_the_order_of_time() -> None:
+    late, early = Mark(9.0, "stop", "emergency stop"), Mark(2.0, "fault", "slice 1 was moved")
+    story = Story(MEASURED, None, ((5.0, "waits"), (1.0, "carries")), (late, early), (8.0, 1.0))
+    said = json.loads(json.dumps(story.to_json()))
+    assert [row["resource"] for row in said["measured"]] == ["robot", "toaster"]
+    assert said["measured"][0]["start_s"] == 1.0
+    assert (said["planned"], said["begins_s"]) == ([], [1.0, 8.0])
+    assert said["captions"] == [[1.0, "carries"], [5.0, "waits"]]
+    assert [mark["kind"] for mark in said["marks"]] == ["fault", "stop"]
+
+
+def test_a_bar_is_called_as_its_part_and_has_its_colour_where_the_part_is_worked_on_or_carried() -> None:
+    waits = Activity("robot", "wait", 1, "plate", "plate", 0.0, 1.0)
+    schedule = Schedule((waits, CARRY), (TOASTS,), (), 64.0, (1,))
+    rows = Story(schedule, looks={1: ("slice 1", "#E69F00")}).to_json()["measured"]
+    assert [row["name"] for row in rows] == ["slice 1"] * 3
+    assert [row.get("color") for row in rows] == [None, "#E69F00", "#E69F00"]
+    assert "name" not in Story(schedule).to_json()["measured"][0]
+
+
+def test_a_mark_is_of_a_known_kind() -> None:
+    with pytest.raises(BadInput, match=r"'fualt'.*did you mean 'fault'"):
+        Mark(1.0, "fualt", "")  # type: ignore[arg-type]
+    assert [Mark(0.0, kind, "").kind for kind in MARKS] == [*MARKS]
+
+
+# ---- camera placement -------------------------------------------------------------------------------------------------
+
+
+InPicture = Callable[[Viewpoint, FloatArray], bool]  # the fixture of tests/conftest.py
+coordinate = st.floats(-3.0, 3.0)
+points = st.lists(st.tuples(coordinate, coordinate, coordinate), min_size=1, max_size=12)
+
+
+@given(seen=points, azimuth=st.floats(-3.0, 3.0), elevation=st.floats(0.1, 1.4))
+def test_a_camera_has_all_points_in_its_picture_and_looks_from_where_it_is_told(
+    in_picture: InPicture, seen: list[tuple[float, float, float]], azimuth: float, elevation: float
+) -> None:
+    cloud = np.array(seen) + np.array([[0.0, 0.0, 0.0], [0.1, 0.1, 0.1]])[:, None]
+    camera = camera_for(cloud.reshape(-1, 3), azimuth, elevation)
+    assert in_picture(camera, cloud.reshape(-1, 3))
+    x, y, z = np.subtract(camera.eye, camera.target)
+    assert np.arctan2(y, x) == pytest.approx(azimuth)
+    assert np.arctan2(z, np.hypot(x, y)) == pytest.approx(elevation)
+
+
+def test_a_nearer_camera_would_not_do() -> None:
+    """The unit square from straight in front fills the picture but for the margin: 0.5 / tan(19 degrees) away, and 6 %."""
+    square = np.array([[-0.5, 0.0, 0.0], [0.5, 0.0, 0.0], [-0.5, 0.0, 1.0], [0.5, 0.0, 1.0]])
+    camera = camera_for(square, radians(-90.0), 0.0)
+    assert camera.target == pytest.approx((0.0, 0.0, 0.5))
+    assert camera.eye == pytest.approx((0.0, -1.06 * 0.5 / tan(radians(19.0)), 0.5))

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from lab.errors import BadInput
+from lab.mdp import coverage, grid
 from lab.toolbox.policy import GOAL, ON, OUT, Policy
 from lab.view import value_levels as levels
 from lab.view.canvas import ORANGE, RED
-from lab.view.value_levels import LearnedValues, Planes, can_be_drawn, value_levels
+from lab.view.value_levels import GridPlanes, LearnedValues, Planes, can_be_drawn, is_map, value_levels
 
 MakePolicy = Callable[..., Policy]
 SPACE = ("left", "right", "backward", "forward", "down", "up")
@@ -103,3 +104,36 @@ def test_what_is_no_grid_is_refused(policy: MakePolicy, tmp_path: Path) -> None:
     with pytest.raises(BadInput, match=r"plots are written as \.png"):
         value_levels(policy((2, 2)), tmp_path / "map.svg")
     assert not list(tmp_path.iterdir())
+
+
+# ---- grid planes ------------------------------------------------------------------------------------------------------
+
+
+BLOCKED = np.array([[0, 1, 0], [0, 0, 0]], bool)
+
+
+def test_rows_run_down_and_columns_to_the_right() -> None:
+    planes = GridPlanes(grid((2, 3), BLOCKED, (0, 0), (1, 2), action_labels=("up", "down", "left", "right")))
+    assert (planes.rows, planes.columns, planes.layers, planes.place((1, 2))) == (2, 3, 1, (1, 2))
+    assert ["".join(row) for row in planes.marks(0)] == [".#.", "..G"]
+
+
+def test_a_map_has_x_to_the_right_and_y_up() -> None:
+    mdp = grid((2, 3), BLOCKED, (0, 0), (1, 2), action_labels=("left", "right", "down", "up"))
+    planes = GridPlanes(mdp)
+    assert is_map(mdp)
+    assert (planes.rows, planes.columns, planes.place((1, 2)), planes.place((0, 0))) == (3, 2, (0, 1), (2, 0))
+    assert ["".join(row) for row in planes.marks(0)] == [".G", "#.", ".."]
+    assert planes.plane(np.arange(6)).tolist() == [[2, 5], [1, 4], [0, 3]]
+
+
+def test_axes_beyond_the_second_are_layers() -> None:
+    planes = GridPlanes(grid((1, 2, 2, 3), np.zeros((1, 2, 2, 3), bool), (0, 0, 0, 0), (0, 1, 1, 2)))
+    assert (planes.layers, planes.layer((0, 1, 1, 2))) == (6, 5)
+    assert planes.plane(np.arange(12), 5).tolist() == [[5, 11]]
+
+
+def test_one_axis_is_a_row_and_of_a_coverage_it_is_the_grid_to_cover() -> None:
+    row = GridPlanes(grid((4,), np.zeros(4, bool), (0,), (3,)))
+    assert (row.rows, row.columns, row.place((3,)), "".join(row.marks(0).ravel())) == (1, 4, (0, 3), "...G")
+    assert (GridPlanes(coverage((2, 2))).rows, GridPlanes(coverage((2, 2))).columns) == (2, 2)

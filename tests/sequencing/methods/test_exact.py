@@ -16,7 +16,7 @@ from lab.sequencing.cell.routes import part_of
 from lab.sequencing.cell.stations import UNLIMITED, Arrivals, Product, Robot, Stage, Station, one_robot
 from lab.sequencing.cell.ways import TICKS_PER_S
 from lab.sequencing.methods.cp_sat import cp_sat
-from lab.sequencing.methods.exact import Optimum, exact, optimum
+from lab.sequencing.methods.exact import ExactValues, Optimum, exact, optimum
 from lab.sequencing.search import Reference, Search
 from lab.sequencing.simulate.follow import simulate
 from lab.sequencing.simulate.merged import MergedCell
@@ -257,3 +257,34 @@ def test_states_are_for_one_robot_and_cp_sat_for_all(oven_cell: CellMaker) -> No
         optimum(cell)
     found = exact(cell, Search(), np.random.default_rng(0))
     assert found.cost == 2.0 + oven.processing_s + 2.0
+
+
+# ---- exact values -----------------------------------------------------------------------------------------------------
+
+
+def test_one_toast_by_hand(oven_cell: CellMaker) -> None:
+    """2 s to the oven, 10 s in it, 2 s out."""
+    run = Run(oven_cell(1))
+    values = ExactValues(run.cell)
+    assert values.of(run, run.allowed()) == [14.0]
+    run.move(1)
+    assert values.of(run, run.allowed()) == [12.0]
+
+
+@settings(max_examples=40, deadline=None)
+@given(data=st.data())
+def test_the_best_value_is_the_optimum_and_leads_to_it(
+    cells: Callable[..., st.SearchStrategy[Cell]], data: st.DataObject
+) -> None:
+    cell = data.draw(cells(max_machines=2, max_parts=3, many=True))
+    run, values, best_s = Run(cell), ExactValues(cell), optimum(cell).cost
+    while allowed := run.allowed():
+        left_s = values.of(run, allowed)
+        assert run.now_s + min(left_s) == pytest.approx(best_s, abs=1e-5)
+        run.move(allowed[left_s.index(min(left_s))])
+    assert run.now_s == pytest.approx(best_s, abs=1e-5)
+
+
+def test_too_many_parts_to_know(toast_cell: CellMaker) -> None:
+    with pytest.raises(BadInput, match="41 parts are too many, at most 40"):
+        ExactValues(toast_cell("I", 41))

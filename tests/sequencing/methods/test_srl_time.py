@@ -11,14 +11,16 @@ from hypothesis import strategies as st
 
 from lab.errors import BadInput
 from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.chance import NO_CHANCE, Chance
 from lab.sequencing.cell.objectives import OBJECTIVES, cost, stuck_cost
 from lab.sequencing.cell.stations import Product, Stage, Station
 from lab.sequencing.methods.cp_sat import cp_sat
 from lab.sequencing.methods.exact import optimum
-from lab.sequencing.methods.srl_time import SrlTimeResult, srl_time
+from lab.sequencing.methods.srl_time import SrlTimeResult, reacting, srl_time
 from lab.sequencing.search import EpisodeSequenced, Search
 from lab.sequencing.simulate.follow import simulate
 from lab.sequencing.simulate.run import Run
+from lab.sequencing.simulate.several import replicate
 
 CellMaker = Callable[..., Cell]
 Cells = Callable[..., st.SearchStrategy[Cell]]
@@ -149,3 +151,26 @@ def test_what_the_bound_is_worth(toast_cell: CellMaker) -> None:
     for seed in range(3):
         few, many = (srl_time(cell, Search(n), np.random.default_rng(seed), bounded=False) for n in (50, 500))
         assert few.final_cost > optimum(cell).cost == many.final_cost == learned(cell, 50, seed).final_cost
+
+
+# ---- srl time reacting ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("case", ["I", "II", "III"])
+def test_without_chance_it_carries_out_the_optimum(toast_cell: CellMaker, case: str) -> None:
+    cell = toast_cell(case, 3)
+    assert replicate(cell, reacting(cell), NO_CHANCE, 1, 0) == pytest.approx([optimum(cell).cost])
+
+
+def test_it_is_not_bound_to_a_list_when_a_part_comes_late(fms_cell: CellMaker) -> None:
+    """Exponential arrivals: in the same episodes it needs less time on average than the list that is best by the means."""
+    cell, chance = fms_cell("RSR", 200), Chance("constant", "exponential")
+    fixed = replicate(cell, optimum(cell).sequence, chance, 60, 1)
+    reacts = replicate(cell, reacting(cell), chance, 60, 1)
+    assert reacts.mean() < fixed.mean()
+
+
+def test_same_seed_same_costs(toast_cell: CellMaker) -> None:
+    cell = toast_cell("I", 2)
+    one, other = (replicate(cell, reacting(cell, seed=3), Chance(), 5, 1) for _ in range(2))
+    assert np.array_equal(one, other)
