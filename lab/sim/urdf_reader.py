@@ -219,12 +219,12 @@ def check_mesh(path: Path, name: str, folder: Path) -> None:
     file = within(folder, name, path.parent)
     if file is None:
         raise BadInput(f"{path}: mesh '{name}' lies outside the URDF's folder")
-    if not is_file(file) or not 0 < file.stat().st_size <= mesh_file.MAX_BYTES:
-        raise BadInput(f"{path}: mesh '{name}' is missing, empty or over {mesh_file.MAX_BYTES // 1_000_000} MB")
+    if not is_file(file):
+        raise BadInput(f"{path}: mesh '{name}' is missing")
     kind = "an STL" if file.suffix.lower() == ".stl" else "an OBJ"
     try:
         vertices = mesh_file.vertices(file)
-    except ValueError as error:
+    except (OSError, ValueError) as error:
         raise BadInput(f"{path}: mesh '{name}' is not {kind} file: {error}") from None
     if len(vertices) < 4 or vertices.shape[1] < 3 or not np.isfinite(vertices).all():
         raise BadInput(

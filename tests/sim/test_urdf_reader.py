@@ -108,7 +108,7 @@ def test_what_is_no_urdf_at_all_is_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("mesh", "said"),
     [
-        ("", "missing, empty or over"),
+        ("", "has 0 vertices"),
         ("v 0 0 0\nv 1 0 0\nv 0 1 0\n", "has 3 vertices"),
         ("f 1 2 3\n", "has 0 vertices"),
         (MESH.replace("v 0 1 0", "v 0 nan 0"), "not three finite numbers"),

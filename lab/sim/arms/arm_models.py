@@ -29,7 +29,6 @@ ALONG_Z = np.array([[0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]])  # the 
 FARTHEST_TURN = (
     pi - 0.15
 )  # [rad] of a first joint that could go farther: behind it, neighbours would be a whole turn apart
-MOST_BYTES = 5_000_000  # of a URDF
 OWN_NEAREST_M = 0.25  # [m] of a URDF file that says nothing
 
 
@@ -77,8 +76,8 @@ def arm_of(settings: RobotSettings, folder: Path = Path()) -> Arm:
         if found is None:
             raise BadInput(f"robot.model '{settings.model}': the URDF lies outside the task file's folder")
         path = found
-        if not is_file(path) or not 0 < path.stat().st_size <= MOST_BYTES:
-            raise BadInput(f"robot.model '{settings.model}': no such file beside the task file, or over 5 MB")
+        if not is_file(path):
+            raise BadInput(f"robot.model '{settings.model}': no such file beside the task file")
         changed = path.stat().st_mtime_ns
     mount = (settings.opening_m, settings.base_up_m, settings.nearest_m)
     tool = settings.tool_link or "", settings.fingers or (), settings.tip_m

@@ -19,7 +19,7 @@ from lab.errors import BadInput, counted
 from lab.files import assets_folder, is_file, within
 from lab.sim import urdf_reader
 from lab.sim.frames import Quaternion, Shape, ShapeKind, Vector
-from lab.sim.mesh_file import MAX_BYTES, is_binary, readable, text_corners
+from lab.sim.mesh_file import is_binary, readable, text_corners
 from lab.tasks.part_fields import PartFields
 
 if TYPE_CHECKING:
@@ -204,9 +204,6 @@ def _found(part: PartFields, field: str, name: str, folder: Path) -> Path:
         path = within(place, name)
         if path is None:
             raise BadInput(f"{where}: it lies outside the folder '{place}'")
-        size = path.stat().st_size
-        if not 0 < size <= MAX_BYTES:
-            raise BadInput(f"{where}: {size} bytes: wanted 1 to {MAX_BYTES // 1_000_000} MB")
         return path
     raise BadInput(f"{where}: no such file, neither in '{folder}' nor in the lab's assets")
 

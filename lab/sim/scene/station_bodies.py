@@ -12,7 +12,7 @@ from lab.errors import BadInput
 from lab.files import beside_or_asset
 from lab.sim import urdf_reader
 from lab.sim.frames import Rgba, Vector
-from lab.sim.mesh_file import MAX_BYTES, readable
+from lab.sim.mesh_file import readable
 from lab.sim.world import World
 from lab.tasks.task_fields import Station
 
@@ -93,8 +93,6 @@ def _mesh_bounds(path: Path) -> tuple[Array, Array]:
     import trimesh
 
     kind = path.suffix.lower().removeprefix(".")
-    if not 0 < path.stat().st_size <= MAX_BYTES:
-        raise BadInput(f"{path.stat().st_size} bytes: wanted 1 to {MAX_BYTES // 1_000_000} MB")
     try:
         mesh: Any = trimesh.load(
             BytesIO(readable(path)), kind, force="mesh", skip_materials=True
