@@ -15,7 +15,7 @@ from lab.production.controls import Controls
 Argument = str | float | tuple[float, float, float] | tuple[int, ...] | None
 How = Literal["at once", "by hand", "in turn", "console"]
 MOST_POINT_MM = 10_000.0
-MOST_MM, MOST_DEGREES, MOST_SPEED, MOST_ENTRIES, MOST_CHARACTERS = 500.0, 180.0, 100.0, 10_000, 4000
+MOST_MM, MOST_DEGREES, MOST_SPEED = 500.0, 180.0, 100.0
 AXES = {"x": 0, "y": 1, "z": 2}
 _SIGN = re.compile(r"([+-])([xyz])")
 OPERATOR = "operator"
@@ -55,8 +55,6 @@ def spoken(line: str) -> Spoken:
     if not words:
         raise BadInput("no command: help lists them")
     word = words[0].lower()
-    if len(line) > MOST_CHARACTERS:
-        raise BadInput(f"'{word[:40]} ...': a line has {MOST_CHARACTERS} characters at the most")
     if word not in COMMANDS:
         raise unknown("command", words[0][:80], COMMANDS, "typed")
     rest = " ".join(words[1:])
@@ -140,8 +138,6 @@ def _order(rest: str) -> tuple[int, ...]:
     for number, word in enumerate(words, start=1):
         if not (word.isascii() and word.isdecimal() and len(word) <= 6 and int(word) > 0):
             raise BadInput(f"entry {number}, '{word[:40]}': wanted the number of a part, from 1")
-    if len(words) > MOST_ENTRIES:
-        raise BadInput(f"{len(words)} entries: allowed are 1 to {MOST_ENTRIES}")
     return tuple(int(word) for word in words)
 
 

@@ -16,8 +16,6 @@ from lab.sequencing.cyclic.cycle import Cycle
 from lab.sequencing.simulate.follow import simulate, waits_in
 from lab.sequencing.simulate.run import Run
 
-MOST_PERIODS = 20
-
 
 @dataclass(frozen=True)
 class Steady:
@@ -30,9 +28,9 @@ class Steady:
 
 
 def steady(cycle: Cycle, periods: int) -> Steady:
-    """The steady state of a cycle. Parts are numbered from the first one seen; raises BadInput for too many or no periods."""
-    if not 1 <= periods <= MOST_PERIODS:
-        raise BadInput(f"periods = {periods}: allowed are 1 to {MOST_PERIODS}")
+    """The steady state of a cycle. Parts are numbered from the first one seen; raises BadInput for no periods."""
+    if periods < 1:
+        raise BadInput(f"periods = {periods}: allowed are whole numbers from 1")
     end_s, first = periods * cycle.period_s, -max(cycle.passed) - 1
     cycles = range(first, periods)
     robot = list(_robot(cycle, range(first, periods + 1)))

@@ -49,7 +49,6 @@ def test_a_line_is_understood(line: str, said: Spoken) -> None:
         ("learn", "learn: no name after it"),
         ("move", "move: no name after it"),
         ("move 1 2 99999", "99999: allowed are -10000 to 10000 mm"),
-        ("run " + 5000 * "x", "4000 characters at the most"),
     ],
 )
 def test_what_is_wrong_is_said_in_one_line(line: str, why: str) -> None:

@@ -160,7 +160,6 @@ def test_parts_are_named_by_their_products(crossing_cell: Callable[[], Cell]) ->
     assert sorted(shown.names) == [*range(1, len(shown.names) + 1)]
 
 
-@pytest.mark.parametrize("periods", [0, 21])
-def test_too_many_periods(oven_cell: CellMaker, periods: int) -> None:
-    with pytest.raises(BadInput, match=f"periods = {periods}: allowed are 1 to 20"):
-        steady(best_cycle(oven_cell(), ("toast",)), periods)
+def test_no_periods(oven_cell: CellMaker) -> None:
+    with pytest.raises(BadInput, match="periods = 0: allowed are whole numbers from 1"):
+        steady(best_cycle(oven_cell(), ("toast",)), 0)
