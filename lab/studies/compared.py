@@ -148,7 +148,6 @@ class ComparedSessions:
 # ---- the comparison -------------------------------------------------------------------------------------------------
 
 
-MOST_SETTINGS = 1000
 FAMILIES: dict[str, Family[Any]] = {"gates": GATES, "learners": UPDATES, "advisors": ADVISORS}
 MEASURES = (
     "solved_percent: sessions whose greedy way is as good as can be in the end. mean_steps: of all episodes, a failed one as the "
@@ -162,7 +161,7 @@ MEASURES = (
 class Compared:
     """A comparison: the problem (see `lab.teaching.subjects`), the advisors, and the values of settings by name.
 
-    Each combination is one `ComparedSetting`. Raises BadInput for an empty list and for more than MOST_SETTINGS combinations.
+    Each combination is one `ComparedSetting`. Raises BadInput for an empty list.
     """
 
     problem: Teachable
@@ -176,9 +175,6 @@ class Compared:
         for name, several in (("advisor", self.advisors), *self.values.items()):
             if not several:
                 raise BadInput(f"{name}: nothing to compare: wanted one value or several")
-        most = int(np.prod([len(several) for several in self.values.values()])) * len(self.advisors)
-        if most > MOST_SETTINGS:
-            raise BadInput(f"{most} settings to compare: allowed are {MOST_SETTINGS}")
 
     def settings(self) -> "Iterator[ComparedSetting]":
         """All combinations, the first name varying slowest."""

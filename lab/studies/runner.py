@@ -13,7 +13,6 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from hashlib import sha256
-from io import BytesIO
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -21,7 +20,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.errors import BadInput, LabError, WorkFailed
-from lab.files import read_limited
 from lab.optional import optional
 
 STORE = "sessions.jsonl"
@@ -86,7 +84,7 @@ class Job:
             ending: dict[str, Any] = {"initializer": _end_with_parent, "initargs": (os.getpid(),)}
             # if there are few items, each of them takes long and is given out alone
             batch = min(most, max(1, len(items) // (4 * self.workers)))
-            pool = Parallel(self.workers, return_as="generator", batch_size=batch, **ending)
+            pool = Parallel(min(self.workers, len(items)), return_as="generator", batch_size=batch, **ending)
             yield from zip(items, pool(delayed(work)(item) for item in items), strict=True)
 
     def kept(self) -> Iterator[Any]:
@@ -95,14 +93,12 @@ class Job:
         if path is None or not path.is_file():
             return
         try:
-            content = read_limited(path)
+            with path.open("rb") as file:
+                for line in file:
+                    with suppress(ValueError, RecursionError):
+                        yield json.loads(line.decode("utf-8", errors="replace"))
         except OSError as error:
             raise BadInput(f"'{path}': what is kept cannot be read: {error.strerror or error}") from None
-        for line in BytesIO(content):
-            try:
-                yield json.loads(line.decode("utf-8", errors="replace"))
-            except (ValueError, RecursionError):
-                continue
 
     def kept_as(self, read: Callable[[Any], tuple[Any, Result] | None]) -> dict[Any, Result]:
         """The stored results by key; read: returns (key, result) for a record, None if it is not needed.
@@ -126,7 +122,8 @@ class Job:
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
             if path.is_file() and _is_cut(path):  # an incomplete line, whose work has just been repeated
-                os.truncate(path, read_limited(path).rfind(b"\n") + 1)
+                with path.open("r+b") as cut:
+                    cut.truncate(cut.read().rfind(b"\n") + 1)
             with path.open("a", encoding="utf-8") as file:
                 file.write(json.dumps(record) + "\n")
         except OSError as error:

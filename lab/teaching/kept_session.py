@@ -5,6 +5,7 @@ import os
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import asdict
+from itertools import count
 from pathlib import Path
 from shlex import quote
 from typing import Any, TypeVar
@@ -26,7 +27,6 @@ from lab.toolbox.policy import Policy
 from lab.toolbox.policy_file import encode
 from lab.toolbox.registry import Toolbox
 
-_MOST = 100_000  # sessions of one name
 MOST_VALUES = 3_000_000  # entries of a table; the optimal values of larger ones take too long to compute
 Options = TypeVar("Options", bound=SessionOptions)
 
@@ -152,17 +152,16 @@ class NewSession(SessionInFolder):
 def claimed(toolbox: Toolbox, name: str, make: Callable[[Path], None]) -> Path:
     """A new folder for a session of this problem, made by `make`; no two processes get the same one."""
     plain = slug(name.lower().replace(" ", "-"))
-    for number in range(1, _MOST):
-        folder = toolbox.folder / SESSIONS / f"{plain}-{number}"
-        try:
-            folder.parent.mkdir(parents=True, exist_ok=True)
-            make(folder)
-        except FileExistsError:
-            continue
-        except OSError as error:
-            raise BadInput(f"toolbox {toolbox.folder}: {folder}: {error.strerror or error}") from error
-        return folder
-    raise BadInput(f"toolbox {toolbox.folder}: it holds {_MOST} sessions of '{name}': remove some")
+    numbers, folder = count(1), toolbox.folder / SESSIONS
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        while True:
+            folder = toolbox.folder / SESSIONS / f"{plain}-{next(numbers)}"
+            with suppress(FileExistsError):
+                make(folder)
+                return folder
+    except OSError as error:
+        raise BadInput(f"toolbox {toolbox.folder}: {folder}: {error.strerror or error}") from error
 
 
 class KeptSession(SessionInFolder):

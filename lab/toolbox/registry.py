@@ -97,7 +97,6 @@ LEFT_S = 600.0  # older drafts are leftovers: no running command takes so long t
 _NOT_LISTED = ("action_labels", "shape")
 _MOST_NAMED = 12  # the most policies that an error lists; of more, it lists the nearest
 _NEAREST = 5
-_LONGEST_LINE = 100  # the most ancestors that are looked up
 
 
 class Toolbox:
@@ -232,7 +231,7 @@ class Toolbox:
         """A row for each ancestor by warm starts, the nearest first: name, hash, scene, and whether it is in this toolbox."""
         found: Rows = []
         seen, parent = set(), policy.parent
-        while parent and parent not in seen and len(found) < _LONGEST_LINE:
+        while parent and parent not in seen:
             seen.add(parent)
             name, _, digits = parent.rpartition("@")
             versions, ancestor = self._of(slug(name)), None

@@ -12,7 +12,6 @@ from pathlib import Path
 
 import pytest
 
-from lab.errors import BadInput
 from lab.studies.runner import STORE, Job, record_of
 
 ROOT = str(Path(__file__).parents[2])
@@ -97,13 +96,6 @@ def test_what_was_kept_is_read_and_what_is_not_understood_passed_over(tmp_path: 
     }
     job.keep({"key": "last", "found": {"name": "b", "steps": []}})  # on a line of its own
     assert "last" in job.kept_as(lambda entry: (entry["key"], record_of(Found, entry["found"])))
-
-
-def test_what_was_kept_is_not_read_from_a_file_without_end(tmp_path: Path) -> None:
-    with (tmp_path / STORE).open("wb") as file:
-        file.truncate(1 << 32)
-    with pytest.raises(BadInput, match="what is kept cannot be read: it has 4294967296 bytes"):
-        list(Job(folder=tmp_path).kept())
 
 
 def test_a_line_that_was_cut_off_is_written_anew(tmp_path: Path) -> None:
