@@ -83,7 +83,10 @@ class WorkFailed(LabError):
     exit_code = 1
 
 
-_NO_ROOM = ("failed to map segment", "annot allocate memory", "can't start new thread", "unable to allocate")
+_NO_ROOM = (
+    *("failed to map segment", "annot allocate memory", "can't start new thread", "unable to allocate"),
+    *("allowed dimension exceeded", "int too large to convert"),  # of a size that no memory could hold
+)
 
 
 def out_of_memory(error: BaseException) -> WorkFailed | None:

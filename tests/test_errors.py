@@ -110,4 +110,5 @@ def test_too_little_memory_is_known_by_its_words() -> None:
     outer = ValueError("no table")
     outer.__cause__ = MemoryError("of 5 GiB")
     assert isinstance(out_of_memory(outer), WorkFailed)
+    assert isinstance(out_of_memory(ValueError("Maximum allowed dimension exceeded")), WorkFailed)
     assert out_of_memory(ImportError("no module named x")) is None

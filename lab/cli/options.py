@@ -6,9 +6,6 @@ import typer
 
 from lab.cli.families import from_files, offers
 
-MAX_EPISODES = 1_000_000
-MAX_SESSIONS = 10_000
-
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")]
 Seed = Annotated[int, typer.Option("--seed", min=0, help="Seed of all random numbers.")]
 ToolboxPlace = Annotated[

@@ -67,7 +67,6 @@ def run(
         typer.Option(
             "--workers",
             min=1,
-            max=256,
             help="Processes that survey, time moves and draw; the numbers are the same.",
             show_default="one a core, at most 8",
         ),

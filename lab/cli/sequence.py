@@ -10,8 +10,6 @@ from lab.cli import deferred
 from lab.cli.families import offers
 from lab.cli.lessons import lesson_seat, say_read, sequenced, teacher_of
 from lab.cli.options import (
-    MAX_EPISODES,
-    MAX_SESSIONS,
     Json,
     MethodName,
     Parts,
@@ -99,13 +97,11 @@ def sequence(
         typer.Option("--objective", help="{objectives}; default: the file's.", autocompletion=offers("objectives")),
     ] = None,
     episodes: Annotated[
-        int | None, typer.Option("--episodes", min=1, max=MAX_EPISODES, help="Session length; default: the file's.")
+        int | None, typer.Option("--episodes", min=1, help="Session length; default: the file's.")
     ] = None,
     sessions: Annotated[
         int,
-        typer.Option(
-            "--sessions", min=1, max=MAX_SESSIONS, help="The number of sessions, each with its own random numbers."
-        ),
+        typer.Option("--sessions", min=1, help="The number of sessions, each with its own random numbers."),
     ] = 1,
     stochastic: Annotated[
         bool,

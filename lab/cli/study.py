@@ -29,11 +29,10 @@ def study_run(
         typer.Option(
             "--sessions",
             min=1,
-            max=1_000_000,
             help="Learning sessions for each cell of a table, or orders of the tasks; default: 500 for most studies.",
         ),
     ] = None,
-    workers: Annotated[int, typer.Option("--workers", min=1, max=256, help="Processes; the rows are the same.")] = 1,
+    workers: Annotated[int, typer.Option("--workers", min=1, help="Processes; the rows are the same.")] = 1,
     dask: Annotated[str | None, typer.Option("--dask", help="The address of a Dask scheduler to work on.")] = None,
     advisor_table: Annotated[
         str | None, typer.Option("--advisor-table", help="The advisors' knowledge: learned (default) or exact values.")

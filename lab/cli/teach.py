@@ -9,7 +9,6 @@ from lab.cli import deferred
 from lab.cli.families import offers
 from lab.cli.lessons import lesson_seat, say_read, teacher_of
 from lab.cli.options import (
-    MAX_EPISODES,
     AdvisorNames,
     Asked,
     Decide,
@@ -53,7 +52,7 @@ def teach(
     asked: Asked = "together",
     decide: Decide = "trust-weighted",
     episodes: Annotated[
-        int | None, typer.Option("--episodes", min=1, max=MAX_EPISODES, help="Session length; default: the task's.")
+        int | None, typer.Option("--episodes", min=1, help="Session length; default: the task's.")
     ] = None,
     save: Annotated[str | None, typer.Option("--save", help="Name of the policy in the toolbox.")] = None,
     sight: Annotated[

@@ -100,12 +100,9 @@ def _told(box: "deferred.Toolbox", name: str) -> "tuple[deferred.Policy, list[di
 # ---- evaluate -----------------------------------------------------------------------------------------------------------
 
 
-MAX_SCENES = 100_000
-
-
 def toolbox_evaluate(
     name: str,
-    scenes: Annotated[int, typer.Option("--scenes", min=1, max=MAX_SCENES, help="How many scenes are drawn.")] = 20,
+    scenes: Annotated[int, typer.Option("--scenes", min=1, help="How many scenes are drawn.")] = 20,
     task: Annotated[
         str | None,
         typer.Option("--task", help="The task whose scenes are drawn; default: the task in which it was learned."),

@@ -33,13 +33,11 @@ def tune(
             "omega.",
         ),
     ] = None,
-    trials: Annotated[int, typer.Option("--trials", min=1, max=100_000, help="Combinations that are tried.")] = 100,
-    sessions: Annotated[
-        int, typer.Option("--sessions", min=2, max=100_000, help="Sessions of each trial that is not pruned.")
-    ] = 45,
+    trials: Annotated[int, typer.Option("--trials", min=1, help="Combinations that are tried.")] = 100,
+    sessions: Annotated[int, typer.Option("--sessions", min=2, help="Sessions of each trial that is not pruned.")] = 45,
     task: TaskOfSkill = None,
     sight: SightInWorld = None,
-    workers: Annotated[int, typer.Option("--workers", min=1, max=256, help="Processes; the result is the same.")] = 1,
+    workers: Annotated[int, typer.Option("--workers", min=1, help="Processes; the result is the same.")] = 1,
     seed: Seed = 0,
     out: Annotated[Path, typer.Option("--out", help="Folder for report, rows, sessions and settings.toml.")] = Path(
         "tuned"

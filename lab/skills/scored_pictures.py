@@ -14,7 +14,7 @@ from lab.files import read_limited
 from lab.sim.camera import seen_corners
 from lab.sim.scene.scene_check import places_of
 from lab.skills.camera_grids import camera_view
-from lab.skills.made_pictures import INDEX, MOST_PICTURES, mat_of
+from lab.skills.made_pictures import INDEX, mat_of
 from lab.tasks.record import Record
 from lab.tasks.task import Task
 from lab.tasks.task_file import load
@@ -22,7 +22,6 @@ from lab.vision import Image, View, read_picture, see
 from lab.vision.calibration import Calibration, calibrate
 from lab.vision.part_outline import Outlined, find_part
 
-MOST_BYTES = 10_000_000  # of a picture's ground truth file
 Cell = tuple[int, ...]
 Kept = TypeVar("Kept", bound=Record)
 
@@ -51,7 +50,7 @@ class PicturesIndex(Record):
 
     task: str
     station: str
-    pictures: Annotated[int, Field(ge=1, le=MOST_PICTURES)]
+    pictures: Annotated[int, Field(ge=1)]
     mats: Annotated[int, Field(ge=1, le=100)]
     seed: int
     strength: float
@@ -110,7 +109,7 @@ def _kept(folder: Path, count: int) -> Iterator[tuple[int, Image, Truth]]:
 def _read(kind: type[Kept], path: Path) -> Kept:
     """The record of a file that `lab see --make` wrote. Raises BadInput when it cannot be read or is another file."""
     try:
-        return kind.model_validate_json(read_limited(path, MOST_BYTES))
+        return kind.model_validate_json(read_limited(path))
     except OSError as error:
         raise BadInput(
             f"{path}: cannot be read: {error.strerror or error}: wanted what `lab see --make` wrote"

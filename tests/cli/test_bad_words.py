@@ -56,7 +56,6 @@ ADVISORS, LEARNERS, GATES = (
         ("teach insert --save ", "policy name '' (--save): wanted 1 to 100 printable characters"),
         ("teach insert --episodes 0", "invalid value for '--episodes'"),
         ("sequence toast --method srrl", f"unknown method 'srrl' (--method): did you mean 'srl'? {METHODS}"),
-        ("sequence toast --episodes 99999999", "invalid value for '--episodes'"),
         ("sequence toast --plot no/x.png", "picture 'no/x.png': there is no folder 'no'"),
         ("sequence toast --plot x.pdf", "picture 'x.pdf': plots are written as .png or .svg"),
         ("replay no --movie x.gif", "'no': --movie goes with the folder of a run (lab run --out)"),

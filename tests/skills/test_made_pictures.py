@@ -48,7 +48,7 @@ def test_a_folder_that_is_there_a_wrong_count_and_a_task_without_a_camera_are_re
 ) -> None:
     with pytest.raises(BadInput, match="it is there already"):
         make_pictures("toast", 1, made, 0)
-    with pytest.raises(BadInput, match=r"0 pictures \(--make\): allowed are 1 to"):
+    with pytest.raises(BadInput, match=r"0 pictures \(--make\): wanted 1 or more"):
         make_pictures("toast", 0, tmp_path / "none", 0)
     with pytest.raises(BadInput, match="no station of it is approached through the camera's grid"):
         make_pictures("fms-arm", 1, tmp_path / "none", 0)
