@@ -21,7 +21,6 @@ PREFIX = "gym:"
 WANTED = "wanted gym:ID, or gym:ID?KEYWORD=VALUE&..., such as gym:FrozenLake-v1?is_slippery=false"
 OWN = ("render_mode", "disable_env_checker")  # keywords that the lab itself passes
 _CONSTANTS: dict[str, object] = {"true": True, "false": False, "null": None, "none": None}
-_LONGEST = 300  # the most characters of a foreign error's text
 
 Env = gymnasium.Env[Any, Any]
 
@@ -105,7 +104,6 @@ def make(name: GymName, where: str, render_mode: str | None = None) -> Env:
 def said(error: Exception) -> str:
     """The type and the text of a foreign error in one line."""
     text = " ".join(str(error).split())
-    text = text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
     return f"{type(error).__name__}: {text}" if text else type(error).__name__
 
 

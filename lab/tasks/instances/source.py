@@ -12,7 +12,6 @@ MOST_MACHINES = 98  # a cell has up to 100 stations, two of which are for input 
 MOST_TIME = 1e6  # as in cell files
 MOST_OPERATIONS = 99  # of a job, since a route has up to 100 stages
 _SHOWN = 60  # characters of a bad value that an error shows
-_LONGEST = 300  # characters of an expectation that an error shows
 _WHOLE = re.compile(r"[0-9]{1,9}")
 _TIME = re.compile(r"[0-9]{1,9}(\.[0-9]{0,9})?")
 
@@ -51,7 +50,6 @@ class Source:
         """The error for a value that is not as expected; got: the value; None: there is none to show."""
         found = str(got) if got is not None else ""
         found = found if len(found) <= _SHOWN else f"{found[:_SHOWN]} ..."
-        wanted = wanted if len(wanted) <= _LONGEST else f"{wanted[:_LONGEST]} ..."  # it may hold names from the file
         where = f"{self.path}: " + ("" if line is None else f"line {line}: ")
         return BadInput(f"{where}wanted {wanted}" + (f", not '{found}'" if got is not None else ""))
 
