@@ -134,15 +134,10 @@ class ComparedSessions:
         return {name: np.asarray(value, np.float64).tolist() for name, value in vars(self).items()}
 
     @classmethod
-    def from_json(cls, record: Mapping[str, list[float]], sessions: int) -> "ComparedSessions":
+    def from_json(cls, record: Mapping[str, list[float]]) -> "ComparedSessions":
         """The results that `to_json` wrote. Raises KeyError, TypeError or ValueError for anything else."""
         kinds = {"solved": np.bool_, "rejected": np.bool_}
-        found: dict[str, Any] = {
-            name: np.array(record[name], kinds.get(name, np.float64)) for name in cls.__dataclass_fields__
-        }
-        if any(one.shape != (sessions,) for name, one in found.items() if name != "curve") or found["curve"].ndim != 1:
-            raise ValueError("lists of other lengths")
-        return cls(**found)
+        return cls(**{name: np.array(record[name], kinds.get(name, np.float64)) for name in cls.__dataclass_fields__})
 
 
 # ---- the comparison -------------------------------------------------------------------------------------------------
@@ -215,7 +210,7 @@ def compared(what: Compared, job: Job) -> Findings:
     problem = prepared(what, job.seed)
     keys = {key_of(setting, problem, job): setting for setting in settings}
     done: dict[str, ComparedSessions] = job.kept_as(
-        lambda entry: (entry["key"], ComparedSessions.from_json(entry, job.sessions)) if entry["key"] in keys else None
+        lambda entry: (entry["key"], ComparedSessions.from_json(entry)) if entry["key"] in keys else None
     )
     left = [key for key in keys if key not in done]
     job.progress(len(done), len(keys))

@@ -273,7 +273,7 @@ class _KeptSessions:
         own = what.setting({})
         self.job, self.problem = job, prepared(own.of, job.seed)
         key_of(own, self.problem, job)  # raises BadInput for an invalid advisor or value before any trial
-        self.entries: dict[str, Any] = job.kept_as(lambda entry: (str(entry["key"]), entry))
+        self.kept = job.kept_as(lambda entry: (str(entry["key"]), ComparedSessions.from_json(entry)))
 
     def sessions(
         self, settings: Sequence[ComparedSetting], sessions: int, stream: int
@@ -291,10 +291,8 @@ class _KeptSessions:
             keys.append(key)
             if key in found:
                 continue
-            try:
-                found[key] = ComparedSessions.from_json(self.entries[key], sessions)
-            except (KeyError, TypeError, ValueError, OverflowError):
-                found[key] = None
+            found[key] = self.kept.get(key)
+            if found[key] is None:
                 left.append(one)
         by_setting = dict(zip(settings, keys, strict=True))
         work = partial(sessions_of, sessions=sessions, seed=self.job.seed, stream=stream)

@@ -85,8 +85,6 @@ class AdviceOutcome:
     def from_json(cls, record: dict[str, list[int]]) -> "AdviceOutcome":
         """What `to_json` wrote. Raises KeyError, TypeError, ValueError or OverflowError for anything else."""
         success, helped, requests = (np.array(record[n], np.int64) for n in ("success", "helped_steps", "requests"))
-        if not success.shape == helped.shape == requests.shape == (len(success),):
-            raise ValueError("three lists of one length are wanted")
         return cls(success.astype(bool), helped, requests)
 
 
@@ -99,11 +97,9 @@ def measured(job: Job, settings: Sequence[AdviceSetting]) -> dict[AdviceSetting,
     wanted = list(dict.fromkeys(settings))
     keys = {setting.key(job.sessions, job.seed): setting for setting in wanted}
 
-    def read(entry: Any) -> tuple[AdviceSetting, AdviceOutcome] | None:
-        outcome = AdviceOutcome.from_json(entry)
-        return (keys[entry["key"]], outcome) if len(outcome.success) == job.sessions else None
-
-    done: dict[AdviceSetting, AdviceOutcome] = job.kept_as(read)
+    done: dict[AdviceSetting, AdviceOutcome] = job.kept_as(
+        lambda entry: (keys[entry["key"]], AdviceOutcome.from_json(entry))
+    )
     left = [setting for setting in wanted if setting not in done]
     job.progress(len(done), len(wanted))
     for setting, outcome in job.computed(partial(sessions_of, sessions=job.sessions, seed=job.seed), left):

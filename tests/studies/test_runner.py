@@ -10,8 +10,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
-import pytest
-
 from lab.studies.runner import STORE, Job, record_of
 
 ROOT = str(Path(__file__).parents[2])

@@ -81,10 +81,7 @@ class Outcome(NamedTuple):
     @classmethod
     def from_json(cls, lists: Any) -> "Outcome":
         """What `to_json` wrote. Raises TypeError or ValueError for anything else."""
-        points, last, answers, curve = (np.array(one, np.float64) for one in lists)
-        if any(one.ndim != 1 for one in (points, last, answers, curve)) or not len(points) == len(last) == len(answers):
-            raise ValueError("three lists of one length, and a curve, are wanted")
-        return cls(points, last, answers, curve)
+        return cls(*(np.array(one, np.float64) for one in lists))
 
 
 Outcomes = dict[tuple[str, str], Outcome]  # by rule and budget
