@@ -27,7 +27,6 @@ from lab.toolbox.names import JOURNAL
 
 SCHEMA = 1
 FILE = JOURNAL
-MAX_LINE_BYTES = 1 << 20
 MAX_BYTES = 64 << 20  # of a journal: hundreds of thousands of answers
 Name = Annotated[str, MaxLen(1000), Predicate(str.isprintable)]
 
@@ -111,7 +110,7 @@ def line_of(entry: Entry) -> str:
 
 def entry_of(line: str) -> Entry:
     """The entry in a line. Raises ValueError if it holds none."""
-    entry: Entry = _LINES.entry_of(line.encode(), MAX_LINE_BYTES)
+    entry: Entry = _LINES.entry_of(line.encode())
     return entry
 
 
@@ -179,7 +178,7 @@ def read_journal(folder: Path, where: str) -> Read:
     entries: list[Entry] = []
     for number, line in enumerate(raw[:complete_bytes].split(b"\n")[:-1], start=1):
         try:
-            entries.append(_LINES.entry_of(line, MAX_LINE_BYTES))
+            entries.append(_LINES.entry_of(line))
         except ValueError as error:
             if number == 1:
                 _refuse_schema(line, path, where)

@@ -29,12 +29,12 @@ class EntryKinds:
         """An entry as one line of JSON, without a line break."""
         return json.dumps({"kind": self._name_of[type(entry)], **asdict(entry)}, allow_nan=False)
 
-    def entry_of(self, line: bytes, most_bytes: int = MAX_LINE_BYTES) -> Any:
+    def entry_of(self, line: bytes) -> Any:
         """The entry in a line. Raises ValueError if it holds none."""
         from pydantic import ValidationError
 
-        if len(line) > most_bytes:
-            raise ValueError(f"{len(line)} bytes long, allowed {most_bytes}")
+        if len(line) > MAX_LINE_BYTES:
+            raise ValueError(f"{len(line)} bytes long, allowed {MAX_LINE_BYTES}")
         record = json_of(line.decode("utf-8"))
         kind = record.pop("kind", None) if isinstance(record, dict) else None
         if not isinstance(kind, str) or kind not in self._kinds:
