@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pydantic import PrivateAttr, ValidationError
 
 from lab.errors import BadInput, unknown
-from lab.sequencing.cell.cell import MAX_PARTS, Cell
+from lab.sequencing.cell.cell import Cell, check_parts
 from lab.sequencing.cell.chance import Chance
 from lab.sequencing.cell.routes import positions_of
 from lab.sequencing.cell.stations import ROBOT, UNLIMITED, Arrivals, Begins
@@ -71,8 +71,7 @@ class CellFile(CellFields):
         if isinstance(order, int) and len(self.products) > 1:
             wanted = f"give their order with --case, such as {_example(self.names)}"
             raise BadInput(f"{order} parts (--toasts): cell '{self.name}' makes several products: {wanted}")
-        if not 1 <= count <= MAX_PARTS:
-            raise BadInput(f"an order of {count} parts: allowed are 1 to {MAX_PARTS}")
+        check_parts(count)
         parts = (self.names[0],) * count if isinstance(order, int) else tuple(order)
         for name in parts:
             if name not in self.names:

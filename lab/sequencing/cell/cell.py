@@ -444,7 +444,7 @@ def needed_moves(
 def check_parts(parts: object) -> None:
     """Raises BadInput unless `parts` is an integer from 1 to MAX_PARTS."""
     if not is_count(parts) or int(parts) > MAX_PARTS:  # type: ignore[call-overload]
-        raise BadInput(f"parts = {parts!r}: allowed are 1 to {MAX_PARTS}")
+        raise BadInput(f"an order of {parts!r} parts: allowed are 1 to {MAX_PARTS}")
 
 
 def _check_one_each(field: str, given: Sequence[float], parts: int) -> None:

@@ -130,8 +130,8 @@ def table(value: float) -> np.ndarray:
 @pytest.mark.parametrize(
     ("change", "says"),
     [
-        (order(0), "parts = 0: allowed are 1 to 200"),
-        (order(201), "parts = 201"),
+        (order(0), "an order of 0 parts: allowed are 1 to 200"),
+        (order(201), "an order of 201 parts"),
         (order(10), "'in': capacity 9 cannot hold all 10"),
         ({"robots": one_robot("ovn")}, "unknown station 'ovn'.*did you mean 'oven'"),
         ({"stations": (IN, OVEN, OVEN, OUT)}, "'oven': the name is used twice"),
