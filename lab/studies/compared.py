@@ -136,7 +136,7 @@ class ComparedSessions:
     @classmethod
     def from_json(cls, record: Mapping[str, list[float]]) -> "ComparedSessions":
         """The results that `to_json` wrote. Raises KeyError, TypeError or ValueError for anything else."""
-        kinds = {"solved": np.bool_, "rejected": np.bool_}
+        kinds: dict[str, Any] = {"solved": np.bool_, "rejected": np.bool_}
         return cls(**{name: np.array(record[name], kinds.get(name, np.float64)) for name in cls.__dataclass_fields__})
 
 
