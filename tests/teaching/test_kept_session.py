@@ -20,7 +20,7 @@ from lab.learning.requests import AdviceRequest, Ask
 from lab.learning.session_events import AdviceGiven
 from lab.tasks.task_file import load_world
 from lab.teaching.events import Event, LessonEvent, QuestionAnswered
-from lab.teaching.kept_session import KeptSession, NewSession, check_new
+from lab.teaching.kept_session import KeptSession, NewSession, check_new, claimed
 from lab.teaching.lesson import replay, teach
 from lab.teaching.lesson_options import LessonOptions
 from lab.teaching.lesson_plan import MAX_SESSIONS, Interrupted, LessonPlan
@@ -181,6 +181,12 @@ def test_a_session_without_a_folder_is_kept_in_the_toolbox(tmp_path: Path, maze:
     assert {(row["problem"], row["advisor"]) for row in rows} == {("maze", "novice")}
     (tmp_path / "toolbox" / SESSIONS / "maze-1" / FILE).write_text("nonsense\n")
     assert sorted(row["state"] for row in session_rows(Toolbox(tmp_path / "toolbox")))[0] == "damaged"
+
+
+def test_a_toolbox_without_room_for_sessions(tmp_path: Path) -> None:
+    (tmp_path / SESSIONS).touch()
+    with pytest.raises(BadInput, match=f"toolbox {tmp_path}: .*{SESSIONS}: File exists"):
+        claimed(Toolbox(tmp_path), "maze", Path.mkdir)
 
 
 def test_what_cannot_be_written_after_the_work_is_said_beside_it(tmp_path: Path, maze: Path) -> None:
