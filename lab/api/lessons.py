@@ -5,11 +5,13 @@ from functools import cached_property
 from html import escape
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
-from lab.api.options import Advisors, Settings, ToolboxOrPlace, advising_of, data_frame, toolbox_of
+from annotated_types import Ge, Lt
+
+from lab.api.options import Advisors, Settings, ToolboxOrPlace, advising_of, check_common, data_frame, toolbox_of
 from lab.api.pictures import Picture
-from lab.errors import BadInput
+from lab.errors import BadInput, check_value
 from lab.learning.problem import Problem
 from lab.learning.session_result import SessionResult
 from lab.mdp import FloatArray
@@ -67,7 +69,8 @@ class LessonResult:
         return bool(self.document["solved"])
 
     def act(self, state: int) -> int:
-        """The greedy action in a state."""
+        """The greedy action in a state, an index of the problem's `action_labels`. Raises BadInput for an unknown state."""
+        check_value("state", state, Annotated[int, Ge(0), Lt(len(self.q))], self.problem.name)
         return int(self.q[state].argmax())
 
     def rows(self) -> list[dict[str, Any]]:
@@ -145,6 +148,7 @@ def teach(
         >>> lesson.solved, lesson.session.final_steps == lesson.session.optimal_steps
         (True, True)
     """
+    check_common("lab.teach", seed=seed, task=task, record=record)
     subject = subject_from(problem, task, sight)
     subject.settings = subject.settings.changed("", **settings)
     with TemporaryDirectory() as nowhere:

@@ -5,9 +5,11 @@ from functools import cached_property
 from html import escape
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, TypedDict, Unpack
+from typing import TYPE_CHECKING, Annotated, Any, TypedDict, Unpack
 
-from lab.api.options import ToolboxOrPlace, checked, data_frame, toolbox_of
+from annotated_types import Ge, Le
+
+from lab.api.options import ToolboxOrPlace, check_common, checked, data_frame, toolbox_of
 from lab.api.pictures import Picture
 from lab.errors import BadInput
 from lab.production.sequencing_job import SequencingOptions, sequence_cell, sequenced_named
@@ -30,12 +32,12 @@ class OrderOptions(TypedDict, total=False):
     toasts: int
     parts: str
     layout: Path
-    robots: int
+    robots: Annotated[int, Ge(1), Le(50)]
     method: str
     policy: Path
     objective: str
-    episodes: int
-    sessions: int
+    episodes: Annotated[int, Ge(1)]
+    sessions: Annotated[int, Ge(1)]
     stochastic: bool
     seconds: float
     gap: float
@@ -121,6 +123,7 @@ def sequence(
         >>> order.proven, order.cost == order.bound, order.rows()[0]["start_s"]
         (True, True, 0.0)
     """
+    check_common("lab.sequence", seed=seed)
     given = checked(options, OrderOptions, "lab.sequence")
     case, toasts = given.pop("case", None), given.pop("toasts", None)
     wanted = SequencingOptions(seed=seed, **given)

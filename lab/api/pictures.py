@@ -6,7 +6,7 @@ from html import escape
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from lab.errors import BadInput
+from lab.errors import BadInput, check_value
 from lab.files import write_whole
 
 PAGE_HEIGHT = 480  # pixels of a page in a notebook
@@ -33,7 +33,7 @@ class Picture:
 
     def save(self, path: Path | str) -> Path:
         """Writes the picture and returns the path. Raises BadInput unless the name ends in .png or .svg, as `form` says."""
-        return _written(Path(path), f".{self.form}", self.data)
+        return _written(path, f".{self.form}", self.data)
 
     def _repr_png_(self) -> bytes | None:
         return self.data if self.form == "png" else None
@@ -50,14 +50,16 @@ class Page:
 
     def save(self, path: Path | str) -> Path:
         """Writes the page and returns the path. Raises BadInput unless the name ends in .html."""
-        return _written(Path(path), ".html", self.html.encode())
+        return _written(path, ".html", self.html.encode())
 
     def _repr_html_(self) -> str:
         frame = f'width="100%" height="{PAGE_HEIGHT}" style="border:0"'
         return f'<iframe srcdoc="{escape(self.html)}" {frame}></iframe>'
 
 
-def _written(path: Path, suffix: str, data: bytes) -> Path:
+def _written(where: Path | str, suffix: str, data: bytes) -> Path:
+    check_value("file", where, Path, "save")
+    path = Path(where)
     if path.suffix != suffix:
         raise BadInput(f"file '{path}': its name must end in {suffix}")
     try:

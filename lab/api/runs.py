@@ -6,9 +6,20 @@ from functools import cached_property
 from html import escape
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, TypedDict, Unpack
+from typing import TYPE_CHECKING, Annotated, Any, TypedDict, Unpack
 
-from lab.api.options import Advisors, ToolboxOrPlace, advising_of, checked, data_frame, several, toolbox_of
+from annotated_types import Ge, Le
+
+from lab.api.options import (
+    Advisors,
+    ToolboxOrPlace,
+    advising_of,
+    check_common,
+    checked,
+    data_frame,
+    several,
+    toolbox_of,
+)
 from lab.api.pictures import Page, Picture
 from lab.errors import BadInput
 from lab.files import check_out
@@ -35,12 +46,12 @@ class TaskOptions(TypedDict, total=False):
 
     toasts: int
     parts: str
-    override: int
-    faults: int
+    override: Annotated[int, Ge(10), Le(100)]
+    faults: Annotated[int, Ge(0)]
     order: str
     cyclic: bool
     method: str
-    parts_per_cycle: int
+    parts_per_cycle: Annotated[int, Ge(1)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,9 +129,8 @@ def run(
     Raises BadInput if these do not fit together, WorkFailed if a skill cannot be learned. A run that fails raises nothing:
     see `RunResult.failure`.
     """
+    check_common("lab.run", seed=seed, workers=workers, out=out)
     given = checked(options, TaskOptions, "lab.run")
-    if workers is not None and workers < 1:
-        raise BadInput(f"workers {workers} (lab.run): at least 1, or None for one a core")
     advisors = several(advisor)
     advising = advising_of(advisors, toolbox)
     if out is not None and not all(isinstance(one, str) for one in advisors):

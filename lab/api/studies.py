@@ -1,13 +1,14 @@
 """`lab.study`, `lab.compare` and `lab.tune`: many sessions, and their results."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from lab.api.options import Advisors, OneAdvisor, data_frame, several
+from lab.api.options import Advisors, OneAdvisor, check_common, data_frame, several
 from lab.api.pictures import Picture
+from lab.errors import BadInput
 from lab.learning.settings import USUAL
 from lab.studies import checked, study_of
 from lab.studies.compared import Compared, compared
@@ -67,7 +68,8 @@ def study(name: str, *, sessions: int | None = None, seed: int = 0, workers: int
     number of processes, on which results do not depend; reading: the options that some studies have.
     Raises BadInput for an unknown study, an option that it does not have, and too few sessions.
     """
-    job = Job(sessions or study_of(name).sessions, seed, workers)
+    check_common("lab.study", sessions=sessions, seed=seed, workers=workers)
+    job = Job(study_of(name).sessions if sessions is None else sessions, seed, workers)
     known = checked(name, job, reading)
     return StudyResult(known.title, known.run(job, reading))
 
@@ -94,6 +96,7 @@ def compare(
         >>> sorted({row["advisor"] for row in compared.rows})
         ['expert', 'none']
     """
+    check_common("lab.compare", sessions=sessions, seed=seed, workers=workers, task=task)
     values = {name: _listed(value) for name, value in settings.items()}
     what = Compared(problem, several(advisor), values, task, sight)
     return StudyResult(
@@ -119,6 +122,9 @@ def tune(
     seed: of all randomness; workers: the number of processes; held: other settings with fixed values, and task and sight.
     Raises BadInput if these do not fit together, and if Optuna is not installed.
     """
+    check_common("lab.tune", trials=trials, sessions=sessions, seed=seed, workers=workers)
+    if isinstance(over, str) or not isinstance(over, Iterable):
+        raise BadInput(f"over {over!r} (lab.tune): wanted a list of names of settings")
     where = {name: held.pop(name) for name in ("task", "sight") if name in held}
     what = Tuning(problem, advisor, held, tuple(over), trials, **where)
     title = f"Tuned: {problem}" if isinstance(problem, str) else "Tuned"
