@@ -23,7 +23,16 @@ BoolArray = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class Rewards:
-    """The rewards of the moves on a grid, dimensionless. Source: thesis, sections 8.3 and 9.7."""
+    """The rewards of the moves on a grid, dimensionless. Source: thesis, sections 8.3 and 9.7.
+
+    goal: for entering a goal, above 0; collision: for entering an obstacle, below 0; step: for any other move, -1000 to 0.
+    Raises BadInput for other values.
+
+        >>> import lab
+        >>> board = lab.grid((1, 3), [[0, 0, 0]], (0, 0), (0, 2), lab.Rewards(step=-0.5))
+        >>> board.step_reward, board.arrival.tolist()
+        (-0.5, [0.0, 0.0, 1.5])
+    """
 
     goal: Annotated[float, Gt(0), doc("what entering a goal is worth")] = 1.5
     collision: Annotated[float, Lt(0), doc("what entering an obstacle is worth")] = -1.0

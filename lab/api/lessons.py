@@ -31,9 +31,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class LessonResult:
-    """The result of a lesson.
+    """The result of a lesson, which notebooks display.
 
-    problem: the problem; lesson: the policy and the session's counts; document: the dict that `lab teach --json` prints.
+    problem: the problem, with its table `problem.mdp`; lesson: the policy and the session's counts; document: the dict that `lab teach --json` prints.
 
         >>> import lab
         >>> lesson = lab.teach(lab.world("S.#\\n..G"), gate="never", advisor=None)
@@ -54,7 +54,7 @@ class LessonResult:
 
     @property
     def session(self) -> SessionResult:
-        """The session's arrays and counts, see `lab.learning.session_result.SessionResult`."""
+        """The session's arrays and counts."""
         assert self.lesson.result is not None
         return self.lesson.result
 
@@ -141,7 +141,8 @@ def teach(
     record: whether all steps are recorded, see `LessonResult.steps`.
     settings: of learner and gate, by the names in docs/settings.md; `learner` and `gate` may also be classes.
 
-    Raises BadInput if these do not fit together.
+    Raises BadInput for an unknown name, a value out of range, and what does not fit together; WorkFailed if the toolbox cannot
+    be reached. An error in an advisor, gate or learner of your own is raised as it is.
 
         >>> import lab
         >>> lesson = lab.teach("world-1", advisor="expert", seed=1, episodes=100)

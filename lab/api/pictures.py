@@ -14,7 +14,13 @@ PAGE_HEIGHT = 480  # pixels of a page in a notebook
 
 @dataclass(frozen=True)
 class Picture:
-    """A picture, the bytes of a PNG or SVG file; notebooks display it, and `save` writes it."""
+    """A picture, the bytes of a PNG or SVG file; notebooks display it, and `save` writes it.
+
+        >>> import lab
+        >>> picture = lab.sequence("toast-case-1", toasts=1).gantt
+        >>> picture.form, picture.data[:5]
+        ('svg', b'<?xml')
+    """
 
     data: bytes
 
@@ -44,7 +50,12 @@ class Picture:
 
 @dataclass(frozen=True)
 class Page:
-    """An HTML page that needs neither server nor network; notebooks (Colab too) display it, and `save` writes it."""
+    """An HTML page that needs neither server nor network; notebooks (Colab too) display it, and `save` writes it.
+
+        >>> import lab
+        >>> lab.show(lab.world("S..G")).html[:15]
+        '<!DOCTYPE html>'
+    """
 
     html: str
 

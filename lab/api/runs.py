@@ -42,7 +42,13 @@ if TYPE_CHECKING:
 
 
 class TaskOptions(TypedDict, total=False):
-    """The options of `lab run`, by their names there."""
+    """The options of `lab run`, by their names there.
+
+    toasts: the number of parts of the first kind, 1 to 50; parts: of each kind, such as "slice=2,cup=1".
+    override: of the arm's speed [%]; faults: the seed with which faults are drawn, default none.
+    order: of the moves by part numbers, such as "1,2,1,1,2,2"; cyclic: the shortest cycle is repeated; parts_per_cycle: its
+    most parts; method: the name of the method that finds the order.
+    """
 
     toasts: int
     parts: str
@@ -56,7 +62,7 @@ class TaskOptions(TypedDict, total=False):
 
 @dataclass(frozen=True, eq=False)
 class RunResult:
-    """The result of a run; report: its details; document: the dict that `lab run --json` prints."""
+    """The result of a run, which notebooks display; report: its details; document: the dict that `lab run --json` prints."""
 
     report: Report
     document: dict[str, Any]
@@ -128,6 +134,11 @@ def run(
 
     Raises BadInput if these do not fit together, WorkFailed if a skill cannot be learned. A run that fails raises nothing:
     see `RunResult.failure`.
+
+        >>> import lab
+        >>> run = lab.run("kit", parts="box=1", workers=1)
+        >>> run.success, run.failure, round(run.makespan_s) == round(max(row["end_s"] for row in run.rows()))
+        (True, None, True)
     """
     check_common("lab.run", seed=seed, workers=workers, out=out)
     given = checked(options, TaskOptions, "lab.run")

@@ -34,6 +34,11 @@ def show(
 
     what: a name or file of a task or world, or the object itself; toasts, parts: the order, as for `lab run`; seed: of the scene.
     Raises BadInput for anything that has no scene, such as a cell without physics.
+
+        >>> import lab, tempfile
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     lab.show("toast", toasts=1).save(f"{folder}/toast.html").suffix
+        '.html'
     """
     from lab.view.meshcat import replay_html
 

@@ -52,11 +52,13 @@ class TableSubject(Subject):
 def world(rows: str, name: str = "world") -> GridWorld:
     """A grid world from its rows of cells: '.' free, '#' obstacle, one 'S' (start), one 'G' (goal).
 
+    name: 1 to 40 letters, digits, spaces, - and _.
     Raises BadInput for other characters or rows of different lengths, and NoPath if no path joins start and goal.
 
         >>> import lab
-        >>> lab.world("S.#\\n..G").mdp().n_states
-        6
+        >>> maze = lab.world("S.#\\n..G", name="maze")
+        >>> maze.shape, maze.start, maze.goal, maze.obstacles, maze.mdp().n_states
+        ((2, 3), (0, 0), (1, 2), ((0, 2),), 6)
     """
     check_value("rows", rows, str, "lab.world")
     if not isinstance(name, str) or not re.match(NAME_PATTERN, name):
