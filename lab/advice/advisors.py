@@ -62,6 +62,8 @@ class AdvisorName:
     def made(cls, advisor: "Advisor | Ask") -> "AdvisorName":
         """The name of an advisor object or of a function of a request. Raises BadInput for anything else."""
         text = getattr(advisor, "__name__", type(advisor).__name__)
+        if isinstance(advisor, type):
+            raise BadInput(f"advisor {text}: it is a class: wanted an object, such as {text}()")
         if hasattr(advisor, "advise"):
             return cls(text, PYTHON, itself=advisor)
         if not callable(advisor):

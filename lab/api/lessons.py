@@ -33,7 +33,8 @@ if TYPE_CHECKING:
 class LessonResult:
     """The result of a lesson, which notebooks display.
 
-    problem: the problem, with its table `problem.mdp`; lesson: the policy and the session's counts; document: the dict that `lab teach --json` prints.
+    problem: the problem, with its table `problem.mdp`; lesson: the policy and the session's counts; document: the dict that
+    `lab teach --json` prints.
 
         >>> import lab
         >>> lesson = lab.teach(lab.world("S.#\\n..G"), gate="never", advisor=None)

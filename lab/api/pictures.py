@@ -14,7 +14,9 @@ PAGE_HEIGHT = 480  # pixels of a page in a notebook
 
 @dataclass(frozen=True)
 class Picture:
-    """A picture, the bytes of a PNG or SVG file; notebooks display it, and `save` writes it.
+    """A picture; notebooks display it, and `save` writes it.
+
+    data: the bytes of a PNG or SVG file.
 
         >>> import lab
         >>> picture = lab.sequence("toast-case-1", toasts=1).gantt
@@ -51,6 +53,8 @@ class Picture:
 @dataclass(frozen=True)
 class Page:
     """An HTML page that needs neither server nor network; notebooks (Colab too) display it, and `save` writes it.
+
+    html: its text.
 
         >>> import lab
         >>> lab.show(lab.world("S..G")).html[:15]

@@ -24,7 +24,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class StudyResult:
-    """The result of a study, which notebooks display: its title and its findings (rows, summary, pictures, remarks).
+    """The result of a study, which notebooks display.
+
+    title: in one line; findings: its rows, summary, pictures and remarks.
 
         >>> import lab
         >>> compared = lab.compare("world-1", sessions=4, episodes=60)

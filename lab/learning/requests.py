@@ -233,7 +233,9 @@ class Walked:
 
 
 class AdvisorLeft(Exception):
-    """Raised by an advisor that gives no more advice in this session; the text says why. The learner goes on alone.
+    """Raised by an advisor that gives no more advice in this session; the text says why.
+
+    The learner goes on alone.
 
         >>> import lab
         >>> def advise_early(request: lab.AdviceRequest) -> int | None:
