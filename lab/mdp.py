@@ -115,8 +115,9 @@ class TabularMDP:
         states, actions = self.successor.shape
         if self.reward.shape != (states, actions) or self.terminal.shape != (states,) or self.goal.shape != (states,):
             return f"reward, terminal and goal must have shapes ({states}, {actions}), ({states},) and ({states},)"
-        if not isinstance(self.action_labels, Sequence):
-            return f"action_labels {self.action_labels!r}, wanted a name for each action"
+        labels: object = self.action_labels
+        if not isinstance(labels, Sequence):
+            return f"action_labels {labels!r}: wanted a name for each action"
         if len(self.action_labels) != actions:
             return f"{len(self.action_labels)} action labels for {actions} actions"
         if self.successor.min() < 0 or self.successor.max() >= states:
@@ -125,8 +126,9 @@ class TabularMDP:
             return "a reward is not finite"
         if bool((self.goal & ~self.terminal).any()):
             return "a goal state is not terminal"
-        if not isinstance(self.start, int | np.integer):
-            return f"start {self.start!r} is no state: wanted a whole number"
+        start: object = self.start
+        if not isinstance(start, int | np.integer):
+            return f"start {start!r} is no state: wanted a whole number"
         if not 0 <= self.start < states:
             return f"start {self.start} is outside 0..{states - 1}"
         if self.terminal[self.start]:

@@ -142,13 +142,13 @@ class Skill:
 
         >>> import lab
         >>> from lab.skills import Skill
-        >>> class Tune(Skill):
+        >>> class Dial(Skill):
         ...     '''The toaster finds the setting of its dial.'''
-        ...     subtask, help, doing = "tune", "a machine finds the setting of its dial", "waits for {part}"
+        ...     subtask, help, doing = "dial", "a machine finds the setting of its dial", "waits for {part}"
         ...     moves_arm = False
         ...     @classmethod
         ...     def at_machine(cls, task, station):
-        ...         return cls(f"tune {station}") if station == "toaster" else None
+        ...         return cls(f"dial of {station}") if station == "toaster" else None
         ...     def setup(self, surveys):
         ...         board = lab.grid((5,), [0] * 5, (0,), (3,), None, ("less", "more"))
         ...         self.surveys, self.problem = surveys, lab.Problem(self.name, self.subtask, board)
@@ -157,7 +157,7 @@ class Skill:
         ...         for _ in range(240):  # a second
         ...             yield
         >>> from lab.testing import check_skill
-        >>> check_skill(Tune)
+        >>> check_skill(Dial)
     """
 
     subtask: ClassVar[str]
