@@ -1,7 +1,11 @@
 """Errors of one line, which name the bad value, where it came from and what is allowed; shortened values and lists."""
 
+import operator
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
+from numbers import Integral, Real
+from os import PathLike
+from typing import Annotated, Any, get_args, get_origin
 
 MOST_CHARACTERS = 295  # of a message, to which a command prepends "lab: "
 MOST_OF_VALUE = 80  # characters of a bad value
@@ -114,6 +118,30 @@ def unknown(kind: str, value: object, known: Iterable[str], where: str) -> BadIn
     hint = f" did you mean '{shortened(nearest[0])}'?" if nearest else ""
     beginning = f"unknown {kind} '{shortened(value)}' ({shortened(where, MOST_OF_PLACE)}):{hint}{KNOWN}"
     return BadInput(f"{beginning}{listed(names, max(20, MOST_CHARACTERS - len(beginning))) or 'none'}")
+
+
+LIMITS = {"gt": "above", "ge": "at least", "le": "at most", "lt": "below"}  # the limits of annotated_types
+_KINDS: dict[str, tuple[Any, str]] = {
+    "int": (Integral, "a whole number"),
+    "float": (Real, "a number"),
+    "bool": (bool, "True or False"),
+    "str": (str, "text"),
+    "Path": ((str, PathLike), "a path"),
+}
+
+
+def check_value(name: str, value: object, allowed: Any, where: str) -> None:
+    """Raises BadInput unless a value has the allowed type and is within its limits.
+
+    allowed: int, float, bool, str or Path, or an `Annotated` of one with limits such as `Ge(1)`; where: where it came from.
+    """
+    kind, *limits = get_args(allowed) if get_origin(allowed) is Annotated else (allowed,)
+    types, words = _KINDS[kind.__name__]
+    bounds = [(word, getattr(limit, word)) for limit in limits for word in LIMITS if hasattr(limit, word)]
+    fits = isinstance(value, types) and (kind is bool or not isinstance(value, bool))
+    if not fits or not all(getattr(operator, word)(value, bound) for word, bound in bounds):
+        within = "".join(f", {LIMITS[word]} {bound}" for word, bound in bounds)
+        raise BadInput(f"{name} {shortened(repr(value))} ({where}): wanted {words}{within}")
 
 
 def listed(names: Sequence[str], most: int) -> str:

@@ -4,13 +4,13 @@ import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_type_hints
 
 import numpy as np
 from annotated_types import Ge, Gt, Le, Lt, doc
 from numpy.typing import ArrayLike, NDArray
 
-from lab.errors import BadInput, WorkFailed
+from lab.errors import BadInput, WorkFailed, check_value, shortened
 
 MAX_COVERAGE_CELLS = 12
 MAX_SWEEPS = 100_000
@@ -23,11 +23,24 @@ BoolArray = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class Rewards:
-    """The rewards of the moves on a grid, dimensionless. Source: thesis, sections 8.3 and 9.7."""
+    """The rewards of the moves on a grid, dimensionless. Source: thesis, sections 8.3 and 9.7.
+
+    goal: for entering a goal, above 0; collision: for entering an obstacle, below 0; step: for any other move, -1000 to 0.
+    Raises BadInput for other values.
+
+        >>> import lab
+        >>> board = lab.grid((1, 3), [[0, 0, 0]], (0, 0), (0, 2), lab.Rewards(step=-0.5))
+        >>> board.step_reward, board.arrival.tolist()
+        (-0.5, [0.0, 0.0, 1.5])
+    """
 
     goal: Annotated[float, Gt(0), doc("what entering a goal is worth")] = 1.5
     collision: Annotated[float, Lt(0), doc("what entering an obstacle is worth")] = -1.0
     step: Annotated[float, Le(0), Ge(-1000), doc("what any other step is worth")] = -0.1
+
+    def __post_init__(self) -> None:
+        for name, allowed in get_type_hints(Rewards, include_extras=True).items():
+            check_value(name, getattr(self, name), allowed, "lab.Rewards")
 
 
 class NoPath(BadInput):
@@ -82,7 +95,14 @@ class TabularMDP:
             ("terminal", np.bool_),
             ("goal", np.bool_),
         ):
-            array = np.array(getattr(self, name), dtype=dtype, order="C")
+            given = getattr(self, name)
+            try:
+                array = np.array(given, dtype=dtype, order="C")
+            except (TypeError, ValueError):
+                kind = np.dtype(dtype).name
+                raise BadInput(
+                    f"decision problem: {name} {shortened(repr(given))}: wanted an array of {kind}"
+                ) from None
             array.flags.writeable = False
             object.__setattr__(self, name, array)
         reason = self._what_does_not_fit()
@@ -95,6 +115,9 @@ class TabularMDP:
         states, actions = self.successor.shape
         if self.reward.shape != (states, actions) or self.terminal.shape != (states,) or self.goal.shape != (states,):
             return f"reward, terminal and goal must have shapes ({states}, {actions}), ({states},) and ({states},)"
+        labels: object = self.action_labels
+        if not isinstance(labels, Sequence):
+            return f"action_labels {labels!r}: wanted a name for each action"
         if len(self.action_labels) != actions:
             return f"{len(self.action_labels)} action labels for {actions} actions"
         if self.successor.min() < 0 or self.successor.max() >= states:
@@ -103,6 +126,9 @@ class TabularMDP:
             return "a reward is not finite"
         if bool((self.goal & ~self.terminal).any()):
             return "a goal state is not terminal"
+        start: object = self.start
+        if not isinstance(start, int | np.integer):
+            return f"start {start!r} is no state: wanted a whole number"
         if not 0 <= self.start < states:
             return f"start {self.start} is outside 0..{states - 1}"
         if self.terminal[self.start]:
@@ -241,13 +267,17 @@ def grid(
         >>> mdp.n_states, mdp.action_labels
         (9, ('-axis0', '+axis0', '-axis1', '+axis1'))
     """
-    shape = tuple(int(n) for n in shape)
+    shape = _whole_numbers("grid shape", shape)
     if not shape or min(shape) < 1:
         raise BadInput(f"grid shape {shape}: each axis needs at least one cell")
     rewards = rewards or Rewards()
+    if not isinstance(rewards, Rewards):
+        raise BadInput(f"rewards {rewards!r} (lab.grid): wanted lab.Rewards")
     wall = np.asarray(blocked, dtype=bool)
     if wall.shape != shape:
         raise BadInput(f"blocked cells have shape {wall.shape}, the grid has {shape}")
+    if action_labels is not None and not isinstance(action_labels, Sequence):
+        raise BadInput(f"action_labels {action_labels!r} (lab.grid): wanted a name for each action")
     labels = tuple(action_labels or (f"{sign}axis{axis}" for axis in range(len(shape)) for sign in "-+"))
     closed = wall.ravel()
     first, last = _free_cell("start", start, wall), _free_cell("goal", goal, wall)
@@ -264,9 +294,20 @@ def grid(
     return TabularMDP(successor, reward, terminal, goals, first, labels, shape)
 
 
+def _whole_numbers(name: str, given: Sequence[int]) -> tuple[int, ...]:
+    """The given numbers as a tuple. Raises BadInput for anything else."""
+    try:
+        numbers = tuple(int(n) for n in given)
+        if numbers == tuple(given):
+            return numbers
+    except (TypeError, ValueError):
+        pass
+    raise BadInput(f"{name} {shortened(repr(given))} (lab.grid): wanted a whole number for each axis")
+
+
 def _free_cell(name: str, cell: Sequence[int], wall: BoolArray) -> int:
     """The number of a cell. Raises BadInput if it is outside the grid or blocked."""
-    index = tuple(int(i) for i in cell)
+    index = _whole_numbers(name, cell)
     if len(index) != wall.ndim or any(not 0 <= i < n for i, n in zip(index, wall.shape, strict=True)):
         raise BadInput(f"{name} {index} is outside the grid: allowed {' x '.join(f'0..{n - 1}' for n in wall.shape)}")
     if wall[index]:

@@ -1,8 +1,12 @@
 """The lab's errors: exit codes, one line, the nearest name."""
 
 import re
+from pathlib import Path
+from typing import Annotated, Any
 
+import numpy as np
 import pytest
+from annotated_types import Ge, Lt
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -11,6 +15,7 @@ from lab.errors import (
     BadInput,
     LabError,
     WorkFailed,
+    check_value,
     counted,
     listed,
     out_of_memory,
@@ -43,6 +48,29 @@ def test_what_cannot_be_printed_is_escaped() -> None:
 
 def test_one_is_one() -> None:
     assert [counted(n, "step") for n in (0, 1, 2)] == ["0 steps", "1 step", "2 steps"]
+
+
+@pytest.mark.parametrize(
+    ("value", "allowed", "wanted"),
+    [
+        (-1, Annotated[int, Ge(0)], "a whole number, at least 0"),
+        ("two", Annotated[int, Ge(0)], "a whole number, at least 0"),
+        (True, int, "a whole number"),
+        (2.5, int, "a whole number"),
+        (float("nan"), Annotated[float, Ge(0), Lt(1)], "a number, at least 0, below 1"),
+        (1, bool, "True or False"),
+        (None, str, "text"),
+        (3, Path, "a path"),
+    ],
+)
+def test_a_value_of_another_type_or_outside_its_limits_is_refused(value: object, allowed: Any, wanted: str) -> None:
+    with pytest.raises(BadInput, match=f"^{re.escape(f'n {value!r} (lab.f): wanted {wanted}')}$"):
+        check_value("n", value, allowed, "lab.f")
+
+
+def test_numbers_of_numpy_and_paths_as_text_are_allowed() -> None:
+    for value, allowed in ((np.int64(3), Annotated[int, Ge(3)]), (np.float32(0.5), float), (2, float), ("x", Path)):
+        check_value("n", value, allowed, "lab.f")
 
 
 PRINTABLE = st.text(st.characters(exclude_categories=("C", "Z")), min_size=1)

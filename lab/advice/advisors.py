@@ -5,7 +5,9 @@ for the order of transfers.
 """
 
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
+from inspect import signature
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
@@ -60,10 +62,17 @@ class AdvisorName:
     def made(cls, advisor: "Advisor | Ask") -> "AdvisorName":
         """The name of an advisor object or of a function of a request. Raises BadInput for anything else."""
         text = getattr(advisor, "__name__", type(advisor).__name__)
+        if isinstance(advisor, type):
+            raise BadInput(f"advisor {text}: it is a class: wanted an object, such as {text}()")
         if hasattr(advisor, "advise"):
             return cls(text, PYTHON, itself=advisor)
         if not callable(advisor):
             raise BadInput(f"advisor {advisor!r}: wanted a name, a function of a request, or an object with `advise`")
+        with suppress(ValueError):  # some functions in C have no signature
+            try:
+                signature(advisor).bind(None)
+            except TypeError as error:
+                raise BadInput(f"advisor {text!r}: {error}: wanted a function of a request") from None
         return cls(text, PYTHON, itself=Person(advisor))
 
     @classmethod

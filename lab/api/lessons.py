@@ -5,11 +5,13 @@ from functools import cached_property
 from html import escape
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
-from lab.api.options import Advisors, Settings, ToolboxOrPlace, advising_of, data_frame, toolbox_of
+from annotated_types import Ge, Lt
+
+from lab.api.options import Advisors, Settings, ToolboxOrPlace, advising_of, check_common, data_frame, toolbox_of
 from lab.api.pictures import Picture
-from lab.errors import BadInput
+from lab.errors import BadInput, check_value
 from lab.learning.problem import Problem
 from lab.learning.session_result import SessionResult
 from lab.mdp import FloatArray
@@ -29,9 +31,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class LessonResult:
-    """The result of a lesson.
+    """The result of a lesson, which notebooks display.
 
-    problem: the problem; lesson: the policy and the session's counts; document: the dict that `lab teach --json` prints.
+    problem: the problem, with its table `problem.mdp`; lesson: the policy and the session's counts; document: the dict that
+    `lab teach --json` prints.
 
         >>> import lab
         >>> lesson = lab.teach(lab.world("S.#\\n..G"), gate="never", advisor=None)
@@ -52,7 +55,7 @@ class LessonResult:
 
     @property
     def session(self) -> SessionResult:
-        """The session's arrays and counts, see `lab.learning.session_result.SessionResult`."""
+        """The session's arrays and counts."""
         assert self.lesson.result is not None
         return self.lesson.result
 
@@ -67,7 +70,8 @@ class LessonResult:
         return bool(self.document["solved"])
 
     def act(self, state: int) -> int:
-        """The greedy action in a state."""
+        """The greedy action in a state, an index of the problem's `action_labels`. Raises BadInput for an unknown state."""
+        check_value("state", state, Annotated[int, Ge(0), Lt(len(self.q))], self.problem.name)
         return int(self.q[state].argmax())
 
     def rows(self) -> list[dict[str, Any]]:
@@ -138,13 +142,15 @@ def teach(
     record: whether all steps are recorded, see `LessonResult.steps`.
     settings: of learner and gate, by the names in docs/settings.md; `learner` and `gate` may also be classes.
 
-    Raises BadInput if these do not fit together.
+    Raises BadInput for an unknown name, a value out of range, and what does not fit together; WorkFailed if the toolbox cannot
+    be reached. An error in an advisor, gate or learner of your own is raised as it is.
 
         >>> import lab
         >>> lesson = lab.teach("world-1", advisor="expert", seed=1, episodes=100)
         >>> lesson.solved, lesson.session.final_steps == lesson.session.optimal_steps
         (True, True)
     """
+    check_common("lab.teach", seed=seed, task=task, record=record)
     subject = subject_from(problem, task, sight)
     subject.settings = subject.settings.changed("", **settings)
     with TemporaryDirectory() as nowhere:

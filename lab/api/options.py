@@ -3,10 +3,12 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypedDict
+from typing import TYPE_CHECKING, Annotated, Any, TypedDict, get_type_hints
+
+from annotated_types import Ge, Le
 
 from lab.advice.advising import Advising
-from lab.errors import unknown
+from lab.errors import check_value, unknown
 from lab.learning.gates import Gate
 from lab.learning.requests import Advisor, Ask
 from lab.learning.updates import Update
@@ -65,20 +67,46 @@ class Settings(TypedDict, total=False):
     memory: bool
 
 
+# ---- checks of what is handed in ------------------------------------------------------------------------------------
+
+
+COMMON: dict[str, Any] = {  # the arguments that several functions share
+    "seed": Annotated[int, Ge(0)],
+    "sessions": Annotated[int, Ge(1)],
+    "trials": Annotated[int, Ge(1)],
+    "workers": Annotated[int, Ge(1), Le(256)],
+    "toasts": int,
+    "parts": str,
+    "task": str,
+    "record": bool,
+    "out": Path,
+}
+
+
+def check_common(where: str, **given: object) -> None:
+    """Raises BadInput for an argument that `COMMON` does not allow; None stands for a default, which a seed does not have."""
+    for name, value in given.items():
+        if value is not None or name == "seed":
+            check_value(name, value, COMMON[name], where)
+
+
+def checked(given: Mapping[str, Any], known: type, where: str) -> dict[str, Any]:
+    """The options as a dict. Raises BadInput for a name or a value that the TypedDict `known` does not allow; None: default."""
+    allowed = get_type_hints(known, include_extras=True)
+    for name, value in given.items():
+        if name not in allowed:
+            raise unknown("option", name, allowed, where)
+        if value is not None:
+            check_value(name, value, allowed[name], where)
+    return dict(given)
+
+
 # ---- advisors and toolboxes -----------------------------------------------------------------------------------------
 
 
 OneAdvisor = str | Advisor | Ask
 Advisors = OneAdvisor | Sequence[OneAdvisor] | None
 ToolboxOrPlace = Toolbox | Path | str | None
-
-
-def checked(given: Mapping[str, Any], known: type, where: str) -> dict[str, Any]:
-    """The options as a dict. Raises BadInput for a name that is not in the TypedDict `known`."""
-    for name in given:
-        if name not in known.__annotations__:
-            raise unknown("option", name, known.__annotations__, where)
-    return dict(given)
 
 
 def several(advisors: Advisors) -> list[OneAdvisor]:

@@ -5,9 +5,11 @@ from functools import cached_property
 from html import escape
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, TypedDict, Unpack
+from typing import TYPE_CHECKING, Annotated, Any, TypedDict, Unpack
 
-from lab.api.options import ToolboxOrPlace, checked, data_frame, toolbox_of
+from annotated_types import Ge, Le
+
+from lab.api.options import ToolboxOrPlace, check_common, checked, data_frame, toolbox_of
 from lab.api.pictures import Picture
 from lab.errors import BadInput
 from lab.production.sequencing_job import SequencingOptions, sequence_cell, sequenced_named
@@ -24,18 +26,25 @@ if TYPE_CHECKING:
 
 
 class OrderOptions(TypedDict, total=False):
-    """The options of `lab sequence`, by their names there; the default of each is the value in the file."""
+    """The options of `lab sequence`, by their names there; the default of each is the value in the file.
+
+    case: an order by name; toasts: the number of parts; parts: of each kind, such as "slice=2,cup=1".
+    layout, robots: the travel times and the number of robots beside an instance file.
+    method, objective: by name; policy: the file of the method "carried"; episodes: of a session; sessions: how many.
+    stochastic: whether times are drawn; seconds: the search ends after so many [s]; gap: it ends when the cost is at most this
+    fraction above the bound.
+    """
 
     case: str
     toasts: int
     parts: str
     layout: Path
-    robots: int
+    robots: Annotated[int, Ge(1), Le(50)]
     method: str
     policy: Path
     objective: str
-    episodes: int
-    sessions: int
+    episodes: Annotated[int, Ge(1)]
+    sessions: Annotated[int, Ge(1)]
     stochastic: bool
     seconds: float
     gap: float
@@ -43,9 +52,14 @@ class OrderOptions(TypedDict, total=False):
 
 @dataclass(frozen=True, eq=False)
 class OrderResult:
-    """The result of a search for an order of transfers.
+    """The result of a search for an order of transfers, which notebooks display.
 
     cell: the cell; sessions: the result of each session of the method; document: the dict that `lab sequence --json` prints.
+
+        >>> import lab
+        >>> order = lab.sequence("toast-case-1", toasts=1)
+        >>> order.moves
+        ['toast 1: plate > toaster', 'toast 1: toaster > butter_applier', 'toast 1: butter_applier > finished_plate']
     """
 
     cell: Cell
@@ -114,13 +128,14 @@ def sequence(
     toolbox: provides and saves a task's skills; None (default): nothing is saved.
     options: those of `lab sequence`, such as method, objective, episodes, seconds [s], gap (a fraction).
 
-    Raises BadInput if these do not fit together.
+    Raises BadInput for an unknown name, a value out of range, and what does not fit together.
 
         >>> import lab
         >>> order = lab.sequence("toast-case-1", toasts=2)
         >>> order.proven, order.cost == order.bound, order.rows()[0]["start_s"]
         (True, True, 0.0)
     """
+    check_common("lab.sequence", seed=seed)
     given = checked(options, OrderOptions, "lab.sequence")
     case, toasts = given.pop("case", None), given.pop("toasts", None)
     wanted = SequencingOptions(seed=seed, **given)

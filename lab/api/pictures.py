@@ -6,7 +6,7 @@ from html import escape
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from lab.errors import BadInput
+from lab.errors import BadInput, check_value
 from lab.files import write_whole
 
 PAGE_HEIGHT = 480  # pixels of a page in a notebook
@@ -14,7 +14,15 @@ PAGE_HEIGHT = 480  # pixels of a page in a notebook
 
 @dataclass(frozen=True)
 class Picture:
-    """A picture, the bytes of a PNG or SVG file; notebooks display it, and `save` writes it."""
+    """A picture; notebooks display it, and `save` writes it.
+
+    data: the bytes of a PNG or SVG file.
+
+        >>> import lab
+        >>> picture = lab.sequence("toast-case-1", toasts=1).gantt
+        >>> picture.form, picture.data[:5]
+        ('svg', b'<?xml')
+    """
 
     data: bytes
 
@@ -33,7 +41,7 @@ class Picture:
 
     def save(self, path: Path | str) -> Path:
         """Writes the picture and returns the path. Raises BadInput unless the name ends in .png or .svg, as `form` says."""
-        return _written(Path(path), f".{self.form}", self.data)
+        return _written(path, f".{self.form}", self.data)
 
     def _repr_png_(self) -> bytes | None:
         return self.data if self.form == "png" else None
@@ -44,20 +52,29 @@ class Picture:
 
 @dataclass(frozen=True)
 class Page:
-    """An HTML page that needs neither server nor network; notebooks (Colab too) display it, and `save` writes it."""
+    """An HTML page that needs neither server nor network; notebooks (Colab too) display it, and `save` writes it.
+
+    html: its text.
+
+        >>> import lab
+        >>> lab.show(lab.world("S..G")).html[:15]
+        '<!DOCTYPE html>'
+    """
 
     html: str
 
     def save(self, path: Path | str) -> Path:
         """Writes the page and returns the path. Raises BadInput unless the name ends in .html."""
-        return _written(Path(path), ".html", self.html.encode())
+        return _written(path, ".html", self.html.encode())
 
     def _repr_html_(self) -> str:
         frame = f'width="100%" height="{PAGE_HEIGHT}" style="border:0"'
         return f'<iframe srcdoc="{escape(self.html)}" {frame}></iframe>'
 
 
-def _written(path: Path, suffix: str, data: bytes) -> Path:
+def _written(where: Path | str, suffix: str, data: bytes) -> Path:
+    check_value("file", where, Path, "save")
+    path = Path(where)
     if path.suffix != suffix:
         raise BadInput(f"file '{path}': its name must end in {suffix}")
     try:

@@ -6,9 +6,20 @@ from functools import cached_property
 from html import escape
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, TypedDict, Unpack
+from typing import TYPE_CHECKING, Annotated, Any, TypedDict, Unpack
 
-from lab.api.options import Advisors, ToolboxOrPlace, advising_of, checked, data_frame, several, toolbox_of
+from annotated_types import Ge, Le
+
+from lab.api.options import (
+    Advisors,
+    ToolboxOrPlace,
+    advising_of,
+    check_common,
+    checked,
+    data_frame,
+    several,
+    toolbox_of,
+)
 from lab.api.pictures import Page, Picture
 from lab.errors import BadInput
 from lab.files import check_out
@@ -31,21 +42,27 @@ if TYPE_CHECKING:
 
 
 class TaskOptions(TypedDict, total=False):
-    """The options of `lab run`, by their names there."""
+    """The options of `lab run`, by their names there.
+
+    toasts: the number of parts of the first kind, 1 to 50; parts: of each kind, such as "slice=2,cup=1".
+    override: of the arm's speed [%]; faults: the seed with which faults are drawn, default none.
+    order: of the moves by part numbers, such as "1,2,1,1,2,2"; cyclic: the shortest cycle is repeated; parts_per_cycle: its
+    most parts; method: the name of the method that finds the order.
+    """
 
     toasts: int
     parts: str
-    override: int
-    faults: int
+    override: Annotated[int, Ge(10), Le(100)]
+    faults: Annotated[int, Ge(0)]
     order: str
     cyclic: bool
     method: str
-    parts_per_cycle: int
+    parts_per_cycle: Annotated[int, Ge(1)]
 
 
 @dataclass(frozen=True, eq=False)
 class RunResult:
-    """The result of a run; report: its details; document: the dict that `lab run --json` prints."""
+    """The result of a run, which notebooks display; report: its details; document: the dict that `lab run --json` prints."""
 
     report: Report
     document: dict[str, Any]
@@ -117,10 +134,14 @@ def run(
 
     Raises BadInput if these do not fit together, WorkFailed if a skill cannot be learned. A run that fails raises nothing:
     see `RunResult.failure`.
+
+        >>> import lab
+        >>> run = lab.run("kit", parts="box=1", workers=1)
+        >>> run.success, run.failure, round(run.makespan_s) == round(max(row["end_s"] for row in run.rows()))
+        (True, None, True)
     """
+    check_common("lab.run", seed=seed, workers=workers, out=out)
     given = checked(options, TaskOptions, "lab.run")
-    if workers is not None and workers < 1:
-        raise BadInput(f"workers {workers} (lab.run): at least 1, or None for one a core")
     advisors = several(advisor)
     advising = advising_of(advisors, toolbox)
     if out is not None and not all(isinstance(one, str) for one in advisors):

@@ -6,6 +6,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, NamedTuple
 
+from lab.api.options import check_common
 from lab.api.pictures import Page
 from lab.errors import BadInput, counted
 from lab.mdp import shortest_path
@@ -33,9 +34,17 @@ def show(
 
     what: a name or file of a task or world, or the object itself; toasts, parts: the order, as for `lab run`; seed: of the scene.
     Raises BadInput for anything that has no scene, such as a cell without physics.
+
+        >>> import lab, tempfile
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     lab.show("toast", toasts=1).save(f"{folder}/toast.html").suffix
+        '.html'
     """
     from lab.view.meshcat import replay_html
 
+    check_common("lab.show", toasts=toasts, parts=parts, seed=seed)
+    if not isinstance(what, str | Path | GridWorld | Task):
+        raise BadInput(f"what {what!r} (lab.show): wanted a name or file of a task or a world, a GridWorld or a Task")
     with seen(what, SceneRequest(toasts, parts, seed)) as (title, recording), TemporaryDirectory() as folder:
         path = replay_html(recording, Path(folder) / "scene.html", title=title)
         return Page(path.read_text(encoding="utf-8"))

@@ -1,13 +1,14 @@
 """`lab.study`, `lab.compare` and `lab.tune`: many sessions, and their results."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from lab.api.options import Advisors, OneAdvisor, data_frame, several
+from lab.api.options import Advisors, OneAdvisor, check_common, data_frame, several
 from lab.api.pictures import Picture
+from lab.errors import BadInput
 from lab.learning.settings import USUAL
 from lab.studies import checked, study_of
 from lab.studies.compared import Compared, compared
@@ -23,7 +24,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class StudyResult:
-    """The result of a study: its title and its findings (rows, summary, pictures, remarks)."""
+    """The result of a study, which notebooks display.
+
+    title: in one line; findings: its rows, summary, pictures and remarks.
+
+        >>> import lab
+        >>> compared = lab.compare("world-1", sessions=4, episodes=60)
+        >>> [caption.partition(",")[0] for caption in compared.figures]
+        ['Sessions that are solved in the end', 'Mean steps of each episode']
+    """
 
     title: str
     findings: Findings
@@ -66,8 +75,14 @@ def study(name: str, *, sessions: int | None = None, seed: int = 0, workers: int
     name: as `lab study list` prints it; sessions: per setting, default the study's own; seed: of all randomness; workers: the
     number of processes, on which results do not depend; reading: the options that some studies have.
     Raises BadInput for an unknown study, an option that it does not have, and too few sessions.
+
+        >>> import lab
+        >>> figure = lab.study("figure-9.4", sessions=10)
+        >>> figure.rows[0]["measure"], figure.rows[0]["beta"]
+        ('SP_percent', 0.5)
     """
-    job = Job(sessions or study_of(name).sessions, seed, workers)
+    check_common("lab.study", sessions=sessions, seed=seed, workers=workers)
+    job = Job(study_of(name).sessions if sessions is None else sessions, seed, workers)
     known = checked(name, job, reading)
     return StudyResult(known.title, known.run(job, reading))
 
@@ -94,6 +109,7 @@ def compare(
         >>> sorted({row["advisor"] for row in compared.rows})
         ['expert', 'none']
     """
+    check_common("lab.compare", sessions=sessions, seed=seed, workers=workers, task=task)
     values = {name: _listed(value) for name, value in settings.items()}
     what = Compared(problem, several(advisor), values, task, sight)
     return StudyResult(
@@ -115,10 +131,18 @@ def tune(
     """Settings tuned to a problem, and their gain on unseen seeds; nothing is written.
 
     problem, advisor: as in `lab.teach`; over: the names of the settings to tune; trials: combinations to try; sessions: per
-    trial;
-    seed: of all randomness; workers: the number of processes; held: other settings with fixed values, and task and sight.
+    trial; seed: of all randomness; workers: the number of processes, on which results do not depend; held: other settings with
+    fixed values, and task and sight. The gain is measured in steps an episode.
     Raises BadInput if these do not fit together, and if Optuna is not installed.
+
+        >>> import lab
+        >>> tuned = lab.tune("world-1", over=["alpha"], trials=2, sessions=2)
+        >>> tuned.summary["trials"], 0.05 <= tuned.summary["alpha"] <= 1
+        (2, True)
     """
+    check_common("lab.tune", trials=trials, sessions=sessions, seed=seed, workers=workers)
+    if isinstance(over, str) or not isinstance(over, Iterable):
+        raise BadInput(f"over {over!r} (lab.tune): wanted a list of names of settings")
     where = {name: held.pop(name) for name in ("task", "sight") if name in held}
     what = Tuning(problem, advisor, held, tuple(over), trials, **where)
     title = f"Tuned: {problem}" if isinstance(problem, str) else "Tuned"

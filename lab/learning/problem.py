@@ -11,7 +11,7 @@ class Problem:
     """The problem of one lesson.
 
     name: of the problem; subtask: of the skill that it belongs to; mdp: its table.
-    environment: where steps are made; None for the table itself.
+    environment: where steps are made, an object with the methods of `Environment`; None for the table itself.
     scene: the place in words, if the name does not say it; arm: the arm that carries the sub-task out, "" for none.
 
         >>> import lab

@@ -174,11 +174,17 @@ def allowed_words(request: Request) -> str:
 class AdviceRequest(Request):
     """A question about the next action in a state of a table. An advisor is a function of it, or an object with `advise`.
 
+    It answers with one of `allowed`, or with None for the learner's own choice, or raises `AdvisorLeft`; any other answer ends
+    the session with BadInput.
+
+    episode, step: both count from 1; state: the number of the state.
+    own: the action that the learner would choose; allowed: the possible answers, indices of `mdp.action_labels`.
     mdp: the problem.
     q: the learner's current action values, `q[state][action]`; they must not be changed.
     temperature, selection: how the learner chooses at present; temperature is epsilon for "epsilon-greedy".
     environment: draws the state; None if the table's grid is all there is.
-    The other fields are those of `Request`.
+    improvement, reason, standing, undoable: how the learner improves, why it asks, and what came of the advice so far, see
+    `Request`.
 
         >>> import lab
         >>> def advise(request: lab.AdviceRequest) -> int | None:
@@ -227,7 +233,18 @@ class Walked:
 
 
 class AdvisorLeft(Exception):
-    """Raised by an advisor that gives no more advice in this session; the text says why."""
+    """Raised by an advisor that gives no more advice in this session; the text says why.
+
+    The learner goes on alone.
+
+        >>> import lab
+        >>> def advise_early(request: lab.AdviceRequest) -> int | None:
+        ...     if request.episode > 2:
+        ...         raise lab.AdvisorLeft("two episodes are enough")
+        ...     return request.own
+        >>> lab.teach("world-1", advisor=advise_early, gate="always", episodes=5).session.guided.tolist()
+        [True, True, False, False, False]
+    """
 
 
 Ask = Callable[[Any], int | None]  # a function of a `Request`

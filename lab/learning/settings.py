@@ -6,10 +6,9 @@ from typing import Annotated, Any, NamedTuple, get_type_hints
 
 from annotated_types import DocInfo, Ge, Gt, Le, Lt, doc
 
-from lab.errors import BadInput
+from lab.errors import LIMITS, BadInput
 
 COMPARE_WINDOWS = ("ccrl", "combined")
-WORDS = {"gt": "above", "ge": "at least", "le": "at most", "lt": "below"}
 
 
 @cache
@@ -41,7 +40,7 @@ def _require_allowed(settings: Any) -> None:
 def _limits(metadata: "list[Any] | tuple[Any, ...]") -> list[str]:
     """The limits of a field in words, such as "at least 0"."""
     limits = (limit for limit in metadata if not isinstance(limit, DocInfo))
-    return [f"{WORDS[name]} {value}" for limit in limits for name, value in asdict(limit).items()]
+    return [f"{LIMITS[name]} {value}" for limit in limits for name, value in asdict(limit).items()]
 
 
 @dataclass(frozen=True)

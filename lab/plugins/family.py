@@ -91,9 +91,16 @@ class Family(MutableMapping[str, Row]):
         self._rows[name] = self._adopt(name, thing)
         known_source(thing, source)
 
-    def named(self, thing: Any) -> Any:
-        """The name of a class, which is added by `use`; any other object unchanged."""
-        return self.use(thing.__name__, thing) if isinstance(thing, type) else thing
+    def named(self, thing: Any) -> str:
+        """The name of a class, which is added by `use`; a name is returned unchanged. Raises BadInput for anything else."""
+        if isinstance(thing, str):
+            return thing
+        if not isinstance(thing, type):
+            raise BadInput(f"{self.kind}: {thing!r}: wanted a name or a class")
+        try:
+            return self.use(thing.__name__, thing)
+        except BadInput as error:
+            raise BadInput(f"{self.kind}: {error}") from None
 
     def use(self, name: str, thing: Any) -> str:
         """Adds a member under a name that is not listed, and returns the name. Raises BadInput if it is no member."""

@@ -124,10 +124,40 @@ class Photo:
 
 
 class Skill:
-    """One sub-task at one place, with its life cycle; a new skill is a subclass in a file of its own and a row in `SKILLS`.
+    """The base class of skills: one sub-task at one place, with its life cycle.
 
     The life cycle: which skills a task needs (`at_pick` to `at_service`), the survey of the problem (`setup`), the part
     (`aim`), the motion (`start`, `step`, `stop`), what people see (`show` to `photo`), the trial in physics (`begins_at`).
+    A subclass defines `subtask`, `help` and `doing`, at least one of `at_pick` to `at_service`, `setup` and `motion`, and
+    `pose` if the arm moves. A skill like one that ships is shorter as a subclass of `Grasp`, `Transfer`, `PlacePart`,
+    `Insert` or `Cover`. An entry point in the group `teaching_lab.skills` adds it, under the name `subtask`.
+
+    name: of the skill, unique in a task; kind: of the part that it handles or carries, "" for none.
+    subtask: the name of the family of problems; help: what is learned, in one line; doing: what the robot does meanwhile, a
+    predicate in which "{part}" stands for the part's name. Class attributes.
+    moves_arm: False for a machine's process; tried: whether a lesson ends with a trial in physics; near: whether it stays around
+    its station's first spot. Class attributes.
+    station: where it takes place, if anywhere; carries: whether the gripper holds a part meanwhile.
+    surveys, problem: what `setup` was given and what it returned; it has to keep both.
+
+        >>> import lab
+        >>> from lab.skills import Skill
+        >>> class Dial(Skill):
+        ...     '''The toaster finds the setting of its dial.'''
+        ...     subtask, help, doing = "dial", "a machine finds the setting of its dial", "waits for {part}"
+        ...     moves_arm = False
+        ...     @classmethod
+        ...     def at_machine(cls, task, station):
+        ...         return cls(f"dial of {station}") if station == "toaster" else None
+        ...     def setup(self, surveys):
+        ...         board = lab.grid((5,), [0] * 5, (0,), (3,), None, ("less", "more"))
+        ...         self.surveys, self.problem = surveys, lab.Problem(self.name, self.subtask, board)
+        ...         return self.problem
+        ...     def motion(self, bench, policy):
+        ...         for _ in range(240):  # a second
+        ...             yield
+        >>> from lab.testing import check_skill
+        >>> check_skill(Dial)
     """
 
     subtask: ClassVar[str]
@@ -188,7 +218,10 @@ class Skill:
         return ()
 
     def setup(self, surveys: "Surveys") -> Problem:
-        """The problem to learn, from a survey of the scene. BadInput, naming what blocks it, when it has no solution."""
+        """The problem to learn, from a survey of the scene: `surveys.task`, its kinds of parts, their places, free cells.
+
+        Raises BadInput, which names what blocks it, if it has no solution. The same scene gives the same problem.
+        """
         raise NotImplementedError
 
     def aim(self, name: str, spot: Spot | None = None) -> Self:
@@ -314,11 +347,14 @@ class Skill:
         return self.kind and f"{self.surveys.task.made_as(self.kind).name} 1"
 
     def motion(self, bench: Bench, policy: "Policy") -> Iterator[None]:
-        """Follow the policy: each `next` sets the targets of one physics step. Raises SkillFailed."""
+        """Follows the policy: each `next` sets the targets of one physics step of 1/240 s. Raises SkillFailed.
+
+        bench: the scene, with `bench.scene.robot` and `bench.scene.world`; policy: `policy.q` is the learned table.
+        """
         raise NotImplementedError
 
     def start(self, bench: Bench, policy: "Policy") -> None:
-        """Begin to follow `policy` from the bench's current state."""
+        """Begins to follow `policy` from the bench's current state."""
         self._motion = self.motion(bench, policy)
         self.status, self.reason = Status.RUNNING, ""
 

@@ -84,7 +84,7 @@ def checked(name: str, job: "Job", reading: Mapping[str, Any]) -> Study:
         raise unknown("advisor table", table, TABLES, "--advisor-table")
     for option in reading:
         if option not in study.reads:
-            takes = ", ".join(one for one, other in STUDIES.items() if option in other.reads)
+            takes = ", ".join(one for one, other in STUDIES.items() if option in other.reads) or "no study"
             raise BadInput(f"--{option.replace('_', '-')}: the study '{name}' has none to choose; it is for {takes}")
     return study
 

@@ -132,7 +132,7 @@ class Learned(Record):
             named["gate"] = GATES.named(named["gate"])
         for name in named:
             if name not in SETTINGS:
-                raise unknown("setting", name, SETTINGS, where)
+                raise unknown("setting", name, SETTINGS, where or "learner and gate")
         own = replace(self.learner, **{name: value for name, value in named.items() if hasattr(self.learner, name)})
         when = replace(self.gate, **{name: value for name, value in named.items() if hasattr(self.gate, name)})
         other = self.model_copy(update={"learner": own, "gate": when})

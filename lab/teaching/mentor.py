@@ -4,11 +4,12 @@ from collections import Counter
 from collections.abc import Callable, Hashable, Iterable, Sequence
 from dataclasses import dataclass
 from math import exp, log
-from typing import Any, Protocol
+from typing import Annotated, Any, Protocol
 
 import numpy as np
+from annotated_types import Ge, Le
 
-from lab.errors import BadInput, unknown
+from lab.errors import BadInput, check_value, unknown
 
 Policy = Callable[[Any], Any]  # a function from an observation to an action, or to a value per action
 
@@ -45,7 +46,7 @@ def entropy(values: Sequence[Sequence[float]]) -> float:
     """The entropy of the values as probabilities (of their softmax if they are none), as a share of its maximum."""
     row = np.asarray(values[0], np.float64)
     chances = row if row.min() >= 0.0 and abs(row.sum() - 1.0) < 1e-6 else _softmax(row)
-    return float(-sum(p * log(p) for p in chances.tolist() if p > 0.0) / log(len(row)))
+    return float(-sum(p * log(p) for p in chances.tolist() if p > 0.0) / log(max(2, len(row))))
 
 
 def disagreement(values: Sequence[Sequence[float]]) -> float:
@@ -85,8 +86,13 @@ class Watched:
         if rule not in NAMES:
             raise unknown("rule", rule, NAMES, "watch")
         self._policies = [_called(one) for one in (policy if isinstance(policy, list | tuple) else [policy])]
+        if not self._policies:
+            raise BadInput("policy [] (watch): wanted a policy, or a list of one or more")
         if rule == "ensemble" and len(self._policies) < 2:
             raise BadInput("rule 'ensemble' (watch): one policy: wanted a list of two or more")
+        check_value("threshold", threshold, float, "watch")
+        if not isinstance(seen, Iterable):
+            raise BadInput(f"seen {seen!r} (watch): wanted the observations of the training")
         self.rule, self.threshold = rule, threshold
         self._visits = Counter(_key(observation) for observation in seen)
         if rule == VISITS and not self._visits:
@@ -118,6 +124,8 @@ class Watched:
             raise BadInput(
                 f"rule '{self.rule}' (watch): the policy answers {answers[0]!r}: wanted a value for each action"
             )
+        if np.size(answers[0]) == 0:
+            raise BadInput(f"rule '{self.rule}' (watch): the policy answers []: wanted a value for each action")
         if np.ndim(answers[0]) == 0:
             best = Counter(answers)
             return 1.0 - best.most_common(1)[0][1] / len(answers)
@@ -131,6 +139,9 @@ class Watched:
         share: of all steps that it asks about; if None, caught: the share of the wrong steps that it asks about, with as few
         questions as possible. Raises BadInput if there are no steps, or no wrong ones to be caught.
         """
+        for name, value in (("share", share), ("caught", caught)):
+            if value is not None:
+                check_value(name, value, Annotated[float, Ge(0), Le(1)], "calibrate")
         steps = []
         for episode in episodes:
             self.begin()

@@ -1,15 +1,16 @@
 """The subjects of lessons, by name or object: worlds, skills of tasks, Gymnasium environments, tables; `lab.world`."""
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING
 
-from lab.errors import BadInput
+from lab.errors import BadInput, check_value
 from lab.learning.problem import Problem
 from lab.mdp import TabularMDP
 from lab.tasks.grid_world import GridWorld, from_rows
-from lab.tasks.record import Learned
+from lab.tasks.record import NAME_PATTERN, Learned
 from lab.tasks.task_file import names_file
 from lab.teaching.lesson import Subject
 from lab.teaching.lesson_options import LessonOptions
@@ -51,12 +52,17 @@ class TableSubject(Subject):
 def world(rows: str, name: str = "world") -> GridWorld:
     """A grid world from its rows of cells: '.' free, '#' obstacle, one 'S' (start), one 'G' (goal).
 
+    name: 1 to 40 letters, digits, spaces, - and _.
     Raises BadInput for other characters or rows of different lengths, and NoPath if no path joins start and goal.
 
         >>> import lab
-        >>> lab.world("S.#\\n..G").mdp().n_states
-        6
+        >>> maze = lab.world("S.#\\n..G", name="maze")
+        >>> maze.shape, maze.start, maze.goal, maze.obstacles, maze.mdp().n_states
+        ((2, 3), (0, 0), (1, 2), ((0, 2),), 6)
     """
+    check_value("rows", rows, str, "lab.world")
+    if not isinstance(name, str) or not re.match(NAME_PATTERN, name):
+        raise BadInput(f"name {name!r} (lab.world): wanted 1 to 40 letters, digits, spaces, - and _")
     lines = [line.strip() for line in rows.strip().splitlines()]
     return from_rows("\n".join(lines), name, f"world '{name}'")
 
@@ -74,8 +80,10 @@ def subject_from(problem: Teachable, task: str | None = None, sight: str | None 
     if isinstance(problem, TabularMDP):
         problem = Problem("problem", "table", problem)
     if isinstance(problem, Problem):
+        if not isinstance(problem.mdp, TabularMDP):
+            raise BadInput(f"mdp {problem.mdp!r} of the problem '{problem.name}': wanted a TabularMDP")
         return TableSubject(problem)
-    raise BadInput(f"problem {problem!r}: it is a {type(problem).__name__}: wanted {KINDS}")
+    raise BadInput(f"problem {problem!r} ({type(problem).__name__}): wanted {KINDS}")
 
 
 def subject_of(options: LessonOptions, kept: "KeptSession | None" = None) -> Subject:

@@ -51,6 +51,11 @@ class Policy:
     learned with; each of these is "" if there is none.
 
     Raises BadInput if these do not fit together.
+
+        >>> import lab
+        >>> policy = lab.teach("world-1", seed=1, episodes=60).policy
+        >>> policy.task, policy.q.shape, policy.seed, len(policy.curve)
+        ('world-1', (1000, 6), 1, 60)
     """
 
     name: str

@@ -9,7 +9,7 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from lab.errors import BadInput, WorkFailed, unknown
+from lab.errors import BadInput, WorkFailed, check_value, unknown
 from lab.files import json_of
 from lab.toolbox import deferred
 from lab.toolbox.folder_place import FilePlace, FolderPlace, read_file
@@ -149,6 +149,7 @@ class Toolbox:
 
     def load(self, path: Path | str) -> "Policy":
         """The policy in a file of the toolbox or a local file. Raises BadInput, which names it, unless it is a sound policy."""
+        check_value("path", path, Path, "Toolbox.load")
         inside = self._inside(path)
         try:
             content = read_file(Path(path)) if inside is None else self.place.read(inside)
@@ -374,6 +375,8 @@ class Toolbox:
 
 def _place_of(where: Path | str | None) -> FilePlace:
     """The place that a folder or an address names, default the user's own."""
+    if where is not None:
+        check_value("where", where, Path, "lab.Toolbox")
     text = default_address() if where is None else str(where)
     if text.startswith("file://"):
         text = text.removeprefix("file://")

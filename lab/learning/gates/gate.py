@@ -92,11 +92,13 @@ class Gate:
     `takes` with the answer, `saw` after each step (if `watches`), and `judges` after the episode. A subclass overrides what it
     decides.
 
-    settings: of the gate; episodes, max_steps: of the session; around: what else a gate may use, None outside sessions.
+    settings: of the gate, a `GateSettings`; episodes, max_steps: of the session; around: what else a gate may use, None outside
+    sessions.
     watches: class attribute, whether `saw` is called; weighs: class attribute, whether `asks` and `takes` are also called when
     the budget is spent.
     misleads: episodes that misled; rejected: whether the advisor is rejected; converged: whether the gate has stopped asking for
-    good; why: the reason for the last question; verdict: on the last episode (`Verdict`).
+    good; why: the `Reason` for the last question, which people read as text; verdict: on the last episode: "better" than those
+    before it, "best", "misled", or "" for none.
 
         >>> import lab
         >>> class EveryOther(lab.Gate):

@@ -45,9 +45,10 @@ def towards(value: float, target: float, alpha: float) -> float:
 class Update:
     """The base class of learners, which a session creates with (q, settings, mdp) and calls in the order `begin`, `learn`, `end`.
 
+    q: the start values, `q[state][action]`, S lists of A floats, which `learn` changes in place; settings: a `LearnerSettings`;
+    mdp: the problem, a `TabularMDP`. A subclass has to keep `q`; the values of terminal states stay 0.
     lookahead: class attribute, whether `learn` needs the next action, as SARSA does; chained: class attribute, whether a step is
     learned from together with others of its episode, so that none may be left out.
-    q: the current action values, `q[state][action]`; S rows of A floats.
 
         >>> import lab
         >>> class Slow(lab.Update):

@@ -59,6 +59,15 @@ class Cell:
     machines without servers. `lab.sequencing.simulate.rest.rest_of` makes the cell of the remaining work of a run.
     Raises BadInput for an inconsistent cell, and for a missing time that a route needs (see `needed_moves`).
     Source: thesis ch. 7 (rules), tables 7.1 and 7.2 (times); App. III (pallets, arrivals, vacuuming).
+
+        >>> import lab, numpy
+        >>> from lab.sequencing.cell.stations import Product, Robot, Stage, Station
+        >>> stations = Station("in", "storage", 2), Station("oven", "machine", 1, 30.0), Station("out", "storage", 2)
+        >>> route = Stage("in"), Stage("oven"), Stage("out")
+        >>> drive_s = 10.0 * (1 - numpy.eye(3))
+        >>> cell = lab.Cell(stations, (Product("bun", (route,)),), ("bun",) * 2, drive_s, drive_s, (Robot("arm", "in"),))
+        >>> lab.sequence(cell).cost
+        110.0
     """
 
     stations: tuple[Station, ...]
