@@ -90,30 +90,26 @@ class Session:
         far is returned.
         """
         self.tell = on_event or self.tell
-        interrupted = False
+        settings, gate, recall, interrupted = self.settings, self.gate, self.recall, False
         try:
-            for episode in range(1, self.settings.episodes + 1):
-                self.play(episode)
+            for episode in range(1, settings.episodes + 1):
+                self.episode, self.asked_now, self.helped_now = episode, False, 0
+                self.tau = temperature(episode, settings.beta, settings.exploration)  # eq. 9.2
+                was_converged = gate.converged
+                is_open = gate.opens(episode, self.steps) and self.advisor is not None  # eqs. 6.1 and 6.2
+                is_open = is_open if recall is None else recall.opens(episode, is_open)
+                if gate.converged and not was_converged and self.advisor is not None:
+                    self.tell(events.AdviceEnded(episode, "converged"))
+                self.trail = [] if is_open and self.followed is not None else None
+                alone = self._own_choice
+                if recall is not None and recall.late:
+                    self.tau, alone = COLDEST, self._practised_choice
+                self._judge(is_open, self._walk(self._advised_choice if is_open else alone))
                 if enough():
                     break
         except KeyboardInterrupt:
             interrupted = True
         return self.result(interrupted)
-
-    def play(self, episode: int) -> None:
-        """Runs one episode: decides whether it may ask, makes its moves, judges it."""
-        self.episode, self.asked_now, self.helped_now = episode, False, 0
-        self.tau = temperature(episode, self.settings.beta, self.settings.exploration)  # eq. 9.2
-        gate, recall, was_converged = self.gate, self.recall, self.gate.converged
-        is_open = gate.opens(episode, self.steps) and self.advisor is not None  # eqs. 6.1 and 6.2
-        is_open = is_open if recall is None else recall.opens(episode, is_open)
-        if gate.converged and not was_converged and self.advisor is not None:
-            self.tell(events.AdviceEnded(episode, "converged"))
-        self.trail = [] if is_open and self.followed is not None else None
-        alone = self._own_choice
-        if recall is not None and recall.late:
-            self.tau, alone = COLDEST, self._practised_choice
-        self._judge(is_open, self._walk(self._advised_choice if is_open else alone))
 
     def _walk(self, choose: Callable[[int, int], int]) -> int | None:
         """The number of moves to the goal, None if it was not reached; each move is chosen, made and learned from.
