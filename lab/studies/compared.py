@@ -12,7 +12,6 @@ from zlib import crc32
 import numpy as np
 from numpy.typing import NDArray
 
-from lab import __version__
 from lab.advice.advising import Advising
 from lab.advice.advisors import ADVISORS
 from lab.errors import BadInput
@@ -35,6 +34,7 @@ from lab.studies.findings import Findings, Row, mean_row, share_row, varying_row
 from lab.studies.runner import Job
 from lab.teaching.lesson import Subject
 from lab.teaching.subjects import Teachable, subject_from
+from lab.version import __version__
 from lab.view.canvas import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, RED, SKY, picture_bytes
 
 if TYPE_CHECKING:
