@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.errors import BadInput, LabError, WorkFailed
-from lab.files import read_limited
+from lab.files import read_limited, source_hash
 from lab.optional import optional
 
 STORE = "sessions.jsonl"
@@ -38,6 +38,7 @@ class Job:
 
     sessions: per setting; seed: of all randomness; workers: the number of processes; dask: the address of a cluster, None for
     none; folder: stores finished work, None for nowhere; progress: called with the numbers of finished and of all settings.
+    code: a key of the study's own code, "" for none; work that was stored under another one, or by another lab, is repeated.
     """
 
     sessions: int = 500
@@ -46,6 +47,11 @@ class Job:
     dask: str | None = None
     folder: Path | None = None
     progress: Progress = lambda done, total: None
+    code: str = ""
+
+    @property
+    def _code(self) -> str:
+        return f"{source_hash()[:16]} {self.code}".strip()
 
     def each(self, work: Callable[[Item], Result], items: Sequence[Item]) -> dict[Item, Result]:
         """The result of `work`, a module-level function, by item; nothing is stored in the folder."""
@@ -90,7 +96,7 @@ class Job:
             yield from zip(items, pool(delayed(work)(item) for item in items), strict=True)
 
     def kept(self) -> Iterator[Any]:
-        """The records that `keep` stored; incomplete lines and lines that are no JSON are skipped."""
+        """The records that `keep` stored; those of other code, incomplete lines and lines that are no JSON are skipped."""
         path = None if self.folder is None else self.folder / STORE
         if path is None or not path.is_file():
             return
@@ -100,9 +106,11 @@ class Job:
             raise BadInput(f"'{path}': what is kept cannot be read: {error.strerror or error}") from None
         for line in BytesIO(content):
             try:
-                yield json.loads(line.decode("utf-8", errors="replace"))
+                record = json.loads(line.decode("utf-8", errors="replace"))
             except (ValueError, RecursionError):
                 continue
+            if isinstance(record, dict) and record.pop("code", None) == self._code:
+                yield record
 
     def kept_as(self, read: Callable[[Any], tuple[Any, Result] | None]) -> dict[Any, Result]:
         """The stored results by key; read: returns (key, result) for a record, None if it is not needed.
@@ -128,7 +136,7 @@ class Job:
             if path.is_file() and _is_cut(path):  # an incomplete line, whose work has just been repeated
                 os.truncate(path, read_limited(path).rfind(b"\n") + 1)
             with path.open("a", encoding="utf-8") as file:
-                file.write(json.dumps(record) + "\n")
+                file.write(json.dumps(record | {"code": self._code}) + "\n")
         except OSError as error:
             raise WorkFailed(f"output folder '{self.folder}' (--out) cannot be written: {error.strerror}") from error
 
