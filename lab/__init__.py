@@ -3,6 +3,8 @@
 The names in `__all__` are stable: docs/reference.md lists them. Each is imported when it is first used.
 """
 
+from lab.version import __version__ as __version__
+
 TYPE_CHECKING = False  # typing.TYPE_CHECKING without its import, which would dominate the time of `import lab`
 if TYPE_CHECKING:
     from typing import Any
@@ -26,7 +28,6 @@ if TYPE_CHECKING:
     from lab.toolbox.policy import Policy
     from lab.toolbox.registry import Toolbox
 
-__version__ = "0.2.0"
 
 _FACE = {
     "lab.api.lessons": ("LessonResult", "teach"),

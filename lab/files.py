@@ -1,5 +1,6 @@
-"""Where the shipped files are; bounded reading; atomic writing; drafts and locks; checks of output folders and of named files."""
+"""Files: those that ship, keys of source, bounded reading, atomic writing, drafts and locks, checks of output folders."""
 
+import ast
 import hashlib
 import json
 import os
@@ -15,6 +16,7 @@ from math import isfinite
 from pathlib import Path
 from secrets import token_hex
 from shutil import rmtree
+from sysconfig import get_paths
 from typing import Any
 
 from lab.errors import BadInput, WorkFailed
@@ -87,6 +89,63 @@ def source_key(module: str) -> str:
     file = Path(str(sys.modules[package].__file__))
     own = source_hash(file.parent if file.name == "__init__.py" else file)
     return f"{package}-{own[:16]}-{source_hash()[:16]}"
+
+
+@cache
+def code_key(*modules: str) -> str:
+    """A key of own code: the first 16 hex digits of a SHA-256 over the source of modules and of what they import; "" for none.
+
+    A module counts with its whole top-level package. Imports are followed, also those in functions, until one leads to the lab or
+    to an installed package. What code reads from other files is not part of the key. Raises BadInput for a module without a
+    source file.
+    """
+    own = {name.partition(".")[0] for name in modules}
+    digest, waiting, seen = hashlib.sha256(), sorted(own), set[str]()
+    while waiting:
+        name = waiting.pop()
+        file = _file_of(name)
+        if file is None and name in own:
+            raise BadInput(f"module '{name}': it has no source file, so that no result can be kept under its name")
+        if file is None or name in seen or name == PACKAGE.name or (name not in own and _is_installed(file)):
+            continue
+        seen.add(name)
+        whole = file.parent if file.name == "__init__.py" else file
+        digest.update(f"{name} {source_hash(whole)} ".encode())
+        if not _is_installed(file):
+            waiting += sorted(_imported(whole))
+    return digest.hexdigest()[:16] if modules else ""
+
+
+def _file_of(name: str) -> Path | None:
+    """The Python file of a top-level module, loaded or not, None if it has none; none of its code runs."""
+    if name in sys.modules:
+        file = getattr(sys.modules[name], "__file__", None)
+    else:
+        try:
+            spec = find_spec(name)
+        except (ImportError, AttributeError, ValueError):
+            return None
+        file = None if spec is None else spec.origin
+    return Path(file).resolve() if file and file.endswith(".py") else None
+
+
+def _is_installed(file: Path) -> bool:
+    installed = {get_paths()[name] for name in ("stdlib", "platstdlib", "purelib", "platlib")}
+    return any(file.is_relative_to(Path(folder).resolve()) for folder in installed)
+
+
+def _imported(whole: Path) -> Iterator[str]:
+    """The top-level names of all modules that the files of a package, or a file, may import."""
+    for file in [whole] if whole.is_file() else whole.rglob("*.py"):
+        try:
+            tree = ast.parse(read_limited(file))
+        except (OSError, SyntaxError, ValueError):  # such a file cannot be imported either
+            continue
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Import):
+                yield from (alias.name.partition(".")[0] for alias in node.names)
+            elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+                yield node.module.partition(".")[0]
 
 
 def read_limited(path: Path, most: int = MOST_BYTES) -> bytes:

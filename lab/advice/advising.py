@@ -1,11 +1,11 @@
 """The advisors of a session: one or several, simulated, recorded, learned or people, combined into one `Advisor`."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from lab.advice.advisors import PEOPLE, AdvisorName, RecordedAdvisor, make_advisor
+from lab.advice.advisors import ADVISORS, PEOPLE, AdvisorName, RecordedAdvisor, make_advisor
 from lab.advice.entries import Read, read_journal
 from lab.advice.journal import Journal
 from lab.advice.panel import Panel, PanelSettings, members_of
@@ -81,6 +81,14 @@ class Advising:
         level = TableLevel(mdp, 1.0, np.random.default_rng(0), toolbox=self.toolbox)
         advisors = [make_advisor(name, level) for name in self.names if name.folder or name.policy or name.answers]
         return [advisor for advisor in advisors if isinstance(advisor, PolicyAdvisor)]
+
+    def for_session(self) -> "Advising":
+        """The same advisors for one of several sessions, which share no state: see `AdvisorName.for_session`."""
+        return replace(self, names=tuple(name.for_session() for name in self.names))
+
+    def modules(self) -> list[str]:
+        """The modules of added advisors' code, see `Family.modules_of`."""
+        return [module for name in self.names for module in ADVISORS.modules_of(name.row)]
 
     def gather(
         self,

@@ -6,7 +6,8 @@ for the order of transfers.
 
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from copy import deepcopy
+from dataclasses import dataclass, replace
 from inspect import signature
 from math import isfinite
 from pathlib import Path
@@ -15,9 +16,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 from lab.advice.entries import read_journal
 from lab.errors import BadInput, unknown
 from lab.plugins.code_file import from_file
-from lab.plugins.family import Family, first_line, takes, wanted
+from lab.plugins.family import Family, checked_action, first_line, takes, takes_generator, wanted
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from lab.advice.entries import Read
     from lab.learning.requests import Advisor, Ask, Request
 
@@ -28,6 +31,10 @@ class Level(Protocol):
     @property
     def people(self) -> "Mapping[str, Ask]":
         """The functions that ask people, by advisor name."""
+
+    @property
+    def rng(self) -> "np.random.Generator":
+        """The generator of the session, which its advisors share."""
 
     def simulated(self, taus: tuple[float, ...], sign: float) -> "Advisor":
         """An advisor that draws from the exact values with tau, or from the first to the last tau; sign -1 inverts the values."""
@@ -47,7 +54,7 @@ class AdvisorName:
     """A parsed advisor name.
 
     text: as it was typed; row: the key in ADVISORS; taus, folder, policy, answers: the parameters in the name.
-    itself: an advisor made in Python, which is in no table.
+    itself: an advisor made in Python, or its class, which is in no table.
     """
 
     text: str
@@ -56,24 +63,37 @@ class AdvisorName:
     folder: Path | None = None
     policy: str = ""
     answers: Path | None = None
-    itself: "Advisor | None" = None
+    itself: "Advisor | Ask | type[Advisor] | None" = None
 
     @classmethod
     def made(cls, advisor: "Advisor | Ask") -> "AdvisorName":
-        """The name of an advisor object or of a function of a request. Raises BadInput for anything else."""
+        """The name of an advisor object or class, or of a function of a request. Raises BadInput for anything else."""
         text = getattr(advisor, "__name__", type(advisor).__name__)
-        if isinstance(advisor, type):
-            raise BadInput(f"advisor {text}: it is a class: wanted an object, such as {text}()")
-        if hasattr(advisor, "advise"):
-            return cls(text, PYTHON, itself=advisor)
-        if not callable(advisor):
-            raise BadInput(f"advisor {advisor!r}: wanted a name, a function of a request, or an object with `advise`")
-        with suppress(ValueError):  # some functions in C have no signature
-            try:
-                signature(advisor).bind(None)
-            except TypeError as error:
-                raise BadInput(f"advisor {text!r}: {error}: wanted a function of a request") from None
-        return cls(text, PYTHON, itself=Person(advisor))
+        is_class = isinstance(advisor, type)
+        if not (_is_advisor_class(advisor) if is_class else hasattr(advisor, "advise") or callable(advisor)):
+            raise BadInput(f"advisor {advisor!r}: wanted a name, {WANTED}, or an object with `advise`")
+        if not (is_class or hasattr(advisor, "advise")):
+            with suppress(ValueError):  # some functions in C have no signature
+                try:
+                    signature(advisor).bind(None)
+                except TypeError as error:
+                    raise BadInput(f"advisor {text!r}: {error}: wanted a function of a request") from None
+        return cls(text, PYTHON, itself=advisor)
+
+    def for_session(self) -> "AdvisorName":
+        """The same name with an advisor of its own for one session: a copy of an object that was made in Python.
+
+        Raises BadInput for an object that cannot be copied.
+        """
+        if self.itself is None or isinstance(self.itself, type) or not hasattr(self.itself, "advise"):
+            return self
+        try:
+            return replace(self, itself=deepcopy(self.itself))
+        except Exception as error:  # whatever the object's own code raises
+            why = f"{type(error).__name__}: {error}"
+            raise BadInput(
+                f"advisor '{self}': its object cannot be copied for each session ({why}): name its class"
+            ) from None
 
     @classmethod
     def of(cls, text: str, where: str = "advisor") -> "AdvisorName":
@@ -179,12 +199,35 @@ PEOPLE = {"terminal": "prompt", "web": "page"}
 SKILL_TAUS = {"expert": 0.01, "moderate": 0.1, "limited": 0.3, "novice": 1.0}
 
 
+WANTED = "a function of a request, or a class with `advise` that is made with nothing or with `rng`"
+
+
+class AddedAdvisor:
+    """An advisor from other code, whose answers are checked.
+
+    The class of an advisor is made with `rng`, a generator of the session's seed that nobody else draws from, if it takes that.
+    """
+
+    def __init__(self, name: object, thing: Any, rng: "np.random.Generator"):
+        if isinstance(thing, type):
+            thing = thing(rng=rng.spawn(1)[0]) if takes_generator(thing) else thing()
+        self._name, self._ask = name, getattr(thing, "advise", thing)
+        self.followed = getattr(thing, "followed", None)
+
+    def advise(self, request: "Request") -> int | None:
+        """The advisor's answer. Raises BadInput, which names the advisor, if it is neither an allowed action nor None."""
+        answer = self._ask(request)
+        return None if answer is None else checked_action(answer, request.allowed, f"advisor '{self._name}'")
+
+
+def _is_advisor_class(thing: Any) -> bool:
+    return isinstance(thing, type) and hasattr(thing, "advise") and (takes(thing) or takes_generator(thing))
+
+
 def _adopted(name: str, thing: Any) -> AdvisorKind:
-    if isinstance(thing, type) and hasattr(thing, "advise") and takes(thing):
-        return AdvisorKind(lambda name, level: thing(), first_line(thing))
-    if isinstance(thing, type) or not takes(thing, "request"):
-        raise wanted(thing, "a function of a request, or a class with `advise` that is made without arguments")
-    return AdvisorKind(lambda name, level: Person(thing), first_line(thing))
+    if not (_is_advisor_class(thing) or (not isinstance(thing, type) and takes(thing, "request"))):
+        raise wanted(thing, WANTED)
+    return AdvisorKind(lambda name, level: AddedAdvisor(name, thing, level.rng), first_line(thing))
 
 
 _SHIPPED: dict[str, AdvisorKind] = {
@@ -211,7 +254,11 @@ def make_advisor(name: AdvisorName, level: Level) -> "Advisor | None":
 
     Raises BadInput if there is no way to ask the person, if a record does not fit, and if the exact values cannot be computed.
     """
-    return name.itself or ADVISORS[name.row].make(name, level)
+    if name.itself is None:
+        return ADVISORS[name.row].make(name, level)
+    if type(name.itself).__module__.partition(".")[0] == "lab" and hasattr(name.itself, "advise"):
+        return name.itself  # one of the lab's own, such as a table of advice
+    return AddedAdvisor(name, name.itself, level.rng)
 
 
 def recorded_fault(record: "Read", what: str, signature: str) -> BadInput:

@@ -23,8 +23,9 @@ from lab.advice.entries import (
 )
 from lab.advice.json_lines import AppendedFile, differing
 from lab.errors import BadInput, WorkFailed
-from lab.learning.requests import AdvisorLeft, Ask, Request, allowed_words
+from lab.learning.requests import AdvisorLeft, Ask, Request
 from lab.learning.session_events import EpisodeEnded
+from lab.plugins.family import allowed_words
 
 
 class Undo(Exception):
@@ -148,7 +149,7 @@ class Journal:
             before = self.entries[self._at]
             known = before if isinstance(before, Answer) else Answer(by, 0, 0, 0, None)
             if known.action is not None and known.action not in request.allowed:
-                allowed = "allowed " + allowed_words(request)
+                allowed = "allowed " + allowed_words(request.allowed)
                 raise BadInput(f"{self._which}: {line_of(known)}: action {known.action}: {allowed}: it was edited")
             self.tell(replace(known, by=by, episode=request.episode, step=request.step, state=request.state))
             return _answered_action(known)

@@ -158,6 +158,6 @@ def teach(
         tell = unheard if steps is None else steps.hear
         teacher = Teacher(toolbox_of(toolbox, nowhere), advising_of(advisor, toolbox), seed, tell)
         teacher, plan = planned(subject, teacher)
-        lesson = teacher.one_session(plan)
+        lesson = teacher.teach(plan)
     document = document_of(plan.problem, lesson, teacher) | subject.facts()
     return LessonResult(plan.problem, lesson, document, subject, steps)

@@ -12,7 +12,7 @@ from annotated_types import Ge, Le
 from lab.api.options import ToolboxOrPlace, check_common, checked, data_frame, toolbox_of
 from lab.api.pictures import Picture
 from lab.errors import BadInput
-from lab.production.sequencing_job import SequencingOptions, sequence_cell, sequenced_named
+from lab.production.sequencing_job import SequencingOptions, named_cell, sequence_cell
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import NO_CHANCE
 from lab.sequencing.search import SequenceResult
@@ -146,5 +146,6 @@ def sequence(
         return OrderResult(cell, found, document)
     with TemporaryDirectory() as nowhere:
         teacher = Teacher(toolbox_of(toolbox, nowhere), seed=seed)
-        ordered, document, found = sequenced_named(str(cell), case, toasts, wanted, teacher)
-    return OrderResult(ordered, found, document)
+        named = named_cell(str(cell), case, toasts, wanted, teacher)
+    document, found = sequence_cell(named.cell, named.settings, wanted, named.chance)
+    return OrderResult(named.cell, found, {"task": named.name} | document)

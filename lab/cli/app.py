@@ -10,11 +10,11 @@ from typing import Annotated, Any, NamedTuple, cast
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-from lab import __version__
 from lab.cli.families import CommandOfFamilies
 from lab.cli.output import begin, end, fail, silence, write
 from lab.errors import LabError, out_of_memory
 from lab.plugins.family import blame
+from lab.version import __version__
 
 
 class UnloadedCommand(TyperCommand):

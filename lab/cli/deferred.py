@@ -68,7 +68,7 @@ if TYPE_CHECKING:
     from lab.tasks.grid_world import write_random
     from lab.tasks.instances import INSTANCES, pyjobshop
     from lab.tasks.instances import InstanceRequest as InstanceAsked
-    from lab.tasks.new_task import MACHINE, file_of, new_task
+    from lab.tasks.new_task import MACHINE, Changes, file_of, new_task
     from lab.tasks.record import write_whole as write_task_text
     from lab.tasks.robot_fields import MODELS
     from lab.tasks.schedule_table import read_schedule
@@ -184,7 +184,7 @@ TABLE = {
     "lab.tasks.cell_file": ("CellFile", "toml_of"),
     "lab.tasks.grid_world": ("write_random",),
     "lab.tasks.instances": ("InstanceRequest as InstanceAsked", "INSTANCES", "pyjobshop"),
-    "lab.tasks.new_task": ("file_of", "MACHINE", "new_task"),
+    "lab.tasks.new_task": ("Changes", "file_of", "MACHINE", "new_task"),
     "lab.tasks.record": ("write_whole as write_task_text",),
     "lab.tasks.robot_fields": ("MODELS",),
     "lab.tasks.schedule_table": ("read_schedule",),

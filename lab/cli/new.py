@@ -62,9 +62,9 @@ def new(
     Without options it asks for them; with any option it asks nothing.
     """
     path, task_name = deferred.file_of(name)
-    numbers = (mass or (), friction or (), capacity or (), batch or ())
-    if part or machine or arm or buffer or any(numbers):
-        wanted = deferred.new_task(task_name, arm or "up6", part or (), machine or (), buffer, *numbers)
+    changes = deferred.Changes(mass or (), friction or (), capacity or (), batch or ())
+    if part or machine or arm or buffer or any(changes):
+        wanted = deferred.new_task(task_name, arm or "up6", part or (), machine or (), buffer, changes)
     elif yes:
         wanted = deferred.new_task(task_name, "up6", (), (deferred.MACHINE,), False)
     else:

@@ -242,6 +242,11 @@ class GymEnvironment:
         return self.live.picture(state)
 
     @property
+    def modules(self) -> tuple[str, ...]:
+        """The module of the environment's code, see `lab.files.code_key`."""
+        return (type(self.live.inside).__module__,)
+
+    @property
     def max_steps(self) -> int:
         """The limit of steps of an episode: its own, otherwise one that allows for a walk through all states."""
         return self.live.limit or min(MOST_STEPS, max(200, 4 * self.mdp.n_states))

@@ -164,12 +164,6 @@ class Request:
     undoable: bool = False
 
 
-def allowed_words(request: Request) -> str:
-    """The possible answers as text, such as "0..3" or "1, 4, 6"."""
-    known = request.allowed
-    return f"{known[0]}..{known[-1]}" if isinstance(known, range) else ", ".join(map(str, known))
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AdviceRequest(Request):
     """A question about the next action in a state of a table. An advisor is a function of it, or an object with `advise`.

@@ -21,12 +21,13 @@ from lab.learning.advice_memory import Recall
 from lab.learning.environment import Environment, TableEnvironment, check_solvable
 from lab.learning.gates import GATES, Surroundings, improvement
 from lab.learning.physics.cells import CellTable
-from lab.learning.requests import AdviceRequest, Advisor, AdvisorLeft, Standing, Walked, allowed_words
+from lab.learning.requests import AdviceRequest, Advisor, AdvisorLeft, Standing, Walked
 from lab.learning.selection import COLDEST, SELECTIONS, Draw, temperature, uniforms
 from lab.learning.session_result import SessionResult, check_members, start_values
 from lab.learning.settings import GateSettings, LearnerSettings
-from lab.learning.updates import scattered, update_of
+from lab.learning.updates import UPDATES, scattered, update_of
 from lab.mdp import FloatArray, TabularMDP
+from lab.plugins.family import checked_action
 
 OnEvent = Callable[[events.Event], None]
 
@@ -59,7 +60,7 @@ class Session:
         self.tell: OnEvent = lambda event: None
         mdp, cells = self.mdp, self.mdp if isinstance(self.mdp, CellTable) else None
         self.draw = uniforms(rng) if isinstance(rng, np.random.Generator) else rng
-        self.update = update_of(learner, mdp, start_values(mdp, q0, learner))
+        self.update = update_of(learner, mdp, start_values(mdp, q0, learner), self.draw)
         self.q = self.update.q  # plain lists, which the loop reads faster than arrays
         self.visits: list[list[int]] = [[0] * mdp.n_actions for _ in range(mdp.n_states)]
         self.actions = range(mdp.n_actions)
@@ -69,6 +70,7 @@ class Session:
         size = mdp.n_states, mdp.n_actions
         others = partial(scattered, learner, mdp, self.draw)
         around = Surroundings(self.draw, others, several_starts, self.update.gauge, size, learner)
+        self.gate_name = f"gate '{gate.gate}'"
         make = GATES[gate.gate if self.advised else "never"].make
         self.gate = make(gate, learner.episodes, learner.max_steps, around)
         self.max_moves = learner.max_steps - learner.count_start
@@ -90,30 +92,26 @@ class Session:
         far is returned.
         """
         self.tell = on_event or self.tell
-        interrupted = False
+        settings, gate, recall, interrupted = self.settings, self.gate, self.recall, False
         try:
-            for episode in range(1, self.settings.episodes + 1):
-                self.play(episode)
+            for episode in range(1, settings.episodes + 1):
+                self.episode, self.asked_now, self.helped_now = episode, False, 0
+                self.tau = temperature(episode, settings.beta, settings.exploration)  # eq. 9.2
+                was_converged = gate.converged
+                is_open = gate.opens(episode, self.steps) and self.advisor is not None  # eqs. 6.1 and 6.2
+                is_open = is_open if recall is None else recall.opens(episode, is_open)
+                if gate.converged and not was_converged and self.advisor is not None:
+                    self.tell(events.AdviceEnded(episode, "converged"))
+                self.trail = [] if is_open and self.followed is not None else None
+                alone = self._own_choice
+                if recall is not None and recall.late:
+                    self.tau, alone = COLDEST, self._practised_choice
+                self._judge(is_open, self._walk(self._advised_choice if is_open else alone))
                 if enough():
                     break
         except KeyboardInterrupt:
             interrupted = True
         return self.result(interrupted)
-
-    def play(self, episode: int) -> None:
-        """Runs one episode: decides whether it may ask, makes its moves, judges it."""
-        self.episode, self.asked_now, self.helped_now = episode, False, 0
-        self.tau = temperature(episode, self.settings.beta, self.settings.exploration)  # eq. 9.2
-        gate, recall, was_converged = self.gate, self.recall, self.gate.converged
-        is_open = gate.opens(episode, self.steps) and self.advisor is not None  # eqs. 6.1 and 6.2
-        is_open = is_open if recall is None else recall.opens(episode, is_open)
-        if gate.converged and not was_converged and self.advisor is not None:
-            self.tell(events.AdviceEnded(episode, "converged"))
-        self.trail = [] if is_open and self.followed is not None else None
-        alone = self._own_choice
-        if recall is not None and recall.late:
-            self.tau, alone = COLDEST, self._practised_choice
-        self._judge(is_open, self._walk(self._advised_choice if is_open else alone))
 
     def _walk(self, choose: Callable[[int, int], int]) -> int | None:
         """The number of moves to the goal, None if it was not reached; each move is chosen, made and learned from.
@@ -171,7 +169,7 @@ class Session:
             self.helped_now += 1
             if recall is not None:
                 recall.asked()
-        return gate.takes(state, own, answer)
+        return checked_action(gate.takes(state, own, answer), self.actions, self.gate_name)
 
     def _ask(self, advisor: Advisor, state: int, step: int, own: int) -> int | None:
         """The advisor's answer, None if it gives none. Raises BadInput if the answer is no action."""
@@ -201,9 +199,7 @@ class Session:
             self.tell(events.AdviceEnded(self.episode, "advisor left"))
             return None
         self.tell(events.AdviceGiven(self.episode, step, state, action, own))
-        if action is not None and action not in self.actions:
-            raise BadInput(f"the advisor named action {action}: allowed {allowed_words(request)}")
-        return action
+        return None if action is None else checked_action(action, self.actions, "the advisor")
 
     def _judge(self, is_open: bool, moves: int | None) -> None:
         """Records the episode, lets the gate judge it (eqs. 6.3 and 6.4), and reports its events."""
@@ -232,7 +228,9 @@ class Session:
 
     def result(self, interrupted: bool) -> SessionResult:
         """The result so far; an unfinished episode counts in q and visits only."""
-        q, finished = self.update.table(), len(self.guided)
+        q, finished, name = self.update.table(), len(self.guided), self.settings.learner
+        if UPDATES.is_added(name) and (wrong := int((~np.isfinite(q)).sum())):
+            raise BadInput(f"learner '{name}': {wrong} of its {q.size} action values are not finite")
         final_steps, optimal_steps, solved = self.environment.judge(q, self.settings)
         return SessionResult(
             q=q,

@@ -1,26 +1,32 @@
 """Families: tables of members, shipped or added by other packages through entry points; the blame for faulty members."""
 
 import warnings
-from collections.abc import Callable, Iterator, Mapping, MutableMapping
+from collections.abc import Callable, Iterator, Mapping, MutableMapping, Sequence
 from dataclasses import is_dataclass
 from inspect import signature
+from numbers import Integral
 from traceback import walk_tb
 from typing import Any, TypeVar
 
-from lab.errors import BadInput, Notice
+from lab.errors import BadInput, Notice, shortened
 
 OWN = "package 'teaching-lab'"  # the source of shipped members, whose errors keep their traceback
 _modules: dict[str, str] = {}  # module of an added member -> where it comes from
 
 
 def known_source(thing: object, source: str) -> None:
-    """Records the source of a member's code; for a record such as a `Study`, of the code of its functions."""
+    """Records where the code of a member comes from."""
     if source == OWN:
         return
-    for one in (thing, *vars(thing).values()) if is_dataclass(thing) else (thing,):
-        module = getattr(one, "__module__", type(one).__module__)
-        if module.partition(".")[0] != "lab":
-            _modules[module] = source
+    for module in _modules_of(thing):
+        _modules[module] = source
+
+
+def _modules_of(thing: object) -> set[str]:
+    """The modules of a member's code; of a record such as a `Study`, of the code of its functions."""
+    parts = (thing, *vars(thing).values()) if is_dataclass(thing) and not isinstance(thing, type) else (thing,)
+    modules = {str(getattr(one, "__module__", type(one).__module__)) for one in parts}
+    return {name for name in modules if name.partition(".")[0] not in ("lab", "builtins")}
 
 
 def blame(error: BaseException) -> str | None:
@@ -57,6 +63,7 @@ class Family(MutableMapping[str, Row]):
         self.kind, self._rows, self._adopt = kind, dict(rows), adopt
         self._complete = False
         self._used: dict[str, Row] = {}
+        self._things: dict[str, Any] = {}  # the objects of which the added rows were made
 
     def __getitem__(self, name: str) -> Row:
         if name in self._used:
@@ -89,6 +96,7 @@ class Family(MutableMapping[str, Row]):
         if name in self._rows:
             raise BadInput(f"the name '{name}' is taken")
         self._rows[name] = self._adopt(name, thing)
+        self._things[name] = thing
         known_source(thing, source)
 
     def named(self, thing: Any) -> str:
@@ -96,7 +104,9 @@ class Family(MutableMapping[str, Row]):
         if isinstance(thing, str):
             return thing
         if not isinstance(thing, type):
-            raise BadInput(f"{self.kind}: {thing!r}: wanted a name or a class")
+            raise BadInput(
+                f"{self.kind}: {thing!r}: wanted a name or a class, of which each session makes its own object"
+            )
         try:
             return self.use(thing.__name__, thing)
         except BadInput as error:
@@ -105,7 +115,16 @@ class Family(MutableMapping[str, Row]):
     def use(self, name: str, thing: Any) -> str:
         """Adds a member under a name that is not listed, and returns the name. Raises BadInput if it is no member."""
         self._used[name] = self._adopt(name, thing)
+        self._things[name] = thing
         return name
+
+    def is_added(self, name: str) -> bool:
+        """Whether a member comes from other code: a package, a file, or a class made in Python."""
+        return name in self._things
+
+    def modules_of(self, name: str) -> list[str]:
+        """The modules of an added member's code, see `lab.files.code_key`; empty for a shipped member."""
+        return sorted(_modules_of(self._things[name])) if name in self._things else []
 
     def _look(self) -> None:
         """Adds the members of installed packages, once."""
@@ -140,6 +159,28 @@ def takes(thing: Any, *given: str) -> bool:
     except (TypeError, ValueError):
         return False
     return True
+
+
+def allowed_words(allowed: Sequence[int]) -> str:
+    """The allowed actions as text, such as "0..3" or "1, 4, 6"."""
+    return f"{allowed[0]}..{allowed[-1]}" if isinstance(allowed, range) else ", ".join(map(str, allowed))
+
+
+def checked_action(action: object, allowed: Sequence[int], who: str) -> int:
+    """The action that a member named, as a plain int. Raises BadInput, which names `who`, if it is none of the allowed ones."""
+    if type(action) is int and action in allowed:
+        return action
+    if isinstance(action, bool) or not isinstance(action, Integral) or action not in allowed:
+        raise BadInput(f"{who} named action {shortened(repr(action))}: allowed {allowed_words(allowed)}")
+    return int(action)
+
+
+def takes_generator(thing: Any) -> bool:
+    """Whether a class takes the argument `rng`, a generator for all its randomness."""
+    try:
+        return "rng" in signature(thing).parameters
+    except (TypeError, ValueError):
+        return False
 
 
 def wanted(thing: Any, what: str) -> BadInput:

@@ -70,7 +70,7 @@ def answer_to(state: RunState, trouble: Trouble, seen: tuple[Deviation, ...], *,
 
     seen: what is not as believed, now; dark: the camera sees nothing.
     """
-    if trouble.held:
+    if trouble.kind == "held":
         return GoOn()
     if state.tries.total() >= MOST_TROUBLES:
         return Stop(f"{trouble} (after {MOST_TROUBLES} troubles)")
@@ -78,10 +78,10 @@ def answer_to(state: RunState, trouble: Trouble, seen: tuple[Deviation, ...], *,
         return WaitForCamera()
     if seen:
         return Believe(seen)
-    if trouble.seen:
+    if trouble.kind == "seen":
         return GoOn()
     tries = state.tries[trouble.key]
-    if trouble.final:
+    if trouble.kind == "final":
         return GiveUp(trouble.what)
     if tries >= MAX_TRIES:
         return GiveUp(f"{state.first.get(trouble.part, trouble.what)} (tried {tries} times)")

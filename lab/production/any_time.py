@@ -1,9 +1,11 @@
 """Sessions of a method on a cell, then a proof: whenever that is stopped, it returns an order and a bound."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Protocol
 
 from lab.interrupts import uninterrupted
+from lab.learning.settings import GateSettings
 from lab.production.order import SECOND_OPINION_S, reference_of, unit_of
 from lab.sequencing import SEQUENCERS
 from lab.sequencing.cell.cell import Cell
@@ -16,7 +18,13 @@ from lab.sequencing.search import SAME, EpisodeSequenced, Reference, Search, Seq
 from lab.teaching.events import SequenceFound, SequencingBegan, SequencingStands, Tell
 
 CTRL_C, FIRST_COME = "Ctrl-C", "first come, first served"
-Session = Callable[[Search, int], SequenceResult]  # given the search and the session's number, from 0
+
+
+class Session(Protocol):
+    """A session of a method."""
+
+    def __call__(self, search: Search, *, session: int) -> SequenceResult:
+        """The result of the session with that number, counted from 0."""
 
 
 @dataclass(frozen=True)
@@ -65,34 +73,40 @@ class _Heard:
         )
 
 
-def looked_for(
-    cell: Cell,
-    method: str,
-    search: Search,
-    sessions: int,
-    find: Session,
-    tell: Tell,
-    limits: Limits = NO_LIMITS,
-    began: Callable[[Reference | None], SequencingBegan] | None = None,
-) -> SearchResults:
-    """What so many sessions find, and what is proven of the best order, unless the method's answer needs no proof beside it.
+@dataclass(frozen=True)
+class SearchPlan:
+    """The plan of a search: the method's name, its search, and how many sessions it has.
 
-    A bound is known within a second, for small cells the optimum. limits: a session ends when its order is within their gap,
-    the whole search at their moment; with limits a proof is looked for whatever the method.
-    Raises KeyboardInterrupt and WorkFailed only where there is no order at all, and as `find` does.
+    limits: a session ends when its order is within their gap, the whole search at their moment; gate: that of a session with
+    advice, for the page.
     """
+
+    method: str
+    search: Search
+    sessions: int = 1
+    limits: Limits = NO_LIMITS
+    gate: GateSettings | None = None
+
+
+def looked_for(cell: Cell, plan: SearchPlan, find: Session, tell: Tell) -> SearchResults:
+    """What the sessions find, and what is proven of the best order, unless the method's answer needs no proof beside it.
+
+    find: carries out a session. A bound is known within a second, for small cells the optimum; with limits a proof is looked for
+    whatever the method. Raises KeyboardInterrupt and WorkFailed only where there is no order at all, and as `find` does.
+    """
+    method, search, limits = plan.method, plan.search, plan.limits
     best = Shared(cell, search.objective, limits, lambda shared: tell(_stands(shared)))
     heard, stopped_by = list[_Heard](), ""
     try:
         if search.objective in BUILT_IN:
             look_first(best)
-        for number in range(sessions):
+        for number in range(plan.sessions):
             shown = _known(best) if search.chance == NO_CHANCE else None
             one = _Heard(method, search, Shared(cell, search.objective, limits, parent=best), tell)
             heard.append(one)
-            tell(SequencingBegan(search.episodes, shown) if began is None else began(shown))
+            tell(SequencingBegan(search.episodes, shown, plan.gate, method))
             try:
-                one.whole = find(replace(search, on_episode=one, shared=one.shared), number)
+                one.whole = find(replace(search, on_episode=one, shared=one.shared), session=number)
                 best.tell(method, one.whole.sequence)
             except SearchOver as over:
                 if over.by == "seconds":

@@ -10,6 +10,7 @@ from lab.errors import WorkFailed
 from lab.production.controls import Controls, StopKind, StopRecord, StopsChanged, unwritten
 from lab.production.machine import Machine, MachineWork
 from lab.production.recorder import Recorder, Viewer, extras_of
+from lab.production.trouble import Kind
 from lab.sim.arms.kinematics import ToolPose
 from lab.sim.arms.robot import NAME
 from lab.sim.scene.places import Layout
@@ -104,6 +105,11 @@ class Floor:
         self._quiet_s = 0.0  # from when on waiting may be skipped
         self._told_held = ""
         self._paced = (0.0, 0.0, 0.0)  # speed, simulated and real time from which on it holds
+
+    @property
+    def trouble_kind(self) -> Kind:
+        """The kind of a trouble in the last motion: "held" if the operator stopped the arm, otherwise "missed"."""
+        return "held" if self.was_held else "missed"
 
     def record(self, viewer: Viewer | None = None) -> Recorder:
         """What keeps frames from now on, of all that is there; `viewer` sees them live."""

@@ -253,7 +253,10 @@ def _with_advice(
 def advised_session(
     cell: Cell, search: Search, advice: OrderAdvice, seeds: tuple[int, int], journal: Journal | None, tell: Tell
 ) -> "AdvisedResult":
-    """A session of SRL with advice; seeds: the command's, and the session's number. Raises Again, and as `advised_srl`."""
+    """The result of a session of SRL with advice; seeds: the command's, and the session's number.
+
+    Raises Again, and as `advised_srl`.
+    """
     from lab.sequencing.methods.srl_advised import advised_srl  # only where it counts: the compiler takes its time
 
     seed, session = seeds

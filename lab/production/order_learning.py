@@ -15,7 +15,7 @@ from lab.sequencing.cell.objectives import MAKESPAN, stuck_cost
 from lab.sequencing.methods.srl_time import bound_alone, srl_time
 from lab.sequencing.search import Reference, Search, SequenceResult
 from lab.view.figures import beside, gap_of
-from lab.view.sequencing_plots import sequence_plot
+from lab.view.sequencing_plots import PlotBeside, sequence_plot
 
 BOUND_ALONE, UNBOUNDED = "its bound alone", "without its bound"
 
@@ -96,9 +96,9 @@ class OrderLearning:
             self.known.bound,
             ylabel="makespan [s]" if self.objective == MAKESPAN else self.objective,
             deadlock=stuck_cost(cell, self.objective),
-            proven=self.known.proven,
-            title=f"The order, as {BESIDE_METHODS.get(self.by, self.by)} learned it",
-            beside=lines,
+            beside=PlotBeside(
+                f"The order, as {BESIDE_METHODS.get(self.by, self.by)} learned it", lines, self.known.proven
+            ),
         )
 
     def _gap(self, cost: float | None) -> float | None:

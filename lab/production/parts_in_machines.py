@@ -143,10 +143,10 @@ class PartsInMachines:
                 raise Trouble(work.failed, name, station)
             late_s = floor.now_s - work.expected_s
             if floor.now_s > work.given_up_s:
-                raise Trouble(f"it is not done {late_s:.0f} s after it should be", name, station, final=True)
+                raise Trouble(f"it is not done {late_s:.0f} s after it should be", name, station, kind="final")
             if late_s > LATE_S and not work.late:
                 work.late = True
-                raise Trouble("it is not done when it should be", name, station, late=True)
+                raise Trouble("it is not done when it should be", name, station, kind="late")
             floor.wait(work.expected_s if late_s < 0 else floor.now_s + 1.0)
             look(floor, self.state)
 

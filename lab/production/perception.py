@@ -64,7 +64,7 @@ def look(floor: Floor, state: RunState) -> None:
         return
     state.looked_s = floor.now_s
     if found := new_deviations(floor, state):
-        raise Trouble(found[0].words, found[0].name, found[0].station, seen=True)
+        raise Trouble(found[0].words, found[0].name, found[0].station, kind="seen")
     if not floor.world.dark:
         state.right_s = floor.now_s
 

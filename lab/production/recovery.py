@@ -65,32 +65,32 @@ class Recovery:
     def answer(self, trouble: Trouble) -> None:
         """Do what lets the run go on, perhaps without a part. Raises RunStopped."""
         floor = self.floor
-        if trouble.late:
+        if trouble.kind == "late":
             self._put_off(trouble)
             return
         self.state.place = ""
         floor.scene.robot.brake()
-        if not trouble.held:  # a protective stop
+        if trouble.kind != "held":  # a protective stop
             floor.tell(RunHeld(StopKind.PROTECTIVE, str(trouble), "robot", floor.now_s))
         try:
             self._answer(trouble)
         finally:
-            if not trouble.held:
+            if trouble.kind != "held":
                 floor.tell(RunWentOn(floor.now_s))
 
     def _answer(self, trouble: Trouble) -> None:
         floor, state = self.floor, self.state
         self._let_go_of_what_is_gone()
-        if not trouble.held:
+        if trouble.kind != "held":
             state.tries[trouble.key] += 1
-        seen = () if trouble.held else tuple(new_deviations(floor, state))
+        seen = () if trouble.kind == "held" else tuple(new_deviations(floor, state))
         answer = answer_to(state, trouble, seen, dark=floor.world.dark)
-        if not (trouble.held or trouble.final or trouble.seen or isinstance(answer, Stop)):
+        if trouble.kind == "missed" and not isinstance(answer, Stop):
             skill = trouble.skill and f" '{trouble.skill}',"
             self._note(f"{trouble.part} at '{trouble.station}',{skill} try {state.tries[trouble.key]}: {trouble.what}")
         match answer:
             case GoOn():
-                if trouble.held:
+                if trouble.kind == "held":
                     self._tell(trouble, "goes on from where it is")
             case Stop(why):
                 raise RunStopped(why)

@@ -13,7 +13,6 @@ from pathlib import Path
 from shutil import rmtree
 from typing import Any, NamedTuple
 
-from lab import __version__
 from lab.advice.entries import MAX_BYTES
 from lab.advice.json_lines import AppendedFile, EntryKinds, differing
 from lab.errors import BadInput, WorkFailed
@@ -26,6 +25,7 @@ from lab.toolbox.index import KnownPolicies
 from lab.toolbox.names import SUFFIX, slug
 from lab.toolbox.policy import Policy
 from lab.toolbox.policy_file import decode, encode
+from lab.version import __version__
 
 FILE = "run.jsonl"
 KNOWN = "known.json"  # which policies the toolbox held when the run began

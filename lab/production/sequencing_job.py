@@ -2,8 +2,9 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from lab.errors import BadInput, unknown
 from lab.interrupts import uninterrupted
 from lab.learning.requests import Ask
 from lab.learning.settings import GateSettings
-from lab.production.any_time import CTRL_C, SearchResults, looked_for
+from lab.production.any_time import CTRL_C, SearchPlan, SearchResults, Session, looked_for
 from lab.production.order import NOBODY, KeepOrder, OrderAdvice, advised_session
 from lab.sequencing import SEQUENCERS, carried_reaction, check_method, find_sequence
 from lab.sequencing.cell.cell import EVERY_PLAN, Cell
@@ -39,7 +40,7 @@ from lab.tasks.instances import InstanceRequest
 from lab.tasks.sequencing import Sequencing, read_policy, search_for
 from lab.tasks.task import Task
 from lab.tasks.task_file import load_beside
-from lab.teaching.events import Event, PhaseBegan, SequenceFound, SequencingBegan, Tell, unheard
+from lab.teaching.events import Event, PhaseBegan, SequenceFound, Tell, unheard
 from lab.teaching.teacher import Teacher
 from lab.view.canvas import check_picture
 from lab.view.gantt import gantt
@@ -88,26 +89,32 @@ def sequence_named(
     teacher: Teacher,
     files: dict[str, Path],
 ) -> dict[str, Any]:
-    """The document of `lab sequence`, as `sequenced_named` makes it; draws its pictures.
+    """The document of `lab sequence` for a name as in `named_cell`; files: what is drawn, by name (see `draw`).
 
-    files: pictures to draw, by name (see `draw`).
+    Raises BadInput as `named_cell` and `sequence_cell` do, and before any work for a file that cannot be drawn.
     """
-
     for kind, path in files.items():
         check_table(path) if kind == "schedule" else check_picture(path)
-    cell, document, found = sequenced_named(name, case, toasts, wanted, teacher)
+    named = named_cell(name, case, toasts, wanted, teacher)
+    document, found = sequence_cell(named.cell, named.settings, wanted, named.chance, tell=teacher.tell)
     if files:
-        draw(cell, document, found, files)
-    return document
+        draw(named.cell, document, found, files)
+    return {"task": named.name} | document
 
 
-def sequenced_named(
+class NamedCell(NamedTuple):
+    """A cell file's cell, or a task's over durations measured in simulation, with the settings and the chance of its file."""
+
+    name: str
+    cell: Cell
+    settings: Sequencing
+    chance: Chance
+
+
+def named_cell(
     name: str, case: str | None, toasts: int | None, wanted: SequencingOptions, teacher: Teacher
-) -> tuple[Cell, dict[str, Any], list[SequenceResult]]:
-    """A cell file's cell, or a task's over durations measured in simulation, with its document and its sessions.
-
-    Raises BadInput for a world and for what does not fit the file.
-    """
+) -> NamedCell:
+    """The cell of that name; a task's skills are learned first. Raises BadInput for a world and what does not fit its file."""
     if case is not None and name == "toast":
         name, case = toast_case(case), None
     loaded, case = load_beside(name, InstanceRequest(wanted.layout, wanted.robots, case))
@@ -124,9 +131,7 @@ def sequenced_named(
             raise BadInput(f"case '{case}' (--case): task '{name}' has none; {which}")
         cell, chance = measured_cell(loaded, toasts, wanted, teacher), Chance()
     check_objective(wanted.objective or loaded.sequencing.objective, cell)
-    teacher.tell(PhaseBegan("sequence", wanted.sessions))
-    document, found = sequence_cell(cell, loaded.sequencing, wanted, chance, tell=teacher.tell)
-    return cell, {"task": loaded.name} | document, found
+    return NamedCell(loaded.name, cell, loaded.sequencing, chance)
 
 
 def _check_names(wanted: SequencingOptions, settings: Sequencing) -> None:
@@ -177,27 +182,11 @@ def measured_cell(task: Task, toasts: int | None, wanted: SequencingOptions, tea
 def sequence_cell(
     cell: Cell, settings: Sequencing, wanted: SequencingOptions, chance: Chance, *, tell: Tell = unheard
 ) -> tuple[dict[str, Any], list[SequenceResult]]:
-    """Sessions of one method on a cell, beside what cannot be beaten; the document of `lab sequence`, and the sessions.
+    """The document of `lab sequence`, and the results of the method's sessions on a cell, beside a lower bound or a proof.
 
-    They are run from their beginning each time an answer is taken back. BadInput for an unknown method or objective, and
-    for an objective that the cell has no times for.
+    The sessions are run from their beginning each time an answer is taken back. Raises BadInput for an unknown method or
+    objective, and for an objective that the cell has no times for.
     """
-    if wanted.advisor.row not in PEOPLE:
-        return _sessions(cell, settings, wanted, chance, tell, None)
-    journal = wanted.keep(cell, wanted.objective or settings.objective)
-    try:
-        while True:
-            try:
-                return _sessions(cell, settings, wanted, chance, tell, journal)
-            except Again:
-                journal.rewind()
-    finally:
-        journal.close()
-
-
-def _sessions(
-    cell: Cell, settings: Sequencing, wanted: SequencingOptions, chance: Chance, tell: Tell, journal: Journal | None
-) -> tuple[dict[str, Any], list[SequenceResult]]:
     method = wanted.method or settings.method
     check_method(method)
     search = search_for(
@@ -208,34 +197,42 @@ def _sessions(
     )
     search = replace(search, policy=None if wanted.policy is None else read_policy(wanted.policy))
     check_objective(search.objective, cell)
-    advised = wanted.advisor.row != "none"
-    gate = GateSettings(wanted.gate, spare_best=True) if advised else None
-    advice = OrderAdvice("", wanted.advisor, wanted.gate, wanted.people)
+    tell(PhaseBegan("sequence", wanted.sessions))
+    journal = wanted.keep(cell, search.objective) if wanted.advisor.row in PEOPLE else None
+    plan = SearchPlan(method, search, wanted.sessions, Limits.of(wanted.seconds, wanted.gap))
+    find: Session = partial(find_sequence, cell, method, seed=wanted.seed)
+    if wanted.advisor.row != "none":
+        plan = replace(plan, gate=GateSettings(wanted.gate, spare_best=True))
+        advice = OrderAdvice("", wanted.advisor, wanted.gate, wanted.people)
 
-    def find(search: Search, session: int) -> SequenceResult:
-        if advised:
+        def find(search: Search, session: int) -> SequenceResult:
             return advised_session(cell, search, advice, (wanted.seed, session), journal, tell)
-        return find_sequence(cell, method, search, wanted.seed, session)
-
-    def began(known: Reference | None) -> SequencingBegan:
-        return SequencingBegan(search.episodes, known, gate, method)
 
     def say(event: Event) -> None:
         if journal is None or not (journal.folding and isinstance(event, SequenceFound)):
             tell(event)
 
-    limits = Limits.of(wanted.seconds, wanted.gap)
-    looked = looked_for(cell, method, search, wanted.sessions, find, say, limits, began)
-    found, interrupted = looked.sessions, looked.stopped_by == CTRL_C
-    document = _document(cell, search, looked, wanted)
-    if wanted.stochastic and not interrupted:
-        document["stochastic"] = stochastic(
-            cell, method, search, min(found, key=lambda one: one.cost), chance, wanted.seed
-        )
-    if journal is not None and not interrupted:
-        proven = document["optimal_cost"]
-        is_best = proven is not None and document["gap"] == 0.0
-        journal.closes(Closed(wanted.sessions * search.episodes, document["cost"], proven, is_best, saved_as=""))
+    try:
+        looked = None
+        while looked is None:
+            try:
+                looked = looked_for(cell, plan, find, say)
+            except Again:  # an answer was taken back
+                assert journal is not None
+                journal.rewind()
+        found, interrupted = looked.sessions, looked.stopped_by == CTRL_C
+        document = _document(cell, search, looked, wanted)
+        if wanted.stochastic and not interrupted:
+            best = min(found, key=lambda one: one.cost)
+            document["stochastic"] = stochastic(cell, method, search, best, chance, wanted.seed)
+        if journal is not None and not interrupted:
+            proven = document["optimal_cost"]
+            is_best = proven is not None and document["gap"] == 0.0
+            episodes = wanted.sessions * search.episodes
+            journal.closes(Closed(episodes, document["cost"], proven, is_best, saved_as=""))
+    finally:
+        if journal is not None:
+            journal.close()
     return document, found
 
 

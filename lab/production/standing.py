@@ -56,7 +56,7 @@ def free_spot(
         if not blocked:
             return spot
         why = f": {blocked} is there"
-    raise Trouble(f"no spot of '{way.target}' is free{why}", name, way.target, final=True)
+    raise Trouble(f"no spot of '{way.target}' is free{why}", name, way.target, kind="final")
 
 
 def _carries(bench: Bench, body: str, spot: Spot, lying: Collection[str]) -> bool:

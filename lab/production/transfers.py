@@ -55,7 +55,7 @@ class Transfers:
         decision, ahead = sequence[0], len(sequence)
         option = self.state.plan.option(decision)
         if option is None:
-            raise Trouble(self.state.plan.refusal(decision), final=True)
+            raise Trouble(self.state.plan.refusal(decision), kind="final")
         part, floor = part_of(decision, self.state.cell.parts), self.floor
         way, name = self.way(part, option), self.state.name(part)
         move = self._begin(name, way, ahead)
@@ -221,7 +221,7 @@ class Transfers:
         self.state.place = ""
         why = self.floor.follow(by_free_cells(self.floor.bench, surveys, surveys.approach(station)))
         if why:
-            raise Trouble(why, station=station, held=self.floor.was_held)
+            raise Trouble(why, station=station, kind=self.floor.trouble_kind)
         self.state.place = station
 
     def _stay_above(self, sequence: Sequence[int], way: CarriedPath, move: UnderWay) -> None:
@@ -238,7 +238,7 @@ class Transfers:
         """Let the arm rest. Raises Trouble where it is stopped."""
         steps = round(seconds / TIME_STEP)
         if steps and (why := self.floor.follow(self.floor.scene.robot.rest(steps))):
-            raise Trouble(why, name, station, held=self.floor.was_held)
+            raise Trouble(why, name, station, kind=self.floor.trouble_kind)
 
     def _serve(self, part: int, station: str) -> None:
         """What the robot does at a station before it takes a part out, once."""
@@ -294,10 +294,10 @@ class Transfers:
         if hypot(tool.x - begin.x, tool.y - begin.y, tool.z - begin.z) > BEGINS_M:
             way = by_free_cells(self.floor.bench, skill.surveys, begin, skill.kind if skill.carries else "")
             if why := self.floor.follow(way):
-                raise Trouble(why, name, where, held=self.floor.was_held)
+                raise Trouble(why, name, where, kind=self.floor.trouble_kind)
 
     def _do(self, skill: Skill, name: str, where: str) -> None:
         """Carry a skill out; Trouble when it fails."""
         self.floor.tell(SkillBegan(skill.name, skill.does(name), name, self.floor.now_s))
         if self.floor.run(skill) is not Status.SUCCESS:
-            raise Trouble(skill.reason, name, where, held=self.floor.was_held, skill=skill.name)
+            raise Trouble(skill.reason, name, where, kind=self.floor.trouble_kind, skill=skill.name)

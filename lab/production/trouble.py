@@ -1,13 +1,16 @@
 """What keeps a run from going on as planned, in words that are true."""
 
+from typing import Literal
+
+Kind = Literal["missed", "held", "final", "late", "seen"]
+
 
 class Trouble(Exception):
     """Something that was noticed: with which part, by its name, and at which station; "" where it is about neither.
 
-    skill: what was being carried out. held: the operator stopped the arm: what was under way is done again, and that does
-    not count as a try. final: to try again is no use.
-    late: a machine takes longer than it should, and may yet get done.
-    seen: something is not where it should be.
+    skill: what was being carried out. kind: "held": the operator stopped the arm, so that what was under way is done again, which
+    does not count as a try; "final": to try again is no use; "late": a machine takes longer than it should, and may yet get done;
+    "seen": something is not where it should be; "missed": anything else.
     """
 
     def __init__(
@@ -17,14 +20,10 @@ class Trouble(Exception):
         station: str = "",
         *,
         skill: str = "",
-        held: bool = False,
-        final: bool = False,
-        late: bool = False,
-        seen: bool = False,
+        kind: Kind = "missed",
     ) -> None:
         super().__init__(what)
-        self.what, self.part, self.station, self.skill = what, part, station, skill
-        self.held, self.final, self.late, self.seen = held, final, late, seen
+        self.what, self.part, self.station, self.skill, self.kind = what, part, station, skill, kind
 
     @property
     def key(self) -> tuple[str, str, str]:

@@ -159,4 +159,4 @@ def check_method(name: str) -> None:
 def find_sequence(cell: "Cell", method: str, search: "Search", seed: int, session: int = 0) -> "SequenceResult":
     """The best sequence that a method finds in a session of a seed; BadInput for an unknown method."""
     check_method(method)
-    return SEQUENCERS[method](cell, search, deferred.default_rng([seed, 2, session]))
+    return SEQUENCERS[method].load()(cell, search, deferred.default_rng([seed, 2, session]))

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lab.errors import BadInput, counted, unknown
-from lab.files import check_out
+from lab.files import check_out, code_key
 from lab.plugins.family import Family, first_line, takes, wanted
 
 if TYPE_CHECKING:
@@ -97,7 +97,7 @@ def carried_out(
 
     check_out(out)
     try:
-        findings = study.run(replace(job, folder=out), reading or {})
+        findings = study.run(replace(job, folder=out, code=code_key(*STUDIES.modules_of(name))), reading or {})
     except KeyboardInterrupt:
         can_continue = f"'{out}' keeps what is done, and the same command goes on"
         kept = can_continue if (out / STORE).is_file() else "nothing is kept"

@@ -12,10 +12,10 @@ from zlib import crc32
 import numpy as np
 from numpy.typing import NDArray
 
-from lab import __version__
 from lab.advice.advising import Advising
 from lab.advice.advisors import ADVISORS
 from lab.errors import BadInput
+from lab.files import code_key
 from lab.learning.batch import run_sessions
 from lab.learning.environment import Environment, TableEnvironment
 from lab.learning.gates import GATES
@@ -35,6 +35,7 @@ from lab.studies.findings import Findings, Row, mean_row, share_row, varying_row
 from lab.studies.runner import Job
 from lab.teaching.lesson import Subject
 from lab.teaching.subjects import Teachable, subject_from
+from lab.version import __version__
 from lab.view.canvas import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, RED, SKY, picture_bytes
 
 if TYPE_CHECKING:
@@ -170,6 +171,10 @@ class Compared:
         for name, several in (("advisor", self.advisors), *self.values.items()):
             if not several:
                 raise BadInput(f"{name}: nothing to compare: wanted one value or several")
+            classes = {one.__name__: one for one in several if isinstance(one, type)}
+            for one in several:
+                if isinstance(one, type) and classes[one.__name__] is not one:
+                    raise BadInput(f"{name}: two classes are called {one.__name__}: give one of them another name")
 
     def settings(self) -> "Iterator[ComparedSetting]":
         """All combinations, the first name varying slowest."""
@@ -235,7 +240,7 @@ def sessions_of(setting: ComparedSetting, sessions: int, seed: int, stream: int 
     chances = [seed, crc32(problem.mdp.signature.encode())]
     rng = np.random.default_rng(chances if stream is None else [*chances, stream])
     seeds = rng.integers(2**64, size=sessions, dtype=np.uint64)
-    advisor = advising.gather(environment, how.learner, np.random.default_rng(0))
+    advisor = advising.for_session().gather(environment, how.learner, np.random.default_rng(0))
     at_once = problem.environment is None or isinstance(environment, PhysicsEnvironment)
     if at_once and (advisor is None or isinstance(advisor, TableAdvisor)):
         advice = None if advisor is None else advisor.advice
@@ -258,7 +263,7 @@ def _alone(
 ) -> tuple[bool, NDArray[np.int64], FloatArray, int, int, int]:
     """(rejected, steps (E,), q (S, A), helped steps, requests, misleads) of one session that is not compiled."""
     rng = np.random.default_rng(seed)
-    advisor = advising.gather(environment, learner, rng)
+    advisor = advising.for_session().gather(environment, learner, rng)
     one = Session(environment, learner, gate, advisor, rng).run()
     if one.interrupted:
         raise KeyboardInterrupt
@@ -300,5 +305,9 @@ def key_of(setting: ComparedSetting, problem: Problem, job: Job) -> str:
     how = setting.subject().settings
     region = None if setting.of.sight is None else setting.of.sight
     whole: list[Any] = [__version__, problem.mdp.signature, region, setting.named, vars(how.learner), vars(how.gate)]
-    whole += [one.said.tolist() for one in Advising.of([setting.advisor]).check_records(problem.mdp)]
+    advising = Advising.of([setting.advisor])
+    whole += [one.said.tolist() for one in advising.check_records(problem.mdp)]
+    if job.folder is not None:  # otherwise nothing is kept, and own code needs no source file
+        own = UPDATES.modules_of(how.learner.learner) + GATES.modules_of(how.gate.gate) + advising.modules()
+        whole.append(code_key(*own, *getattr(problem.environment, "modules", ())))
     return sha256(json.dumps([*whole, job.sessions, job.seed], default=str).encode()).hexdigest()[:24]

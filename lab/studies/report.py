@@ -10,10 +10,11 @@ from math import inf, isfinite
 from pathlib import Path
 from typing import Any
 
-from lab import __version__, files
+from lab import files
 from lab.errors import BadInput, WorkFailed
 from lab.statistics import PERCENT_POINTS, RELATIVE, allowed
 from lab.studies.findings import JUDGED, Findings, counts, share_within
+from lab.version import __version__
 
 Row = Mapping[str, Any]  # settings under their names, and RESULTS; `lab_version` where another version measured it
 Line = tuple[tuple[str, Any], ...]  # some settings of a row

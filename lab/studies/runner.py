@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.errors import BadInput, LabError, WorkFailed
+from lab.files import source_hash
 from lab.optional import optional
 
 STORE = "sessions.jsonl"
@@ -36,6 +37,7 @@ class Job:
 
     sessions: per setting; seed: of all randomness; workers: the number of processes; dask: the address of a cluster, None for
     none; folder: stores finished work, None for nowhere; progress: called with the numbers of finished and of all settings.
+    code: a key of the study's own code, "" for none; work that was stored under another one, or by another lab, is repeated.
     """
 
     sessions: int = 500
@@ -44,6 +46,11 @@ class Job:
     dask: str | None = None
     folder: Path | None = None
     progress: Progress = lambda done, total: None
+    code: str = ""
+
+    @property
+    def _code(self) -> str:
+        return f"{source_hash()[:16]} {self.code}".strip()
 
     def each(self, work: Callable[[Item], Result], items: Sequence[Item]) -> dict[Item, Result]:
         """The result of `work`, a module-level function, by item; nothing is stored in the folder."""
@@ -88,15 +95,19 @@ class Job:
             yield from zip(items, pool(delayed(work)(item) for item in items), strict=True)
 
     def kept(self) -> Iterator[Any]:
-        """The records that `keep` stored; incomplete lines and lines that are no JSON are skipped."""
+        """The records that `keep` stored; those of other code, incomplete lines and lines that are no JSON are skipped."""
         path = None if self.folder is None else self.folder / STORE
         if path is None or not path.is_file():
             return
         try:
             with path.open("rb") as file:
                 for line in file:
-                    with suppress(ValueError, RecursionError):
-                        yield json.loads(line.decode("utf-8", errors="replace"))
+                    try:
+                        record = json.loads(line.decode("utf-8", errors="replace"))
+                    except (ValueError, RecursionError):
+                        continue
+                    if isinstance(record, dict) and record.pop("code", None) == self._code:
+                        yield record
         except OSError as error:
             raise BadInput(f"'{path}': what is kept cannot be read: {error.strerror or error}") from None
 
@@ -125,7 +136,7 @@ class Job:
                 with path.open("r+b") as cut:
                     cut.truncate(cut.read().rfind(b"\n") + 1)
             with path.open("a", encoding="utf-8") as file:
-                file.write(json.dumps(record) + "\n")
+                file.write(json.dumps(record | {"code": self._code}) + "\n")
         except OSError as error:
             raise WorkFailed(f"output folder '{self.folder}' (--out) cannot be written: {error.strerror}") from error
 

@@ -195,22 +195,24 @@ def machine_of_word(word: str, taken: Collection[str] = ()) -> NewMachine:
     return NewMachine(name, seconds)
 
 
-def new_task(
-    name: str,
-    arm: str,
-    parts: Sequence[str],
-    machines: Sequence[str],
-    buffers: bool,
-    masses: Sequence[str] = (),
-    frictions: Sequence[str] = (),
-    capacities: Sequence[str] = (),
-    batches: Sequence[str] = (),
-) -> NewTask:
-    """The new task that options, or answers, describe. Raises BadInput.
-
-    masses [kg], frictions: of kinds of parts, such as "pin=0.05". capacities: of stations, such as "oven=2". batches: names of
-    machines.
+class Changes(NamedTuple):
+    """What a new task changes by name: masses [kg] and frictions of kinds of parts, such as "pin=0.05"; capacities of stations,
+    such as "oven=2"; the names of machines that work on batches.
     """
+
+    masses: Sequence[str] = ()
+    frictions: Sequence[str] = ()
+    capacities: Sequence[str] = ()
+    batches: Sequence[str] = ()
+
+
+NO_CHANGES = Changes()
+
+
+def new_task(
+    name: str, arm: str, parts: Sequence[str], machines: Sequence[str], buffers: bool, changes: Changes = NO_CHANGES
+) -> NewTask:
+    """The new task that options, or answers, describe. Raises BadInput."""
     kinds: list[NewPart] = []
     for word in parts or (PART,):
         kinds.append(part_of_word(word, [part.name for part in kinds]))
@@ -220,19 +222,19 @@ def new_task(
             machine_of_word(word, ["input", "output", *(m.name for m in stations), *(p.name for p in kinds)])
         )
     names = [part.name for part in kinds]
-    weigh = _by_name(masses, "--mass", "part", names, (0.001, 6.0), "0.05")
-    rub = _by_name(frictions, "--friction", "part", names, (0.0, 5.0), "0.5")
+    weigh = _by_name(changes.masses, "--mass", "part", names, (0.001, 6.0), "0.05")
+    rub = _by_name(changes.frictions, "--friction", "part", names, (0.0, 5.0), "0.5")
     kinds = [replace(one, given_kg=weigh.get(one.name), friction=rub.get(one.name, FRICTION)) for one in kinds]
     found = NewTask(name, arm_of_word(arm), tuple(kinds), tuple(stations), buffers)
     if found.count > MAX_PARTS:
         raise BadInput(f"{found.count} parts (--part): allowed are 1 to {MAX_PARTS} in all")
-    found = replace(found, capacities=_capacities(found, capacities))
-    for name in batches:
+    found = replace(found, capacities=_capacities(found, changes.capacities))
+    for name in changes.batches:
         if name not in [machine.name for machine in found.machines]:
             raise unknown("machine", name, [machine.name for machine in found.machines], "--batch")
         if found.stations[name][1] < 2:
             raise BadInput(f"'{name}' (--batch): it holds 1 part, a batch needs room for 2: add --capacity {name}=2")
-    return replace(found, batches=tuple(dict.fromkeys(batches)))
+    return replace(found, batches=tuple(dict.fromkeys(changes.batches)))
 
 
 def _by_name(

@@ -8,7 +8,6 @@ from typing import Annotated, Any, ClassVar
 
 from annotated_types import Ge
 
-from lab import __version__
 from lab.advice.advisors import AdvisorName
 from lab.advice.entries import MAX_BYTES, Read, SessionEntry
 from lab.advice.journal import Journal
@@ -21,6 +20,7 @@ from lab.tasks.record import write_whole
 from lab.teaching.kept_session import SessionInFolder, check_same, claimed, kept_journal, read_session
 from lab.teaching.lesson_options import SessionOptions, whole_path
 from lab.toolbox.registry import Toolbox
+from lab.version import __version__
 
 DURATIONS = "durations.json"  # beside the journal of a run's order
 

@@ -10,7 +10,6 @@ from pathlib import Path
 from shlex import quote
 from typing import Any, TypeVar
 
-from lab import __version__
 from lab.advice.entries import FILE, Read, SessionEntry, is_unbegun, line_of, read_journal
 from lab.advice.journal import Journal
 from lab.advice.receipt import Receipt, receipt
@@ -26,6 +25,7 @@ from lab.toolbox.names import BEGUN, SESSIONS, SUFFIX, default_address, slug
 from lab.toolbox.policy import Policy
 from lab.toolbox.policy_file import encode
 from lab.toolbox.registry import Toolbox
+from lab.version import __version__
 
 MOST_VALUES = 3_000_000  # entries of a table; the optimal values of larger ones take too long to compute
 Options = TypeVar("Options", bound=SessionOptions)

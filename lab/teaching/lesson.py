@@ -91,7 +91,7 @@ def one_lesson(
     sessions: those of the run that the lesson belongs to. Raises BadInput if the policy called `name` is of another problem.
     """
     teacher, plan = planned(subject, teacher, name, sessions)
-    problem, lesson = plan.problem, teacher.one_session(plan)
+    problem, lesson = plan.problem, teacher.teach(plan)
     document = document_of(problem, lesson, teacher) | subject.facts()
     if out is None:
         return document
@@ -107,13 +107,14 @@ def one_lesson(
 def planned(
     subject: Subject, teacher: Teacher, name: str | None = None, sessions: int = 1
 ) -> tuple[Teacher, LessonPlan]:
-    """The teacher for this subject, and the plan of the lesson, which is surveyed now; `Teacher.one_session` carries it out."""
+    """The teacher for this subject, and the plan of the lesson, which is surveyed now; `Teacher.teach` carries it out."""
     check_name(name)
     problem = subject.prepare(teacher.seed)
     teacher.tell(ScenePrepared(subject.scene, problem))
     teacher = replace(teacher, advising=replace(teacher.advising, region=subject.region), trial=subject.tried)
     settings = subject.settings
-    return teacher, LessonPlan(problem, settings.learner, settings.gate, subject.name, name=name, sessions=sessions)
+    plan = LessonPlan(problem, settings.learner, settings.gate, subject.name, name=name, sessions=sessions)
+    return teacher, teacher.continuing(plan)
 
 
 def replay(kept: KeptSession, subject: Subject, tell: Tell) -> dict[str, Any]:

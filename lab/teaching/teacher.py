@@ -120,10 +120,10 @@ class Teacher:
                 return found
         return None
 
-    def one_session(self, plan: LessonPlan) -> Lesson:
-        """One session, which continues a policy that was interrupted, or left unsolved by the same learner, gate and advisor.
+    def continuing(self, plan: LessonPlan) -> LessonPlan:
+        """The plan, begun from a policy that was interrupted, or left unsolved by the same learner, gate and advisor, if any.
 
-        It has several sessions if it resumes a lesson of a run that had. Raises BadInput if the plan's name is that of another
+        A resumed lesson begins from the policy that it began from before. Raises BadInput if the plan's name is that of another
         problem's policy.
         """
         problem, name = plan.problem, plan.name
@@ -136,14 +136,14 @@ class Teacher:
         if self.begun is not None:
             found = self.begun(problem)
             if found is not None and found.signature != problem.mdp.signature:
-                return self.teach(replace(plan, warm=found))
+                return replace(plan, warm=found)
         else:
             found = self.unfinished(problem, name)
             if found is not None and (self.advising.records or not self._same(found, plan)):
                 found = None  # another learner, gate or advisor begins anew, so that they can be compared
             if found is not None:
                 self.tell(LessonContinued(found))
-        return self.teach(replace(plan, unfinished=found))
+        return replace(plan, unfinished=found)
 
     def _same(self, policy: Policy, plan: LessonPlan) -> bool:
         """Whether a policy was learned with these settings and advisors, or interrupted with the same learner."""

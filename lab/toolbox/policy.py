@@ -11,9 +11,9 @@ import numpy as np
 from annotated_types import Ge
 from numpy.typing import NDArray
 
-from lab import __version__
 from lab.errors import BadInput
 from lab.mdp import FloatArray, TabularMDP
+from lab.version import __version__
 
 if TYPE_CHECKING:
     from lab.learning.session_result import CountArray, SessionResult

@@ -1,9 +1,9 @@
 """Plots of the episode costs of sequencing sessions, one or many."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from itertools import cycle
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,9 +16,16 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 SIZE_INCH = 7.0, 4.0
-NOTHING: Mapping[str, float] = MappingProxyType({})
-
 FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class PlotBeside:
+    """What stands beside the episodes of a plot: other costs for comparison, by name; whether the optimum is one, or a bound."""
+
+    title: str = ""
+    costs: Mapping[str, float] = field(default_factory=dict)
+    proven: bool = True
 
 
 def sequence_plot(
@@ -28,20 +35,18 @@ def sequence_plot(
     *,
     ylabel: str = "makespan [s]",
     deadlock: float | None = None,
-    proven: bool = True,
-    title: str = "",
-    beside: Mapping[str, float] = NOTHING,
+    beside: PlotBeside | None = None,
 ) -> None:
     """Plot the cost of each sequencing episode, the incumbent, and the proven optimum; PNG or SVG by the path's suffix.
 
     Of several sessions (a list of lists): each incumbent as a pale line, their mean, and the mean cost of an episode.
     deadlock: the cost of episodes that ended in a deadlock (`stuck_cost`), drawn as marks at the upper edge and excluded
-    from all means. proven: whether `optimal` is the optimum, not only a bound. beside: other costs for comparison, by
-    name. Raises BadInput without episodes, and for a path that cannot be written. Source: thesis fig. 7.3.
+    from all means. optimal: the proven optimum, or None.
+    Raises BadInput without episodes, and for a path that cannot be written. Source: thesis fig. 7.3.
     """
     from matplotlib.ticker import MaxNLocator
 
-    sessions = _sessions(episode_costs)
+    sessions, beside = _sessions(episode_costs), beside or PlotBeside()
     if not sessions or not all(map(len, sessions)):
         raise BadInput("sequencing plot: there are no episodes")
     costs = np.full((len(sessions), max(map(len, sessions))), np.nan)
@@ -55,16 +60,16 @@ def sequence_plot(
         draw = _draw_session if len(sessions) == 1 else _draw_sessions
         draw(axes, kept, unit)
         if optimal is not None:
-            label = f"proven {'optimum' if proven else 'bound'}: {_number(optimal, unit)}"
+            label = f"proven {'optimum' if beside.proven else 'bound'}: {_number(optimal, unit)}"
             axes.axhline(optimal, color=RED, linestyle="--", linewidth=1.4, label=label)
-        for (label, value), look in zip(beside.items(), cycle((":", "-.")), strict=False):
+        for (label, value), look in zip(beside.costs.items(), cycle((":", "-.")), strict=False):
             axes.axhline(value, color=ORANGE, linestyle=look, linewidth=1.2, label=label)
         _draw_stuck(axes, stuck)
         axes.set(xlabel="episode", ylabel=ylabel, xlim=(0, 1.02 * max(2, costs.shape[1])))
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
         axes.grid()
         several = f"Sequences tried in {len(sessions)} sessions"
-        axes.set_title(title or ("Sequences tried" if len(sessions) == 1 else several))
+        axes.set_title(beside.title or ("Sequences tried" if len(sessions) == 1 else several))
         figure.legend(loc="outside lower center", ncols=3)
 
 

@@ -38,15 +38,23 @@ def tiles_speed(job: Job, reading: Mapping[str, Any]) -> Findings:
     short = replace(learner, episodes=READABLE_EPISODES)
     seeds = np.arange(job.seed, job.seed + job.sessions, dtype=np.uint64)
 
-    def readable(place: Environment) -> int:
+    def readable(place: Environment) -> tuple[int, float]:
+        ended_s = list[float]()  # the end of each episode: the judgement after the last one is not counted
         session = Session(place, short, NOBODY, None, stream(job.seed))
-        for episode in range(1, READABLE_EPISODES + 1):
-            session.play(episode)
-        return sum(map(sum, session.visits))
+
+        def timed() -> bool:
+            ended_s.append(time.perf_counter())
+            return False
+
+        session.run(enough=timed)
+        return sum(map(sum, session.visits)), ended_s[-1]
+
+    def compiled() -> tuple[int, float]:
+        return int(run_sessions(car, learner, NOBODY, None, seeds).moves.sum()), time.perf_counter()
 
     theirs = GymEnvironment(NumberedEnvironment(parse_name(f"gym:{NAME}", "study"), "study"))
-    runs: dict[str, Callable[[], int]] = {
-        "kernel": lambda: int(run_sessions(car, learner, NOBODY, None, seeds).moves.sum()),
+    runs: dict[str, Callable[[], tuple[int, float]]] = {
+        "kernel": compiled,
         "session": lambda: readable(car),
         "session through gymnasium": lambda: readable(theirs),
         "gymnasium alone": lambda: _by_chance(job.seed),
@@ -57,8 +65,8 @@ def tiles_speed(job: Job, reading: Mapping[str, Any]) -> Findings:
     return Findings(rows, summary, {}, (ABOUT,))
 
 
-def _by_chance(seed: int) -> int:
-    """The steps of READABLE_EPISODES episodes."""
+def _by_chance(seed: int) -> tuple[int, float]:
+    """The steps of READABLE_EPISODES episodes, and the time at their end [s]."""
     env, made, draw = gymnasium.make(NAME), 0, stream(seed)
     for episode in range(READABLE_EPISODES):
         env.reset(seed=seed + episode)
@@ -67,14 +75,14 @@ def _by_chance(seed: int) -> int:
             made += 1
             if over or late:
                 break
-    return made
+    return made, time.perf_counter()
 
 
-def _row(name: str, run: Callable[[], int]) -> Row:
+def _row(name: str, run: Callable[[], tuple[int, float]]) -> Row:
     run()  # compiles
     rates = []
     for _ in range(REPEATS):
         began = time.perf_counter()
-        moves = run()
-        rates.append(moves / (time.perf_counter() - began) / 1e3)
+        moves, ended = run()
+        rates.append(moves / (ended - began) / 1e3)
     return median_row({"name": name, "world": NAME}, "speed_thousand steps per s", rates)

@@ -136,6 +136,36 @@ def test_names_are_checked() -> None:
             AdvisorName.of(bad)
 
 
+@pytest.mark.parametrize("answer", [1.0, True, np.float64(1.0), np.bool_(True), "up", 4, -1, [1]])
+def test_an_added_advisor_answers_with_an_allowed_action(answer: object) -> None:
+    class Odd:
+        def advise(self, request: AdviceRequest) -> object:
+            return answer
+
+    mdp = board()
+    for thing in (Odd, Odd(), lambda request: answer):
+        name = AdvisorName.made(thing)
+        advisor = TableLevel(mdp, 0.99, np.random.default_rng(0)).advisor(name)
+        assert advisor is not None
+        with pytest.raises(BadInput, match=f"advisor '{name}' named action .*: allowed 0..3"):
+            advisor.advise(request(mdp, 0))
+
+
+@pytest.mark.parametrize("answer", [None, 2, np.int64(2)])
+def test_an_added_advisor_may_answer_with_an_integer_of_any_kind(answer: int | None) -> None:
+    mdp = board()
+    advisor = TableLevel(mdp, 0.99, np.random.default_rng(0)).advisor(AdvisorName.made(lambda request: answer))
+    assert advisor is not None
+    said = advisor.advise(request(mdp, 0))
+    assert (said, type(said)) == (answer, type(None) if answer is None else int)
+
+
+@pytest.mark.parametrize("thing", [7, int, type("NeedsMore", (), {"__init__": lambda self, a: None, "advise": None})])
+def test_what_is_no_advisor_is_refused(thing: object) -> None:
+    with pytest.raises(BadInput, match="wanted a name, a function of a request, or a class with `advise`"):
+        AdvisorName.made(thing)  # type: ignore[arg-type]
+
+
 def test_an_advisor_with_a_limited_view_says_nothing_outside_it() -> None:
     mdp = board()
     region = np.arange(16) >= 8

@@ -10,7 +10,7 @@ from lab.advice.advisors import PEOPLE, AdvisorName, named
 from lab.advice.table_level import TableLevel
 from lab.errors import BadInput
 from lab.learning.environment import Judged, Step, TableEnvironment
-from lab.learning.gates import GATES
+from lab.learning.gates import GATES, Gate
 from lab.learning.requests import AdviceRequest, AdvisorLeft
 from lab.learning.selection import SELECTIONS, Draw
 from lab.learning.session import Session
@@ -23,7 +23,8 @@ from lab.learning.session_events import (
     Improvement,
 )
 from lab.learning.settings import GateSettings, LearnerSettings
-from lab.learning.updates import UPDATES
+from lab.learning.updates import UPDATES, Row
+from lab.learning.updates.update import OnTable
 from lab.mdp import FloatArray, Rewards, TabularMDP, coverage, greedy_path, grid, optimal_values
 from lab.testing.contracts import EARLY, SHORT, board, check_advisor, check_gate, check_learner, check_session, session
 
@@ -349,6 +350,43 @@ def test_unknown_names_and_actions() -> None:
         Session(corridor(3), LearnerSettings(), GateSettings("crl"), None, rng).run()
     with pytest.raises(BadInput, match="advisor named action 2: allowed 0"):
         Session(corridor(3), LearnerSettings(), GateSettings("always"), Scripted(lambda request: 2), rng).run()
+
+
+class TakesOne(Gate):
+    """Takes what is an action's equal, and none."""
+
+    def takes(self, state: int, own: int, answer: int | None) -> Any:
+        return 1.0
+
+
+class Halves(OnTable):
+    """Keeps half of the table."""
+
+    def __init__(self, q: list[Row], settings: LearnerSettings, mdp: TabularMDP):
+        super().__init__(q, settings, mdp)
+        self.q = self.q[: mdp.n_states // 2]
+
+
+class Diverges(OnTable):
+    """Learns no numbers."""
+
+    def learn(self, s_tm1: int, a_tm1: int, r_t: float, discount_t: float, s_t: int, a_t: int) -> None:
+        self.q[s_tm1][a_tm1] = float("nan")
+
+
+@pytest.mark.parametrize(
+    ("changes", "line"),
+    [
+        ({"gate": GATES.named(TakesOne)}, r"gate 'TakesOne' named action 1\.0: allowed 0\.\.1"),
+        ({"learner": UPDATES.named(Halves)}, r"learner 'Halves': its `q` has the shape \(1, 2\): wanted \(3, 2\)"),
+        ({"learner": UPDATES.named(Diverges)}, r"learner 'Diverges': 2 of its 6 action values are not finite"),
+    ],
+)
+def test_what_an_added_member_does_wrong_is_said_with_its_name(changes: dict[str, str], line: str) -> None:
+    learner = replace(SHORT, learner=changes.get("learner", "q"))
+    gate = GateSettings(changes.get("gate", "always"))
+    with pytest.raises(BadInput, match=line):
+        Session(corridor(3), learner, gate, Scripted(lambda request: 1), np.random.default_rng(0)).run()
 
 
 def test_episodes_begin_at_each_of_several_starts() -> None:

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from lab.errors import BadInput
 from lab.learning.settings import LearnerSettings
+from lab.learning.splitmix import stream
 from lab.learning.tiles import Bounds, TileCoding, cell_along
 from lab.learning.updates import update_of
 from lab.learning.updates.linear import OnTiles
@@ -58,7 +59,7 @@ def test_cells_of_a_continuous_space() -> None:
 
 def test_one_step_moves_all_tiles_of_a_state_by_their_shares() -> None:
     mdp = grid((4,), np.zeros(4, bool), (0,), (3,))
-    learner = update_of(LearnerSettings("q", alpha=0.5, tilings=2), mdp, np.zeros((4, 2)))
+    learner = update_of(LearnerSettings("q", alpha=0.5, tilings=2), mdp, np.zeros((4, 2)), stream(0))
     learner.learn(1, 1, 1.0, 0.0, 2, 0)  # the tiles 0 and 4 of cell 1 get a quarter each
     np.testing.assert_array_equal(learner.table()[:, 1], [0.25, 0.5, 0.25, 0.0])
 
@@ -68,7 +69,7 @@ def test_a_replacing_trace_is_set_to_one_and_an_accumulating_one_grows() -> None
     found = []
     for replacing in (True, False):
         settings = LearnerSettings("sarsa-lambda", alpha=1.0, discount=1.0, trace=0.5, replacing=replacing, tilings=2)
-        learner = update_of(settings, mdp, np.zeros((4, 2)))
+        learner = update_of(settings, mdp, np.zeros((4, 2)), stream(0))
         learner.learn(0, 1, 0.0, 1.0, 0, 1)
         learner.learn(0, 1, 1.0, 0.0, 1, 1)
         found.append(learner.table()[0, 1])
@@ -77,7 +78,7 @@ def test_a_replacing_trace_is_set_to_one_and_an_accumulating_one_grows() -> None
 
 def test_the_ensemble_begins_with_values_within_a_half() -> None:
     mdp = grid((6, 6), np.zeros((6, 6), bool), (0, 0), (5, 5))
-    learner = update_of(LearnerSettings("q", tilings=4), mdp, np.zeros((36, 4)))
+    learner = update_of(LearnerSettings("q", tilings=4), mdp, np.zeros((36, 4)), stream(0))
     learner.scatter(np.random.default_rng(0).random)
     assert isinstance(learner, OnTiles)
     assert 0.0 < np.abs(learner.table()).max() <= 0.5

@@ -24,7 +24,7 @@ from lab.production.trouble import Trouble
 from lab.tasks.task_file import load_cell
 
 MISSED = Trouble("it missed", "toast 1", "toaster", skill="insert at toaster")
-SEEN_AGAIN = Trouble("toast 1 is not at 'plate'", "toast 1", "plate", seen=True)
+SEEN_AGAIN = Trouble("toast 1 is not at 'plate'", "toast 1", "plate", kind="seen")
 MOVED = Deviation("part moved", "toast 1", "toast 1 is not at 'plate'", "plate")
 
 
@@ -48,11 +48,11 @@ def test_what_fails_is_tried_again_a_few_times_and_then_given_up_for_what_was_wr
 @pytest.mark.parametrize(
     ("trouble", "seen", "dark", "answer"),
     [
-        (Trouble("emergency stop", "toast 1", held=True), (MOVED,), True, GoOn()),
+        (Trouble("emergency stop", "toast 1", kind="held"), (MOVED,), True, GoOn()),
         (MISSED, (), True, WaitForCamera()),
         (MISSED, (MOVED,), False, Believe((MOVED,))),
         (SEEN_AGAIN, (), False, GoOn()),
-        (Trouble("no spot is free", "toast 1", "toaster", final=True), (), False, GiveUp("no spot is free")),
+        (Trouble("no spot is free", "toast 1", "toaster", kind="final"), (), False, GiveUp("no spot is free")),
     ],
     ids=["held", "dark", "seen", "not seen any more", "final"],
 )

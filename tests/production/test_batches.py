@@ -12,7 +12,7 @@ from lab.sequencing.simulate.follow import follow, simulate
 from lab.skills.new_cell import new_cell
 from lab.skills.prepared_scene import Prepared, prepare
 from lab.tasks.fault_fields import FaultFields
-from lab.tasks.new_task import new_task
+from lab.tasks.new_task import Changes, new_task
 from lab.tasks.task_file import load
 from lab.teaching.events import Event, MachineBegan
 from lab.teaching.lesson_plan import LessonPlan
@@ -25,7 +25,9 @@ from lab.toolbox.registry import Toolbox
 def oven_of_two(tmp_path_factory: pytest.TempPathFactory) -> Prepared:
     """Three boxes, and an oven of 60 s for two; its skills are learned from the expert."""
     folder: Path = tmp_path_factory.mktemp("batches")
-    new = new_task("ovens", "up6", ["box:0.05x0.03x0.04:3"], ["oven:60"], False, (), (), ["oven=2"], ["oven"])
+    new = new_task(
+        "ovens", "up6", ["box:0.05x0.03x0.04:3"], ["oven:60"], False, Changes(capacities=["oven=2"], batches=["oven"])
+    )
     (folder / "ovens.toml").write_text(new_cell(new, folder / "ovens.toml")[0], encoding="utf-8")
     task = load(str(folder / "ovens.toml"))
     assert task.station("oven").batch

@@ -1,6 +1,9 @@
 """Settings compared: the same sessions compiled and one by one, the same chances for all, and nothing run twice."""
 
 import json
+import os
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -9,9 +12,10 @@ from zlib import crc32
 import numpy as np
 import pytest
 
+import lab
 from lab.errors import BadInput
 from lab.learning.batch import run_sessions
-from lab.learning.gates import GATES
+from lab.learning.gates import GATES, Gate
 from lab.learning.members import Member
 from lab.studies.compared import Compared, ComparedSetting, compared, sessions_of, words
 from lab.studies.runner import STORE, Job
@@ -105,3 +109,113 @@ def test_a_bad_value_is_found_before_anything_is_run(tmp_path: Path) -> None:
     with pytest.raises(BadInput, match=r"psi = -1.0: allowed at least 0"):
         compared(Compared(WORLD, values={"psi": [0.1, -1.0]}), Job(3, 0, folder=tmp_path))
     assert not [*tmp_path.iterdir()]
+
+
+class Patient:
+    """Answers 20 questions, then none; with a generator, at random."""
+
+    def __init__(self, rng: np.random.Generator | None = None):
+        self.left, self.rng = 20, rng
+
+    def advise(self, request: Any) -> int | None:
+        self.left -= 1
+        return None if self.left < 0 else 0 if self.rng is None else int(self.rng.integers(len(request.allowed)))
+
+
+class Entangled(Patient):
+    """Cannot be copied."""
+
+    def __deepcopy__(self, memo: Any) -> "Entangled":
+        raise RuntimeError("it holds a socket")
+
+
+def helped(advisor: Any, seed: int = 0) -> list[float]:
+    setting = one(Compared(WORLD, (advisor,), {"gate": ["always"], **SHORT}))
+    return sessions_of(setting, 4, seed).helped_steps.tolist()
+
+
+@pytest.mark.parametrize("advisor", [Patient(), Patient])
+def test_an_advisor_keeps_nothing_from_session_to_session(advisor: Any) -> None:
+    assert helped(advisor) == [20.0] * 4
+
+
+def test_an_advisor_that_cannot_be_copied_is_refused() -> None:
+    with pytest.raises(
+        BadInput, match=r"advisor 'Entangled': .* cannot be copied .*RuntimeError: it holds a socket.* class"
+    ):
+        helped(Entangled())
+
+
+def test_a_class_gets_a_generator_of_its_session() -> None:
+    setting = one(Compared(WORLD, (Patient,), {"gate": ["always"], **SHORT}))
+    first, again, other = (sessions_of(setting, 4, seed).mean_steps.tolist() for seed in (0, 0, 1))
+    assert first == again != other
+    assert len(set(first)) > 1
+
+
+def test_two_classes_of_one_name_are_not_mixed_up() -> None:
+    with pytest.raises(BadInput, match="gate: two classes are called Gate"):
+        Compared(WORLD, values={"gate": [type("Gate", (Gate,), {}), type("Gate", (Gate,), {})]})
+
+
+OWN = """import lab
+from lab.learning.updates.update import OnTable
+from helping import SHARE
+
+
+class Mine(lab.Gate):
+    def opens(self, episode, steps):
+        return episode % SHARE == 0
+
+
+class Learns(OnTable):
+    def learn(self, s_tm1, a_tm1, r_t, discount_t, s_t, a_t):
+        self.q[s_tm1][a_tm1] += RATE * (r_t + discount_t * max(self.q[s_t]) - self.q[s_tm1][a_tm1])
+
+
+def says(request):
+    return ANSWER
+
+
+RATE, ANSWER = 0.5, 3
+"""
+
+
+def test_own_code_that_was_edited_is_run_again(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text(OWN)
+    (tmp_path / "helping.py").write_text("SHARE = 2\n")
+    (tmp_path / "small.txt").write_text("S..\n.#.\n..G\n")
+    own = [
+        f"--{kind}=./mine.py:{name}" for kind, name in (("gate", "Mine"), ("learner", "Learns"), ("advisor", "says"))
+    ]
+    command = [
+        sys.executable,
+        "-c",
+        "from lab.cli import main; main()",
+        "study",
+        "compare",
+        "small.txt",
+        *own,
+        "--episodes=8",
+        "--sessions=4",
+    ]
+
+    def rows() -> Any:
+        path = os.pathsep.join([str(tmp_path), str(Path(lab.__file__).parents[1])])
+        environment = os.environ | {"PYTHONPATH": path}
+        ran = subprocess.run([*command, "--json"], cwd=tmp_path, env=environment, capture_output=True, check=True)
+        return json.loads(ran.stdout)["rows"]
+
+    first, stored = rows(), tmp_path / "compared" / STORE
+    kept = stored.read_text().splitlines()
+    assert rows() == first
+    assert stored.read_text().splitlines() == kept  # nothing was run twice
+    edits = (
+        ("helping.py", "SHARE = 2", "SHARE = 3"),
+        ("mine.py", "= 0.5, 3", "= 0.5, 1"),
+        ("mine.py", "= 0.5, 1", "= 0.1, 1"),
+    )
+    for number, (file, old, new) in enumerate(edits, 2):  # an imported module, the advisor, the learner
+        (tmp_path / file).write_text((tmp_path / file).read_text().replace(old, new))
+        assert rows() != first
+        assert len(stored.read_text().splitlines()) == number * len(kept)

@@ -16,6 +16,7 @@ from lab.tasks.new_task import (
     GRIPPER_M,
     MACHINE,
     Around,
+    Changes,
     NewMachine,
     NewPart,
     NewTask,
@@ -90,9 +91,7 @@ def test_masses_frictions_and_capacities_go_to_what_they_name() -> None:
         ("pin=cylinder:0.012x0.04:2", "box:0.06x0.03x0.08:1"),
         ("oven:60",),
         True,
-        ["pin=0.05"],
-        ["box=0.4"],
-        ["oven=2", "output=6"],
+        Changes(["pin=0.05"], ["box=0.4"], ["oven=2", "output=6"]),
     )
     assert [(part.mass_kg, part.friction) for part in found.parts] == [(0.05, 0.8), (0.058, 0.4)]
     assert found.stations == {
@@ -119,15 +118,15 @@ def test_numbers_that_cannot_be(option: int, word: str, line: str) -> None:
     numbers: list[list[str]] = [[], [], []]
     numbers[option] = [word]
     with pytest.raises(BadInput, match=line):
-        new_task("t", "up6", (), (MACHINE,), False, *numbers)
+        new_task("t", "up6", (), (MACHINE,), False, Changes(*numbers))
     numbers[0] = ["box=1", "box=2"]
     with pytest.raises(BadInput, match=r"'box=2' .*once is allowed"):
-        new_task("t", "up6", (), (MACHINE,), False, numbers[0])
+        new_task("t", "up6", (), (MACHINE,), False, Changes(numbers[0]))
 
 
 @pytest.mark.parametrize("capacity", [1, 2, 3])
 def test_a_machine_of_any_capacity_has_its_spots_on_its_body(capacity: int) -> None:
-    new = new_task("t", "up6", (), (MACHINE,), False, capacities=[f"press={capacity}"])
+    new = new_task("t", "up6", (), (MACHINE,), False, Changes(capacities=[f"press={capacity}"]))
     task = task_of_text(Path("t.toml"), text_of(new, next(layouts(new, ROOMY)), ROOMY))
     press = task.station("press")
     assert press.size_m is not None

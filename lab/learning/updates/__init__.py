@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from lab.errors import BadInput
 from lab.learning.members import Member
 from lab.learning.selection import Draw
 from lab.learning.settings import LearnerSettings
@@ -12,18 +13,19 @@ from lab.learning.updates.linear import LINEAR
 from lab.learning.updates.tabular import Afterstate, DynaQ, MonteCarlo, QLearning, Sarsa, SarsaLambda, WatkinsQLambda
 from lab.learning.updates.update import ACTION_VALUES, STATE_VALUES, Row, Table, Update
 from lab.mdp import FloatArray, TabularMDP
-from lab.plugins.family import Family, first_line, takes, wanted
+from lab.plugins.family import Family, first_line, takes, takes_generator, wanted
 
 __all__ = ["LINEAR", "UPDATES", "Row", "Table", "Update", "scattered", "update_of"]
 
-Learner = Callable[[list[Row], LearnerSettings, TabularMDP], Update]
+Learner = Callable[..., Update]  # made with (q, settings, mdp)
 
 LEARNER_TAKES = ("q", "settings", "mdp")
 
 
 def _adopted(name: str, thing: Any) -> Member[Learner]:
-    if not (isinstance(thing, type) and issubclass(thing, Update) and takes(thing, *LEARNER_TAKES)):
-        raise wanted(thing, f"a subclass of lab.Update that is made with {', '.join(LEARNER_TAKES)}")
+    is_learner = isinstance(thing, type) and issubclass(thing, Update)
+    if not (is_learner and (takes(thing, *LEARNER_TAKES) or takes_generator(thing))):
+        raise wanted(thing, f"a subclass of lab.Update that is made with {', '.join(LEARNER_TAKES)}, and perhaps rng")
     return Member(thing, first_line(thing))
 
 
@@ -43,16 +45,29 @@ _SHIPPED: dict[str, Member[Learner]] = {
 UPDATES = Family("learners", _SHIPPED, _adopted)
 
 
-def update_of(settings: LearnerSettings, mdp: TabularMDP, q: FloatArray) -> Update:
-    """The learner that the settings name, on a table or on tiles, with the start values q (S, A)."""
+def update_of(settings: LearnerSettings, mdp: TabularMDP, q: FloatArray, draw: Draw) -> Update:
+    """The learner that the settings name, on a table or on tiles, with the start values q (S, A).
+
+    An added class that takes `rng` gets a generator, which is seeded by `draw`. Raises BadInput, which names the learner, if the
+    `q` of an added class has another shape.
+    """
+    name = settings.learner
     if settings.tilings > 1:
-        return LINEAR[settings.learner](q, settings, mdp)
-    return UPDATES[settings.learner].make(q.tolist(), settings, mdp)
+        return LINEAR[name](q, settings, mdp)
+    make, values = UPDATES[name].make, q.tolist()
+    if not UPDATES.is_added(name):
+        return make(values, settings, mdp)
+    given = {"rng": np.random.default_rng(int(draw() * 2**53))} if takes_generator(make) else {}
+    learner = make(values, settings, mdp, **given)
+    shape = np.shape(getattr(learner, "q", None))
+    if shape != q.shape:
+        raise BadInput(f"learner '{name}': its `q` has the shape {shape}: wanted {q.shape}, states by actions")
+    return learner
 
 
 def scattered(settings: LearnerSettings, mdp: TabularMDP, draw: Draw, tables: int) -> list[Update]:
     """`tables` independent learners of the kind that the settings name, with start values drawn within +-0.5."""
-    learners = [update_of(settings, mdp, np.zeros(mdp.successor.shape)) for _ in range(tables)]
+    learners = [update_of(settings, mdp, np.zeros(mdp.successor.shape), draw) for _ in range(tables)]
     for learner in learners:
         learner.scatter(draw)
     return learners

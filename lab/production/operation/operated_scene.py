@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from threading import RLock
-from typing import Any
+from typing import Any, NamedTuple
 
 from lab.advice.advisors import PYTHON, AdvisorName, RecordedAdvisor
 from lab.errors import BadInput, WorkFailed, unknown
@@ -65,6 +65,16 @@ class Plan:
         return self.production.state
 
 
+class SceneCalls(NamedTuple):
+    """What a scene calls. on_laid_out: when it was laid out; before_step: before each physics step; meanwhile: in a pause of the
+    run, for what is done by hand; it returns whether that was anything.
+    """
+
+    on_laid_out: Callable[[], None]
+    before_step: Callable[[], None]
+    meanwhile: Callable[[], bool]
+
+
 class OperatedScene:
     """One scene and all that is in it; it belongs to the thread that simulates, but for `now` and the controls.
 
@@ -78,16 +88,9 @@ class OperatedScene:
         seed: int,
         teacher: Teacher,
         conditions: Conditions,
-        *,
-        on_laid_out: Callable[[], None],
-        before_step: Callable[[], None],
-        meanwhile: Callable[[], bool],
+        calls: SceneCalls,
     ) -> None:
-        """Nothing is laid out before `open`. What happens is told to the teacher's listener.
-
-        on_laid_out: called when the scene was laid out; before_step: before each physics step; meanwhile: in a pause of the
-        run, for what is done by hand, and says whether that was anything.
-        """
+        """Nothing is laid out before `open`. What happens is told to the teacher's listener."""
         self.task, self.order, self.seed, self.conditions = task, order, seed, conditions
         self.controls, self.journal = conditions.controls, conditions.journal
         self.leaving = self.again = self.resting = False
@@ -95,7 +98,7 @@ class OperatedScene:
         self.lead: Lead | None = None
         self.demonstrations: list[dict[str, Any]] = []  # what came of each, as `Demonstration.judged`
         self.failure: str | None = None
-        self._on_laid_out, self._before_step, self._meanwhile = on_laid_out, before_step, meanwhile
+        self.calls = calls
         self._world: World | None = None
         self.lock, self._status = RLock(), RunStatus.of(task, order)
         self._told, self.teacher = teacher.tell, replace(teacher, tell=self.tell)
@@ -113,7 +116,7 @@ class OperatedScene:
         hooks = Hooks(
             before_step=self._reach_in,
             after_step=self._watch,
-            meanwhile=self._meanwhile,
+            meanwhile=self.calls.meanwhile,
             hear=noting(self.journal, self.heard, self.tell),
             note_stops=self.journal.note_stops,
         )
@@ -129,7 +132,7 @@ class OperatedScene:
         self._world, self.by_hand = world, ByHand(floor, self._ready)
         with self.lock:
             self._status = RunStatus.of(self.task, prepared.order)
-        self._on_laid_out()
+        self.calls.on_laid_out()
 
     def close(self) -> None:
         """Take the scene down; safe to call again."""
@@ -146,7 +149,7 @@ class OperatedScene:
         self._status.now_s, self.resting = floor.now_s, False
         if self.lead is not None and floor.steps % EVERY == 0:
             self.lead.see(floor.scene.robot.tool())
-        self._before_step()
+        self.calls.before_step()
         self.check_leaving()
         return self.injector.tick(floor)
 

@@ -15,7 +15,7 @@ from lab.errors import LabError, WorkFailed
 from lab.production.composer import Conditions
 from lab.production.controls import StopsChanged
 from lab.production.operation.commands import OPERATOR, Done, Spoken, press, spoken
-from lab.production.operation.operated_scene import OperatedScene
+from lab.production.operation.operated_scene import OperatedScene, SceneCalls
 from lab.production.report import Report
 from lab.production.run_journal import Commanded, Entry, Stopped, stops_of
 from lab.production.run_status import RunStatus
@@ -33,12 +33,8 @@ class Operation:
 
     def __init__(self, task: Task, order: Order, seed: int, teacher: Teacher, conditions: Conditions) -> None:
         """Nothing is laid out before `open`. What happens is told to the teacher's listener."""
-        self.scene = OperatedScene(
-            *(task, order, seed, teacher, conditions),
-            on_laid_out=self._laid_out,
-            before_step=self.write,
-            meanwhile=self._meanwhile,
-        )
+        calls = SceneCalls(on_laid_out=self._laid_out, before_step=self.write, meanwhile=self._meanwhile)
+        self.scene = OperatedScene(task, order, seed, teacher, conditions, calls)
         self.controls, self._journal = conditions.controls, conditions.journal
         self.waiting: deque[tuple[Spoken, str]] = deque()
         self.done: list[Done] = []

@@ -161,7 +161,8 @@ class _SequenceSearch:
             drop = int(max(now + work.empty[here, work.at[part, c[part]]], ready[part]) + work.carry[part, c[part]])
             queue = kernels.queue_at(work, c, ready, part, drop)
             c[part] += 1
-            kernels.put(work, c, ready, part, drop, queue, place)
+            begins = drop if place == 0 else ready[queue[place - 1]]
+            kernels.put(work, c, ready, part, begins, queue[place:])
             last, now = part, drop
         ends |= {(j, int(c[j])): int(ready[j]) for j in range(len(c))}
         return self._listed([part for part, _ in reversed(moves)], ends)

@@ -123,12 +123,11 @@ def queue_at(work: CellWork, c: Whole, ready: Whole, part: int, now: int) -> Who
 
 
 @compiled
-def put(work: CellWork, c: Whole, ready: Whole, part: int, now: int, queue: Whole, place: int) -> None:
-    """Inserts `part`, dropped now, after `place` parts of the queue and updates `ready` of it and of the parts behind it."""
-    end = now if place == 0 else ready[queue[place - 1]]
-    end += work.process[part, c[part]]
+def put(work: CellWork, c: Whole, ready: Whole, part: int, begins: int, behind: Whole) -> None:
+    """Updates `ready` of `part`, whose process begins then, and of the parts that stand behind it in the machine's queue."""
+    end = begins + work.process[part, c[part]]
     ready[part] = end
-    for i in queue[place:]:
+    for i in behind:
         end = max(ready[i] - work.process[i, c[i]], end) + work.process[i, c[i]]
         ready[i] = end
 
@@ -189,7 +188,8 @@ def expand(
             c[j] += 1
             for place in range(len(queue) + 1):
                 ready[:] = layer.ready[a]
-                put(work, c, ready, j, drop, queue, place)
+                begins = drop if place == 0 else ready[queue[place - 1]]
+                put(work, c, ready, j, begins, queue[place:])
                 least = bound(work, rest, code, j, drop, c, ready)
                 if least >= below:
                     continue

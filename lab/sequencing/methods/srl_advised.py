@@ -7,9 +7,10 @@ import numpy as np
 
 from lab.errors import BadInput, unknown
 from lab.learning.gates import GATES, Gate, improvement
-from lab.learning.requests import Advisor, AdvisorLeft, Standing, allowed_words
+from lab.learning.requests import Advisor, AdvisorLeft, Standing
 from lab.learning.session_events import AdviceEnded, AdviceGiven, AdviceRejected, AdviceRequested, EpisodeEnded, Event
 from lab.learning.settings import GateSettings
+from lab.plugins.family import checked_action
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import drawn_seed
 from lab.sequencing.methods.session_readable import Guide, learn_readably
@@ -132,9 +133,7 @@ class _Advised(Guide):
             self._tell(AdviceEnded(number, "advisor left"))
             return None
         self._tell(AdviceGiven(number, request.step, request.state, said, own))
-        if said is not None and said not in allowed:
-            raise BadInput(f"the advisor named {said}: allowed {allowed_words(request)}")
-        return said
+        return None if said is None else checked_action(said, allowed, "the advisor")
 
     def _standing(self) -> Standing:
         helped, settings = self.helped_steps + self._helped, self._settings
