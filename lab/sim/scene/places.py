@@ -1,4 +1,4 @@
-"""The places in a task's cell: the spots for parts at each station, the room that they take, and the layout of a seed."""
+"""The places in a task's cell: the spots for parts at each station, the room that they need, and the layout of a seed."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -14,20 +14,20 @@ from lab.sim.scene import station_bodies
 from lab.tasks.task import Order, Task
 from lab.tasks.task_fields import Obstacle, Station
 
-SLAB = 0.012  # [m] plates and buffers are slabs this thick, where the file says nothing else
-COLUMNS = 4  # of a storage
-BETWEEN_M, FINGERS_M = 0.02, 0.02  # [m] between parts at a station, and as much more where a finger comes between them
-AROUND_M, OPEN_M = 0.01, 0.0325  # [m] kept free around a part, and as much more where the fingers are open beside it
+SLAB = 0.012  # [m] default thickness of the slabs of plates and buffers
+COLUMNS = 4  # most columns of a storage
+BETWEEN_M, FINGERS_M = 0.02, 0.02  # [m] gap between parts at a station, and extra gap for fingers
+AROUND_M, OPEN_M = 0.01, 0.0325  # [m] room around a part, and extra room for open fingers beside it
 SLAB_M, CLOSING_M = (
     0.06,
     0.025,
-)  # [m] that a slab is larger than what stands on it, and as much more where fingers close
-APART_M = 0.002  # [m] between parts where they begin, at least
-FREE_M = 0.0125  # [m] beyond an open finger to what stands beside, at least
-UNDER_M = 0.005  # [m] of the palm over what stands beside a part, at least
-MAX_DRAWS = 100  # of an obstacle's place
-ON_TOP_M = 0.002  # between the top of a part and the foot of the one that stands on it, at most [m]
-SPARE_SPOTS = 4  # so many spots of a station are reckoned with, however few parts there are
+)  # [m] margin of a slab around its parts, and extra margin where fingers close
+APART_M = 0.002  # [m] least gap between parts at the start
+FREE_M = 0.0125  # [m] least clearance between an open finger and a body beside it
+UNDER_M = 0.005  # [m] least height of the palm above a body beside the part
+MAX_DRAWS = 100  # draws of an obstacle's place before it counts as impossible
+ON_TOP_M = 0.002  # [m] largest gap between the top of a part and the foot of the part on it
+SPARE_SPOTS = 4  # spots of a station that are always considered, even with fewer parts
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class Rectangle:
     yaw: float
 
     def meets(self, other: "Rectangle") -> bool:
-        """Whether the two overlap: no side of either has the other wholly beyond it."""
+        """Whether the two overlap, by the separating axes of their sides."""
         dx, dy = other.x - self.x, other.y - self.y
         for yaw in (self.yaw, self.yaw + pi / 2, other.yaw, other.yaw + pi / 2):
             apart = abs(cos(yaw) * dx + sin(yaw) * dy)
@@ -68,7 +68,7 @@ class Rectangle:
 
 
 class Places:
-    """The stations of a task as places for parts of its kinds."""
+    """The spots at the stations of a task for parts of its kinds."""
 
     def __init__(self, task: Task, kinds: Mapping[str, Kind]) -> None:
         self.task, self.kinds = task, kinds
@@ -81,7 +81,7 @@ class Places:
         return found
 
     def floor(self, station: Station) -> float:
-        """How high a part's foot is above the table at this station [m]."""
+        """The height of a part's foot above the table at this station [m]."""
         if station.floor_m is not None:
             return station.floor_m
         if station.stands_on == "box" and station.size_m is not None:
@@ -91,7 +91,7 @@ class Places:
     def spots(self, station: Station, kind: str = "") -> list[Spot]:
         """The places for parts at a station, the middle or lowest ones first; as many as its capacity.
 
-        kind: only those that take parts of this kind, which may be named as it comes, on its pallet.
+        kind: only those for parts of this kind, by its own name or by that on its pallet.
         """
         at, yaw, high = station.pose[:2], station.pose[2], self.floor(station)
         if given := station.own_places:
@@ -110,7 +110,7 @@ class Places:
         return [Spot(*beside(at, yaw, off), high, yaw) for off in offsets[: station.capacity]]
 
     def _has_columns(self, station: Station) -> bool:
-        """Whether parts stand before and behind one another there, too: the palm of a level tool is behind its part."""
+        """Whether parts also stand behind one another there; the palm of a level tool, which is behind its part, forbids it."""
         return station.kind == "storage" and self.task.robot.tool != "level"
 
     def raised(self, kind: str, station: Station, spot: Spot) -> Spot:
@@ -139,13 +139,13 @@ class Places:
         return pitch_m
 
     def room(self, station: Station) -> tuple[float, float]:
-        """How far a part and the gripper around it reach from a spot, along and across [m]."""
+        """The extent of a part and the gripper around it from a spot, along and across [m]."""
         return self._largest(station, AROUND_M, lambda kind: max(OPEN_M, kind.finger_m - AROUND_M + FREE_M), 1.0)
 
     def _largest(
         self, station: Station, beside_m: float, closing_m: Callable[[Kind], float], times: float
     ) -> tuple[float, float]:
-        """So many times what the kinds at a station reach, and so much beside them, more where their fingers close [m]."""
+        """`times` the largest extent of the kinds at a station, plus margins, larger where their fingers close [m]."""
         sizes = []
         for kind in self.kinds_at(station.name):
             reach, margins = kind.footprint_m(), kind.margins_m(beside_m, closing_m(kind))
@@ -154,12 +154,12 @@ class Places:
         return float(x), float(y)
 
     def used_spots(self, station: Station, parts: int, kind: str = "") -> list[Spot]:
-        """The spots that so many parts can ever need, and a few more for a plate; nests all, for each takes its kind."""
+        """The spots that so many parts can need, and a few more for a plate; all nests, because each takes only its kind."""
         found = self.spots(station, kind)
         return found if station.places is not None else found[: max(parts, SPARE_SPOTS)]
 
     def top_m(self, station: Station) -> float:
-        """How high what stands at a station reaches above the table at most [m]."""
+        """The largest height above the table of the parts at a station [m]."""
         tops = [
             spot.z + kind.height_m for kind in self.kinds_at(station.name) for spot in self.spots(station, kind.name)
         ]
@@ -178,7 +178,7 @@ class Places:
         ]
 
     def below(self, station: Station, spot: Spot) -> list[tuple[str, Spot]]:
-        """What has to stand for a part to stand on a spot: kinds and their spots, the lowest first."""
+        """The kinds and spots of the parts that must stand below a spot, the lowest first."""
         found = dict[Spot, str]()
         for under in self.carriers(station, spot):
             found |= {other: kind for kind, other in self.below(station, under)}
@@ -210,7 +210,7 @@ class Places:
         return (length, width, self.floor(station)), (*middle, self.floor(station) / 2)
 
     def body(self, station: Station, parts: int) -> Rectangle:
-        """The ground that a station's body takes."""
+        """The ground that a station's body covers."""
         x, y, yaw = station.pose
         if station.stands_on in ("slab", "box"):
             size, middle = self.slab(station, parts)
@@ -237,8 +237,8 @@ class Places:
     def draw(self, order: Order, rng: np.random.Generator) -> Layout:
         """A layout drawn uniformly within the areas that the task gives its obstacles and parts.
 
-        An obstacle drawn onto a station, and a part drawn into another one, is drawn again; BadInput names what an area
-        leaves no room for.
+        An obstacle that overlaps a station, or a part that overlaps another one, is drawn again; BadInput names one for which
+        its area leaves no room.
         """
         kept = self.kept_free(len(order))
         places = [_draw_place(obstacle, kept, rng) for obstacle in self.task.obstacles]
@@ -249,7 +249,7 @@ class Places:
     def _draw_off(
         self, kind: str, spot: Spot, stand: list[tuple[float, Rectangle]], rng: np.random.Generator
     ) -> tuple[float, float, float]:
-        """How far a part stands off its spot, clear of those that `stand` already as high [m], to which it is added."""
+        """A drawn offset of a part from its spot, clear of the parts in `stand` at its height [m]; the part is added to them."""
         part = self.task.part(kind)
         along, across = (reach + APART_M / 2 for reach in self.kinds[comes_as(part)].footprint_m())
         for _ in range(MAX_DRAWS):
@@ -266,7 +266,7 @@ class Places:
     def begins(self, order: Order) -> list[Spot]:
         """The spot on which each part of an order stands at the start, part 1 first: the stations' first ones.
 
-        BadInput where nothing is there to carry one.
+        BadInput for a part that no other part carries.
         """
         found: list[Spot] = []
         for kind in order:
@@ -282,7 +282,7 @@ class Places:
         return found
 
     def neighbours(self, station: Station, spot: Spot) -> dict[str, tuple[str, Spot]]:
-        """Parts that may stand beside one spot, their kind and spots by name; where there is one place only there are none."""
+        """Parts that may stand beside one spot, their kind and spots by name; empty at a station with one place."""
         kinds = outermost(self.kinds_at(station.name))
         if not kinds or station.capacity == 1:
             return {}
@@ -300,15 +300,15 @@ class Places:
         }
 
     def _seen_from(self, station: Station, spot: Spot) -> list[tuple[str, Spot]]:
-        """The outermost kinds on each other spot of the station and where that lies as seen from any of them, from this one.
+        """The outermost kinds on each other spot of the station, with the position of that spot relative to this one.
 
-        Lower layers are left away: they are no higher than what this spot lies on; and so is what this one carries.
+        Lower layers are left out, because they are no higher than the support of this spot, and so are parts on top of this one.
         """
         found: dict[tuple[str | float, ...], tuple[str, Spot]] = {}
         stand = {one: [kind for kind, _ in self.grounds(station, one)] for one in self.spots(station)}
         for one, own in stand.items():
             for other, kinds in stand.items():
-                # the places of a kind are filled from the lowest on: above it stands none of its own yet
+                # the places of a kind are filled from the lowest on, so none of its own stands above it yet
                 up = other.z - one.z
                 if other == one or not own or not kinds or up < 0.0 or (up > 0.0 and own == kinds):
                     continue
