@@ -25,9 +25,9 @@ BoolArray = NDArray[np.bool_]
 class Rewards:
     """The rewards of the moves on a grid, dimensionless. Source: thesis, sections 8.3 and 9.7."""
 
-    goal: Annotated[float, Gt(0), doc("what entering a goal is worth")] = 1.5
-    collision: Annotated[float, Lt(0), doc("what entering an obstacle is worth")] = -1.0
-    step: Annotated[float, Le(0), Ge(-1000), doc("what any other step is worth")] = -0.1
+    goal: Annotated[float, Gt(0), doc("the reward for entering a goal")] = 1.5
+    collision: Annotated[float, Lt(0), doc("the reward for entering an obstacle")] = -1.0
+    step: Annotated[float, Le(0), Ge(-1000), doc("the reward for any other step")] = -0.1
 
 
 class NoPath(BadInput):

@@ -25,7 +25,7 @@ TOAST_CASES = {"I": "toast-case-1", "II": "toast-case-2", "III": "toast-case-3"}
 
 
 class CellFile(CellFields):
-    """A whole cell file: the cell, the order that it is to make, and how a sequence for it is looked for."""
+    """A whole cell file: the cell, the ordered parts, and the settings of the search for a sequence."""
 
     _toml: TomlText | None = PrivateAttr(default=None)
 

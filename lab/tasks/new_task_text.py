@@ -21,7 +21,7 @@ FINISHES = ((0.70, 0.42, 0.16), (0.85, 0.30, 0.20), (0.20, 0.40, 0.55), (0.45, 0
 
 
 def text_of(new: NewTask, placed: Sequence[PlacedStation], around: Around, opening_m: float | None = None) -> str:
-    """The task file; `opening_m`: the fingers open no farther, None: all the way."""
+    """The task file; opening_m: the largest opening of the fingers; None: as wide as they open."""
     parts = "\n".join(_part(new, part, number) for number, part in enumerate(new.parts))
     stations = "\n".join(_station(new, one) for one in placed)
     return "\n".join([_head(new, opening_m), parts, _workspace(new, placed, around), stations, _OBSTACLES, _LEARNING])
@@ -77,7 +77,7 @@ routes = [[
 
 def _workspace(new: NewTask, placed: Sequence[PlacedStation], around: Around) -> str:
     low = round(heights_m(new)[1] - CELL_M / 2, 3)
-    ahead = max(hypot(one.x, one.y) for one in placed)  # the way from one side to the other leads there
+    ahead = max(hypot(one.x, one.y) for one in placed)  # paths between the two sides pass there
     lower, shape = [], []
     behind = -floor(around.nearest_m / CELL_M)  # no cell is free right behind the arm, where it cannot turn through
     for axis, others, least in ((0, [ahead], behind), (1, [0.0], -inf)):

@@ -19,7 +19,7 @@ def read(source: Source, asked: InstanceRequest) -> CellFile:
 
 
 def _job(source: Source, job: int, line: int, words: Sequence[str], machines: int) -> list[Operation]:
-    """The operations of a row, which holds their number and, for each, the number of machines and each machine's time."""
+    """The operations of a row, which contains their number and, for each, the number of machines and each machine's time."""
     rest = iter(words)
 
     def word(what: str) -> str:
