@@ -268,7 +268,7 @@ def _hints(of: Receipt, entries: Sequence[Entry], window: int) -> Iterator[str]:
     ended = [one for one in entries if isinstance(one, EpisodeEnded)]
     if not of.taken:
         if of.questions:
-            yield f"it asked about {counted(of.questions, 'step')} and was never advised: an answer shows it a way at once"
+            yield f"it asked about {counted(of.questions, 'step')} and was never advised: an answer would show it a path at once"
         return
     if 2 * of.agreed > of.taken:
         help_was = f"{of.agreed} of {counted(of.taken, 'step')}, was what it would have done by itself"

@@ -96,7 +96,7 @@ def _summary(document: dict[str, Any]) -> "RenderableType":
     lines = [
         f"{document['task']}, {document['arm']}: {counted(document['transfers'], 'transfer')} as "
         f"{counted(len(files), 'file')} in {Path(files[0]).parent}",
-        f"read back and played in physics: at most {worst} off the run's tool on {counted(document['motions'], 'way')}, "
-        f"{rest} where they end",
+        f"read back and played in physics: at most {worst} off the run's tool on {counted(document['motions'], 'path')}, "
+        f"{rest} at their ends",
     ]
     return Text("\n".join(lines))

@@ -106,7 +106,7 @@ def task_random(
 
     def told(d: dict[str, Any]) -> str:
         return (
-            f"{d['file']}: {counted(d['obstacles'], 'obstacle')}, the shortest way takes "
+            f"{d['file']}: {counted(d['obstacles'], 'obstacle')}, the shortest path takes "
             f"{counted(d['optimal_steps'], 'move')} (seed {seed})"
         )
 

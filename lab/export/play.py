@@ -81,7 +81,7 @@ def deviation(program: Program, played: "list[Command] | TimedPoints") -> ToolDe
         return _compared_by_time(program, play_timed(played, arm, robot, program.seen_at_s))
     motions, ways = [way for job in jobs for way in job.ways], play(played, arm, robot)
     if len(motions) != len(ways):
-        raise BadInput(f"{len(ways)} ways were read back, the run had {len(motions)}")
+        raise BadInput(f"{len(ways)} paths were read back, the run had {len(motions)}")
     worst, poses = np.zeros(4), 0
     for together, way in zip(motions, ways, strict=True):
         motion = together[-1]

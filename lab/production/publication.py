@@ -42,7 +42,7 @@ def publish(policy: Policy, events: Sequence[Event], license_name: str, out: Pat
 def _what(policy: Policy) -> str:
     """What the policy does, in words."""
     skill = SKILLS.get(policy.subtask)
-    return f"a way to the goal in '{policy.task}'" if skill is None else skill.help
+    return f"a path to the goal in '{policy.task}'" if skill is None else skill.help
 
 
 def _pictures(policy: Policy) -> Files:

@@ -252,7 +252,7 @@ def _with(before: Durations, fresh: Prepared, ways: SkillSet, teacher: Teacher) 
     try:
         return before.joined(measure(replace(fresh, skillset=ways)))
     except LabError as error:
-        teacher.tell(RecordSkipped(f"a way in the changed scene: {error}"))
+        teacher.tell(RecordSkipped(f"a path in the changed scene: {error}"))
         return before
 
 

@@ -141,7 +141,7 @@ def lesson_parts(lesson: Lesson, first_asked: int | None = None, rejected: Advic
     reached, fewest = lesson.steps
     parts = [f"{'?' if reached is None else reached}/{fewest or '?'} steps"]
     if reached is not None and reached > (fewest or reached):
-        parts.append("not the shortest way")
+        parts.append("not the shortest path")
     if result is not None and not result.requests:
         parts.append("never asked")
     elif result is not None:

@@ -33,7 +33,7 @@ _NAME = 52
 _INDENT = 12
 _LONGEST_LIST = 8
 _UNLIMITED = 1000
-ALL_FREE = "their ways are free here, and none is longer than one learned anew"
+ALL_FREE = "their paths are free here, and none is longer than one learned anew"
 
 
 class RunProgress:

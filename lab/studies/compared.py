@@ -151,7 +151,7 @@ class ComparedSessions:
 MOST_SETTINGS = 1000
 FAMILIES: dict[str, Family[Any]] = {"gates": GATES, "learners": UPDATES, "advisors": ADVISORS}
 MEASURES = (
-    "solved_percent: sessions whose greedy way is as good as can be in the end. mean_steps: of all episodes, a failed one as the "
+    "solved_percent: sessions whose final greedy path is optimal. mean_steps: of all episodes, a failed one as the "
     "step limit + 1 (the area under the learning curve). last_steps: of the last episode. helped_steps, requests, misleads, "
     "rejected_percent: of a session, as lab teach counts them. Every setting meets the same chances: session n has the same "
     "seed in each."

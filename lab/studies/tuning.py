@@ -176,7 +176,7 @@ UNSEEN_STREAM = 1_000_000  # the stream of their seeds, apart from those of the 
 FILE = "settings.toml"
 OBJECTIVE = (
     "cost: the mean steps of a session's episodes (the area under the learning curve), a failed one as the step limit + 1; a "
-    "session whose greedy way is not as good as can be in the end costs the step limit + 1 as a whole. gain: the cost with the "
+    "session whose final greedy path is not optimal costs the step limit + 1 as a whole. gain: the cost with the "
     "problem's own settings less that with the tuned ones, session by session with the same seed, on seeds that no trial had."
 )
 

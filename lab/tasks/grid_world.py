@@ -140,7 +140,7 @@ class GridWorld(Learned):
         moves = shortest_steps(mdp)
         steps = moves + self.learner.count_start
         if steps > most:
-            need = f"the shortest way has {counted(moves, 'move')} and needs {counted(steps, 'step')}"
+            need = f"the shortest path has {counted(moves, 'move')} and needs {counted(steps, 'step')}"
             raise BadInput(f"world '{self.name}': learner.max_steps = {most}: {need}")
         if not self.obstacles:
             return mdp
@@ -148,7 +148,7 @@ class GridWorld(Learned):
         crash, way = self.worth(near, collision), self.worth(moves, self.rewards.goal)
         if crash >= way:
             worth = (
-                f"running into an obstacle is worth {crash:.2f} and the way of {counted(moves, 'move')} only {way:.2f}"
+                f"running into an obstacle is worth {crash:.2f} and the path of {counted(moves, 'move')} only {way:.2f}"
             )
             raise BadInput(
                 f"world '{self.name}': rewards.collision = {collision}: at the start, {worth}: "

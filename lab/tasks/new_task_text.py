@@ -68,7 +68,7 @@ mass_kg = {part.mass_kg}
 friction = {part.friction}
 color = {_list(COLORS[number % len(COLORS)])}
 area = {_list(area)}  # it stands on its spot at the start within +- x, +- y [m], +- yaw [rad]
-# its way; a buffer is used only when the machine ahead of it is busy
+# its route; a buffer is used only when the machine ahead of it is busy
 routes = [[
 {route}
 ]]
@@ -129,7 +129,7 @@ def _list(numbers: Sequence[float]) -> str:
 
 
 _OBSTACLES = """\
-# ---- what stands in the way: take the # away, and it does ----------------------------------------------------------
+# ---- obstacles: remove the # to add one ----------------------------------------------------------------------------
 # [[obstacles]]
 # name = "tower"
 # position_m = [0.5, 0.3]

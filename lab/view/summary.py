@@ -104,7 +104,7 @@ def lesson_summary(lesson: Mapping[str, Any]) -> RenderableType:
     """The text at the end of `lab teach`, from its JSON document."""
     lines = [
         f"{lesson['skill']}: {counted(lesson['episodes'], 'episode')}   {sparkline(lesson['steps_per_episode'], 40)}",
-        f"learned way: {_way(lesson)}: {_verdict(lesson)}",
+        f"learned path: {_way(lesson)}: {_verdict(lesson)}",
         *([_advice(lesson)] if lesson["requests"] else []),  # otherwise the receipt says that nobody was asked
         *(["it went on from what was left unfinished"] if lesson["source"] == "continued" else []),
         *lesson["receipt"]["lines"],
@@ -198,7 +198,7 @@ def _way(lesson: Mapping[str, Any]) -> str:
     final, best, drawn = lesson["final_steps"], lesson["optimal_steps"], lesson["steps_are_means"]
     learned = "does not reach the goal" if final is None else counted(final, "step")
     learned += " on average, where it reaches the goal" if drawn and final is not None else ""
-    return learned if best is None else f"{learned}, the {'best way' if drawn else 'shortest'} takes {best}"
+    return learned if best is None else f"{learned}, the {'best path' if drawn else 'shortest'} takes {best}"
 
 
 def _verdict(lesson: Mapping[str, Any]) -> str:
@@ -210,7 +210,7 @@ def _verdict(lesson: Mapping[str, Any]) -> str:
         return "not solved"
     if lesson["steps_are_means"]:
         return (
-            "not solved" if lesson["optimal_steps"] is None else "not solved, its mean return is below the best way's"
+            "not solved" if lesson["optimal_steps"] is None else "not solved, its mean return is below the best path's"
         )
     longer = lesson["optimal_steps"] is not None and lesson["final_steps"] > lesson["optimal_steps"]
     return "not solved, it is longer" if longer else "not solved, it does not reach the goal from every start"

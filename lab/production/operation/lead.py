@@ -86,7 +86,7 @@ class Lead:
     def of(cls, skill: Skill, where: str) -> "Lead":
         """The demonstration for a skill whose states are cells of the tool; BadInput for another skill."""
         if not (skill.moves_arm and skill.problem.mdp.shape):
-            raise BadInput(f"{where}: '{skill.name}' is no way through a grid of cells: it cannot be led")
+            raise BadInput(f"{where}: '{skill.name}' is no path through a grid of cells: it cannot be led")
         return cls(skill)
 
     def see(self, pose: ToolPose) -> None:
@@ -213,18 +213,18 @@ def led_in_words(row: dict[str, Any]) -> str:
     learned, fewest = row["learned_moves"], row["fewest_moves"]
     said = f"led {counted(row['led_moves'], 'move')}{'' if row['begins_at_start'] else ', not from the start'}"
     said += f"{'' if row['reached'] else ', not to the goal'}"
-    said += f"; learned: {'no way' if learned is None else learned}, fewest: {fewest}"
+    said += f"; learned: {'no path' if learned is None else learned}, fewest: {fewest}"
     notes: Sequence[str] = (
         row["left_grid"] and f"it left the grid {counted(row['left_grid'], 'time')}",
         row["blocked"] and f"blocked cells on it: {', '.join(row['blocked'][:4])}",
     )
     for note in filter(None, notes):
-        said += f"; {note}: gone round by free cells"
+        said += f"; {note}: led around through free cells"
     guided, misleads = counted(row["guided_episodes"], "episode"), counted(row["misleads"], "mislead")
     verdict = {
         "believed": f"believed: followed in {guided}, {counted(row['helped_steps'], 'step')}",
         "dropped": f"dropped in episode {row['rejected_at_episode']} after {misleads}",
-        "not asked for": "not asked for: the learner found a way before",
+        "not asked for": "not asked for: the learner found a path before",
     }[row["verdict"]]
     failed = f"; in physics it failed: {row['failure']}" if row["failure"] else ""
     return f"{said}; {verdict}; kept as '{row['policy']}', {row['advisor']}{failed}"

@@ -95,7 +95,7 @@ class Cell:
             for origin, target in needed if self.track else ():
                 at = self.index(origin), self.index(target)
                 if at not in self.ways or abs(travel_s(self.ways[at]) - table[at]) > TRACK_SLACK_S:
-                    raise BadInput(f"track: no way of {table[at]:g} s leads from '{origin}' to '{target}' on it")
+                    raise BadInput(f"track: no path of {table[at]:g} s leads from '{origin}' to '{target}' on it")
 
     @classmethod
     def alike(

@@ -152,7 +152,9 @@ def lines(cell: Cell, mix: Sequence[str]) -> Iterator[Line]:
     most = sum(count * max(len(path) for path in ways[name]) for name, count in counts.items())
     if many > MOST_LINES:
         allowed = f"allowed are {MOST_LINES}; fewer parts a cycle have fewer"
-        raise BadInput(f"--cyclic: the {counted(len(mix), 'part')} of a cycle can take {many} ways; {allowed}")
+        raise BadInput(
+            f"--cyclic: the {counted(len(mix), 'part')} of a cycle can take {many} combinations of routes; {allowed}"
+        )
     if most > MOST_MOVES:
         raise BadInput(f"--cyclic: a cycle of {counted(len(mix), 'part')} has {most} moves; allowed are {MOST_MOVES}")
     choices = [combinations_with_replacement(ways[name], count) for name, count in counts.items()]
@@ -173,7 +175,7 @@ def _paths(cell: Cell, name: str, count: int, parts: int) -> list[Path]:
 
     numbers = from_the_ends(cell.positions, lambda place, ahead: sum(ahead) or 1)
     if comb(numbers[start] + count - 1, count) > MOST_LINES:
-        told = f"product '{name}' has {numbers[start]} ways through its routes and buffers"
+        told = f"product '{name}' has {numbers[start]} paths through its routes and buffers"
         raise BadInput(f"--cyclic: {told}: too many for a cycle of {counted(parts, 'part')}")
     return list(islice(longer((), cell.positions[start], start), numbers[start]))
 

@@ -141,7 +141,7 @@ def _stuck(cell: Cell, begins: Sequence[Begins], closed: set[int]) -> dict[int, 
                 way = ", ".join(
                     f"'{cell.names[n]}' is {why}" for n, why in shut.items() if n in _ahead(cell, one.position)
                 )
-                found[part] = f"{cell.part_name(part)} at '{name}' has no way on: {way}"
+                found[part] = f"{cell.part_name(part)} at '{name}' cannot continue: {way}"
         found = found or _waiting(cell, begins, stuck)
         if not found:
             return stuck
