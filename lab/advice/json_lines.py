@@ -44,8 +44,8 @@ class EntryKinds:
             found = _reader(model).validate_json(json.dumps(record))
         except ValidationError as error:
             wrong = [
-                f"{'.'.join(map(str, one['loc']))}: {_PLAINLY.get(one['type'], one['msg'])}"
-                for one in error.errors(include_url=False)
+                f"{'.'.join(map(str, finding['loc']))}: {_PLAINLY.get(finding['type'], finding['msg'])}"
+                for finding in error.errors(include_url=False)
             ]
             raise ValueError(f"{kind}: {'; '.join(wrong)}") from None
         return model(**{name: getattr(found, name) for name in found.__dataclass_fields__})

@@ -58,7 +58,7 @@ def export(
         "files": [str(path) for path in files],
         "transfers": len(program.carried.transfers),
         "motions": off.motions,
-        "moves": sum(len(one.points) for one in read_back if isinstance(one, deferred.Lines))
+        "moves": sum(len(command.points) for command in read_back if isinstance(command, deferred.Lines))
         if isinstance(read_back, list)
         else 0,
         "poses": off.poses,

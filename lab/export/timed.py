@@ -55,7 +55,11 @@ def _rounded(number: float) -> float:
 
 def _rows(program: Program) -> Iterator[tuple[float, Array, str]]:
     """Times, joints and the machine waited for, of each action in order."""
-    waits = [(one.reach_s, one.waits_for) for one in program.carried.transfers if one.waits_for is not None]
+    waits = [
+        (transfer.reach_s, transfer.waits_for)
+        for transfer in program.carried.transfers
+        if transfer.waits_for is not None
+    ]
     joints = program.joints[0] if len(program.joints) else None
     for action in program.carried.actions:
         while waits and joints is not None and waits[0][0] <= action.at_s + 1e-9:

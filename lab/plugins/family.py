@@ -17,8 +17,8 @@ def known_source(thing: object, source: str) -> None:
     """Records the source of a member's code; for a record such as a `Study`, of the code of its functions."""
     if source == OWN:
         return
-    for one in (thing, *vars(thing).values()) if is_dataclass(thing) else (thing,):
-        module = getattr(one, "__module__", type(one).__module__)
+    for value in (thing, *vars(thing).values()) if is_dataclass(thing) else (thing,):
+        module = getattr(value, "__module__", type(value).__module__)
         if module.partition(".")[0] != "lab":
             _modules[module] = source
 

@@ -286,13 +286,13 @@ def both_views(request: AdviceRequest, marks: Marks, width: int, height: int) ->
     if not views:
         return None
     drawn = [_Drawing(request, marks, view, (width - GAP * (len(views) - 1)) // len(views), height) for view in views]
-    rows = max(len(one.lines) for one in drawn)
-    lines = [Text(" " * GAP).join(one.line(row) for one in drawn) for row in range(rows)]
-    seen = {mark for one in drawn for mark in one.seen}
+    rows = max(len(plane.lines) for plane in drawn)
+    lines = [Text(" " * GAP).join(plane.line(row) for plane in drawn) for row in range(rows)]
+    seen = {mark for plane in drawn for mark in plane.seen}
     legend = [word for mark, word in {**LEGEND, "g": "g goal beyond or before"}.items() if mark in seen and mark != "r"]
     if seen & {*marks.arrows, "*"}:
         legend.append("arrow or *: the learner's own choice")
-    shown = dict(part for one in drawn for part in one.cut)
+    shown = dict(part for plane in drawn for part in plane.cut)
     return TextPicture(lines, ", ".join(legend), tuple((axis, *ends) for axis, ends in sorted(shown.items())))
 
 

@@ -135,8 +135,8 @@ class RunProgress:
     def _tell_reused(self) -> None:
         """Write all reused skills in few lines, those of another problem separately."""
         reused, self._reused = self._reused, []
-        elsewhere = [one for one in reused if one[1].fitness is not None]
-        self._tell_found([one for one in reused if one[1].fitness is None])
+        elsewhere = [skill for skill in reused if skill[1].fitness is not None]
+        self._tell_found([skill for skill in reused if skill[1].fitness is None])
         self._tell_found(elsewhere, f" (of another problem: {ALL_FREE})")
         arms = Counter(lesson.other_arm for _, lesson in reused if lesson.other_arm)
         for arm, count in arms.items():

@@ -123,7 +123,7 @@ class TableCamera(Camera):
             width, height = pixels, round(height * pixels / width)
             calibration = replace(calibration, lens=calibration.lens.scaled((width, height)))
         eye, turn = calibration.eye_m, np.array(calibration.turn)
-        x, y, z = (float(one) for one in np.array(eye) + turn[2])
+        x, y, z = (float(value) for value in np.array(eye) + turn[2])
         up = (float(-turn[1][0]), float(-turn[1][1]), float(-turn[1][2]))
         angle = 2.0 * atan(height / 2.0 / calibration.lens.focal[1])
         return cls(eye, (x, y, z), up, angle, width, height, calibration, strength)

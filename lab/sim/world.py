@@ -182,7 +182,7 @@ class World:
             solid, seen = solid_of(self._p, self._call, shape), seen_of(self._p, self._call, shape)
             entry.number = self._call("createMultiBody", mass_kg, solid, seen, list(position), list(body))
         moments, rolling = (
-            [float(f"{one * mass_kg:.12g}") for one in shape.inertia_m2],
+            [float(f"{moment * mass_kg:.12g}") for moment in shape.inertia_m2],
             PART_ROLLING * (shape.solid != "box"),
         )
         self._call("changeDynamics", entry.number, -1, localInertiaDiagonal=moments, rollingFriction=rolling)
@@ -331,7 +331,7 @@ class World:
         It keeps a contact as long as the two points stay together, with the direction that it had in the world: in a gripper
         that turned by half a turn a part would press on the fingers from behind, and hold them closed.
         """
-        entry, movable = self._bodies[name], {one.number for one in self._bodies.values() if one.moves}
+        entry, movable = self._bodies[name], {body.number for body in self._bodies.values() if body.moves}
         touched = {
             int(found[2])
             for link in links
@@ -357,7 +357,7 @@ class World:
         for point in self._call("getContactPoints", self._bodies[name].number):
             if point[1] != point[2]:
                 forces[point[2]] = forces.get(point[2], 0.0) + float(point[9])
-        number, force = max(forces.items(), key=lambda one: one[1], default=(-1, 0.0))
+        number, force = max(forces.items(), key=lambda item: item[1], default=(-1, 0.0))
         return self._names.get(number, ""), force
 
     def nearest(self, one: str, other: str, within: float, first_link: int = -1) -> float:

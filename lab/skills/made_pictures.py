@@ -228,7 +228,7 @@ def _markers(placed: PicturedTask, station: str, grid: CameraGrid) -> list[tuple
         ("toaster", (float(x), float(y), float(z) + upper)),
     ]
     stands = zip(placed.task.obstacles, placed.layout.obstacles, strict=True)
-    return found + [("obstacle", (*at, one.size[2] + MARKER_ABOVE + upper)) for one, at in stands]
+    return found + [("obstacle", (*at, obstacle.size[2] + MARKER_ABOVE + upper)) for obstacle, at in stands]
 
 
 def _in_sight(world: World, camera: Camera, lens: Lens, at: tuple[float, float, float]) -> bool:

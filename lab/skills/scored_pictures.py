@@ -76,7 +76,7 @@ def score_pictures(
     """
     index = _read(PicturesIndex, folder / INDEX)
     task, count = load(index.task), index.pictures
-    if index.station not in [one.name for one in task.stations if one.grid is not None]:
+    if index.station not in [station.name for station in task.stations if station.grid is not None]:
         raise BadInput(f"{folder / INDEX}: station '{index.station}' of '{index.task}' has no grid")
     if calibration is None:
         names = [folder / f"mat-{number + 1}.png" for number in range(index.mats)]

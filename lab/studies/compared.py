@@ -51,7 +51,7 @@ MOST_DOTS = 60  # lines of a picture
 
 def figures(results: Sequence[Result]) -> dict[str, bytes]:
     """SVG pictures by caption; if there are many settings, of the best ones."""
-    ranked = sorted(results, key=lambda one: (-one[1].solved.mean(), one[1].mean_steps.mean()))
+    ranked = sorted(results, key=lambda result: (-result[1].solved.mean(), result[1].mean_steps.mean()))
     most = "" if len(ranked) <= MOST_DOTS else f", the best {MOST_DOTS} of {len(ranked)} settings"
     several = "" if len(ranked) <= MOST_CURVES else f", the best {MOST_CURVES} of {len(ranked)} settings"
     return {
@@ -62,7 +62,7 @@ def figures(results: Sequence[Result]) -> dict[str, bytes]:
 
 def words(named: Row, among: Sequence[Row]) -> str:
     """A setting in words, by the options that differ among several: "ccrl, expert, psi 0.1"."""
-    varies = [name for name in named if len({repr(one[name]) for one in among}) > 1] or [*named][:1]
+    varies = [name for name in named if len({repr(setting[name]) for setting in among}) > 1] or [*named][:1]
     plain = ("advisor", "gate", "learner", "selection")
     return ", ".join(str(named[name]) if name in plain else f"{name} {named[name]}" for name in varies)
 
@@ -140,7 +140,10 @@ class ComparedSessions:
         found: dict[str, Any] = {
             name: np.array(record[name], kinds.get(name, np.float64)) for name in cls.__dataclass_fields__
         }
-        if any(one.shape != (sessions,) for name, one in found.items() if name != "curve") or found["curve"].ndim != 1:
+        if (
+            any(values.shape != (sessions,) for name, values in found.items() if name != "curve")
+            or found["curve"].ndim != 1
+        ):
             raise ValueError("lists of other lengths")
         return cls(**found)
 
@@ -230,7 +233,7 @@ def compared(what: Compared, job: Job) -> Findings:
         job.keep({"key": key, **found.to_json()})
         job.progress(len(done), len(keys))
     results = {key: (setting.named, done[key]) for key, setting in keys.items()}
-    rows = [one for named, found in results.values() for one in rows_of(named, found)]
+    rows = [row for named, found in results.values() for row in rows_of(named, found)]
     return Findings(rows, in_short(results.values()), figures([*results.values()]), (MEASURES,))
 
 
@@ -253,10 +256,10 @@ def sessions_of(setting: ComparedSetting, sessions: int, seed: int, stream: int 
         counts: tuple[NDArray[np.int64], ...] = (batch.helped_steps, batch.requests, batch.misleads)
     else:
         alone = [_alone(environment, how.learner, how.gate, advising, int(own)) for own in seeds]
-        rejected, steps, q = (np.array([one[n] for one in alone]) for n in range(3))
-        counts = tuple(np.array([one[n] for one in alone]) for n in range(3, 6))
+        rejected, steps, q = (np.array([session[n] for session in alone]) for n in range(3))
+        counts = tuple(np.array([session[n] for session in alone]) for n in range(3, 6))
     solved = np.array([environment.judge(table, how.learner).solved for table in q])
-    helped, requests, misleads = (np.asarray(one, np.float64) for one in counts)
+    helped, requests, misleads = (np.asarray(count, np.float64) for count in counts)
     return ComparedSessions(
         steps.mean(axis=0), solved, steps.mean(axis=1), steps[:, -1].astype(float), helped, requests, misleads, rejected
     )
@@ -268,10 +271,17 @@ def _alone(
     """(rejected, steps (E,), q (S, A), helped steps, requests, misleads) of one session that is not compiled."""
     rng = np.random.default_rng(seed)
     advisor = advising.gather(environment, learner, rng)
-    one = Session(environment, learner, gate, advisor, rng).run()
-    if one.interrupted:
+    session = Session(environment, learner, gate, advisor, rng).run()
+    if session.interrupted:
         raise KeyboardInterrupt
-    return one.rejected_at_episode is not None, one.steps, one.q, one.helped_steps, one.requests, one.misleads
+    return (
+        session.rejected_at_episode is not None,
+        session.steps,
+        session.q,
+        session.helped_steps,
+        session.requests,
+        session.misleads,
+    )
 
 
 def rows_of(named: Row, found: ComparedSessions) -> list[Row]:
@@ -287,7 +297,7 @@ def rows_of(named: Row, found: ComparedSessions) -> list[Row]:
 
 def in_short(results: "Iterator[tuple[Row, ComparedSessions]] | Any") -> Row:
     """The summary: the setting that solves most sessions, of equal ones the one with the fewest mean steps."""
-    named, best = max(results, key=lambda one: (one[1].solved.mean(), -one[1].mean_steps.mean()))
+    named, best = max(results, key=lambda result: (result[1].solved.mean(), -result[1].mean_steps.mean()))
     what = ", ".join(f"{name} {value}" for name, value in named.items())
     return {"best": what, "best solves [%]": round(100 * float(best.solved.mean()), 1)}
 
@@ -309,5 +319,5 @@ def key_of(setting: ComparedSetting, problem: Problem, job: Job) -> str:
     how = setting.subject().settings
     region = None if setting.of.sight is None else setting.of.sight
     whole: list[Any] = [__version__, problem.mdp.signature, region, setting.named, vars(how.learner), vars(how.gate)]
-    whole += [one.said.tolist() for one in Advising.of([setting.advisor]).check_records(problem.mdp)]
+    whole += [record.said.tolist() for record in Advising.of([setting.advisor]).check_records(problem.mdp)]
     return sha256(json.dumps([*whole, job.sessions, job.seed], default=str).encode()).hexdigest()[:24]

@@ -64,27 +64,27 @@ def search(
     done: list[Trial] = []
     while len(done) < trials:
         asked = [study.ask(kinds) for _ in range(min(BATCH, trials - len(done)))]
-        costs: dict[int, list[float]] = {one.number: [] for one in asked}
+        costs: dict[int, list[float]] = {trial.number: [] for trial in asked}
         left, given_up = list(asked), set()
         for rung in range(rungs):
-            found = measure(rung, [one.params for one in left])
-            for one, cost in zip(list(left), found, strict=True):
+            found = measure(rung, [trial.params for trial in left])
+            for trial, cost in zip(list(left), found, strict=True):
                 if cost is not None:
-                    costs[one.number].append(cost)
-                    one.report(cost, rung)
-                if cost is None or (rung < rungs - 1 and one.should_prune()):
-                    given_up.add(one.number)
-            left = [one for one in left if one.number not in given_up]
-        for one in asked:
-            pruned = one.number in given_up
+                    costs[trial.number].append(cost)
+                    trial.report(cost, rung)
+                if cost is None or (rung < rungs - 1 and trial.should_prune()):
+                    given_up.add(trial.number)
+            left = [trial for trial in left if trial.number not in given_up]
+        for trial in asked:
+            pruned = trial.number in given_up
             state = optuna.trial.TrialState
-            if not costs[one.number]:
-                study.tell(one, state=state.FAIL)
+            if not costs[trial.number]:
+                study.tell(trial, state=state.FAIL)
             elif pruned:
-                study.tell(one, state=state.PRUNED)
+                study.tell(trial, state=state.PRUNED)
             else:
-                study.tell(one, costs[one.number][-1])
-            done.append(Trial(one.number, one.params, tuple(costs[one.number]), pruned))
+                study.tell(trial, costs[trial.number][-1])
+            done.append(Trial(trial.number, trial.params, tuple(costs[trial.number]), pruned))
     return done, _importances(optuna, study)
 
 
@@ -106,7 +106,7 @@ def _distribution(optuna: Any, allowed: Range) -> Any:
 
 def _importances(optuna: Any, study: Any) -> dict[str, float]:
     ended = study.get_trials(deepcopy=False, states=(optuna.trial.TrialState.COMPLETE,))
-    if len({one.value for one in ended}) < BATCH:
+    if len({trial.value for trial in ended}) < BATCH:
         return {}
     evaluator = optuna.importance.PedAnovaImportanceEvaluator()
     found = optuna.importance.get_param_importances(study, evaluator=evaluator)
@@ -140,7 +140,7 @@ def _gain(gained: FloatArray) -> bytes:
 def _importance(importances: Mapping[str, float]) -> bytes:
     def draw(figure: "Figure") -> None:
         axes = figure.add_subplot()
-        axes.barh(range(len(importances)), [100 * one for one in importances.values()], color=BLUE)
+        axes.barh(range(len(importances)), [100 * importance for importance in importances.values()], color=BLUE)
         axes.set_yticks(range(len(importances)), list(importances))
         axes.invert_yaxis()
         axes.set_xlabel("share of the importance [%]")
@@ -152,13 +152,18 @@ def _history(trials: Sequence[Trial]) -> bytes:
     def draw(figure: "Figure") -> None:
         axes = figure.add_subplot()
         for pruned, colour, name in ((True, GREY, "given up early"), (False, BLUE, "tried to the end")):
-            shown = [one for one in trials if one.pruned == pruned and one.costs]
+            shown = [trial for trial in trials if trial.pruned == pruned and trial.costs]
             axes.plot(
-                [one.number for one in shown], [one.costs[-1] for one in shown], "o", ms=4, color=colour, label=name
+                [trial.number for trial in shown],
+                [trial.costs[-1] for trial in shown],
+                "o",
+                ms=4,
+                color=colour,
+                label=name,
             )
-        ended = [one for one in trials if not one.pruned]
-        best = np.minimum.accumulate([one.costs[-1] for one in ended])
-        axes.step([one.number for one in ended], best, where="post", color=ORANGE, label="best so far")
+        ended = [trial for trial in trials if not trial.pruned]
+        best = np.minimum.accumulate([trial.costs[-1] for trial in ended])
+        axes.step([trial.number for trial in ended], best, where="post", color=ORANGE, label="best so far")
         axes.set_xlabel("trial")
         axes.set_ylabel("cost [steps an episode]")
         axes.legend()
@@ -239,16 +244,16 @@ def tuned(what: Tuning, job: Job) -> Findings:
         found = kept.sessions([what.setting(values) for values in those], shares[rung], rung)
         done += len(those)
         job.progress(done, total)
-        return [None if one is None else float(costs(one, limit).mean()) for one in found]
+        return [None if sessions is None else float(costs(sessions, limit).mean()) for sessions in found]
 
     trials, importances = search(ranges, first, what.trials, job.seed, len(SHARES), measure)
-    ended = [one for one in trials if not one.pruned]
+    ended = [trial for trial in trials if not trial.pruned]
     if not ended:
         raise BadInput("tuning: none of the settings that were tried can be: hold other ones, or tune fewer")
-    best = min(ended, key=lambda one: (one.costs[-1], one.number))
+    best = min(ended, key=lambda trial: (trial.costs[-1], trial.number))
     pair = kept.sessions([what.setting({}), what.setting(best.values)], UNSEEN, UNSEEN_STREAM)
     job.progress(total, total)
-    before, after = (one for one in pair if one is not None)
+    before, after = (sessions for sessions in pair if sessions is not None)
     if job.folder is not None:
         write_file(job.folder / FILE, settings_text(what, best.values))
     return _findings(trials, importances, best, (before, after), limit)
@@ -282,9 +287,9 @@ class _KeptSessions:
         found: dict[str, ComparedSessions | None] = {}
         keys: list[str] = []
         left: list[ComparedSetting] = []
-        for one in settings:
+        for setting in settings:
             try:
-                key = f"{key_of(one, self.problem, replace(self.job, sessions=sessions))}-{stream}"
+                key = f"{key_of(setting, self.problem, replace(self.job, sessions=sessions))}-{stream}"
             except BadInput:
                 key = f"none-{len(keys)}"
                 found[key] = None
@@ -295,12 +300,12 @@ class _KeptSessions:
                 found[key] = ComparedSessions.from_json(self.entries[key], sessions)
             except (KeyError, TypeError, ValueError, OverflowError):
                 found[key] = None
-                left.append(one)
+                left.append(setting)
         by_setting = dict(zip(settings, keys, strict=True))
         work = partial(sessions_of, sessions=sessions, seed=self.job.seed, stream=stream)
-        for one, result in self.job.computed(work, left, 1):
-            found[by_setting[one]] = result
-            self.job.keep({"key": by_setting[one], **result.to_json()})
+        for setting, result in self.job.computed(work, left, 1):
+            found[by_setting[setting]] = result
+            self.job.keep({"key": by_setting[setting], **result.to_json()})
         return [found[key] for key in keys]
 
 
@@ -351,7 +356,7 @@ def _findings(
     rows += [*_trial_rows(trials)]
     summary: Row = {
         "trials": len(trials),
-        "given up early": sum(one.pruned for one in trials),
+        "given up early": sum(trial.pruned for trial in trials),
         "cost with its own settings": round(float(costs(before, limit).mean()), 2),
         "cost tuned": round(float(costs(after, limit).mean()), 2),
         "gain": f"{gain:.2f} ({low:.2f} to {high:.2f})",
@@ -361,7 +366,7 @@ def _findings(
 
 
 def _trial_rows(trials: Sequence[Trial]) -> Iterator[Row]:
-    for one in trials:
-        if one.costs:
-            settings = "given up" if one.pruned else "tried"
-            yield row({"settings": settings, "trial": one.number, "setting": None}, "cost", one.costs[-1])
+    for trial in trials:
+        if trial.costs:
+            settings = "given up" if trial.pruned else "tried"
+            yield row({"settings": settings, "trial": trial.number, "setting": None}, "cost", trial.costs[-1])

@@ -103,7 +103,7 @@ def layout_faults(cell: CellFields) -> Iterator[FileFault]:
     reached = {robot.start for robot in cell.built_robots} | {
         name for _, stage in stages for name in (stage.station, stage.buffer)
     }
-    timeless = {one.name for one in cell.stations if one.kind == "machine" and one.processing_s is None}
+    timeless = {machine.name for machine in cell.stations if machine.kind == "machine" and machine.processing_s is None}
     for loc, stage in stages:
         if stage.station in timeless and stage.processing_s is None:
             yield FileFault(

@@ -199,7 +199,7 @@ class CellTrack(Record):
 
     def built(self) -> tuple[Stretch, ...]:
         """The stretches of the track, each as a record of the cell."""
-        return tuple(Stretch(*one) for one in self.stretches)
+        return tuple(Stretch(*stretch) for stretch in self.stretches)
 
 
 class CellFields(Record):

@@ -208,18 +208,18 @@ def toml_of(file: CellFile) -> str:
     lines = [f"{_key(key)} = {_value(value)}" for key, value in raw.items() if key not in (*_TABLES, "stations")]
     if raw.get("robots") == ():
         lines.append("robots = []")
-    lines += ["", "stations = [", *(f"  {_value(_station(one))}," for one in raw["stations"]), "]"]
+    lines += ["", "stations = [", *(f"  {_value(_station(station))}," for station in raw["stations"]), "]"]
     for key in _TABLES:
         value = raw.get(key)
-        for one in value if isinstance(value, tuple) else ():
-            lines += ["", f"[[{key}]]", *_pairs(one)]
+        for item in value if isinstance(value, tuple) else ():
+            lines += ["", f"[[{key}]]", *_pairs(item)]
         if isinstance(value, Mapping):
             lines += ["", f"[{key}]", *_pairs(value)]
     return "\n".join(lines) + "\n"
 
 
-def _station(one: Mapping[str, Any]) -> dict[str, Any]:
-    return {key: "unlimited" if key == "capacity" and value >= UNLIMITED else value for key, value in one.items()}
+def _station(fields: Mapping[str, Any]) -> dict[str, Any]:
+    return {key: "unlimited" if key == "capacity" and value >= UNLIMITED else value for key, value in fields.items()}
 
 
 def _pairs(table: Mapping[str, Any]) -> list[str]:

@@ -222,7 +222,7 @@ def new_task(
     names = [part.name for part in kinds]
     weigh = _by_name(masses, "--mass", "part", names, (0.001, 6.0), "0.05")
     rub = _by_name(frictions, "--friction", "part", names, (0.0, 5.0), "0.5")
-    kinds = [replace(one, given_kg=weigh.get(one.name), friction=rub.get(one.name, FRICTION)) for one in kinds]
+    kinds = [replace(kind, given_kg=weigh.get(kind.name), friction=rub.get(kind.name, FRICTION)) for kind in kinds]
     found = NewTask(name, arm_of_word(arm), tuple(kinds), tuple(stations), buffers)
     if found.count > MAX_PARTS:
         raise BadInput(f"{found.count} parts (--part): allowed are 1 to {MAX_PARTS} in all")
@@ -301,10 +301,10 @@ def layouts(new: NewTask, around: Around, between_m: float | None = None) -> Ite
         far = around.nearest_m + share * (around.farthest_m - around.nearest_m)
         angles = [radians(turn) * (1 - 2 * number / (len(stations) - 1)) for number in range(len(stations))]
         placed = tuple(
-            one._replace(x=round(far * cos(angle), 3), y=round(far * sin(angle), 3))
-            for one, angle in zip(stations, angles, strict=True)
+            station._replace(x=round(far * cos(angle), 3), y=round(far * sin(angle), 3))
+            for station, angle in zip(stations, angles, strict=True)
         )
-        if all(_reached(one, around) for one in placed) and _apart(placed, new.foot_m, gap):
+        if all(_reached(station, around) for station in placed) and _apart(placed, new.foot_m, gap):
             yield placed
 
 
@@ -333,8 +333,8 @@ def _stations(new: NewTask, between_m: float | None = None) -> list[PlacedStatio
     return [placed(name, kind, capacity) for name, (kind, capacity) in new.stations.items()]
 
 
-def _reached(one: PlacedStation, around: Around) -> bool:
-    far = [hypot(one.x + x, one.y + y) for x, y in one.spots]
+def _reached(station: PlacedStation, around: Around) -> bool:
+    far = [hypot(station.x + x, station.y + y) for x, y in station.spots]
     return around.nearest_m + EDGE_M <= min(far) and max(far) <= around.farthest_m - EDGE_M
 
 

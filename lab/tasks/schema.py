@@ -114,7 +114,7 @@ def _from_dataclasses() -> dict[str, dict[str, str]]:
         hints = get_type_hints(kind, include_extras=True)
         found[kind.__name__] = {"": " ".join(str(kind.__doc__).split("\n\n")[0].split())}
         for field in fields(kind):
-            texts = [one.documentation for one in hints[field.name].__metadata__ if isinstance(one, DocInfo)]
+            texts = [item.documentation for item in hints[field.name].__metadata__ if isinstance(item, DocInfo)]
             found[kind.__name__][field.name] = "".join(texts)
     return found
 
@@ -147,7 +147,7 @@ def _plain(schema: Schema) -> Schema:
             found[key] = _plain(found[key])
     if found.get("default", ()) is None or isinstance(found.get("default"), dict) or found.get("default") == []:
         del found["default"]
-    choices = [_plain(one) for one in found.pop("anyOf", []) if one != {"type": "null"}]
+    choices = [_plain(choice) for choice in found.pop("anyOf", []) if choice != {"type": "null"}]
     if len(choices) == 1:
         found = choices[0] | found
     elif choices:
@@ -156,7 +156,7 @@ def _plain(schema: Schema) -> Schema:
         for old, new in (("minLength", "minItems"), ("maxLength", "maxItems")):
             if old in found:
                 found[new] = found.pop(old)
-        if places := [_plain(one) for one in found.pop("prefixItems", [])]:
+        if places := [_plain(place) for place in found.pop("prefixItems", [])]:
             found["items"] = places[0] if all(place == places[0] for place in places) else places
     if "description" in found:
         found["description"] = " ".join(found["description"].split())
@@ -241,7 +241,7 @@ def tables_of(schema: Schema) -> list[SchemaTable]:
     seen: set[str] = set()
 
     def walk(above: str, properties: Schema) -> None:
-        inner = [(key, *one) for key, field in properties.items() for one in _held(field) if one[0] not in seen]
+        inner = [(key, *held) for key, field in properties.items() for held in _held(field) if held[0] not in seen]
         for key, name, many in inner:
             if name in seen:
                 continue
@@ -257,9 +257,9 @@ def tables_of(schema: Schema) -> list[SchemaTable]:
 
 def _held(field: Schema, many: str = "") -> Iterator[tuple[str, str]]:
     """The records in a field and their nesting: "" one, "[]" a list, "[][]" a list of lists, "{}" a table by name."""
-    for one in (field, *field.get("allOf", []), *field.get("anyOf", [])):
-        if "$ref" in one:
-            yield one["$ref"].rpartition("/")[2], many
+    for schema in (field, *field.get("allOf", []), *field.get("anyOf", [])):
+        if "$ref" in schema:
+            yield schema["$ref"].rpartition("/")[2], many
     for key, way in (("items", "[]"), ("additionalProperties", "{}")):
         if isinstance(field.get(key), dict):
             yield from _held(field[key], many + way)
@@ -268,7 +268,7 @@ def _held(field: Schema, many: str = "") -> Iterator[tuple[str, str]]:
 def _allowed(field: Schema, schema: Schema) -> str:
     """The values that a field allows, in words."""
     if "anyOf" in field:
-        return ", or ".join(_allowed(one, schema) for one in field["anyOf"])
+        return ", or ".join(_allowed(choice, schema) for choice in field["anyOf"])
     if (held := next(_held(field), None)) and field.get("type") != "array":
         return next(table.heading for table in tables_of(schema) if table.schema is schema[TABLES][held[0]])
     if "enum" in field or "const" in field:
@@ -277,7 +277,7 @@ def _allowed(field: Schema, schema: Schema) -> str:
         case "array":
             items = field.get("items", {})
             each = " and ".join(
-                dict.fromkeys(_allowed(one, schema) for one in (items if isinstance(items, list) else [items]))
+                dict.fromkeys(_allowed(item, schema) for item in (items if isinstance(items, list) else [items]))
             )
             return f"{_count(field.get('minItems', 0), field.get('maxItems'))}: {each}"
         case "object":

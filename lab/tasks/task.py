@@ -277,12 +277,14 @@ class Task(Record):
     @model_validator(mode="after")
     def _after_known(self) -> Self:
         made = [part.name for part in self.made]
-        for number, one in enumerate(self.after, start=1):
-            if one.part == one.of:
-                raise ValueError(f"after {number}: of = '{one.of}': a kind cannot wait for itself, wanted another one")
+        for number, precedence in enumerate(self.after, start=1):
+            if precedence.part == precedence.of:
+                raise ValueError(
+                    f"after {number}: of = '{precedence.of}': a kind cannot wait for itself, wanted another one"
+                )
             for kind, step, station in (
-                (one.part, one.step, one.station),
-                (one.of, one.of_step, one.of_station or one.station),
+                (precedence.part, precedence.step, precedence.station),
+                (precedence.of, precedence.of_step, precedence.of_station or precedence.station),
             ):
                 if kind not in made:
                     raise unknown("part", kind, made, f"after {number}")
@@ -349,8 +351,8 @@ class Task(Record):
             stations = machines if fault.what.startswith("machine") else [place.name for place in self.stations]
             if fault.station is not None and fault.station not in stations:
                 raise unknown("station", fault.station, stations, where)
-            if fault.obstacle is not None and fault.obstacle not in [one.name for one in self.obstacles]:
-                raise unknown("obstacle", fault.obstacle, [one.name for one in self.obstacles], where)
+            if fault.obstacle is not None and fault.obstacle not in [obstacle.name for obstacle in self.obstacles]:
+                raise unknown("obstacle", fault.obstacle, [obstacle.name for obstacle in self.obstacles], where)
             if fault.part is not None and fault.part.rpartition(" ")[0] not in [part.name for part in self.made]:
                 raise unknown("part", fault.part, [f"{part.name} 1" for part in self.made], where)
             if fault.what == "camera blind" and self.camera is None:

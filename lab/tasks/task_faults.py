@@ -117,7 +117,7 @@ def fields_at(model: type[BaseModel], loc: Loc) -> list[str]:
     records: list[type] = [model]
     for part in loc:
         inner = [_annotations(record)[part] for record in records if part in _annotations(record)]
-        records = [found for one in inner for found in _records(one)] or records
+        records = [found for annotation in inner for found in _records(annotation)] or records
     return sorted({str(name) for record in records for name in _annotations(record)})
 
 

@@ -84,7 +84,7 @@ class Watched:
     ):
         if rule not in NAMES:
             raise unknown("rule", rule, NAMES, "watch")
-        self._policies = [_called(one) for one in (policy if isinstance(policy, list | tuple) else [policy])]
+        self._policies = [_called(member) for member in (policy if isinstance(policy, list | tuple) else [policy])]
         if rule == "ensemble" and len(self._policies) < 2:
             raise BadInput("rule 'ensemble' (watch): one policy: wanted a list of two or more")
         self.rule, self.threshold = rule, threshold
@@ -195,7 +195,7 @@ def _first(answer: Any) -> Any:
 
 def _action(answers: list[Any]) -> int:
     """The majority action; ties: the lowest."""
-    votes = Counter(int(one) if np.ndim(one) == 0 else int(np.argmax(one)) for one in answers)
+    votes = Counter(int(answer) if np.ndim(answer) == 0 else int(np.argmax(answer)) for answer in answers)
     return max(votes, key=lambda action: (votes[action], -action))
 
 

@@ -150,7 +150,9 @@ def _whole(rows: Sequence[TimedRow]) -> list[TimedRow]:
         if part and (row.vehicle is None or row.kind == "carry"):
             later[part].pop(0)
             if row.kind == "carry":
-                target = row.target or next((one.origin for one in later[part] if one.origin), FINISHED)
+                target = row.target or next(
+                    (later_row.origin for later_row in later[part] if later_row.origin), FINISHED
+                )
                 row = replace(row, origin=row.origin or here.get(part, START), target=target)
             here[part] = row.target or START
         found.append(row)

@@ -70,8 +70,8 @@ def sequence_plot(
 
 def _sessions(costs: Sequence[float] | Sequence[Sequence[float]]) -> list[Sequence[float]]:
     """The costs as a list of sessions, also when only one is given."""
-    one = [cost for cost in costs if isinstance(cost, int | float | np.number)]
-    return [one] if one else [session for session in costs if not isinstance(session, int | float)]
+    numbers = [cost for cost in costs if isinstance(cost, int | float | np.number)]
+    return [numbers] if numbers else [session for session in costs if not isinstance(session, int | float)]
 
 
 def _draw_session(axes: "Axes", costs: FloatArray, unit: str) -> None:

@@ -156,7 +156,7 @@ def audit_summary(document: Mapping[str, Any]) -> RenderableType:
         for stay in document["stays"]
     ]
     claimed, delivered = len(document["claimed"]), len(document["delivered"])
-    lines = [Text(f"{one['part']}: {one['words']}") for one in document["findings"]]
+    lines = [Text(f"{finding['part']}: {finding['words']}") for finding in document["findings"]]
     said = f"delivered: {delivered} of the {counted(claimed, 'part')} that the run claims"
     return Group(table_of(rows, ("part", "station", "from_s", "to_s", "stood_s")), *lines, Text(said))
 
@@ -167,7 +167,7 @@ def _event_text(event: Mapping[str, Any]) -> str:
         case "moved":
             return f"{event['part']}: {event['origin']} to {event['target']}"
         case "met":
-            about = " at ".join(one for one in (event["part"], event["station"]) if one)
+            about = " at ".join(word for word in (event["part"], event["station"]) if word)
             return f"{about}: {event['what']}: {event['answer']}"
         case "stopped":
             stops = [f"{kind} ({why or by})" for kind, why, by in event["stops"]]
@@ -383,7 +383,7 @@ def pictures_summary(record: Mapping[str, Any]) -> RenderableType:
         if record["marker_mean_m"] is not None:
             mean, most = 1e3 * record["marker_mean_m"], 1e3 * record["marker_max_m"]
             lines.append(f"markers seen {mean:.1f} mm off on average, {most:.1f} mm at the most")
-        lines += [f"{one['picture']}: {one['reason']}" for one in record["wrong"]]
+        lines += [f"{picture['picture']}: {picture['reason']}" for picture in record["wrong"]]
     else:
         lines = [f"{counted(record['pictures'], 'picture')} of '{record['task']}' and {record['mats']} of the mat made"]
     return Group(*map(Text, [*lines, *(f"{name}: {path}" for name, path in record.get("files", {}).items())]))

@@ -207,7 +207,7 @@ def shortest(
     away = away_s(cell)
     # Of equal periods that with the fewest moves is found first, and stays.
     ahead = [(len(line.moves), max(line.bound_s(away), least_s), n, line) for n, line in enumerate(lines(cell, mix))]
-    ahead.sort(key=lambda one: one[:3])
+    ahead.sort(key=lambda entry: entry[:3])
     best: Cycle | None = None
     above_s, resolution_s = inf, 0.0
     for _, bound_s, _, line in ahead:

@@ -108,8 +108,10 @@ class Line:
         """
         numbers = range(len(self.moves))
         least_s = {span.drop: span.least_s for span in self.needs}
-        empty_s = [max((s for to in numbers if (s := self.after_s(one, to)) < inf), default=0.0) for one in numbers]
-        return sum(self.moves[one].work_s + max(least_s.get(one, 0.0), empty_s[one]) for one in numbers)
+        empty_s = [
+            max((s for to in numbers if (s := self.after_s(number, to)) < inf), default=0.0) for number in numbers
+        ]
+        return sum(self.moves[number].work_s + max(least_s.get(number, 0.0), empty_s[number]) for number in numbers)
 
     def bound_s(self, away_s: Sequence[Sequence[float]]) -> float:
         """A lower bound of the period [s]: the robot's moves with the cheapest drives between them, and each station's needs.

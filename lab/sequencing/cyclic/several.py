@@ -142,7 +142,7 @@ class Rhythm:
         """A lower bound of the time per part of the cycles in `proven_of` [s]."""
         if self._is_least:
             return self.per_part_s
-        return min(self.per_part_s, max(self.least_part_s, min(one.bound_s / one.parts for one in self.tried)))
+        return min(self.per_part_s, max(self.least_part_s, min(trial.bound_s / trial.parts for trial in self.tried)))
 
     @property
     def proven(self) -> bool:
@@ -202,7 +202,7 @@ def best_rhythm(
         if found.cycle is not None:
             best, mix_s = found.cycle, found.cycle.period_s / times
     if best is None:
-        none = all(one.bound_s == inf for one in tried)
+        none = all(trial.bound_s == inf for trial in tried)
         parts = counted(tried[-1].parts, "part") if len(tried) == 1 else f"up to {tried[-1].parts} parts"
         why = "it is proven that there is none" if none else f"none was found in {time_limit_s:g} s"
         raise WorkFailed(f"no order of {parts} a cycle can be repeated for ever: {why}")

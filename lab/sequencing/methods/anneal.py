@@ -99,7 +99,7 @@ class Annealing:
     @property
     def best(self) -> tuple[int, ...]:
         """The best sequence so far."""
-        return tuple(int(one) for one in self._work.best if one)
+        return tuple(int(decision) for decision in self._work.best if decision)
 
     @property
     def best_cost(self) -> float:

@@ -42,7 +42,7 @@ class FeatureArrays(NamedTuple):
 def feature_arrays(cell: Cell, objective: str = MAKESPAN) -> FeatureArrays:
     """The arrays from which a cell's features are computed, for a policy that was learned for this objective."""
     size = len(cell.stations)
-    places = np.array([*(one.servers or one.capacity for one in cell.stations), 1], np.int64)
+    places = np.array([*(own.servers or own.capacity for own in cell.stations), 1], np.int64)
     load_s = np.zeros((len(cell.positions), size + 1))
     for place, loads in enumerate(loads_s(cell)):
         for station, seconds in loads.items():
@@ -56,7 +56,7 @@ def feature_arrays(cell: Cell, objective: str = MAKESPAN) -> FeatureArrays:
         left_s=left_s,
         moves=np.array(fewest, np.float64),
         load_s=load_s,
-        machine=np.array([size if one is None else one for one in machine], np.int64),
+        machine=np.array([size if number is None else number for number in machine], np.int64),
         following=np.array(_following(cell), np.int64),
         places=places,
         due=cell.due_s is not None and objective in WITH_DUE_TIMES,

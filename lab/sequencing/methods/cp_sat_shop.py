@@ -146,16 +146,16 @@ class ShopModel:
             takes = {(stop, step): model.new_bool_var("") for stop in before for step in self._shop.steps[stop]}
             model.add_exactly_one(takes.values())
             model.add_exactly_one(at.values())
-            one = _Operation(part, takes, at, self._moment(), self._moment(), self._moment())
-            model.add(one.depart >= free)
+            operation = _Operation(part, takes, at, self._moment(), self._moment(), self._moment())
+            model.add(operation.depart >= free)
             for (stop, step), taken in takes.items():
                 model.add_implication(taken, before[stop])
                 model.add_implication(taken, at[step.to])
-                model.add(one.begin >= one.depart + self._carried(step)).only_enforce_if(taken)
+                model.add(operation.begin >= operation.depart + self._carried(step)).only_enforce_if(taken)
             for stop, comes in at.items():
-                model.add(one.end == one.begin + self._worked(stop)).only_enforce_if(comes)
-            self._operations.append(one)
-            free = one.end
+                model.add(operation.end == operation.begin + self._worked(stop)).only_enforce_if(comes)
+            self._operations.append(operation)
+            free = operation.end
         return free
 
     def _carried(self, step: ShopStep) -> int:
@@ -167,10 +167,12 @@ class ShopModel:
     def _add_servers(self) -> None:
         """A server works on one part after the other."""
         spans = defaultdict[int, list[cp_model.IntervalVar]](list)
-        for one in self._operations:
-            for stop, comes in one.at.items():
+        for operation in self._operations:
+            for stop, comes in operation.at.items():
                 if stop in self._servers:
-                    span = self.model.new_optional_interval_var(one.begin, self._worked(stop), one.end, comes, "")
+                    span = self.model.new_optional_interval_var(
+                        operation.begin, self._worked(stop), operation.end, comes, ""
+                    )
                     spans[self._servers[stop]].append(span)
         for station, own in spans.items():
             servers = self.cell.stations[station].servers or 1
@@ -184,8 +186,8 @@ class ShopModel:
         model, times = self.model, self.times
         start, robots = self.cell.index(self.cell.robots[0].start), len(self.cell.robots)
         nodes, spent = list[tuple[int, int, cp_model.LiteralT]](), list[cp_model.LinearExprT]()
-        moved = [one.trips() for one in self._operations]
-        for number, (one, trips) in enumerate(zip(self._operations, moved, strict=True), 1):
+        moved = [operation.trips() for operation in self._operations]
+        for number, (operation, trips) in enumerate(zip(self._operations, moved, strict=True), 1):
             stays = model.new_bool_var("")
             if not trips:
                 nodes.append((number, number, stays))
@@ -196,11 +198,11 @@ class ShopModel:
             self._arcs[0, number], self._arcs[number, 0] = first, last
             ways = {step: times.travel(start, step.trip[0].origin) for step in trips}
             for step, taken in trips.items():
-                model.add(one.depart >= ways[step]).only_enforce_if(first, taken)
+                model.add(operation.depart >= ways[step]).only_enforce_if(first, taken)
                 spent.append(self._carried(step) * taken)
             spent.append(min(ways.values()) * first)
             for other, (then, more) in enumerate(zip(self._operations, moved, strict=True), 1):
-                if other == number or not more or (then.part == one.part and other < number):
+                if other == number or not more or (then.part == operation.part and other < number):
                     continue
                 follows = self._arcs[number, other] = model.new_bool_var("")
                 nodes.append((number, other, follows))
@@ -209,7 +211,7 @@ class ShopModel:
                 }
                 least = min(gaps.values())
                 for (step, after), gap in gaps.items():
-                    begin = one.depart + self._carried(step) + gap
+                    begin = operation.depart + self._carried(step) + gap
                     model.add(then.depart >= begin).only_enforce_if(follows, trips[step], more[after])
                 spent.append(least * follows)
         add_chains(model, nodes, len(self._operations), robots)
@@ -242,14 +244,16 @@ class ShopModel:
             while number:
                 robot[number], number = own, after[number]
         queues = defaultdict[int, list[tuple[int, int, int]]](list)  # a part's decisions, the last one first
-        for number, one in enumerate(self._operations, 1):
-            step = next(step for (_, step), takes in one.takes.items() if solver.boolean_value(takes))
+        for number, operation in enumerate(self._operations, 1):
+            step = next(step for (_, step), takes in operation.takes.items() if solver.boolean_value(takes))
             taken = [option for option in step.trip if option.robot == robot[number]]
-            begins = [(option, solver.value(one.depart), self._carried(step)) for option in taken]
+            begins = [(option, solver.value(operation.depart), self._carried(step)) for option in taken]
             if step.work is not None:
-                begins.append((step.work, solver.value(one.begin), self._worked(step.to)))
+                begins.append((step.work, solver.value(operation.begin), self._worked(step.to)))
             for option, begin, long in begins:
-                queues[one.part].append((begin, begin + long, entry(one.part + 1, option.choice, self.cell.parts)))
+                queues[operation.part].append(
+                    (begin, begin + long, entry(operation.part + 1, option.choice, self.cell.parts))
+                )
         found = list[int]()
         waiting = {part: queue[::-1] for part, queue in queues.items()}
         while waiting:

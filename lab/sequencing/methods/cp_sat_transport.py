@@ -95,7 +95,7 @@ class TransportModel:
         if any(self.cell.takers):
             found += [self._in_order(solver, more, self._picked(solver)) for more in (tasks.brings, ())]
         runs = [self._carried_out(sequence) for sequence in dict.fromkeys(found)]
-        return min(runs, key=lambda one: one[1])[0]
+        return min(runs, key=lambda run: run[1])[0]
 
     @staticmethod
     def _picked(solver: Solution) -> Callable[[PartTask], tuple[int, int]]:

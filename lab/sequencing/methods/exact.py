@@ -147,7 +147,10 @@ class _Search:
     def _straight_on(self, state: MergedState) -> tuple[int, ...]:
         """The decisions of a greedy descent from a state, each to the successor of least bound; empty: it ends in a deadlock."""
         while not self.merged.done(state):
-            ahead = [(one.now + self._least.left(one), n, one) for n, one in enumerate(self.merged.successors(state))]
+            ahead = [
+                (successor.now + self._least.left(successor), n, successor)
+                for n, successor in enumerate(self.merged.successors(state))
+            ]
             self._straight += 1
             least, _, state = min(ahead, default=(FAR, 0, state))
             if least >= FAR:

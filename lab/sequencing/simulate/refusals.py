@@ -53,7 +53,7 @@ class Rooms:
         """An independent copy."""
         return Rooms(
             {at: times_s.copy() for at, times_s in self.free_s.items()},
-            {at: one.copy() for at, one in self.robots.items()},
+            {at: robot.copy() for at, robot in self.robots.items()},
         )
 
 

@@ -201,5 +201,7 @@ def _mount(root: Xml.Element, name: str, parent: str, child: str, place: tuple[s
 
 def _again(urdf: Urdf) -> Urdf:
     """The URDF indexed again after links were added."""
-    carrying = {one.get("link", ""): joint for joint in urdf.root.findall("joint") for one in joint.findall("child")}
+    carrying = {
+        child.get("link", ""): joint for joint in urdf.root.findall("joint") for child in joint.findall("child")
+    }
     return Urdf(urdf.path, urdf.root, carrying, urdf.foot)

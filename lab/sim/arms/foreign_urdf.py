@@ -75,7 +75,7 @@ class Urdf:
     def below(self, link: str) -> list[str]:
         """A link and all that it carries."""
         carried = [name for name, joint in self.carrying.items() if _end(joint, "parent") == link]
-        return [link, *(name for one in carried for name in self.below(one))]
+        return [link, *(name for child_link in carried for name in self.below(child_link))]
 
 
 def child(joint: Xml.Element) -> str:
@@ -199,7 +199,7 @@ def _find_meshes(path: Path, link: Xml.Element, folder: Path) -> None:
         if name.startswith(_PACKAGE):
             rest = name.removeprefix(_PACKAGE)
             places = [rest, rest.partition("/")[2]]
-        place = next((one for one in places if is_file(path.parent / one)), places[0])
+        place = next((candidate for candidate in places if is_file(path.parent / candidate)), places[0])
         check_mesh(path, place, folder)
         mesh.set("filename", str((path.parent / place).resolve()))
     _lighten(link)
@@ -207,7 +207,7 @@ def _find_meshes(path: Path, link: Xml.Element, folder: Path) -> None:
 
 def _lighten(link: Xml.Element) -> None:
     """Replaces visuals with too many triangles for a browser by the link's collision shapes."""
-    solids = [(one.find("origin"), one.find("geometry")) for one in link.findall("collision")]
+    solids = [(collision.find("origin"), collision.find("geometry")) for collision in link.findall("collision")]
     if _bytes(link.findall("collision")) > MOST_SEEN_BYTES or _bytes(link.findall("visual")) <= MOST_SEEN_BYTES:
         return
     material = link.find("visual/material")

@@ -82,7 +82,7 @@ def grip_of(shape: PartShape, gripper: Gripper, friction: float, given: GripFiel
                     )
                 )
         if found:
-            return min(found, key=lambda one: one[0])[1]
+            return min(found, key=lambda rated: rated[0])[1]
     raise BadInput(_refusal(sections, gripper, friction, slopes))
 
 

@@ -53,10 +53,10 @@ class Load:
     def of(cls, kind: Kind) -> "Load":
         """The load of a carried kind."""
         mass_kg, moment, foot_m = 0.0, 0.0, 0.0
-        for one in kind.stack():
-            mass_kg += one.part.mass_kg
-            moment += one.part.mass_kg * (foot_m + one.shape.foot_m)
-            foot_m += one.height_m
+        for layer in kind.stack():
+            mass_kg += layer.part.mass_kg
+            moment += layer.part.mass_kg * (foot_m + layer.shape.foot_m)
+            foot_m += layer.height_m
         carries = inf if kind.rider is None else kind.part.friction * kind.rider.part.friction
         lever_m = abs(moment / mass_kg - kind.grip.up_m)
         return cls(kind.name, mass_kg, kind.part.friction, lever_m, carries, kind.shape.solid, kind.gyration_m)

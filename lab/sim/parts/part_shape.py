@@ -116,7 +116,7 @@ def shape_of(part: PartFields, folder: Path) -> PartShape:
         hull, moments = _box(size) if part.shape == "box" else _cylinder(size)
         seen = Shape(part.shape, size if part.shape == "box" else (size[0] / 2, size[1]), None, (r, g, b, 1.0))
     looks = (seen,) if part.look is None else _look(part, folder)
-    x, y, z = (float(f"{one:.12g}") for one in moments)  # without rounding noise
+    x, y, z = (float(f"{moment:.12g}") for moment in moments)  # without rounding noise
     return PartShape(
         part.name,
         solid,
@@ -124,19 +124,19 @@ def shape_of(part: PartFields, folder: Path) -> PartShape:
         _quaternion(tilt @ axes),
         hull @ tilt.T,
         (x, y, z),
-        tuple(_placed(one, tilt, middle) for one in looks),
+        tuple(_placed(look, tilt, middle) for look in looks),
     )
 
 
 def visual_arrays(looks: Sequence[Shape]) -> dict[str, Any]:
     """The arguments of PyBullet's createVisualShapeArray except kinds and places; unused entries are blank."""
     return {
-        "halfExtents": [[edge / 2 for edge in one.size] if one.kind == "box" else [0.0] * 3 for one in looks],
-        "radii": [one.size[0] if one.kind in ("cylinder", "sphere") else 0.0 for one in looks],
-        "lengths": [one.size[1] if one.kind == "cylinder" else 0.0 for one in looks],
-        "fileNames": [str(one.mesh or "") for one in looks],
-        "meshScales": [list(one.size or (1, 1, 1)) if one.kind == "mesh" else [1, 1, 1] for one in looks],
-        "rgbaColors": [list(one.rgba) for one in looks],
+        "halfExtents": [[edge / 2 for edge in look.size] if look.kind == "box" else [0.0] * 3 for look in looks],
+        "radii": [look.size[0] if look.kind in ("cylinder", "sphere") else 0.0 for look in looks],
+        "lengths": [look.size[1] if look.kind == "cylinder" else 0.0 for look in looks],
+        "fileNames": [str(look.mesh or "") for look in looks],
+        "meshScales": [list(look.size or (1, 1, 1)) if look.kind == "mesh" else [1, 1, 1] for look in looks],
+        "rgbaColors": [list(look.rgba) for look in looks],
     }
 
 
@@ -153,13 +153,13 @@ def _quaternion(turn: Array) -> Quaternion:
         return (0.0, 0.0, 0.0, 1.0)
     from scipy.spatial.transform import Rotation
 
-    x, y, z, w = (float(one) + 0.0 for one in Rotation.from_matrix(turn).as_quat(canonical=True))
+    x, y, z, w = (float(value) + 0.0 for value in Rotation.from_matrix(turn).as_quat(canonical=True))
     return x, y, z, w
 
 
 def _placed(look: Shape, tilt: Array, middle: Array) -> Shape:
     """A visible shape without a turn of its own, moved from the axes of size, file or URDF to the part's."""
-    x, y, z = (float(one) + 0.0 for one in tilt @ (np.array(look.position) - middle))
+    x, y, z = (float(value) + 0.0 for value in tilt @ (np.array(look.position) - middle))
     return replace(look, position=(x, y, z), quaternion=_quaternion(tilt))
 
 
@@ -329,6 +329,8 @@ def seen_of(engine: Any, call: Call, shape: PartShape) -> int:
         return int(call("createVisualShape", engine.GEOM_MESH, **place))
     arrays = visual_arrays(shape.looks)
     kinds = [getattr(engine, f"GEOM_{look.kind.upper()}") for look in shape.looks]
-    at, turns = ([list(one) for one in ways] for ways in zip(*places, strict=True))  # PyBullet crashes over tuples
+    at, turns = (
+        [list(values) for values in ways] for ways in zip(*places, strict=True)
+    )  # PyBullet crashes over tuples
     arrays |= {"shapeTypes": kinds, "visualFramePositions": at, "visualFrameOrientations": turns}
     return int(call("createVisualShapeArray", **arrays))

@@ -243,7 +243,7 @@ class Places:
         kept = self.kept_free(len(order))
         places = [_draw_place(obstacle, kept, rng) for obstacle in self.task.obstacles]
         stand: list[tuple[float, Rectangle]] = []
-        offsets = [self._draw_off(*one, stand, rng) for one in zip(order, self.begins(order), strict=True)]
+        offsets = [self._draw_off(*placed, stand, rng) for placed in zip(order, self.begins(order), strict=True)]
         return Layout(tuple(places), tuple(offsets))
 
     def _draw_off(
@@ -305,19 +305,21 @@ class Places:
         Lower layers are left out, because they are no higher than the support of this spot, and so are parts on top of this one.
         """
         found: dict[tuple[str | float, ...], tuple[str, Spot]] = {}
-        stand = {one: [kind for kind, _ in self.grounds(station, one)] for one in self.spots(station)}
-        for one, own in stand.items():
+        stand = {
+            other_spot: [kind for kind, _ in self.grounds(station, other_spot)] for other_spot in self.spots(station)
+        }
+        for spot_there, own in stand.items():
             for other, kinds in stand.items():
                 # the places of a kind are filled from the lowest on, so none of its own stands above it yet
-                up = other.z - one.z
-                if other == one or not own or not kinds or up < 0.0 or (up > 0.0 and own == kinds):
+                up = other.z - spot_there.z
+                if other == spot_there or not own or not kinds or up < 0.0 or (up > 0.0 and own == kinds):
                     continue
-                if up > 0.0 and one in [under for _, under in self.below(station, other)]:
+                if up > 0.0 and spot_there in [under for _, under in self.below(station, other)]:
                     continue
-                along, across = beside((0.0, 0.0), -one.yaw, (other.x - one.x, other.y - one.y))
+                along, across = beside((0.0, 0.0), -spot_there.yaw, (other.x - spot_there.x, other.y - spot_there.y))
                 x, y = beside((spot.x, spot.y), spot.yaw, (along, across))
-                seen = Spot(x, y, spot.z + up, spot.yaw + other.yaw - one.yaw)
-                key = round(along, 4), round(across, 4), round(up, 4), round(other.yaw - one.yaw, 4)
+                seen = Spot(x, y, spot.z + up, spot.yaw + other.yaw - spot_there.yaw)
+                key = round(along, 4), round(across, 4), round(up, 4), round(other.yaw - spot_there.yaw, 4)
                 found |= {(kind.name, *key): (kind.name, seen) for kind in outermost(kinds)}
         return list(found.values())
 

@@ -159,7 +159,7 @@ def _rests(ground: Rectangle, below: list[Rectangle]) -> bool:
     held = []
     for along, across in product(shares, shares):
         at = beside((ground.x, ground.y), ground.yaw, (along * ground.half_along, across * ground.half_across))
-        if any(one.meets(Rectangle(*at, 0.0, 0.0, 0.0)) for one in below):
+        if any(support.meets(Rectangle(*at, 0.0, 0.0, 0.0)) for support in below):
             held.append((along, across))
     return bool(held) and all(min(axis) <= -RESTS and max(axis) >= RESTS for axis in zip(*held, strict=True))
 

@@ -63,7 +63,11 @@ def check(station: Station, folder: Path) -> None:
     if station.process is None:
         return
     root = urdf_reader.read(_file(station, folder)) if station.stands_on.lower().endswith(".urdf") else None
-    names = {} if root is None else {kind: [one.get("name") for one in root.iter(kind)] for kind in ("joint", "link")}
+    names = (
+        {}
+        if root is None
+        else {kind: [element.get("name") for element in root.iter(kind)] for kind in ("joint", "link")}
+    )
     lacking = [f"joint '{name}'" for name in HEAD_JOINTS if name not in names.get("joint", [])]
     lacking += [f"link '{HEAD_LINK}'"] if HEAD_LINK not in names.get("link", []) else []
     if lacking:

@@ -87,7 +87,7 @@ def format_of(source: Source) -> str:
     found = None if not rows else _of_text(source) or _of_numbers(source)
     if found is None:
         suffix = source.path.suffix.lower()
-        found = next((name for name, one in INSTANCES.items() if suffix in one.suffixes), None)
+        found = next((name for name, form in INSTANCES.items() if suffix in form.suffixes), None)
     if found is None or not rows:
         line, got = (rows[0][0], " ".join(rows[0][1])) if rows else (1, None)
         raise source.refusal(line, f"an instance ({', '.join(INSTANCES)})" + ("" if rows else ": it is empty"), got)
