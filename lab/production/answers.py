@@ -45,7 +45,7 @@ class Believe:
     @property
     def fixed(self) -> tuple[Deviation, ...]:
         """The deviations of fixed bodies, after which the scene is surveyed and learned again."""
-        return tuple(one for one in self.seen if one.sort in FIXED)
+        return tuple(deviation for deviation in self.seen if deviation.sort in FIXED)
 
 
 @dataclass(frozen=True)

@@ -225,7 +225,7 @@ def audited(
     """
     names = {cell.part_name(part): part for part in range(1, cell.parts + 1)}
     claimed = [name for name, part in names.items() if part in outcome.delivered]
-    struck = tuple(Struck(one.what, one.part, one.station) for one in outcome.happened)
+    struck = tuple(Struck(fault.what, fault.part, fault.station) for fault in outcome.happened)
     rows = rows_of(outcome.schedule, cell, "measured")
     kept = sequence and not any(isinstance(event, TroubleMet) for event in outcome.heard)
     planned = rows_of(simulate(cell, sequence), cell, "planned") if kept else ()

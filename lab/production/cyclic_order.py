@@ -34,8 +34,8 @@ def cycle_document(rhythm: Rhythm) -> dict[str, Any]:
         "most_parts_a_cycle": rhythm.most_parts,
         "why_no_more": rhythm.why_no_more or None,
         "tried": [
-            {"parts_a_cycle": one.parts, "period_s": one.period_s, "bound_s": one.bound_s, "proven": one.proven}
-            for one in rhythm.tried
+            {"parts_a_cycle": trial.parts, "period_s": trial.period_s, "bound_s": trial.bound_s, "proven": trial.proven}
+            for trial in rhythm.tried
         ],
         "most_in_work": cycle.most_in_work,
         "moves": cycle.to_json(),

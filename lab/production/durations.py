@@ -247,7 +247,10 @@ def _more_s(floor: Floor, skill: Skill, spots: Sequence[Spot]) -> float:
     }
     station, layered = task.station(skill.station), task.station(skill.station).is_layered
     standing = {spot for spot, _ in feet.values()}
-    carriers = {spot: [one for one in scene.places.below(station, spot) if one[1] not in standing] for spot in standing}
+    carriers = {
+        spot: [carrier for carrier in scene.places.below(station, spot) if carrier[1] not in standing]
+        for spot in standing
+    }
     for spot in () if skill.carries else standing:
         stand_below(scene, station.name, carriers[spot])
     assert pose is not None
@@ -258,7 +261,7 @@ def _more_s(floor: Floor, skill: Skill, spots: Sequence[Spot]) -> float:
             scene.add(name, skill.kind, foot)
             if bench.sight is not None:
                 bench.sight.where[scene.body_of(name, skill.kind)] = foot
-    for name, (spot, foot) in sorted(feet.items(), key=lambda one: one[1][0].z if skill.carries else -one[1][0].z):
+    for name, (spot, foot) in sorted(feet.items(), key=lambda item: item[1][0].z if skill.carries else -item[1][0].z):
         if skill.carries:  # other parts of its kind may have to stand below its support
             stand_below(scene, station.name, carriers[spot])
         floor.stand(pose)

@@ -30,7 +30,7 @@ class GivenUpParts:
         state.left_lying.add(name)
         state.spot_of.pop(name, None)
         state.finished.pop(part, None)
-        state.to_put_back = [one for one in state.to_put_back if one != part]
+        state.to_put_back = [other for other in state.to_put_back if other != part]
         self.floor.tell(PartLost(name, why, self.floor.now_s))
 
     def as_left(self, part: int, astray: bool = False) -> GivenUp | None:

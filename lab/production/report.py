@@ -190,7 +190,7 @@ class Report:
             "sequence": list(self.sequenced.sequence),
             "method": self.method,
             "order_learning": None if self.learning is None else self.learning.to_json(),
-            "replanned": [asdict(one) for one in outcome.replanned],
+            "replanned": [asdict(replan) for replan in outcome.replanned],
             "predicted_makespan_s": self.predicted_s,
             "measured_makespan_s": outcome.schedule.makespan_s if self.success else None,
             "optimal_makespan_s": self.proven.optimal_s,

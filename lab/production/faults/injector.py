@@ -32,9 +32,9 @@ def draw(task: Task, order: Order, seed: int, predicted_makespan_s: float) -> tu
         kind = kinds[int(rng.integers(len(kinds)))]
         at_s = round(float(rng.uniform(*BETWEEN)) * predicted_makespan_s, 1)
         fields = kind.drawn(task, order, rng)
-        if fields is not None and kind.what not in [one.what for one in found]:
+        if fields is not None and kind.what not in [drawn.what for drawn in found]:
             found.append(FaultFields.model_validate({"what": kind.what, "at_s": at_s, **fields}))
-    return tuple(sorted(found, key=lambda one: one.at_s))
+    return tuple(sorted(found, key=lambda fault: fault.at_s))
 
 
 class Injector:
@@ -44,7 +44,7 @@ class Injector:
     """
 
     def __init__(self, faults: Sequence[FaultFields]) -> None:
-        self.waiting: list[Fault] = [FAULTS[one.what](one, n) for n, one in enumerate(faults, start=1)]
+        self.waiting: list[Fault] = [FAULTS[fault.what](fault, n) for n, fault in enumerate(faults, start=1)]
         self.lasting: list[Fault] = []
         self.happened: list[Happened] = []
         self._look_s = 0.0

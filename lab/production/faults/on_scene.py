@@ -34,7 +34,7 @@ DRAWS = 60
 
 def machines_of(task: Task) -> list[str]:
     """The machines that parts are brought to."""
-    return [one.name for one in task.stations if one.kind == "machine" and task.kinds_at(one.name)]
+    return [station.name for station in task.stations if station.kind == "machine" and task.kinds_at(station.name)]
 
 
 def one_of(names: list[str], rng: np.random.Generator) -> str:
@@ -108,7 +108,7 @@ class ObstaclePut(Fault):
                 for low, count, cell in zip(grid.lower_m[:2], grid.shape[:2], grid.cell_m[:2], strict=True)
             )
             box = Rectangle(x, y, BOX_M[0] / 2 + ROOM_M, BOX_M[1] / 2 + ROOM_M, 0.0)
-            seen = any(in_grid(one.grid, (x, y)) for one in task.stations if one.grid is not None)
+            seen = any(in_grid(station.grid, (x, y)) for station in task.stations if station.grid is not None)
             if x * x + y * y > nearest**2 and not seen and not any(room.meets(box) for room in kept):
                 return {"at_m": (x, y)}
         return None
@@ -150,7 +150,7 @@ class ObstacleMoved(Fault):
     @classmethod
     def drawn(cls, task: Task, order: Order, rng: np.random.Generator) -> dict[str, object] | None:
         """One of the obstacles that the task says may stand elsewhere."""
-        names = [one.name for one in task.obstacles if max(one.area) > 0]
+        names = [obstacle.name for obstacle in task.obstacles if max(obstacle.area) > 0]
         return {"obstacle": one_of(names, rng), "by_m": any_way(OBSTACLE_M, rng)} if names else None
 
     def strikes(self, floor: Floor) -> Happened | None:
@@ -178,7 +178,7 @@ class ObstacleGone(Fault):
     @classmethod
     def drawn(cls, task: Task, order: Order, rng: np.random.Generator) -> dict[str, object] | None:
         """One of the obstacles that the task says may stand elsewhere."""
-        names = [one.name for one in task.obstacles if max(one.area) > 0]
+        names = [obstacle.name for obstacle in task.obstacles if max(obstacle.area) > 0]
         return {"obstacle": one_of(names, rng)} if names else None
 
     def strikes(self, floor: Floor) -> Happened | None:
@@ -233,7 +233,9 @@ class StationFull(Fault):
     def drawn(cls, task: Task, order: Order, rng: np.random.Generator) -> dict[str, object] | None:
         """Any station except those where parts begin."""
         begins = {task.starts(kind) for kind in order}
-        names = [one.name for one in task.stations if one.name not in begins and task.kinds_at(one.name)]
+        names = [
+            station.name for station in task.stations if station.name not in begins and task.kinds_at(station.name)
+        ]
         return {"station": one_of(names, rng)} if names else None
 
     @property

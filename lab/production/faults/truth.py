@@ -53,7 +53,7 @@ def verdict(
     Wrong: all others. If nothing struck, the reasons of a stop are not checked.
     """
     troubles = [event for event in heard if isinstance(event, TroubleMet)]
-    rows = tuple(_row(one, troubles) for one in happened)
+    rows = tuple(_row(fault, troubles) for fault in happened)
     unexplained = tuple(t.what for t in troubles if not explained(t.what, happened, t.part, t.station, t.at_s))
     why = "; ".join(_wrong(happened, heard, failure, lacking))
     came: Came = "delivered" if failure is None else "stopped"
@@ -64,9 +64,9 @@ def _wrong(
     happened: Sequence[Happened], heard: Sequence[Event], failure: str | None, lacking: Sequence[str]
 ) -> Iterator[str]:
     """The untrue statements of the run, and its untrue silences."""
-    for one in happened:
-        if one.undone and one.part not in lacking and not _begun_again(one, heard):
-            yield f"{one.part} was delivered, and '{one.station}' had not finished it"
+    for fault in happened:
+        if fault.undone and fault.part not in lacking and not _begun_again(fault, heard):
+            yield f"{fault.part} was delivered, and '{fault.station}' had not finished it"
     if failure is None and lacking:
         yield f"nothing was said of {', '.join(lacking)}"
     for piece in untrue([*pieces(failure or "")], happened) if happened else ():
@@ -87,25 +87,25 @@ def _follows(piece: str, true: Sequence[str]) -> bool:
     return stands is not None and any(one.startswith(f"{stands[1]} ") for one in true)
 
 
-def _begun_again(one: Happened, heard: Sequence[Event]) -> bool:
+def _begun_again(fault: Happened, heard: Sequence[Event]) -> bool:
     """Whether the machine from which a part was taken worked on it again."""
-    begun = [event for event in heard if isinstance(event, MachineBegan) and event.at_s >= one.at_s]
-    return any(event.part == one.part for event in begun)
+    begun = [event for event in heard if isinstance(event, MachineBegan) and event.at_s >= fault.at_s]
+    return any(event.part == fault.part for event in begun)
 
 
 def explained(reason: str, happened: Sequence[Happened], part: str = "", station: str = "", at_s: float = 1e9) -> bool:
     """Whether a fault that had struck makes a reason true: it is of a possible kind and affects the same body."""
-    return any(_explains(one, reason, part, station) for one in happened if one.at_s <= at_s)
+    return any(_explains(fault, reason, part, station) for fault in happened if fault.at_s <= at_s)
 
 
-def _explains(one: Happened, reason: str, part: str, station: str) -> bool:
+def _explains(fault: Happened, reason: str, part: str, station: str) -> bool:
     claims = [(kinds, anywhere) for pattern, kinds, anywhere in CLAIMS if re.search(pattern, reason)]
     for kinds, anywhere in claims[:1]:
-        if one.what in kinds and anywhere:
+        if fault.what in kinds and anywhere:
             return True
-        if one.what not in kinds and not (anywhere and one.what in PART):
+        if fault.what not in kinds and not (anywhere and fault.what in PART):
             return False
-    return one.explains(reason, part, station)
+    return fault.explains(reason, part, station)
 
 
 def pieces(failure: str) -> Iterator[str]:
@@ -115,10 +115,10 @@ def pieces(failure: str) -> Iterator[str]:
             yield piece.strip()
 
 
-def _row(one: Happened, troubles: Sequence[TroubleMet]) -> dict[str, Any]:
+def _row(fault: Happened, troubles: Sequence[TroubleMet]) -> dict[str, Any]:
     """A fault, and the first trouble of the run that refers to it."""
-    found = next((t for t in troubles if t.at_s >= one.at_s and _explains(one, t.what, t.part, t.station)), None)
-    row: dict[str, Any] = {"what": one.what, "at_s": round(one.at_s, 3), "true_reason": one.words}
+    found = next((t for t in troubles if t.at_s >= fault.at_s and _explains(fault, t.what, t.part, t.station)), None)
+    row: dict[str, Any] = {"what": fault.what, "at_s": round(fault.at_s, 3), "true_reason": fault.words}
     return row | {
         "noticed": None if found is None else found.what,
         "noticed_s": None if found is None else round(found.at_s, 3),
