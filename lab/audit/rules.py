@@ -24,22 +24,22 @@ AT_POSE_M, AT_POSE_RAD = 0.002, 0.02  # largest deviation of a body from its pos
 
 def findings(evidence: Evidence) -> list[Finding]:
     """All findings against a run, by time."""
-    found: list[Finding] = []
+    all_findings: list[Finding] = []
     for seen in evidence.parts:
         if seen.name in evidence.claimed:
-            found += _route(evidence, seen)
-            found += _end(evidence, seen)
+            all_findings += _route(evidence, seen)
+            all_findings += _end(evidence, seen)
         if evidence.undisturbed(seen.name):
-            found += stood(evidence, seen)
-            found += told(evidence, seen)
-            found += in_hand(evidence, seen)
-    found += _stations(evidence)
-    found += _capacities(evidence)
-    found += batches(evidence)
-    found += one_gripper(evidence)
-    found += in_one_another(evidence)
-    found += one_story(evidence)
-    return sorted(found, key=lambda finding: finding.at_s)
+            all_findings += stood(evidence, seen)
+            all_findings += told(evidence, seen)
+            all_findings += in_hand(evidence, seen)
+    all_findings += _stations(evidence)
+    all_findings += _capacities(evidence)
+    all_findings += batches(evidence)
+    all_findings += one_gripper(evidence)
+    all_findings += in_one_another(evidence)
+    all_findings += one_story(evidence)
+    return sorted(all_findings, key=lambda finding: finding.at_s)
 
 
 # ---- the route of one part -------------------------------------------------------------------------------------------
@@ -47,8 +47,8 @@ def findings(evidence: Evidence) -> list[Finding]:
 
 def _route(evidence: Evidence, seen: PartStays) -> list[Finding]:
     """The findings on a part's stays, by the route that gives the fewest."""
-    found = [list(_along(evidence, seen, route)) for route in evidence.task.part(seen.kind).routes]
-    return min(found, key=len)
+    by_route = [list(_along(evidence, seen, route)) for route in evidence.task.part(seen.kind).routes]
+    return min(by_route, key=len)
 
 
 def _along(evidence: Evidence, seen: PartStays, route: Sequence[Stage]) -> Iterator[Finding]:

@@ -77,10 +77,10 @@ def study_compare(
 
 def listed(name: str, text: str) -> list[str]:
     """The values of an option, separated by commas; BadInput for an empty one."""
-    found = [word.strip() for word in text.split(",")]
-    if not all(found):
+    words = [word.strip() for word in text.split(",")]
+    if not all(words):
         raise BadInput(f"--{name.replace('_', '-')} '{text}': wanted one value, or several with commas between")
-    return found
+    return words
 
 
 def parsed(name: str, text: str) -> list[Any]:

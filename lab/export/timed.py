@@ -39,14 +39,14 @@ class TimedPoints:
 def timed(program: Program) -> TimedPoints:
     """The points of a run, as few as stay within WITHIN_RAD of its joints; numbers are rounded to DIGITS decimals."""
     drops = [transfer.drop_s for transfer in program.carried.transfers]
-    found: list[Point] = []
+    points: list[Point] = []
     for t_s, joints, waits_for in _rows(program):
         pose = program.arm.forward(joints)
         tool = (_rounded(pose.x), _rounded(pose.y), _rounded(pose.z), _rounded(pose.yaw))
         closed = bool(closed_at(program.carried.actions, np.array([t_s + 1e-9]))[0])
         job = int(np.searchsorted(drops, t_s, side="left")) + 1
-        found.append(Point(_rounded(t_s), tuple(map(_rounded, joints)), tool, closed, waits_for, job))
-    return TimedPoints(program.arm.joints, tuple(found))
+        points.append(Point(_rounded(t_s), tuple(map(_rounded, joints)), tool, closed, waits_for, job))
+    return TimedPoints(program.arm.joints, tuple(points))
 
 
 def _rounded(number: float) -> float:

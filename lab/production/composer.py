@@ -137,10 +137,10 @@ class Production:
         while asked and self.floor.protected(f"{asked}{PUT_RIGHT}"):
             self.recovery.forget()
             try:
-                found = self.recovery.find_again(attended=True)
-                if not found:
+                any_back = self.recovery.find_again(attended=True)
+                if not any_back:
                     self.recovery.replan("a person has put things right")
-                return found or bool(self.state.sequence)
+                return any_back or bool(self.state.sequence)
             except RunStopped as stopped:
                 asked = str(stopped)
         return False
@@ -229,9 +229,9 @@ def audited(
     rows = rows_of(outcome.schedule, cell, "measured")
     kept = sequence and not any(isinstance(event, TroubleMet) for event in outcome.heard)
     planned = rows_of(simulate(cell, sequence), cell, "planned") if kept else ()
-    found = audit(Evidence(prepared.task, prepared.order, tracks_of(recording), rows, claimed, struck, planned))
-    delivered = tuple(names[name] for name in found.delivered)
-    return replace(outcome, audit=found, delivered=delivered, failure=outcome.failure or found.failure)
+    judged = audit(Evidence(prepared.task, prepared.order, tracks_of(recording), rows, claimed, struck, planned))
+    delivered = tuple(names[name] for name in judged.delivered)
+    return replace(outcome, audit=judged, delivered=delivered, failure=outcome.failure or judged.failure)
 
 
 def noting(journal: RunJournal, heard: list[Event], tell: Tell) -> Callable[[Event, int], None]:

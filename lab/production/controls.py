@@ -49,7 +49,7 @@ class Controls:
     @property
     def held(self) -> Held | None:
         """The stop with the highest priority, in the order emergency, protective, pause; None if there is none."""
-        return next((found for kind in PRIORITY if (found := self.stops.get(kind)) is not None), None)
+        return next((stop for kind in PRIORITY if (stop := self.stops.get(kind)) is not None), None)
 
     @property
     def holds_arm(self) -> bool:

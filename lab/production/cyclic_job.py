@@ -123,16 +123,16 @@ def _largest(make: Callable[[int], Cell], most: int, step: int) -> Cell:
 def _finite(cycle: Cycle, cell: Cell) -> dict[str, Any]:
     """The cost of the cycle for the cell's parts beside that of the best order; None for a missing one, with the reason."""
     parts = cell.parts
-    found: dict[str, Any] = {"parts": parts, "why_not": None}
+    document: dict[str, Any] = {"parts": parts, "why_not": None}
     names = ("cyclic_makespan_s", "cyclic_sequence", "waits_on_purpose", "best_s", "best_per_part_s", "best_proven")
-    found |= dict.fromkeys(names)
+    document |= dict.fromkeys(names)
     try:
         made = unrolled(cycle, cell)
-        found["cyclic_makespan_s"], found["cyclic_sequence"] = made.schedule.makespan_s, list(made.sequence)
-        found["waits_on_purpose"] = made.waits
+        document["cyclic_makespan_s"], document["cyclic_sequence"] = made.schedule.makespan_s, list(made.sequence)
+        document["waits_on_purpose"] = made.waits
         best = optimum(cell, MAX_EXPANDED)
-        found["best_s"], found["best_proven"] = best.cost, best.proven
-        found["best_per_part_s"] = best.cost / parts
+        document["best_s"], document["best_proven"] = best.cost, best.proven
+        document["best_per_part_s"] = best.cost / parts
     except LabError as error:
-        found["why_not"] = str(error)
-    return found
+        document["why_not"] = str(error)
+    return document

@@ -191,16 +191,16 @@ def measure(
     """
     tell, skillset, timed = on_move or (lambda name, seconds: None), prepared.skillset, trials(prepared)
     whole = Durations({}, {}, {})
-    for found in (workers or Workers()).each(partial(carried_out, prepared), timed):
-        for carried in found.loaded_s:
-            found.loaded_s[carried] += sum(whole.more_s.get(skill.name, 0.0) for skill in skillset.legs[carried])
-        for way, seconds in (found.loaded_s | found.empty_s).items():
+    for timed_now in (workers or Workers()).each(partial(carried_out, prepared), timed):
+        for carried in timed_now.loaded_s:
+            timed_now.loaded_s[carried] += sum(whole.more_s.get(skill.name, 0.0) for skill in skillset.legs[carried])
+        for way, seconds in (timed_now.loaded_s | timed_now.empty_s).items():
             tell(f"{_word(way)}, {'loaded' if isinstance(way, CarriedPath) else 'empty'}", seconds)
-        for station, seconds in found.process_s.items():
+        for station, seconds in timed_now.process_s.items():
             tell(skillset.processes[station][-1].name, seconds)
-        for own, seconds in found.service_s.items():
+        for own, seconds in timed_now.service_s.items():
             tell(_service(own), seconds)
-        whole = whole.joined(found)
+        whole = whole.joined(timed_now)
     return replace(whole, more_s={})
 
 
@@ -209,27 +209,27 @@ def carried_out(prepared: Prepared, trial: TimingTrial) -> Durations:
     skillset = prepared.skillset
     with World() as world:
         floor = Floor(world, skillset, prepared.surveys.layout, parts=len(prepared.order))
-        found = Durations({}, {}, {})
+        durations = Durations({}, {}, {})
         if trial.loaded is not None:
             leg = skillset.legs[trial.loaded]
             for skill in leg:
                 skill.furnish(floor.bench)
             leg[0].begin(floor.bench)
             part = leg[0].part
-            found.loaded_s[trial.loaded] = _timed(floor, leg, part)
+            durations.loaded_s[trial.loaded] = _timed(floor, leg, part)
             for skill in skillset.processes[trial.loaded.target] if trial.process else ():
-                found.process_s[trial.loaded.target] = _timed(floor, [skill], part)
+                durations.process_s[trial.loaded.target] = _timed(floor, [skill], part)
         for pair in trial.empty:
             way = skillset.travels[pair]
             way[0].begin(floor.bench)
-            found.empty_s[pair] = _timed(floor, way)
+            durations.empty_s[pair] = _timed(floor, way)
         if trial.service is not None:
             skills = skillset.services[trial.service]
             skills[0].begin(floor.bench)
-            found.service_s[trial.service] = _timed(floor, skills)
+            durations.service_s[trial.service] = _timed(floor, skills)
         if trial.at:
-            found.more_s[trial.at] = _more_s(floor, skillset.skills[trial.at], trial.spots)
-        return replace(found, sim_s=world.steps * TIME_STEP)
+            durations.more_s[trial.at] = _more_s(floor, skillset.skills[trial.at], trial.spots)
+        return replace(durations, sim_s=world.steps * TIME_STEP)
 
 
 def _more_s(floor: Floor, skill: Skill, spots: Sequence[Spot]) -> float:

@@ -51,9 +51,9 @@ class GivenUpParts:
         asked = {part: left for part, left in state.given_up.items() if attended or left.astray}
         back = {part: left for part, left in asked.items() if self._is_back(part, left)}
         standing = {part for part, left in back.items() if left.spot is not None and self._stands(part, left.spot)}
-        found, later = with_room(state, back, standing)
+        ready, later = with_room(state, back, standing)
         state.given_up |= {part: replace(left, astray=True) for part, left in later.items()}
-        return found
+        return ready
 
     def take_back(self, part: int, left: GivenUp) -> None:
         """Returns a given-up part to the job."""

@@ -63,8 +63,8 @@ def look(floor: Floor, state: RunState) -> None:
     if floor.now_s - state.looked_s < LOOK_S:
         return
     state.looked_s = floor.now_s
-    if found := new_deviations(floor, state):
-        raise Trouble(found[0].words, found[0].name, found[0].station, seen=True)
+    if deviations := new_deviations(floor, state):
+        raise Trouble(deviations[0].words, deviations[0].name, deviations[0].station, seen=True)
     if not floor.world.dark:
         state.right_s = floor.now_s
 
@@ -72,8 +72,10 @@ def look(floor: Floor, state: RunState) -> None:
 def new_deviations(floor: Floor, state: RunState) -> list[Deviation]:
     """The deviations that are new to a run, without those of given-up parts and of known strange parts."""
     delivered = {state.name(part) for part in state.finished}
-    found = perceive(floor, floor.scene.task, floor.scene.layout, state.spot_of, delivered)
-    return [deviation for deviation in found if deviation.sort != "camera blind" and not _is_known(state, deviation)]
+    deviations = perceive(floor, floor.scene.task, floor.scene.layout, state.spot_of, delivered)
+    return [
+        deviation for deviation in deviations if deviation.sort != "camera blind" and not _is_known(state, deviation)
+    ]
 
 
 def _is_known(state: RunState, seen: Deviation) -> bool:
@@ -93,8 +95,8 @@ def perceive(
     """
     if floor.world.dark:
         return [Deviation("camera blind", "", "the camera sees nothing")]
-    found = [*_parts(floor, task, spot_of, delivered), *_strange_parts(floor, task, spot_of)]
-    return [*found, *_obstacles(floor, task, layout), *_stations(floor, task)]
+    deviations = [*_parts(floor, task, spot_of, delivered), *_strange_parts(floor, task, spot_of)]
+    return [*deviations, *_obstacles(floor, task, layout), *_stations(floor, task)]
 
 
 def _parts(floor: Floor, task: Task, spot_of: Mapping[str, Spot], delivered: Container[str]) -> Iterator[Deviation]:

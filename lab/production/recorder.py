@@ -82,7 +82,7 @@ def show_scene(task: Task, order: Order, layout: Layout, viewer: Viewer) -> None
 
 def extras_of(scene: Scene, skillset: SkillSet) -> dict[str, tuple[Body, ...]]:
     """The extra bodies of each part of a scene: the coats and finishes that machines leave on it."""
-    found: dict[str, tuple[Body, ...]] = {}
+    extras: dict[str, tuple[Body, ...]] = {}
     for name, kind in scene.kind_of.items():
         bodies: list[Body] = []
         for station in (scene.task.station(place) for place in kind.part.places):
@@ -95,8 +95,8 @@ def extras_of(scene: Scene, skillset: SkillSet) -> dict[str, tuple[Body, ...]]:
             for skill in skillset.processes[station.name]:
                 bodies += skill.on_part(name, kind)
         if bodies:
-            found[name] = tuple(bodies)
-    return found
+            extras[name] = tuple(bodies)
+    return extras
 
 
 def _windows(kind: Kind, station: str) -> list[float | None]:

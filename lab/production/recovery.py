@@ -274,26 +274,26 @@ class Recovery:
         ready_s |= dict.fromkeys(sorted(taken_up), 0.0)
         mishaps = Mishaps(frozenset(state.lost), tuple(state.out), ready_s, back)
         try:
-            found = plan_again(state.plan, mishaps, first, self.planner)
+            new_plan = plan_again(state.plan, mishaps, first, self.planner)
         except LabError as error:
             if first is None or not self.set_aside(why):
                 raise RunStopped(f"{why}: {error}") from None
             self.replan(why, back)
             return
-        for part, stuck in found.stuck.items():
+        for part, stuck in new_plan.stuck.items():
             if part not in state.lost:
                 reasons = ", ".join(f"'{station}': {what}" for station, what in state.out.items())
                 self.given_up.lose(part, f"{stuck}: {reasons}" if reasons else stuck)
-        state.sequence = [*found.sequence]
-        state.go_by(found.run, floor.now_s)
+        state.sequence = [*new_plan.sequence]
+        state.go_by(new_plan.run, floor.now_s)
         gap = None
-        if found.schedule is not None:
-            is_proven = found.proven is not None and found.proven.proven
-            gap = None if found.proven is None else found.proven.gap(found.schedule.makespan_s)
-            plan = found.schedule.later(now_s)
-            floor.tell(PlanMade(plan, len(state.sequence), gap, is_proven, now_s, why, found.method))
-        if found.method:
-            state.replanned.append(Replanned(now_s, why, found.method, len(state.sequence), gap))
+        if new_plan.schedule is not None:
+            is_proven = new_plan.proven is not None and new_plan.proven.proven
+            gap = None if new_plan.proven is None else new_plan.proven.gap(new_plan.schedule.makespan_s)
+            plan = new_plan.schedule.later(now_s)
+            floor.tell(PlanMade(plan, len(state.sequence), gap, is_proven, now_s, why, new_plan.method))
+        if new_plan.method:
+            state.replanned.append(Replanned(now_s, why, new_plan.method, len(state.sequence), gap))
 
     def set_aside(self, why: str) -> bool:
         """Sets down the part in the gripper, which cannot be brought on now; returns whether that succeeded."""
@@ -313,20 +313,20 @@ class Recovery:
         If no order brings the parts on, they are given up as before.
         """
         state, parts = self.state, self.given_up
-        found = parts.found(attended)
-        why = {part: state.lost[part] for part in found}
-        for part, left in found.items():
+        ready = parts.found(attended)
+        why = {part: state.lost[part] for part in ready}
+        for part, left in ready.items():
             parts.take_back(part, left)
             self._tell(Trouble("it can be taken up again", state.name(part)), "goes on with it")
         try:
-            if found:
-                self.replan("a part can be taken up again", {part: left.position for part, left in found.items()})
+            if ready:
+                self.replan("a part can be taken up again", {part: left.position for part, left in ready.items()})
         except RunStopped as stopped:
             self._note(str(stopped))
-            for part, left in found.items():
+            for part, left in ready.items():
                 self.given_up.lose(part, why[part], left)
             return False
-        return bool(found)
+        return bool(ready)
 
     def forget(self) -> None:
         """Reopens closed stations and resets the counts of tries, after a person has put things right."""

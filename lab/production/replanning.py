@@ -99,12 +99,12 @@ def _ordered(rest: Rest, now: Run, first: tuple[int, ...], planner: Planner) -> 
     """The plan of the rest, which begins after the first decisions; its bound covers both."""
     if rest.cell is None:
         return NewPlan(now, first, None, None, rest.stuck)
-    found, ahead = optimum(rest.cell), branch(now)
+    best, ahead = optimum(rest.cell), branch(now)
     for decision in first:
         ahead.move(decision)
-    own, method = planner.order(rest.cell, found)
-    cost, bound_s = (ahead.now_s + seconds for seconds in (found.cost, found.bound_s))
-    whole = replace(found, cost=cost, sequence=(*first, *found.sequence), bound_s=bound_s)
+    own, method = planner.order(rest.cell, best)
+    cost, bound_s = (ahead.now_s + seconds for seconds in (best.cost, best.bound_s))
+    whole = replace(best, cost=cost, sequence=(*first, *best.sequence), bound_s=bound_s)
     # With windows it may be better to hold the part in the gripper for a while, which the plan of the rest ignores.
     proven = None if first and now.cell.has_windows else whole
     schedule = simulate(now.cell, (*first, *own))

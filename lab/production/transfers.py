@@ -29,10 +29,10 @@ MOST_ASIDE = 3  # most places that are tried to set a part aside
 
 def first_spots(floor: Floor, state: RunState) -> dict[str, Spot]:
     """The first spots of the bodies of all parts, by body."""
-    scene, found = floor.scene, dict[str, Spot]()
+    scene, spots = floor.scene, dict[str, Spot]()
     for part, spot in enumerate(scene.places.begins(scene.order), start=1):
-        found |= dict.fromkeys(bodies_of(floor, state, part), spot)
-    return found
+        spots |= dict.fromkeys(bodies_of(floor, state, part), spot)
+    return spots
 
 
 def bodies_of(floor: Floor, state: RunState, part: int) -> list[str]:

@@ -95,8 +95,8 @@ class RunProgress:
                 self._say(f"  {event.name:{_NAME}} {event.seconds:6.2f} s")
             case SequenceFound():
                 self._stands = ""  # which this line contains
-                order, found = sequence_parts(event)
-                self._pack([Text(f"  {order}"), Text(found)], gap=" ")
+                order, cost = sequence_parts(event)
+                self._pack([Text(f"  {order}"), Text(cost)], gap=" ")
             case OrderChosen():
                 self._say(f"  {run_text(event)}")
             case SequencingStands() if self._running and self._task is not None and self.console.is_terminal:

@@ -55,12 +55,12 @@ def looks(path: Path) -> dict[str, tuple[Shape, ...]]:
     """The visuals of each link of a valid URDF, with their colours; the root link is ''."""
     root = Xml.parse(path).getroot()
     children = {child.get("link") for child in root.iterfind("joint/child")}
-    found = {}
+    looks_of = {}
     for link in root.iter("link"):
         name = link.get("name", "")
         shapes = (_shape(path, visual) for visual in link.iter("visual"))
-        found[name if name in children else ""] = tuple(shape for shape in shapes if shape is not None)
-    return found
+        looks_of[name if name in children else ""] = tuple(shape for shape in shapes if shape is not None)
+    return looks_of
 
 
 def _shape(path: Path, visual: Xml.Element) -> Shape | None:

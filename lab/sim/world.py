@@ -333,9 +333,9 @@ class World:
         """
         entry, movable = self._bodies[name], {body.number for body in self._bodies.values() if body.moves}
         touched = {
-            int(found[2])
+            int(contact[2])
             for link in links
-            for found in self._call("getContactPoints", entry.number, linkIndexA=entry.links[link])
+            for contact in self._call("getContactPoints", entry.number, linkIndexA=entry.links[link])
         }
         for number in sorted(touched & movable - {entry.number}):
             self._call("setCollisionFilterGroupMask", number, -1, GROUP, ALL)

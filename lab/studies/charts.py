@@ -80,8 +80,8 @@ def curve(axes: "Axes", rows: Sequence[Row], by: str, look: Look) -> None:
 def legend_below(figure: "Figure", handles: Mapping[str, "Artist"] | None = None) -> None:
     """Draws one legend below all plots, in as many columns as fit; handles: by name, None for all artists with labels."""
     if handles is None:
-        found = [axes.get_legend_handles_labels() for axes in figure.axes]
-        handles = {name: handle for some, names in found for handle, name in zip(some, names, strict=True)}
+        legends = [axes.get_legend_handles_labels() for axes in figure.axes]
+        handles = {name: handle for some, names in legends for handle, name in zip(some, names, strict=True)}
     fitting = int(LETTERS_AN_INCH * figure.get_figwidth() / (max(map(len, handles)) + 6))
     columns = min(len(handles), max(1, fitting))
     figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=columns)

@@ -101,10 +101,10 @@ def _mean(values: Any) -> tuple[float, float, float]:
 def _curves(results: Sequence[Result]) -> bytes:
     def draw(figure: "Figure") -> None:
         axes: Axes = figure.add_subplot()
-        for n, (named, found) in enumerate(results):
+        for n, (named, measured) in enumerate(results):
             name = words(named, [other for other, _ in results])
             look: dict[str, Any] = {"color": COLOURS[n % len(COLOURS)], "linestyle": DASHES[n // len(COLOURS)]}
-            axes.plot(np.arange(1, len(found.curve) + 1), found.curve, label=name, linewidth=1.3, **look)
+            axes.plot(np.arange(1, len(measured.curve) + 1), measured.curve, label=name, linewidth=1.3, **look)
         axes.set(xlabel="episode", ylabel="steps", ylim=(0, None))
         axes.yaxis.label.set_color(INK)
         axes.grid(axis="y")
@@ -137,15 +137,15 @@ class ComparedSessions:
     def from_json(cls, record: Mapping[str, list[float]], sessions: int) -> "ComparedSessions":
         """The results that `to_json` wrote. Raises KeyError, TypeError or ValueError for anything else."""
         kinds = {"solved": np.bool_, "rejected": np.bool_}
-        found: dict[str, Any] = {
+        arrays: dict[str, Any] = {
             name: np.array(record[name], kinds.get(name, np.float64)) for name in cls.__dataclass_fields__
         }
         if (
-            any(values.shape != (sessions,) for name, values in found.items() if name != "curve")
-            or found["curve"].ndim != 1
+            any(values.shape != (sessions,) for name, values in arrays.items() if name != "curve")
+            or arrays["curve"].ndim != 1
         ):
             raise ValueError("lists of other lengths")
-        return cls(**found)
+        return cls(**arrays)
 
 
 # ---- the comparison -------------------------------------------------------------------------------------------------
@@ -227,13 +227,13 @@ def compared(what: Compared, job: Job) -> Findings:
     left = [key for key in keys if key not in done]
     job.progress(len(done), len(keys))
     work = partial(sessions_of, sessions=job.sessions, seed=job.seed)
-    for setting, found in job.computed(work, [keys[key] for key in left], 1):
+    for setting, measured in job.computed(work, [keys[key] for key in left], 1):
         key = key_of(setting, problem, job)
-        done[key] = found
-        job.keep({"key": key, **found.to_json()})
+        done[key] = measured
+        job.keep({"key": key, **measured.to_json()})
         job.progress(len(done), len(keys))
     results = {key: (setting.named, done[key]) for key, setting in keys.items()}
-    rows = [row for named, found in results.values() for row in rows_of(named, found)]
+    rows = [row for named, measured in results.values() for row in rows_of(named, measured)]
     return Findings(rows, in_short(results.values()), figures([*results.values()]), (MEASURES,))
 
 
@@ -284,14 +284,14 @@ def _alone(
     )
 
 
-def rows_of(named: Row, found: ComparedSessions) -> list[Row]:
+def rows_of(named: Row, measured: ComparedSessions) -> list[Row]:
     """The rows of one setting, one per measure."""
     return [
-        share_row(named, "solved_percent", found.solved),
-        mean_row(named, "mean_steps", found.mean_steps),
-        *(varying_row(named, name, getattr(found, name)) for name in ("last_steps", "helped_steps")),
-        *(varying_row(named, name, getattr(found, name)) for name in ("requests", "misleads")),
-        share_row(named, "rejected_percent", found.rejected),
+        share_row(named, "solved_percent", measured.solved),
+        mean_row(named, "mean_steps", measured.mean_steps),
+        *(varying_row(named, name, getattr(measured, name)) for name in ("last_steps", "helped_steps")),
+        *(varying_row(named, name, getattr(measured, name)) for name in ("requests", "misleads")),
+        share_row(named, "rejected_percent", measured.rejected),
     ]
 
 

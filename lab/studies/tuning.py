@@ -67,8 +67,8 @@ def search(
         costs: dict[int, list[float]] = {trial.number: [] for trial in asked}
         left, given_up = list(asked), set()
         for rung in range(rungs):
-            found = measure(rung, [trial.params for trial in left])
-            for trial, cost in zip(list(left), found, strict=True):
+            measured = measure(rung, [trial.params for trial in left])
+            for trial, cost in zip(list(left), measured, strict=True):
                 if cost is not None:
                     costs[trial.number].append(cost)
                     trial.report(cost, rung)
@@ -109,8 +109,8 @@ def _importances(optuna: Any, study: Any) -> dict[str, float]:
     if len({trial.value for trial in ended}) < BATCH:
         return {}
     evaluator = optuna.importance.PedAnovaImportanceEvaluator()
-    found = optuna.importance.get_param_importances(study, evaluator=evaluator)
-    return {name: float(share) for name, share in found.items()}
+    importances = optuna.importance.get_param_importances(study, evaluator=evaluator)
+    return {name: float(share) for name, share in importances.items()}
 
 
 # ---- the figures ----------------------------------------------------------------------------------------------------
@@ -118,10 +118,10 @@ def _importances(optuna: Any, study: Any) -> dict[str, float]:
 
 def figures(trials: Sequence[Trial], importances: Mapping[str, float], gained: FloatArray) -> dict[str, bytes]:
     """SVG pictures by caption; gained: (N,), the gain of each unseen session."""
-    found = {"Gain of each session over the problem's own settings, on unseen seeds": _gain(gained)}
+    drawn = {"Gain of each session over the problem's own settings, on unseen seeds": _gain(gained)}
     if importances:
-        found["Which settings the cost hangs on"] = _importance(importances)
-    return found | {"Cost of each trial, and the best so far": _history(trials)}
+        drawn["Which settings the cost hangs on"] = _importance(importances)
+    return drawn | {"Cost of each trial, and the best so far": _history(trials)}
 
 
 def _gain(gained: FloatArray) -> bytes:
@@ -241,10 +241,10 @@ def tuned(what: Tuning, job: Job) -> Findings:
 
     def measure(rung: int, those: Sequence[Values]) -> list[float | None]:
         nonlocal done
-        found = kept.sessions([what.setting(values) for values in those], shares[rung], rung)
+        measured = kept.sessions([what.setting(values) for values in those], shares[rung], rung)
         done += len(those)
         job.progress(done, total)
-        return [None if sessions is None else float(costs(sessions, limit).mean()) for sessions in found]
+        return [None if sessions is None else float(costs(sessions, limit).mean()) for sessions in measured]
 
     trials, importances = search(ranges, first, what.trials, job.seed, len(SHARES), measure)
     ended = [trial for trial in trials if not trial.pruned]
@@ -259,9 +259,9 @@ def tuned(what: Tuning, job: Job) -> Findings:
     return _findings(trials, importances, best, (before, after), limit)
 
 
-def costs(found: ComparedSessions, limit: int) -> FloatArray:
+def costs(measured: ComparedSessions, limit: int) -> FloatArray:
     """The cost of each session, (N,)."""
-    return found.mean_steps * found.solved + limit * ~found.solved
+    return measured.mean_steps * measured.solved + limit * ~measured.solved
 
 
 def _within(value: Any, allowed: Range) -> Any:
@@ -284,7 +284,7 @@ class _KeptSessions:
         self, settings: Sequence[ComparedSetting], sessions: int, stream: int
     ) -> list[ComparedSessions | None]:
         """The sessions of each setting, with the seeds of that stream; None for an invalid setting."""
-        found: dict[str, ComparedSessions | None] = {}
+        by_key: dict[str, ComparedSessions | None] = {}
         keys: list[str] = []
         left: list[ComparedSetting] = []
         for setting in settings:
@@ -292,21 +292,21 @@ class _KeptSessions:
                 key = f"{key_of(setting, self.problem, replace(self.job, sessions=sessions))}-{stream}"
             except BadInput:
                 key = f"none-{len(keys)}"
-                found[key] = None
+                by_key[key] = None
             keys.append(key)
-            if key in found:
+            if key in by_key:
                 continue
             try:
-                found[key] = ComparedSessions.from_json(self.entries[key], sessions)
+                by_key[key] = ComparedSessions.from_json(self.entries[key], sessions)
             except (KeyError, TypeError, ValueError, OverflowError):
-                found[key] = None
+                by_key[key] = None
                 left.append(setting)
         by_setting = dict(zip(settings, keys, strict=True))
         work = partial(sessions_of, sessions=sessions, seed=self.job.seed, stream=stream)
         for setting, result in self.job.computed(work, left, 1):
-            found[by_setting[setting]] = result
+            by_key[by_setting[setting]] = result
             self.job.keep({"key": by_setting[setting], **result.to_json()})
-        return [found[key] for key in keys]
+        return [by_key[key] for key in keys]
 
 
 def settings_text(what: Tuning, values: Values) -> str:
@@ -343,11 +343,11 @@ def _findings(
     gained = costs(before, limit) - costs(after, limit)
     gain, low, high = interval(gained) if gained.any() else (0.0, 0.0, 0.0)
     rows: list[Row] = []
-    for settings, found in (("own", before), ("tuned", after)):
+    for settings, measured in (("own", before), ("tuned", after)):
         named = {"settings": settings, "trial": None, "setting": None}
-        rows.append(mean_row(named, "cost", costs(found, limit)))
-        rows.append(share_row(named, "solved_percent", found.solved))
-        rows.append(mean_row(named, "helped_steps", found.helped_steps))
+        rows.append(mean_row(named, "cost", costs(measured, limit)))
+        rows.append(share_row(named, "solved_percent", measured.solved))
+        rows.append(mean_row(named, "helped_steps", measured.helped_steps))
     rows.append(row({"settings": "tuned", "trial": None, "setting": None}, "gain", gain, (low, high)))
     rows += [
         row({"settings": None, "trial": None, "setting": name}, "importance", share)

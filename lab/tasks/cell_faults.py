@@ -164,8 +164,8 @@ def loc_of(cell: CellFields, message: str) -> Loc:
         for number in reversed(range(len(members))):  # of two with the same name, the second one is at fault
             if message.startswith(f"{field[:-1]} '{members[number].name}'"):
                 return (field, number, "name")
-    if found := re.match(r"due_s of part (\d+) ", message):
-        return ("due_s", int(found[1]) - 1)
+    if match := re.match(r"due_s of part (\d+) ", message):
+        return ("due_s", int(match[1]) - 1)
     return next(((field,) for field in ("due_s", "release_s") if message.startswith(field)), ())
 
 
@@ -176,7 +176,7 @@ def _bad_stage(cell: CellFields) -> Loc:
             try:
                 check_layout(cell.built_stations, (replace(product, routes=(route,)),))
             except BadInput as error:
-                found = re.match(r".*stage (\d+) of ", str(error))
-                stage = () if found is None else (int(found[1]) - 1,)
+                match = re.match(r".*stage (\d+) of ", str(error))
+                stage = () if match is None else (int(match[1]) - 1,)
                 return ("products", i, "routes", j, *stage)
     return ()

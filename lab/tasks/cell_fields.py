@@ -263,10 +263,10 @@ class CellFields(Record):
         """The seconds from each station to each other: the travel table, or the durations of the paths on the track."""
         if self.track is None:
             return self.travel
-        names, found = self.station_names, Times()
+        names, table = self.station_names, Times()
         for (origin, target), way in ways_on(self.track.built(), names).items():
-            found.setdefault(names[origin], {})[names[target]] = travel_s(way)
-        return found
+            table.setdefault(names[origin], {})[names[target]] = travel_s(way)
+        return table
 
     @property
     def built_stations(self) -> tuple[Station, ...]:

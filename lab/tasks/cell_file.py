@@ -33,12 +33,12 @@ class CellFile(CellFields):
     def checked(cls, toml: TomlText) -> Self:
         """The cell file of a text; raises BadInput, with file and line, when its own order is invalid."""
         try:
-            found = cls.model_validate(toml.raw)
+            cell_file = cls.model_validate(toml.raw)
         except ValidationError as error:
             raise toml.refusal(finding(error)["loc"], explain(error, partial(fields_at, cls), raw=toml.raw)) from None
-        found._toml = toml
-        found.cell()
-        return found
+        cell_file._toml = toml
+        cell_file.cell()
+        return cell_file
 
     def cell(self, order: Sequence[str] | int | None = None) -> Cell:
         """The cell for an order: a product for each part, or a number of parts of the only product; None: the file's own.
@@ -87,9 +87,9 @@ class CellFile(CellFields):
         named = tuple(first.model_copy(update={"name": f"{ROBOT} {n}"}) for n in range(1, count + 1))
         several = {"robot": None, "robots": named}
         alone = {"robot": first, "robots": None, "track": None, "travel": self.times}  # a single robot needs no track
-        found = self.model_copy(update=several if count > 1 else alone)
-        found.cell()
-        return found
+        changed = self.model_copy(update=several if count > 1 else alone)
+        changed.cell()
+        return changed
 
     def _cell_or_fault(self, order: Sequence[str] | int | None) -> Cell | FileFault:
         """The cell, or the first fault; each kind of fault is searched only when all kinds before it are absent."""
@@ -180,12 +180,12 @@ def order_from_word(cellfile: CellFile, word: str) -> tuple[str, ...]:
     known = ", ".join(f"{letter} ({' or '.join(names)})" for letter, names in meant.items())
     order: list[str] = []
     for number, letter in enumerate(word.strip(), 1):
-        found = meant.get(letter.upper(), [])
-        if len(found) != 1:
-            wrong = f"letter {number}, '{letter}', means {'no' if not found else 'more than one'} product"
+        initials = meant.get(letter.upper(), [])
+        if len(initials) != 1:
+            wrong = f"letter {number}, '{letter}', means {'no' if not initials else 'more than one'} product"
             wanted = f"known: {known}; or names with commas between them"
             raise BadInput(f"order '{word[:80]}' (--case) for cell '{cellfile.name}': {wrong}: {wanted}")
-        order += found
+        order += initials
     return cellfile.ordered(order)
 
 

@@ -95,8 +95,8 @@ class _Record:
         if word is None:
             return []
         value = self.values[word]
-        found = [" ".join(str(text).split()) for text in (value if isinstance(value, list) else [value])]
-        return [shortened(f"{word} {one}" if one.isdigit() else one, 40) for one in found]
+        texts = [" ".join(str(text).split()) for text in (value if isinstance(value, list) else [value])]
+        return [shortened(f"{word} {one}" if one.isdigit() else one, 40) for one in texts]
 
     def name(self, field_name: str) -> str | None:
         return next(iter(self.names(field_name)), None)
@@ -257,8 +257,8 @@ def _of_problem(problem: Mapping[str, Any], record: _Record) -> tuple[str | None
     task = called("tasks", number)
     told = problem["tasks"][number]
     job = told.get("job") if isinstance(told, dict) else None
-    found = record.values.get("resource")
-    resources = found if isinstance(found, list) else [found]
+    numbers = record.values.get("resource")
+    resources = numbers if isinstance(numbers, list) else [numbers]
     return task if job is None else called("jobs", job), [called("resources", resource) for resource in resources]
 
 
@@ -345,7 +345,7 @@ def _walk(
         if scalars or not isinstance(plain, list | dict):
             values[word] = plain
             units |= {} if unit is None else {word: unit}
-    found = [
+    records = [
         record
         for key, item in value.items()
         for record in _walk(source, item, (*way, key), _inside(way, key, around), problems)
@@ -353,9 +353,9 @@ def _walk(
     if len(way) > 1 and _word(str(way[-2]))[0] in _KNOWN and isinstance(way[-1], int):
         values.pop("id", None)  # the name of a part, machine or vehicle in its list, see `around`
     own = _Record(source, values, units, way)
-    if (own.timed and not any(record.timed for record in found)) or (own.word("x") and own.word("y")):
+    if (own.timed and not any(record.timed for record in records)) or (own.word("x") and own.word("y")):
         yield own
-    yield from found
+    yield from records
 
 
 def _inside(way: tuple[str | int, ...], key: str, around: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -370,8 +370,8 @@ def _word(column: str) -> tuple[str, float | None]:
     unit = _UNIT.search(text)
     plain = re.sub(r"[\W_]", "", text[: unit.start()] if unit else text)
     for end in ("", "id", "name", "time", "date", "at", "s"):
-        if plain.endswith(end) and (found := plain.removesuffix(end)) in _KNOWN:
-            return found, UNITS[unit[1]] if unit else None
+        if plain.endswith(end) and (stem := plain.removesuffix(end)) in _KNOWN:
+            return stem, UNITS[unit[1]] if unit else None
     return plain, UNITS[unit[1]] if unit else None
 
 

@@ -152,13 +152,13 @@ class Task(Record):
                 if kind not in wanted:
                     raise unknown("part", kind, wanted, "--parts")
                 wanted[kind] = count
-        found = tuple(kind for kind, count in wanted.items() for _ in range(count))
+        kinds = tuple(kind for kind, count in wanted.items() for _ in range(count))
         if first is None and counts is None:
             with self.in_its_file():
-                self._check_room(found, "the sum of their counts", f"part '{self.made[0].name}': count: ")
+                self._check_room(kinds, "the sum of their counts", f"part '{self.made[0].name}': count: ")
         else:
-            self._check_room(found, "--toasts, --parts", "")
-        return found
+            self._check_room(kinds, "--toasts, --parts", "")
+        return kinds
 
     def ordered(self, toasts: int | None = None, parts: str | None = None) -> Order:
         """The order of --toasts (parts of the first kind) or of --parts (parts of each kind); raises BadInput for both."""

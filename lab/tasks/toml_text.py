@@ -76,10 +76,10 @@ class TomlText:
             RecursionError,
         ) as error:  # besides TOMLDecodeError: numbers or nesting beyond Python's limits
             raise BadInput(f"{path}: not valid TOML: {error}") from None
-        found = cls(path, text, raw)
+        toml = cls(path, text, raw)
         if _MANY_DIGITS.search(text) and (loc := _beyond_64_bits(raw)) is not None:
-            raise found.refusal(loc, f"{'.'.join(map(str, loc))}: a whole number beyond 64 bits")
-        return found
+            raise toml.refusal(loc, f"{'.'.join(map(str, loc))}: a whole number beyond 64 bits")
+        return toml
 
     @cached_property
     def _lines(self) -> dict[Loc, int]:

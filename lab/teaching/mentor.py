@@ -189,8 +189,8 @@ def _called(policy: Any) -> Policy:
 
 def _first(answer: Any) -> Any:
     """The action in an answer of `predict`, which may be a tuple of action and state."""
-    found = answer[0] if isinstance(answer, tuple) else answer
-    return int(found) if np.ndim(found) == 0 else found
+    first = answer[0] if isinstance(answer, tuple) else answer
+    return int(first) if np.ndim(first) == 0 else first
 
 
 def _action(answers: list[Any]) -> int:
@@ -203,7 +203,7 @@ def _key(observation: Any) -> Hashable:
     """A key that is equal for equal observations; floats are rounded."""
     if isinstance(observation, dict):
         return tuple((name, _key(value)) for name, value in sorted(observation.items()))
-    found = np.asarray(observation)
-    if found.dtype.kind == "f":
-        found = np.round(found, DECIMALS) + 0.0
-    return found.shape, found.tobytes()
+    values = np.asarray(observation)
+    if values.dtype.kind == "f":
+        values = np.round(values, DECIMALS) + 0.0
+    return values.shape, values.tobytes()

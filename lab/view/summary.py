@@ -181,16 +181,16 @@ def _event_text(event: Mapping[str, Any]) -> str:
 
 def _found(skills: Sequence[Mapping[str, Any]], task: str) -> str:
     """The numbers of skills that are reused, adapted and learned, and of those that come from other tasks."""
-    found = []
+    lines = []
     for kind in ("reused", "adapted"):
         rows = [row for row in skills if row["source"] == kind]
         from_tasks = Counter(row["from_task"] for row in rows if row["from_task"] != task)
         notes = [f"{count} from {name}" for name, count in from_tasks.most_common()]
         elsewhere = sum(kind == "reused" and row["fitness"] is not None for row in rows)
         notes += [f"{elsewhere} of another problem"] if elsewhere else []
-        found += [f"{len(rows)} {kind}" + (f" ({', '.join(notes)})" if notes else "")] if rows else []
+        lines += [f"{len(rows)} {kind}" + (f" ({', '.join(notes)})" if notes else "")] if rows else []
     learned = sum(row["source"] in ("learned", "continued") for row in skills)
-    return ", ".join([*found, *([f"{learned} learned"] if learned or not found else [])])
+    return ", ".join([*lines, *([f"{learned} learned"] if learned or not lines else [])])
 
 
 def _way(lesson: Mapping[str, Any]) -> str:
@@ -234,53 +234,57 @@ STOPPED = {
 }
 
 
-def sequence_summary(found: Mapping[str, Any]) -> RenderableType:
+def sequence_summary(document: Mapping[str, Any]) -> RenderableType:
     """The text at the end of `lab sequence`, from its JSON document."""
-    what, unit = _measured(found["objective"])
-    proven = "proven optimum" if found["optimum_proven"] else "proven bound"
-    best, bound = beside(found["best_cost"], found["bound_cost"], unit, 2)
-    alone = beside(found["cost"], found["bound_cost"], unit, 2)[0]
-    whose = " alone" if found["advice"] is None else {True: " with advice", False: " alone", None: ""}[found["advised"]]
+    what, unit = _measured(document["objective"])
+    proven = "proven optimum" if document["optimum_proven"] else "proven bound"
+    best, bound = beside(document["best_cost"], document["bound_cost"], unit, 2)
+    alone = beside(document["cost"], document["bound_cost"], unit, 2)[0]
+    whose = (
+        " alone"
+        if document["advice"] is None
+        else {True: " with advice", False: " alone", None: ""}[document["advised"]]
+    )
     lines = [
-        f"best order known: {what}{best} for {_ordered(found['order'])} (by {found['best_by']}; seed {found['seed']})",
-        f"{proven} {bound}{_gap(found['best_cost'], found)} ({found['bound_by']})",
-        f"{found['method']}{whose}: {what}{alone}{_gap(found['cost'], found)}, "
-        f"in episode {found['found_at_episode']} of {found['episodes']}",
-        *_order_of_transfers(found),
+        f"best order known: {what}{best} for {_ordered(document['order'])} (by {document['best_by']}; seed {document['seed']})",
+        f"{proven} {bound}{_gap(document['best_cost'], document)} ({document['bound_by']})",
+        f"{document['method']}{whose}: {what}{alone}{_gap(document['cost'], document)}, "
+        f"in episode {document['found_at_episode']} of {document['episodes']}",
+        *_order_of_transfers(document),
     ]
-    if found["stopped_by"] is not None:
-        proven = "which is proven" if found["proven"] else "which is not proven to be the best"
-        lines.insert(0, f"{STOPPED[found['stopped_by']]}: the best order until then, {proven}")
-    if found["luckiest_cost"] is not None:
-        lines.append(f"by the mean times; in its luckiest drawn episode {found['luckiest_cost']:.2f}{unit}")
-    if found["sessions"] > 1:
-        hits = "" if found["success_percent"] is None else f"optimum found in {found['success_percent']:.0f} %, "
-        lines.append(f"{found['sessions']} sessions: {hits}mean best {found['mean_best_cost']:.2f}{unit}")
-    for number, advice in enumerate(found["advice"] or [], 1):
+    if document["stopped_by"] is not None:
+        proven = "which is proven" if document["proven"] else "which is not proven to be the best"
+        lines.insert(0, f"{STOPPED[document['stopped_by']]}: the best order until then, {proven}")
+    if document["luckiest_cost"] is not None:
+        lines.append(f"by the mean times; in its luckiest drawn episode {document['luckiest_cost']:.2f}{unit}")
+    if document["sessions"] > 1:
+        hits = "" if document["success_percent"] is None else f"optimum found in {document['success_percent']:.0f} %, "
+        lines.append(f"{document['sessions']} sessions: {hits}mean best {document['mean_best_cost']:.2f}{unit}")
+    for number, advice in enumerate(document["advice"] or [], 1):
         if advice["requests"] is None:
             continue
         asked, helped = counted(advice["requests"], "episode"), counted(advice["helped_steps"], "move")
         text = f"session {number}: asked in {asked}, {helped} advised"
         episode = advice["rejected_at_episode"]
         lines.append(text if episode is None else f"{text}; rejected its advisor in episode {episode}")
-    if found["stochastic"] is not None:
-        lines += _drawn(found["stochastic"], unit)
-    return Group(*map(Text, [*lines, *found["files"].values()]))
+    if document["stochastic"] is not None:
+        lines += _drawn(document["stochastic"], unit)
+    return Group(*map(Text, [*lines, *document["files"].values()]))
 
 
-def _gap(value: float, found: Mapping[str, Any]) -> str:
+def _gap(value: float, document: Mapping[str, Any]) -> str:
     """The gap between a cost and the bound, in words; "" when they are equal or the bound is 0."""
-    bound = found["bound_cost"]
+    bound = document["bound_cost"]
     share = value / bound - 1 if bound > 0 else 0.0
     return f", gap {gap_of(share, 2)}" if share > SAME else ""
 
 
-def _order_of_transfers(found: Mapping[str, Any]) -> list[str]:
+def _order_of_transfers(document: Mapping[str, Any]) -> list[str]:
     """The best order, or the beginning of a long one: part numbers, or words if a part can continue in several ways."""
-    sequence, words = found["best_sequence"], found["best_moves"]
+    sequence, words = document["best_sequence"], document["best_moves"]
     more = len(sequence) - SHOWN_MOVES
     rest = f" and {more} more (--json has all)" if more > 0 else ""
-    if all(decision <= len(found["order"]) for decision in sequence):
+    if all(decision <= len(document["order"]) for decision in sequence):
         return [f"order of the transfers: {' '.join(map(str, sequence[:SHOWN_MOVES]))}{rest}"]
     return [
         "order of the transfers:",
@@ -363,8 +367,8 @@ def grid_summary(seen: Mapping[str, Any]) -> RenderableType:
     turned = ["  ".join(marks[rows[i][j]] for i in range(len(rows))) for j in reversed(range(len(rows[0])))]
     ends = f"start {tuple(seen['start'])}, goal {tuple(seen['goal'])}"
     blocked, markers = counted(len(seen["obstacles"]), "cell"), counted(len(seen["markers"]), "marker")
-    found = f"{ends}, {blocked} with obstacles, {markers}"
-    return Group(*map(Text, turned), Text(found))
+    size_text = f"{ends}, {blocked} with obstacles, {markers}"
+    return Group(*map(Text, turned), Text(size_text))
 
 
 def pictures_summary(record: Mapping[str, Any]) -> RenderableType:

@@ -138,7 +138,7 @@ def calibrate(pictures: Sequence[tuple[str, Image]], mat: Mat, angle_rad: float 
     Raises BadInput for too few pictures, pictures without the mat or of different sizes, and WorkFailed when the focal
     length cannot be determined. Source: Z. Zhang, 2000.
     """
-    found = [mat.corners(image, name) for name, image in pictures]
+    corners = [mat.corners(image, name) for name, image in pictures]
     sizes = {(image.shape[1], image.shape[0]) for _, image in pictures}
     if len(sizes) > 1:
         raise BadInput(f"pictures of {len(sizes)} sizes: {sorted(sizes)}: wanted one camera's")
@@ -153,8 +153,8 @@ def calibrate(pictures: Sequence[tuple[str, Image]], mat: Mat, angle_rad: float 
     if known:
         flags |= cv2.CALIB_FIX_FOCAL_LENGTH | cv2.CALIB_FIX_PRINCIPAL_POINT | cv2.CALIB_ZERO_TANGENT_DIST
     start = pinhole(size, radians(45) if angle_rad is None else angle_rad)
-    worlds = [world.astype(np.float32)[:, None] for world, _ in found]
-    pixels = [pixel.astype(np.float32)[:, None] for _, pixel in found]
+    worlds = [world.astype(np.float32)[:, None] for world, _ in corners]
+    pixels = [pixel.astype(np.float32)[:, None] for _, pixel in corners]
     result: Any = cv2.calibrateCameraExtended(worlds, pixels, size, start.matrix, np.zeros(5), flags=flags)
     residual, matrix, terms, turns, shifts, unsure = result[:6]
     if not known and not unsure.ravel()[0] < UNSURE * matrix[0, 0]:
@@ -255,10 +255,10 @@ def read_calibration(path: Path) -> Calibration:
             raise ValueError("turn is no rotation (3, 3), or shift has not 3 numbers")
         own = Lens((width, height), (fx, fy), (cx, cy), cast(tuple[float, float, float, float, float], terms))
         rows = tuple(tuple(float(number) for number in row) for row in turn)
-        found = float(record["residual_px"]), int(record["points"]), str(record["method"])
+        quality = float(record["residual_px"]), int(record["points"]), str(record["method"])
     except (ValueError, KeyError, TypeError, BadInput, RecursionError, OverflowError) as error:
         why = f"{error.args[0]!r} is missing" if isinstance(error, KeyError) else str(error)
         raise BadInput(f"{path}: no calibration: {why}: {wanted}") from None
-    if not np.isfinite([*shift, found[0]]).all():
+    if not np.isfinite([*shift, quality[0]]).all():
         raise BadInput(f"{path}: no calibration: numbers that are not finite: {wanted}")
-    return Calibration(own, rows, tuple(float(value) for value in shift), *found)
+    return Calibration(own, rows, tuple(float(value) for value in shift), *quality)

@@ -70,8 +70,8 @@ class Fault:
     def parts(self, floor: Floor, *how: str) -> list[tuple[str, Whereabouts]]:
         """The parts that the fault may strike and that are in one of these states now, with their whereabouts."""
         own = self.fields.part
-        found = [(name, whereabouts(floor, name)) for name in parts_of(floor) if own in (None, name)]
-        return [(name, at) for name, at in found if at.how in how]
+        places = [(name, whereabouts(floor, name)) for name in parts_of(floor) if own in (None, name)]
+        return [(name, at) for name, at in places if at.how in how]
 
 
 def out_of_sight(number: int) -> tuple[float, float]:

@@ -25,16 +25,16 @@ GROUND = "ground"
 def draw(task: Task, order: Order, seed: int, predicted_makespan_s: float) -> tuple[FaultFields, ...]:
     """One or two faults, each of a kind that can strike in a task, by their times; the same for the same seed."""
     rng = np.random.default_rng([seed, _SALT])
-    found: list[FaultFields] = []
+    faults: list[FaultFields] = []
     wanted = int(rng.integers(1, MOST + 1))
-    while len(found) < wanted:
+    while len(faults) < wanted:
         kinds = list(FAULTS.values())
         kind = kinds[int(rng.integers(len(kinds)))]
         at_s = round(float(rng.uniform(*BETWEEN)) * predicted_makespan_s, 1)
         fields = kind.drawn(task, order, rng)
-        if fields is not None and kind.what not in [drawn.what for drawn in found]:
-            found.append(FaultFields.model_validate({"what": kind.what, "at_s": at_s, **fields}))
-    return tuple(sorted(found, key=lambda fault: fault.at_s))
+        if fields is not None and kind.what not in [drawn.what for drawn in faults]:
+            faults.append(FaultFields.model_validate({"what": kind.what, "at_s": at_s, **fields}))
+    return tuple(sorted(faults, key=lambda fault: fault.at_s))
 
 
 class Injector:

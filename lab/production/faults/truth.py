@@ -117,10 +117,10 @@ def pieces(failure: str) -> Iterator[str]:
 
 def _row(fault: Happened, troubles: Sequence[TroubleMet]) -> dict[str, Any]:
     """A fault, and the first trouble of the run that refers to it."""
-    found = next((t for t in troubles if t.at_s >= fault.at_s and _explains(fault, t.what, t.part, t.station)), None)
+    noticed = next((t for t in troubles if t.at_s >= fault.at_s and _explains(fault, t.what, t.part, t.station)), None)
     row: dict[str, Any] = {"what": fault.what, "at_s": round(fault.at_s, 3), "true_reason": fault.words}
     return row | {
-        "noticed": None if found is None else found.what,
-        "noticed_s": None if found is None else round(found.at_s, 3),
-        "answer": None if found is None else found.answer,
+        "noticed": None if noticed is None else noticed.what,
+        "noticed_s": None if noticed is None else round(noticed.at_s, 3),
+        "answer": None if noticed is None else noticed.answer,
     }

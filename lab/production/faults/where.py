@@ -86,8 +86,8 @@ def in_the_air(floor: Floor, body: str) -> bool:
 def station_at(floor: Floor, name: str, at: tuple[float, float]) -> str:
     """The station of a part's routes that has the spot nearest to a place; "" where none is near."""
     places = floor.scene.kind_of[name].part.places
-    found = [(distance(floor, station, at), station) for station in places]
-    far, station = min(found, default=(AT_STATION_M, ""))
+    distances = [(distance(floor, station, at), station) for station in places]
+    far, station = min(distances, default=(AT_STATION_M, ""))
     return station if far < AT_STATION_M else ""
 
 

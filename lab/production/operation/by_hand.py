@@ -99,30 +99,30 @@ class ByHand:
         ]
         if not near:
             raise BadInput("no part is here that a skill of this task takes up")
-        *_, skills, part = min(near, key=lambda found: found[:2])
+        *_, skills, part = min(near, key=lambda candidate: candidate[:2])
         return self._carried_out(skills, part)
 
     def execute(self, name: str) -> Deed:
         """Carries one skill out, with the named part, or else with the part nearest to the skill's spots."""
         floor = self.floor
         skills, held = floor.skillset.skills, floor.bench.held
-        found = next((own for own in sorted(skills, key=len, reverse=True) if f"{name} ".startswith(f"{own} ")), None)
-        if found is None:
+        named = next((own for own in sorted(skills, key=len, reverse=True) if f"{name} ".startswith(f"{own} ")), None)
+        if named is None:
             raise unknown("skill", name, skills, "execute")
-        skill, part = skills[found], name[len(found) :].strip()
+        skill, part = skills[named], name[len(named) :].strip()
         if not skill.moves_arm:
-            raise BadInput(f"'{found}' is what a machine does by itself: bring a part there, and it begins")
+            raise BadInput(f"'{named}' is what a machine does by itself: bring a part there, and it begins")
         parts = self._parts(skill.kind)
         if part and part not in floor.scene.kind_of:
             raise unknown("part", part, floor.scene.kind_of, "execute")
         if part and part not in parts.values():
-            raise BadInput(f"'{found}' is not done with {part}: wanted {', '.join(parts.values()) or 'no part'}")
+            raise BadInput(f"'{named}' is not done with {part}: wanted {', '.join(parts.values()) or 'no part'}")
         if skill.carries and held is None:
-            raise BadInput(f"'{found}' begins with a part in the gripper: grasp one first")
+            raise BadInput(f"'{named}' begins with a part in the gripper: grasp one first")
         if not skill.carries and held is not None:
-            raise BadInput(f"'{found}' begins with an empty gripper, and the robot holds {held}: open first")
+            raise BadInput(f"'{named}' begins with an empty gripper, and the robot holds {held}: open first")
         if skill.carries and (held not in parts or part not in ("", parts[held])):
-            raise BadInput(f"the robot holds {held}: '{found}' carries {part or f'a {skill.kind}'}")
+            raise BadInput(f"the robot holds {held}: '{named}' carries {part or f'a {skill.kind}'}")
         if not part and parts:
             part = parts[held or min(parts, key=lambda body: self._far_m(body, self._spots(skill.station)))]
         return self._carried_out((skill,), part)
@@ -131,8 +131,8 @@ class ByHand:
         """The parts that may be carried as a kind, by the body that the gripper then holds; "": no part."""
         scene = self.floor.scene
         made = scene.task.made_as(kind).name if kind else ""
-        found = {scene.body_of(name, kind): name for name, own in scene.kind_of.items() if own.part.name == made}
-        return {body: name for body, name in found.items() if body in scene.kind_of}
+        parts = {scene.body_of(name, kind): name for name, own in scene.kind_of.items() if own.part.name == made}
+        return {body: name for body, name in parts.items() if body in scene.kind_of}
 
     def _spots(self, station: str) -> Sequence[Spot]:
         places = self.floor.scene.places

@@ -250,21 +250,21 @@ class OperatedScene:
             taught = teach_all(self.prepared, self.teacher, self.journal)
             self.tell(PhaseBegan("sequence", 1))
             chosen = ordered(taught.cell, self.task.sequencing, OrderAdvice(), self.seed, self.tell)
-            found, proven = chosen.found, chosen.proven
+            result, proven = chosen.found, chosen.proven
             if drawn:
                 self._build(
                     (
                         *self.task.faults,
-                        *draw(self.task, self.prepared.order, self.conditions.fault_seed or 0, found.cost),
+                        *draw(self.task, self.prepared.order, self.conditions.fault_seed or 0, result.cost),
                     )
                 )
             relearner = Relearner(self.prepared, taught, self.teacher)
             planner = Planner(self.task.sequencing, self.seed)
             production = Production.of(self.floor, RunState.of(taught.cell, self.floor.now_s), relearner, planner)
-            self.plan = Plan(taught, found, chosen.used, proven, production, chosen.learning)
-            self.plan.state.sequence = [*found.sequence]
+            self.plan = Plan(taught, result, chosen.used, proven, production, chosen.learning)
+            self.plan.state.sequence = [*result.sequence]
             self._tell_plan("")
-            return f"{len(found.sequence)} moves, {found.cost:.1f} s"
+            return f"{len(result.sequence)} moves, {result.cost:.1f} s"
 
         return deed
 

@@ -202,9 +202,9 @@ class Operation:
             program=scene.motions.program(scene.task, scene.seed, moves, cell.part_name),
         )
         scene.recorder.take()
-        found = plan.found, plan.method, plan.proven
+        result = plan.found, plan.method, plan.proven
         return Report(
-            scene.prepared, plan.taught, *found, outcome, scene.recorder.recording, self._began, learning=plan.learning
+            scene.prepared, plan.taught, *result, outcome, scene.recorder.recording, self._began, learning=plan.learning
         )
 
 

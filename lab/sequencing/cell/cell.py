@@ -146,12 +146,12 @@ class Cell:
     @cached_property
     def takers(self) -> tuple[frozenset[int], ...]:
         """By station, the robots (by index) and servers (`SERVER`) that may free room there; empty with fewer than two robots."""
-        found = [set[int]() for _ in self.stations]
+        by_station = [set[int]() for _ in self.stations]
         for place in self.positions if len(self.robots) > 1 else ():
             for way in place.options:
                 for station in set(place.holds) - set(self.positions[way.to].holds):
-                    found[station].add(way.robot)
-        return tuple(map(frozenset, found))
+                    by_station[station].add(way.robot)
+        return tuple(map(frozenset, by_station))
 
     @cached_property
     def without_windows(self) -> "Cell":
@@ -193,7 +193,7 @@ class Cell:
         own = [
             [n for n, at in enumerate(self.laid_out) if at.product == number] for number in range(len(self._classes))
         ]
-        found = []
+        known_rules = []
         for number, precedence in enumerate(self.precedences):
             sides = []
             for side, step in enumerate((precedence.step, precedence.of_step)):
@@ -206,8 +206,8 @@ class Cell:
                     if product in members and (step.leaves if at is None else at in made)
                 }
                 sides.append(made | standing)
-            found.append(Rule(sides[0], sides[1], precedence.counts))
-        return tuple(found)
+            known_rules.append(Rule(sides[0], sides[1], precedence.counts))
+        return tuple(known_rules)
 
     @cached_property
     def starts(self) -> tuple[int, ...]:
@@ -272,10 +272,10 @@ class Cell:
     def at_most_s(self, part: int, station: str) -> float | None:
         """How long after its processing at a station a part may be picked [s]; None: at any time."""
         product, at = self._products[part - 1], self.index(station)
-        found = [
+        limits = [
             p.at_most_s for p in self.laid_out if p.product == product and at in p.holds and p.at_most_s is not None
         ]
-        return min(found, default=None)
+        return min(limits, default=None)
 
     @cached_property
     def longest_s(self) -> float:
@@ -313,11 +313,11 @@ class Cell:
     def _classes(self) -> list[tuple[int, tuple[tuple[bool, bool], ...]]]:
         """The classes of identical parts: a product (by index) and the sides of the precedences on which they stand."""
         signs = signatures(self.precedences, self.parts)
-        found = []
+        classes = []
         for number, product in enumerate(self.products):
             own = dict.fromkeys(sign for name, sign in zip(self.order, signs, strict=True) if name == product.name)
-            found += [(number, sign) for sign in own or {((False, False),) * len(self.precedences): None}]
-        return found
+            classes += [(number, sign) for sign in own or {((False, False),) * len(self.precedences): None}]
+        return classes
 
     def _is_apart(self, begin: Begins) -> bool:
         """Whether a part needs a position of its own: it stays where it is, or it is nowhere and precedences count it."""

@@ -206,17 +206,17 @@ def _part_activities(
 
 def _batches(cell: Cell, moves: Sequence[Move]) -> dict[tuple[int, str], tuple[float, float]]:
     """Begin and duration of each part's processing in a machine with batches [s], by part and machine."""
-    found: dict[tuple[int, str], tuple[float, float]] = {}
+    times: dict[tuple[int, str], tuple[float, float]] = {}
     for name in [cell.names[station] for station in cell.batches]:
         batch: list[Move] = []
         for move in moves:
             if move.target == name:
                 batch = [*batch, move]
                 at_s, process_s = max(stay.drop_s for stay in batch), max(stay.process_s for stay in batch)
-                found |= {(stay.part, name): (at_s, process_s) for stay in batch}
+                times |= {(stay.part, name): (at_s, process_s) for stay in batch}
             elif move.origin == name:
                 batch = []
-    return found
+    return times
 
 
 def _limits(cell: Cell, part: int, moves: Sequence[Move]) -> Iterator[FetchBy]:

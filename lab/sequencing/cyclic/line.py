@@ -71,7 +71,7 @@ class Line:
     @cached_property
     def needs(self) -> tuple[LineSpan, ...]:
         """The processing times before picks, and the latest picks after them."""
-        found = list[LineSpan]()
+        spans = list[LineSpan]()
         begun: tuple[int, float] | None = None
         for number, move in enumerate(self.moves):
             at = self.cell.positions[move.place]
@@ -83,17 +83,17 @@ class Line:
             if begun is not None and move.option.waits:
                 drop, least_s = begun
                 most_s = inf if at.at_most_s is None else least_s + at.at_most_s - move.option.service_s
-                found.append(LineSpan(drop, number, least_s, most_s))
-        return tuple(found)
+                spans.append(LineSpan(drop, number, least_s, most_s))
+        return tuple(spans)
 
     @cached_property
     def holds(self) -> dict[int, tuple[int, ...]]:
         """The stays (by number) that take room at each station (by index)."""
-        found: dict[int, list[int]] = {}
+        by_station: dict[int, list[int]] = {}
         for number, stay in enumerate(self.stays):
             for station in self.cell.positions[self.moves[stay.pick].place].holds:
-                found.setdefault(station, []).append(number)
-        return {station: tuple(numbers) for station, numbers in found.items()}
+                by_station.setdefault(station, []).append(number)
+        return {station: tuple(numbers) for station, numbers in by_station.items()}
 
     def after_s(self, one: int, then: int) -> float:
         """The empty time from a move's drop to another move's begin [s]; NaN: the two never follow each other."""

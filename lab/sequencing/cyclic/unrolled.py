@@ -173,7 +173,7 @@ def _turns(cycle: Cycle, cell: Cell) -> Iterator[_Turn]:
     moves, first = cycle.line.moves, {move.slot: number for number, move in reversed([*enumerate(cycle.line.moves)])}
     rank = {move: number for number, move in enumerate(cycle.order)}
     slots = sorted(first, key=lambda slot: rank[first[slot]])
-    found, left = list[tuple[int, int, _Turn]](), cell.parts
+    turns, left = list[tuple[int, int, _Turn]](), cell.parts
     for number in count():
         for slot in slots:
             part = next(waiting[cycle.product(moves[first[slot]])], None)
@@ -182,10 +182,10 @@ def _turns(cycle: Cycle, cell: Cell) -> Iterator[_Turn]:
             left -= 1
             for n, move in enumerate(moves):
                 if move.slot == slot:
-                    found.append((number + cycle.passed[n], rank[n], _Turn(part, move.place, move.option)))
+                    turns.append((number + cycle.passed[n], rank[n], _Turn(part, move.place, move.option)))
         if not left:
             break
-    return (turn for _, _, turn in sorted(found, key=lambda one: one[:2]))
+    return (turn for _, _, turn in sorted(turns, key=lambda one: one[:2]))
 
 
 def _numbers(cell: Cell, product: Product) -> list[int]:

@@ -87,7 +87,7 @@ def features(run: Run, allowed: tuple[int, ...], known: FeatureArrays) -> Floats
     options = [_way(run, decision) for decision in allowed]
     begins = [run.pick_s(part, way) - _service_s(way) for part, way in zip(parts, options, strict=True)]
     ends = [run.drop_s(part, way) for part, way in zip(parts, options, strict=True)]
-    found = np.zeros((len(allowed), len(FEATURES)))
+    table = np.zeros((len(allowed), len(FEATURES)))
     for i, (part, way) in enumerate(zip(parts, options, strict=True)):
         here, there, index = run.locations[part - 1], way.to, part - 1
         left_s, ready_s, end_s = known.left_s[here], run.ready_s[index], ends[i]
@@ -129,8 +129,8 @@ def features(run: Run, allowed: tuple[int, ...], known: FeatureArrays) -> Floats
             "load-after": survey.share(int(known.following[there])) - 1.0 if known.following[there] != last else 0.0,
         }
         for k, name in enumerate(FEATURES):
-            found[i, k] = plain[name] if name in plain else seconds[name] / known.scale_s
-    return found
+            table[i, k] = plain[name] if name in plain else seconds[name] / known.scale_s
+    return table
 
 
 class _Survey:

@@ -55,20 +55,20 @@ def shop_of(cell: Cell, objective: str) -> Shop | None:
         return None
     steps, layers = dict[int, tuple[ShopStep, ...]](), list[tuple[tuple[int, ...], ...]]()
     for start in cell.begin_at:
-        found: list[tuple[int, ...]] = [(start,)]
-        while any(cell.positions[stop].options for stop in found[-1]):
-            for stop in found[-1]:
+        stations: list[tuple[int, ...]] = [(start,)]
+        while any(cell.positions[stop].options for stop in stations[-1]):
+            for stop in stations[-1]:
                 if stop not in steps:
                     known = _steps(cell, stop)
                     if known is None:
                         return None
                     steps[stop] = known
-            found.append(tuple(sorted({step.to for stop in found[-1] for step in steps[stop]})))
-        stops = [stop for layer in found for stop in layer]
+            stations.append(tuple(sorted({step.to for stop in stations[-1] for step in steps[stop]})))
+        stops = [stop for layer in stations for stop in layer]
         ends = [not cell.positions[stop].options for stop in stops]
-        if len(set(stops)) < len(stops) or sum(ends) > len(found[-1]):
+        if len(set(stops)) < len(stops) or sum(ends) > len(stations[-1]):
             return None  # some routes are longer than others
-        layers.append(tuple(found))
+        layers.append(tuple(stations))
     return Shop(steps, tuple(layers))
 
 
@@ -79,20 +79,20 @@ def _rooms(cell: Cell) -> list[int]:
 
 def _steps(cell: Cell, stop: int) -> tuple[ShopStep, ...] | None:
     """The steps from a stop; None: one of its options does not occur in a shop."""
-    found, trips = list[ShopStep](), defaultdict[tuple[int, int], list[Option]](list)
+    steps, trips = list[ShopStep](), defaultdict[tuple[int, int], list[Option]](list)
     for way in cell.positions[stop].options:
         if way.if_full is not None or way.carries == "pallet":
             return None
         if way.robot == SERVER:
-            found.append(ShopStep(way.to, (), way))
+            steps.append(ShopStep(way.to, (), way))
         else:
             trips[way.target, way.to].append(way)
     for (_, to), ways in trips.items():
         works = cell.positions[to].options
         if any(work.robot != SERVER for work in works) or (works and cell.positions[to].processing_s):
             return None
-        found += [ShopStep(work.to, tuple(ways), work) for work in works] or [ShopStep(to, tuple(ways), None)]
-    return tuple(found)
+        steps += [ShopStep(work.to, tuple(ways), work) for work in works] or [ShopStep(to, tuple(ways), None)]
+    return tuple(steps)
 
 
 class _Operation(NamedTuple):
@@ -254,11 +254,11 @@ class ShopModel:
                 queues[operation.part].append(
                     (begin, begin + long, entry(operation.part + 1, option.choice, self.cell.parts))
                 )
-        found = list[int]()
+        decisions = list[int]()
         waiting = {part: queue[::-1] for part, queue in queues.items()}
         while waiting:
             part = min(waiting, key=lambda part: waiting[part][-1])
-            found.append(waiting[part].pop()[-1])
+            decisions.append(waiting[part].pop()[-1])
             if not waiting[part]:
                 del waiting[part]
-        return tuple(found)
+        return tuple(decisions)

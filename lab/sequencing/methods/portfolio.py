@@ -115,8 +115,8 @@ def look_on(
     """
     cell, objective = shared.cell, shared.objective
     if objective == MAKESPAN and cell.serial:
-        found = optimum(cell, most, shared)
-        shared.tell("A*", found.sequence, found.bound_s)
+        best = optimum(cell, most, shared)
+        shared.tell("A*", best.sequence, best.bound_s)
         return known_of(shared)
     tell_alone(shared)
     from lab.sequencing.methods.one_robot import one_robot, why_not  # here and below: numba takes its time
@@ -156,10 +156,10 @@ def portfolio(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceR
     """The best sequence that any method finds within its time; it draws nothing from `rng`."""
     search.check(cell)
     shared = shared_of(cell, search)
-    found = look_on(shared, shared.left_s(TIME_LIMIT_S), workers=WORKERS)
-    if not found.sequence and found.bound < inf:
-        raise not_in_time(cell, "any method", found.bound)
-    return only_one(cell, search, found.sequence, found.cost, bool(found.sequence))
+    proof = look_on(shared, shared.left_s(TIME_LIMIT_S), workers=WORKERS)
+    if not proof.sequence and proof.bound < inf:
+        raise not_in_time(cell, "any method", proof.bound)
+    return only_one(cell, search, proof.sequence, proof.cost, bool(proof.sequence))
 
 
 def _look(shared: Shared, time_limit_s: float, seed: int, workers: int) -> None:

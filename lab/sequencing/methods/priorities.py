@@ -55,14 +55,14 @@ def _way(cell: Any, run: Any, part: int, choice: int) -> int:
     """The number of the option that a part takes now: that of its choice if allowed, else the first allowed; -1: none."""
     place = run.locations[part]
     first, last = cell.first_option[place], cell.first_option[place + 1]
-    found = -1
+    chosen = -1
     for o in range(first, last):
         if may(cell, run, part, o):
             if cell.choice[o] == choice:
                 return int(o)
-            if found < 0:
-                found = o
-    return int(found)
+            if chosen < 0:
+                chosen = o
+    return int(chosen)
 
 
 @inner

@@ -154,12 +154,12 @@ def first_come(cell: Cell) -> tuple[int, ...]:
 
 def any_order(cell: Cell) -> tuple[int, ...]:
     """A complete sequence from the first quick method that finds one; empty when none does, since rules never look ahead."""
-    if found := first_come(cell):
-        return found
+    if order := first_come(cell):
+        return order
     for rule in usable(cell).values():
-        found = dispatch(run := Run(cell), rule)
+        order = dispatch(run := Run(cell), rule)
         if run.done:
-            return found
+            return order
     return ()
 
 

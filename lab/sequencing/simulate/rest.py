@@ -129,28 +129,28 @@ def _stuck(cell: Cell, begins: Sequence[Begins], closed: set[int]) -> dict[int, 
                 inside = next(part for part in stuck if station in cell.laid_out[begins[part - 1].position or 0].holds)
                 shut.setdefault(station, f"taken by {cell.part_name(inside)}")
         positions = open_ways(cell.laid_out, shut)
-        found = dict[int, str]()
+        reasons = dict[int, str]()
         for part, begin in enumerate(begins, 1):
             if part in stuck or begin.position is None or not cell.laid_out[begin.position].options:
                 continue
             at, name = cell.laid_out[begin.position], cell.names[cell.laid_out[begin.position].station]
             broken = [station for station in at.holds if station in closed]
             if broken and begin.ready_s > 0:
-                found[part] = f"{cell.part_name(part)} is not done in '{cell.names[broken[0]]}', which is out of use"
+                reasons[part] = f"{cell.part_name(part)} is not done in '{cell.names[broken[0]]}', which is out of use"
             elif not positions[begin.position].options:
                 way = ", ".join(
                     f"'{cell.names[n]}' is {why}" for n, why in shut.items() if n in _ahead(cell, begin.position)
                 )
-                found[part] = f"{cell.part_name(part)} at '{name}' cannot continue: {way}"
-        found = found or _waiting(cell, begins, stuck)
-        if not found:
+                reasons[part] = f"{cell.part_name(part)} at '{name}' cannot continue: {way}"
+        reasons = reasons or _waiting(cell, begins, stuck)
+        if not reasons:
             return stuck
-        stuck |= found
+        stuck |= reasons
 
 
 def _waiting(cell: Cell, begins: Sequence[Begins], stuck: Collection[int]) -> dict[int, str]:
     """The parts that can never move because a precedence waits for parts which cannot make their step, with the reason."""
-    found = dict[int, str]()
+    reasons = dict[int, str]()
     for rule, precedence in zip(cell.rules, cell.precedences, strict=True):
         at = {part: begins[part - 1].position for part in (*precedence.parts, *precedence.of)}
         never = [
@@ -163,10 +163,10 @@ def _waiting(cell: Cell, begins: Sequence[Begins], stuck: Collection[int]) -> di
         free = sum(count <= len(precedence.of) - len(never) for count in rule.counts)
         for part in waiting[max(0, free - made) :]:
             names = " and ".join(cell.part_name(other) for other in never)
-            found[part] = (
+            reasons[part] = (
                 f"{cell.part_name(part)} may not {precedence.step}: {names} cannot {precedence.of_step} before"
             )
-    return found
+    return reasons
 
 
 def _ahead(cell: Cell, place: int) -> set[int]:
@@ -176,21 +176,21 @@ def _ahead(cell: Cell, place: int) -> set[int]:
 
 def _intervals_s(run: Run, begins: Sequence[Begins]) -> tuple[float, ...]:
     """The intervals of arrivals of the parts not fetched yet, counted from now [s]."""
-    cell, came_s, found = run.cell, 0.0, list[float]()
+    cell, came_s, intervals = run.cell, 0.0, list[float]()
     first = True
     for part, (begin, start) in enumerate(zip(begins, cell.starts, strict=True), 1):
         interval_s = cell.arrivals.interval_s[part - 1] if cell.arrivals else 0.0
         if begin.position != start:
-            found.append(0.0)
+            intervals.append(0.0)
             continue
         left_s = max(0.0, run.ready_s[part - 1] - run.now_s)
         if cell.arrivals is not None and cell.arrivals.after == "clock":
             interval_s, came_s = left_s - came_s, left_s
         elif first:
             interval_s = left_s
-        found.append(interval_s)
+        intervals.append(interval_s)
         first = False
-    return tuple(found)
+    return tuple(intervals)
 
 
 def _filled(cell: Cell, fallback_s: float) -> NDArray[np.float64]:

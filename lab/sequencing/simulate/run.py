@@ -106,7 +106,7 @@ class Run:
     def allowed(self) -> tuple[int, ...]:
         """The decisions allowed now, ascending; empty when all parts are finished, or in a deadlock."""
         parts, full = self.cell.parts, self.full()
-        found = [
+        decisions = [
             entry(part, option.choice, parts)
             for part in range(1, parts + 1)
             if self.in_turn(part)
@@ -114,7 +114,7 @@ class Run:
             if self._possible(part, option, full) and not self.waits_for(part, option)
             if not self.too_late(part, option)
         ]
-        return tuple(sorted(found))
+        return tuple(sorted(decisions))
 
     def option(self, decision: int) -> Option | None:
         """The option that a decision takes now; None when it is not allowed."""

@@ -73,9 +73,9 @@ class Arm:
         ahead = self.level.wrist_m
         for aside in _ASIDE:
             way = ahead * cos(yaw + aside), ahead * sin(yaw + aside)
-            found = self.inverse(ToolPose(x + way[0], y + way[1], z + ahead + self.base_up_m, yaw + aside))
-            if found is not None:
-                return found
+            solution = self.inverse(ToolPose(x + way[0], y + way[1], z + ahead + self.base_up_m, yaw + aside))
+            if solution is not None:
+                return solution
         raise BadInput(f"robot.tool = 'level': the wrist of arm '{self.name}' cannot hold its tool so in front of it")
 
     def inverse(self, pose: ToolPose) -> Array | None:
@@ -135,8 +135,8 @@ class Arm:
     def reach_in_words(self, z: float) -> str:
         """The nearest and farthest reach of the tool ahead of the arm at a height [m], in words."""
         out = np.arange(self.nearest_m, 3.0, 0.01)
-        found = self.inverse_each(np.stack([out, 0 * out, 0 * out + z, 0 * out], axis=1))
-        reached = out[~np.isnan(found[:, 0])]
+        solutions = self.inverse_each(np.stack([out, 0 * out, 0 * out + z, 0 * out], axis=1))
+        reached = out[~np.isnan(solutions[:, 0])]
         at = f"at a height of {z:.2f} m{'' if self.level is None else ', its tool level and straight ahead'}"
         return f"reaches {reached[0]:.2f} to {reached[-1]:.2f} m {at}" if len(reached) else f"reaches nothing {at}"
 

@@ -73,10 +73,10 @@ def arm_of(settings: RobotSettings, folder: Path = Path()) -> Arm:
     changed = 0
     path = Path()
     if settings.is_file:
-        found = within(folder, settings.model)
-        if found is None:
+        urdf_path = within(folder, settings.model)
+        if urdf_path is None:
             raise BadInput(f"robot.model '{settings.model}': the URDF lies outside the task file's folder")
-        path = found
+        path = urdf_path
         if not is_file(path) or not 0 < path.stat().st_size <= MOST_BYTES:
             raise BadInput(f"robot.model '{settings.model}': no such file beside the task file, or over 5 MB")
         changed = path.stat().st_mtime_ns

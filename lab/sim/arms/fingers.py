@@ -225,12 +225,12 @@ def _multiplier(urdf: Urdf, name: str) -> float:
 
 def solid_vertices(link: Xml.Element) -> Array:
     """The corners (n, 3) [m] of a link's collision shapes, in its own frame."""
-    found = [np.zeros((0, 3))]
+    corners = [np.zeros((0, 3))]
     for collision in link.findall("collision"):
         frame = placed(collision.find("origin"))
         points = _corners(collision)
-        found.append(points @ frame[:3, :3].T + frame[:3, 3])
-    return np.concatenate(found)
+        corners.append(points @ frame[:3, :3].T + frame[:3, 3])
+    return np.concatenate(corners)
 
 
 def _corners(collision: Xml.Element) -> Array:

@@ -148,8 +148,8 @@ def _tree(path: Path, root: Xml.Element, links: Sequence[str]) -> tuple[dict[str
     feet = [link for link in links if link not in carrying]
     if len(feet) != 1:
         raise BadInput(f"{path}: {len(feet)} links are carried by no joint, wanted one: {', '.join(feet)}")
-    found = Urdf(path, root, carrying, feet[0]).below(feet[0])
-    apart = [link for link in links if link not in found]
+    reached = Urdf(path, root, carrying, feet[0]).below(feet[0])
+    apart = [link for link in links if link not in reached]
     if apart:
         raise BadInput(f"{path}: link '{apart[0]}' hangs on itself: its joints lead round in a circle")
     return carrying, feet[0]

@@ -41,7 +41,7 @@ class LevelTool:
 
     def raised(self, joints: Array, poses: Array) -> Array:
         """The joints (n, k) for level tool poses (n, 4) in the foot's frame, from hanging ones (n, k); NaN: unsolvable."""
-        found = np.full_like(joints, np.nan)
+        solved = np.full_like(joints, np.nan)
         known = ~np.isnan(joints[:, 0])
         begun, poses = joints[known], poses[known]
         now, wrist = begun.copy(), poses[:, :3] - self.wrist_m * _axes(poses[:, 3], pi / 2)[:, :, 0]
@@ -59,8 +59,8 @@ class LevelTool:
         good = (np.abs(missed) < EXACT).all(axis=1) & (np.abs(now - begun)[:, 1:-1].max(axis=1) < MOST_RAD)
         if len(self.chain.names) == 6:  # at a straight wrist a continuous path would be singular
             good &= np.sign(self._volume(now)) == np.sign(self._volume(begun))
-        found[known] = np.where(good[:, None], now, np.nan)
-        return found
+        solved[known] = np.where(good[:, None], now, np.nan)
+        return solved
 
     def tools(self, joints: Array) -> Array:
         """The tool poses x, y, z [m], yaw [rad] (n, 4) that joints (n, k) hold, in the foot's frame."""

@@ -70,10 +70,10 @@ class NumericKinematics:
         seeds, weights = np.zeros((len(out), self.count)), np.zeros(len(out))
         for i in (0, 1):
             for j in (0, 1):
-                found = table[corner[:, 0] + i, corner[:, 1] + j]
+                corner_joints = table[corner[:, 0] + i, corner[:, 1] + j]
                 weight = np.abs(1 - i - share[:, 0]) * np.abs(1 - j - share[:, 1]) + 1e-9
-                weight = np.where(np.isnan(found[:, 0]), 0.0, weight)
-                seeds += weight[:, None] * np.nan_to_num(found)
+                weight = np.where(np.isnan(corner_joints[:, 0]), 0.0, weight)
+                seeds += weight[:, None] * np.nan_to_num(corner_joints)
                 weights += weight
         known = inside & (weights > 0.0)
         joints = np.full((len(out), self.count), np.nan)

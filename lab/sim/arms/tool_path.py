@@ -161,10 +161,10 @@ def _squares(pieces: Sequence[_Piece], speed: float, acceleration: float) -> lis
 
 def _pass(pieces: Sequence[_Piece], caps: Sequence[float], acceleration: float) -> list[float]:
     """The squared speeds, at most `caps`, that can be reached by accelerating from the previous ones."""
-    found = [caps[0]]
+    squares = [caps[0]]
     for piece, cap in zip(pieces, caps[1:], strict=True):
-        found.append(min(cap, found[-1] + 2.0 * piece.length * _gain(found[-1], piece, acceleration)))
-    return found
+        squares.append(min(cap, squares[-1] + 2.0 * piece.length * _gain(squares[-1], piece, acceleration)))
+    return squares
 
 
 def _gain(square: float, piece: _Piece, acceleration: float) -> float:

@@ -67,7 +67,7 @@ def grip_of(shape: PartShape, gripper: Gripper, friction: float, given: GripFiel
     slopes: list[float] = []
     headings = [0.0] if _is_round(shape) else [pi * n / HEADINGS for n in range(HEADINGS)]
     for number, up_m in enumerate(_heights(shape, gripper)):
-        found: list[tuple[tuple[float, ...], Grip]] = []
+        rated_grips: list[tuple[tuple[float, ...], Grip]] = []
         for yaw in headings:
             pads = sections.between(yaw, up_m, gripper.width_m, gripper.opening_m - 2 * BESIDE_M)
             if pads is None:
@@ -75,14 +75,14 @@ def grip_of(shape: PartShape, gripper: Gripper, friction: float, given: GripFiel
             if pads.slope > atan(SHARE * friction):
                 slopes.append(pads.slope)
             elif pads.flat or number > 0:  # a part without flat sides swings if it is held near its top
-                found.append(
+                rated_grips.append(
                     (
                         (not pads.flat, round(pads.slope, 3), round(pads.width_m, 4), min(yaw, pi - yaw)),
                         _grip(shape, pads, yaw, up_m),
                     )
                 )
-        if found:
-            return min(found, key=lambda rated: rated[0])[1]
+        if rated_grips:
+            return min(rated_grips, key=lambda rated: rated[0])[1]
     raise BadInput(_refusal(sections, gripper, friction, slopes))
 
 
@@ -261,13 +261,13 @@ class _Sections:
 
     def _profile(self, yaw: float, heights: Array, wide_m: float) -> Array | None:
         """The part's extent (levels, ACROSS, 2) [m] across a heading, NaN where it is absent; None if it is nowhere."""
-        found = np.full((len(heights), ACROSS, 2), np.nan)
+        extent = np.full((len(heights), ACROSS, 2), np.nan)
         at = np.linspace(-wide_m / 2, wide_m / 2, ACROSS)
         for level, up_m in enumerate(heights):
             section = self.at_height(float(up_m))
             if section is not None:
-                found[level] = _crossed(section @ np.array([cos(yaw), sin(yaw)]), section @ _across(yaw), at)
-        return None if np.isnan(found).all() else found
+                extent[level] = _crossed(section @ np.array([cos(yaw), sin(yaw)]), section @ _across(yaw), at)
+        return None if np.isnan(extent).all() else extent
 
 
 def _across(yaw: float) -> Array:
@@ -294,10 +294,10 @@ def _crossed(along: Array, across: Array, at: Array) -> Array:
     share = (at[:, None] - along) / np.where(level, 1.0, after - along)  # (m, n)
     values = np.where((share >= 0) & (share <= 1) & ~level, across + share * (beyond - across), np.nan)
     reached = ~np.isnan(values).all(axis=1)
-    found = np.full((len(at), 2), np.nan)
+    extent = np.full((len(at), 2), np.nan)
     if reached.any():
-        found[reached] = np.stack([np.nanmin(values[reached], axis=1), np.nanmax(values[reached], axis=1)], axis=1)
-    return found
+        extent[reached] = np.stack([np.nanmin(values[reached], axis=1), np.nanmax(values[reached], axis=1)], axis=1)
+    return extent
 
 
 def _slope(side: Array, step: tuple[float, float]) -> float:

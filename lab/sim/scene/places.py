@@ -75,10 +75,10 @@ class Places:
 
     def kinds_at(self, station: str) -> list[Kind]:
         """The kinds that may stand at a station, with their pallets where they come on one."""
-        found = []
+        kinds = []
         for part in self.task.kinds_at(station):
-            found.append(self.kinds[part.name if self.task.station(station).kind == "machine" else comes_as(part)])
-        return found
+            kinds.append(self.kinds[part.name if self.task.station(station).kind == "machine" else comes_as(part)])
+        return kinds
 
     def floor(self, station: Station) -> float:
         """The height of a part's foot above the table at this station [m]."""
@@ -124,8 +124,8 @@ class Places:
         rows = ceil(station.capacity / columns)
         column_m, row_m = self.pitch(station)
         grid = product(range(columns), range(rows))
-        found = [((c - (columns - 1) / 2) * column_m, (r - (rows - 1) // 2) * row_m) for c, r in grid]
-        return sorted(found, key=lambda at: (round(hypot(*at), 6), at))
+        offsets = [((c - (columns - 1) / 2) * column_m, (r - (rows - 1) // 2) * row_m) for c, r in grid]
+        return sorted(offsets, key=lambda at: (round(hypot(*at), 6), at))
 
     def pitch(self, station: Station) -> tuple[float, float]:
         """The distances from spot to spot, along and across [m], with room for fingers and hand between parts."""
@@ -155,8 +155,8 @@ class Places:
 
     def used_spots(self, station: Station, parts: int, kind: str = "") -> list[Spot]:
         """The spots that so many parts can need, and a few more for a plate; all nests, because each takes only its kind."""
-        found = self.spots(station, kind)
-        return found if station.places is not None else found[: max(parts, SPARE_SPOTS)]
+        usable = self.spots(station, kind)
+        return usable if station.places is not None else usable[: max(parts, SPARE_SPOTS)]
 
     def top_m(self, station: Station) -> float:
         """The largest height above the table of the parts at a station [m]."""
@@ -179,23 +179,23 @@ class Places:
 
     def below(self, station: Station, spot: Spot) -> list[tuple[str, Spot]]:
         """The kinds and spots of the parts that must stand below a spot, the lowest first."""
-        found = dict[Spot, str]()
+        by_spot = dict[Spot, str]()
         for under in self.carriers(station, spot):
-            found |= {other: kind for kind, other in self.below(station, under)}
-            found[under] = next(
+            by_spot |= {other: kind for kind, other in self.below(station, under)}
+            by_spot[under] = next(
                 kind.name
                 for kind, _ in self.grounds(station, under)
                 if abs(under.z + kind.height_m - spot.z) <= ON_TOP_M
             )
-        return [(kind, other) for other, kind in found.items()]
+        return [(kind, other) for other, kind in by_spot.items()]
 
     def grounds(self, station: Station, spot: Spot) -> list[tuple[Kind, Rectangle]]:
         """The kinds that may stand on a spot, with the ground that a part of each covers there."""
-        found = []
+        covered = []
         for kind in self.kinds_at(station.name):
             if spot in self.spots(station, kind.name):
-                found.append((kind, Rectangle(spot.x, spot.y, *kind.footprint_m(), spot.yaw)))
-        return found
+                covered.append((kind, Rectangle(spot.x, spot.y, *kind.footprint_m(), spot.yaw)))
+        return covered
 
     def slab(self, station: Station, parts: int) -> tuple[Vector, Vector]:
         """Size and centre [m] of the slab under the spots that so many parts can need, turned as the station is."""
@@ -268,18 +268,18 @@ class Places:
 
         BadInput for a part that no other part carries.
         """
-        found: list[Spot] = []
+        first_spots: list[Spot] = []
         for kind in order:
             own = self.spots(self.task.station(self.task.starts(kind)), kind)
-            found.append(next(spot for spot in own if spot not in found))
-        for kind, spot in zip(order, found, strict=True):
+            first_spots.append(next(spot for spot in own if spot not in first_spots))
+        for kind, spot in zip(order, first_spots, strict=True):
             station = self.task.station(self.task.starts(kind))
-            if lacks := [name for name, under in self.below(station, spot) if under not in found]:
+            if lacks := [name for name, under in self.below(station, spot) if under not in first_spots]:
                 raise BadInput(
                     f"part '{kind}': count: at '{station.name}' {counted(order.count(kind), kind)} would stand on more than "
                     f"{counted(order.count(lacks[0]), lacks[0])}: wanted more of '{lacks[0]}', or fewer of '{kind}'"
                 )
-        return found
+        return first_spots
 
     def neighbours(self, station: Station, spot: Spot) -> dict[str, tuple[str, Spot]]:
         """Parts that may stand beside one spot, their kind and spots by name; empty at a station with one place."""
@@ -304,7 +304,7 @@ class Places:
 
         Lower layers are left out, because they are no higher than the support of this spot, and so are parts on top of this one.
         """
-        found: dict[tuple[str | float, ...], tuple[str, Spot]] = {}
+        seen_once: dict[tuple[str | float, ...], tuple[str, Spot]] = {}
         stand = {
             other_spot: [kind for kind, _ in self.grounds(station, other_spot)] for other_spot in self.spots(station)
         }
@@ -320,8 +320,8 @@ class Places:
                 x, y = beside((spot.x, spot.y), spot.yaw, (along, across))
                 seen = Spot(x, y, spot.z + up, spot.yaw + other.yaw - spot_there.yaw)
                 key = round(along, 4), round(across, 4), round(up, 4), round(other.yaw - spot_there.yaw, 4)
-                found |= {(kind.name, *key): (kind.name, seen) for kind in outermost(kinds)}
-        return list(found.values())
+                seen_once |= {(kind.name, *key): (kind.name, seen) for kind in outermost(kinds)}
+        return list(seen_once.values())
 
 
 def outermost(kinds: Sequence[Kind]) -> list[Kind]:

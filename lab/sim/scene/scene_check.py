@@ -78,10 +78,10 @@ def _check_level(task: Task) -> None:
     grids = [f"station '{station.name}': approach = 'camera'" for station in task.stations if station.grid is not None]
     covers = [f"processes.{name}: by = 'robot'" for name, process in task.processes.items() if process.by == "robot"]
     seen = ["perception = 'camera'"] if task.perception == "camera" else []
-    if found := [*grids, *covers, *seen]:
+    if refused := [*grids, *covers, *seen]:
         sides = [station.name for station in task.stations if station.approach == "side"]
         why = f", for '{sides[0]}' has approach = 'side'" if sides else ""
-        raise BadInput(f"{found[0]} is for a tool that hangs; robot.tool is 'level'{why}")
+        raise BadInput(f"{refused[0]} is for a tool that hangs; robot.tool is 'level'{why}")
 
 
 def _check_on_body(places: Places, station: Station) -> None:
@@ -302,5 +302,5 @@ def _ground(places: Places, station: Station, parts: int) -> list[Rectangle]:
         return Rectangle(spot.x, spot.y, along, across, spot.yaw)
 
     spots = places.spots(station)
-    found = [around(spot) for spot in (spots if station.places is not None else spots[:parts])]
-    return [*found, places.body(station, parts)] if station.kind == "machine" else found
+    areas = [around(spot) for spot in (spots if station.places is not None else spots[:parts])]
+    return [*areas, places.body(station, parts)] if station.kind == "machine" else areas

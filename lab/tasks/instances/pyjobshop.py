@@ -98,15 +98,15 @@ def _check_plain(document: _Json, lists: Mapping[str, Sequence[_Json]]) -> None:
     for name, plain in PLAIN.items():
         for item in lists[name]:
             for key, value in plain.items():
-                if (found := item.get(key, value)).value != value:
-                    raise found.refusal(
-                        f"{json.dumps(value)}, all that the lab's cells can have,", json.dumps(found.value)
+                if (given := item.get(key, value)).value != value:
+                    raise given.refusal(
+                        f"{json.dumps(value)}, all that the lab's cells can have,", json.dumps(given.value)
                     )
     late = [job.get("deadline", NEVER) for job in lists["jobs"]]
     late += [task.get(key, NEVER) for task in lists["tasks"] for key in ("latest_start", "latest_end")]
-    for found in late:
-        if found.whole(2**62) < NEVER:
-            raise found.refusal("no deadline, which the lab's cells do not have,", json.dumps(found.value))
+    for given in late:
+        if given.whole(2**62) < NEVER:
+            raise given.refusal("no deadline, which the lab's cells do not have,", json.dumps(given.value))
     constraints = document.get("constraints", {})
     for name, value in constraints.value.items() if isinstance(constraints.value, dict) else ():
         if value and name not in READ:
@@ -128,7 +128,7 @@ def _servers(resource: _Json) -> int:
 
 def _ways(tasks: Sequence[_Json], modes: Sequence[_Json], resources: int) -> list[Operation]:
     """The machines that can do each task, with their times."""
-    found: list[list[tuple[int, float]]] = [[] for _ in tasks]
+    choices_of: list[list[tuple[int, float]]] = [[] for _ in tasks]
     for mode in modes:
         used, demands = mode.get("resources", []), mode.get("demands", [])
         if len(used.each(resources)) != 1:
@@ -137,11 +137,11 @@ def _ways(tasks: Sequence[_Json], modes: Sequence[_Json], resources: int) -> lis
             raise demands.refusal("a demand of 0 or 1", json.dumps(demands.value))
         task = mode.get("task").whole(len(tasks) - 1)
         machine = used.each(1)[0].whole(resources - 1)
-        found[task].append((machine, float(mode.get("duration").whole(int(MOST_TIME)))))
-    for place, machines in zip(tasks, found, strict=True):
+        choices_of[task].append((machine, float(mode.get("duration").whole(int(MOST_TIME)))))
+    for place, machines in zip(tasks, choices_of, strict=True):
         if not machines:
             raise place.refusal("a mode of this task: there is none")
-    return [tuple(choices) for choices in found]
+    return [tuple(choices) for choices in choices_of]
 
 
 def _orders(document: _Json, jobs: Sequence[_Json], tasks: Sequence[_Json]) -> list[list[int]]:
@@ -180,29 +180,29 @@ def _orders(document: _Json, jobs: Sequence[_Json], tasks: Sequence[_Json]) -> l
 
 def _reached(after: Mapping[int, set[int]], task: int) -> set[int]:
     """All tasks that must follow a task."""
-    found: set[int] = set()
+    following: set[int] = set()
     ahead = [*after.get(task, ())]
     while ahead:
-        if (one := ahead.pop()) not in found:
-            found.add(one)
+        if (one := ahead.pop()) not in following:
+            following.add(one)
             ahead += after.get(one, ())
-    return found
+    return following
 
 
 def _setups(document: _Json, orders: Sequence[Sequence[int]], machines: int) -> dict[int, dict[tuple[int, int], float]]:
     """The setup times of each machine: (job before, job after) -> time; a job has a single task on such a machine."""
     job_of = {task: number for number, order in enumerate(orders) for task in order}
-    found: dict[int, dict[tuple[int, int], float]] = {}
+    setups: dict[int, dict[tuple[int, int], float]] = {}
     for setup in document.get("constraints", {}).get("setup_times", []).each(LISTS["modes"]):
         machine = setup.get("machine").whole(machines - 1)
         first, then = (setup.get(name).whole(len(job_of) - 1) for name in ("task1", "task2"))
         before, after = job_of[first], job_of[then]
         seconds = float(setup.get("duration").whole(int(MOST_TIME)))
-        if found.setdefault(machine, {}).get((before, after), seconds) != seconds:
+        if setups.setdefault(machine, {}).get((before, after), seconds) != seconds:
             raise setup.refusal(f"one setup time from job {before} to job {after} on a machine", f"{seconds:g}, too")
         if first != then:
-            found[machine][before, after] = seconds
-    return {machine: times for machine, times in found.items() if any(times.values())}
+            setups[machine][before, after] = seconds
+    return {machine: times for machine, times in setups.items() if any(times.values())}
 
 
 def write(file: CellFile) -> str:
