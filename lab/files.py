@@ -290,10 +290,10 @@ def beside_or_asset(name: str, folder: Path, what: str) -> Path:
     Raises BadInput, which begins with `what`, if it is in neither, or if the name leads out of the folder.
     """
     for place in (folder, assets_folder()):
-        found = within(place, name)
-        if found is None:
+        inside = within(place, name)
+        if inside is None:
             raise BadInput(f"{what} '{name}': a file's name may not lead out of the task file's folder")
-        if is_file(found):
-            return found
+        if is_file(inside):
+            return inside
     known = ", ".join(sorted(path.name for path in assets_folder().glob("*.urdf")))
     raise BadInput(f"{what} '{name}': no such file in {folder}; of its own the lab has {known}")

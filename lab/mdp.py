@@ -34,9 +34,9 @@ class Rewards:
         (-0.5, [0.0, 0.0, 1.5])
     """
 
-    goal: Annotated[float, Gt(0), doc("what entering a goal is worth")] = 1.5
-    collision: Annotated[float, Lt(0), doc("what entering an obstacle is worth")] = -1.0
-    step: Annotated[float, Le(0), Ge(-1000), doc("what any other step is worth")] = -0.1
+    goal: Annotated[float, Gt(0), doc("the reward for entering a goal")] = 1.5
+    collision: Annotated[float, Lt(0), doc("the reward for entering an obstacle")] = -1.0
+    step: Annotated[float, Le(0), Ge(-1000), doc("the reward for any other step")] = -0.1
 
     def __post_init__(self) -> None:
         for name, allowed in get_type_hints(Rewards, include_extras=True).items():

@@ -47,7 +47,7 @@ class Advising:
     ) -> "Advising":
         """The advisors with these names, or made in Python (see `AdvisorName.made`).
 
-        Raises BadInput for an unknown name, or an unknown way of asking or deciding.
+        Raises BadInput for an unknown name, or an unknown order of asking or rule of deciding.
         """
         advisors = tuple(
             AdvisorName.of(name, "--advisor") if isinstance(name, str) else AdvisorName.made(name) for name in names

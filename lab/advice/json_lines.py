@@ -41,14 +41,14 @@ class EntryKinds:
             raise ValueError(f"kind {kind!r} is none of {', '.join(self._kinds)}")
         model: Any = self._kinds[kind]
         try:
-            found = _reader(model).validate_json(json.dumps(record))
+            entry = _reader(model).validate_json(json.dumps(record))
         except ValidationError as error:
             wrong = [
-                f"{'.'.join(map(str, one['loc']))}: {_PLAINLY.get(one['type'], one['msg'])}"
-                for one in error.errors(include_url=False)
+                f"{'.'.join(map(str, finding['loc']))}: {_PLAINLY.get(finding['type'], finding['msg'])}"
+                for finding in error.errors(include_url=False)
             ]
             raise ValueError(f"{kind}: {'; '.join(wrong)}") from None
-        return model(**{name: getattr(found, name) for name in found.__dataclass_fields__})
+        return model(**{name: getattr(entry, name) for name in entry.__dataclass_fields__})
 
 
 def differing(before: str, now: str) -> str:

@@ -67,9 +67,9 @@ class PanelSettings:
 
     def __post_init__(self) -> None:
         if self.asked not in ASKED:
-            raise unknown("way of asking", self.asked, ASKED, "--ask")
+            raise unknown("order of asking", self.asked, ASKED, "--ask")
         if self.decide not in DECISIONS:
-            raise unknown("way of deciding", self.decide, DECISIONS, "--decide")
+            raise unknown("rule of deciding", self.decide, DECISIONS, "--decide")
 
 
 @dataclass(frozen=True)

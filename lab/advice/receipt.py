@@ -101,7 +101,7 @@ class Receipt:
 
     def lines(self) -> list[str]:
         """The receipt as lines of plain text, at most WIDTH characters wide."""
-        plain = ("".join(one if one.isprintable() else "?" for one in line) for line in _lines(self))
+        plain = ("".join(letter if letter.isprintable() else "?" for letter in line) for line in _lines(self))
         return [part for line in plain for part in textwrap.wrap(line, WIDTH, subsequent_indent="    ")]
 
 
@@ -129,18 +129,20 @@ def receipt(
     responsibility. Entries with states or actions that the problem does not have count as answers only.
     """
     questions = list(_questions(entries))
-    taken = [(one.given.state, one.given.action) for one in questions if one.given.action is not None]
+    taken = [
+        (question.given.state, question.given.action) for question in questions if question.given.action is not None
+    ]
     there = _existing(taken, mdp)
     led = [int(mdp.successor[pair]) for pair in there] if certain and mdp else []
-    voices = _voices(questions, {one.by for one in entries if isinstance(one, Answer)}, mdp, values)
+    voices = _voices(questions, {entry.by for entry in entries if isinstance(entry, Answer)}, mdp, values)
     wrong = None if values is None else worse(there, values)
     counted = Receipt(
-        requests=sum(isinstance(one, AdviceRequested) for one in entries),
+        requests=sum(isinstance(entry, AdviceRequested) for entry in entries),
         questions=len(questions),
         taken=len(taken),
         refused=_refused(questions, voices),
-        remembered=sum(one.steps for one in entries if isinstance(one, AdviceRemembered)),
-        agreed=sum(one.given.action == one.given.own for one in questions),
+        remembered=sum(entry.steps for entry in entries if isinstance(entry, AdviceRemembered)),
+        agreed=sum(question.given.action == question.given.own for question in questions),
         into_walls=sum(entered == state for (state, _), entered in zip(there, led, strict=False)),
         into_obstacles=sum(bool(mdp.terminal[entered] and not mdp.goal[entered]) for entered in led) if mdp else 0,
         sent_back=len(_sent_back(questions, mdp)) if certain and mdp else 0,
@@ -149,8 +151,8 @@ def receipt(
         skill=None if values is None else skill_of(there, values),
         voices=voices if len(voices) > 1 else (),
         notices=tuple(_notices(entries)),
-        yours=any(isinstance(one, Answer) for one in entries) and all(voice.whole for voice in voices),
-        **_episodes([one for one in entries if isinstance(one, EpisodeEnded)], window),
+        yours=any(isinstance(entry, Answer) for entry in entries) and all(voice.whole for voice in voices),
+        **_episodes([entry for entry in entries if isinstance(entry, EpisodeEnded)], window),
     )
     return replace(counted, hints=tuple(_hints(counted, entries, window)))
 
@@ -180,11 +182,11 @@ def _voices(
     of: Sequence[_Question], people: Collection[str], mdp: TabularMDP | None, values: Values
 ) -> tuple[Voice, ...]:
     voices = []
-    for name in dict.fromkeys(name for one in of for name in one.said):
-        own = [one for one in of if name in one.said]
-        followed = sum(one.said[name] == one.given.action for one in own)
-        overruled = sum(one.said[name] != one.given.action and name in one.heard for one in own)
-        answers = _existing([(one.given.state, one.said[name]) for one in own], mdp)
+    for name in dict.fromkeys(name for question in of for name in question.said):
+        own = [question for question in of if name in question.said]
+        followed = sum(question.said[name] == question.given.action for question in own)
+        overruled = sum(question.said[name] != question.given.action and name in question.heard for question in own)
+        answers = _existing([(question.given.state, question.said[name]) for question in own], mdp)
         against = None if values is None else sum(worse(answers, values).values())
         skill = skill_of(answers, values) if values is not None and name in people else None
         unheard = len(own) - followed - overruled
@@ -194,9 +196,9 @@ def _voices(
 
 def _refused(questions: Sequence[_Question], voices: Sequence[Voice]) -> dict[str, int]:
     counts = {
-        SILENT: sum(one.given.action is None for one in questions),
-        OVERRULED: sum(one.overruled for one in voices),
-        UNHEARD: sum(one.unheard for one in voices),
+        SILENT: sum(question.given.action is None for question in questions),
+        OVERRULED: sum(voice.overruled for voice in voices),
+        UNHEARD: sum(voice.unheard for voice in voices),
     }
     return {reason: count for reason, count in counts.items() if count}
 
@@ -206,7 +208,7 @@ def _sent_back(questions: Iterable[_Question], mdp: TabularMDP) -> set[int]:
     sent_from: set[int] = set()
     seen: set[int] = set()
     episode, last = None, 0
-    for given in (one.given for one in questions):
+    for given in (question.given for question in questions):
         if given.episode != episode or given.step <= last:
             seen.clear()
         episode, last = given.episode, given.step
@@ -219,26 +221,26 @@ def _sent_back(questions: Iterable[_Question], mdp: TabularMDP) -> set[int]:
 
 
 def _mean(episodes: Sequence[EpisodeEnded]) -> float | None:
-    return sum(one.steps for one in episodes) / len(episodes) if episodes else None
+    return sum(episode.steps for episode in episodes) / len(episodes) if episodes else None
 
 
 def _judged(ended: Sequence[EpisodeEnded], window: int) -> list[bool]:
     """For each guided episode, whether it was good: better than the mean of the K before it, or as good as the best."""
     means = [_mean(ended[max(0, n - window) : n]) for n in range(len(ended))]
     return [
-        one.verdict != "misled" if one.verdict else mean is not None and one.steps < mean
-        for one, mean in zip(ended, means, strict=True)
-        if one.guided
+        episode.verdict != "misled" if episode.verdict else mean is not None and episode.steps < mean
+        for episode, mean in zip(ended, means, strict=True)
+        if episode.guided
     ]
 
 
 def _episodes(ended: Sequence[EpisodeEnded], window: int) -> dict[str, Any]:
-    guided = [n for n, one in enumerate(ended) if one.guided]
+    guided = [n for n, episode in enumerate(ended) if episode.guided]
     best = sum(ended[n].verdict == "best" for n in guided)
     before = _mean(ended[max(0, guided[0] - window) : guided[0]]) if guided else None
     after = _mean(ended[guided[-1] + 1 : guided[-1] + 1 + window]) if guided else None
     return {
-        "helped_steps": sum(one.helped_steps for one in ended),
+        "helped_steps": sum(episode.helped_steps for episode in ended),
         "episodes": len(ended),
         "guided": len(guided),
         "better": sum(_judged(ended, window)) - best,
@@ -253,7 +255,7 @@ def _notices(entries: Sequence[Entry]) -> Iterator[str]:
     """Rejections, the end of advice, and dropped or readmitted advisors, in words."""
     for n, entry in enumerate(entries):
         if isinstance(entry, AdviceRejected):
-            left = sum(isinstance(one, EpisodeEnded) for one in entries[n:])
+            left = sum(isinstance(later, EpisodeEnded) for later in entries[n:])
             why = f"{counted(entry.misleads, 'episode')} no better than before, {entry.omega} tolerated"
             yield f"episode {entry.episode}: advice rejected ({why}); alone for the {counted(left, 'episode')} after it"
         elif isinstance(entry, AdviceEnded):
@@ -265,10 +267,10 @@ def _notices(entries: Sequence[Entry]) -> Iterator[str]:
 
 def _hints(of: Receipt, entries: Sequence[Entry], window: int) -> Iterator[str]:
     """Suggestions for better advice, each based on a count."""
-    ended = [one for one in entries if isinstance(one, EpisodeEnded)]
+    ended = [entry for entry in entries if isinstance(entry, EpisodeEnded)]
     if not of.taken:
         if of.questions:
-            yield f"it asked about {counted(of.questions, 'step')} and was never advised: an answer shows it a way at once"
+            yield f"it asked about {counted(of.questions, 'step')} and was never advised: an answer would show it a path at once"
         return
     if 2 * of.agreed > of.taken:
         help_was = f"{of.agreed} of {counted(of.taken, 'step')}, was what it would have done by itself"
@@ -284,8 +286,8 @@ def _hints(of: Receipt, entries: Sequence[Entry], window: int) -> Iterator[str]:
     if 2 * of.refused.get(SILENT, 0) > of.questions:
         left = f"{of.refused[SILENT]} of {counted(of.questions, 'question')}"
         yield (f"you left {left} to it" if of.yours else f"{left} had no answer") + ": answer more of them"
-    first = next((one.episode for one in ended if one.guided), 0)
-    late = sum(isinstance(one, AdviceRequested) and one.episode < first for one in entries)
+    first = next((episode.episode for episode in ended if episode.guided), 0)
+    late = sum(isinstance(entry, AdviceRequested) and entry.episode < first for entry in entries)
     if late:
         who = "you helped" if of.yours else "it was helped"
         yield f"earlier: it had asked in {counted(late, 'episode')} before {who} for the first time"
@@ -322,8 +324,8 @@ def _lines(of: Receipt) -> Iterator[str]:
         yield f"  skill {of.skill}"
     if of.against_best:
         yield f"  another action was better in {counted(of.against_best, 'step')}:"
-        for one in of.differences:
-            yield f"    {one.label}: said {one.said}, best {' or '.join(one.best)} ({one.times} x)"
+        for difference in of.differences:
+            yield f"    {difference.label}: said {difference.said}, best {' or '.join(difference.best)} ({difference.times} x)"
     for voice in of.voices:
         against = "" if voice.against_best is None else f", {counted(voice.against_best, 'time')} not the best"
         skill = "" if voice.skill is None else f"; skill {voice.skill}"

@@ -208,5 +208,5 @@ def differences(wrong: Mapping[Pair, int], mdp: TabularMDP, values: FloatArray, 
             tuple(labels[n] for n in np.flatnonzero(values[state] >= values[state].max() - SAME)),
             times,
         )
-        for (state, action), times in sorted(wrong.items(), key=lambda one: (-one[1], one[0]))[:most]
+        for (state, action), times in sorted(wrong.items(), key=lambda item: (-item[1], item[0]))[:most]
     )

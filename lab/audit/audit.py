@@ -29,7 +29,7 @@ class Audit:
     @property
     def delivered(self) -> tuple[str, ...]:
         """The claimed parts that no finding names."""
-        guilty = {one.part for one in self.findings}
+        guilty = {finding.part for finding in self.findings}
         return tuple(name for name in self.claimed if name not in guilty)
 
     @property
@@ -52,9 +52,9 @@ class Audit:
         return {
             "claimed": list(self.claimed),
             "delivered": list(self.delivered),
-            "struck": [asdict(one) for one in self.evidence.struck],
+            "struck": [asdict(fault) for fault in self.evidence.struck],
             "plan_kept": bool(self.evidence.planned),
-            "findings": [asdict(one) for one in self.findings],
+            "findings": [asdict(finding) for finding in self.findings],
             "stays": [{k: round(v, 3) if isinstance(v, float) else v for k, v in row.items()} for row in stays],
         }
 
@@ -74,7 +74,9 @@ def kept_evidence(folder: Path, task: Task, order: Order) -> Evidence:
         run = json_of(read_limited(folder / "run.json"))
         claimed = [str(name) for name in run["audit"]["claimed"]]
         kept = run["audit"].get("plan_kept") is True
-        struck = [Struck(str(one["what"]), str(one["part"]), str(one["station"])) for one in run["audit"]["struck"]]
+        struck = [
+            Struck(str(fault["what"]), str(fault["part"]), str(fault["station"])) for fault in run["audit"]["struck"]
+        ]
         rows = schedule_rows(read_limited(folder / "schedule.csv").decode())
     except OSError as error:
         raise BadInput(f"{where}: '{error.filename}' cannot be read: {error.strerror or error}") from None

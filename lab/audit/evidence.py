@@ -52,9 +52,9 @@ class Evidence:
 
     def __post_init__(self) -> None:
         self.parts = parts_seen(self.task, self.order, self.tracks)
-        moved = {one.station for one in self.struck if one.what == "station moved"}
-        self._touched = {one.part for one in self.struck if one.part}
-        self._touched |= {one.name for one in self.parts for stay in one.stays if stay.station in moved}
+        moved = {fault.station for fault in self.struck if fault.what == "station moved"}
+        self._touched = {fault.part for fault in self.struck if fault.part}
+        self._touched |= {part.name for part in self.parts for stay in part.stays if stay.station in moved}
 
     def undisturbed(self, part: str) -> bool:
         """Whether no fault has affected a part."""

@@ -99,13 +99,13 @@ def _in_links(tracks: BodyTracks, body: int) -> Array:
 
 def _creeps(carried: Mask, places: Array) -> list[int]:
     """The first frames of the transports in which a part moves within the hand (the link that it moves with)."""
-    found = []
+    starts = []
     for first, after in runs(carried):
         flight = places[:, first:after]
         off_m = np.linalg.norm(flight - np.median(flight, axis=1, keepdims=True), axis=2)
         if off_m.max(axis=1).min(initial=np.inf) > HELD_M:
-            found.append(first)
-    return found
+            starts.append(first)
+    return starts
 
 
 def _apart(tracks: BodyTracks, body: int, others: Sequence[int], frames: Numbers) -> Array:

@@ -24,22 +24,22 @@ AT_POSE_M, AT_POSE_RAD = 0.002, 0.02  # largest deviation of a body from its pos
 
 def findings(evidence: Evidence) -> list[Finding]:
     """All findings against a run, by time."""
-    found: list[Finding] = []
+    all_findings: list[Finding] = []
     for seen in evidence.parts:
         if seen.name in evidence.claimed:
-            found += _route(evidence, seen)
-            found += _end(evidence, seen)
+            all_findings += _route(evidence, seen)
+            all_findings += _end(evidence, seen)
         if evidence.undisturbed(seen.name):
-            found += stood(evidence, seen)
-            found += told(evidence, seen)
-            found += in_hand(evidence, seen)
-    found += _stations(evidence)
-    found += _capacities(evidence)
-    found += batches(evidence)
-    found += one_gripper(evidence)
-    found += in_one_another(evidence)
-    found += one_story(evidence)
-    return sorted(found, key=lambda finding: finding.at_s)
+            all_findings += stood(evidence, seen)
+            all_findings += told(evidence, seen)
+            all_findings += in_hand(evidence, seen)
+    all_findings += _stations(evidence)
+    all_findings += _capacities(evidence)
+    all_findings += batches(evidence)
+    all_findings += one_gripper(evidence)
+    all_findings += in_one_another(evidence)
+    all_findings += one_story(evidence)
+    return sorted(all_findings, key=lambda finding: finding.at_s)
 
 
 # ---- the route of one part -------------------------------------------------------------------------------------------
@@ -47,8 +47,8 @@ def findings(evidence: Evidence) -> list[Finding]:
 
 def _route(evidence: Evidence, seen: PartStays) -> list[Finding]:
     """The findings on a part's stays, by the route that gives the fewest."""
-    found = [list(_along(evidence, seen, route)) for route in evidence.task.part(seen.kind).routes]
-    return min(found, key=len)
+    by_route = [list(_along(evidence, seen, route)) for route in evidence.task.part(seen.kind).routes]
+    return min(by_route, key=len)
 
 
 def _along(evidence: Evidence, seen: PartStays, route: Sequence[Stage]) -> Iterator[Finding]:
@@ -66,7 +66,7 @@ def _along(evidence: Evidence, seen: PartStays, route: Sequence[Stage]) -> Itera
         chosen = long[0] if long else max(there, key=lambda n: stays[n].seconds)
         if not evidence.undisturbed(seen.name):  # it may have been taken out of a machine and processed again
             chosen = min(long or [chosen], key=lambda n: len([*_covered_in(evidence, seen, stage, stays[n])]))
-        between = [one for one in stays[place:chosen] if one.station != stage.buffer]
+        between = [between_stay for between_stay in stays[place:chosen] if between_stay.station != stage.buffer]
         if between and evidence.undisturbed(seen.name) and not _repeated(between, before, stage):
             words = f"came to '{between[0].station}', which is not on its route from '{before}' to '{stage.station}'"
             yield Finding("route", seen.name, between[0].station, between[0].start_s, words)
@@ -81,7 +81,7 @@ def _along(evidence: Evidence, seen: PartStays, route: Sequence[Stage]) -> Itera
 
 def _repeated(between: Sequence[Stay], before: str, stage: Stage) -> bool:
     """Whether the stays in between are only repeated ones, at the station before or at the stage's own."""
-    return all(one.station in (before, stage.station) for one in between)
+    return all(stay.station in (before, stage.station) for stay in between)
 
 
 def _covered_in(evidence: Evidence, seen: PartStays, stage: Stage, stay: Stay) -> Iterator[Finding]:
@@ -104,7 +104,7 @@ def _times(evidence: Evidence, seen: PartStays, stage: Stage, stay: Stay, work_s
     at_most_s = evidence.at_most_s(stage)
     if at_most_s is None:
         return
-    slow = any(one.what.startswith("machine") and one.station == where for one in evidence.struck)
+    slow = any(fault.what.startswith("machine") and fault.station == where for fault in evidence.struck)
     learned = evidence.task.station(where).process is not None
     begun_s = max([stay.start_s, *(row["start_s"] for row in own if row["start_s"] < stay.start_s + TAKES_S)])
     done_s = own[-1]["end_s"] if (slow or learned) and own else begun_s + work_s
@@ -160,7 +160,7 @@ def _missed(evidence: Evidence, seen: PartStays, rule: str, where: str, grid: _G
     rests_s = np.where(np.linalg.norm(np.diff(grid.at, axis=0), axis=1) < RESTS_M, np.diff(times_s), 0.0)
     numbers = np.floor((grid.at[1:] - grid.low) / (grid.size / shape)).astype(int)
     cells = list(np.ndindex(*shape))
-    missed = [one for one in cells if rests_s[(numbers == one).all(axis=1)].sum() < grid.process.dwell_s - SLACK_S]
+    missed = [cell for cell in cells if rests_s[(numbers == cell).all(axis=1)].sum() < grid.process.dwell_s - SLACK_S]
     if missed:
         words = f"{len(missed)} of {len(cells)} cells were not covered in '{where}'"
         yield Finding(rule, seen.name, where, float(times_s[-1]), words)
@@ -198,15 +198,15 @@ def _place(evidence: Evidence, seen: PartStays, last: str, body: int) -> Iterato
     station, tracks = evidence.task.station(last), evidence.tracks
     x, y = evidence.off_pose(last, tracks.inside(tracks.number(last), tracks.poses[:, body, :3])[-1])
     foot_m = tracks.poses[-1, body, 2] + tracks.low[body, 2] - floor_of(station, tracks)[-1]
-    level = [one for one in station.own_places if LOW_M <= foot_m - one.height_m <= HIGH_M]
+    level = [place for place in station.own_places if LOW_M <= foot_m - place.height_m <= HIGH_M]
     if not level:
         return
-    near = min(level, key=lambda one: hypot(x - one.at[0], y - one.at[1]))
+    near = min(level, key=lambda place: hypot(x - place.at[0], y - place.at[1]))
     off_m = hypot(x - near.at[0], y - near.at[1])
-    here = [one for one in level if hypot(x - one.at[0], y - one.at[1]) <= ON_SPOT_M]
+    here = [place for place in level if hypot(x - place.at[0], y - place.at[1]) <= ON_SPOT_M]
     if off_m > ON_SPOT_M:
         yield f"stands {off_m:.3f} m off the spots of '{last}' in the end"
-    elif all(one.kind != station.nests(seen.kind) for one in here):
+    elif all(place.kind != station.nests(seen.kind) for place in here):
         whose = "no kind of its own" if near.kind is None else f"a {near.kind}"
         yield f"stands on a place of '{last}' in the end that is for {whose}"
     if near.height_m and station.stands_on in ("slab", "box") and not _is_carried(evidence, body):
@@ -285,7 +285,7 @@ def batches(evidence: Evidence) -> Iterator[Finding]:
     own = [seen for seen in evidence.parts if evidence.undisturbed(seen.name)]
     for name in [station.name for station in evidence.task.stations if station.batch]:
         rows = {
-            seen.name: [one for one in evidence.own_rows(seen.name, "process") if one["station"] == name]
+            seen.name: [row for row in evidence.own_rows(seen.name, "process") if row["station"] == name]
             for seen in own
         }
         for seen, other in permutations(own, 2):

@@ -125,17 +125,17 @@ def floor_of(station: Station, tracks: BodyTracks) -> Array:
 
 def _stays(task: Task, tracks: BodyTracks, at: NDArray[np.int64]) -> tuple[Stay, ...]:
     edges = np.flatnonzero(np.diff(at)) + 1
-    found: list[Stay] = []
+    stays: list[Stay] = []
     for first, after in zip([0, *edges], [*edges, len(at)], strict=True):
         if at[first] < 0:
             continue
         stay = Stay(task.stations[at[first]].name, float(tracks.times_s[first]), float(tracks.times_s[after - 1]))
-        last = found[-1] if found else None
+        last = stays[-1] if stays else None
         if last is not None and last.station == stay.station and stay.start_s - last.end_s < GAP_S:
-            found[-1] = Stay(stay.station, last.start_s, stay.end_s)
+            stays[-1] = Stay(stay.station, last.start_s, stay.end_s)
         else:
-            found.append(stay)
-    return tuple(stay for stay in found if stay.seconds >= LEAST_S)
+            stays.append(stay)
+    return tuple(stay for stay in stays if stay.seconds >= LEAST_S)
 
 
 def _carried(tracks: BodyTracks, body: int, at: NDArray[np.int64]) -> Mask:

@@ -229,7 +229,7 @@ COMMANDS = {  # words after `lab` -> the command
     "study list": Command("study", "The studies that can be run.", "lab study list"),
     "study run": Command(
         "study",
-        "Run a study and write its report; what its folder already holds (chapter 9, faults, transport) is not run again.",
+        "Run a study and write its report. Results that its folder already holds are not computed again.",
         "lab study run table-9.2 --workers 2",
     ),
     "study compare": Command(

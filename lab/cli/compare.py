@@ -21,7 +21,7 @@ SWITCHES = {"true": True, "false": False}
 def _with_settings(function: Callable[..., None]) -> Callable[..., None]:
     """The command with an option for each setting of learner and gate in place of **values."""
     shown = signature(function)
-    own = [one for one in shown.parameters.values() if one.kind is not Parameter.VAR_KEYWORD]
+    own = [parameter for parameter in shown.parameters.values() if parameter.kind is not Parameter.VAR_KEYWORD]
     more = []
     for name, setting in SETTINGS.items():
         family = FAMILIES.get(name)
@@ -35,7 +35,7 @@ def _with_settings(function: Callable[..., None]) -> Callable[..., None]:
         kind = Annotated[str | None, option]
         more.append(Parameter(name, Parameter.KEYWORD_ONLY, default=None, annotation=kind))
     function.__signature__ = shown.replace(parameters=[*own, *more])  # type: ignore[attr-defined]
-    function.__annotations__ = {one.name: one.annotation for one in (*own, *more)}
+    function.__annotations__ = {parameter.name: parameter.annotation for parameter in (*own, *more)}
     return function
 
 
@@ -77,10 +77,10 @@ def study_compare(
 
 def listed(name: str, text: str) -> list[str]:
     """The values of an option, separated by commas; BadInput for an empty one."""
-    found = [one.strip() for one in text.split(",")]
-    if not all(found):
+    words = [word.strip() for word in text.split(",")]
+    if not all(words):
         raise BadInput(f"--{name.replace('_', '-')} '{text}': wanted one value, or several with commas between")
-    return found
+    return words
 
 
 def parsed(name: str, text: str) -> list[Any]:

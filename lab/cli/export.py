@@ -58,7 +58,7 @@ def export(
         "files": [str(path) for path in files],
         "transfers": len(program.carried.transfers),
         "motions": off.motions,
-        "moves": sum(len(one.points) for one in read_back if isinstance(one, deferred.Lines))
+        "moves": sum(len(command.points) for command in read_back if isinstance(command, deferred.Lines))
         if isinstance(read_back, list)
         else 0,
         "poses": off.poses,
@@ -96,7 +96,7 @@ def _summary(document: dict[str, Any]) -> "RenderableType":
     lines = [
         f"{document['task']}, {document['arm']}: {counted(document['transfers'], 'transfer')} as "
         f"{counted(len(files), 'file')} in {Path(files[0]).parent}",
-        f"read back and played in physics: at most {worst} off the run's tool on {counted(document['motions'], 'way')}, "
-        f"{rest} where they end",
+        f"read back and played in physics: at most {worst} off the run's tool on {counted(document['motions'], 'path')}, "
+        f"{rest} at their ends",
     ]
     return Text("\n".join(lines))

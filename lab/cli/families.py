@@ -73,8 +73,8 @@ def _of_export() -> Tables:
 def members(family: str) -> Mapping[str, Any] | Sequence[str]:
     """The table of a family, such as "gates", or its names; only the tables needed for it are loaded."""
     for room in (_of_studies, _of_teaching, _of_sequencing, _of_tasks, _of_export):
-        if family in (found := room()):
-            return found[family]
+        if family in (family_room := room()):
+            return family_room[family]
     raise KeyError(family)
 
 

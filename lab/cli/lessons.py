@@ -99,7 +99,7 @@ def say_read(kept: "deferred.KeptSession | deferred.OrderSession", where: str) -
         named = list(deferred.parse_name(str(named[0]), where).options.values())
     files = [word for word in named if isinstance(word, str) and deferred.is_path(word) and is_file(word)]
     advisors = [deferred.AdvisorName.of(name) for name in options.advisors]
-    files += [str(one) for name in advisors for one in (name.folder, name.answers) if one is not None]
+    files += [str(file) for name in advisors for file in (name.folder, name.answers) if file is not None]
     here = kept.read.path.parent.resolve()
     if outside := [name for name in files if not Path(name).resolve().is_relative_to(here)]:
         complain(f"journal '{kept.read.path}' names, outside its folder, what is read now: {', '.join(outside)}")

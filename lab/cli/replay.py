@@ -110,10 +110,10 @@ def replay(
 def _audit_run(folder: Path, as_json: bool) -> None:
     """Print the audit of a run's folder; exit 1 when it has findings."""
     options, task = deferred.kept_task(folder, "DIR")
-    found = deferred.audit(deferred.kept_evidence(folder, task, task.ordered(options.toasts, options.parts)))
-    show({"run": str(folder), "task": task.name} | found.to_json(), as_json, deferred.audit_summary)
-    if found.failure:
-        end(found.failure, 1)
+    audited = deferred.audit(deferred.kept_evidence(folder, task, task.ordered(options.toasts, options.parts)))
+    show({"run": str(folder), "task": task.name} | audited.to_json(), as_json, deferred.audit_summary)
+    if audited.failure:
+        end(audited.failure, 1)
 
 
 def _replay_run(

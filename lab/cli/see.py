@@ -125,19 +125,19 @@ def calibrate_camera(
     pictures = [(str(path), deferred.read_picture(path)) for path in images]
     angle = None if loaded is None or loaded.camera is None else loaded.camera.field_of_view_rad
     if corners is None:
-        found = deferred.calibrate(pictures, deferred.Mat() if loaded is None else deferred.mat_of(loaded), angle)
+        calibrated = deferred.calibrate(pictures, deferred.Mat() if loaded is None else deferred.mat_of(loaded), angle)
     else:
-        found = _from_corners(corners, task, pictures[0][1], _calibration(known))
+        calibrated = _from_corners(corners, task, pictures[0][1], _calibration(known))
     files = {}
     if out is not None:
-        deferred.write_calibration(out, found)
+        deferred.write_calibration(out, calibrated)
         files["calibration"] = str(out)
     if overlay is not None:
         deferred.write_picture(
-            overlay, deferred.drawn(pictures[0][1], found, None if loaded is None else deferred.mat_of(loaded))
+            overlay, deferred.drawn(pictures[0][1], calibrated, None if loaded is None else deferred.mat_of(loaded))
         )
         files["overlay"] = str(overlay)
-    return found.to_json() | {"files": files}
+    return calibrated.to_json() | {"files": files}
 
 
 def _from_corners(

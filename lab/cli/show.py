@@ -30,7 +30,7 @@ def write_page(schedule: list[Path], out: Path | None) -> dict[str, Any]:
     page = Path(f"{schedule[0].stem}.html") if out is None else out
     if page.suffix != ".html":
         raise BadInput(f"page '{page}' (--out): its name must end in .html")
-    table = deferred.read_schedule([one / "schedule.csv" if one.is_dir() else one for one in schedule])
+    table = deferred.read_schedule([path / "schedule.csv" if path.is_dir() else path for path in schedule])
     shown = deferred.scene_of(table, schedule[0].stem)
     deferred.replay_html(shown.recording, page, shown.speed, shown.title, shown.story, tracks=shown.tracks)
     rows, measured = table.rows, shown.story.measured

@@ -70,7 +70,7 @@ def study_run(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Run a study and write its report; what its folder already holds (chapter 9, faults, transport) is not run again."""
+    """Run a study and write its report. Results that its folder already holds are not computed again."""
     asked = {
         "advisor_table": advisor_table,
         "seconds": seconds,

@@ -80,14 +80,23 @@ def task_convert(
     as_json: Json = False,
 ) -> None:
     """Read an instance in a common format, and write it as the lab's own cell file (TOML), or as PyJobShop's JSON."""
-    found = deferred.load_cell_beside(file, deferred.InstanceAsked(layout, robots, case))
+    cell_file = deferred.load_cell_beside(file, deferred.InstanceAsked(layout, robots, case))
     if out is not None and out.suffix not in (".toml", ".json"):
         raise BadInput(f"file '{out}' (--out): wanted one that ends with .toml or .json")
-    text = deferred.pyjobshop.write(found) if out is not None and out.suffix == ".json" else deferred.toml_of(found)
+    text = (
+        deferred.pyjobshop.write(cell_file)
+        if out is not None and out.suffix == ".json"
+        else deferred.toml_of(cell_file)
+    )
     if out is not None:
         deferred.write_task_text(out, text)
-    parts, robots_there = len(found.ordered()), len(found.built_robots)
-    document = {"file": None if out is None else str(out), "name": found.name, "parts": parts, "robots": robots_there}
+    parts, robots_there = len(cell_file.ordered()), len(cell_file.built_robots)
+    document = {
+        "file": None if out is None else str(out),
+        "name": cell_file.name,
+        "parts": parts,
+        "robots": robots_there,
+    }
     if as_json or out is not None:
         what = f"{counted(parts, 'part')}, {counted(robots_there, 'robot')}"
         show(document | {"text": text}, as_json, lambda d: f"{d['file']}: {d['name']}, {what}")
@@ -106,7 +115,7 @@ def task_random(
 
     def told(d: dict[str, Any]) -> str:
         return (
-            f"{d['file']}: {counted(d['obstacles'], 'obstacle')}, the shortest way takes "
+            f"{d['file']}: {counted(d['obstacles'], 'obstacle')}, the shortest path takes "
             f"{counted(d['optimal_steps'], 'move')} (seed {seed})"
         )
 
@@ -155,10 +164,10 @@ def _to_draw(file: str, plot: Path) -> "deferred.Task | None":
     """The task to draw, None when it cannot be read; BadInput for a cell or a world, and for a bad path of the picture."""
     deferred.check_picture(plot)
     try:
-        found = deferred.load_any(file)
+        loaded = deferred.load_any(file)
     except LabError:  # which the check reports
         return None
-    if not isinstance(found, deferred.Task):
-        instead = f"lab sequence {file} --gantt {plot}" if isinstance(found, deferred.CellFile) else f"lab view {file}"
+    if not isinstance(loaded, deferred.Task):
+        instead = f"lab sequence {file} --gantt {plot}" if isinstance(loaded, deferred.CellFile) else f"lab view {file}"
         raise BadInput(f"--plot draws the cell of a task from above, and {file} is none: see {instead}")
-    return found
+    return loaded

@@ -117,10 +117,10 @@ def toolbox_evaluate(
     """Measure a policy's success rate in physics, in scenes drawn from the seed, and record it in the policy's log."""
     box = deferred.Toolbox(toolbox)
     policy = box.load(box.show(name)["file"])
-    found = deferred.task_of(policy, task)
-    wanted = deferred.skill_of(policy, found, skill)
+    in_task = deferred.task_of(policy, task)
+    wanted = deferred.skill_of(policy, in_task, skill)
     with deferred.counting(console(), "scenes") as told:
-        evaluation = deferred.evaluate(policy, found, wanted, scenes, seed, told)
+        evaluation = deferred.evaluate(policy, in_task, wanted, scenes, seed, told)
     document = evaluation.to_json()
     if document["scenes"]:
         box.note(policy.name, deferred.EVALUATED, **evaluation.facts())
@@ -131,21 +131,21 @@ def toolbox_evaluate(
         end(f"in none of {counted(scenes, 'drawn scene')} can '{wanted}' reach its goal", 1)
 
 
-def evaluation_summary(found: Mapping[str, Any]) -> "RenderableType":
+def evaluation_summary(document: Mapping[str, Any]) -> "RenderableType":
     """The text of `lab toolbox evaluate`, from its JSON document: the success rate, and a line for each failed scene."""
     from rich.console import Group
     from rich.text import Text
 
-    scenes = f"{counted(found['scenes'], 'drawn scene')} of {found['task']} from seed {found['seed']}"
-    lines = [f"'{found['policy']}' as '{found['skill']}': {found['successes']} of {scenes} succeeded"]
-    if found["success_percent"] is not None:
-        low, high = found["ci95"]
-        lines.append(f"success {found['success_percent']:.1f} % (95 % interval {low:.1f} to {high:.1f})")
-    if found["mean_sim_s"] is not None:
-        lines.append(f"a success takes {found['mean_sim_s']:.1f} s on average")
-    if found["unsolvable"]:
-        lines.append(f"not counted: {counted(found['unsolvable'], 'scene')} in which nobody could reach the goal")
-    failed = [row for row in found["rows"] if not row["success"]]
+    scenes = f"{counted(document['scenes'], 'drawn scene')} of {document['task']} from seed {document['seed']}"
+    lines = [f"'{document['policy']}' as '{document['skill']}': {document['successes']} of {scenes} succeeded"]
+    if document["success_percent"] is not None:
+        low, high = document["ci95"]
+        lines.append(f"success {document['success_percent']:.1f} % (95 % interval {low:.1f} to {high:.1f})")
+    if document["mean_sim_s"] is not None:
+        lines.append(f"a success takes {document['mean_sim_s']:.1f} s on average")
+    if document["unsolvable"]:
+        lines.append(f"not counted: {counted(document['unsolvable'], 'scene')} in which nobody could reach the goal")
+    failed = [row for row in document["rows"] if not row["success"]]
     return Group(*map(Text, lines), *(Text(f"seed {row['seed']}: {row['reason']}", "red") for row in failed))
 
 

@@ -139,7 +139,7 @@ def _job(
     program: Program, actions: Sequence[Action], transfer: ProgramTransfer | None, more: Collection[str] = frozenset()
 ) -> TransferJob:
     machines = program.carried.machines
-    found: list[Command] = []
+    commands: list[Command] = []
     ways: list[tuple[Motion, ...]] = []
     together: list[Motion] = []  # motions since the last command
     wait, taken = None if transfer is None else transfer.waits_for, False
@@ -151,29 +151,29 @@ def _job(
         if not way:
             return
         if not ways:
-            found.append(JointMove(tuple(map(float, program.joints[way[0].first]))))
+            commands.append(JointMove(tuple(map(float, program.joints[way[0].first]))))
         ways.append(way)
-        found.append(_path(program, way))
+        commands.append(_path(program, way))
         if taken and transfer is not None and transfer.waits_for is not None and transfer.waits_for not in more:
-            found.append(Reset(machines.index(transfer.waits_for) + 1, transfer.waits_for))
+            commands.append(Reset(machines.index(transfer.waits_for) + 1, transfer.waits_for))
             taken = False
 
     for action in actions:
         if wait is not None and transfer is not None and action.at_s >= transfer.reach_s - TIME_STEP / 2:
             lead()
-            found.append(Await(machines.index(wait) + 1, wait))
+            commands.append(Await(machines.index(wait) + 1, wait))
             wait, taken = None, False
         if isinstance(action, Motion):
             together.append(action)
             continue
         lead()
         if isinstance(action, Press):
-            found += [GripperOutput(action.closed), Pause(GRIP_S)]
+            commands += [GripperOutput(action.closed), Pause(GRIP_S)]
             if transfer is not None:
-                found += [Check(), Payload(transfer.mass_kg)] if action.closed else [Payload(0.0)]
+                commands += [Check(), Payload(transfer.mass_kg)] if action.closed else [Payload(0.0)]
                 taken = action.closed and wait is None
         else:
-            found.append(Pause(action.seconds))
+            commands.append(Pause(action.seconds))
     lead()
     if (
         transfer is not None
@@ -181,8 +181,8 @@ def _job(
         and transfer.target in machines
         and transfer.target not in more
     ):
-        found.append(Start(machines.index(transfer.target) + 1, transfer.target))
-    return TransferJob("not finished" if transfer is None else transfer.words, tuple(found), tuple(ways))
+        commands.append(Start(machines.index(transfer.target) + 1, transfer.target))
+    return TransferJob("not finished" if transfer is None else transfer.words, tuple(commands), tuple(ways))
 
 
 def _path(program: Program, way: Sequence[Motion]) -> Path:

@@ -236,10 +236,10 @@ def read_job(text: str, where: str) -> InformJob:
 
 def _read_positions(lines: _Lines, count: int) -> list[InformPosition]:
     tool, pulses = _read_sort(lines)
-    found: list[InformPosition] = []
+    positions: list[InformPosition] = []
     configuration: tuple[int, ...] | None = None
     number = r"-?\d{1,9}" if pulses else _NUMBER
-    while len(found) < count:
+    while len(positions) < count:
         if lines.peek().startswith("///TOOL"):
             tool, other = _read_sort(lines)
             configuration = None
@@ -250,12 +250,12 @@ def _read_positions(lines: _Lines, count: int) -> list[InformPosition]:
             bits = lines.matched(r"///RCONF ([01](?:,[01]){7})", "///RCONF and eight times 0 or 1")[1]
             configuration = tuple(map(int, bits.split(",")))
             continue
-        at = rf"C{len(found):05d}=({number}(?:,{number}){{5}})"
-        numbers = lines.matched(at, f"C{len(found):05d}= and six {'pulses' if pulses else 'numbers'}")[1]
+        at = rf"C{len(positions):05d}=({number}(?:,{number}){{5}})"
+        numbers = lines.matched(at, f"C{len(positions):05d}= and six {'pulses' if pulses else 'numbers'}")[1]
         if not pulses and configuration is None:
             raise lines.fault("a position before any ///RCONF")
-        found.append(InformPosition(tuple(map(float, numbers.split(","))), configuration, tool))
-    return found
+        positions.append(InformPosition(tuple(map(float, numbers.split(","))), configuration, tool))
+    return positions
 
 
 def _read_sort(lines: _Lines) -> tuple[int, bool]:

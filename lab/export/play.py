@@ -81,7 +81,7 @@ def deviation(program: Program, played: "list[Command] | TimedPoints") -> ToolDe
         return _compared_by_time(program, play_timed(played, arm, robot, program.seen_at_s))
     motions, ways = [way for job in jobs for way in job.ways], play(played, arm, robot)
     if len(motions) != len(ways):
-        raise BadInput(f"{len(ways)} ways were read back, the run had {len(motions)}")
+        raise BadInput(f"{len(ways)} paths were read back, the run had {len(motions)}")
     worst, poses = np.zeros(4), 0
     for together, way in zip(motions, ways, strict=True):
         motion = together[-1]
@@ -97,7 +97,7 @@ def deviation(program: Program, played: "list[Command] | TimedPoints") -> ToolDe
 
 def signals(played: "Sequence[Command] | TimedPoints", program: Program) -> list[str]:
     """The gripper's changes, beginning open, and the waits for machines, in order, as comparable words."""
-    machines, found, closed = program.carried.machines, list[str](), False
+    machines, words, closed = program.carried.machines, list[str](), False
     if isinstance(played, TimedPoints):
         told: list[Command] = []
         for point in played.points:
@@ -106,17 +106,17 @@ def signals(played: "Sequence[Command] | TimedPoints", program: Program) -> list
         played = told
     for command in played:
         if isinstance(command, Await):
-            found.append(f"wait for input {command.machine}")
+            words.append(f"wait for input {command.machine}")
         elif isinstance(command, GripperOutput) and command.closed != closed:
             closed = command.closed
-            found.append("close" if closed else "open")
+            words.append("close" if closed else "open")
         elif isinstance(command, Start | Reset):
-            found.append(f"{type(command).__name__} machine {command.machine}")
+            words.append(f"{type(command).__name__} machine {command.machine}")
         elif isinstance(command, Check):
-            found.append("check the gripper")
+            words.append("check the gripper")
         elif isinstance(command, Payload):
-            found.append(f"carry {command.mass_kg:.3f} kg")
-    return found
+            words.append(f"carry {command.mass_kg:.3f} kg")
+    return words
 
 
 def _compared_by_time(program: Program, played: Array) -> ToolDeviation:
@@ -216,12 +216,12 @@ def play_timed(played: TimedPoints, arm: Arm, settings: RobotSettings, at_s: Arr
 
 def _rests(times: Array, joints: Array) -> dict[int, int]:
     """The physics steps to skip, first -> last: the arm rests in between and has come to a stop."""
-    found = {}
+    rests = {}
     for number in range(len(times) - 1):
         first, last = ceil(times[number]) + HOLD_STEPS, int(times[number + 1]) - HOLD_STEPS
         if first < last and np.abs(joints[number + 1] - joints[number]).max() < _AT_REST_RAD:
-            found[first] = last
-    return found
+            rests[first] = last
+    return rests
 
 
 def _at(times: Array, joints: Array, step: int) -> Array:

@@ -228,13 +228,13 @@ def _arrays(path: Path) -> list[Any]:
         content = read_limited(path, MAX_BYTES)
         _check_sizes(content)
         with np.load(BytesIO(content), allow_pickle=False) as stored:
-            found = {name: np.asarray(stored[name], bool if name == "closed" else float) for name in _ARRAYS}
+            arrays = {name: np.asarray(stored[name], bool if name == "closed" else float) for name in _ARRAYS}
     except Exception as error:  # any error of the readers of zip files and arrays, for a file of unknown origin
         raise BadInput(f"'{path}': not a run's trajectory: {error}") from None
     for name, dimensions in _ARRAYS.items():
-        if found[name].ndim != dimensions or not np.isfinite(found[name]).all():
+        if arrays[name].ndim != dimensions or not np.isfinite(arrays[name]).all():
             raise BadInput(f"'{path}': '{name}' is not an array of {dimensions} dimensions of finite numbers")
-    return list(found.values())
+    return list(arrays.values())
 
 
 def _check_sizes(content: bytes) -> None:

@@ -137,8 +137,8 @@ def closed_at(actions: Sequence[Action], at_s: Array) -> NDArray[np.bool_]:
 
 def _mass_kg(task: Task, part: str, *, on_pallet: bool) -> float:
     """The mass [kg] of a part, named by kind and number, and of its pallet; 0 for a part that the task does not contain."""
-    masses = {one.name: one.mass_kg for one in task.parts}
-    own = next((one for one in task.parts if one.name == part.rpartition(" ")[0]), None)
+    masses = {kind.name: kind.mass_kg for kind in task.parts}
+    own = next((kind for kind in task.parts if kind.name == part.rpartition(" ")[0]), None)
     if own is None:
         return 0.0
     return own.mass_kg + (masses.get(own.pallet or "", 0.0) if on_pallet else 0.0)

@@ -39,14 +39,14 @@ class TimedPoints:
 def timed(program: Program) -> TimedPoints:
     """The points of a run, as few as stay within WITHIN_RAD of its joints; numbers are rounded to DIGITS decimals."""
     drops = [transfer.drop_s for transfer in program.carried.transfers]
-    found: list[Point] = []
+    points: list[Point] = []
     for t_s, joints, waits_for in _rows(program):
         pose = program.arm.forward(joints)
         tool = (_rounded(pose.x), _rounded(pose.y), _rounded(pose.z), _rounded(pose.yaw))
         closed = bool(closed_at(program.carried.actions, np.array([t_s + 1e-9]))[0])
         job = int(np.searchsorted(drops, t_s, side="left")) + 1
-        found.append(Point(_rounded(t_s), tuple(map(_rounded, joints)), tool, closed, waits_for, job))
-    return TimedPoints(program.arm.joints, tuple(found))
+        points.append(Point(_rounded(t_s), tuple(map(_rounded, joints)), tool, closed, waits_for, job))
+    return TimedPoints(program.arm.joints, tuple(points))
 
 
 def _rounded(number: float) -> float:
@@ -55,7 +55,11 @@ def _rounded(number: float) -> float:
 
 def _rows(program: Program) -> Iterator[tuple[float, Array, str]]:
     """Times, joints and the machine waited for, of each action in order."""
-    waits = [(one.reach_s, one.waits_for) for one in program.carried.transfers if one.waits_for is not None]
+    waits = [
+        (transfer.reach_s, transfer.waits_for)
+        for transfer in program.carried.transfers
+        if transfer.waits_for is not None
+    ]
     joints = program.joints[0] if len(program.joints) else None
     for action in program.carried.actions:
         while waits and joints is not None and waits[0][0] <= action.at_s + 1e-9:

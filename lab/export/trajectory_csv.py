@@ -47,9 +47,9 @@ def read_table(text: str, joints: Sequence[str], where: str) -> TimedPoints:
     rows = csv.reader(StringIO(text), strict=True)
     points: list[Point] = []
     try:
-        wanted, found = _header(joints), next(rows, [])
-        if found != wanted:
-            raise BadInput(f"{where}, line 1: the columns are {', '.join(found)}; wanted {', '.join(wanted)}")
+        wanted, header = _header(joints), next(rows, [])
+        if header != wanted:
+            raise BadInput(f"{where}, line 1: the columns are {', '.join(header)}; wanted {', '.join(wanted)}")
         for row in rows:
             place = f"{where}, line {rows.line_num}"
             point = _point(row, len(joints), place)

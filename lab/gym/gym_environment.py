@@ -270,8 +270,8 @@ class GymEnvironment:
         if result.interrupted:
             raise KeyboardInterrupt
         if not (np.ptp(result.q, axis=1) > 0.0).any():
-            found = f"{ALONE.episodes} episodes of learning alone found nothing to prefer"
-            raise WorkFailed(f"{self.live.which}: nobody knows what is best in it: {found}")
+            why = f"{ALONE.episodes} episodes of learning alone found nothing to prefer"
+            raise WorkFailed(f"{self.live.which}: nobody knows what is best in it: {why}")
         return result.q
 
     def judge(self, q: FloatArray, learner: LearnerSettings) -> Judged:

@@ -94,8 +94,8 @@ class WorldEnv(TableEnv):
     """A grid world: one that ships, a .toml file, a .txt grid, or "random:SHAPE:DENSITY:SEED". Raises BadInput."""
 
     def __init__(self, world: str, render_mode: str | None = None):
-        found = load_world(world)
-        super().__init__(found.check(), found.learner.max_steps - found.learner.count_start, render_mode)
+        loaded = load_world(world)
+        super().__init__(loaded.check(), loaded.learner.max_steps - loaded.learner.count_start, render_mode)
 
 
 class InsertEnv(TableEnv):
@@ -106,15 +106,15 @@ class InsertEnv(TableEnv):
         from lab.skills.prepared_scene import prepare
         from lab.skills.skillset import SkillSet
 
-        found = load(task)
-        order = found.fitting(TAUGHT_WITH)
+        loaded = load(task)
+        order = loaded.fitting(TAUGHT_WITH)
         name = next(
-            (name for name, skill in SkillSet.of(found, order).skills.items() if skill.subtask == Insert.subtask), None
+            (name for name, skill in SkillSet.of(loaded, order).skills.items() if skill.subtask == Insert.subtask), None
         )
         if name is None:
-            raise BadInput(f"task '{found.name}': no station is approached through the camera's grid")
-        problem = prepare(found, order, layout_seed, name).problems[name]  # as for a lesson of this seed
-        super().__init__(problem.mdp, found.subtask(Insert.subtask).learner.max_steps, render_mode)
+            raise BadInput(f"task '{loaded.name}': no station is approached through the camera's grid")
+        problem = prepare(loaded, order, layout_seed, name).problems[name]  # as for a lesson of this seed
+        super().__init__(problem.mdp, loaded.subtask(Insert.subtask).learner.max_steps, render_mode)
 
 
 class CellEnv(gymnasium.Env[Any, Any]):

@@ -51,10 +51,10 @@ class LearnerSettings:
     Raises BadInput for a value outside its range.
     """
 
-    learner: Annotated[str, doc("how it learns")] = "q-lambda"
+    learner: Annotated[str, doc("the update rule, by name")] = "q-lambda"
     alpha: Annotated[float, Gt(0), Le(1), doc("learning rate")] = 0.95
     discount: Annotated[float, Gt(0), Le(1), doc("gamma: the weight of the next step, compared with this one")] = 0.99
-    trace: Annotated[float, Ge(0), Le(1), doc("lambda, of the learners with traces")] = 0.5
+    trace: Annotated[float, Ge(0), Le(1), doc("lambda: the decay of traces, for learners that have them")] = 0.5
     replacing: Annotated[bool, doc("a trace is set to 1 on each visit instead of growing by 1")] = False
     tilings: Annotated[
         int,
@@ -68,8 +68,8 @@ class LearnerSettings:
         Le(1_000_000),
         doc("initial value of every action: optimistic values, above the true ones, explore; pessimistic ones exploit"),
     ] = 0.0
-    planning: Annotated[int, Ge(0), Le(1000), doc("earlier moves that dyna-q replays after each move")] = 5
-    selection: Annotated[str, doc("how it chooses its actions")] = "softmax"
+    planning: Annotated[int, Ge(0), Le(1000), doc("number of earlier moves that dyna-q replays after each move")] = 5
+    selection: Annotated[str, doc("the rule by which actions are chosen, by name")] = "softmax"
     exploration: Annotated[float, Gt(0), Le(1_000_000), doc("temperature, or epsilon, of the first episode")] = 1.0
     beta: Annotated[float, Ge(0), Le(100), doc("decay: in episode n it explores by exploration * n**-beta")] = 1.3
     episodes: Annotated[int, Ge(1), Le(1_000_000), doc("session length N")] = 200
@@ -91,23 +91,30 @@ class GateSettings:
     Raises BadInput for a value outside its range, or for X < 2K with a gate that compares moving averages.
     """
 
-    gate: Annotated[str, doc("when it asks")] = "ccrl"
-    lambda_threshold: Annotated[float, Ge(0), Le(1), doc("Lambda: it asks while it improves by less")] = 0.05
-    omega: Annotated[int, Ge(0), Le(1_000_000), doc("Omega: misleads that are tolerated")] = 7
+    gate: Annotated[str, doc("the rule by which the learner asks, by name")] = "ccrl"
+    lambda_threshold: Annotated[
+        float, Ge(0), Le(1), doc("Lambda: the improvement below which ccrl and combined ask")
+    ] = 0.05
+    omega: Annotated[int, Ge(0), Le(1_000_000), doc("Omega: number of misleads that are tolerated")] = 7
     first_episode: Annotated[int, Ge(1), Le(1_000_000), doc("X: the first episode that may ask")] = 30
-    window: Annotated[int, Ge(1), Le(100_000), doc("K: episodes in a moving average")] = 5
+    window: Annotated[int, Ge(1), Le(100_000), doc("K: number of episodes in a moving average")] = 5
     psi: Annotated[
         float, Ge(0), Le(1_000_000), doc("Psi: distance of action values at which ia, combined and importance decide")
     ] = 1.0
-    spread: Annotated[float, Ge(0), Le(1_000_000), doc("deviation of its tables at which uncertainty asks")] = 0.1
+    spread: Annotated[
+        float, Ge(0), Le(1_000_000), doc("least deviation between its tables at which uncertainty asks")
+    ] = 0.1
     rate: Annotated[float, Ge(0), Le(1), doc("share of the steps that random asks about")] = 0.1
     fading: Annotated[
-        float, Ge(0), Le(1), doc("factor by which the share of the steps that fading asks about falls, each episode")
+        float,
+        Ge(0),
+        Le(1),
+        doc("factor by which the share of the steps that fading asks about shrinks in each episode"),
     ] = 0.97
     consistency: Annotated[float, Gt(0.5), Lt(1), doc("shaping's probability that an answer is right")] = 0.9
-    enough_steps: Annotated[float, Gt(0), Le(1_000_000), doc("mean step count that satisfies cq")] = 50.0
+    enough_steps: Annotated[float, Gt(0), Le(1_000_000), doc("mean step count above which cq asks")] = 50.0
     ensemble: Annotated[int, Ge(2), Le(100), doc("number of tables of uncertainty")] = 5
-    budget: Annotated[int, Ge(0), Le(1_000_000_000), doc("helped steps that any gate may use in a session")] = (
+    budget: Annotated[int, Ge(0), Le(1_000_000_000), doc("number of helped steps that a session may use")] = (
         1_000_000_000
     )
     judge_unhelped: Annotated[

@@ -25,7 +25,7 @@ def known_source(thing: object, source: str) -> None:
 def _modules_of(thing: object) -> set[str]:
     """The modules of a member's code; of a record such as a `Study`, of the code of its functions."""
     parts = (thing, *vars(thing).values()) if is_dataclass(thing) and not isinstance(thing, type) else (thing,)
-    modules = {str(getattr(one, "__module__", type(one).__module__)) for one in parts}
+    modules = {str(getattr(value, "__module__", type(value).__module__)) for value in parts}
     return {name for name in modules if name.partition(".")[0] not in ("lab", "builtins")}
 
 

@@ -1,6 +1,6 @@
-"""What is decided about trouble: pure functions of the state of a run and of what was seen, which return what to do.
+"""Decisions about trouble: pure functions of a run's state and of the perceived deviations, which return an answer.
 
-`recovery` does it.
+`recovery` carries the answers out.
 """
 
 from collections import Counter
@@ -12,52 +12,52 @@ from lab.production.perception import Deviation
 from lab.production.run_state import GivenUp, RunState
 from lab.production.trouble import Trouble
 
-MAX_TRIES = 3  # what fails is tried again from the state reached, at most twice
-PAUSES_S = (0.0, 0.0, 30.0)  # before each try [s]: what disturbs may go away
-MOST_TROUBLES = 40  # in one run; then it is stopped
+MAX_TRIES = 3  # most tries of a skill, each from the reached state
+PAUSES_S = (0.0, 0.0, 30.0)  # pause before each try [s], in which a disturbance may end
+MOST_TROUBLES = 40  # most troubles in one run, after which it is stopped
 LOST = ("part fallen", "part gone", "part out of reach")
 FIXED = ("obstacle moved", "obstacle gone", "obstacle new", "station moved")
 
 
 @dataclass(frozen=True)
 class GoOn:
-    """Go on from where everything is: nothing is wrong any more."""
+    """Continue from the present state: nothing is wrong any more."""
 
 
 @dataclass(frozen=True)
 class Stop:
-    """Stand still safely, and say why."""
+    """Stop the run safely, for a reason."""
 
     why: str
 
 
 @dataclass(frozen=True)
 class WaitForCamera:
-    """Wait until the camera sees again."""
+    """Wait until the camera is uncovered."""
 
 
 @dataclass(frozen=True)
 class Believe:
-    """Take into account what was seen, and order the rest of the work anew."""
+    """Update the believed scene by the perceived deviations, and replan the remaining work."""
 
     seen: tuple[Deviation, ...]
 
     @property
     def fixed(self) -> tuple[Deviation, ...]:
-        """Those that change the scene, so that it has to be surveyed and learned again."""
-        return tuple(one for one in self.seen if one.sort in FIXED)
+        """The deviations of fixed bodies, after which the scene is surveyed and learned again."""
+        return tuple(deviation for deviation in self.seen if deviation.sort in FIXED)
 
 
 @dataclass(frozen=True)
 class TryAgain:
-    """Try it again after a pause [s]."""
+    """Retry after a pause [s]."""
 
     pause_s: float
 
 
 @dataclass(frozen=True)
 class GiveUp:
-    """Go on without the machine or the part, and say why."""
+    """Continue without the machine or the part, for a reason."""
 
     why: str
 
@@ -66,9 +66,9 @@ Answer = GoOn | Stop | WaitForCamera | Believe | TryAgain | GiveUp
 
 
 def answer_to(state: RunState, trouble: Trouble, seen: tuple[Deviation, ...], *, dark: bool) -> Answer:
-    """What to do about trouble that has been counted in `state.tries`.
+    """The answer to trouble that has been counted in `state.tries`.
 
-    seen: what is not as believed, now; dark: the camera sees nothing.
+    seen: the present deviations; dark: whether the camera is covered.
     """
     if trouble.kind == "held":
         return GoOn()
@@ -89,20 +89,20 @@ def answer_to(state: RunState, trouble: Trouble, seen: tuple[Deviation, ...], *,
 
 
 class Belief(Enum):
-    """What to believe of a body that was seen where it was not expected, or was not seen at all."""
+    """A new belief about a body that was seen at an unexpected place, or was not seen."""
 
-    FORGET = auto()  # what belonged to nobody is not there any more
-    AVOID = auto()  # something that belongs to nobody takes up room
-    LEAVE = auto()  # a part cannot be taken up
-    TAKE_UP = auto()  # a part is taken up where it stands
-    PUT_BACK = auto()  # a part is brought again to where it was moved from
-    SURVEY = auto()  # the scene has changed: it is surveyed as a whole
+    FORGET = auto()  # a strange body is no longer there
+    AVOID = auto()  # a strange body occupies a spot
+    LEAVE = auto()  # the part cannot be taken up
+    TAKE_UP = auto()  # the part is taken up where it stands
+    PUT_BACK = auto()  # the part is brought back to where it was moved from
+    SURVEY = auto()  # a fixed body has moved: the whole scene is surveyed again
 
 
 def belief_in(state: RunState, seen: Deviation, *, blocked: bool = False, unfinished: bool = False) -> Belief:
-    """What to believe of one body, in the order of the cases.
+    """The new belief about one body, by the first case that applies.
 
-    blocked: a part stands too near to something to be taken up. unfinished: a machine, or the robot there, was not done with it.
+    blocked: whether the part is too near to another body to be taken up. unfinished: whether its machine or service is not done.
     """
     part = state.part_of(seen.name)
     if seen.name in state.strange:
@@ -119,8 +119,8 @@ def belief_in(state: RunState, seen: Deviation, *, blocked: bool = False, unfini
 def with_room(
     state: RunState, found: Mapping[int, GivenUp], standing: Container[int]
 ) -> tuple[dict[int, GivenUp], dict[int, GivenUp]]:
-    """Of parts that were given up and could be brought on, those for which there is room at the stations of their positions,
-    those that stand there first; and the others, which come later."""
+    """Of given-up parts that could be brought on, those with room at the stations of their positions, in which those that
+    already stand there come first; and the others, which come later."""
     now, later = dict[int, GivenUp](), dict[int, GivenUp]()
     places = [place for part, place in enumerate(state.plan.locations, 1) if part not in state.lost]
     taken = Counter(station for place in places for station in state.plan.cell.positions[place].holds)

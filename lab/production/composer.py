@@ -1,13 +1,13 @@
-"""Sequence + skills -> motions: carries the order of transfers out in physics, and goes on from whatever was reached.
+"""Sequence + skills -> motions: carries the order of transfers out in physics, and continues from any reached state.
 
-`carry_out` builds all that a job needs, each from what stands before it:
+`carry_out` builds the objects of a job, each from those before it:
 
-1. the state of the job (`run_state`), and the faults that are to strike (`faults`);
+1. the state of the job (`run_state`), and its faults (`faults`);
 2. the floor with the scene, whose hooks let faults strike, watch machines and write the journal (`floor`);
-3. what machines do with parts, what the robot does with them, and what is done about trouble (`parts_in_machines`,
+3. the work of machines, the transfers of the robot, and the recovery from trouble (`parts_in_machines`,
    `transfers`, `recovery`).
 
-Then it makes one move after the other (`Production`), and has the frames audited (`audited`).
+Then it makes the moves one by one (`Production`), and has the frames audited (`audited`).
 """
 
 from collections.abc import Callable, Sequence
@@ -44,21 +44,21 @@ from lab.skills.prepared_scene import Prepared
 from lab.tasks.fault_fields import FaultFields
 from lab.teaching.events import Event, MoveMade, Tell, TroubleMet, unheard
 
-PUT_RIGHT = "; put it right, then go on"  # what a person is asked
+PUT_RIGHT = "; put it right, then go on"  # the text that asks a person to put something right
 
 
 def nobody(floor: Floor) -> None:
-    """Nobody looks at it."""
+    """Does nothing: nobody watches."""
 
 
 @dataclass(frozen=True)
 class Conditions:
-    """Under which conditions a prepared task is carried out: how fast, who watches and may stop it, and what is kept of it.
+    """The conditions of a run: its speed, its viewer, its controls, its faults, and its journal.
 
-    override: the share of the task's speed and acceleration with which the arm moves. viewer: who watches live.
-    faults: what goes wrong in it; fault_seed: draws more of that, None: nothing more. advice: who is asked, None: nobody
-    about the order. on_floor: called with the floor when it is ready. before_step, meanwhile: called by the floor, before
-    faults strike (see `Hooks`).
+    override: the share of the task's speed and acceleration with which the arm moves. viewer: shows the run live.
+    faults: the given faults; fault_seed: draws more of them, None: none. advice: the advice on the order, None: none.
+    on_floor: called with the floor when it is ready. before_step, meanwhile: called by the floor, before faults strike
+    (see `Hooks`).
     """
 
     override: float = 1.0
@@ -75,7 +75,7 @@ class Conditions:
 
 @dataclass(frozen=True)
 class Production:
-    """One job being carried out on a floor: its state, what the robot does, and what is done about trouble."""
+    """One job that is carried out on a floor: its state, its transfers, and its recovery from trouble."""
 
     floor: Floor
     state: RunState
@@ -86,9 +86,9 @@ class Production:
     def of(
         cls, floor: Floor, state: RunState, relearner: Relearner | None = None, planner: Planner | None = None
     ) -> "Production":
-        """A job that begins on a floor, with its parts where they stand at first.
+        """The job at its beginning, with the parts on their first spots.
 
-        relearner: learns what changed in the scene, None: nobody does. planner: who orders the rest where it must be.
+        relearner: learns the changed problems of the scene; None: they are not learned. planner: replans the remaining work.
         """
         state.spot_of |= first_spots(floor, state)
         machines = PartsInMachines(floor, state)
@@ -98,10 +98,10 @@ class Production:
         return cls(floor, state, work, recovery)
 
     def carry_out(self, sequence: Sequence[int]) -> str | None:
-        """Carry the whole sequence out; None, or why not all parts were made: which, where and why.
+        """Carries the whole sequence out; returns why not all parts were made, by part, station and reason, or None.
 
-        Where the run cannot go on by itself, or ends without a part that a person may help on, and somebody attends it, it
-        waits until they have put things right.
+        If the run is attended and cannot continue by itself, or ends without a part that a person could help, it waits until
+        the person has put things right.
         """
         self.state.sequence = [*sequence]
         while True:
@@ -115,7 +115,7 @@ class Production:
                 return why
 
     def _next(self) -> bool:
-        """The next move, or the answer to what keeps it from being made; False when nothing is left. Raises RunStopped."""
+        """Makes the next move or answers its trouble; returns False when no work is left. Raises RunStopped."""
         state = self.state
         try:
             if state.sequence:
@@ -133,20 +133,20 @@ class Production:
         return True
 
     def _put_right(self, asked: str) -> bool:
-        """Wait until a person has put right what is asked for; whether anybody has, and the run goes on."""
+        """Waits until a person has put right what `asked` names; returns whether somebody did, so that the run continues."""
         while asked and self.floor.protected(f"{asked}{PUT_RIGHT}"):
             self.recovery.forget()
             try:
-                found = self.recovery.find_again(attended=True)
-                if not found:
+                any_back = self.recovery.find_again(attended=True)
+                if not any_back:
                     self.recovery.replan("a person has put things right")
-                return found or bool(self.state.sequence)
+                return any_back or bool(self.state.sequence)
             except RunStopped as stopped:
                 asked = str(stopped)
         return False
 
     def outcome(self, failure: str | None, interrupted: bool = False) -> Outcome:
-        """What came of it, as the scene is now."""
+        """The outcome of the run, from the present scene."""
         state, bench, cell = self.state, self.floor.bench, self.state.cell
         finished = [part for part in sorted(state.finished) if part not in state.spoilt]
         names = {part: state.name(part) for part in range(1, cell.parts + 1)}
@@ -176,8 +176,8 @@ def carry_out(
 ) -> tuple[Outcome, Recording]:
     """Carry `sequence` (one decision a move, see `Run`) out in physics, from parts on their first stations to the end.
 
-    A part is delivered when it stands on its last station at the end, on its pallet if it has one; dropped when it is
-    nowhere upright. Ctrl-C ends it with what came of it until then.
+    A part is delivered if it stands at its last station at the end, on its pallet if it has one; dropped if it stands
+    nowhere upright. After Ctrl-C the outcome until then is returned.
     """
     conditions = conditions or Conditions()
     journal, before_step, heard = conditions.journal, conditions.before_step, list[Event]()
@@ -219,23 +219,23 @@ def carry_out(
 def audited(
     outcome: Outcome, recording: Recording, prepared: Prepared, cell: Cell, sequence: Sequence[int] = ()
 ) -> Outcome:
-    """What came of a run after the audit: delivered is only what the frames show, else it fails for what they show.
+    """The outcome after the audit: only parts whose delivery the frames show are delivered; a finding is a failure.
 
-    sequence: what was to be carried out; empty where it was made up on the way.
+    sequence: the planned decisions; empty if they were chosen during the run.
     """
     names = {cell.part_name(part): part for part in range(1, cell.parts + 1)}
     claimed = [name for name, part in names.items() if part in outcome.delivered]
-    struck = tuple(Struck(one.what, one.part, one.station) for one in outcome.happened)
+    struck = tuple(Struck(fault.what, fault.part, fault.station) for fault in outcome.happened)
     rows = rows_of(outcome.schedule, cell, "measured")
     kept = sequence and not any(isinstance(event, TroubleMet) for event in outcome.heard)
     planned = rows_of(simulate(cell, sequence), cell, "planned") if kept else ()
-    found = audit(Evidence(prepared.task, prepared.order, tracks_of(recording), rows, claimed, struck, planned))
-    delivered = tuple(names[name] for name in found.delivered)
-    return replace(outcome, audit=found, delivered=delivered, failure=outcome.failure or found.failure)
+    judged = audit(Evidence(prepared.task, prepared.order, tracks_of(recording), rows, claimed, struck, planned))
+    delivered = tuple(names[name] for name in judged.delivered)
+    return replace(outcome, audit=judged, delivered=delivered, failure=outcome.failure or judged.failure)
 
 
 def noting(journal: RunJournal, heard: list[Event], tell: Tell) -> Callable[[Event, int], None]:
-    """A listener that writes what happened, at a physics step, to the journal, keeps it in `heard`, then tells it on."""
+    """A listener that writes each event, with its physics step, to the journal, appends it to `heard`, and passes it on."""
 
     def hear(event: Event, step: int) -> None:
         match event:

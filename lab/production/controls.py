@@ -1,6 +1,6 @@
-"""What stops a run and sets its pace: pause, protective stop, emergency stop, kept apart; and at which steps it was stopped.
+"""The stops of a run (pause, protective stop, emergency stop), its pace, and the physics steps at which it was stopped.
 
-Simulated: no safety function.
+They are simulated, and no safety function.
 """
 
 from collections.abc import Callable
@@ -12,19 +12,19 @@ RESET_FIRST = "an emergency stop holds the robot: reset it first"
 
 
 class StopKind(StrEnum):
-    """Why nothing moves: the operator's pause between two moves, what the robot noticed, or the emergency stop."""
+    """The kind of a stop: the operator's pause between two moves, a protective stop of the robot, or the emergency stop."""
 
     PAUSE = "pause"
     PROTECTIVE = "protective"
     EMERGENCY = "emergency"
 
 
-PRIORITY = (StopKind.EMERGENCY, StopKind.PROTECTIVE, StopKind.PAUSE)  # the first one that is pressed counts
+PRIORITY = (StopKind.EMERGENCY, StopKind.PROTECTIVE, StopKind.PAUSE)  # the first pressed one counts
 
 
 @dataclass(frozen=True)
 class Held:
-    """A stop: its kind, why, and who stopped ("operator", "robot")."""
+    """A stop: its kind, its reason, and its origin ("operator", "robot")."""
 
     kind: StopKind
     why: str = ""
@@ -33,10 +33,10 @@ class Held:
 
 @dataclass
 class Controls:
-    """The stops and the pace of one run; a page's or a terminal's thread sets them, the simulation looks once a step.
+    """The stops and the pace of one run, set by the thread of a page or terminal, and read by the simulation in each step.
 
-    speed: simulated seconds per second of the clock on the wall; None: as fast as it can. on_change: told of every change,
-    in the thread that made it. attended: somebody is there who can go on after a protective stop.
+    speed: simulated seconds per second of real time; None: unlimited. on_change: called after every change, in the thread
+    that made it. attended: whether somebody is there who can release a protective stop.
     """
 
     speed: float | None = None
@@ -48,20 +48,20 @@ class Controls:
 
     @property
     def held(self) -> Held | None:
-        """What stops the run now: an emergency stop before a protective one, that before a pause; None: nothing."""
-        return next((found for kind in PRIORITY if (found := self.stops.get(kind)) is not None), None)
+        """The stop with the highest priority, in the order emergency, protective, pause; None if there is none."""
+        return next((stop for kind in PRIORITY if (stop := self.stops.get(kind)) is not None), None)
 
     @property
     def holds_arm(self) -> bool:
-        """Whether the arm is to stand still at once; a pause lets the move under way end."""
+        """Whether the arm must stand still at once; a pause lets the current move end."""
         return bool(self.stops) and (StopKind.EMERGENCY in self.stops or StopKind.PROTECTIVE in self.stops)
 
     def pause(self, by: str = "operator") -> None:
-        """Stop when the move under way has ended."""
+        """Pauses the run after the current move."""
         self._press(Held(StopKind.PAUSE, "", by))
 
     def step(self) -> str:
-        """Carry one move out, then pause again; why it may not be, "" when it may."""
+        """Lets the run make one move and pause again; returns why it may not, or ""."""
         if self.holds_arm:
             return self._refusal()
         self._one_move = True
@@ -69,22 +69,22 @@ class Controls:
         return ""
 
     def protective(self, why: str, by: str = "robot") -> None:
-        """Hold the arm at once, because the robot noticed something."""
+        """Holds the arm at once by a protective stop."""
         self._press(Held(StopKind.PROTECTIVE, why, by))
 
     def emergency(self, why: str = "pressed by hand", by: str = "operator") -> None:
-        """Hold the arm at once, until it is reset."""
+        """Holds the arm at once by the emergency stop, until `reset`."""
         self._press(Held(StopKind.EMERGENCY, why, by))
 
     def reset(self) -> str:
-        """Release the emergency stop: it stays until `go_on`; why there is nothing to reset, ""."""
+        """Turns the emergency stop into a pause; returns why there is nothing to reset, or ""."""
         if StopKind.EMERGENCY not in self.stops:
             return "no emergency stop is pressed"
         self._release(StopKind.EMERGENCY, StopKind.PROTECTIVE, instead=Held(StopKind.PAUSE, "after the emergency stop"))
         return ""
 
     def go_on(self) -> str:
-        """Go on after a pause or a protective stop; why it may not be, "" when it may."""
+        """Releases a pause or a protective stop; returns why it may not, or ""."""
         if StopKind.EMERGENCY in self.stops:
             return RESET_FIRST
         self._one_move = False
@@ -92,21 +92,21 @@ class Controls:
         return ""
 
     def set_speed(self, speed: float | None) -> None:
-        """Simulated seconds per second; None: as fast as it can."""
+        """Sets the simulated seconds per second of real time; None: unlimited."""
         self.speed = speed
         self._tell()
 
     def move_ended(self) -> None:
-        """To be called by the run between two moves: one step was made."""
+        """Notes that a move has ended; the run calls it between two moves."""
         self._one_move = False
 
     @property
     def waits(self) -> bool:
-        """Whether the run is to wait before the next move."""
+        """Whether the run must wait before the next move."""
         return bool(self.stops) and not (self._one_move and not self.holds_arm)
 
     def wait(self, timeout_s: float) -> None:
-        """Wait until something changes, at most so long [s]."""
+        """Waits until something changes, at most `timeout_s` [s]."""
         with self._changed:
             self._changed.wait(timeout_s)
 
@@ -131,22 +131,22 @@ class Controls:
 
 @dataclass(frozen=True)
 class StopsChanged:
-    """From a physics step on these stops were pressed; none: the run went on."""
+    """The stops that were pressed from a physics step on; empty: the run continued."""
 
     step: int
     stops: tuple[Held, ...]
 
 
 def unwritten(changed: StopsChanged) -> None:
-    """No journal is kept."""
+    """Does nothing: there is no journal."""
 
 
 @dataclass
 class StopRecord:
-    """What the simulation knows of the controls: what they were at its last look; each change is noted before it counts.
+    """The controls as the simulation last read them; each change is written to the journal before it takes effect.
 
-    script: of a run that is carried out again, what is still to come; again_until: the physics step up to which it was
-    carried out before.
+    script: the changes still to come of a run that is repeated; again_until: the physics step up to which the earlier run
+    went.
     """
 
     script: list[StopsChanged] = field(default_factory=list)
@@ -156,7 +156,7 @@ class StopRecord:
     folding: bool = False
 
     def look(self, step: int, controls: Controls) -> bool:
-        """Take over what has changed until a physics step; whether anything is stopped now."""
+        """Takes over the changes up to a physics step; returns whether the run is stopped now."""
         if self.folding:
             while self.script and self.script[0].step <= step:
                 self.now = self.script.pop(0).stops
@@ -171,19 +171,19 @@ class StopRecord:
         return bool(self.now)
 
     def again(self, script: list[StopsChanged], until: int) -> None:
-        """Do from now on what was done before, up to a physics step."""
+        """Repeats from now on the changes of an earlier run, up to a physics step."""
         self.script, self.again_until, self.folding = script, until, bool(script) or until > 0
 
     @property
     def held(self) -> Held | None:
-        """The stop that counts; None: nothing is stopped."""
+        """The stop with the highest priority; None if there is none."""
         return next((held for kind in PRIORITY for held in self.now if held.kind is kind), None)
 
     @property
     def holds_arm(self) -> bool:
-        """Whether the arm is to stand still at once."""
+        """Whether the arm must stand still at once."""
         return any(held.kind is not StopKind.PAUSE for held in self.now)
 
     def pauses(self, controls: Controls) -> bool:
-        """Whether the next move is to wait; what is done again does not."""
+        """Whether the next move must wait; repeated moves do not wait."""
         return not self.folding and controls.waits

@@ -29,13 +29,13 @@ from lab.view.canvas import check_picture
 from lab.view.gantt import cycle_gantt
 
 SHOWN_PERIODS = 3
-FEWEST_CYCLES = 6  # of the finite order that is shown beside: enough for the line to be full
+FEWEST_CYCLES = 6  # parts of the finite order that is shown for comparison: enough to fill the line
 MAX_EXPANDED = 50_000  # states, for the best finite order
 
 
 @dataclass(frozen=True)
 class CyclicOptions:
-    """What is asked for: which parts enter in a cycle, as `lab sequence` names an order, and how many at the most; the seed;
+    """The options of a cycle: its parts, as `lab sequence` names an order, the most parts per cycle, and the seed;
     see `InstanceRequest`."""
 
     case: str | None = None
@@ -50,10 +50,9 @@ class CyclicOptions:
 def cyclic_named(name: str, wanted: CyclicOptions, teacher: Teacher, files: dict[str, Path]) -> dict[str, Any]:
     """The document of `lab sequence --cyclic` on a cell file, or on a task over durations measured in simulation.
 
-    Where no order is asked for, one part enters in a cycle, or, of several products, the smallest mix of what the file orders;
-    or several times as much, up to parts_per_cycle parts (see `best_rhythm`). Where the parts are named and parts_per_cycle is
-    not given, just these enter. Raises
-    BadInput for what has no cycle, WorkFailed when none was found.
+    Without a named order one part enters in a cycle or, of several products, the smallest mix of the file's order; or a
+    multiple of that, up to parts_per_cycle parts (see `best_rhythm`). If the parts are named and parts_per_cycle is not given,
+    exactly these enter. Raises BadInput for a cell without a cycle, and WorkFailed if none was found.
     """
 
     for path in files.values():
@@ -83,7 +82,7 @@ def cyclic_named(name: str, wanted: CyclicOptions, teacher: Teacher, files: dict
 
 
 def _mix(loaded: CellFile | Task, case: str | None, wanted: CyclicOptions) -> tuple[tuple[str, ...], int]:
-    """The products that enter in a cycle, and how many parts the file orders itself."""
+    """The products that enter in a cycle, and the number of parts that the file orders."""
     if isinstance(loaded, CellFile):
         if wanted.parts is not None:
             raise BadInput(f"--parts {wanted.parts}: '{loaded.name}' is a cell: give its cycle with --case or --toasts")
@@ -103,7 +102,7 @@ def _mix(loaded: CellFile | Task, case: str | None, wanted: CyclicOptions) -> tu
 
 
 def _cell(loaded: CellFile | Task, mix: Sequence[str], parts: int, teacher: Teacher) -> Cell:
-    """The cell for so many parts, in whole cycles."""
+    """The cell for a number of parts that fills whole cycles."""
     if isinstance(loaded, CellFile):
         return of_parts(loaded.cell([mix[number % len(mix)] for number in range(parts)]), mix, parts)
     counts = {name: count * parts // len(mix) for name, count in Counter(mix).items()}
@@ -112,7 +111,7 @@ def _cell(loaded: CellFile | Task, mix: Sequence[str], parts: int, teacher: Teac
 
 
 def _largest(make: Callable[[int], Cell], most: int, step: int) -> Cell:
-    """The cell for as many whole cycles as there is room for."""
+    """The cell for the largest number of whole cycles that it has room for."""
     for parts in range(min(most, MAX_PARTS // step * step), step, -step):
         try:
             return make(parts)
@@ -122,18 +121,18 @@ def _largest(make: Callable[[int], Cell], most: int, step: int) -> Cell:
 
 
 def _finite(cycle: Cycle, cell: Cell) -> dict[str, Any]:
-    """The cycle carried out for the cell's parts, beside the best order of as many; None for what was not found, and why."""
+    """The cost of the cycle for the cell's parts beside that of the best order; None for a missing one, with the reason."""
     parts = cell.parts
-    found: dict[str, Any] = {"parts": parts, "why_not": None}
+    document: dict[str, Any] = {"parts": parts, "why_not": None}
     names = ("cyclic_makespan_s", "cyclic_sequence", "waits_on_purpose", "best_s", "best_per_part_s", "best_proven")
-    found |= dict.fromkeys(names)
+    document |= dict.fromkeys(names)
     try:
         made = unrolled(cycle, cell)
-        found["cyclic_makespan_s"], found["cyclic_sequence"] = made.schedule.makespan_s, list(made.sequence)
-        found["waits_on_purpose"] = made.waits
+        document["cyclic_makespan_s"], document["cyclic_sequence"] = made.schedule.makespan_s, list(made.sequence)
+        document["waits_on_purpose"] = made.waits
         best = optimum(cell, MAX_EXPANDED)
-        found["best_s"], found["best_proven"] = best.cost, best.proven
-        found["best_per_part_s"] = best.cost / parts
+        document["best_s"], document["best_proven"] = best.cost, best.proven
+        document["best_per_part_s"] = best.cost / parts
     except LabError as error:
-        found["why_not"] = str(error)
-    return found
+        document["why_not"] = str(error)
+    return document

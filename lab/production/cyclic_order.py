@@ -1,4 +1,4 @@
-"""A cyclic order in a run: found for the products that are ordered, unrolled for all of the parts, and measured."""
+"""A cyclic order in a run: found for the ordered products, unrolled for all parts, and measured."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -34,8 +34,8 @@ def cycle_document(rhythm: Rhythm) -> dict[str, Any]:
         "most_parts_a_cycle": rhythm.most_parts,
         "why_no_more": rhythm.why_no_more or None,
         "tried": [
-            {"parts_a_cycle": one.parts, "period_s": one.period_s, "bound_s": one.bound_s, "proven": one.proven}
-            for one in rhythm.tried
+            {"parts_a_cycle": trial.parts, "period_s": trial.period_s, "bound_s": trial.bound_s, "proven": trial.proven}
+            for trial in rhythm.tried
         ],
         "most_in_work": cycle.most_in_work,
         "moves": cycle.to_json(),
@@ -51,7 +51,7 @@ def mix_of(order: Sequence[str]) -> tuple[str, ...]:
 
 
 def check_parts(most_parts: int, mix: Sequence[str], cyclic: bool) -> None:
-    """BadInput for so many parts a cycle (--parts-per-cycle) where none is looked for, and where a mix has more."""
+    """Raises BadInput for --parts-per-cycle without a cycle, and for a mix with more parts."""
     if not cyclic:
         raise BadInput(f"--parts-per-cycle {most_parts}: only a cycle has as many: add --cyclic")
     if most_parts < len(mix):
@@ -62,7 +62,7 @@ def check_parts(most_parts: int, mix: Sequence[str], cyclic: bool) -> None:
 
 
 def measured_period(rhythm: Rhythm, planned: Schedule, measured: Schedule) -> dict[str, Any]:
-    """The period of a run that carried a cycle out, beside the planned one; None where too few parts were delivered."""
+    """The measured and the planned period of a run that carried a cycle out; None if too few parts were delivered."""
 
     cycle = rhythm.cycle
     found_s = period_of(measured, cycle)
@@ -74,10 +74,9 @@ def measured_period(rhythm: Rhythm, planned: Schedule, measured: Schedule) -> di
 
 
 def cyclic_order(cell: Cell, seed: int, most_parts: int | None = None) -> tuple[Rhythm, Unrolled]:
-    """The cycle of a cell's products that needs the least time a part, and its order for the cell's parts, as a run carries it
-    out.
+    """The cycle of a cell's products with the least time per part, and its unrolled order for the cell's parts.
 
-    most_parts: of a cycle, see `best_rhythm`; never more than the cell has. BadInput as `best_rhythm`.
+    most_parts: the limit of a cycle, see `best_rhythm`; at most the cell's parts. Raises BadInput as `best_rhythm`.
     """
 
     rhythm = best_rhythm(cell, mix_of(cell.order), most_parts and min(most_parts, cell.parts), seed)

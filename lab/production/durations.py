@@ -1,4 +1,4 @@
-"""How long the moves of a job take: measured once in physics, kept under a hash of all that they depend on; and the cell."""
+"""The durations of a job's moves, measured once in physics and kept under a hash of all inputs; and the cell that they make."""
 
 import hashlib
 import json
@@ -31,13 +31,13 @@ from lab.workers import Workers
 
 RECORDS = "durations"  # the kind of record in the toolbox
 LONGEST_S = 86_400.0  # of a move or a process
-AWAY_M = 5.0  # from its station, where a part is in nobody's way
+AWAY_M = 5.0  # distance from its station at which a part blocks nothing
 
 Way = Pair | CarriedPath
 
 
 class TimedMove(NamedTuple):
-    """How long the robot took in a run [s] from one station to another: empty, or with a part in the gripper (`CarriedPath`)."""
+    """The duration [s] of one move in a run: an empty one between two stations, or one with a part (`CarriedPath`)."""
 
     way: Way
     seconds: float
@@ -45,10 +45,10 @@ class TimedMove(NamedTuple):
 
 @dataclass(frozen=True)
 class Durations:
-    """Measured times [s]: the robot's moves, empty and with what it carries; its services, and what machines take.
+    """Measured durations [s]: the robot's moves, empty and loaded, its services, and the processes of machines.
 
-    A move with a part takes what it does in the mean over the spots that the order uses at both ends. more_s: of trials only,
-    by skill: how much longer it takes in the mean over its station's spots in use than on the first.
+    A loaded move has its mean over the spots that the order uses at both ends. more_s (of trials only), by skill: the mean extra
+    time over the station's spots in use, compared with the first spot.
     """
 
     empty_s: dict[Pair, float]
@@ -68,7 +68,7 @@ class Durations:
         }
 
     def after(self, timed: Sequence[TimedMove]) -> "Durations":
-        """What is believed after a run: each move that it carried out takes what it took there, in the mean.
+        """The durations after a run: each move that it made has the mean of its times there.
 
         Source: thesis, section 10.2.1 (i).
         """
@@ -83,7 +83,7 @@ class Durations:
         )
 
     def joined(self, other: "Durations") -> "Durations":
-        """All times of both; where both have one, the other's."""
+        """The durations of both; where both have one, that of `other`."""
         return Durations(
             self.empty_s | other.empty_s,
             self.loaded_s | other.loaded_s,
@@ -95,9 +95,9 @@ class Durations:
 
     @classmethod
     def from_json(cls, record: Mapping[str, Any], skillset: SkillSet) -> "Durations":
-        """What `to_json` wrote of the moves, processes and services of these skills.
+        """The durations that `to_json` wrote for the moves, processes and services of these skills.
 
-        BadInput for a move or station too many or too few, and for what is no time [s].
+        Raises BadInput for an unknown or missing move or station, and for a value that is no time [s].
         """
         empty, loaded = {_word(pair): pair for pair in skillset.travels}, {_word(way): way for way in skillset.legs}
         services = {_service(own): own for own, skills in skillset.services.items() if skills}
@@ -126,7 +126,7 @@ def _service(own: Pair) -> str:
 
 
 def _times(record: Mapping[str, Any], table: str, wanted: set[str]) -> dict[str, float]:
-    """One table of a record, with exactly the wanted entries in the order in which they were written."""
+    """One table of a record, with exactly the wanted entries, in the order in which they were written."""
     times = record.get(table)
     if not isinstance(times, dict):
         raise BadInput(f"{table}: it is no table of times")
@@ -142,9 +142,9 @@ def _times(record: Mapping[str, Any], table: str, wanted: set[str]) -> dict[str,
 
 @dataclass(frozen=True)
 class TimingTrial:
-    """What is timed in one world of its own: a way with a part and the process behind it, empty ways, or a service.
+    """A trial in its own world: a loaded path and the process after it, empty paths, or a service.
 
-    at: a skill that takes parts up or sets them down, on the spots of its station that the order uses.
+    at: a skill that takes parts up or sets them down, on the spots of its station that the order uses, or None.
     """
 
     loaded: CarriedPath | None = None
@@ -156,7 +156,7 @@ class TimingTrial:
 
 
 def trials(prepared: Prepared) -> list[TimingTrial]:
-    """What times every move once, and its ends on every spot that the order uses; each trial can be made beside the others."""
+    """The trials that time every move once, and its ends on every spot that the order uses; they are independent."""
     skillset, timed = prepared.skillset, set[str]()
     ends = dict.fromkeys(skill for leg in skillset.legs.values() for skill in leg if skill.station and skill.kind)
     used = ((skill, spots_in_use(prepared, skill)) for skill in ends)
@@ -176,68 +176,67 @@ def trials(prepared: Prepared) -> list[TimingTrial]:
 
 
 def spots_in_use(prepared: Prepared, skill: Skill) -> tuple[Spot, ...]:
-    """The spots on which a skill takes parts of an order up, or sets them down."""
+    """The spots on which a skill takes up or sets down the parts of an order."""
     return prepared.surveys.spots_in_use(prepared.task.station(skill.station), skill.kind, skill.carries)
 
 
 def measure(
     prepared: Prepared, on_move: Callable[[str, float], None] | None = None, workers: Workers | None = None
 ) -> Durations:
-    """Carry every needed move out in simulation and time it [s]; WorkFailed when one does not succeed.
+    """The durations [s] of all needed moves, carried out in simulation; WorkFailed if a move fails.
 
-    A way with a part leads from the tool's rest over one station to that over the other. So what it takes between other
-    spots is what it takes between the first ones, and what taking up and setting down take more there; that is timed once
-    for all ways that begin or end so. Each trial has a world of its own, so that the times do not depend on how many
-    processes share the trials.
+    A loaded path leads from the tool's rest over one station to that over the other. Its duration between other spots is
+    that between the first ones plus the extra times of taking up and setting down, which are timed once for all paths
+    with the same end. Each trial has its own world, so that durations do not depend on the number of processes.
     """
     tell, skillset, timed = on_move or (lambda name, seconds: None), prepared.skillset, trials(prepared)
     whole = Durations({}, {}, {})
-    for found in (workers or Workers()).each(partial(carried_out, prepared), timed):
-        for carried in found.loaded_s:
-            found.loaded_s[carried] += sum(whole.more_s.get(skill.name, 0.0) for skill in skillset.legs[carried])
-        for way, seconds in (found.loaded_s | found.empty_s).items():
+    for timed_now in (workers or Workers()).each(partial(carried_out, prepared), timed):
+        for carried in timed_now.loaded_s:
+            timed_now.loaded_s[carried] += sum(whole.more_s.get(skill.name, 0.0) for skill in skillset.legs[carried])
+        for way, seconds in (timed_now.loaded_s | timed_now.empty_s).items():
             tell(f"{_word(way)}, {'loaded' if isinstance(way, CarriedPath) else 'empty'}", seconds)
-        for station, seconds in found.process_s.items():
+        for station, seconds in timed_now.process_s.items():
             tell(skillset.processes[station][-1].name, seconds)
-        for own, seconds in found.service_s.items():
+        for own, seconds in timed_now.service_s.items():
             tell(_service(own), seconds)
-        whole = whole.joined(found)
+        whole = whole.joined(timed_now)
     return replace(whole, more_s={})
 
 
 def carried_out(prepared: Prepared, trial: TimingTrial) -> Durations:
-    """What one trial times [s]; WorkFailed when a move does not succeed."""
+    """The durations [s] of one trial; WorkFailed if a move fails."""
     skillset = prepared.skillset
     with World() as world:
         floor = Floor(world, skillset, prepared.surveys.layout, parts=len(prepared.order))
-        found = Durations({}, {}, {})
+        durations = Durations({}, {}, {})
         if trial.loaded is not None:
             leg = skillset.legs[trial.loaded]
             for skill in leg:
                 skill.furnish(floor.bench)
             leg[0].begin(floor.bench)
             part = leg[0].part
-            found.loaded_s[trial.loaded] = _timed(floor, leg, part)
+            durations.loaded_s[trial.loaded] = _timed(floor, leg, part)
             for skill in skillset.processes[trial.loaded.target] if trial.process else ():
-                found.process_s[trial.loaded.target] = _timed(floor, [skill], part)
+                durations.process_s[trial.loaded.target] = _timed(floor, [skill], part)
         for pair in trial.empty:
             way = skillset.travels[pair]
             way[0].begin(floor.bench)
-            found.empty_s[pair] = _timed(floor, way)
+            durations.empty_s[pair] = _timed(floor, way)
         if trial.service is not None:
             skills = skillset.services[trial.service]
             skills[0].begin(floor.bench)
-            found.service_s[trial.service] = _timed(floor, skills)
+            durations.service_s[trial.service] = _timed(floor, skills)
         if trial.at:
-            found.more_s[trial.at] = _more_s(floor, skillset.skills[trial.at], trial.spots)
-        return replace(found, sim_s=world.steps * TIME_STEP)
+            durations.more_s[trial.at] = _more_s(floor, skillset.skills[trial.at], trial.spots)
+        return replace(durations, sim_s=world.steps * TIME_STEP)
 
 
 def _more_s(floor: Floor, skill: Skill, spots: Sequence[Spot]) -> float:
-    """How much longer a skill takes in the mean over spots of its station than on the first of them [s]; WorkFailed.
+    """The mean extra time [s] of a skill over spots of its station, compared with the first one; WorkFailed if it fails.
 
-    As many parts are there as spots: they are taken up one after the other and put back at once, or set down. Of layers the
-    lowest is filled first and emptied last: what is taken up there does not come back.
+    There is one part for each spot; they are taken up one after the other and put back at once, or set down. The lowest layer
+    is filled first and emptied last: parts that are taken up from layers are not put back.
     """
     scene, bench, pose, times = floor.scene, floor.bench, skill.begins_at(), dict[Spot, float]()
     task, own = scene.task, scene.task.made_as(skill.kind)
@@ -248,7 +247,10 @@ def _more_s(floor: Floor, skill: Skill, spots: Sequence[Spot]) -> float:
     }
     station, layered = task.station(skill.station), task.station(skill.station).is_layered
     standing = {spot for spot, _ in feet.values()}
-    carriers = {spot: [one for one in scene.places.below(station, spot) if one[1] not in standing] for spot in standing}
+    carriers = {
+        spot: [carrier for carrier in scene.places.below(station, spot) if carrier[1] not in standing]
+        for spot in standing
+    }
     for spot in () if skill.carries else standing:
         stand_below(scene, station.name, carriers[spot])
     assert pose is not None
@@ -259,8 +261,8 @@ def _more_s(floor: Floor, skill: Skill, spots: Sequence[Spot]) -> float:
             scene.add(name, skill.kind, foot)
             if bench.sight is not None:
                 bench.sight.where[scene.body_of(name, skill.kind)] = foot
-    for name, (spot, foot) in sorted(feet.items(), key=lambda one: one[1][0].z if skill.carries else -one[1][0].z):
-        if skill.carries:  # others of its kind may have to stand below what carries it
+    for name, (spot, foot) in sorted(feet.items(), key=lambda item: item[1][0].z if skill.carries else -item[1][0].z):
+        if skill.carries:  # other parts of its kind may have to stand below its support
             stand_below(scene, station.name, carriers[spot])
         floor.stand(pose)
         if skill.carries:
@@ -274,7 +276,7 @@ def _more_s(floor: Floor, skill: Skill, spots: Sequence[Spot]) -> float:
 
 
 def _timed(floor: Floor, skills: Sequence[Skill], part: str = "", spot: Spot | None = None) -> float:
-    """How long skills take one after the other with a part, set down on a spot, by default the first [s]; WorkFailed."""
+    """The duration [s] of skills in sequence with a part that is set down on a spot, by default the first; or WorkFailed."""
     start = floor.now_s
     for skill in skills:
         if floor.run(skill.aim(part, spot)) is not Status.SUCCESS:
@@ -283,7 +285,7 @@ def _timed(floor: Floor, skills: Sequence[Skill], part: str = "", spot: Spot | N
 
 
 def cell_of(task: Task, durations: Durations, order: Order) -> Cell:
-    """The sequencing problem that the measured durations make; parts of all kinds that share a way share its mean time."""
+    """The sequencing problem with the measured durations; kinds that share a path share its mean time."""
     places = stations(task, durations.process_s)
     names = [place.name for place in places]
     wanted = [part for part in task.made if part.name in order]
@@ -311,8 +313,8 @@ def cell_of(task: Task, durations: Durations, order: Order) -> Cell:
 def untimed(task: Task, order: Order) -> Cell:
     """The sequencing problem before anything is timed: every move takes 1 s, and there are no windows.
 
-    It tells whether an order is allowed, which with one robot does not depend on times.
-    BadInput, with its place in the file, for a task that makes no such problem.
+    With one robot it suffices to check whether an order is allowed, because that does not depend on times.
+    Raises BadInput, with its place in the file, for a task that has no sequencing problem.
     """
     with task.in_its_file():
         skillset = SkillSet.of(task, order)
@@ -321,7 +323,7 @@ def untimed(task: Task, order: Order) -> Cell:
 
 
 def kept_durations(toolbox: Toolbox, key: str, skillset: SkillSet) -> Durations | None:
-    """The durations kept under a key, None when there are none; BadInput for a record that does not hold them."""
+    """The durations kept under a key, or None; BadInput for a record that does not contain them."""
     record = toolbox.load_record(RECORDS, key)
     if record is None:
         return None
@@ -332,11 +334,11 @@ def kept_durations(toolbox: Toolbox, key: str, skillset: SkillSet) -> Durations 
 
 
 def durations_key(task: Task, layout: Layout, skillset: SkillSet, policies: Mapping[str, Policy], order: Order) -> str:
-    """A hash (24 hex digits) of all that the durations depend on.
+    """A hash (24 hex digits) of all inputs of the durations.
 
-    These are the task and its files, the order, for it says which spots are used, the layout, the moves, the policies, the
-    assets, all source of the lab and of the packages that its skills come from, and the physics engine. Raises WorkFailed
-    when that or a source is not found.
+    These are the task and its files, the order, which determines the spots in use, the layout, the moves, the policies, the
+    assets, all source of the lab and of the packages of its skills, and the physics engine. Raises WorkFailed if the
+    engine or a source is not found.
     """
     decides = {
         "task": task.model_dump(mode="json", exclude={"name", "title", "sequencing", "subtasks", "faults"}),

@@ -18,15 +18,15 @@ from lab.tasks.task_file import load
 from lab.toolbox.policy import Policy
 
 PARTS = 3  # of the first kind for which the scene has room, or as many as it holds
-Told = Callable[[int, int], None]  # hears how many scenes are done, of how many
+Told = Callable[[int, int], None]  # called with the number of finished scenes, and of all
 Why = Literal["scene", "table", "physics"]
 
 
 class SceneResult(NamedTuple):
-    """What came of one scene.
+    """The result of a skill in one scene.
 
-    failed_in: None where the skill succeeded; "scene": the goal cannot be reached there; "table": the greedy policy does not
-    lead to it; "physics": the skill was carried out, and failed. sim_s: how long that took [s].
+    failed_in: None for success; "scene": the goal cannot be reached; "table": the greedy policy does not lead to it;
+    "physics": the skill was carried out, and failed. sim_s: the simulated duration [s].
     """
 
     seed: int
@@ -37,7 +37,7 @@ class SceneResult(NamedTuple):
 
 @dataclass(frozen=True)
 class Evaluation:
-    """Scenes in the order of their seeds, from `seed` on; fewer than `wanted` when it was stopped."""
+    """The results of scenes in the order of their seeds, from `seed` on; fewer than `wanted` if it was stopped."""
 
     policy: str
     skill: str
@@ -49,11 +49,11 @@ class Evaluation:
 
     @property
     def interrupted(self) -> bool:
-        """Whether it was stopped before all scenes were done."""
+        """Whether the evaluation was stopped before all scenes were done."""
         return len(self.scenes) < self.wanted
 
     def facts(self) -> dict[str, Any]:
-        """What a log keeps of it: how many scenes could be solved, in how many it did, and Wilson's 95 % interval."""
+        """The entry for the log: the numbers of solvable and of solved scenes, and Wilson's 95 % interval."""
 
         counting = [scene for scene in self.scenes if scene.failed_in != "scene"]
         good = [scene for scene in counting if scene.failed_in is None]
@@ -80,10 +80,10 @@ class Evaluation:
 
 
 def evaluate(policy: Policy, task: Task, skill: str, scenes: int, seed: int, told: Told) -> Evaluation:
-    """Carry a skill out with a policy in so many scenes of a task, drawn with `seed` and those after it.
+    """The evaluation of a policy: its skill is carried out in `scenes` scenes of a task, drawn with consecutive seeds.
 
-    Ctrl-C ends it with the scenes until then. Raises KeyboardInterrupt when there is none yet, and BadInput when the
-    policy's table is not of the skill's size and actions.
+    After Ctrl-C the scenes until then are returned. Raises KeyboardInterrupt if there are none, and BadInput if the policy's
+    table has not the skill's size and actions.
     """
     began, done = time.perf_counter(), list[SceneResult]()
     try:
@@ -98,7 +98,7 @@ def evaluate(policy: Policy, task: Task, skill: str, scenes: int, seed: int, tol
 
 
 def in_scene(policy: Policy, task: Task, name: str, seed: int) -> SceneResult:
-    """One scene, drawn with this seed; where parts are taken up first, the part stands off its spot as drawn."""
+    """The result in the scene of one seed; at its first station a part stands off its spot as drawn."""
     try:
         prepared = prepare(task, task.fitting(PARTS), seed, name)
     except BadInput as error:
@@ -118,7 +118,7 @@ def in_scene(policy: Policy, task: Task, name: str, seed: int) -> SceneResult:
 
 
 def check_table(policy: Policy, skill: str, mdp: TabularMDP) -> None:
-    """BadInput unless a policy's table is one of a skill's problem: as many states, the same actions."""
+    """Raises BadInput unless a policy's table has the states and actions of a skill's problem."""
     if policy.q.shape != (mdp.n_states, mdp.n_actions) or policy.action_labels != mdp.action_labels:
         raise BadInput(
             f"policy '{policy.name}' is for {len(policy.q)} states and the actions {', '.join(policy.action_labels)}; "
@@ -136,16 +136,16 @@ def _starts_without_a_way(policy: Policy, mdp: TabularMDP) -> list[int]:
 
 
 def _astray(policy: Policy, mdp: TabularMDP, start: int) -> str:
-    """Where the greedy policy leads instead of to the goal, in words."""
+    """The place to which the greedy policy leads instead of the goal, in words."""
     last = greedy_path(policy.q, mdp, mdp.n_states, start)[0][-1]
     where = "run into something at" if mdp.terminal[last] else "go round and round at"
     return f"its best moves from {mdp.state_label(start)} {where} {mdp.state_label(last)}"
 
 
 def _off(prepared: Prepared, skill: Skill) -> tuple[float, float, float]:
-    """How far off its spot, x, y [m] and yaw [rad], the skill finds its part.
+    """The offset x, y [m] and yaw [rad] of the skill's part from its spot.
 
-    That is as drawn at the first station of a part; elsewhere the robot has set it down, and it is 0.
+    It is the drawn one at a part's first station, and 0 elsewhere, because the robot has set the part down.
     """
     stand = zip(prepared.order, prepared.layout.parts, strict=True)
     first = (off for kind, off in stand if prepared.task.starts(kind) == skill.station)
@@ -153,7 +153,7 @@ def _off(prepared: Prepared, skill: Skill) -> tuple[float, float, float]:
 
 
 def task_of(policy: Policy, file: str | None) -> Task:
-    """The task that was named, or the one that the policy was learned in. Raises BadInput."""
+    """The task of the given name, or the one in which the policy was learned. Raises BadInput."""
     if file is not None:
         return load(file)
     try:
@@ -167,8 +167,8 @@ def task_of(policy: Policy, file: str | None) -> Task:
 def skill_of(policy: Policy, task: Task, name: str | None) -> str:
     """The full name of the skill that a policy is for in a task.
 
-    By its name, or the one that the policy's name begins with (the longest), or the only one of its sub-task. BadInput
-    lists what there is.
+    It is the named skill, or the longest name that begins the policy's name, or the only skill of its sub-task. BadInput
+    lists the known ones.
     """
     skills = SkillSet.of(task, task.fitting(PARTS)).skills
     own = [known for known, skill in skills.items() if skill.subtask == policy.subtask]

@@ -1,4 +1,4 @@
-"""A scene with the robot and the machines at work in it, under one clock, and what stops them."""
+"""A scene in which the robot and the machines work under one clock, and their stops."""
 
 from collections import deque
 from collections.abc import Callable, Iterator
@@ -24,40 +24,40 @@ from lab.tasks.task import Order
 from lab.teaching.events import Event, RunHeld, RunWentOn
 
 AT_REST_STEPS = 60  # physics steps at the end of a wait that are simulated in any case
-SKIPPED_STEPS = 240  # at the most without a look at what else goes on
-FORCE_EVERY = 4  # physics steps between two looks at what presses on the arm
-BRAKE_ITERATIONS = 300  # of the solver: with 60 the joints of an arm that has seven creep on at a tenth of their speed
-BACK_STEPS = 120  # physics steps of its way that the arm goes back when it was stopped by a force
-DISTURBED_S = 2.0  # after a hand has reached into the scene, all of it is simulated for so long
+SKIPPED_STEPS = 240  # longest wait without a check for other events
+FORCE_EVERY = 4  # physics steps between two checks of the contact force on the arm
+BRAKE_ITERATIONS = 300  # of the solver: with 60, the joints of a seven-axis arm creep at a tenth of their speed
+BACK_STEPS = 120  # physics steps of its path that the arm retracts after a stop by a force
+DISTURBED_S = 2.0  # time for which everything is simulated after a hand has reached in
 
 
 def untouched(floor: "Floor") -> bool:
-    """Nobody reaches into the scene."""
+    """Returns False: nobody reaches into the scene."""
     return False
 
 
 def _unwatched(floor: "Floor") -> None:
-    """Nobody looks at what a step has done."""
+    """Does nothing: nobody watches the steps."""
 
 
 def idle() -> bool:
-    """Nobody does anything by hand."""
+    """Returns False: nobody does anything by hand."""
     return False
 
 
 def _unheard(event: Event, step: int) -> None:
-    """Nobody listens."""
+    """Does nothing: nobody listens."""
 
 
 @dataclass(frozen=True)
 class Hooks:
-    """Whom a floor calls, and when; by default nobody.
+    """The functions that a floor calls; by default they do nothing.
 
-    before_step: before each physics step, to reach into the scene as a fault does; returns whether it did.
+    before_step: before each physics step, to change the scene as a fault does; returns whether it did.
     after_step: after each physics step.
-    meanwhile: between moves and while a pause lasts, for what the operator does by hand; returns whether that was anything.
-    hear: for each event that is told, with the physics step at which it happened.
-    note_stops: for each change of the stops, before it counts.
+    meanwhile: between moves and during a pause, for the operator's work by hand; returns whether there was any.
+    hear: for each event, with its physics step.
+    note_stops: for each change of the stops, before it takes effect.
     """
 
     before_step: "Callable[[Floor], bool]" = untouched
@@ -73,7 +73,7 @@ NO_HOOKS = Hooks()
 class Floor:
     """A scene in which skills are carried out: one clock, the robot's skill and the machines' processes side by side.
 
-    controls: what stops it and sets its pace. stops: at which steps they did. hooks: who is called as its time goes by.
+    controls: its stops and its pace. stops: the steps at which it was stopped. hooks: the functions that it calls.
     """
 
     def __init__(
@@ -87,24 +87,24 @@ class Floor:
         controls: Controls | None = None,
         hooks: Hooks = NO_HOOKS,
     ) -> None:
-        """Build the scene and let it settle, with nobody called; parts: for how many stations are built (see `Scene`)."""
+        """Builds the scene and lets it settle without hooks; parts: the number for which stations are built (see `Scene`)."""
         self.world, self.skillset = world, skillset
         self.scene = Scene(world, skillset.task, order, layout, parts)
         self.bench = Bench(self.scene)
         self.machines = {s.name: Machine(s.name) for s in skillset.task.stations if s.kind == "machine"}
         self.hooks, self.controls = hooks, controls or Controls()
         self.stops = StopRecord(note=hooks.note_stops)
-        self.pressing_n = 0.0  # allowed on top of the task's limit, so that the arm gets away from where it was stopped
-        self.was_held = False  # by the operator, in the last motion
-        self._trail: deque[Array] = deque(maxlen=BACK_STEPS // FORCE_EVERY)  # the joints on the last steps of the way
+        self.pressing_n = 0.0  # force beyond the task's limit, so that a stopped arm can move away
+        self.was_held = False  # whether the operator stopped the last motion
+        self._trail: deque[Array] = deque(maxlen=BACK_STEPS // FORCE_EVERY)  # the joint positions of the last steps
         for _ in range(SETTLE_STEPS):
             world.step()
         self.recorder: Recorder | None = None
         self.restart_clock()
         self.skipped_s = 0.0
-        self._quiet_s = 0.0  # from when on waiting may be skipped
+        self._quiet_s = 0.0  # the time from which on waiting may be skipped
         self._told_held = ""
-        self._paced = (0.0, 0.0, 0.0)  # speed, simulated and real time from which on it holds
+        self._paced = (0.0, 0.0, 0.0)  # the speed, with the simulated and the real time from which on it applies
 
     @property
     def trouble_kind(self) -> Kind:
@@ -112,12 +112,12 @@ class Floor:
         return "held" if self.was_held else "missed"
 
     def record(self, viewer: Viewer | None = None) -> Recorder:
-        """What keeps frames from now on, of all that is there; `viewer` sees them live."""
+        """The recorder that keeps frames of all bodies from now on; `viewer` shows them live."""
         self.recorder = Recorder(self.world, extras_of(self.scene, self.skillset), viewer)
         return self.recorder
 
     def show(self, *names: str) -> None:
-        """Show extra bodies on their parts from now on, where frames are kept (see `extras_of`)."""
+        """Shows extra bodies on their parts from now on if frames are kept (see `extras_of`)."""
         if self.recorder is not None:
             for name in names:
                 self.recorder.show(name)
@@ -133,17 +133,17 @@ class Floor:
         return self.world.steps - self._zero
 
     def restart_clock(self) -> None:
-        """Let the floor's time begin now."""
+        """Restarts the floor's time at 0."""
         self._zero = self.world.steps
 
     def tell(self, event: Event) -> None:
-        """Tell what happened."""
+        """Passes an event to the listener."""
         self.hooks.hear(event, self.steps)
 
     # ---- one step ------------------------------------------------------------------------------------------------
 
     def tick(self) -> None:
-        """One physics step, with every running machine."""
+        """Makes one physics step, with every running machine."""
         self._reached_in()
         for machine in self.machines.values():
             machine.step()
@@ -151,7 +151,7 @@ class Floor:
         self._after()
 
     def wait(self, until_s: float) -> None:
-        """One physics step, or, while nothing moves, the time until then without physics, a second at the most."""
+        """Makes one physics step; while nothing moves, skips the time until then without physics, at most one second."""
         steps = min(ceil((until_s - self.now_s) / TIME_STEP) - AT_REST_STEPS, SKIPPED_STEPS)
         still = self.now_s >= self._quiet_s and not any(machine.moves for machine in self.machines.values())
         if steps > 0 and still and not self._reached_in():
@@ -175,7 +175,7 @@ class Floor:
         self._pace()
 
     def _pace(self) -> None:
-        """Wait until real time has caught up with simulated time, where a speed is set; a stop ends the waiting."""
+        """Waits until real time has caught up with simulated time, if a speed is set; a stop ends the wait."""
         speed = None if self.stops.folding else self.controls.speed
         if not speed:
             self._paced = (0.0, 0.0, 0.0)
@@ -186,15 +186,15 @@ class Floor:
         ahead_s = (self.now_s - simulated_s) / speed - (perf_counter() - real_s)
         if ahead_s > 0.004:
             self.controls.wait(ahead_s)
-        elif ahead_s < -1.0:  # it cannot be so fast: what is lost is not made up for
+        elif ahead_s < -1.0:  # it cannot reach this speed: lost time is not made up for
             self._paced = (speed, self.now_s, perf_counter())
 
     # ---- stops ---------------------------------------------------------------------------------------------------
 
     def held(self) -> str:
-        """Hold the arm as long as an emergency or protective stop lasts; returns why it was held, "" when it was not.
+        """Holds the arm as long as an emergency or protective stop lasts; returns the reason, or "" without a stop.
 
-        The brakes act in the same physics step. Simulated time goes on, not faster than real time.
+        The brakes act in the same physics step. Simulated time continues, at most as fast as real time.
         """
         if not self._stopped():
             return ""
@@ -215,9 +215,9 @@ class Floor:
         return why
 
     def protected(self, why: str) -> bool:
-        """Hold a protective stop until somebody lets the run go on; False, and nothing is stopped, where nobody attends the run.
+        """Holds a protective stop until somebody releases it; returns False without a stop if nobody attends the run.
 
-        A run that is replayed from its journal was attended if it was stopped at this step.
+        A run that is repeated from its journal counts as attended if it was stopped at this step.
         """
         if not self.stops.folding:
             if not self.controls.attended:
@@ -226,7 +226,7 @@ class Floor:
         return bool(self.held())
 
     def between_moves(self) -> None:
-        """Wait as long as a pause lasts; simulated time stands still."""
+        """Waits as long as a pause lasts; simulated time stands still."""
         while self.hooks.meanwhile() or (
             self.stops.look(self.steps, self.controls) and self.stops.pauses(self.controls)
         ):
@@ -236,7 +236,7 @@ class Floor:
         self._paced = (0.0, 0.0, 0.0)
 
     def _stopped(self) -> bool:
-        """Whether the arm is to stand still now."""
+        """Whether the arm must stand still now."""
         return self.stops.look(self.steps, self.controls) and self.stops.holds_arm
 
     def _tell_held(self) -> None:
@@ -247,7 +247,7 @@ class Floor:
             self.tell(RunWentOn(self.now_s) if held is None else RunHeld(held.kind, held.why, held.by, self.now_s))
 
     def _too_hard(self) -> str:
-        """What the arm presses on harder than the task allows; "" for nothing."""
+        """The name of the body on which the arm presses harder than the task allows; "" for none."""
         if self.steps % FORCE_EVERY:
             return ""
         robot = self.scene.robot
@@ -257,7 +257,7 @@ class Floor:
         return f"the arm presses on '{body}' with {force_n:.0f} N, allowed are {limit_n:g}" if force_n > limit_n else ""
 
     def _back_off(self) -> None:
-        """Go back a little along the path on which the arm pressed on something."""
+        """Retracts the arm a little along its path after a contact."""
         while self._trail:
             self.world.drive(NAME, self.scene.robot.arm.joints, self._trail.pop())
             for _ in range(FORCE_EVERY):
@@ -266,11 +266,11 @@ class Floor:
     # ---- skills --------------------------------------------------------------------------------------------------
 
     def start(self, skill: Skill) -> None:
-        """Begin to carry a skill out with its policy."""
+        """Starts a skill with its policy."""
         skill.start(self.bench, self.skillset.policies[skill.name])
 
     def run(self, skill: Skill) -> Status:
-        """Carry one skill out to its end; its status. It has failed where something stopped it, and where it is blocked."""
+        """Carries one skill out and returns its status, which is failed if it was stopped or is blocked."""
         if why := self.skillset.blocked.get(skill.name):
             skill.fail(why)
             return skill.status
@@ -284,7 +284,7 @@ class Floor:
         return skill.status
 
     def follow(self, motion: Iterator[None]) -> str:
-        """Carry out a motion of the arm that is no skill; returns what stopped it, "" when nothing did."""
+        """Carries out a motion of the arm that is no skill; returns what stopped it, or ""."""
         self.was_held = False
         try:
             for _ in motion:
@@ -296,7 +296,7 @@ class Floor:
         return ""
 
     def _stopped_by(self) -> str:
-        """Hold the motion under way where something stops it; returns what did once that is over, "" when nothing did."""
+        """Holds the current motion during a stop; returns what stopped it once that is over, or ""."""
         if why := self.held():
             self.was_held = True
             return why
@@ -308,28 +308,28 @@ class Floor:
         return ""
 
     def begin(self, station: str, part: str, seconds: float) -> MachineWork:
-        """Let a machine begin with a part: with its learned process, or for so long [s]."""
+        """Starts a machine's work on a part: its learned process, or a processing time [s]."""
         skills = self.skillset.processes[station]
         work = self.machines[station].begin(part, self.now_s, seconds, skills[0] if skills else None)
         self.again(work)
         return work
 
     def again(self, work: MachineWork) -> None:
-        """Let a machine carry its process out, from the beginning."""
+        """Restarts a machine's process from the beginning."""
         if work.skill is not None:
             work.start(self.bench, self.skillset.policies[work.skill.name])
 
     def work_on(self, part: str) -> MachineWork | None:
-        """What the machine that a part stands in does with it, or has done; None where it stands in none."""
+        """The work of the machine in which a part stands, current or finished; None if it stands in none."""
         return next((m.works[part] for m in self.machines.values() if part in m.works), None)
 
     def take_out(self, part: str) -> None:
-        """Note that a part is in no machine any more."""
+        """Notes that a part is no longer in a machine."""
         for machine in self.machines.values():
             machine.clear(part)
 
     def stand(self, pose: ToolPose) -> None:
-        """Put the open gripper at once to a pose, to begin there; no hook is called meanwhile."""
+        """Places the open gripper at a pose without motion, to begin there; no hook is called."""
         self.scene.robot.stand(pose)
         self.scene.robot.open_at_once()
         for _ in range(STAND_STEPS):

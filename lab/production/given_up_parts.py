@@ -1,4 +1,4 @@
-"""Parts that were given up: how they were left, and whether they can be brought on after all."""
+"""Parts that were given up: their state when they were left, and whether they can be brought on after all."""
 
 from dataclasses import dataclass, replace
 
@@ -15,14 +15,14 @@ from lab.teaching.events import PartLost
 
 @dataclass(frozen=True)
 class GivenUpParts:
-    """The parts of a job that were given up, as `RunState.lost` and `RunState.given_up` have them."""
+    """The given-up parts of a job, in `RunState.lost` and `RunState.given_up`."""
 
     floor: Floor
     state: RunState
     machines: PartsInMachines
 
     def lose(self, part: int, why: str, left: GivenUp | None = None) -> None:
-        """Give a part up, and tell why; left: how it was, None: as it is now."""
+        """Gives a part up and tells why; left: its state, None: the present one."""
         state, name = self.state, self.state.name(part)
         state.lost[part] = why
         if (left := left or self.as_left(part)) is not None:
@@ -30,11 +30,11 @@ class GivenUpParts:
         state.left_lying.add(name)
         state.spot_of.pop(name, None)
         state.finished.pop(part, None)
-        state.to_put_back = [one for one in state.to_put_back if one != part]
+        state.to_put_back = [other for other in state.to_put_back if other != part]
         self.floor.tell(PartLost(name, why, self.floor.now_s))
 
     def as_left(self, part: int, astray: bool = False) -> GivenUp | None:
-        """How a part is that is now given up; None where nobody could go on with it."""
+        """The state of a part that is given up now; None if it cannot be brought on later."""
         state, work = self.state, self.machines.work_on(part)
         position = state.plan.locations[part - 1]
         if position >= len(state.cell.laid_out):
@@ -43,20 +43,20 @@ class GivenUpParts:
         return GivenUp(position, state.spot_of.get(state.name(part)), undone, astray, state.finished.get(part))
 
     def found(self, attended: bool) -> dict[int, GivenUp]:
-        """The parts that can be brought on now, with how they were left; those for which there is no room yet come later.
+        """The parts that can be brought on now, with the states in which they were left; those without room yet come last.
 
-        attended: a person has put things right; then parts count, too, that were given up though they could be taken up.
+        attended: a person has put things right; parts that were given up although they could be taken up then count, too.
         """
         state = self.state
         asked = {part: left for part, left in state.given_up.items() if attended or left.astray}
         back = {part: left for part, left in asked.items() if self._is_back(part, left)}
         standing = {part for part, left in back.items() if left.spot is not None and self._stands(part, left.spot)}
-        found, later = with_room(state, back, standing)
+        ready, later = with_room(state, back, standing)
         state.given_up |= {part: replace(left, astray=True) for part, left in later.items()}
-        return found
+        return ready
 
     def take_back(self, part: int, left: GivenUp) -> None:
-        """Count on a part again that had been given up."""
+        """Returns a given-up part to the job."""
         state, name = self.state, self.state.name(part)
         del state.given_up[part], state.lost[part]
         state.left_lying.discard(name)
@@ -68,14 +68,14 @@ class GivenUpParts:
             self.machines.begin_again(part, stands)
 
     def _is_back(self, part: int, left: GivenUp) -> bool:
-        """Whether a part that was given up can be brought on: it stands where it was left, or can be taken up elsewhere."""
+        """Whether a given-up part can be brought on: it stands where it was left, or can be taken up elsewhere."""
         cell = self.state.cell
         if left.undone and cell.names[cell.laid_out[left.position].station] in self.state.out:
             return False
         return (left.spot is not None and self._stands(part, left.spot)) or self._can_be_taken_up(part)
 
     def _stands(self, part: int, spot: Spot) -> bool:
-        """Whether a part is seen to stand upright on a spot."""
+        """Whether a part is seen standing upright on a spot."""
         floor, name = self.floor, self.state.name(part)
         upright = not floor.world.dark and floor.bench.upright(name) >= UPRIGHT
         return upright and floor.bench.stands(name, spot, DELIVERED_M)

@@ -1,4 +1,4 @@
-"""How a method learned the order of a job: the costs of its episodes, when it found its best, and what its bound alone does."""
+"""The learning of a job's order: the costs of episodes, the episode of the best one, and the results of the bound alone."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ BOUND_ALONE, UNBOUNDED = "its bound alone", "without its bound"
 
 @dataclass(frozen=True)
 class Beside:
-    """What a part of a method reaches by itself: its best cost, None where it found no order, and in which episode."""
+    """The result of a part of a method by itself: its best cost, None without an order, and the episode of it."""
 
     by: str
     cost: float | None
@@ -31,9 +31,9 @@ class Beside:
 
 @dataclass(frozen=True)
 class OrderLearning:
-    """What a method found, `by` its name, or by one of `BESIDE_METHODS`, episode by episode, beside what no order can beat.
+    """The costs that a method, `by` (a name or one of `BESIDE_METHODS`), found by episode, beside the bound.
 
-    beside: of srl-time, what the bound is that its values begin at: followed greedily without learning, and learned without.
+    beside: for srl-time, the results of its bound followed greedily without learning, and of learning without the bound.
     """
 
     by: str
@@ -44,16 +44,16 @@ class OrderLearning:
 
     @property
     def episode(self) -> int:
-        """The first one, from 1, that came to the best cost."""
+        """The first episode, from 1, with the best cost."""
         return self.found.episode_costs.index(self.found.cost) + 1
 
     @property
     def first_cost(self) -> float:
-        """What the first episode cost."""
+        """The cost of the first episode."""
         return self.found.episode_costs[0]
 
     def to_json(self) -> dict[str, Any]:
-        """In `lab run --json`; the costs of the episodes are in the run's folder."""
+        """The entry of `lab run --json`; the costs of the episodes are in the run's folder."""
         return {
             "by": self.by,
             "objective": self.objective,
@@ -64,12 +64,12 @@ class OrderLearning:
             "episodes": len(self.found.episode_costs),
             "found_at_episode": self.episode,
             "first_cost": self.first_cost,
-            "beside": [vars(one) | {"gap": self._gap(one.cost)} for one in self.beside],
+            "beside": [vars(rival) | {"gap": self._gap(rival.cost)} for rival in self.beside],
             "lines": self.lines(),
         }
 
     def lines(self) -> list[str]:
-        """The same for people, one line first, and one for each that stands beside."""
+        """The result in words: one line, and one more for each of `beside`."""
         known, episodes = self.known, len(self.found.episode_costs)
         cost, bound = beside(self.found.cost, known.bound, known.unit, 1)
         what = "proven optimum" if known.proven else "proven bound"
@@ -78,18 +78,22 @@ class OrderLearning:
         lines = [f"{by}: {cost} {when}; {what} {bound}{self._above(self.found.cost)}"]
         if episodes > 1:
             lines.append(f"its first episode: {self.first_cost:.1f}{known.unit}{self._above(self.first_cost)}")
-        for one in self.beside:
-            if one.cost is None:
-                lines.append(f"{one.by}: no order in {counted(episodes, 'episode')}")
+        for rival in self.beside:
+            if rival.cost is None:
+                lines.append(f"{rival.by}: no order in {counted(episodes, 'episode')}")
                 continue
-            when = "nothing learned" if one.by == BOUND_ALONE else f"in episode {one.episode}"
-            lines.append(f"{one.by}: {one.cost:.1f}{known.unit}, {when}{self._above(one.cost)}")
+            when = "nothing learned" if rival.by == BOUND_ALONE else f"in episode {rival.episode}"
+            lines.append(f"{rival.by}: {rival.cost:.1f}{known.unit}, {when}{self._above(rival.cost)}")
         return lines
 
     def drawn(self, cell: Cell) -> Callable[[Path], None]:
-        """A function that draws it to a file: the cost by episode, the best so far, and what each part of the method reaches."""
+        """A function that draws the costs by episode, the best so far, and the result of each part of the method to a file."""
 
-        lines = {f"{one.by}: {one.cost:.1f}{self.known.unit}": one.cost for one in self.beside if one.cost is not None}
+        lines = {
+            f"{rival.by}: {rival.cost:.1f}{self.known.unit}": rival.cost
+            for rival in self.beside
+            if rival.cost is not None
+        }
         return partial(
             sequence_plot,
             self.found.episode_costs,
@@ -110,9 +114,9 @@ class OrderLearning:
 
 
 def bound_shares(cell: Cell, method: str, search: Search, seed: int) -> tuple[Beside, ...]:
-    """What the bound of srl-time reaches without learning, and learning without the bound; empty for other methods.
+    """The results of the bound of srl-time without learning, and of learning without the bound; empty for other methods.
 
-    Both draw what the session 0 of this seed draws (see `find_sequence`).
+    Both use the random numbers of session 0 of this seed (see `find_sequence`).
     """
     if method != "srl-time":
         return ()

@@ -1,4 +1,4 @@
-"""What came of a run in physics, and, where faults struck in it, whether it noticed them and told the truth."""
+"""The outcome of a run in physics, and the verdict on its reports of faults."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,13 +15,13 @@ from lab.teaching.events import Event
 
 @dataclass(frozen=True)
 class Outcome:
-    """A run in physics: the measured schedule, which parts were delivered, retries, and why not all were (None: all).
+    """The outcome of a run: the measured schedule, the delivered parts, retries, and why not all were delivered (None: all were).
 
-    timed: the duration of each move in which nothing had to be tried again. skipped_s: of sim_s, the time that passed
-    without physics, while the robot waited and nothing moved. interrupted: by Ctrl-C; all else is what came of it until then.
-    happened: the faults that struck. heard: what the run told. program: what the robot carried out. audit: what the frames
-    show (see `lab.audit`), None: nobody has looked; `delivered` are the parts that pass it, and what it finds is the failure
-    where there is no other.
+    timed: the duration of each move without retries. skipped_s: of sim_s, the time that passed
+    without physics, while the robot waited and nothing moved. interrupted: by Ctrl-C; all else is the outcome until then.
+    happened: the faults that struck. heard: the run's events. program: the robot's program. audit: the audit of the
+    frames (see `lab.audit`), None before it; `delivered` are the parts that pass it, and its first finding is the failure
+    if there is no other.
     """
 
     schedule: Schedule
@@ -41,6 +41,6 @@ class Outcome:
     replanned: tuple[Replanned, ...] = ()
 
     def verdict(self, names: Sequence[str]) -> Verdict:
-        """Whether all parts, of these names, were delivered, or the run stopped and told the truth (see `truth.verdict`)."""
+        """The verdict on the run, with these names of parts (see `truth.verdict`)."""
         lacking = [name for part, name in enumerate(names, start=1) if part not in self.delivered]
         return verdict(self.happened, self.heard, self.failure, lacking)

@@ -1,4 +1,4 @@
-"""Parts that stand in machines: begun alone or in batches, waited for, fetched before they spoil."""
+"""Parts in machines: they are begun alone or in batches, waited for, and fetched before they spoil."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -16,14 +16,14 @@ from lab.skills import Skill
 from lab.skills.skillset import WINDOW_MARGIN_S
 from lab.teaching.events import MachineBegan, MachineDone, PartLost, TroubleMet
 
-ON_TIME_S = 2 * TIME_STEP  # a window is kept that is not overrun by more: what a machine does is noticed a step later
-LATE_S = 1.0  # a machine that takes so much longer than it should is late
+ON_TIME_S = 2 * TIME_STEP  # tolerance of a window: the end of a machine's work is noticed a step later
+LATE_S = 1.0  # a machine with a longer delay is late
 
 
 def watch_machines(state: RunState, floor: Floor) -> None:
-    """After each physics step: tell of machines that are done, and show what they have done to their parts.
+    """Tells, after a physics step, which machines are done, and shows the finish of their parts.
 
-    A machine is never done with a part that is seen not to stand in it.
+    A machine is never done with a part that is seen elsewhere.
     """
     now_s = floor.now_s
     for work in (work for machine in floor.machines.values() for work in machine.works.values()):
@@ -47,7 +47,7 @@ def watch_machines(state: RunState, floor: Floor) -> None:
 
 
 def may_stay_s(floor: Floor, name: str, station: str) -> float | None:
-    """How long a part may stay in a machine that is done with it, by the task [s]; None: as long as it is left there."""
+    """The longest stay [s] of a finished part in its machine, from the task; None: no limit."""
     routes = floor.scene.kind_of[name].part.routes
     own = [s.at_most_s for route in routes for s in route if s.station == station and s.at_most_s is not None]
     return own[0] if own else floor.skillset.task.station(station).at_most_s
@@ -55,17 +55,17 @@ def may_stay_s(floor: Floor, name: str, station: str) -> float | None:
 
 @dataclass(frozen=True)
 class PartsInMachines:
-    """What machines do with the parts that were brought to them, and when these have to be fetched."""
+    """The work of machines on the parts that were brought to them, and the times by which parts must be fetched."""
 
     floor: Floor
     state: RunState
 
     def work_on(self, part: int) -> MachineWork | None:
-        """What the machine that a part stands in does with it, or has done; None where it stands in none."""
+        """The work of the machine in which a part stands, current or finished; None if it stands in none."""
         return self.floor.work_on(self.state.name(part))
 
     def taken_out(self) -> list[int]:
-        """The parts that a machine is done with and that are not in it any more, though not at their next station either."""
+        """The finished parts that are no longer in their machine and not yet at their next station."""
         state, laid_out, names = self.state, self.state.cell.laid_out, self.state.cell.names
         places = [(part, place) for part, place in enumerate(state.plan.locations, 1) if place < len(laid_out)]
         in_machine = [part for part, place in places if names[laid_out[place].station] in self.floor.machines]
@@ -74,7 +74,7 @@ class PartsInMachines:
     # ---- begun -----------------------------------------------------------------------------------------------------
 
     def brought(self, name: str, station: str, process_s: float, following: Sequence[int]) -> None:
-        """A part was set down at a station: let a machine begin with it, alone, or with its batch where it closes that.
+        """Starts a machine's work on a part that was set down, alone, or with its batch if the part completes it.
 
         following: the decisions after the one that brought it.
         """
@@ -87,7 +87,7 @@ class PartsInMachines:
             self._begin_batch(station)
 
     def brought_back(self, name: str, station: str, process_s: float) -> None:
-        """A part was put back into a machine, which begins anew; with a batch that waits it waits, too."""
+        """Restarts a machine's work on a part that was put back; in a batch that waits, the part waits, too."""
         if self.state.cell.index(station) not in self.state.cell.batches:
             self.begin(name, station, process_s)
         elif self.floor.machines[station].works:
@@ -95,7 +95,7 @@ class PartsInMachines:
             self._begin_batch(station)
 
     def begin_again(self, part: int, stands: bool) -> None:
-        """Let the machine begin a part anew that it had not finished; stands: where it was brought, else it is put back first."""
+        """Restarts the machine's work on an unfinished part; stands: whether it is still there; else it is put back first."""
         name = self.state.name(part)
         way, process_s = self.state.brought[name]
         self.floor.take_out(name)
@@ -105,7 +105,7 @@ class PartsInMachines:
             self.state.to_put_back.append(part)
 
     def begin(self, name: str, station: str, process_s: float) -> None:
-        """Let the machine begin that a part has been brought to; at another station nothing begins."""
+        """Starts the work of a machine on a part; does nothing at another station."""
         floor = self.floor
         self.state.served.discard(name)
         if station in floor.machines:
@@ -113,14 +113,14 @@ class PartsInMachines:
             floor.tell(MachineBegan(station, name, work.begun_s, work.expected_s))
 
     def begin_batches(self) -> None:
-        """Let machines begin with the parts that wait in them for others of their batch: nothing more is to come."""
+        """Starts all waiting batches, because no more parts will come."""
         state = self.state
         for station in [state.cell.names[index] for index in sorted(state.cell.batches)]:
             if any(state.name(part) in state.waiting for part in state.plan.inside(state.cell.index(station))):
                 self._begin_batch(station)
 
     def _begin_batch(self, station: str) -> None:
-        """Let a machine begin with all parts in it that it is not done with, for the longest of their times."""
+        """Starts a machine's work on all unfinished parts in it, for the longest of their times."""
         state = self.state
         inside = [part for part in state.plan.inside(state.cell.index(station)) if part not in state.to_put_back]
         working = {name for name, work in self.floor.machines[station].works.items() if not work.done(self.floor.now_s)}
@@ -133,8 +133,8 @@ class PartsInMachines:
     # ---- waited for ------------------------------------------------------------------------------------------------
 
     def wait_for(self, name: str, station: str) -> None:
-        """Wait until the machine is done with a part. Raises Trouble when it fails, once when it is late, and when it takes far
-        too long."""
+        """Waits until the machine is done with a part. Raises Trouble if it fails, once if it is late, and if it is given
+        up."""
         floor, work = self.floor, self.floor.work_on(name)
         if work is None or work.station != station:
             return
@@ -151,8 +151,8 @@ class PartsInMachines:
             look(floor, self.state)
 
     def waits(self, sequence: Sequence[int], origin: str, at_s: float) -> Wait:
-        """How long the first of the decisions still to come has to wait on purpose, if its work at its origin begins at a time:
-        so that no part is left too long in a machine, by what the machines have really begun and done."""
+        """The deliberate waits of the next decision, if its work at its origin begins at `at_s`, so that no part stays too long
+        in a machine, by the times at which machines really began and ended."""
         state = self.state
         if not state.plan.cell.has_windows:
             return NO_WAIT
@@ -165,16 +165,16 @@ class PartsInMachines:
         return NO_WAIT
 
     def ready_s(self, part: int, else_s: float) -> float:
-        """When the machine that a part stands in is done with it; of a part that stands in none, and of a spoilt one, another
-        time."""
+        """The time [s] at which the machine of a part is done with it; `else_s` for a part in no machine and for a spoilt
+        one."""
         work, now_s = self.work_on(part), self.floor.now_s
         if work is None or part in self.state.spoilt:
             return else_s
         return work.until_s if work.done(now_s) else max(now_s, work.expected_s)
 
     def left_s(self, part: int) -> float:
-        """How long until the machine of a part should be done, or, when it is late, is given up [s]; below 0: it has been done
-        for so long, and the part must not wait on without end. A spoilt part may."""
+        """The time [s] until the machine of a part should be done or, if it is late, is given up; negative: the time since it
+        was done, for a part with a limited stay that is not spoilt."""
         work, now_s = self.work_on(part), self.floor.now_s
         assert work is not None
         if not work.done(now_s):
@@ -187,7 +187,7 @@ class PartsInMachines:
     # ---- fetched ---------------------------------------------------------------------------------------------------
 
     def check_window(self, part: int) -> None:
-        """Notice a part that its machine has been done with for longer than it may stay there: it is spoilt."""
+        """Marks a part as spoilt if it has stayed in its machine for longer than allowed."""
         floor, state, work, name = self.floor, self.state, self.work_on(part), self.state.name(part)
         if work is None or part in state.spoilt or work.moves:
             return
@@ -200,15 +200,15 @@ class PartsInMachines:
         floor.tell(PartLost(name, what, floor.now_s))
 
     def service(self, part: int, station: str) -> Sequence[Skill]:
-        """What the robot does at a station before it takes a part out."""
+        """The skills of the robot's service at a station before it takes a part out."""
         return self.floor.skillset.services.get((self.state.cell.order[part - 1], station), ())
 
     def to_be_served(self, part: int, station: str) -> bool:
-        """Whether the robot has yet to do something at a station for a part that is there."""
+        """Whether the robot's service for a part at a station is still to be done."""
         return bool(self.service(part, station)) and self.state.name(part) not in self.state.served
 
     def fetched(self, name: str, station: str) -> None:
-        """A part was taken out of a machine: note for how long that has really worked on it."""
+        """Notes that a part was taken out of a machine, and the real time of the machine's work on it."""
         self._note_work(name)
         self.floor.machines[station].clear(name)
 

@@ -1,6 +1,6 @@
-"""What is seen of parts, obstacles, stations and strange parts, compared with where the run believes them to be.
+"""The perceived poses of parts, obstacles, stations and strange parts, compared with those that the run believes.
 
-Bodies' poses stand in for a camera that looks at the whole table: with the camera covered nothing is seen.
+Bodies' poses stand for a camera that looks at the whole table; while the camera is covered, nothing is seen.
 """
 
 from collections.abc import Container, Iterator, Mapping
@@ -21,11 +21,11 @@ from lab.skills.skill import UPRIGHT
 from lab.tasks.task import Task
 from lab.tasks.task_fields import Obstacle
 
-PART_M = 0.035  # a part farther than this from where it was set down was moved
-FIXED_M, FIXED_RAD = 0.006, 0.05  # and what does not move by itself
+PART_M = 0.035  # a part farther than this from its spot was moved
+FIXED_M, FIXED_RAD = 0.006, 0.05  # the same for fixed bodies
 ON_SPOT_M = 0.10  # a strange part this near to a spot of a station stands on it
-BELOW_M = -0.05  # what is below the table top is not on the table
-FELL_M = 0.02  # a part that stands so far below its spot is off it
+BELOW_M = -0.05  # bodies below this height are not on the table
+FELL_M = 0.02  # a part this far below its spot is off it
 
 Sort = Literal[
     "camera blind",
@@ -43,10 +43,10 @@ Sort = Literal[
 
 @dataclass(frozen=True)
 class Deviation:
-    """A difference between what is seen and what is believed: of which body, in words, at which station ("": at none).
+    """A difference between the perceived and the believed scene: the body, the difference in words, the station ("": none).
 
-    at: where a part's foot is seen, or a fixed body's middle, or a station's pose; by_m: how far off [m]; None, 0: it is not
-    seen at all. obstacle: of a new one, what is known of it.
+    at: the perceived place of a part's foot, a fixed body's middle, or a station; by_m: the distance [m]; None and 0 for a
+    missing body. obstacle: the record of a new one.
     """
 
     sort: Sort
@@ -59,21 +59,23 @@ class Deviation:
 
 
 def look(floor: Floor, state: RunState) -> None:
-    """See, once a second, whether all is where it should be. Raises Trouble for the first thing that is not."""
+    """Checks once a second whether all bodies are where they are believed. Raises Trouble for the first deviation."""
     if floor.now_s - state.looked_s < LOOK_S:
         return
     state.looked_s = floor.now_s
-    if found := new_deviations(floor, state):
-        raise Trouble(found[0].words, found[0].name, found[0].station, kind="seen")
+    if deviations := new_deviations(floor, state):
+        raise Trouble(deviations[0].words, deviations[0].name, deviations[0].station, kind="seen")
     if not floor.world.dark:
         state.right_s = floor.now_s
 
 
 def new_deviations(floor: Floor, state: RunState) -> list[Deviation]:
-    """The deviations that a run does not know of yet: none of parts that it gave up, or of strange parts that it saw before."""
+    """The deviations that are new to a run, without those of given-up parts and of known strange parts."""
     delivered = {state.name(part) for part in state.finished}
-    found = perceive(floor, floor.scene.task, floor.scene.layout, state.spot_of, delivered)
-    return [one for one in found if one.sort != "camera blind" and not _is_known(state, one)]
+    deviations = perceive(floor, floor.scene.task, floor.scene.layout, state.spot_of, delivered)
+    return [
+        deviation for deviation in deviations if deviation.sort != "camera blind" and not _is_known(state, deviation)
+    ]
 
 
 def _is_known(state: RunState, seen: Deviation) -> bool:
@@ -88,13 +90,13 @@ def perceive(
 ) -> list[Deviation]:
     """All deviations: of fixed things from the task and the layout, of parts from their spots.
 
-    delivered: those that have to stay within DELIVERED_M of them. What is in the gripper is left out. The order is that of
+    delivered: the parts that must stay within DELIVERED_M of their spots. Held bodies are left out. The order is that of
     `Sort` for parts, then strange parts, obstacles and stations.
     """
     if floor.world.dark:
         return [Deviation("camera blind", "", "the camera sees nothing")]
-    found = [*_parts(floor, task, spot_of, delivered), *_strange_parts(floor, task, spot_of)]
-    return [*found, *_obstacles(floor, task, layout), *_stations(floor, task)]
+    deviations = [*_parts(floor, task, spot_of, delivered), *_strange_parts(floor, task, spot_of)]
+    return [*deviations, *_obstacles(floor, task, layout), *_stations(floor, task)]
 
 
 def _parts(floor: Floor, task: Task, spot_of: Mapping[str, Spot], delivered: Container[str]) -> Iterator[Deviation]:
@@ -122,13 +124,13 @@ def _parts(floor: Floor, task: Task, spot_of: Mapping[str, Spot], delivered: Con
 
 
 def moved_off(floor: Floor, name: str, spot: Spot | None) -> bool:
-    """Whether a part is not on its spot any more, whether or not the camera sees it; False where no spot is known."""
+    """Whether a part is no longer on its spot, independent of the camera; False if no spot is known."""
     x, y, _ = floor.world.pose(name)[0]
     return spot is not None and hypot(float(x) - spot.x, float(y) - spot.y) > PART_M
 
 
 def _held(floor: Floor) -> set[str]:
-    """What the gripper holds, and what stands on that."""
+    """The bodies in the gripper and on top of the held one."""
     held = floor.bench.held
     if held is None:
         return set()
@@ -158,8 +160,8 @@ def _obstacles(floor: Floor, task: Task, layout: Layout) -> Iterator[Deviation]:
             yield Deviation(
                 "obstacle moved", name, f"'{name}' stands {far:.2f} m off where it was surveyed", "", at, far
             )
-    stations = {one.name for one in task.stations}
-    known = {TABLE, NAME, *stations, *floor.scene.kind_of, *(one.name for one in task.obstacles)}
+    stations = {station.name for station in task.stations}
+    known = {TABLE, NAME, *stations, *floor.scene.kind_of, *(fixed.name for fixed in task.obstacles)}
     for name in world.names():
         looks = world.looks(name)
         if name in known or name.endswith(MARKER) or name.startswith(f"{NAME} ") or not looks or looks[0].kind != "box":
@@ -180,7 +182,7 @@ def _stations(floor: Floor, task: Task) -> Iterator[Deviation]:
         dx, dy, turn = at.x - middle[0], at.y - middle[1], (at.yaw - yaw + pi) % (2 * pi) - pi
         far = hypot(dx, dy)
         if far > FIXED_M or abs(turn) > FIXED_RAD:
-            x, y, own = station.pose  # it turned about the middle of its body
+            x, y, own = station.pose  # the station was turned about the middle of its body
             off, across = x - middle[0], y - middle[1]
             pose = (
                 at.x + cos(turn) * off - sin(turn) * across,
@@ -194,7 +196,7 @@ def _stations(floor: Floor, task: Task) -> Iterator[Deviation]:
 
 
 def seen_at(floor: Floor, body: str) -> Spot:
-    """Where the foot of a part is, and how it is turned."""
+    """The present place of a part's foot, with its yaw."""
     (x, y, z), turn = floor.world.pose(body)
     foot = floor.scene.kind_of[body].shape.foot_m
     return Spot(float(x), float(y), float(z) - foot, 2.0 * atan2(float(turn[2]), float(turn[3])))
@@ -216,8 +218,8 @@ def station_of(floor: Floor, task: Task, at: Spot) -> str:
 
 
 def scene_seen(task: Task, layout: Layout, deviations: list[Deviation]) -> tuple[Task, Layout]:
-    """The task and layout with obstacles and stations where they were seen; BadInput for what cannot be."""
-    seen = {one.name: one for one in deviations}
+    """The task and layout with obstacles and stations where they were seen; Raises BadInput for an impossible scene."""
+    seen = {deviation.name: deviation for deviation in deviations}
     stations = []
     for station in task.stations:
         moved = seen.get(station.name)

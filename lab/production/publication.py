@@ -1,4 +1,4 @@
-"""A policy shown to others: its card with pictures in a folder, or the whole folder that the Hugging Face Hub takes."""
+"""Publication of a policy: its card with pictures in a folder, or a whole folder for the Hugging Face Hub."""
 
 import shlex
 from collections.abc import Sequence
@@ -18,11 +18,11 @@ from lab.view.value_levels import can_be_drawn, value_levels
 
 CARD = "card.md"
 PICTURES = {"learning curve": "learning-curve.png", "value map": "value-map.png"}
-Files = dict[str, str]  # what was written, by what it is
+Files = dict[str, str]  # the written files, by kind
 
 
 def write_card(policy: Policy, events: Sequence[Event], out: Path) -> Files:
-    """The policy's file and its card with pictures, in the folder `out`. Raises BadInput and WorkFailed."""
+    """Writes the policy's file and its card with pictures to `out`, and returns the files. Raises BadInput and WorkFailed."""
     file, content = f"{slug(policy.name)}{SUFFIX}", encode(policy)
     bring_in = f"lab toolbox export {shlex.quote(policy.name)} --out skill.zip\nlab toolbox import skill.zip"
     telling = Telling(_what(policy), sha256(content), file, bring_in, _pictures(policy), events)
@@ -30,7 +30,7 @@ def write_card(policy: Policy, events: Sequence[Event], out: Path) -> Files:
 
 
 def publish(policy: Policy, events: Sequence[Event], license_name: str, out: Path) -> Files:
-    """A folder that can be pushed to the Hub as it is, and imported again. Raises BadInput and WorkFailed."""
+    """Writes a folder that can be pushed to the Hub and imported again, and returns its files. Raises BadInput and WorkFailed."""
     check_license(license_name)
     files = hub_files(policy)
     bring_in = "lab toolbox import ."
@@ -40,20 +40,20 @@ def publish(policy: Policy, events: Sequence[Event], license_name: str, out: Pat
 
 
 def _what(policy: Policy) -> str:
-    """What the policy does, in words."""
+    """The purpose of the policy, in words."""
     skill = SKILLS.get(policy.subtask)
-    return f"a way to the goal in '{policy.task}'" if skill is None else skill.help
+    return f"a path to the goal in '{policy.task}'" if skill is None else skill.help
 
 
 def _pictures(policy: Policy) -> Files:
-    """The pictures that there can be of a policy."""
+    """The possible pictures of a policy."""
 
     there = {"learning curve": bool(policy.curve), "value map": can_be_drawn(policy)}
     return {name: file for name, file in PICTURES.items() if there[name]}
 
 
 def _write(policy: Policy, contents: dict[str, bytes], out: Path) -> Files:
-    """Files and pictures, all drawn before any of them stands in `out`; pictures of another policy go."""
+    """Writes files and pictures to `out`, after all are drawn, and removes pictures of another policy; returns the files."""
 
     check_out(out)
     pictures = _pictures(policy)

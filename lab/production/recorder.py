@@ -1,4 +1,4 @@
-"""What a run looked like: frames of the world, and what a viewer shows beside the bodies: what machines have left on parts."""
+"""The frames of a run's world, and the extra bodies of a viewer: the finish that machines have left on parts."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -13,27 +13,27 @@ from lab.skills.skillset import SkillSet
 from lab.tasks.task import Order, Task
 
 FRAME_EVERY = 24  # physics steps: ten frames a simulated second
-RIM_M, PROUD_M = 0.022, 0.0016  # [m] that the finish of a flat part leaves free in all, and is thicker than it
-LEAST = 0.8  # of an edge is covered by it, however short that is
+RIM_M, PROUD_M = 0.022, 0.0016  # [m] total rim that the finish of a flat part leaves free, and its extra thickness
+LEAST = 0.8  # least share of an edge that it covers
 BURNT: Rgba = (0.10, 0.08, 0.07, 1.0)
-LARGER = 1.01  # than another part is its finish
+LARGER = 1.01  # factor of the size of another part's finish
 
 
 class Viewer(Protocol):
-    """Who watches live."""
+    """A live viewer."""
 
     def show(self, bodies: tuple[Body, ...]) -> None:
-        """What there is to see."""
+        """Shows these bodies."""
 
     def update(self, frame: Frame) -> None:
-        """Where it is now."""
+        """Moves the bodies to their poses in this frame."""
 
 
 @dataclass
 class Recorder:
-    """Takes a frame every FRAME_EVERY steps; a viewer gets each at once. Parts change their looks as they are told.
+    """Takes a frame every FRAME_EVERY steps, which a viewer gets at once; `show` changes the looks of parts.
 
-    extras: by the part that carries it, what may come to be seen on it.
+    extras: the extra bodies that may be shown on a part, by part.
     """
 
     world: World
@@ -51,12 +51,12 @@ class Recorder:
             self.viewer.show(self.bodies)
 
     def step(self) -> None:
-        """To be called after each physics step."""
+        """Takes a frame if it is due; called after each physics step."""
         if (self.world.steps - self._start) % FRAME_EVERY == 0:
             self.take()
 
     def take(self) -> None:
-        """Take a frame now."""
+        """Takes a frame now."""
         poses = self.world.poses()
         for name, part in self._shown.items():
             poses[name] = poses[part]
@@ -67,36 +67,36 @@ class Recorder:
             self.viewer.update(made)
 
     def show(self, name: str) -> None:
-        """From now on this extra body is seen on its part."""
+        """Shows this extra body on its part from now on."""
         if name not in self._shown:
             self._shown[name] = self._carrier[name]
             self._pending[name] = True
 
 
 def show_scene(task: Task, order: Order, layout: Layout, viewer: Viewer) -> None:
-    """Show a viewer the scene before anything has happened in it."""
+    """Shows a viewer the scene at its beginning."""
     with World() as world:
         Scene(world, task, order, layout)
         Recorder(world, viewer=viewer).take()
 
 
 def extras_of(scene: Scene, skillset: SkillSet) -> dict[str, tuple[Body, ...]]:
-    """What may come to be seen on each part of a scene: what machines leave on it, by their processes or their finish."""
-    found: dict[str, tuple[Body, ...]] = {}
+    """The extra bodies of each part of a scene: the coats and finishes that machines leave on it."""
+    extras: dict[str, tuple[Body, ...]] = {}
     for name, kind in scene.kind_of.items():
         bodies: list[Body] = []
         for station in (scene.task.station(place) for place in kind.part.places):
             if station.finish is not None:
                 bodies.append(finish_on(name, kind, station.name, (*station.finish, 1.0)))
-            if any(one is not None for one in (station.at_most_s, *_windows(kind, station.name))):
+            if any(limit is not None for limit in (station.at_most_s, *_windows(kind, station.name))):
                 bodies.append(
                     replace(finish_on(name, kind, station.name, BURNT, 2), name=burnt_name(name, station.name))
                 )
             for skill in skillset.processes[station.name]:
                 bodies += skill.on_part(name, kind)
         if bodies:
-            found[name] = tuple(bodies)
-    return found
+            extras[name] = tuple(bodies)
+    return extras
 
 
 def _windows(kind: Kind, station: str) -> list[float | None]:
@@ -104,17 +104,17 @@ def _windows(kind: Kind, station: str) -> list[float | None]:
 
 
 def burnt_name(name: str, station: str) -> str:
-    """What the looks of a part are called that stayed in a machine for too long."""
+    """The name of the extra body of a part that stayed in a machine for too long."""
     return f"burnt {name} at {station}"
 
 
 def finish_name(name: str, station: str) -> str:
-    """What the finish of a part is called that a machine has left on it."""
+    """The name of the finish that a machine has left on a part."""
     return f"done {name} at {station}"
 
 
 def finish_on(name: str, kind: Kind, station: str, rgba: Rgba, coat: int = 1) -> Body:
-    """A part's finish: both sides of a flat part within its rim, all of another; coat: 2 lies over 1."""
+    """A part's finish: both sides of a flat part within its rim, or the whole of any other part; coat 2 lies over coat 1."""
     fields = kind.part
     if fields.shape == "box" and fields.size_m is not None and min(fields.size_m) < RIM_M:
         size = tuple(

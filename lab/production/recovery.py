@@ -1,6 +1,6 @@
-"""What is done about trouble: look what is where, take up again, learn again, order anew, leave a part, or stop and say why.
+"""The recovery from trouble: perceive, retry, learn again, replan, give a part up, or stop for a reason.
 
-What to do is decided in `answers`, as a function of the state and of what was seen; here it is done.
+`answers` decides what to do, from the state and the perceived deviations; this module does it.
 """
 
 from collections.abc import Mapping, Sequence
@@ -35,9 +35,9 @@ from lab.production.trouble import RunStopped, Trouble
 from lab.sequencing.simulate.rest import Mishaps
 from lab.teaching.events import MachineFailed, MoveRetried, PlanMade, RunHeld, RunWentOn, TroubleMet
 
-BLIND_S = 120.0  # so long a skill waits until the camera sees again
+BLIND_S = 120.0  # longest wait for a covered camera
 NOBODY: Mapping[int, int] = MappingProxyType({})
-TO_DO = {  # by a person, with a part that is left
+TO_DO = {  # what a person must do with a given-up part
     "part fallen": "stand it up",
     "part gone": "bring it back",
     "part out of reach": "put it within reach",
@@ -47,9 +47,9 @@ TO_DO = {  # by a person, with a part that is left
 
 @dataclass(frozen=True)
 class Recovery:
-    """Does what is decided about trouble: to the scene by `work` and `machines`, to what is believed in the state.
+    """Carries out the answers to trouble: in the scene by `work` and `machines`, in the believed scene by `state`.
 
-    relearner: learns what changed in the scene, None: nobody does. planner: who orders the rest where it must be.
+    relearner: learns the changed problems of the scene; None: they are not learned. planner: replans the remaining work.
     """
 
     floor: Floor
@@ -63,7 +63,7 @@ class Recovery:
     # ---- answers ---------------------------------------------------------------------------------------------------
 
     def answer(self, trouble: Trouble) -> None:
-        """Do what lets the run go on, perhaps without a part. Raises RunStopped."""
+        """Answers trouble so that the run can continue, perhaps without a part. Raises RunStopped."""
         floor = self.floor
         if trouble.kind == "late":
             self._put_off(trouble)
@@ -108,8 +108,8 @@ class Recovery:
                 assert_never(answer)
 
     def _put_off(self, trouble: Trouble) -> None:
-        """A machine is late: what can be done meanwhile comes first, and its part is fetched as if the machine took as long as it
-        is allowed to. Where no order keeps to all windows then, the old one is gone on with."""
+        """Replans for a late machine, whose part is fetched as if the machine took the longest allowed time. If then no order
+        keeps all windows, the old one is kept."""
         self._tell(trouble, "waits for it, and does first what can be done meanwhile")
         with suppress(RunStopped):
             self.replan(str(trouble))
@@ -134,7 +134,7 @@ class Recovery:
             floor.wait(min(floor.now_s + LOOK_S, until_s))
 
     def _give_up(self, trouble: Trouble, why: str) -> None:
-        """Go on without a machine or without a part; RunStopped when the part cannot be set down, or it is about none."""
+        """Continues without a machine or a part; RunStopped if the part cannot be set down, or the trouble concerns none."""
         floor, state = self.floor, self.state
         text = str(Trouble(why, trouble.part, trouble.station))
         part = state.part_of(trouble.part)
@@ -150,7 +150,7 @@ class Recovery:
     # ---- what was seen ---------------------------------------------------------------------------------------------
 
     def _believe(self, answer: Believe) -> None:
-        """Take into account what was seen, body by body, and order the rest anew. Raises RunStopped."""
+        """Updates the believed scene body by body, and replans the rest. Raises RunStopped."""
         for seen in answer.seen:
             self._account(seen)
         if answer.fixed:
@@ -158,7 +158,7 @@ class Recovery:
         self.replan(answer.seen[0].words)
 
     def _account(self, seen: Deviation) -> None:
-        """Believe what was seen of one body."""
+        """Updates the belief about one body."""
         floor, state, part = self.floor, self.state, self.state.part_of(seen.name)
         near, unfinished = "", False
         if part is not None and seen.sort == "part moved":
@@ -182,13 +182,13 @@ class Recovery:
                 assert part is not None
                 self._follow(part, seen, put_back=belief is Belief.PUT_BACK, unfinished=unfinished)
             case Belief.SURVEY:
-                pass  # once, for all that is fixed
+                pass  # once, for all fixed bodies
             case _:
                 assert_never(belief)
 
     def _avoid(self, seen: Deviation) -> None:
-        """Something stands where it does not belong: its spot is taken; where that was the only one, it is set aside, or else the
-        station is closed."""
+        """Marks the spot of a strange body as taken; if it was the only spot, the body is set aside or else the station
+        closed."""
         assert seen.at is not None
         floor, state = self.floor, self.state
         state.strange[seen.name] = Strange()
@@ -209,7 +209,7 @@ class Recovery:
         self._tell_seen(seen, "brings nothing there")
 
     def _clear_away(self, seen: Deviation) -> bool:
-        """Whether what belongs to nobody was set aside; what is in the gripper is set down first."""
+        """Sets a strange body aside, after the part in the gripper; returns whether that succeeded."""
         try:
             if self.floor.bench.held is not None and not self.set_aside(seen.words):
                 return False
@@ -219,7 +219,7 @@ class Recovery:
             return False
 
     def _leave(self, part: int, seen: Deviation) -> None:
-        """A part that cannot be taken up is left; where it lies in a machine, that is closed."""
+        """Gives up a part that cannot be taken up; if it lies in a machine, that is closed."""
         work = self.machines.work_on(part)
         left = self.given_up.as_left(part, astray=True)
         if work is not None and seen.sort == "part fallen":
@@ -229,9 +229,9 @@ class Recovery:
         self._tell_seen(seen, "leaves it")
 
     def _follow(self, part: int, seen: Deviation, *, put_back: bool, unfinished: bool) -> None:
-        """A part that was moved is put back, or taken up where it stands.
+        """Lets a moved part be put back, or taken up where it stands.
 
-        Where the machine that it stood in is done by now, and the part was not seen in it since, it is noted that nobody knows.
+        If its machine is done by now, and the part was not seen in it since, a note says that its processing is unknown.
         """
         assert seen.at is not None
         state, work = self.state, self.machines.work_on(part)
@@ -245,10 +245,10 @@ class Recovery:
         self._tell_seen(seen, "puts it back" if put_back else "takes it up there")
 
     def _learn_again(self, fixed: Sequence[Deviation]) -> None:
-        """Learn what is another problem in the scene as it is now. RunStopped when nothing can be done in it."""
+        """Learns the problems that changed in the present scene. RunStopped if the scene allows no work."""
         floor, state = self.floor, self.state
-        for one in fixed:
-            self._tell_seen(one, "surveys the scene again, and learns what has changed")
+        for deviation in fixed:
+            self._tell_seen(deviation, "surveys the scene again, and learns what has changed")
         if self.relearner is None:
             raise RunStopped(f"{fixed[0].words}: nobody is there to teach what changed")
         try:
@@ -261,9 +261,9 @@ class Recovery:
     # ---- the order of what remains ---------------------------------------------------------------------------------
 
     def replan(self, why: str, back: Mapping[int, int] = NOBODY) -> None:
-        """Order the work that remains anew, from the state that was reached. Raises RunStopped where no order ends it.
+        """Replans the remaining work from the reached state. Raises RunStopped if no order completes it.
 
-        back: parts that had been given up and are to be brought on after all, and their positions.
+        back: given-up parts that are to be brought on after all, with their positions.
         """
         floor, state, machines, now_s = self.floor, self.state, self.machines, self.floor.now_s
         machines.begin_batches()
@@ -274,29 +274,29 @@ class Recovery:
         ready_s |= dict.fromkeys(sorted(taken_up), 0.0)
         mishaps = Mishaps(frozenset(state.lost), tuple(state.out), ready_s, back)
         try:
-            found = plan_again(state.plan, mishaps, first, self.planner)
+            new_plan = plan_again(state.plan, mishaps, first, self.planner)
         except LabError as error:
             if first is None or not self.set_aside(why):
                 raise RunStopped(f"{why}: {error}") from None
             self.replan(why, back)
             return
-        for part, stuck in found.stuck.items():
+        for part, stuck in new_plan.stuck.items():
             if part not in state.lost:
                 reasons = ", ".join(f"'{station}': {what}" for station, what in state.out.items())
                 self.given_up.lose(part, f"{stuck}: {reasons}" if reasons else stuck)
-        state.sequence = [*found.sequence]
-        state.go_by(found.run, floor.now_s)
+        state.sequence = [*new_plan.sequence]
+        state.go_by(new_plan.run, floor.now_s)
         gap = None
-        if found.schedule is not None:
-            is_proven = found.proven is not None and found.proven.proven
-            gap = None if found.proven is None else found.proven.gap(found.schedule.makespan_s)
-            plan = found.schedule.later(now_s)
-            floor.tell(PlanMade(plan, len(state.sequence), gap, is_proven, now_s, why, found.method))
-        if found.method:
-            state.replanned.append(Replanned(now_s, why, found.method, len(state.sequence), gap))
+        if new_plan.schedule is not None:
+            is_proven = new_plan.proven is not None and new_plan.proven.proven
+            gap = None if new_plan.proven is None else new_plan.proven.gap(new_plan.schedule.makespan_s)
+            plan = new_plan.schedule.later(now_s)
+            floor.tell(PlanMade(plan, len(state.sequence), gap, is_proven, now_s, why, new_plan.method))
+        if new_plan.method:
+            state.replanned.append(Replanned(now_s, why, new_plan.method, len(state.sequence), gap))
 
     def set_aside(self, why: str) -> bool:
-        """Set down what is in the gripper, for it cannot be brought on now; whether that was done."""
+        """Sets down the part in the gripper, which cannot be brought on now; returns whether that succeeded."""
         held = self.floor.bench.held
         if held is None or not self.work.set_aside():
             return False
@@ -306,37 +306,37 @@ class Recovery:
     # ---- parts that were given up ----------------------------------------------------------------------------------
 
     def find_again(self, attended: bool = False) -> bool:
-        """Go on with parts that were given up and can now be brought on; whether there are any.
+        """Returns given-up parts that can now be brought on to the job; returns whether there are any.
 
-        Unattended, these are parts that could not be taken up. Attended, a person has put things right: then also those that
-        stand where they were left, as in a machine that was out of order. What a machine had not finished, it begins anew.
-        Where no order brings them on, they are given up as before.
+        Unattended, these are parts that could not be taken up. Attended, after a person has put things right, they include those
+        that stand where they were left, as in a machine that was out of order. Machines restart their unfinished work.
+        If no order brings the parts on, they are given up as before.
         """
         state, parts = self.state, self.given_up
-        found = parts.found(attended)
-        why = {part: state.lost[part] for part in found}
-        for part, left in found.items():
+        ready = parts.found(attended)
+        why = {part: state.lost[part] for part in ready}
+        for part, left in ready.items():
             parts.take_back(part, left)
             self._tell(Trouble("it can be taken up again", state.name(part)), "goes on with it")
         try:
-            if found:
-                self.replan("a part can be taken up again", {part: left.position for part, left in found.items()})
+            if ready:
+                self.replan("a part can be taken up again", {part: left.position for part, left in ready.items()})
         except RunStopped as stopped:
             self._note(str(stopped))
-            for part, left in found.items():
+            for part, left in ready.items():
                 self.given_up.lose(part, why[part], left)
             return False
-        return bool(found)
+        return bool(ready)
 
     def forget(self) -> None:
-        """A person has put things right: what was out of use is used again, and tries are counted anew."""
+        """Reopens closed stations and resets the counts of tries, after a person has put things right."""
         self._let_go_of_what_is_gone()
         self.state.out.clear()
         self.state.tries.clear()
         self.state.first.clear()
 
     def _let_go_of_what_is_gone(self) -> None:
-        """Believe the gripper to be empty where what it held is not in it any more."""
+        """Believes the gripper to be empty if it has lost its part."""
         bench = self.floor.bench
         if bench.held is not None and not bench.holds(bench.held):
             bench.held = None

@@ -1,4 +1,4 @@
-"""The order of the work that remains, found anew by the run's method from the state that was reached, with its proven gap."""
+"""Replanning: the order of the remaining work from the reached state, by the run's method, with its proven gap."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -23,7 +23,7 @@ EXACT = "exact"
 
 @dataclass(frozen=True)
 class Planner:
-    """Who orders a run's work, and what is left of it where something went wrong: the method of these settings."""
+    """The planner of a run's work, and of the rest after trouble, by the method of these settings."""
 
     settings: Sequencing = field(default_factory=Sequencing)
     seed: int = 0
@@ -31,7 +31,7 @@ class Planner:
     def order(self, cell: Cell, proven: Optimum) -> tuple[tuple[int, ...], str]:
         """The order that the method finds, and the method's name; the search ends as soon as its order is proven to be optimal.
 
-        It is the order of the exact search where the method finds none, or cannot order what is left.
+        It is the order of the exact search if the method finds none, or cannot order the rest.
         """
         method, search = self.settings.method, search_for(self.settings)
         is_timed = search.objective == MAKESPAN
@@ -51,7 +51,7 @@ class Planner:
 
 
 class _NothingBetter(Exception):
-    """A search has found an order that costs no more than the proven bound."""
+    """Raised when a search has found an order that costs no more than the proven bound."""
 
     def __init__(self, sequence: tuple[int, ...]) -> None:
         self.sequence = sequence
@@ -59,10 +59,10 @@ class _NothingBetter(Exception):
 
 @dataclass(frozen=True)
 class NewPlan:
-    """The run to go on with, the decisions still to come, and what is proven of them; schedule: None where nothing was ordered.
+    """The new plan: the run, the remaining decisions and their proven bound; schedule: None if nothing was ordered.
 
-    proven: of all orders that begin with what is in the gripper; None where that is not known. stuck: the parts that cannot be
-    finished, and why not. method: by what the order was found, "" where nothing was ordered.
+    proven: the bound over all orders that begin with the part in the gripper; None: unknown. stuck: the parts that cannot be
+    finished, with reasons. method: the method that found the order, "" if nothing was ordered.
     """
 
     run: Run
@@ -74,10 +74,10 @@ class NewPlan:
 
 
 def plan_again(run: Run, mishaps: Mishaps, under_way: int | None = None, planner: Planner | None = None) -> NewPlan:
-    """The order of what is left from where a run is; under_way: the decision that must come first, its part is in the gripper.
+    """The plan of the remaining work from a run's state; under_way: the first decision, whose part is in the gripper.
 
-    planner: who finds it, by default as where a file says nothing.
-    Raises WorkFailed where no order comes to its end, and where that part cannot be brought on.
+    planner: by default that of default settings.
+    Raises WorkFailed if no order can be completed, or that part cannot be brought on.
     """
     fallback_s = float(np.nanmax(run.cell.empty_s, initial=0.0))
     rest = rest_of(run, mishaps, fallback_s)
@@ -96,16 +96,16 @@ def plan_again(run: Run, mishaps: Mishaps, under_way: int | None = None, planner
 
 
 def _ordered(rest: Rest, now: Run, first: tuple[int, ...], planner: Planner) -> NewPlan:
-    """The order of the rest, which begins when the first decisions are carried out; what is proven is proven of both."""
+    """The plan of the rest, which begins after the first decisions; its bound covers both."""
     if rest.cell is None:
         return NewPlan(now, first, None, None, rest.stuck)
-    found, ahead = optimum(rest.cell), branch(now)
+    best, ahead = optimum(rest.cell), branch(now)
     for decision in first:
         ahead.move(decision)
-    own, method = planner.order(rest.cell, found)
-    cost, bound_s = (ahead.now_s + seconds for seconds in (found.cost, found.bound_s))
-    whole = replace(found, cost=cost, sequence=(*first, *found.sequence), bound_s=bound_s)
-    # With windows it may be better to hold what is in the gripper for a while, which the rest does not know.
+    own, method = planner.order(rest.cell, best)
+    cost, bound_s = (ahead.now_s + seconds for seconds in (best.cost, best.bound_s))
+    whole = replace(best, cost=cost, sequence=(*first, *best.sequence), bound_s=bound_s)
+    # With windows it may be better to hold the part in the gripper for a while, which the plan of the rest ignores.
     proven = None if first and now.cell.has_windows else whole
     schedule = simulate(now.cell, (*first, *own))
     return NewPlan(now, (*first, *own), proven, schedule, rest.stuck, method)
@@ -116,7 +116,7 @@ def in_another(run: Run, cell: Cell) -> Run:
     other = Run(cell)
     own = run.cell.begins
     for part, place in enumerate(run.locations):
-        if place >= len(cell.laid_out) and own is not None:  # a position of its own: it stays there, or is nowhere
+        if place >= len(cell.laid_out) and own is not None:  # a separate position: the part stays there, or is nowhere
             known, product = own[part].position, run.cell.positions[place].product
             ends = (n for n, at in enumerate(cell.laid_out) if at.product == product and not at.options)
             place = next(ends) if known is None else known

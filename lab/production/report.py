@@ -112,16 +112,16 @@ class _Story:
 
 def story_of(outcome: Outcome, planned: Schedule | None) -> Story:
     """The story of a run for its replay: captions and marks, the measured schedule beside the plan, the faults that struck."""
-    found = _Story()
+    story = _Story()
     for event in outcome.heard:
-        found.hear(event)
+        story.hear(event)
     schedule = outcome.schedule
     names = {activity.part: activity.resource for activity in schedule.parts}
     for did in schedule.robot:
         if did.kind == "wait" and did.end_s - did.start_s > LEAST_WAIT_S:
-            found._say(did.start_s, f"The robot waits at '{did.origin}' for {names.get(did.part, 'its part')}")
+            story._say(did.start_s, f"The robot waits at '{did.origin}' for {names.get(did.part, 'its part')}")
     struck = tuple(Mark(fault.at_s, "fault", fault.words) for fault in outcome.happened)
-    return Story(schedule, planned, tuple(found.captions), (*found.marks, *struck), tuple(found.begins_s))
+    return Story(schedule, planned, tuple(story.captions), (*story.marks, *struck), tuple(story.begins_s))
 
 
 def held_words(kind: str) -> str:
@@ -190,7 +190,7 @@ class Report:
             "sequence": list(self.sequenced.sequence),
             "method": self.method,
             "order_learning": None if self.learning is None else self.learning.to_json(),
-            "replanned": [asdict(one) for one in outcome.replanned],
+            "replanned": [asdict(replan) for replan in outcome.replanned],
             "predicted_makespan_s": self.predicted_s,
             "measured_makespan_s": outcome.schedule.makespan_s if self.success else None,
             "optimal_makespan_s": self.proven.optimal_s,

@@ -65,7 +65,7 @@ class RunAdvice:
         """
         name, signature = plan.problem.name, plan.problem.mdp.signature
         begun = [KeptSession(folder, "--resume") for folder in self.journal.sessions(name)]
-        kept = next((one for one in begun if one.read.session.signature == signature), None)
+        kept = next((session for session in begun if session.read.session.signature == signature), None)
         if kept is None:
             return None
         if kept.read.closed is not None:
@@ -111,7 +111,9 @@ class RunAdvice:
 
     def receipts(self, found: Ordered) -> dict[str, Any]:
         """What the advice of each level was worth: by skill, where people were asked, and of the order, None for nobody's."""
-        lessons = {name: one.worth() for name, one in self.sessions.items() if name != ORDER and _was_asked(one)}
+        lessons = {
+            name: session.worth() for name, session in self.sessions.items() if name != ORDER and _was_asked(session)
+        }
         order = self.sessions.get(ORDER)
         where = {} if order is None or order.folder is None else {"session": str(order.folder)}
         return {"skills": lessons, "order": None if found.receipt is None else found.receipt | where}

@@ -227,10 +227,10 @@ class RunJournal:
 
     def skill(self, name: str) -> "KeptSkill | None":
         """What was kept of a skill. BadInput when its policy is damaged or gone."""
-        found = next((e for e in self.known if isinstance(e, SkillKept) and e.row.get("name") == name), None)
-        if found is None or self.path is None:
+        kept = next((e for e in self.known if isinstance(e, SkillKept) and e.row.get("name") == name), None)
+        if kept is None or self.path is None:
             return None
-        return KeptSkill(found.row, decode(FolderPlace(self.path.parent / SKILLS).read(found.file), found.file))
+        return KeptSkill(kept.row, decode(FolderPlace(self.path.parent / SKILLS).read(kept.file), kept.file))
 
     def keep_skill(self, row: dict[str, Any], policy: Policy) -> None:
         """A skill is there: its policy is written to the run's folder, then its line."""

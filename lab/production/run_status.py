@@ -205,11 +205,11 @@ class RunStatus:
 
     def _fetched(self, station: str, part: str, at_s: float) -> None:
         """Note that a part was taken out of a machine, whose work on it is added to what was measured."""
-        for machine in [one for one in self.machines if (one.station, one.part) == (station, part)]:
+        for machine in [status for status in self.machines if (status.station, status.part) == (station, part)]:
             self.measured += self._work(machine, at_s)
             machine.light, machine.part, machine.until_s = "idle", "", None
             if len(self._in(station)) > 1:
-                self.machines = [one for one in self.machines if one is not machine]
+                self.machines = [status for status in self.machines if status is not machine]
 
     def _work(self, machine: MachineStatus, until_s: float) -> list[Activity]:
         """What a machine has done with the part in it, until a time."""
@@ -289,8 +289,8 @@ class RunStatus:
             "machines": [self._machine_json(name) for name in dict.fromkeys(m.station for m in self.machines)],
             "plan": None if self.plan is None else asdict(self.plan),
             "measured": _rows(self.so_far()),
-            "trouble": [asdict(one) for one in self.trouble],
-            "acted": [asdict(one) for one in self.acted],
+            "trouble": [asdict(met) for met in self.trouble],
+            "acted": [asdict(command) for command in self.acted],
             "speed": self.speed,
         }
 

@@ -1,4 +1,4 @@
-"""Where parts stand, and where there is room to set one down."""
+"""The places of standing parts, and free places to set one down."""
 
 from collections.abc import Collection, Iterator, Mapping
 from math import hypot
@@ -21,10 +21,10 @@ from lab.skills.skill import UPRIGHT, Bench
 from lab.skills.skillset import CarriedPath, SkillSet
 from lab.skills.surveys import NEAR_SHAPE, NEAR_STEP_M, Surveys
 
-ASTRAY_M = 0.15  # a part this near to a spot of a station is taken up by the station's own way
+ASTRAY_M = 0.15  # a part this near to a spot of a station is taken up by the station's own skill
 DELIVERED_M = 0.02  # a part this near to its spot has been delivered
-BESIDE_M = 0.004  # between a part, or the open fingers, and what stands beside it
-ASIDE_M = 0.03  # around a part that is set aside on the table
+BESIDE_M = 0.004  # clearance between a part, or the open fingers, and the bodies beside it
+ASIDE_M = 0.03  # clearance around a part that is set aside on the table
 
 
 def free_spot(
@@ -35,10 +35,10 @@ def free_spot(
     taken: Collection[Spot],
     lying: Collection[str],
 ) -> Spot:
-    """The first free spot at the target of a way: not taken, and with nothing that lies on it. Raises Trouble.
+    """The first free spot at the target of a path: not taken, and without a lying body. Raises Trouble.
 
-    standing: the spot of each other body. lying: the bodies that may lie anywhere. A spot of a layer is free only if what
-    carries it stands below.
+    standing: the spot of each other body. lying: the bodies that may lie anywhere. A spot of a layer is free only if its
+    support stands below.
     """
     scene, why = bench.scene, ""
     kind, station = scene.kinds[way.kind], scene.task.station(way.target)
@@ -60,15 +60,15 @@ def free_spot(
 
 
 def _carries(bench: Bench, body: str, spot: Spot, lying: Collection[str]) -> bool:
-    """Whether a body stands on its spot, as far as is known, so that another one can be put on it."""
+    """Whether a body is believed to stand on its spot, so that another one can be put on it."""
     return body not in lying and bench.stands(body, spot, DELIVERED_M)
 
 
 def spots_aside(
     bench: Bench, surveys: Surveys, name: str, way: CarriedPath, spot_of: Mapping[str, Spot]
 ) -> Iterator[Spot]:
-    """Spots on which a part in the gripper may be set down for now: the one from which it was taken up, unless a machine would
-    begin with it there, then free places on the table, the nearest first."""
+    """Spots on which a part in the gripper may be set down temporarily: the one from which it was taken up, unless a machine
+    would start there, then free places on the table, the nearest first."""
     scene, own = bench.scene, bench.scene.bodies_of(name, way.kind)
     kind, begun, origin = scene.kinds[way.kind], spot_of.get(own[0]), scene.task.station(way.origin)
     others = [
@@ -83,12 +83,16 @@ def spots_aside(
             return False
         return not in_fingers_way(scene, tool, bodies)
 
-    if begun and origin.kind != "machine" and is_free(begun, BESIDE_M, [one for one in others if one != origin.name]):
+    if (
+        begun
+        and origin.kind != "machine"
+        and is_free(begun, BESIDE_M, [other for other in others if other != origin.name])
+    ):
         yield begun
     blocked, (x, y, _) = surveys.workspace(way.kind).blocked, origin.pose
     cells = [surveys.cell_pose(cell) for cell in np.ndindex(*blocked.shape[:2], 1) if not blocked[cell]]
     kept = [room for _, room in scene.places.kept_free(len(scene.order))]
-    grids = [one.grid for one in scene.task.stations if one.grid is not None]
+    grids = [station.grid for station in scene.task.stations if station.grid is not None]
     for cell in sorted(cells, key=lambda cell: hypot(cell.x - x, cell.y - y)):
         ground = Rectangle(cell.x, cell.y, length + ASIDE_M, across + ASIDE_M, 0.0)
         if any(in_grid(grid, (cell.x, cell.y)) for grid in grids) or any(room.meets(ground) for room in kept):
@@ -98,8 +102,8 @@ def spots_aside(
 
 
 def set_down(bench: Bench, surveys: Surveys, spot: Spot, carried: str) -> Iterator[None]:
-    """Set down what is in the gripper on a free spot, by free cells; carried: its kind. Raises SkillFailed where it does not
-    stand there then."""
+    """Sets the part in the gripper down on a free spot, through free cells; carried: its kind. Raises SkillFailed if it does not
+    stand there afterwards."""
     body, robot = bench.held, bench.scene.robot
     assert body is not None
     goal = release_pose(bench, body, spot)
@@ -113,9 +117,9 @@ def set_down(bench: Bench, surveys: Surveys, spot: Spot, carried: str) -> Iterat
 
 
 def too_near(bench: Bench, body: str) -> str:
-    """What the arm with open fingers would touch on its way down to a part; "" for nothing.
+    """The name of a body that the arm with open fingers would touch as it descends to a part; "" for none.
 
-    A copy of the scene is searched, with all bodies where they are now.
+    The check uses a copy of the scene with all bodies at their present poses.
     """
     scene, goal = bench.scene, bench.part_pose(body)
     own = {body, pallet_of(body), body.removesuffix(pallet_of(""))}
@@ -151,7 +155,7 @@ def _standing_in(scene: Scene, room: Rectangle, above_m: float, bodies: Collecti
 
 
 def station_near(bench: Bench, body: str, way: CarriedPath, skillset: SkillSet) -> str:
-    """The station at which a part stands, origin or target of its way; the origin when it stands at neither."""
+    """The station at which a part stands, origin or target of its path; the origin if it stands at neither."""
     at, places = bench.part_pose(body), bench.scene.places
     for station in (way.origin, way.target):
         foots = places.spots(bench.scene.task.station(station))

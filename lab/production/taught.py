@@ -168,9 +168,9 @@ class Relearner:
 
     def learn(self, scene: tuple[Task, Layout]) -> Cell:
         """The cell of the changed scene, once its skills are learned. Raises BadInput as `relearned` does."""
-        found = relearned(self.prepared, self.taught, scene, self.teacher)
-        self.prepared, self.taught = found.prepared, found.taught
-        return found.taught.cell
+        learned = relearned(self.prepared, self.taught, scene, self.teacher)
+        self.prepared, self.taught = learned.prepared, learned.taught
+        return learned.taught.cell
 
 
 def relearned(prepared: Prepared, taught: Taught, scene: tuple[Task, Layout], teacher: Teacher) -> Relearned:
@@ -234,12 +234,12 @@ def _timed(fresh: Prepared, before: Durations, others: set[str], teacher: Teache
 
     legs = {way: leg for way, leg in skills.legs.items() if changed({skill.name for skill in leg})}
     travels = {pair: way for pair, way in skills.travels.items() if changed({skill.name for skill in way})}
-    found = before
+    durations = before
     for way, leg in legs.items():
-        found = _with(found, fresh, SkillSet(skills.task, skills.moves, legs={way: leg}), teacher)
+        durations = _with(durations, fresh, SkillSet(skills.task, skills.moves, legs={way: leg}), teacher)
     if travels:
-        found = _with(found, fresh, SkillSet(skills.task, skills.moves, travels=travels), teacher)
-    return found
+        durations = _with(durations, fresh, SkillSet(skills.task, skills.moves, travels=travels), teacher)
+    return durations
 
 
 def _with(before: Durations, fresh: Prepared, ways: SkillSet, teacher: Teacher) -> Durations:
@@ -252,7 +252,7 @@ def _with(before: Durations, fresh: Prepared, ways: SkillSet, teacher: Teacher) 
     try:
         return before.joined(measure(replace(fresh, skillset=ways)))
     except LabError as error:
-        teacher.tell(RecordSkipped(f"a way in the changed scene: {error}"))
+        teacher.tell(RecordSkipped(f"a path in the changed scene: {error}"))
         return before
 
 

@@ -1,4 +1,4 @@
-"""One decision at a time: go to a part, wait for its machine, take it up, carry it on; from whatever state was reached."""
+"""The robot's transfers, one decision at a time, from any reached state: go to a part, wait for it, pick, carry, place."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -23,27 +23,27 @@ from lab.skills.skill import Status
 from lab.skills.skillset import CarriedPath, ways_of
 from lab.teaching.events import MoveBegan, MoveMade, PartDone, SkillBegan
 
-BEGINS_M = 0.05  # a tool this near to where a skill begins need not be brought there
-MOST_ASIDE = 3  # places at which it is tried to set a part aside
+BEGINS_M = 0.05  # a tool this near to a skill's start is not moved there first
+MOST_ASIDE = 3  # most places that are tried to set a part aside
 
 
 def first_spots(floor: Floor, state: RunState) -> dict[str, Spot]:
-    """The spots on which the bodies of all parts stand at first, by body."""
-    scene, found = floor.scene, dict[str, Spot]()
+    """The first spots of the bodies of all parts, by body."""
+    scene, spots = floor.scene, dict[str, Spot]()
     for part, spot in enumerate(scene.places.begins(scene.order), start=1):
-        found |= dict.fromkeys(bodies_of(floor, state, part), spot)
-    return found
+        spots |= dict.fromkeys(bodies_of(floor, state, part), spot)
+    return spots
 
 
 def bodies_of(floor: Floor, state: RunState, part: int) -> list[str]:
-    """The bodies that a part is made of as it comes: with its pallet, which is the first, if it has one."""
+    """The bodies of a part as it arrives: its pallet, if it has one, and the part."""
     scene = floor.scene
     return scene.bodies_of(state.name(part), comes_as(scene.task.part(state.cell.order[part - 1])))
 
 
 @dataclass(frozen=True)
 class Transfers:
-    """The robot's motions that bring parts on, put them back and set them aside, upon a floor; what they come to is in the
+    """The robot's motions on a floor that bring parts on, put them back and set them aside; the results are in the
     state."""
 
     floor: Floor
@@ -51,7 +51,7 @@ class Transfers:
     machines: PartsInMachines
 
     def bring_on(self, sequence: Sequence[int]) -> None:
-        """Carry the first of the decisions out that are still to come; what was done of it is not done again. Raises Trouble."""
+        """Carries out the first of the remaining decisions, without repeating the finished part of it. Raises Trouble."""
         decision, ahead = sequence[0], len(sequence)
         option = self.state.plan.option(decision)
         if option is None:
@@ -80,7 +80,7 @@ class Transfers:
         self._finish(sequence, way, spot, move)
 
     def put_back(self) -> None:
-        """Bring parts again to where they were moved from, on a spot that is free by now; their machines begin anew. Raises
+        """Brings moved parts back to their stations, onto a free spot, where their machines start again. Raises
         Trouble."""
         state = self.state
         while state.to_put_back and self.floor.bench.held in (None, state.name(state.to_put_back[0])):
@@ -99,7 +99,7 @@ class Transfers:
             self.machines.brought_back(name, way.target, process_s)
 
     def set_aside(self) -> bool:
-        """Set what is in the gripper down where it was taken up, or on a free place of the table; whether that was done."""
+        """Sets the held part down where it was taken up, or on a free place of the table; returns whether it succeeded."""
         state = self.state
         bench, skillset = self.floor.bench, self.floor.skillset
         if state.under_way is None or bench.held is None:
@@ -118,7 +118,7 @@ class Transfers:
         return False
 
     def clear_away(self, body: str, station: str) -> bool:
-        """Take up what stands at a station and belongs to nobody, and set it aside; whether that was done. Raises Trouble."""
+        """Takes up a strange body at a station and sets it aside; returns whether it succeeded. Raises Trouble."""
         bench, kind = self.floor.bench, self.floor.scene.kind_of[body].part.name
         skills = self.floor.skillset.picks.get((kind, station), ())
         if bench.held is not None or bench.sight is not None or not skills:
@@ -131,8 +131,8 @@ class Transfers:
         return self.set_aside()
 
     def _begin(self, name: str, way: CarriedPath, ahead: int) -> UnderWay:
-        """The times of the move, which begins now or was interrupted. A part that was on its way to another station then, and is
-        still in the gripper, left its origin when it was taken up."""
+        """The times of the move, which begins now or was interrupted. A part that is still in the gripper from an interrupted
+        move left its origin when it was taken up."""
         state = self.state
         now_s, move = self.floor.now_s, state.under_way
         if move is not None and move.what == (name, way):
@@ -148,7 +148,7 @@ class Transfers:
         return move
 
     def _finish(self, sequence: Sequence[int], way: CarriedPath, spot: Spot, move: UnderWay) -> None:
-        """The part stands where it was to be brought: all that knows of it is told."""
+        """Updates state, plan and machines after a part was placed at its target."""
         state = self.state
         decision, *following = sequence
         part, floor, name = part_of(decision, state.cell.parts), self.floor, move.what[0]
@@ -179,7 +179,7 @@ class Transfers:
     # ---- ways and spots ------------------------------------------------------------------------------------------
 
     def way(self, part: int, option: Option) -> CarriedPath:
-        """From where to where an option leads, and what the gripper then holds."""
+        """The path of an option: its origin, its target, and the kind in the gripper."""
         names, own = self.state.cell.names, self.floor.skillset.task.part(self.state.cell.order[part - 1])
         origin, target = names[option.origin], names[option.target]
         if option.carries == "pallet":
@@ -187,21 +187,21 @@ class Transfers:
         return next(way for way in ways_of(own) if way[:2] == (origin, target) and way.kind != own.pallet)
 
     def _spot_for(self, part: int, way: CarriedPath) -> Spot:
-        """Where to set it down: where its pallet waits for it, or the first spot on which nothing stands."""
+        """The spot to place a part on: that of its waiting pallet, or the first free one."""
         state = self.state
         scene, name = self.floor.scene, state.name(part)
         if on_its_pallet(scene.task, way.kind, way.target):
             return state.spot_of[pallet_of(name)]
         own, spots = scene.bodies_of(name, way.kind), scene.places.spots(scene.task.station(way.target))
         others = {body: spot for body, spot in state.spot_of.items() if body not in own}
-        in_the_way = state.left_lying | {state.name(one) for one in state.to_put_back}
+        in_the_way = state.left_lying | {state.name(part_back) for part_back in state.to_put_back}
         in_the_way |= {body for body, spot in others.items() if spot not in spots}  # they stand astray
         return free_spot(self.floor.bench, name, way, others, state.taken, in_the_way - {*own})
 
     # ---- what a move is made of ------------------------------------------------------------------------------------
 
     def _go(self, station: str, name: str, move: UnderWay) -> None:
-        """Bring the empty gripper to a station: by the learned way, or by free cells from where none leads."""
+        """Moves the empty gripper to a station, by the learned path or, if there is none, through free cells."""
         if self.state.place == station:
             move.reach_s = self.floor.now_s
             return
@@ -216,7 +216,7 @@ class Transfers:
         self.state.place, move.reach_s = station, self.floor.now_s
 
     def over_to(self, station: str) -> None:
-        """Take the tool to a station's approach by free cells, from wherever it is. Raises Trouble."""
+        """Moves the tool to a station's approach through free cells, from anywhere. Raises Trouble."""
         surveys = next(iter(self.floor.skillset.skills.values())).surveys
         self.state.place = ""
         why = self.floor.follow(by_free_cells(self.floor.bench, surveys, surveys.approach(station)))
@@ -225,7 +225,7 @@ class Transfers:
         self.state.place = station
 
     def _stay_above(self, sequence: Sequence[int], way: CarriedPath, move: UnderWay) -> None:
-        """Wait with what is in the gripper, so that what follows is not left too long in the machine that it comes to."""
+        """Waits with the part in the gripper, so that a later part does not stay too long in its machine."""
         option = self.state.plan.option(sequence[0])
         assert option is not None
         carry_s = self.state.plan.carry_s(option)
@@ -235,13 +235,13 @@ class Transfers:
         move.stayed_s += self.floor.now_s - began_s
 
     def _stay(self, seconds: float, name: str, station: str) -> None:
-        """Let the arm rest. Raises Trouble where it is stopped."""
+        """Lets the arm rest. Raises Trouble if it is stopped."""
         steps = round(seconds / TIME_STEP)
         if steps and (why := self.floor.follow(self.floor.scene.robot.rest(steps))):
             raise Trouble(why, name, station, kind=self.floor.trouble_kind)
 
     def _serve(self, part: int, station: str) -> None:
-        """What the robot does at a station before it takes a part out, once."""
+        """Carries out, once, the robot's service at a station before it takes a part out."""
         name = self.state.name(part)
         if name not in self.state.served:
             for skill in self.machines.service(part, station):
@@ -250,7 +250,7 @@ class Transfers:
             self.state.served.add(name)
 
     def _take_up(self, name: str, way: CarriedPath, spot: Spot) -> None:
-        """Take a part up: by the way of the station that it stands near to, or of its own where it stands astray."""
+        """Takes a part up with the skill of the station near it, or directly if it stands astray."""
         bench, skillset, body = self.floor.bench, self.floor.skillset, self.floor.scene.body_of(name, way.kind)
         if self.floor.world.dark and moved_off(self.floor, name, self.state.spot_of.get(name)):
             raise Trouble(f"{name} is not where it was, and the camera sees nothing", name, way.origin)
@@ -267,9 +267,9 @@ class Transfers:
         assert bench.held == body
 
     def _bring(self, way: CarriedPath, spot: Spot, move: UnderWay, sequence: Sequence[int] = ()) -> None:
-        """Carry what is in the gripper to its target and set it down; from a station near the target, that is all.
+        """Carries the part in the gripper to its target and places it.
 
-        sequence: what is still to be done, this first; above the target the robot waits as long as that wants.
+        sequence: the remaining decisions, this one first; above the target the robot makes their deliberate waits.
         """
         name, legs = move.what[0], [skill for skill in self.floor.skillset.legs[way] if skill.carries]
         if self.state.place:
@@ -287,7 +287,7 @@ class Transfers:
         self.state.place = way.target
 
     def _to_begin(self, skill: Skill, name: str, where: str) -> None:
-        """Bring the tool to where a skill begins, by free cells, when it is far from there as after an interruption."""
+        """Moves the tool through free cells to a skill's start if it is far from it, as after an interruption."""
         begin, tool = skill.begins_at(), self.floor.scene.robot.tool()
         if begin is None or self.state.under_way is None or self.state.under_way.smooth:
             return
@@ -297,7 +297,7 @@ class Transfers:
                 raise Trouble(why, name, where, kind=self.floor.trouble_kind)
 
     def _do(self, skill: Skill, name: str, where: str) -> None:
-        """Carry a skill out; Trouble when it fails."""
+        """Carries a skill out. Raises Trouble if it fails."""
         self.floor.tell(SkillBegan(skill.name, skill.does(name), name, self.floor.now_s))
         if self.floor.run(skill) is not Status.SUCCESS:
             raise Trouble(skill.reason, name, where, kind=self.floor.trouble_kind, skill=skill.name)

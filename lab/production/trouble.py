@@ -1,4 +1,4 @@
-"""What keeps a run from going on as planned, in words that are true."""
+"""Trouble: a noticed event that keeps a run from continuing as planned."""
 
 from typing import Literal
 
@@ -6,11 +6,11 @@ Kind = Literal["missed", "held", "final", "late", "seen"]
 
 
 class Trouble(Exception):
-    """Something that was noticed: with which part, by its name, and at which station; "" where it is about neither.
+    """A noticed problem with a part, by its name, and a station; "" for neither.
 
-    skill: what was being carried out. kind: "held": the operator stopped the arm, so that what was under way is done again, which
-    does not count as a try; "final": to try again is no use; "late": a machine takes longer than it should, and may yet get done;
-    "seen": something is not where it should be; "missed": anything else.
+    skill: the current skill. kind: "held": the operator stopped the arm, so the skill is repeated without counting as a try;
+    "final": a retry is useless; "late": a machine takes longer than expected, and may still finish; "seen": a body is not where
+    it is believed to be; "missed": anything else.
     """
 
     def __init__(
@@ -27,13 +27,13 @@ class Trouble(Exception):
 
     @property
     def key(self) -> tuple[str, str, str]:
-        """By what tries are counted: the part, the station and the skill."""
+        """The key by which tries are counted: part, station and skill."""
         return self.part, self.station, self.skill
 
     def __str__(self) -> str:
-        where = " at ".join(one for one in (self.part, self.station and f"'{self.station}'") if one)
+        where = " at ".join(word for word in (self.part, self.station and f"'{self.station}'") if word)
         return f"{where}: {self.what}" if where else self.what
 
 
 class RunStopped(Exception):
-    """The run stands still safely and cannot go on by itself; the text says why, and what a person must do."""
+    """Raised when a run stands still safely and cannot continue by itself; the text says why, and what a person must do."""

@@ -141,7 +141,7 @@ def lesson_parts(lesson: Lesson, first_asked: int | None = None, rejected: Advic
     reached, fewest = lesson.steps
     parts = [f"{'?' if reached is None else reached}/{fewest or '?'} steps"]
     if reached is not None and reached > (fewest or reached):
-        parts.append("not the shortest way")
+        parts.append("not the shortest path")
     if result is not None and not result.requests:
         parts.append("never asked")
     elif result is not None:
@@ -176,10 +176,10 @@ def sequence_parts(event: SequenceFound) -> tuple[str, str]:
         reference = f"{what} {bound}" + ("" if gap is None else f", gap {gap_of(gap, 1)}")
     by = f" by {event.method}" if event.method else ""
     episode, episodes = best.episode_costs.index(best.cost) + 1, len(best.episode_costs)
-    found = f"{shown} found{by} in episode {episode} of {episodes}"
+    cost_text = f"{shown} found{by} in episode {episode} of {episodes}"
     if event.method in BESIDE_METHODS:
-        found = f"{shown}, {BESIDE_METHODS[event.method]}"
-    return f"parts {order}{more}:", f"{found}, {reference}"
+        cost_text = f"{shown}, {BESIDE_METHODS[event.method]}"
+    return f"parts {order}{more}:", f"{cost_text}, {reference}"
 
 
 def stands_text(event: SequencingStands) -> str:

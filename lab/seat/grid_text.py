@@ -123,7 +123,7 @@ def picture_of(request: AdviceRequest, marks: Marks, width: int, height: int) ->
 
 def safe_ansi(drawing: str) -> Text:
     """The text of an ANSI drawing with its colours; all other escape sequences and control characters are removed."""
-    kept = _ESCAPE.sub(lambda found: found[1] or "", drawing.replace("\r\n", "\n").expandtabs().strip("\n"))
+    kept = _ESCAPE.sub(lambda match: match[1] or "", drawing.replace("\r\n", "\n").expandtabs().strip("\n"))
     parts = zip(_SGR.split(kept), [*_SGR.findall(kept), ""], strict=True)
     return Text.from_ansi("".join(_printable(part) + code for part, code in parts))
 
@@ -286,13 +286,13 @@ def both_views(request: AdviceRequest, marks: Marks, width: int, height: int) ->
     if not views:
         return None
     drawn = [_Drawing(request, marks, view, (width - GAP * (len(views) - 1)) // len(views), height) for view in views]
-    rows = max(len(one.lines) for one in drawn)
-    lines = [Text(" " * GAP).join(one.line(row) for one in drawn) for row in range(rows)]
-    seen = {mark for one in drawn for mark in one.seen}
+    rows = max(len(plane.lines) for plane in drawn)
+    lines = [Text(" " * GAP).join(plane.line(row) for plane in drawn) for row in range(rows)]
+    seen = {mark for plane in drawn for mark in plane.seen}
     legend = [word for mark, word in {**LEGEND, "g": "g goal beyond or before"}.items() if mark in seen and mark != "r"]
     if seen & {*marks.arrows, "*"}:
         legend.append("arrow or *: the learner's own choice")
-    shown = dict(part for one in drawn for part in one.cut)
+    shown = dict(part for plane in drawn for part in plane.cut)
     return TextPicture(lines, ", ".join(legend), tuple((axis, *ends) for axis, ends in sorted(shown.items())))
 
 
@@ -313,13 +313,15 @@ class _Drawing:
         states = np.arange(mdp.n_states).reshape(mdp.shape)
         plane = states[tuple(slice(None) if axis in axes else here[axis] for axis in range(len(mdp.shape)))]
         plane = plane if view.across < view.upright else plane.T
-        found = np.where(mdp.goal, "G", np.where(mdp.terminal, "#", marks.free))[plane]
+        marked = np.where(mdp.goal, "G", np.where(mdp.terminal, "#", marks.free))[plane]
         goal = nearest_goal(mdp, here)
         for mark, cell in (("g", goal), (_choice(request, marks, view), _entered(request)), ("R", here)):
             at = None if cell is None else (cell[view.across], cell[view.upright])
-            if at is not None and (mark == "R" or found[at] in (marks.free, "g") or (mark == "g" and found[at] != "G")):
-                found[at] = mark
-        rows = [[str(found[x, y]) for x in (across[::-1] if view.is_mirrored else across)] for y in upright]
+            if at is not None and (
+                mark == "R" or marked[at] in (marks.free, "g") or (mark == "g" and marked[at] != "G")
+            ):
+                marked[at] = mark
+        rows = [[str(marked[x, y]) for x in (across[::-1] if view.is_mirrored else across)] for y in upright]
         self.lines = [Text(f" {view.title}"[:width], "bold"), *map(_line, reversed(rows))]
         self.seen = {mark for row in rows for mark in row}
         self._width = max(line.cell_len for line in self.lines)

@@ -33,7 +33,7 @@ _NAME = 52
 _INDENT = 12
 _LONGEST_LIST = 8
 _UNLIMITED = 1000
-ALL_FREE = "their ways are free here, and none is longer than one learned anew"
+ALL_FREE = "their paths are free here, and none is longer than one learned anew"
 
 
 class RunProgress:
@@ -95,8 +95,8 @@ class RunProgress:
                 self._say(f"  {event.name:{_NAME}} {event.seconds:6.2f} s")
             case SequenceFound():
                 self._stands = ""  # which this line contains
-                order, found = sequence_parts(event)
-                self._pack([Text(f"  {order}"), Text(found)], gap=" ")
+                order, cost = sequence_parts(event)
+                self._pack([Text(f"  {order}"), Text(cost)], gap=" ")
             case OrderChosen():
                 self._say(f"  {run_text(event)}")
             case SequencingStands() if self._running and self._task is not None and self.console.is_terminal:
@@ -135,8 +135,8 @@ class RunProgress:
     def _tell_reused(self) -> None:
         """Write all reused skills in few lines, those of another problem separately."""
         reused, self._reused = self._reused, []
-        elsewhere = [one for one in reused if one[1].fitness is not None]
-        self._tell_found([one for one in reused if one[1].fitness is None])
+        elsewhere = [skill for skill in reused if skill[1].fitness is not None]
+        self._tell_found([skill for skill in reused if skill[1].fitness is None])
         self._tell_found(elsewhere, f" (of another problem: {ALL_FREE})")
         arms = Counter(lesson.other_arm for _, lesson in reused if lesson.other_arm)
         for arm, count in arms.items():

@@ -35,7 +35,7 @@ class Camera:
 
     @classmethod
     def overhead(cls, position: tuple[float, float, float], field_of_view_rad: float, pixels: int) -> "Camera":
-        """Straight down from `position` [m]: the picture's right is the world's x, its top the world's y."""
+        """A camera that looks straight down from `position` [m]: the picture's right is the world's x, its top the world's y."""
         return cls(position, (position[0], position[1], 0.0), (0.0, 1.0, 0.0), field_of_view_rad, pixels, pixels)
 
     def view_matrix(self) -> Array:
@@ -71,14 +71,12 @@ class Camera:
             return world.render(view, projection, self.width, self.height)
         left, top, side = window
         across, down = self.width / side, self.height / side
-        magnified = np.diag(
-            [across, down, 1.0, 1.0]
-        )  # clip coordinates of the window's middle become 0, of its edges 1
+        magnified = np.diag([across, down, 1.0, 1.0])  # the window's middle gets clip coordinates 0, its edges 1
         magnified[:2, 3] = across - 1.0 - 2.0 * left / side, 1.0 - down + 2.0 * top / side
         return world.render(view, magnified @ projection, side, side)
 
     def in_picture(self, window: Window) -> Window:
-        """The window, moved and shrunk as far as needed to lie within the picture."""
+        """The window, moved and shrunk so that it lies within the picture."""
         left, top, side = window
         side = min(side, self.width, self.height)
         return min(max(left, 0), self.width - side), min(max(top, 0), self.height - side), side
@@ -86,7 +84,7 @@ class Camera:
     # ---- as a lens in front of a sensor ----------------------------------------------------------------------------
 
     def lens(self) -> Lens:
-        """Its focal length and middle [pixels]: no distortion."""
+        """The lens by focal length and principal point [pixels], without distortion."""
         focal = self.height / 2.0 / tan(self.field_of_view_rad / 2.0)
         return Lens((self.width, self.height), (focal, focal), (self.width / 2.0, self.height / 2.0 - 1.0))
 
@@ -111,7 +109,7 @@ class Camera:
 class TableCamera(Camera):
     """A camera in a real room: a calibrated lens; uneven light, blur and noise of some `strength`.
 
-    Its pictures come straightened.
+    Its pictures are undistorted.
     """
 
     calibration: Calibration | None = None
@@ -125,7 +123,7 @@ class TableCamera(Camera):
             width, height = pixels, round(height * pixels / width)
             calibration = replace(calibration, lens=calibration.lens.scaled((width, height)))
         eye, turn = calibration.eye_m, np.array(calibration.turn)
-        x, y, z = (float(one) for one in np.array(eye) + turn[2])
+        x, y, z = (float(value) for value in np.array(eye) + turn[2])
         up = (float(-turn[1][0]), float(-turn[1][1]), float(-turn[1][2]))
         angle = 2.0 * atan(height / 2.0 / calibration.lens.focal[1])
         return cls(eye, (x, y, z), up, angle, width, height, calibration, strength)
@@ -152,9 +150,7 @@ class TableCamera(Camera):
 
 
 AHEAD_M = 0.085  # along the tool's x axis
-UP_M = (
-    0.1137  # above the finger tips; odd, for TinyRenderer takes minutes where a corner lies in the camera's very plane
-)
+UP_M = 0.1137  # above the finger tips; not a round number: TinyRenderer takes minutes if a corner lies in the camera's plane
 ANGLE_RAD = radians(75.0)
 PIXELS = 480
 _ROUND = 48  # sides of a cylinder's hull

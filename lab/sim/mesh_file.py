@@ -25,7 +25,7 @@ def vertices(path: Path) -> Array:
 
 
 def text_corners(path: Path | None) -> Array | None:
-    """The corners (3 n, 3) of the triangles of an STL file in text, one after the other; None: it is no such file."""
+    """The corners (3 n, 3) of the triangles of an STL file in text, one after the other; None if it is no such file."""
     if path is None or path.suffix.lower() != ".stl" or is_binary(read_limited(path, MAX_BYTES)):
         return None
     return vertices(path)
@@ -48,7 +48,7 @@ def _text(data: bytes) -> str:
 
 
 def is_binary(data: bytes) -> bool:
-    """Whether the bytes of an STL file are a binary one: its length is that of as many triangles as it says."""
+    """Whether the bytes of an STL file are a binary one: its length matches its count of triangles."""
     return len(data) >= _HEAD and len(data) == _HEAD + _FACE * _count(data)
 
 

@@ -188,21 +188,21 @@ SLICE_KG = 0.040
 TOASTER = (0.20, 0.13, 0.10)  # [m] body, along and across the slot, up
 TOASTER_SLOT = (0.132, 0.023)  # [m] length and width of the slot
 TOASTER_FLOOR = 0.015  # [m] the slot's bottom above the table
-APPLIER_FLOOR = 0.02  # [m] what a slice stands on in the butter applier
-APPLIER_LIP = 0.012  # [m] how high the lips beside the slice rise above that floor
+APPLIER_FLOOR = 0.02  # [m] height of the floor of the butter applier
+APPLIER_LIP = 0.012  # [m] height of the lips beside the slice above that floor
 NOZZLE_OUT = -0.115  # [m] the nozzle's plane beside the slice, along its thickness
 FINGER = (0.075, 0.012, 0.030)  # [m] length, thickness, width
 FINGER_OPEN = 0.022  # [m] each finger's pad from the middle when open
 MARKER_OUT, MARKER_UP = 0.13, 0.165  # [m] the gripper's marker beside the tool's axis and above the tips
 MARKER_RADIUS = 0.017
-MARKER_THICK = 0.001  # thin: a side that the camera sees would shift the middle of what it sees
+MARKER_THICK = 0.001  # thin, because a visible side would shift the middle of the outline that the camera sees
 
 WHITE, GRAPHITE, BLUE = (0.93, 0.93, 0.95, 1.0), (0.22, 0.23, 0.26, 1.0), (0.16, 0.30, 0.55, 1.0)
 STEEL, RUBBER = (0.72, 0.73, 0.76, 1.0), (0.12, 0.12, 0.12, 1.0)
 CRUST, CRUMB = (0.62, 0.42, 0.22, 1.0), (0.93, 0.83, 0.64, 1.0)
 MARKER_MAGENTA, MARKER_CYAN, MARKER_GREEN = (0.95, 0.0, 0.95, 1.0), (0.0, 0.85, 0.85, 1.0), (0.0, 0.80, 0.0, 1.0)
 
-FURNACE_FLOOR, FURNACE_ROOF = 0.12, 0.36  # [m] how high its hearth is, and its roof
+FURNACE_FLOOR, FURNACE_ROOF = 0.12, 0.36  # [m] height of the hearth and of the roof
 
 
 def _turning(number: int, parent: str, at: Vector, axis: Vector) -> UrdfJoint:
@@ -280,7 +280,7 @@ def _finger(name: str, side: float) -> Link:
 
 
 def toaster() -> UrdfModel:
-    """A toaster with a real slot: floor, two walls and two ends around it, as separate boxes, for a mesh would be filled."""
+    """A toaster with a real slot between floor, walls and ends, which are separate boxes because physics would fill a mesh."""
     (length, width, height), (slot_length, slot_width) = TOASTER, TOASTER_SLOT
     wall, end, up = (width - slot_width) / 2, (length - slot_length) / 2, height - TOASTER_FLOOR
     parts = [LinkShape(STEEL, (length, width, TOASTER_FLOOR), (0, 0, TOASTER_FLOOR / 2))]

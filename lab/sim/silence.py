@@ -1,4 +1,4 @@
-"""Keeps output that a library writes directly to the file descriptors off the terminal."""
+"""Keeps off the terminal the output that a library writes directly to the file descriptors."""
 
 import os
 from collections.abc import Iterator
@@ -9,7 +9,7 @@ from lab.operating_system import flush_c_streams
 
 @contextmanager
 def silence() -> Iterator[None]:
-    """Keep PyBullet's banner and warnings, which go straight to the file descriptors, off the terminal."""
+    """Keeps PyBullet's banner and warnings off the terminal, which it writes directly to the file descriptors."""
     kept = [os.dup(number) for number in (1, 2)]
     nowhere = os.open(os.devnull, os.O_WRONLY)
     try:

@@ -55,12 +55,12 @@ def looks(path: Path) -> dict[str, tuple[Shape, ...]]:
     """The visuals of each link of a valid URDF, with their colours; the root link is ''."""
     root = Xml.parse(path).getroot()
     children = {child.get("link") for child in root.iterfind("joint/child")}
-    found = {}
+    looks_of = {}
     for link in root.iter("link"):
         name = link.get("name", "")
         shapes = (_shape(path, visual) for visual in link.iter("visual"))
-        found[name if name in children else ""] = tuple(shape for shape in shapes if shape is not None)
-    return found
+        looks_of[name if name in children else ""] = tuple(shape for shape in shapes if shape is not None)
+    return looks_of
 
 
 def _shape(path: Path, visual: Xml.Element) -> Shape | None:
@@ -85,7 +85,7 @@ def meshes(path: Path) -> list[str]:
 
 
 def bounds(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The lowest and the highest corner (3,) [m] of what is solid in the root link of a valid URDF, in its frame."""
+    """The lowest and the highest corner (3,) [m] of the solids in the root link of a valid URDF, in its frame."""
     validate(path)
     root = Xml.parse(path).getroot()
     children = {child.get("link") for child in root.iterfind("joint/child")}
@@ -134,7 +134,7 @@ def _quaternion(roll: float, pitch: float, yaw: float) -> Quaternion:
 
 
 def placed(origin: Xml.Element | None) -> NDArray[np.float64]:
-    """The frame (4, 4) of an <origin> [m] in its parent's; of none, the parent's own."""
+    """The frame (4, 4) of an <origin> [m] in its parent's frame; the identity without an <origin>."""
     frame = np.eye(4)
     frame[:3, :3] = rotation(_quaternion(*floats(origin, "rpy", "0 0 0")))
     frame[:3, 3] = floats(origin, "xyz", "0 0 0")
@@ -154,7 +154,7 @@ def rotation(quaternion: Sequence[float] | NDArray[np.float64]) -> NDArray[np.fl
 
 
 def finite(path: Path, what: str, text: str | None) -> float:
-    """A number of a URDF; BadInput names it when it is none."""
+    """A number of a URDF; BadInput if the text is not a finite number."""
     try:
         value = float(text or "")
     except ValueError:
@@ -168,7 +168,7 @@ _NUMBERS = {"xyz": 3, "rpy": 3, "size": 3, "scale": 3, "rgba": 4, "radius": 1, "
 
 
 def check_numbers(path: Path, root: Xml.Element) -> None:
-    """BadInput unless every place, size, axis and colour in a URDF is as many finite numbers as it takes."""
+    """Raises BadInput unless every place, size, axis and colour in a URDF has its count of finite numbers."""
     for element in root.iter():
         for name, count in _NUMBERS.items():
             text = element.get(name)
@@ -183,7 +183,7 @@ def check_numbers(path: Path, root: Xml.Element) -> None:
 
 
 def check_inertial(path: Path, link: Xml.Element) -> None:
-    """BadInput unless a link has a mass and an inertia that a body can have."""
+    """Raises BadInput unless a link has a possible mass and inertia."""
     name = link.get("name", "")
     mass, inertia = link.find("inertial/mass"), link.find("inertial/inertia")
     if mass is None or inertia is None:
@@ -200,7 +200,7 @@ def check_inertial(path: Path, link: Xml.Element) -> None:
 
 
 def check_joint(path: Path, joint: Xml.Element, links: list[str]) -> None:
-    """BadInput unless a joint joins known links, within limits that are in order."""
+    """Raises BadInput unless a joint joins known links and its lower limit is below its upper limit."""
     name = joint.get("name", "")
     for end in ("parent", "child"):
         element = joint.find(end)

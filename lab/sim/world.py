@@ -17,14 +17,14 @@ from lab.sim.parts.part_shape import PartShape, seen_of, solid_of
 from lab.sim.silence import silence
 
 TIME_STEP = 1.0 / 240.0  # [s]
-PART_SPINNING = 0.001  # [m] what resists a part's turning about a contact
-GROUP, ALL = 1, -1  # the collision group in which movable bodies are, and those that they meet: the engine's own
-PART_ROLLING = 0.0005  # [m] and its rolling, unless it is a box: without, a ball that was set down never rests
+PART_SPINNING = 0.001  # [m] spinning friction of a part's contacts
+GROUP, ALL = 1, -1  # collision group and mask of movable bodies, the engine's defaults
+PART_ROLLING = 0.0005  # [m] rolling friction of parts that are no boxes: without it, a ball never comes to rest
 
 Array = NDArray[np.float64]
 Position = Sequence[float] | Array
 NO_TURN = (0.0, 0.0, 0.0, 1.0)
-ENGINES = ("pybullet", "pybullet-arm64")  # the distributions that bring the module pybullet; one of them is installed
+ENGINES = ("pybullet", "pybullet-arm64")  # the distributions that contain the module pybullet; one of them is installed
 
 
 def engine() -> str:
@@ -39,7 +39,7 @@ def engine() -> str:
 
 @dataclass
 class _Entry:
-    """A body in the world: its number, whether it can move, link numbers and joint numbers by name, how it looks."""
+    """A body in the world: its number, whether it can move, link numbers and joint numbers by name, and its looks."""
 
     number: int
     moves: bool
@@ -47,11 +47,11 @@ class _Entry:
     links: dict[str, int] = field(default_factory=dict)
     joints: dict[str, int] = field(default_factory=dict)
     looks: dict[str, tuple[Shape, ...]] = field(default_factory=dict)
-    turn: Position = NO_TURN  # from PyBullet's axes of it, the principal ones of a part, to those that it is known by
+    turn: Position = NO_TURN  # from PyBullet's axes, the principal axes of a part, to the body's own axes
 
 
 class World:
-    """A PyBullet client without a window; use it as a context manager. Same calls, same result, bit for bit."""
+    """A PyBullet client without a window; use it as a context manager. The same calls give the same result, bit for bit."""
 
     def __init__(self) -> None:
         with silence():
@@ -64,7 +64,7 @@ class World:
         self._bodies: dict[str, _Entry] = {}
         self._names: dict[int, str] = {}
         self.steps = 0
-        self.dark = False  # whether cameras see nothing
+        self.dark = False  # whether cameras are blind
         self._iterations = 60
         self._call("setGravity", 0, 0, -9.81)
         self._call(
@@ -75,16 +75,16 @@ class World:
         )
 
     def iterations(self, count: int) -> int:
-        """Solve contacts and constraints in so many iterations a step: a linkage of fingers needs more than bodies do.
+        """Sets the solver's iterations per step, of which a linkage of fingers needs more than bodies do.
 
-        Returns how many it were before.
+        Returns the previous number.
         """
         before, self._iterations = self._iterations, count
         self._call("setPhysicsEngineParameter", numSolverIterations=count)
         return before
 
     def at_least(self, iterations: int) -> int:
-        """Solve in so many iterations, or in more if that was asked for already; returns how many it were before."""
+        """Raises the solver's iterations per step to at least this number; returns the previous one."""
         return self.iterations(max(iterations, self._iterations))
 
     def _call(self, name: str, *args: Any, **kwargs: Any) -> Any:
@@ -152,7 +152,7 @@ class World:
         self._fixed(name, shape, visual, position, turn, Shape("box", tuple(size), None, rgba))
 
     def mesh(self, name: str, path: Path, position: Position, rgba: Rgba, *, yaw: float = 0.0) -> None:
-        """A mesh file that never moves, hollows and all: its origin at `position` [m]."""
+        """A mesh file that never moves, with its hollows; its origin is at `position` [m]."""
         turn = tuple(self._p.getQuaternionFromEuler([0, 0, yaw]))
         with silence():
             hollow = self._p.GEOM_FORCE_CONCAVE_TRIMESH
@@ -161,7 +161,7 @@ class World:
         self._fixed(name, shape, visual, position, turn, Shape("mesh", (), path, rgba))
 
     def disc(self, name: str, radius: float, height: float, position: Position, rgba: Rgba) -> None:
-        """A flat round marker: only seen; `position` [m] is its centre."""
+        """A flat round marker without collisions; `position` [m] is its centre."""
         visual = self._call(
             "createVisualShape", self._p.GEOM_CYLINDER, radius=radius, length=height, rgbaColor=list(rgba)
         )
@@ -182,7 +182,7 @@ class World:
             solid, seen = solid_of(self._p, self._call, shape), seen_of(self._p, self._call, shape)
             entry.number = self._call("createMultiBody", mass_kg, solid, seen, list(position), list(body))
         moments, rolling = (
-            [float(f"{one * mass_kg:.12g}") for one in shape.inertia_m2],
+            [float(f"{moment * mass_kg:.12g}") for moment in shape.inertia_m2],
             PART_ROLLING * (shape.solid != "box"),
         )
         self._call("changeDynamics", entry.number, -1, localInertiaDiagonal=moments, rollingFriction=rolling)
@@ -212,7 +212,7 @@ class World:
     ) -> None:
         """Set the Coulomb friction of a body (or of some of its links); `spinning` resists turning about the contact [m].
 
-        sticks: what does not slide stays where it touches; otherwise it creeps, as velocities alone are brought to nothing.
+        sticks: a contact that does not slide keeps its place; otherwise it creeps, because only velocities are corrected.
         """
         entry = self._bodies[name]
         anchor = {"frictionAnchor": 1} if sticks else {}
@@ -222,19 +222,19 @@ class World:
             )
 
     def mass(self, name: str, mass_kg: float) -> None:
-        """Give a one-link body another mass [kg]; its inertia is scaled alike."""
+        """Give a one-link body another mass [kg]; its inertia is scaled by the same factor."""
         number = self._bodies[name].number
         info = self._call("getDynamicsInfo", number, -1)
         inertia = [value * mass_kg / info[0] for value in info[2]]
         self._call("changeDynamics", number, -1, mass=mass_kg, localInertiaDiagonal=inertia)
 
     def put(self, name: str, position: Position, quaternion: Position = NO_TURN) -> None:
-        """Set a body down somewhere at once, a fixed one, too: `position` [m], `quaternion` xyzw; a part then rests."""
+        """Moves a body, also a fixed one, without physics to `position` [m], `quaternion` xyzw; a part is then at rest."""
         if not np.isfinite([*position, *quaternion]).all():
             raise WorkFailed(f"body '{name}' cannot be put at {list(position)}: not finite")
         entry = self._bodies[name]
         at, turn = position, self._turned(quaternion, entry.turn)
-        if not entry.moves:  # PyBullet wants to know where the centre of its base's mass comes to be
+        if not entry.moves:  # PyBullet wants the position of the base's centre of mass
             off = self._call("getDynamicsInfo", entry.number, -1)[3:5]
             at, turn = self._p.multiplyTransforms(list(at), list(turn), *off)
         self._call("resetBasePositionAndOrientation", entry.number, list(at), list(turn))
@@ -254,7 +254,7 @@ class World:
         return np.array(position), np.array(turn)
 
     def _pose(self, name: str, link: str) -> tuple[Any, Any]:
-        """As `pose`, as PyBullet gives it: a tuple or an array."""
+        """The position and quaternion of `pose` as PyBullet returns them, tuples or arrays."""
         entry = self._bodies[name]
         if link and link in entry.links:
             state = self._call("getLinkState", entry.number, entry.links[link], computeForwardKinematics=1)
@@ -295,7 +295,7 @@ class World:
         *,
         force: float | Sequence[float] = 2000.0,
     ) -> None:
-        """Set the position motors' targets [rad or m], with velocities fed forward; `force` [Nm or N] is the most they use."""
+        """Set the position motors' targets [rad or m], with velocities fed forward; `force` [Nm or N] is their limit."""
         targets = [float(v) for v in positions]
         speeds = [0.0] * len(names) if velocities is None else [float(v) for v in velocities]
         if not all(map(isfinite, targets + speeds)):
@@ -326,16 +326,16 @@ class World:
     # ---- Contacts, distances and pictures -----------------------------------------------------------------------
 
     def touch_anew(self, name: str, links: Sequence[str]) -> None:
-        """Let the engine find anew, at its next step, where movable bodies touch these links of a body.
+        """Lets the engine recompute, at its next step, the contacts of movable bodies with these links of a body.
 
         It keeps a contact as long as the two points stay together, with the direction that it had in the world: in a gripper
         that turned by half a turn a part would press on the fingers from behind, and hold them closed.
         """
-        entry, movable = self._bodies[name], {one.number for one in self._bodies.values() if one.moves}
+        entry, movable = self._bodies[name], {body.number for body in self._bodies.values() if body.moves}
         touched = {
-            int(found[2])
+            int(contact[2])
             for link in links
-            for found in self._call("getContactPoints", entry.number, linkIndexA=entry.links[link])
+            for contact in self._call("getContactPoints", entry.number, linkIndexA=entry.links[link])
         }
         for number in sorted(touched & movable - {entry.number}):
             self._call("setCollisionFilterGroupMask", number, -1, GROUP, ALL)
@@ -352,16 +352,16 @@ class World:
         return np.array(low), np.array(high)
 
     def pressed(self, name: str) -> tuple[str, float]:
-        """The body that a body pressed on most in the last step, and with which force [N]; ("", 0) when it touched none."""
+        """The body that a body pressed on most in the last step, and the force [N]; ("", 0) if it touched none."""
         forces: dict[int, float] = {}
         for point in self._call("getContactPoints", self._bodies[name].number):
             if point[1] != point[2]:
                 forces[point[2]] = forces.get(point[2], 0.0) + float(point[9])
-        number, force = max(forces.items(), key=lambda one: one[1], default=(-1, 0.0))
+        number, force = max(forces.items(), key=lambda item: item[1], default=(-1, 0.0))
         return self._names.get(number, ""), force
 
     def nearest(self, one: str, other: str, within: float, first_link: int = -1) -> float:
-        """Distance [m] between two bodies where they are now, `within` when they are farther apart than that.
+        """The distance [m] between two bodies, at most `within`.
 
         first_link: of the first body only the links from this number on count; -1 is its base.
         """
@@ -370,7 +370,7 @@ class World:
         return min((float(point[8]) for point in points if point[3] >= first_link), default=within)
 
     def ray(self, start: Position, end: Position) -> tuple[str, Array] | None:
-        """The first body that the ray from `start` to `end` [m] meets, and where, or None."""
+        """The first body that the ray from `start` to `end` [m] meets, and the point, or None."""
         number, _, _, where, _ = self._call("rayTest", list(start), list(end))[0]
         return (self._names[number], np.array(where)) if number in self._names else None
 

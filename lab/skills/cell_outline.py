@@ -109,21 +109,21 @@ def _reached(arm: Arm, pose: ToolPose, low: float) -> bool:
 
 
 def _obstacles(task: Task, layout: Layout) -> list[PlannedObstacle]:
-    found = []
+    obstacles = []
     for obstacle, (x, y) in zip(task.obstacles, layout.obstacles, strict=True):
         own = Block(0.0, 0.0, *obstacle.size[:2], obstacle.yaw)
         wide, high = (np.ptp(own.corners(), axis=0) + 2 * np.array(obstacle.area)).tolist()
         around = Block(*obstacle.position_m, wide, high)
-        found.append(PlannedObstacle(obstacle.name, replace(own, x=x, y=y), around))
-    return found
+        obstacles.append(PlannedObstacle(obstacle.name, replace(own, x=x, y=y), around))
+    return obstacles
 
 
 def _blocked(surveys: Surveys) -> BlockedCells:
     """The cells of the lowest level that are blocked for some carried part."""
     grid, causes = surveys.task.workspace, None
     for part in surveys.task.made:
-        found = surveys.workspace(comes_as(part)).causes[:, :, 0]
-        causes = found if causes is None else np.where(causes == "", found, causes)
+        lowest = surveys.workspace(comes_as(part)).causes[:, :, 0]
+        causes = lowest if causes is None else np.where(causes == "", lowest, causes)
     assert causes is not None
     return BlockedCells(grid.lower_m[:2], grid.cell_m[:2], causes)
 
@@ -135,7 +135,7 @@ def _cameras(task: Task) -> list[CameraCells]:
 
 def _approaches(surveys: Surveys) -> list[Approach]:
     """The approaches of each place with each kind carried there; if a kind cannot reach a place, only that approach."""
-    task, found = surveys.task, []
+    task, approaches = surveys.task, []
     for station in task.stations:
         carried = [comes_as(part) for part in task.kinds_at(station.name)]
         for place in dict.fromkeys((station.name, way_to(task, station.name))):
@@ -143,7 +143,7 @@ def _approaches(surveys: Surveys) -> list[Approach]:
             try:
                 docks = [surveys.cell_pose(surveys.dock(place, kind)) for kind in carried]
             except BadInput:
-                found.append(Approach(place, (at.x, at.y), None))
+                approaches.append(Approach(place, (at.x, at.y), None))
             else:
-                found += [Approach(place, (at.x, at.y), (dock.x, dock.y)) for dock in docks[:1]]
-    return found
+                approaches += [Approach(place, (at.x, at.y), (dock.x, dock.y)) for dock in docks[:1]]
+    return approaches

@@ -222,12 +222,12 @@ def _markers(placed: PicturedTask, station: str, grid: CameraGrid) -> list[tuple
     upper = models.MARKER_THICK / 2
     x, y, z = marker_of(placed.task.station(station), grid)
     gx, gy = placed.gripper
-    found = [
+    markers = [
         ("gripper", (gx + models.MARKER_OUT, gy, grid.height_m + models.MARKER_UP + upper)),
         ("toaster", (float(x), float(y), float(z) + upper)),
     ]
     stands = zip(placed.task.obstacles, placed.layout.obstacles, strict=True)
-    return found + [("obstacle", (*at, one.size[2] + MARKER_ABOVE + upper)) for one, at in stands]
+    return markers + [("obstacle", (*at, obstacle.size[2] + MARKER_ABOVE + upper)) for obstacle, at in stands]
 
 
 def _in_sight(world: World, camera: Camera, lens: Lens, at: tuple[float, float, float]) -> bool:

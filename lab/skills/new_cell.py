@@ -83,13 +83,13 @@ def _grip_width(part: NewPart, arm: Arm, folder: Path) -> float:
 def _around(new: NewTask, arm: Arm) -> Around:
     """The region in which the arm reaches both the parts at a station and the path above them."""
     rings = [ring_of(arm.inverse, height, arm.nearest_m) for height in heights_m(new)]
-    found = [ring for ring in rings if ring is not None]
-    if len(found) < len(rings):
+    known = [ring for ring in rings if ring is not None]
+    if len(known) < len(rings):
         raise BadInput(
             f"parts {heights_m(new)[1]:.2f} m above the table are out of the reach of the arm '{new.arm}': lower ones"
         )
     return Around(
-        max(ring.nearest_m for ring in found),
-        min(ring.farthest_m for ring in found),
-        min(min(ring.right_rad, ring.left_rad) for ring in found),
+        max(ring.nearest_m for ring in known),
+        min(ring.farthest_m for ring in known),
+        min(min(ring.right_rad, ring.left_rad) for ring in known),
     )

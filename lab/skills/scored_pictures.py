@@ -75,7 +75,7 @@ def score_pictures(
     """
     index = _read(PicturesIndex, folder / INDEX)
     task, count = load(index.task), index.pictures
-    if index.station not in [one.name for one in task.stations if one.grid is not None]:
+    if index.station not in [station.name for station in task.stations if station.grid is not None]:
         raise BadInput(f"{folder / INDEX}: station '{index.station}' of '{index.task}' has no grid")
     if calibration is None:
         names = [folder / f"mat-{number + 1}.png" for number in range(index.mats)]
@@ -144,7 +144,7 @@ def parts_seen(task: Task, image: Image, view: View) -> list[dict[str, Any]]:
 
     Each is a record of `kind`, `station`, `world_m` [m], `yaw_rad` [rad] and `outline_px` [pixels].
     """
-    places, found = places_of(task), []
+    places, seen_parts = places_of(task), []
     height, width = image.shape[:2]
     for station in task.stations:
         for kind in {kind.name: kind for kind in places.kinds_at(station.name) if kind.rider is None}.values():
@@ -158,5 +158,5 @@ def parts_seen(task: Task, image: Image, view: View) -> list[dict[str, Any]]:
                     continue
                 if seen := find_part(image, part, near, PART_REACH_M, PART_REACH_RAD):
                     at = {"kind": kind.name, "station": station.name, "world_m": [seen.x, seen.y], "yaw_rad": seen.yaw}
-                    found.append(at | {"outline_px": seen.outline.round(2).tolist()})
-    return found
+                    seen_parts.append(at | {"outline_px": seen.outline.round(2).tolist()})
+    return seen_parts

@@ -74,8 +74,8 @@ class SkillSet:
             made.processes[station.name] = made._own(kind.at_machine(task, station.name) for kind in kinds)
         for part in wanted:
             for stage in (stage for route in part.routes for stage in route):
-                found = made._own(kind.at_service(task, stage) for kind in kinds)
-                made.services[part.name, stage.station] = found
+                own_services = made._own(kind.at_service(task, stage) for kind in kinds)
+                made.services[part.name, stage.station] = own_services
         return made
 
     def _add_leg(self, way: CarriedPath) -> None:

@@ -24,7 +24,7 @@ class Transfer(Skill):
     """Move from one approach to another; a place is a station or the start of a camera's grid."""
 
     subtask: ClassVar[str] = "transfer"
-    help: ClassVar[str] = "the tool's way through the workspace from one station to another"
+    help: ClassVar[str] = "the tool's path through the workspace from one station to another"
 
     doing: ClassVar[str] = "carries {part}"
 
@@ -86,7 +86,10 @@ class Transfer(Skill):
         """The gripper, and the place where the next skill begins."""
         what = f"The gripper with {plain(self.kind)} is" if self.carries else "The empty gripper is"
         camera = grid_of(self.surveys.task, self.target) is not None
-        return what, f"the end of its way{', where the camera takes over' if camera else f' over {plain(self.target)}'}"
+        return (
+            what,
+            f"the end of its path{', where the camera takes over' if camera else f' over {plain(self.target)}'}",
+        )
 
     def motion(self, bench: Bench, policy: "Policy") -> Iterator[None]:
         """Follow the learned path from the tool's pose to the target's approach; its corners are cut where that is free."""

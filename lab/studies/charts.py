@@ -49,18 +49,18 @@ def bars(
         axes = figure.add_subplot()
         for number, (name, line) in enumerate(lines.items()):
             middle = GROUP_WIDTH * ((number + 0.5) / len(lines) - 0.5)
-            for group, one in enumerate(line):
-                if one["value"] is not None:
-                    _draw_bar(axes, group + middle, one, number, GROUP_WIDTH / len(lines))
-                    _write(axes, group + middle, one, str(one.get(label, "")))
+            for group, row in enumerate(line):
+                if row["value"] is not None:
+                    _draw_bar(axes, group + middle, row, number, GROUP_WIDTH / len(lines))
+                    _write(axes, group + middle, row, str(row.get(label, "")))
             colour, hatch = SERIES[number]
             axes.bar([0], [0], color=colour, hatch=hatch, edgecolor="white", label=name)
-        if any(one["thesis"] is not None for line in lines.values() for one in line):
+        if any(row["thesis"] is not None for line in lines.values() for row in line):
             axes.plot([], [], label="printed", **PRINTED)
         axes.set_xticks(range(len(groups)), groups)
         axes.tick_params(axis="x", length=0)
         axes.set(xlabel=xlabel, ylabel=ylabel, xlim=(-0.55, len(groups) - 0.45))
-        axes.set_ylim(0, 1.1 * (max(_top(one) for line in lines.values() for one in line) or 1.0))
+        axes.set_ylim(0, 1.1 * (max(_top(row) for line in lines.values() for row in line) or 1.0))
         axes.grid(axis="y")
         handles, names = axes.get_legend_handles_labels()
         legend_below(figure, dict(sorted(zip(names, handles, strict=True), key=lambda item: item[0] == "printed")))
@@ -71,8 +71,8 @@ def bars(
 def curve(axes: "Axes", rows: Sequence[Row], by: str, look: Look) -> None:
     """Draws the values of rows over one of their settings, with a band for the intervals."""
     colour, marker, name = look
-    x, y = [one[by] for one in rows], [one["value"] for one in rows]
-    low, high = ([(one["ci95"] or [one["value"]] * 2)[end] for one in rows] for end in (0, 1))
+    x, y = [row[by] for row in rows], [row["value"] for row in rows]
+    low, high = ([(row["ci95"] or [row["value"]] * 2)[end] for row in rows] for end in (0, 1))
     axes.fill_between(x, low, high, color=colour, alpha=0.15, linewidth=0)
     axes.plot(x, y, color=colour, marker=marker, markersize=4.5, linewidth=1.4, label=name, zorder=2.5)
 
@@ -80,27 +80,27 @@ def curve(axes: "Axes", rows: Sequence[Row], by: str, look: Look) -> None:
 def legend_below(figure: "Figure", handles: Mapping[str, "Artist"] | None = None) -> None:
     """Draws one legend below all plots, in as many columns as fit; handles: by name, None for all artists with labels."""
     if handles is None:
-        found = [axes.get_legend_handles_labels() for axes in figure.axes]
-        handles = {name: handle for some, names in found for handle, name in zip(some, names, strict=True)}
+        legends = [axes.get_legend_handles_labels() for axes in figure.axes]
+        handles = {name: handle for some, names in legends for handle, name in zip(some, names, strict=True)}
     fitting = int(LETTERS_AN_INCH * figure.get_figwidth() / (max(map(len, handles)) + 6))
     columns = min(len(handles), max(1, fitting))
     figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=columns)
 
 
-def _top(one: Row) -> float:
+def _top(row: Row) -> float:
     """The greatest height that is drawn for a row."""
-    heights = (one["value"], *(one["ci95"] or ()), one["thesis"])
+    heights = (row["value"], *(row["ci95"] or ()), row["thesis"])
     return max((float(height) for height in heights if height is not None), default=0.0)
 
 
-def _draw_bar(axes: "Axes", x: float, one: Row, series: int, width: float) -> None:
+def _draw_bar(axes: "Axes", x: float, row: Row, series: int, width: float) -> None:
     colour, hatch = SERIES[series]
-    axes.bar(x, one["value"], width, color=colour, hatch=hatch, edgecolor="white", linewidth=0.6)
+    axes.bar(x, row["value"], width, color=colour, hatch=hatch, edgecolor="white", linewidth=0.6)
     for line_colour, line_width in (("white", 3.0), (INK, 1.2)):  # a white rim, or it is lost on dark bars
-        axes.vlines(x, *(one["ci95"] or [np.nan] * 2), color=line_colour, linewidth=line_width, zorder=3)
-    axes.plot(x, np.nan if one["thesis"] is None else one["thesis"], zorder=4, **PRINTED)
+        axes.vlines(x, *(row["ci95"] or [np.nan] * 2), color=line_colour, linewidth=line_width, zorder=3)
+    axes.plot(x, np.nan if row["thesis"] is None else row["thesis"], zorder=4, **PRINTED)
 
 
-def _write(axes: "Axes", x: float, one: Row, text: str) -> None:
+def _write(axes: "Axes", x: float, row: Row, text: str) -> None:
     offset: dict[str, Any] = {"xytext": (0, 4), "textcoords": "offset points", "ha": "center"}
-    axes.annotate(text, (x, _top(one)), fontsize=8, color=INK, **offset)
+    axes.annotate(text, (x, _top(row)), fontsize=8, color=INK, **offset)

@@ -52,7 +52,7 @@ MOST_DOTS = 60  # lines of a picture
 
 def figures(results: Sequence[Result]) -> dict[str, bytes]:
     """SVG pictures by caption; if there are many settings, of the best ones."""
-    ranked = sorted(results, key=lambda one: (-one[1].solved.mean(), one[1].mean_steps.mean()))
+    ranked = sorted(results, key=lambda result: (-result[1].solved.mean(), result[1].mean_steps.mean()))
     most = "" if len(ranked) <= MOST_DOTS else f", the best {MOST_DOTS} of {len(ranked)} settings"
     several = "" if len(ranked) <= MOST_CURVES else f", the best {MOST_CURVES} of {len(ranked)} settings"
     return {
@@ -63,7 +63,7 @@ def figures(results: Sequence[Result]) -> dict[str, bytes]:
 
 def words(named: Row, among: Sequence[Row]) -> str:
     """A setting in words, by the options that differ among several: "ccrl, expert, psi 0.1"."""
-    varies = [name for name in named if len({repr(one[name]) for one in among}) > 1] or [*named][:1]
+    varies = [name for name in named if len({repr(setting[name]) for setting in among}) > 1] or [*named][:1]
     plain = ("advisor", "gate", "learner", "selection")
     return ", ".join(str(named[name]) if name in plain else f"{name} {named[name]}" for name in varies)
 
@@ -102,10 +102,10 @@ def _mean(values: Any) -> tuple[float, float, float]:
 def _curves(results: Sequence[Result]) -> bytes:
     def draw(figure: "Figure") -> None:
         axes: Axes = figure.add_subplot()
-        for n, (named, found) in enumerate(results):
+        for n, (named, measured) in enumerate(results):
             name = words(named, [other for other, _ in results])
             look: dict[str, Any] = {"color": COLOURS[n % len(COLOURS)], "linestyle": DASHES[n // len(COLOURS)]}
-            axes.plot(np.arange(1, len(found.curve) + 1), found.curve, label=name, linewidth=1.3, **look)
+            axes.plot(np.arange(1, len(measured.curve) + 1), measured.curve, label=name, linewidth=1.3, **look)
         axes.set(xlabel="episode", ylabel="steps", ylim=(0, None))
         axes.yaxis.label.set_color(INK)
         axes.grid(axis="y")
@@ -146,7 +146,7 @@ class ComparedSessions:
 
 FAMILIES: dict[str, Family[Any]] = {"gates": GATES, "learners": UPDATES, "advisors": ADVISORS}
 MEASURES = (
-    "solved_percent: sessions whose greedy way is as good as can be in the end. mean_steps: of all episodes, a failed one as the "
+    "solved_percent: sessions whose final greedy path is optimal. mean_steps: of all episodes, a failed one as the "
     "step limit + 1 (the area under the learning curve). last_steps: of the last episode. helped_steps, requests, misleads, "
     "rejected_percent: of a session, as lab teach counts them. Every setting meets the same chances: session n has the same "
     "seed in each."
@@ -220,13 +220,13 @@ def compared(what: Compared, job: Job) -> Findings:
     left = [key for key in keys if key not in done]
     job.progress(len(done), len(keys))
     work = partial(sessions_of, sessions=job.sessions, seed=job.seed)
-    for setting, found in job.computed(work, [keys[key] for key in left], 1):
+    for setting, measured in job.computed(work, [keys[key] for key in left], 1):
         key = key_of(setting, problem, job)
-        done[key] = found
-        job.keep({"key": key, **found.to_json()})
+        done[key] = measured
+        job.keep({"key": key, **measured.to_json()})
         job.progress(len(done), len(keys))
     results = {key: (setting.named, done[key]) for key, setting in keys.items()}
-    rows = [one for named, found in results.values() for one in rows_of(named, found)]
+    rows = [row for named, measured in results.values() for row in rows_of(named, measured)]
     return Findings(rows, in_short(results.values()), figures([*results.values()]), (MEASURES,))
 
 
@@ -249,10 +249,10 @@ def sessions_of(setting: ComparedSetting, sessions: int, seed: int, stream: int 
         counts: tuple[NDArray[np.int64], ...] = (batch.helped_steps, batch.requests, batch.misleads)
     else:
         alone = [_alone(environment, how.learner, how.gate, advising, int(own)) for own in seeds]
-        rejected, steps, q = (np.array([one[n] for one in alone]) for n in range(3))
-        counts = tuple(np.array([one[n] for one in alone]) for n in range(3, 6))
+        rejected, steps, q = (np.array([session[n] for session in alone]) for n in range(3))
+        counts = tuple(np.array([session[n] for session in alone]) for n in range(3, 6))
     solved = np.array([environment.judge(table, how.learner).solved for table in q])
-    helped, requests, misleads = (np.asarray(one, np.float64) for one in counts)
+    helped, requests, misleads = (np.asarray(count, np.float64) for count in counts)
     return ComparedSessions(
         steps.mean(axis=0), solved, steps.mean(axis=1), steps[:, -1].astype(float), helped, requests, misleads, rejected
     )
@@ -264,26 +264,33 @@ def _alone(
     """(rejected, steps (E,), q (S, A), helped steps, requests, misleads) of one session that is not compiled."""
     rng = np.random.default_rng(seed)
     advisor = advising.for_session().gather(environment, learner, rng)
-    one = Session(environment, learner, gate, advisor, rng).run()
-    if one.interrupted:
+    session = Session(environment, learner, gate, advisor, rng).run()
+    if session.interrupted:
         raise KeyboardInterrupt
-    return one.rejected_at_episode is not None, one.steps, one.q, one.helped_steps, one.requests, one.misleads
+    return (
+        session.rejected_at_episode is not None,
+        session.steps,
+        session.q,
+        session.helped_steps,
+        session.requests,
+        session.misleads,
+    )
 
 
-def rows_of(named: Row, found: ComparedSessions) -> list[Row]:
+def rows_of(named: Row, measured: ComparedSessions) -> list[Row]:
     """The rows of one setting, one per measure."""
     return [
-        share_row(named, "solved_percent", found.solved),
-        mean_row(named, "mean_steps", found.mean_steps),
-        *(varying_row(named, name, getattr(found, name)) for name in ("last_steps", "helped_steps")),
-        *(varying_row(named, name, getattr(found, name)) for name in ("requests", "misleads")),
-        share_row(named, "rejected_percent", found.rejected),
+        share_row(named, "solved_percent", measured.solved),
+        mean_row(named, "mean_steps", measured.mean_steps),
+        *(varying_row(named, name, getattr(measured, name)) for name in ("last_steps", "helped_steps")),
+        *(varying_row(named, name, getattr(measured, name)) for name in ("requests", "misleads")),
+        share_row(named, "rejected_percent", measured.rejected),
     ]
 
 
 def in_short(results: "Iterator[tuple[Row, ComparedSessions]] | Any") -> Row:
     """The summary: the setting that solves most sessions, of equal ones the one with the fewest mean steps."""
-    named, best = max(results, key=lambda one: (one[1].solved.mean(), -one[1].mean_steps.mean()))
+    named, best = max(results, key=lambda result: (result[1].solved.mean(), -result[1].mean_steps.mean()))
     what = ", ".join(f"{name} {value}" for name, value in named.items())
     return {"best": what, "best solves [%]": round(100 * float(best.solved.mean()), 1)}
 
@@ -306,7 +313,7 @@ def key_of(setting: ComparedSetting, problem: Problem, job: Job) -> str:
     region = None if setting.of.sight is None else setting.of.sight
     whole: list[Any] = [__version__, problem.mdp.signature, region, setting.named, vars(how.learner), vars(how.gate)]
     advising = Advising.of([setting.advisor])
-    whole += [one.said.tolist() for one in advising.check_records(problem.mdp)]
+    whole += [record.said.tolist() for record in advising.check_records(problem.mdp)]
     if job.folder is not None:  # otherwise nothing is kept, and own code needs no source file
         own = UPDATES.modules_of(how.learner.learner) + GATES.modules_of(how.gate.gate) + advising.modules()
         whole.append(code_key(*own, *getattr(problem.environment, "modules", ())))

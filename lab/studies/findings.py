@@ -161,10 +161,10 @@ def row(
     """
     ends = None if ci is None else [float(ci[0]), float(ci[1])]
     agrees = None if thesis is None else within(value, ends, thesis, measure)
-    found = {**named, "measure": measure, "value": float(value), "ci95": ends, "thesis": thesis, "within": agrees}
+    cells = {**named, "measure": measure, "value": float(value), "ci95": ends, "thesis": thesis, "within": agrees}
     if thesis is not None and errors is not None:
-        found["within_errors"] = within_errors(value, thesis, errors)
-    return found
+        cells["within_errors"] = within_errors(value, thesis, errors)
+    return cells
 
 
 def share_row(
@@ -190,8 +190,8 @@ def mean_row(
 
 def varying_row(named: Row, measure: str, values: ArrayLike) -> Row:
     """The row of the mean of values (N,), without an interval if they are constant."""
-    found = np.asarray(values, np.float64)
-    return row(named, measure, found.mean()) if np.ptp(found) <= SAME else mean_row(named, measure, found)
+    numbers = np.asarray(values, np.float64)
+    return row(named, measure, numbers.mean()) if np.ptp(numbers) <= SAME else mean_row(named, measure, numbers)
 
 
 def median_row(named: Row, measure: str, values: Sequence[float]) -> Row:

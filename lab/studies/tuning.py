@@ -64,27 +64,27 @@ def search(
     done: list[Trial] = []
     while len(done) < trials:
         asked = [study.ask(kinds) for _ in range(min(BATCH, trials - len(done)))]
-        costs: dict[int, list[float]] = {one.number: [] for one in asked}
+        costs: dict[int, list[float]] = {trial.number: [] for trial in asked}
         left, given_up = list(asked), set()
         for rung in range(rungs):
-            found = measure(rung, [one.params for one in left])
-            for one, cost in zip(list(left), found, strict=True):
+            measured = measure(rung, [trial.params for trial in left])
+            for trial, cost in zip(list(left), measured, strict=True):
                 if cost is not None:
-                    costs[one.number].append(cost)
-                    one.report(cost, rung)
-                if cost is None or (rung < rungs - 1 and one.should_prune()):
-                    given_up.add(one.number)
-            left = [one for one in left if one.number not in given_up]
-        for one in asked:
-            pruned = one.number in given_up
+                    costs[trial.number].append(cost)
+                    trial.report(cost, rung)
+                if cost is None or (rung < rungs - 1 and trial.should_prune()):
+                    given_up.add(trial.number)
+            left = [trial for trial in left if trial.number not in given_up]
+        for trial in asked:
+            pruned = trial.number in given_up
             state = optuna.trial.TrialState
-            if not costs[one.number]:
-                study.tell(one, state=state.FAIL)
+            if not costs[trial.number]:
+                study.tell(trial, state=state.FAIL)
             elif pruned:
-                study.tell(one, state=state.PRUNED)
+                study.tell(trial, state=state.PRUNED)
             else:
-                study.tell(one, costs[one.number][-1])
-            done.append(Trial(one.number, one.params, tuple(costs[one.number]), pruned))
+                study.tell(trial, costs[trial.number][-1])
+            done.append(Trial(trial.number, trial.params, tuple(costs[trial.number]), pruned))
     return done, _importances(optuna, study)
 
 
@@ -106,11 +106,11 @@ def _distribution(optuna: Any, allowed: Range) -> Any:
 
 def _importances(optuna: Any, study: Any) -> dict[str, float]:
     ended = study.get_trials(deepcopy=False, states=(optuna.trial.TrialState.COMPLETE,))
-    if len({one.value for one in ended}) < BATCH:
+    if len({trial.value for trial in ended}) < BATCH:
         return {}
     evaluator = optuna.importance.PedAnovaImportanceEvaluator()
-    found = optuna.importance.get_param_importances(study, evaluator=evaluator)
-    return {name: float(share) for name, share in found.items()}
+    importances = optuna.importance.get_param_importances(study, evaluator=evaluator)
+    return {name: float(share) for name, share in importances.items()}
 
 
 # ---- the figures ----------------------------------------------------------------------------------------------------
@@ -118,10 +118,10 @@ def _importances(optuna: Any, study: Any) -> dict[str, float]:
 
 def figures(trials: Sequence[Trial], importances: Mapping[str, float], gained: FloatArray) -> dict[str, bytes]:
     """SVG pictures by caption; gained: (N,), the gain of each unseen session."""
-    found = {"Gain of each session over the problem's own settings, on unseen seeds": _gain(gained)}
+    drawn = {"Gain of each session over the problem's own settings, on unseen seeds": _gain(gained)}
     if importances:
-        found["Which settings the cost hangs on"] = _importance(importances)
-    return found | {"Cost of each trial, and the best so far": _history(trials)}
+        drawn["Which settings the cost hangs on"] = _importance(importances)
+    return drawn | {"Cost of each trial, and the best so far": _history(trials)}
 
 
 def _gain(gained: FloatArray) -> bytes:
@@ -140,7 +140,7 @@ def _gain(gained: FloatArray) -> bytes:
 def _importance(importances: Mapping[str, float]) -> bytes:
     def draw(figure: "Figure") -> None:
         axes = figure.add_subplot()
-        axes.barh(range(len(importances)), [100 * one for one in importances.values()], color=BLUE)
+        axes.barh(range(len(importances)), [100 * importance for importance in importances.values()], color=BLUE)
         axes.set_yticks(range(len(importances)), list(importances))
         axes.invert_yaxis()
         axes.set_xlabel("share of the importance [%]")
@@ -152,13 +152,18 @@ def _history(trials: Sequence[Trial]) -> bytes:
     def draw(figure: "Figure") -> None:
         axes = figure.add_subplot()
         for pruned, colour, name in ((True, GREY, "given up early"), (False, BLUE, "tried to the end")):
-            shown = [one for one in trials if one.pruned == pruned and one.costs]
+            shown = [trial for trial in trials if trial.pruned == pruned and trial.costs]
             axes.plot(
-                [one.number for one in shown], [one.costs[-1] for one in shown], "o", ms=4, color=colour, label=name
+                [trial.number for trial in shown],
+                [trial.costs[-1] for trial in shown],
+                "o",
+                ms=4,
+                color=colour,
+                label=name,
             )
-        ended = [one for one in trials if not one.pruned]
-        best = np.minimum.accumulate([one.costs[-1] for one in ended])
-        axes.step([one.number for one in ended], best, where="post", color=ORANGE, label="best so far")
+        ended = [trial for trial in trials if not trial.pruned]
+        best = np.minimum.accumulate([trial.costs[-1] for trial in ended])
+        axes.step([trial.number for trial in ended], best, where="post", color=ORANGE, label="best so far")
         axes.set_xlabel("trial")
         axes.set_ylabel("cost [steps an episode]")
         axes.legend()
@@ -176,7 +181,7 @@ UNSEEN_STREAM = 1_000_000  # the stream of their seeds, apart from those of the 
 FILE = "settings.toml"
 OBJECTIVE = (
     "cost: the mean steps of a session's episodes (the area under the learning curve), a failed one as the step limit + 1; a "
-    "session whose greedy way is not as good as can be in the end costs the step limit + 1 as a whole. gain: the cost with the "
+    "session whose final greedy path is not optimal costs the step limit + 1 as a whole. gain: the cost with the "
     "problem's own settings less that with the tuned ones, session by session with the same seed, on seeds that no trial had."
 )
 
@@ -236,27 +241,27 @@ def tuned(what: Tuning, job: Job) -> Findings:
 
     def measure(rung: int, those: Sequence[Values]) -> list[float | None]:
         nonlocal done
-        found = kept.sessions([what.setting(values) for values in those], shares[rung], rung)
+        measured = kept.sessions([what.setting(values) for values in those], shares[rung], rung)
         done += len(those)
         job.progress(done, total)
-        return [None if one is None else float(costs(one, limit).mean()) for one in found]
+        return [None if sessions is None else float(costs(sessions, limit).mean()) for sessions in measured]
 
     trials, importances = search(ranges, first, what.trials, job.seed, len(SHARES), measure)
-    ended = [one for one in trials if not one.pruned]
+    ended = [trial for trial in trials if not trial.pruned]
     if not ended:
         raise BadInput("tuning: none of the settings that were tried can be: hold other ones, or tune fewer")
-    best = min(ended, key=lambda one: (one.costs[-1], one.number))
+    best = min(ended, key=lambda trial: (trial.costs[-1], trial.number))
     pair = kept.sessions([what.setting({}), what.setting(best.values)], UNSEEN, UNSEEN_STREAM)
     job.progress(total, total)
-    before, after = (one for one in pair if one is not None)
+    before, after = (sessions for sessions in pair if sessions is not None)
     if job.folder is not None:
         write_file(job.folder / FILE, settings_text(what, best.values))
     return _findings(trials, importances, best, (before, after), limit)
 
 
-def costs(found: ComparedSessions, limit: int) -> FloatArray:
+def costs(measured: ComparedSessions, limit: int) -> FloatArray:
     """The cost of each session, (N,)."""
-    return found.mean_steps * found.solved + limit * ~found.solved
+    return measured.mean_steps * measured.solved + limit * ~measured.solved
 
 
 def _within(value: Any, allowed: Range) -> Any:
@@ -279,27 +284,27 @@ class _KeptSessions:
         self, settings: Sequence[ComparedSetting], sessions: int, stream: int
     ) -> list[ComparedSessions | None]:
         """The sessions of each setting, with the seeds of that stream; None for an invalid setting."""
-        found: dict[str, ComparedSessions | None] = {}
+        by_key: dict[str, ComparedSessions | None] = {}
         keys: list[str] = []
         left: list[ComparedSetting] = []
-        for one in settings:
+        for setting in settings:
             try:
-                key = f"{key_of(one, self.problem, replace(self.job, sessions=sessions))}-{stream}"
+                key = f"{key_of(setting, self.problem, replace(self.job, sessions=sessions))}-{stream}"
             except BadInput:
                 key = f"none-{len(keys)}"
-                found[key] = None
+                by_key[key] = None
             keys.append(key)
-            if key in found:
+            if key in by_key:
                 continue
-            found[key] = self.kept.get(key)
-            if found[key] is None:
-                left.append(one)
+            by_key[key] = self.kept.get(key)
+            if by_key[key] is None:
+                left.append(setting)
         by_setting = dict(zip(settings, keys, strict=True))
         work = partial(sessions_of, sessions=sessions, seed=self.job.seed, stream=stream)
-        for one, result in self.job.computed(work, left, 1):
-            found[by_setting[one]] = result
-            self.job.keep({"key": by_setting[one], **result.to_json()})
-        return [found[key] for key in keys]
+        for setting, result in self.job.computed(work, left, 1):
+            by_key[by_setting[setting]] = result
+            self.job.keep({"key": by_setting[setting], **result.to_json()})
+        return [by_key[key] for key in keys]
 
 
 def settings_text(what: Tuning, values: Values) -> str:
@@ -336,11 +341,11 @@ def _findings(
     gained = costs(before, limit) - costs(after, limit)
     gain, low, high = interval(gained) if gained.any() else (0.0, 0.0, 0.0)
     rows: list[Row] = []
-    for settings, found in (("own", before), ("tuned", after)):
+    for settings, measured in (("own", before), ("tuned", after)):
         named = {"settings": settings, "trial": None, "setting": None}
-        rows.append(mean_row(named, "cost", costs(found, limit)))
-        rows.append(share_row(named, "solved_percent", found.solved))
-        rows.append(mean_row(named, "helped_steps", found.helped_steps))
+        rows.append(mean_row(named, "cost", costs(measured, limit)))
+        rows.append(share_row(named, "solved_percent", measured.solved))
+        rows.append(mean_row(named, "helped_steps", measured.helped_steps))
     rows.append(row({"settings": "tuned", "trial": None, "setting": None}, "gain", gain, (low, high)))
     rows += [
         row({"settings": None, "trial": None, "setting": name}, "importance", share)
@@ -349,7 +354,7 @@ def _findings(
     rows += [*_trial_rows(trials)]
     summary: Row = {
         "trials": len(trials),
-        "given up early": sum(one.pruned for one in trials),
+        "given up early": sum(trial.pruned for trial in trials),
         "cost with its own settings": round(float(costs(before, limit).mean()), 2),
         "cost tuned": round(float(costs(after, limit).mean()), 2),
         "gain": f"{gain:.2f} ({low:.2f} to {high:.2f})",
@@ -359,7 +364,7 @@ def _findings(
 
 
 def _trial_rows(trials: Sequence[Trial]) -> Iterator[Row]:
-    for one in trials:
-        if one.costs:
-            settings = "given up" if one.pruned else "tried"
-            yield row({"settings": settings, "trial": one.number, "setting": None}, "cost", one.costs[-1])
+    for trial in trials:
+        if trial.costs:
+            settings = "given up" if trial.pruned else "tried"
+            yield row({"settings": settings, "trial": trial.number, "setting": None}, "cost", trial.costs[-1])

@@ -103,7 +103,7 @@ def layout_faults(cell: CellFields) -> Iterator[FileFault]:
     reached = {robot.start for robot in cell.built_robots} | {
         name for _, stage in stages for name in (stage.station, stage.buffer)
     }
-    timeless = {one.name for one in cell.stations if one.kind == "machine" and one.processing_s is None}
+    timeless = {machine.name for machine in cell.stations if machine.kind == "machine" and machine.processing_s is None}
     for loc, stage in stages:
         if stage.station in timeless and stage.processing_s is None:
             yield FileFault(
@@ -164,8 +164,8 @@ def loc_of(cell: CellFields, message: str) -> Loc:
         for number in reversed(range(len(members))):  # of two with the same name, the second one is at fault
             if message.startswith(f"{field[:-1]} '{members[number].name}'"):
                 return (field, number, "name")
-    if found := re.match(r"due_s of part (\d+) ", message):
-        return ("due_s", int(found[1]) - 1)
+    if match := re.match(r"due_s of part (\d+) ", message):
+        return ("due_s", int(match[1]) - 1)
     return next(((field,) for field in ("due_s", "release_s") if message.startswith(field)), ())
 
 
@@ -176,7 +176,7 @@ def _bad_stage(cell: CellFields) -> Loc:
             try:
                 check_layout(cell.built_stations, (replace(product, routes=(route,)),))
             except BadInput as error:
-                found = re.match(r".*stage (\d+) of ", str(error))
-                stage = () if found is None else (int(found[1]) - 1,)
+                match = re.match(r".*stage (\d+) of ", str(error))
+                stage = () if match is None else (int(match[1]) - 1,)
                 return ("products", i, "routes", j, *stage)
     return ()

@@ -44,13 +44,13 @@ class CellRobot(Record):
     """A transfer robot, or a vehicle."""
 
     start: Name
-    """The station where it stands at time 0, such as `"in"`."""
+    """The station where the robot stands at time 0, such as `"in"`."""
     name: Name = ROBOT
-    """Its name; needed where there are several."""
+    """The robot's name; required in a cell with several robots."""
     speed: Annotated[float, Field(ge=1e-3, le=1e3)] = 1.0
-    """The factor by which it is faster than the travel times [-]."""
+    """The factor by which the robot is faster than the travel times [-]."""
     serves: Annotated[tuple[Name, ...], BeforeValidator(as_tuple)] | None = None
-    """The stations where it may pick and drop, such as `["in", "oven"]`; left out: all."""
+    """The stations where the robot may pick and drop, such as `["in", "oven"]`; left out: all."""
 
     def built(self) -> Robot:
         """The robot as a record of the cell."""
@@ -63,24 +63,24 @@ class CellStation(Record):
     name: Name
     """The station's name, which routes and travel times use, such as `"oven"`."""
     kind: Annotated[Literal["storage", "buffer", "machine"], _known("kind", STATION_KINDS, "station")]
-    """What it is: parts begin and end in storage, wait in a buffer, and are worked on in a machine."""
+    """The station's kind: parts begin and end in storage, wait in a buffer, and are worked on in a machine."""
     capacity: Annotated[Room, WrapValidator(_unlimited, json_schema_input_type=Room | Literal["unlimited"])]
-    """How many parts it holds at once, such as `1`, or `"unlimited"`."""
+    """The number of parts that the station holds at once, such as `1`, or `"unlimited"`."""
     processing_s: Seconds | None = None
-    """How long the machine works on each part [s], such as `60.0`; a stage of a route may have its own."""
+    """The processing time of each part [s], such as `60.0`; a stage of a route may have its own."""
     at_most_s: Seconds | None = None
-    """How long a part may stay in the machine after that before it is spoilt [s], such as `4.0`; left out: no limit."""
+    """The longest stay in the machine after processing, before the part is spoilt [s], such as `4.0`; left out: no limit."""
     servers: Room | None = None
-    """How many parts the machine works on at once, such as `1`; others, and finished ones, wait in its room. Left out: all
-    parts in it, each from its arrival.
+    """The number of parts that the machine works on at once, such as `1`; others, and finished ones, wait inside. Left out:
+    all parts in the machine, each from its arrival.
     """
     batch: bool = False
     """Whether the machine works on all parts that stand in it together, such as `true`: the batch begins with the last
-    part that is brought before one is taken out, takes the longest of their times, and nothing comes in until all are
-    out. It needs a capacity of 2 or more, and one robot.
+    part that is brought before one is taken out, takes the longest of their times, and no part enters until all are
+    out. A batch needs a capacity of 2 or more, and one robot.
     """
     setup_s: Times = Field(default={})
-    """How long a server takes to change over, from product to product [s], such as `{ bun = { loaf = 20.0 } }`."""
+    """The time of a server's changeover from product to product [s], such as `{ bun = { loaf = 20.0 } }`."""
 
     def built(self) -> Station:
         """The station as a record of the cell."""
@@ -105,16 +105,16 @@ class CellStage(Record):
     buffer: Name | None = None
     """Where the part waits when that station is full, such as `"oven_buffer"`."""
     processing_s: Seconds | None = None
-    """How long the machine works on this product [s], such as `45.0`; left out: the station's time."""
+    """The processing time of this product [s], such as `45.0`; left out: the station's time."""
     service_s: Seconds = 0.0
-    """What the robot has to do there before it can take the part out [s], such as `20.0`."""
+    """The robot's work at the station before it can take the part out [s], such as `20.0`."""
     pallet: bool = False
     """Whether the part is lifted off its pallet for this machine; the pallet stays at the station before, and is
     brought to the one after.
     """
     at_most_s: Seconds | None = None
-    """How long this product may stay in the machine after that before it is spoilt [s], such as `4.0`; left out: the
-    station's.
+    """The longest stay of this product in the machine after processing [s], such as `4.0`; left out: the station's
+    limit.
     """
     alternatives: Annotated[
         tuple[Annotated["CellStage", BeforeValidator(_as_stage)], ...], BeforeValidator(as_tuple), Field(max_length=98)
@@ -139,7 +139,7 @@ class CellProduct(Record):
     name: Name
     """The product's name, such as `"bun"`."""
     routes: Annotated[tuple[Route, ...], BeforeValidator(as_tuple), Field(min_length=1, max_length=50)]
-    """The routes that one of them may take, each a list of stages, such as `[["in", "oven", "out"]]`."""
+    """The routes that a part may take, each a list of stages, such as `[["in", "oven", "out"]]`."""
 
     def built(self) -> Product:
         """The product as a record of the cell."""
@@ -147,24 +147,24 @@ class CellProduct(Record):
 
 
 class CellArrivals(Record):
-    """Parts that come to the first station one after the other."""
+    """Parts that arrive at the first station one after the other."""
 
     interval_s: Seconds
     """The time before each part [s], such as `90.0`."""
     after: Literal["clock", "pick"] = "clock"
-    """When the interval begins: at the arrival before ("clock"), or when the part before is taken away ("pick")."""
+    """The start of the interval: the previous arrival ("clock"), or the removal of the previous part ("pick")."""
 
 
 Law = Annotated[str, _known("law", LAWS, "stochastic")]
 
 
 class Stochastic(Record):
-    """What --stochastic draws the times of an episode from."""
+    """The distributions from which --stochastic draws the times of an episode."""
 
     processing: Law = "normal"
-    """The law of processing times."""
+    """The distribution of processing times."""
     arrivals: Law = "constant"
-    """The law of the times between arrivals."""
+    """The distribution of the times between arrivals."""
     spread: Annotated[float, Field(ge=0, le=1)] = 0.1
     """The standard deviation of a normal time, as a share of its mean [-]."""
     breaks_every_s: Seconds = 0.0
@@ -174,8 +174,8 @@ class Stochastic(Record):
     late_s: Seconds = 0.0
     """The mean delay of a part after its release_s [s], such as `30.0`."""
     robot_breaks_every_s: Seconds = 0.0
-    """The mean time between a robot's repair and its next breakdown, at work or not [s], such as `600.0`; 0: none. It then
-    stops where it is, with the part that it holds. At least 1 s; not in a cell with a track.
+    """The mean time between a robot's repair and its next breakdown, at work or not [s], such as `600.0`; 0: none. A broken
+    robot stops where it is, with the part that it holds. At least 1 s; not allowed in a cell with a track.
     """
     robot_repair_s: Seconds = 0.0
     """The mean time of a robot's repair [s], such as `60.0`."""
@@ -193,60 +193,60 @@ class CellTrack(Record):
         BeforeValidator(as_tuple),
         Field(min_length=1, max_length=200),
     ]
-    """For each stretch the two stations that it joins, and how long a robot drives along it [s], such as
+    """The stretches, each with the two stations that it joins and a robot's driving time along it [s], such as
     `[["in", "oven", 5.0]]`.
     """
 
     def built(self) -> tuple[Stretch, ...]:
         """The stretches of the track, each as a record of the cell."""
-        return tuple(Stretch(*one) for one in self.stretches)
+        return tuple(Stretch(*stretch) for stretch in self.stretches)
 
 
 class CellFields(Record):
-    """All that a cell file may hold; `CellFile` makes a cell of it."""
+    """The keys of a cell file; `CellFile` makes a cell of them."""
 
     kind: Literal["cell"] = "cell"
-    """What the file is; always "cell"."""
+    """The kind of the file; always "cell"."""
     name: Name
     """The cell's name, such as `"bakery"`: 1 to 40 letters, digits, spaces, - and _."""
     title: str = ""
-    """A line that says what the cell is, such as `"Two products, one oven"`."""
+    """A title in one line, such as `"Two products, one oven"`."""
     in_physics: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9 ._-]{0,80}$")] | None = None
-    """The name of the task, or its file in the same folder, in which `lab run` carries such a cell out, such as `"fms"`."""
+    """The name or file (in the same folder) of the task in which `lab run` carries this cell out, such as `"fms"`."""
     order: Annotated[tuple[Name, ...], BeforeValidator(as_tuple)] | None = None
-    """A product for each part, such as `["bun", "loaf", "bun"]`."""
+    """The product of each part, such as `["bun", "loaf", "bun"]`."""
     parts: int | None = None
-    """How many parts, of a cell with one product, such as `4`; in place of order."""
+    """The number of parts in a cell with one product, such as `4`; in place of order."""
     buffers: Literal["busy", "free"] = "busy"
     """Whether a part goes to a buffer only while its machine is full ("busy"), or whenever the order says so ("free")."""
     due_s: Annotated[tuple[Seconds, ...], BeforeValidator(as_tuple)] | None = None
-    """When each part is due [s], such as `[120.0, 300.0, 240.0]`; one for each part."""
+    """The due time of each part [s], such as `[120.0, 300.0, 240.0]`."""
     release_s: Annotated[tuple[Seconds, ...], BeforeValidator(as_tuple)] | None = None
-    """When each part arrives [s], such as `[0.0, 60.0, 60.0]`; one for each part."""
+    """The arrival time of each part [s], such as `[0.0, 60.0, 60.0]`."""
     due_factor: Annotated[float, Field(gt=0, le=1000)] | None = None
-    """A part is due this many times its own work after its arrival [-], such as `3.0`; in place of due_s."""
+    """The time from a part's arrival until it is due, as a multiple of its own work [-], such as `3.0`; in place of due_s."""
     robot: CellRobot | None = None
     """The only robot; in place of robots."""
     robots: Annotated[tuple[CellRobot, ...], BeforeValidator(as_tuple), Field(max_length=50)] | None = None
-    """Several robots; `[]` where parts go on by themselves, in place of robot."""
+    """The robots, in place of robot; `[]` if parts move by themselves."""
     stations: Annotated[tuple[CellStation, ...], BeforeValidator(as_tuple), Field(min_length=2, max_length=100)]
-    """Where parts stand and are worked on."""
+    """The stations at which parts stand and are worked on."""
     products: Annotated[tuple[CellProduct, ...], BeforeValidator(as_tuple), Field(min_length=1, max_length=MAX_PARTS)]
     """The types of parts."""
     travel: Times = Field(default={})
-    """How long a robot drives from a station (the row) to another [s], such as `{ in = { oven = 10.0 } }`; a pair that
-    is left out is a forbidden move.
+    """The driving times from a station (the row) to another [s], such as `{ in = { oven = 10.0 } }`; a pair that is left
+    out is a forbidden move.
     """
     track: CellTrack | None = None
     """The track of several robots; its stretches give the times, in place of travel."""
     loaded: Times = Field(default={})
     """The travel times that differ when the robot carries something [s], such as `{ in = { oven = 12.0 } }`."""
     arrivals: CellArrivals | None = None
-    """When parts come; left out: all are there at time 0."""
+    """The arrivals of parts; left out: all parts are there at time 0."""
     stochastic: Stochastic = Stochastic()
-    """What --stochastic draws the times from."""
+    """The distributions from which --stochastic draws times."""
     sequencing: Sequencing = Sequencing()
-    """How the order of the robot's transfers is found."""
+    """The settings of the search for the order of the robot's transfers."""
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -263,10 +263,10 @@ class CellFields(Record):
         """The seconds from each station to each other: the travel table, or the durations of the paths on the track."""
         if self.track is None:
             return self.travel
-        names, found = self.station_names, Times()
+        names, table = self.station_names, Times()
         for (origin, target), way in ways_on(self.track.built(), names).items():
-            found.setdefault(names[origin], {})[names[target]] = travel_s(way)
-        return found
+            table.setdefault(names[origin], {})[names[target]] = travel_s(way)
+        return table
 
     @property
     def built_stations(self) -> tuple[Station, ...]:

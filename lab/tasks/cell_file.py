@@ -25,7 +25,7 @@ TOAST_CASES = {"I": "toast-case-1", "II": "toast-case-2", "III": "toast-case-3"}
 
 
 class CellFile(CellFields):
-    """A whole cell file: the cell, the order that it is to make, and how a sequence for it is looked for."""
+    """A whole cell file: the cell, the ordered parts, and the settings of the search for a sequence."""
 
     _toml: TomlText | None = PrivateAttr(default=None)
 
@@ -33,12 +33,12 @@ class CellFile(CellFields):
     def checked(cls, toml: TomlText) -> Self:
         """The cell file of a text; raises BadInput, with file and line, when its own order is invalid."""
         try:
-            found = cls.model_validate(toml.raw)
+            cell_file = cls.model_validate(toml.raw)
         except ValidationError as error:
             raise toml.refusal(finding(error)["loc"], explain(error, partial(fields_at, cls), raw=toml.raw)) from None
-        found._toml = toml
-        found.cell()
-        return found
+        cell_file._toml = toml
+        cell_file.cell()
+        return cell_file
 
     def cell(self, order: Sequence[str] | int | None = None) -> Cell:
         """The cell for an order: a product for each part, or a number of parts of the only product; None: the file's own.
@@ -86,9 +86,9 @@ class CellFile(CellFields):
         named = tuple(first.model_copy(update={"name": f"{ROBOT} {n}"}) for n in range(1, count + 1))
         several = {"robot": None, "robots": named}
         alone = {"robot": first, "robots": None, "track": None, "travel": self.times}  # a single robot needs no track
-        found = self.model_copy(update=several if count > 1 else alone)
-        found.cell()
-        return found
+        changed = self.model_copy(update=several if count > 1 else alone)
+        changed.cell()
+        return changed
 
     def _cell_or_fault(self, order: Sequence[str] | int | None) -> Cell | FileFault:
         """The cell, or the first fault; each kind of fault is searched only when all kinds before it are absent."""
@@ -179,12 +179,12 @@ def order_from_word(cellfile: CellFile, word: str) -> tuple[str, ...]:
     known = ", ".join(f"{letter} ({' or '.join(names)})" for letter, names in meant.items())
     order: list[str] = []
     for number, letter in enumerate(word.strip(), 1):
-        found = meant.get(letter.upper(), [])
-        if len(found) != 1:
-            wrong = f"letter {number}, '{letter}', means {'no' if not found else 'more than one'} product"
+        initials = meant.get(letter.upper(), [])
+        if len(initials) != 1:
+            wrong = f"letter {number}, '{letter}', means {'no' if not initials else 'more than one'} product"
             wanted = f"known: {known}; or names with commas between them"
             raise BadInput(f"order '{word[:80]}' (--case) for cell '{cellfile.name}': {wrong}: {wanted}")
-        order += found
+        order += initials
     return cellfile.ordered(order)
 
 
@@ -207,18 +207,18 @@ def toml_of(file: CellFile) -> str:
     lines = [f"{_key(key)} = {_value(value)}" for key, value in raw.items() if key not in (*_TABLES, "stations")]
     if raw.get("robots") == ():
         lines.append("robots = []")
-    lines += ["", "stations = [", *(f"  {_value(_station(one))}," for one in raw["stations"]), "]"]
+    lines += ["", "stations = [", *(f"  {_value(_station(station))}," for station in raw["stations"]), "]"]
     for key in _TABLES:
         value = raw.get(key)
-        for one in value if isinstance(value, tuple) else ():
-            lines += ["", f"[[{key}]]", *_pairs(one)]
+        for item in value if isinstance(value, tuple) else ():
+            lines += ["", f"[[{key}]]", *_pairs(item)]
         if isinstance(value, Mapping):
             lines += ["", f"[{key}]", *_pairs(value)]
     return "\n".join(lines) + "\n"
 
 
-def _station(one: Mapping[str, Any]) -> dict[str, Any]:
-    return {key: "unlimited" if key == "capacity" and value >= UNLIMITED else value for key, value in one.items()}
+def _station(fields: Mapping[str, Any]) -> dict[str, Any]:
+    return {key: "unlimited" if key == "capacity" and value >= UNLIMITED else value for key, value in fields.items()}
 
 
 def _pairs(table: Mapping[str, Any]) -> list[str]:

@@ -1,4 +1,4 @@
-"""The record of a fault in a task file: what goes wrong in a run, when, and with which part, station or obstacle."""
+"""The record of a fault in a task file: its kind, its time, and the part, station or obstacle that it affects."""
 
 from typing import Annotated, Any, Literal, Self
 
@@ -77,34 +77,36 @@ def _by_kind(schema: dict[str, Any]) -> None:
 
 
 class FaultFields(Record):
-    """A fault: what goes wrong in a run, when, and with what."""
+    """A fault that strikes during a run: its kind, its time, and what it affects."""
 
     model_config = ConfigDict(json_schema_extra=_by_kind)
 
     what: FaultKind
-    """What goes wrong."""
+    """The kind of fault."""
     at_s: Annotated[float, Field(ge=0, le=86_400)] = 0.0
-    """It happens as early as possible after this time of the run [s]."""
+    """The time of the run from which on the fault strikes as soon as it can [s]."""
     when: When | None = None
-    """It waits until the part is in this state: carried, in a machine, or standing at a station, such as `"standing"`."""
+    """The state of the part that the fault waits for: carried, in a machine, or standing at a station, such as
+    `"standing"`.
+    """
     part: PartName | None = None
-    """Which part: its kind and number, such as `"bun 1"`; left out: the first that fits."""
+    """The affected part by kind and number, such as `"bun 1"`; left out: the first possible one."""
     station: Name | None = None
-    """Which station or machine, such as `"oven"`."""
+    """The affected station or machine, such as `"oven"`."""
     obstacle: Name | None = None
-    """Which obstacle, such as `"tower"`."""
+    """The affected obstacle, such as `"tower"`."""
     by_m: XY | None = None
-    """How far the part, obstacle or station that is moved, or falls, is displaced: x and y [m], such as `[0.05, 0.0]`."""
+    """The displacement of the part, obstacle or station that is moved or falls: x and y [m], such as `[0.05, 0.0]`."""
     turn_rad: Annotated[float, Field(ge=-3.2, le=3.2)] = 0.0
-    """By how much the part is turned [rad]."""
+    """The angle by which the part is turned [rad]."""
     share: Annotated[float, Field(ge=0, le=100)] | None = None
-    """How many times as long the machine takes, or the share of the friction that is left [-], such as `1.5`."""
+    """The factor on the machine's processing time, or the share of the friction that remains [-], such as `1.5`."""
     seconds: Annotated[float, Field(gt=0, le=86_400)] | None = None
-    """How long it lasts [s], such as `30.0`."""
+    """The duration of the fault [s], such as `30.0`."""
     at_m: XY | None = None
-    """The new position of what is moved, dropped or put: x and y [m], such as `[0.5, 0.3]`."""
+    """The new position of the moved, dropped or added body: x and y [m], such as `[0.5, 0.3]`."""
     size_m: Edges | None = None
-    """Length, width and height of the obstacle that is put there [m], such as `[0.06, 0.06, 0.34]`."""
+    """Length, width and height of the added obstacle [m], such as `[0.06, 0.06, 0.34]`."""
 
     @model_validator(mode="after")
     def _its_own_fields(self) -> Self:

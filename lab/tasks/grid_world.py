@@ -48,32 +48,32 @@ class AdvisorView(Record):
     lower: GridCell
     """One corner of the block, such as `[4, 4]`."""
     upper: GridCell
-    """The opposite one, such as `[7, 7]`."""
+    """The opposite corner of the block, such as `[7, 7]`."""
 
 
 class GridWorld(Learned):
-    """A world of cells, counted from 0, with obstacles, and how it is learned.
+    """A world of cells, counted from 0, with obstacles and the settings of its learner.
 
     Two axes: rows running down and columns to the right, as in a text grid. Three axes: x to the right, y forward, z
     up. An advisor with a limited view sees the robot in `view` only.
     """
 
     kind: Literal["world"] = "world"
-    """What the file is; always "world"."""
+    """The kind of the file; always "world"."""
     name: Name
     """The world's name, such as `"maze"`: 1 to 40 letters, digits, spaces, - and _."""
     title: str = ""
-    """A line that says what the world is, such as `"A maze with one way"`."""
+    """A title in one line, such as `"A maze with one path"`."""
     shape: GridShape
-    """How many cells there are along each axis, such as `[12, 12]` or `[10, 10, 10]`."""
+    """The number of cells along each axis, such as `[12, 12]` or `[10, 10, 10]`."""
     start: GridCell
     """The cell where every episode begins, such as `[0, 0]`."""
     goal: GridCell
-    """The cell to be reached, such as `[11, 11]`."""
+    """The cell that the learner must reach, such as `[11, 11]`."""
     obstacles: Annotated[tuple[GridCell, ...], BeforeValidator(as_tuple)] = ()
     """The cells that are blocked, such as `[[3, 4], [3, 5]]`."""
     view: AdvisorView | None = None
-    """Where an advisor with a limited view sees the robot; left out: everywhere."""
+    """The region in which an advisor with a limited view sees the robot; left out: everywhere."""
 
     @model_validator(mode="after")
     def _cells_fit(self) -> Self:
@@ -140,7 +140,7 @@ class GridWorld(Learned):
         moves = shortest_steps(mdp)
         steps = moves + self.learner.count_start
         if steps > most:
-            need = f"the shortest way has {counted(moves, 'move')} and needs {counted(steps, 'step')}"
+            need = f"the shortest path has {counted(moves, 'move')} and needs {counted(steps, 'step')}"
             raise BadInput(f"world '{self.name}': learner.max_steps = {most}: {need}")
         if not self.obstacles:
             return mdp
@@ -148,7 +148,7 @@ class GridWorld(Learned):
         crash, way = self.worth(near, collision), self.worth(moves, self.rewards.goal)
         if crash >= way:
             worth = (
-                f"running into an obstacle is worth {crash:.2f} and the way of {counted(moves, 'move')} only {way:.2f}"
+                f"running into an obstacle is worth {crash:.2f} and the path of {counted(moves, 'move')} only {way:.2f}"
             )
             raise BadInput(
                 f"world '{self.name}': rewards.collision = {collision}: at the start, {worth}: "

@@ -88,13 +88,13 @@ class NewTask:
     @property
     def stations(self) -> dict[str, tuple[str, int]]:
         """The kind and the capacity of each station, in the order of the route."""
-        found = {"input": ("storage", self.count)}
+        by_name = {"input": ("storage", self.count)}
         for machine in self.machines:
             if self.buffers:
-                found[f"{machine.name}_buffer"] = ("buffer", BUFFER_ROOM)
-            found[machine.name] = ("machine", 1)
-        found["output"] = ("storage", self.count)
-        return {name: (kind, self.capacities.get(name, own)) for name, (kind, own) in found.items()}
+                by_name[f"{machine.name}_buffer"] = ("buffer", BUFFER_ROOM)
+            by_name[machine.name] = ("machine", 1)
+        by_name["output"] = ("storage", self.count)
+        return {name: (kind, self.capacities.get(name, own)) for name, (kind, own) in by_name.items()}
 
     @property
     def count(self) -> int:
@@ -164,10 +164,10 @@ def arm_of_word(word: str) -> str:
 def part_of_word(word: str, taken: Collection[str] = ()) -> NewPart:
     """The kind of part of a word such as "cup=cylinder:0.035x0.1:1"; the default name is its shape's. Raises BadInput."""
     where = f"part '{word}' (--part)"
-    found = re.fullmatch(r"(?:([^=:]*)=)?([^=:]*):([^=:]*):([^=:]*)", word)
-    if found is None:
+    match = re.fullmatch(r"(?:([^=:]*)=)?([^=:]*):([^=:]*):([^=:]*)", word)
+    if match is None:
         raise BadInput(f"{where}: wanted {PART_WORDS}")
-    named, shape, size, count = found.groups()
+    named, shape, size, count = match.groups()
     if shape not in SIZES:
         raise unknown("shape", shape, SIZES, where)
     form, numbers = SIZES[shape]
@@ -224,24 +224,24 @@ def new_task(
     names = [part.name for part in kinds]
     weigh = _by_name(changes.masses, "--mass", "part", names, (0.001, 6.0), "0.05")
     rub = _by_name(changes.frictions, "--friction", "part", names, (0.0, 5.0), "0.5")
-    kinds = [replace(one, given_kg=weigh.get(one.name), friction=rub.get(one.name, FRICTION)) for one in kinds]
-    found = NewTask(name, arm_of_word(arm), tuple(kinds), tuple(stations), buffers)
-    if found.count > MAX_PARTS:
-        raise BadInput(f"{found.count} parts (--part): allowed are 1 to {MAX_PARTS} in all")
-    found = replace(found, capacities=_capacities(found, changes.capacities))
+    kinds = [replace(kind, given_kg=weigh.get(kind.name), friction=rub.get(kind.name, FRICTION)) for kind in kinds]
+    new = NewTask(name, arm_of_word(arm), tuple(kinds), tuple(stations), buffers)
+    if new.count > MAX_PARTS:
+        raise BadInput(f"{new.count} parts (--part): allowed are 1 to {MAX_PARTS} in all")
+    new = replace(new, capacities=_capacities(new, changes.capacities))
     for name in changes.batches:
-        if name not in [machine.name for machine in found.machines]:
-            raise unknown("machine", name, [machine.name for machine in found.machines], "--batch")
-        if found.stations[name][1] < 2:
+        if name not in [machine.name for machine in new.machines]:
+            raise unknown("machine", name, [machine.name for machine in new.machines], "--batch")
+        if new.stations[name][1] < 2:
             raise BadInput(f"'{name}' (--batch): it holds 1 part, a batch needs room for 2: add --capacity {name}=2")
-    return replace(found, batches=tuple(dict.fromkeys(changes.batches)))
+    return replace(new, batches=tuple(dict.fromkeys(changes.batches)))
 
 
 def _by_name(
     words: Sequence[str], option: str, label: str, names: Collection[str], allowed: tuple[float, float], example: str
 ) -> dict[str, float]:
     """The numbers of an option such as --mass pin=0.05 by name. Raises BadInput."""
-    found: dict[str, float] = {}
+    numbers: dict[str, float] = {}
     for word in words:
         name, equals, number = word.rpartition("=")
         if not equals:
@@ -251,19 +251,19 @@ def _by_name(
         value = _number(number, -inf)
         if not allowed[0] <= value <= allowed[1]:
             raise BadInput(f"'{word}' ({option}): '{number}': allowed are {allowed[0]:g} to {allowed[1]:g}")
-        if name in found:
-            raise BadInput(f"'{word}' ({option}): {label} '{name}' has {found[name]:g} already: once is allowed")
-        found[name] = value
-    return found
+        if name in numbers:
+            raise BadInput(f"'{word}' ({option}): {label} '{name}' has {numbers[name]:g} already: once is allowed")
+        numbers[name] = value
+    return numbers
 
 
 def _capacities(new: NewTask, words: Sequence[str]) -> dict[str, int]:
-    found = _by_name(words, "--capacity", "station", [*new.stations], (1, MAX_PARTS), "2")
-    for name, most in found.items():
+    by_station = _by_name(words, "--capacity", "station", [*new.stations], (1, MAX_PARTS), "2")
+    for name, most in by_station.items():
         least = new.count if new.stations[name][0] == "storage" else 1
         if most != int(most) or most < least:
             raise BadInput(f"'{name}={most:g}' (--capacity): allowed are whole numbers from {least} to {MAX_PARTS}")
-    return {name: int(most) for name, most in found.items()}
+    return {name: int(most) for name, most in by_station.items()}
 
 
 def _number(text: str, none: float = -1.0) -> float:
@@ -303,10 +303,10 @@ def layouts(new: NewTask, around: Around, between_m: float | None = None) -> Ite
         far = around.nearest_m + share * (around.farthest_m - around.nearest_m)
         angles = [radians(turn) * (1 - 2 * number / (len(stations) - 1)) for number in range(len(stations))]
         placed = tuple(
-            one._replace(x=round(far * cos(angle), 3), y=round(far * sin(angle), 3))
-            for one, angle in zip(stations, angles, strict=True)
+            station._replace(x=round(far * cos(angle), 3), y=round(far * sin(angle), 3))
+            for station, angle in zip(stations, angles, strict=True)
         )
-        if all(_reached(one, around) for one in placed) and _apart(placed, new.foot_m, gap):
+        if all(_reached(station, around) for station in placed) and _apart(placed, new.foot_m, gap):
             yield placed
 
 
@@ -335,8 +335,8 @@ def _stations(new: NewTask, between_m: float | None = None) -> list[PlacedStatio
     return [placed(name, kind, capacity) for name, (kind, capacity) in new.stations.items()]
 
 
-def _reached(one: PlacedStation, around: Around) -> bool:
-    far = [hypot(one.x + x, one.y + y) for x, y in one.spots]
+def _reached(station: PlacedStation, around: Around) -> bool:
+    far = [hypot(station.x + x, station.y + y) for x, y in station.spots]
     return around.nearest_m + EDGE_M <= min(far) and max(far) <= around.farthest_m - EDGE_M
 
 

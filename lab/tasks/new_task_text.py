@@ -21,9 +21,9 @@ FINISHES = ((0.70, 0.42, 0.16), (0.85, 0.30, 0.20), (0.20, 0.40, 0.55), (0.45, 0
 
 
 def text_of(new: NewTask, placed: Sequence[PlacedStation], around: Around, opening_m: float | None = None) -> str:
-    """The task file; `opening_m`: the fingers open no farther, None: all the way."""
+    """The task file; opening_m: the largest opening of the fingers; None: as wide as they open."""
     parts = "\n".join(_part(new, part, number) for number, part in enumerate(new.parts))
-    stations = "\n".join(_station(new, one) for one in placed)
+    stations = "\n".join(_station(new, station) for station in placed)
     return "\n".join([_head(new, opening_m), parts, _workspace(new, placed, around), stations, _OBSTACLES, _LEARNING])
 
 
@@ -68,7 +68,7 @@ mass_kg = {part.mass_kg}
 friction = {part.friction}
 color = {_list(COLORS[number % len(COLORS)])}
 area = {_list(area)}  # it stands on its spot at the start within +- x, +- y [m], +- yaw [rad]
-# its way; a buffer is used only when the machine ahead of it is busy
+# its route; a buffer is used only when the machine ahead of it is busy
 routes = [[
 {route}
 ]]
@@ -77,11 +77,11 @@ routes = [[
 
 def _workspace(new: NewTask, placed: Sequence[PlacedStation], around: Around) -> str:
     low = round(heights_m(new)[1] - CELL_M / 2, 3)
-    ahead = max(hypot(one.x, one.y) for one in placed)  # the way from one side to the other leads there
+    ahead = max(hypot(station.x, station.y) for station in placed)  # paths between the two sides pass there
     lower, shape = [], []
     behind = -floor(around.nearest_m / CELL_M)  # no cell is free right behind the arm, where it cannot turn through
     for axis, others, least in ((0, [ahead], behind), (1, [0.0], -inf)):
-        at = [((one.x, one.y)[axis], one.half_m(new.foot_m)[axis] + CELL_M) for one in placed]
+        at = [((station.x, station.y)[axis], station.half_m(new.foot_m)[axis] + CELL_M) for station in placed]
         first = max(least, floor(min(x - half for x, half in at) / CELL_M))
         lower.append(round(CELL_M * first, 3))
         shape.append(ceil(max(*others, *(x + half for x, half in at)) / CELL_M) - first)
@@ -95,24 +95,26 @@ shape = [{shape[0]}, {shape[1]}, {LEVELS}]
 """
 
 
-def _station(new: NewTask, one: PlacedStation) -> str:
+def _station(new: NewTask, station: PlacedStation) -> str:
     lines = [
         "[[stations]]",
-        f'name = "{one.name}"',
-        f'kind = "{one.kind}"',
-        f"pose = {_list((one.x, one.y, 0.0))}",
-        f"capacity = {one.capacity}",
+        f'name = "{station.name}"',
+        f'kind = "{station.kind}"',
+        f"pose = {_list((station.x, station.y, 0.0))}",
+        f"capacity = {station.capacity}",
     ]
-    if one.name in new.batches:
+    if station.name in new.batches:
         lines.append("batch = true                # all parts in it begin and end together")
-    if one.lists_spots:
+    if station.lists_spots:
         lines.append("spots = [                   # where parts stand: x, y, yaw off the pose")
-        lines += [f"  {_list((*spot, 0.0))}," for spot in one.spots]
+        lines += [f"  {_list((*spot, 0.0))}," for spot in station.spots]
         lines.append("]")
     order = [machine.name for machine in new.machines]
-    if one.name in order:
-        number = order.index(one.name)
-        out = [2 * max(abs(spot[axis]) for spot in one.spots) for axis in (0, 1)]  # from the pose to all spots, twice
+    if station.name in order:
+        number = order.index(station.name)
+        out = [
+            2 * max(abs(spot[axis]) for spot in station.spots) for axis in (0, 1)
+        ]  # from the pose to all spots, twice
         edges = (foot + AROUND_PART_M + more for foot, more in zip(new.foot_m, out, strict=True))
         size = (*(round(edge, 3) for edge in edges), MACHINE_HIGH_M)
         lines += [
@@ -129,7 +131,7 @@ def _list(numbers: Sequence[float]) -> str:
 
 
 _OBSTACLES = """\
-# ---- what stands in the way: take the # away, and it does ----------------------------------------------------------
+# ---- obstacles: remove the # to add one ----------------------------------------------------------------------------
 # [[obstacles]]
 # name = "tower"
 # position_m = [0.5, 0.3]

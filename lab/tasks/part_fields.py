@@ -22,25 +22,25 @@ SIZES = {
 
 
 class GripFields(Record):
-    """Where the gripper takes a part."""
+    """The place at which the gripper takes a part."""
 
     yaw: Angle = 0.0
-    """The tool's turn against the part [rad]; at 0 the fingers close along the part's y axis."""
+    """The tool's yaw relative to the part [rad]; at 0 the fingers close along the part's y axis."""
     up_m: Annotated[float, Field(gt=0, le=10)]
-    """How high the finger tips are above the part's foot [m], such as `0.04`."""
+    """The height of the finger tips above the part's foot [m], such as `0.04`."""
     at_m: Annotated[
         tuple[Annotated[float, Field(ge=-1, le=1)], Annotated[float, Field(ge=-1, le=1)]], BeforeValidator(as_tuple)
     ] = (0.0, 0.0)
-    """How far the tool's axis is off the part's middle, along its x and y [m], such as `[0.0, 0.01]`."""
+    """The offset of the tool's axis from the part's middle, along its x and y axes [m], such as `[0.0, 0.01]`."""
 
 
 class PartFields(Record):
-    """A kind of part: its body, and where the gripper takes it."""
+    """A kind of part: its body, and the place of the grip."""
 
     name: Name
     """The kind's name, such as `"bun"`; parts are called by it and their number: bun 1, bun 2."""
     shape: ShapeName
-    """What its body is: a box, an upright cylinder, or a mesh from a file."""
+    """The shape of its body: a box, an upright cylinder, or a mesh from a file."""
     size_m: Annotated[tuple[Edge, ...] | None, BeforeValidator(as_tuple)] = None
     """The edges along x, y and z of a box, or the diameter and height of a cylinder [m], such as `[0.06, 0.03, 0.08]`
     or `[0.03, 0.09]`; a mesh has none.
@@ -48,25 +48,25 @@ class PartFields(Record):
     file: str | None = None
     """The OBJ or STL file of a mesh, beside the task file, such as `"bracket.stl"`."""
     scale: Annotated[float, Field(gt=0, le=1000)] = 1.0
-    """How many metres one unit of the mesh file is [m], such as `0.001`."""
+    """The length of one unit of the mesh file [m], such as `0.001`."""
     hull: bool = False
     """Whether a mesh with holes is taken as its convex hull."""
     stands: Annotated[tuple[Angle, Angle], BeforeValidator(as_tuple)] = (0.0, 0.0)
-    """How the shape is tilted as it stands: roll and pitch [rad], such as `[1.5708, 0.0]`."""
+    """The tilt of the standing shape against its file: roll and pitch [rad], such as `[1.5708, 0.0]`."""
     mass_kg: Annotated[float, Field(ge=0.001, le=6)]
-    """What one part weighs [kg], such as `0.05`."""
+    """The mass of one part [kg], such as `0.05`."""
     friction: Annotated[float, Field(ge=0, le=5)] = 0.8
-    """The coefficient of friction against the fingers and what it stands on [-]."""
+    """The coefficient of friction of the part against the fingers and its support [-]."""
     color: Annotated[tuple[Share, Share, Share], BeforeValidator(as_tuple)] = (0.62, 0.42, 0.22)
-    """Its colour: red, green and blue [-]."""
+    """The part's colour: red, green and blue [-]."""
     look: str | None = None
     """A URDF that is shown instead of the shape in its colour, such as `"slice.urdf"`."""
     area: Annotated[tuple[Off, Off, Off], BeforeValidator(as_tuple)] = (0.0, 0.0, 0.0)
-    """How far a part may stand off its spot at the start, either way, drawn from the seed: x, y and turn [m, m, rad],
-    such as `[0.004, 0.004, 0.06]`.
+    """The largest offset of a part from its spot at the start, drawn from the seed in both directions: x, y and turn
+    [m, m, rad], such as `[0.004, 0.004, 0.06]`.
     """
     grip: GripFields | None = None
-    """Where the gripper takes it, such as `{ up_m = 0.04 }`; left out, that is computed from the shape."""
+    """The place of the grip, such as `{ up_m = 0.04 }`; left out: computed from the shape."""
 
     @field_validator("shape", mode="before")
     @classmethod

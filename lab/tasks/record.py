@@ -59,19 +59,19 @@ def walking(step: float, learner: LearnerSettings) -> float:
 
 
 class Learned(Record):
-    """How something is learned: learner, rewards and gate, which spares the best episodes unless a file says otherwise.
+    """Settings of learning: learner, rewards and gate. The gate has `spare_best` on unless a file switches it off.
 
-    Where a file names no `rewards.collision`, it costs the goal's worth more than walking as long as can be: however long a
-    learner has strayed, it does better to go on than to crash.
+    A `rewards.collision` that a file leaves out is the return of the longest walk minus the reward of the goal: however long a
+    learner has strayed, continuing is worth more than a collision.
     """
 
     learner: Annotated[LearnerSettings, FROM_TABLE] = LearnerSettings()
-    """How it learns; the keys that are left out keep their defaults, such as `{ learner = "dyna-q", episodes = 300 }`."""
+    """The settings of the learner, such as `{ learner = "dyna-q", episodes = 300 }`; left-out keys have their defaults."""
     rewards: Annotated[Rewards, FROM_TABLE] = Field(default=cast(Rewards, {}), validate_default=True)
-    """What moves are worth, such as `{ goal = 1.5, step = -0.1 }`."""
+    """The rewards of moves, such as `{ goal = 1.5, step = -0.1 }`."""
     gate: Annotated[GateSettings, FROM_TABLE] = GateSettings(spare_best=True)
-    """When it asks for advice, such as `{ gate = "ccrl", omega = 7 }`; `spare_best` is true here unless the file says
-    otherwise.
+    """The settings of the gate, by which the learner asks for advice, such as `{ gate = "ccrl", omega = 7 }`;
+    `spare_best` is true by default here.
     """
 
     @field_validator("rewards", mode="before")
@@ -102,7 +102,7 @@ class Learned(Record):
         return rewards
 
     def warning(self) -> str | None:
-        """Why these rewards make crashing the better choice for a learner that has strayed; None where they do not."""
+        """The reason why a strayed learner does better to collide with these rewards; None if it does not."""
         collision, learner, moves, walked = self.rewards.collision, self.learner, 0, 0.0
         if collision < walking(self.rewards.step, learner):
             return None

@@ -14,45 +14,45 @@ Part = Annotated[str, Field(min_length=1, max_length=100)]
 
 
 class RobotSettings(Record):
-    """The arm, how it is mounted, where it starts, and how fast and firm it works."""
+    """The arm, its mounting, its start, its speed and its forces."""
 
     model: str = "up6"
-    """An arm that ships: `up6`, `panda`, `iiwa`, `xarm6`; or the URDF file of another beside the task file, such as
+    """The arm: `up6`, `panda`, `iiwa` or `xarm6`, or the URDF file of another one beside the task file, such as
     `"my-arm.urdf"`.
     """
     tool_link: Part | None = None
-    """Of a URDF: the link whose z axis points out of the gripper and along whose y axis the fingers close, such as
+    """In a URDF: the link whose z axis points out of the gripper and along whose y axis the fingers close, such as
     `"hand"`.
     """
     fingers: Annotated[tuple[Part, ...], BeforeValidator(as_tuple), Field(min_length=1, max_length=8)] | None = None
-    """Of a URDF: the joints that move the fingers, such as `["left_finger", "right_finger"]`."""
+    """In a URDF: the joints that move the fingers, such as `["left_finger", "right_finger"]`."""
     tip_m: Annotated[float, Field(ge=0, le=1)] | None = None
-    """Of a URDF: how far the finger tips are out along the tool link's z axis [m], such as `0.1`."""
+    """In a URDF: the distance of the finger tips along the tool link's z axis [m], such as `0.1`."""
     nearest_m: Annotated[float, Field(ge=0.05, le=5)] | None = None
-    """The tool never comes nearer than this to the arm's own vertical axis [m], such as `0.3`; left out: as the arm
-    has it.
+    """The least distance of the tool from the arm's vertical axis [m], such as `0.3`; left out: the arm's own
+    limit.
     """
     opening_m: Annotated[float, Field(ge=0.002, le=1)] | None = None
-    """How far the fingers open [m], such as `0.046`; left out: all the way."""
+    """The opening between the fingers [m], such as `0.046`; left out: as wide as they open."""
     base_up_m: Annotated[float, Field(ge=-2, le=5)] = 0.0
-    """How high the arm's foot stands above the table [m]."""
+    """The height of the arm's foot above the table [m]."""
     tool: Literal["hanging", "level"] | None = None
-    """How the tool is held, everywhere: it hangs down ("hanging"), or is level and takes parts from behind ("level"); left
-    out: level where a station has approach = "side", else hanging.
+    """The direction of the tool in the whole task: it hangs down ("hanging"), or is level and takes parts from behind
+    ("level"); left out: level if a station has approach = "side", else hanging.
     """
     start: Name
     """The station above which the arm waits at time 0, such as `"input"`."""
     speed_m_s: Annotated[float, Field(ge=0.01, le=1.5)] = 0.5
-    """How fast the tool moves along its path, at most [m/s]."""
+    """The largest speed of the tool along its path [m/s]."""
     acceleration_m_s2: Annotated[float, Field(ge=0.01, le=10)] = 2.0
-    """How fast the tool gains and loses speed, at most [m/s2]."""
+    """The largest acceleration of the tool [m/s2]."""
     grip_force_n: Annotated[float, Field(gt=0, le=STRONGEST_N)] | None = None
-    """With what force each finger presses, at most [N], such as `25.0`: a part that would creep is held more
-    gently. Left out, it is chosen for each kind of part from its mass, size and friction.
+    """The largest force of each finger [N], such as `25.0`; a part that would creep is held with less. Left out: chosen
+    for each kind of part from its mass, size and friction.
     """
     force_limit_n: Annotated[float, Field(ge=10, le=5000)] | None = None
-    """With what force the arm may press on something hard before a protective stop holds it [N], such as `150.0`; left
-    out: 150, or six times the grip force where that is more.
+    """The contact force of the arm at which a protective stop holds it [N], such as `150.0`; left out: 150, or six times
+    the grip force if that is more.
     """
 
     @property

@@ -95,8 +95,8 @@ class _Record:
         if word is None:
             return []
         value = self.values[word]
-        found = [" ".join(str(one).split()) for one in (value if isinstance(value, list) else [value])]
-        return [shortened(f"{word} {one}" if one.isdigit() else one, 40) for one in found]
+        texts = [" ".join(str(text).split()) for text in (value if isinstance(value, list) else [value])]
+        return [shortened(f"{word} {one}" if one.isdigit() else one, 40) for one in texts]
 
     def name(self, field_name: str) -> str | None:
         return next(iter(self.names(field_name)), None)
@@ -144,23 +144,25 @@ def read_schedule(paths: Sequence[Path]) -> ScheduleTable:
             records += _of_json(source, problems)
         else:
             records += _of_csv(source)
-    places = {name: at for one in records for name, at in _place(one)}
-    timed = [one for one in records if one.timed and str(one.values.get("present", True)).lower() != "false"]
-    carrying = [one for one in timed if one.word("station") or one.word("vehicle")]
+    places = {name: at for record in records for name, at in _place(record)}
+    timed = [
+        record for record in records if record.timed and str(record.values.get("present", True)).lower() != "false"
+    ]
+    carrying = [record for record in timed if record.word("station") or record.word("vehicle")]
     if not carrying:
         raise _nothing(_source(paths[0]), timed)
     _check_count("row", carrying, paths[0])
-    told = [row for one in carrying for row in _rows(one, problems[0] if problems else None)]
-    dates = {one.dated for one in carrying}
+    told = [row for record in carrying for row in _rows(record, problems[0] if problems else None)]
+    dates = {record.dated for record in carrying}
     if len(dates) > 1:
-        odd = next(one for one in carrying if one.dated != carrying[0].dated)
+        odd = next(record for record in carrying if record.dated != carrying[0].dated)
         raise odd.refusal("all times to be numbers or all to be dates", odd.values.get(odd.word("start") or ""))
     first_s = min(row.start_s for _, row in told) if True in dates else 0.0
     if (last_s := max(row.end_s for _, row in told) - first_s) > MOST_TIME_S:
         raise BadInput(f"schedule '{paths[0]}': it lasts {last_s:g} s: at most {MOST_TIME_S:g} s are shown")
     rows = sorted(
         ((when, replace(row, start_s=row.start_s - first_s, end_s=row.end_s - first_s)) for when, row in told),
-        key=lambda one: (one[1].start_s, one[1].end_s),
+        key=lambda row: (row[1].start_s, row[1].end_s),
     )
     measured = tuple(row for when, row in rows if when != "planned")
     planned = tuple(row for when, row in rows if when == "planned")
@@ -171,7 +173,7 @@ def read_schedule(paths: Sequence[Path]) -> ScheduleTable:
         ("vehicle", vehicles),
     ):
         _check_count(kind, names, paths[0])
-    arms = len(vehicles) == 1 and all((one.word("vehicle") or "robot") in _ARMS for one in carrying)
+    arms = len(vehicles) == 1 and all((record.word("vehicle") or "robot") in _ARMS for record in carrying)
     return ScheduleTable(measured or planned, planned if measured else (), places, arms)
 
 
@@ -191,7 +193,7 @@ def _check_count(kind: str, found: Any, path: Path) -> None:
 
 def _nothing(source: Source, timed: Sequence[_Record]) -> BadInput:
     """The error for a file in which no row has both a station or vehicle and times."""
-    words = sorted({word for one in timed for word in one.values})
+    words = sorted({word for record in timed for word in record.values})
     what = "a machine" if timed else "a start and an end"
     there = f", not only {', '.join(words)}" if words else ""
     keys = list(dict.fromkeys(re.findall(r'"([^"\n]{1,30})"\s*:', source.text)))[:100]
@@ -255,9 +257,9 @@ def _of_problem(problem: Mapping[str, Any], record: _Record) -> tuple[str | None
     task = called("tasks", number)
     told = problem["tasks"][number]
     job = told.get("job") if isinstance(told, dict) else None
-    found = record.values.get("resource")
-    resources = found if isinstance(found, list) else [found]
-    return task if job is None else called("jobs", job), [called("resources", one) for one in resources]
+    numbers = record.values.get("resource")
+    resources = numbers if isinstance(numbers, list) else [numbers]
+    return task if job is None else called("jobs", job), [called("resources", resource) for resource in resources]
 
 
 # ---- Records of CSV files and of JSON files ---------------------------------------------------------------------------
@@ -271,7 +273,7 @@ def _of_csv(source: Source) -> list[_Record]:
     head = lines[0][1]
     comma = max((",", ";", "\t"), key=head.count)
     columns = next(csv.reader([head], delimiter=comma))
-    words = [_word(one) for one in columns]
+    words = [_word(column) for column in columns]
     there = {word for word, _ in words}
     if not (there & {"x", "y"}):
         _check_columns(source, lines[0][0], columns, there)
@@ -296,8 +298,8 @@ def _check_columns(source: Source, line: int, columns: Sequence[str], there: set
         known = [word for name in group for word in WORDS[name]]
         if there & set(known):
             continue
-        free = [(one, _word(one)[0]) for one in columns if _word(one)[0] not in _KNOWN]
-        near = [(one, close[0]) for one, word in free if (close := get_close_matches(word, known, n=1))]
+        free = [(column, _word(column)[0]) for column in columns if _word(column)[0] not in _KNOWN]
+        near = [(column, close[0]) for column, word in free if (close := get_close_matches(word, known, n=1))]
         hint = f"; did you mean '{near[0][1]}' by '{shortened(near[0][0], 40)}'?" if near else ";"
         wanted = ", ".join(word for name in group for word in WORDS[name][:4])
         shown = shortened(", ".join(columns))
@@ -325,10 +327,10 @@ def _walk(
         raise source.refusal(None, f"JSON in which nothing is more than {MOST_DEEP} deep")
     if isinstance(value, list):
         word = _word(str(way[-1]))[0] if way else ""
-        for number, one in enumerate(value):
-            own = next((one[key] for key in ("id", "name") if isinstance(one, dict) and one.get(key)), number)
+        for number, item in enumerate(value):
+            own = next((item[key] for key in ("id", "name") if isinstance(item, dict) and item.get(key)), number)
             inside = {**around, word: own} if word in _KNOWN else around
-            yield from _walk(source, one, (*way, number), inside, problems)
+            yield from _walk(source, item, (*way, number), inside, problems)
         return
     if not isinstance(value, dict):
         return
@@ -336,24 +338,24 @@ def _walk(
         problems.append(value)  # PyJobShop's ProblemData
         return
     values, units = dict(around), dict[str, float]()
-    for key, one in value.items():
+    for key, item in value.items():
         word, unit = _word(key)
-        plain = one["time"] if isinstance(one, dict) and set(one) == {"time"} else one
+        plain = item["time"] if isinstance(item, dict) and set(item) == {"time"} else item
         scalars = isinstance(plain, list) and all(isinstance(each, str | int) for each in plain)
         if scalars or not isinstance(plain, list | dict):
             values[word] = plain
             units |= {} if unit is None else {word: unit}
-    found = [
+    records = [
         record
-        for key, one in value.items()
-        for record in _walk(source, one, (*way, key), _inside(way, key, around), problems)
+        for key, item in value.items()
+        for record in _walk(source, item, (*way, key), _inside(way, key, around), problems)
     ]
     if len(way) > 1 and _word(str(way[-2]))[0] in _KNOWN and isinstance(way[-1], int):
         values.pop("id", None)  # the name of a part, machine or vehicle in its list, see `around`
     own = _Record(source, values, units, way)
-    if (own.timed and not any(one.timed for one in found)) or (own.word("x") and own.word("y")):
+    if (own.timed and not any(record.timed for record in records)) or (own.word("x") and own.word("y")):
         yield own
-    yield from found
+    yield from records
 
 
 def _inside(way: tuple[str | int, ...], key: str, around: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -368,8 +370,8 @@ def _word(column: str) -> tuple[str, float | None]:
     unit = _UNIT.search(text)
     plain = re.sub(r"[\W_]", "", text[: unit.start()] if unit else text)
     for end in ("", "id", "name", "time", "date", "at", "s"):
-        if plain.endswith(end) and (found := plain.removesuffix(end)) in _KNOWN:
-            return found, UNITS[unit[1]] if unit else None
+        if plain.endswith(end) and (stem := plain.removesuffix(end)) in _KNOWN:
+            return stem, UNITS[unit[1]] if unit else None
     return plain, UNITS[unit[1]] if unit else None
 
 

@@ -95,7 +95,7 @@ def _below(record: type[Record]) -> Iterator[type[Record]]:
 
 def field_texts(record: type[Record]) -> dict[str, str]:
     """The text below each field of a record, inherited fields included; a field may have none."""
-    found: dict[str, str] = {}
+    texts: dict[str, str] = {}
     for kind in reversed(record.__mro__):
         if issubclass(kind, Record):
             [made] = ast.parse(dedent(getsource(kind))).body
@@ -103,20 +103,20 @@ def field_texts(record: type[Record]) -> dict[str, str]:
             for field, below in pairwise(made.body):
                 match field, below:
                     case ast.AnnAssign(target=ast.Name(name)), ast.Expr(ast.Constant(str(text))):
-                        found[name] = cleandoc(text)
-    return found
+                        texts[name] = cleandoc(text)
+    return texts
 
 
 def _from_dataclasses() -> dict[str, dict[str, str]]:
     """The descriptions of dataclasses and of their fields, by class and field; "" holds the description of the class."""
-    found: dict[str, dict[str, str]] = {}
+    by_class: dict[str, dict[str, str]] = {}
     for kind in (LearnerSettings, GateSettings, Rewards):
         hints = get_type_hints(kind, include_extras=True)
-        found[kind.__name__] = {"": " ".join(str(kind.__doc__).split("\n\n")[0].split())}
+        by_class[kind.__name__] = {"": " ".join(str(kind.__doc__).split("\n\n")[0].split())}
         for field in fields(kind):
-            texts = [one.documentation for one in hints[field.name].__metadata__ if isinstance(one, DocInfo)]
-            found[kind.__name__][field.name] = "".join(texts)
-    return found
+            texts = [item.documentation for item in hints[field.name].__metadata__ if isinstance(item, DocInfo)]
+            by_class[kind.__name__][field.name] = "".join(texts)
+    return by_class
 
 
 def _names() -> dict[tuple[str, str], tuple[list[str], Schema | None]]:
@@ -137,50 +137,50 @@ def _names() -> dict[tuple[str, str], tuple[list[str], Schema | None]]:
 
 def _plain(schema: Schema) -> Schema:
     """A schema adapted to draft 7 and TOML: without null, arrays with items, references without siblings, with examples."""
-    found = {key: value for key, value in schema.items() if key != "title"}
-    if "properties" in found:
-        found["properties"] = {key: _plain(value) for key, value in found["properties"].items()}
-    for pattern, value in found.pop("patternProperties", {}).items():  # tables by name, all of one kind
-        found |= {"propertyNames": {"pattern": pattern}, "additionalProperties": value}
+    plain = {key: value for key, value in schema.items() if key != "title"}
+    if "properties" in plain:
+        plain["properties"] = {key: _plain(value) for key, value in plain["properties"].items()}
+    for pattern, value in plain.pop("patternProperties", {}).items():  # tables by name, all of one kind
+        plain |= {"propertyNames": {"pattern": pattern}, "additionalProperties": value}
     for key in ("items", "additionalProperties"):
-        if isinstance(found.get(key), dict):
-            found[key] = _plain(found[key])
-    if found.get("default", ()) is None or isinstance(found.get("default"), dict) or found.get("default") == []:
-        del found["default"]
-    choices = [_plain(one) for one in found.pop("anyOf", []) if one != {"type": "null"}]
+        if isinstance(plain.get(key), dict):
+            plain[key] = _plain(plain[key])
+    if plain.get("default", ()) is None or isinstance(plain.get("default"), dict) or plain.get("default") == []:
+        del plain["default"]
+    choices = [_plain(choice) for choice in plain.pop("anyOf", []) if choice != {"type": "null"}]
     if len(choices) == 1:
-        found = choices[0] | found
+        plain = choices[0] | plain
     elif choices:
-        found["anyOf"] = choices
-    if found.get("type") == "array":
+        plain["anyOf"] = choices
+    if plain.get("type") == "array":
         for old, new in (("minLength", "minItems"), ("maxLength", "maxItems")):
-            if old in found:
-                found[new] = found.pop(old)
-        if places := [_plain(one) for one in found.pop("prefixItems", [])]:
-            found["items"] = places[0] if all(place == places[0] for place in places) else places
-    if "description" in found:
-        found["description"] = " ".join(found["description"].split())
-        if examples := examples_of(found["description"]):
-            found["examples"] = examples
-    if found.get("$ref", "").rpartition("/")[2] in STAGES:
-        found = {"anyOf": [{"type": "string", "pattern": NAME_PATTERN}, found]}
-    if "$ref" in found and len(found) > 1:
-        found["allOf"] = [{"$ref": found.pop("$ref")}]
-    return found
+            if old in plain:
+                plain[new] = plain.pop(old)
+        if places := [_plain(place) for place in plain.pop("prefixItems", [])]:
+            plain["items"] = places[0] if all(place == places[0] for place in places) else places
+    if "description" in plain:
+        plain["description"] = " ".join(plain["description"].split())
+        if examples := examples_of(plain["description"]):
+            plain["examples"] = examples
+    if plain.get("$ref", "").rpartition("/")[2] in STAGES:
+        plain = {"anyOf": [{"type": "string", "pattern": NAME_PATTERN}, plain]}
+    if "$ref" in plain and len(plain) > 1:
+        plain["allOf"] = [{"$ref": plain.pop("$ref")}]
+    return plain
 
 
 def examples_of(description: str) -> list[Any]:
     """The example values in a description, after "such as", parsed as TOML."""
-    found = EXAMPLES.search(description)
+    match = EXAMPLES.search(description)
     return (
-        [] if found is None else [tomllib.loads(f"value = {word[1:-1]}")["value"] for word in QUOTED.findall(found[1])]
+        [] if match is None else [tomllib.loads(f"value = {word[1:-1]}")["value"] for word in QUOTED.findall(match[1])]
     )
 
 
 def unit_of(description: str) -> str:
     """The unit in brackets in a description; "-": a bare number; empty: there is none."""
-    found = UNIT.search(QUOTED.sub("", description))
-    return "" if found is None else found[1]
+    match = UNIT.search(QUOTED.sub("", description))
+    return "" if match is None else match[1]
 
 
 # ---- The reference page -------------------------------------------------------------------------------------------
@@ -237,29 +237,29 @@ def page_of(kind: str) -> str:
 
 def tables_of(schema: Schema) -> list[SchemaTable]:
     """The tables of a kind of file, each once, in the order of the keys that hold them; the whole file first."""
-    found = [SchemaTable("The file itself", schema)]
+    tables = [SchemaTable("The file itself", schema)]
     seen: set[str] = set()
 
     def walk(above: str, properties: Schema) -> None:
-        inner = [(key, *one) for key, field in properties.items() for one in _held(field) if one[0] not in seen]
+        inner = [(key, *held) for key, field in properties.items() for held in _held(field) if held[0] not in seen]
         for key, name, many in inner:
             if name in seen:
                 continue
             seen.add(name)
             path = f"{above}{key}"
             own = {"[]": f"`[[{path}]]`", "{}": f"`[{path}.NAME]`", "": f"`[{path}]`"}.get(many, f"A stage of `{path}`")
-            found.append(SchemaTable(own, schema[TABLES][name]))
+            tables.append(SchemaTable(own, schema[TABLES][name]))
             walk(path + {"{}": ".NAME."}.get(many, "."), schema[TABLES][name]["properties"])
 
     walk("", schema["properties"])
-    return found
+    return tables
 
 
 def _held(field: Schema, many: str = "") -> Iterator[tuple[str, str]]:
     """The records in a field and their nesting: "" one, "[]" a list, "[][]" a list of lists, "{}" a table by name."""
-    for one in (field, *field.get("allOf", []), *field.get("anyOf", [])):
-        if "$ref" in one:
-            yield one["$ref"].rpartition("/")[2], many
+    for schema in (field, *field.get("allOf", []), *field.get("anyOf", [])):
+        if "$ref" in schema:
+            yield schema["$ref"].rpartition("/")[2], many
     for key, way in (("items", "[]"), ("additionalProperties", "{}")):
         if isinstance(field.get(key), dict):
             yield from _held(field[key], many + way)
@@ -268,7 +268,7 @@ def _held(field: Schema, many: str = "") -> Iterator[tuple[str, str]]:
 def _allowed(field: Schema, schema: Schema) -> str:
     """The values that a field allows, in words."""
     if "anyOf" in field:
-        return ", or ".join(_allowed(one, schema) for one in field["anyOf"])
+        return ", or ".join(_allowed(choice, schema) for choice in field["anyOf"])
     if (held := next(_held(field), None)) and field.get("type") != "array":
         return next(table.heading for table in tables_of(schema) if table.schema is schema[TABLES][held[0]])
     if "enum" in field or "const" in field:
@@ -277,7 +277,7 @@ def _allowed(field: Schema, schema: Schema) -> str:
         case "array":
             items = field.get("items", {})
             each = " and ".join(
-                dict.fromkeys(_allowed(one, schema) for one in (items if isinstance(items, list) else [items]))
+                dict.fromkeys(_allowed(item, schema) for item in (items if isinstance(items, list) else [items]))
             )
             return f"{_count(field.get('minItems', 0), field.get('maxItems'))}: {each}"
         case "object":

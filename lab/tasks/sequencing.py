@@ -54,26 +54,26 @@ def read_policy(path: Path, where: str = "--policy") -> CarriedPolicy:
 
 
 class Sequencing(Record):
-    """How the order of the robot's transfers is found, and what it is judged by."""
+    """The search for the order of the robot's transfers, and its objective."""
 
     method: str = "srl-time"
     """The method that finds the order: a name that `lab sequence --help` lists."""
     episodes: Annotated[int, Field(ge=1, le=1_000_000)] = 400
-    """How many sequences are tried."""
+    """The number of sequences that are tried."""
     alpha: Annotated[float, Field(gt=0, le=1)] = 0.05
     """The learning rate of srl and mc [-]."""
     discount: Annotated[float, Field(gt=0, le=1)] = 0.9
-    """What the next step counts for, compared with this one, in srl [-]."""
+    """The discount factor of srl: the weight of the next step, compared with this one [-]."""
     beta: Annotated[float, Field(ge=0, le=100)] = 1.0
-    """How fast srl stops exploring: in episode n with the chance n**-beta [-]."""
+    """The decay of srl's exploration, whose probability in episode n is n**-beta [-]."""
     reward_factor: Literal["A", "B"] = "B"
-    """Which of the thesis's two reward factors srl has."""
+    """The thesis's reward factor, A or B, that srl uses."""
     objective: str = MAKESPAN
-    """What a sequence is judged by: a name that `lab sequence --help` lists."""
+    """The objective that is minimised: a name that `lab sequence --help` lists."""
     values: Literal["pairs", "states"] = "pairs"
-    """What srl has values of: pairs of a state and an action (figure 5.1), or the states after it (the listings)."""
+    """The arguments of srl's values: pairs of a state and an action (figure 5.1), or afterstates (the listings)."""
     state: Literal["parts", "stations"] = "parts"
-    """What a state of srl is: where each part is, or what stands at each station (thesis, appendix III)."""
+    """The state of srl: the position of each part, or the parts at each station (thesis, appendix III)."""
 
     def settings(self) -> SrlSettings:
         """The parameters of SRL and Monte Carlo."""

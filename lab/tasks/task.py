@@ -39,16 +39,14 @@ Order = tuple[str, ...]  # the kind of each part, part 1 first
 
 
 class Task(Record):
-    """A whole task file, checked: a cell in physics, the parts that are made in it, and how the robot learns."""
+    """A whole task file, checked: a cell in physics, the parts that are made in it, and the settings of learning."""
 
     name: Name
     """The task's name, such as `"bakery"`: 1 to 40 letters, digits, spaces, - and _."""
     title: str = ""
-    """A line that says what the task is, such as `"Two buns through one oven"`."""
+    """A title in one line, such as `"Two buns through one oven"`."""
     perception: Literal["truth", "camera"] = "truth"
-    """How the robot knows where parts stand: the simulator says so ("truth"), or the camera in the hand sees it
-    ("camera").
-    """
+    """The source of the parts' poses for the robot: the simulator ("truth"), or the camera in the hand ("camera")."""
     robot: RobotSettings
     """The arm."""
     parts: Annotated[tuple[Part, ...], BeforeValidator(as_tuple), Field(min_length=1, max_length=MAX_PARTS)]
@@ -58,21 +56,21 @@ class Task(Record):
     camera: CameraSettings | None = None
     """The overhead camera; needed by a station with approach = "camera"."""
     stations: Annotated[tuple[Station, ...], BeforeValidator(as_tuple), Field(min_length=2, max_length=MOST_THINGS)]
-    """Where parts stand and are worked on."""
+    """The stations at which parts stand and are worked on."""
     processes: dict[Name, Process] = Field(default={})
-    """What is done to a surface cell by cell, such as butter or glue; by the names that stations and stages use."""
+    """The processes that cover a surface cell by cell, as with butter or glue, by the names that stations and stages use."""
     after: Annotated[tuple[After, ...], BeforeValidator(as_tuple), Field(max_length=MOST_THINGS)] = ()
-    """Which transfers have to wait for others, as tables `[[after]]`."""
+    """The precedences between transfers, as tables `[[after]]`."""
     obstacles: Annotated[tuple[Obstacle, ...], BeforeValidator(as_tuple), Field(max_length=MOST_THINGS)] = ()
-    """What stands in the way."""
+    """The obstacles, which the arm must avoid."""
     faults: Annotated[tuple[FaultFields, ...], BeforeValidator(as_tuple), Field(max_length=MOST_THINGS)] = ()
-    """What goes wrong in every run."""
+    """The faults that strike in every run."""
     subtasks: dict[str, Subtask] = Field(default={})
-    """How a sub-task is learned, by its kind: grasp, transfer, place, insert or cover; the defaults serve where there
-    is none.
+    """The settings of learning by kind of sub-task: grasp, transfer, place, insert or cover; left out: the
+    defaults.
     """
     sequencing: Sequencing = Sequencing()
-    """How the order of the robot's transfers is found."""
+    """The settings of the search for the order of the robot's transfers."""
     _folder: Path | None = PrivateAttr(default=None)
     _toml: TomlText | None = PrivateAttr(default=None)
 
@@ -154,13 +152,13 @@ class Task(Record):
                 if kind not in wanted:
                     raise unknown("part", kind, wanted, "--parts")
                 wanted[kind] = count
-        found = tuple(kind for kind, count in wanted.items() for _ in range(count))
+        kinds = tuple(kind for kind, count in wanted.items() for _ in range(count))
         if first is None and counts is None:
             with self.in_its_file():
-                self._check_room(found, "the sum of their counts", f"part '{self.made[0].name}': count: ")
+                self._check_room(kinds, "the sum of their counts", f"part '{self.made[0].name}': count: ")
         else:
-            self._check_room(found, "--toasts, --parts", "")
-        return found
+            self._check_room(kinds, "--toasts, --parts", "")
+        return kinds
 
     def ordered(self, toasts: int | None = None, parts: str | None = None) -> Order:
         """The order of --toasts (parts of the first kind) or of --parts (parts of each kind); raises BadInput for both."""
@@ -279,12 +277,14 @@ class Task(Record):
     @model_validator(mode="after")
     def _after_known(self) -> Self:
         made = [part.name for part in self.made]
-        for number, one in enumerate(self.after, start=1):
-            if one.part == one.of:
-                raise ValueError(f"after {number}: of = '{one.of}': a kind cannot wait for itself, wanted another one")
+        for number, precedence in enumerate(self.after, start=1):
+            if precedence.part == precedence.of:
+                raise ValueError(
+                    f"after {number}: of = '{precedence.of}': a kind cannot wait for itself, wanted another one"
+                )
             for kind, step, station in (
-                (one.part, one.step, one.station),
-                (one.of, one.of_step, one.of_station or one.station),
+                (precedence.part, precedence.step, precedence.station),
+                (precedence.of, precedence.of_step, precedence.of_station or precedence.station),
             ):
                 if kind not in made:
                     raise unknown("part", kind, made, f"after {number}")
@@ -351,8 +351,8 @@ class Task(Record):
             stations = machines if fault.what.startswith("machine") else [place.name for place in self.stations]
             if fault.station is not None and fault.station not in stations:
                 raise unknown("station", fault.station, stations, where)
-            if fault.obstacle is not None and fault.obstacle not in [one.name for one in self.obstacles]:
-                raise unknown("obstacle", fault.obstacle, [one.name for one in self.obstacles], where)
+            if fault.obstacle is not None and fault.obstacle not in [obstacle.name for obstacle in self.obstacles]:
+                raise unknown("obstacle", fault.obstacle, [obstacle.name for obstacle in self.obstacles], where)
             if fault.part is not None and fault.part.rpartition(" ")[0] not in [part.name for part in self.made]:
                 raise unknown("part", fault.part, [f"{part.name} 1" for part in self.made], where)
             if fault.what == "camera blind" and self.camera is None:

@@ -36,7 +36,7 @@ def loc_of(raw: dict[str, Any], message: str) -> Loc:
     if (numbered := _NUMBERED.search(message)) is not None:
         loc: Loc = ("faults" if numbered[1] == "fault" else "after", int(numbered[2]) - 1)
         return loc + within(raw, loc, message)
-    things = [(found.start(), loc) for found in _THING.finditer(message) if (loc := _member(raw, *found.groups()))]
+    things = [(match.start(), loc) for match in _THING.finditer(message) if (loc := _member(raw, *match.groups()))]
     dotted = _DOTTED.search(message)
     if dotted is not None and (not things or dotted.start() < things[0][0]):
         return (dotted[1], *dotted[2][1:].split("."))
@@ -68,12 +68,12 @@ def within(raw: dict[str, Any], loc: Loc, message: str) -> Loc:
 
 def _stage(raw: dict[str, Any], message: str) -> Loc | None:
     """The path to the stage in a sequencer's message, which names the part when an order has several kinds."""
-    found = _STAGE.search(message)
-    if found is None:
+    match = _STAGE.search(message)
+    if match is None:
         return None
     parts = [part if isinstance(part, dict) else {} for part in raw["parts"]]
-    kind = next(n for n, part in enumerate(parts) if part.get("routes") and found[3] in (None, part.get("name")))
-    return ("parts", kind, "routes", int(found[2] or 1) - 1, *((int(found[1]) - 1,) if found[1] else ()))
+    kind = next(n for n, part in enumerate(parts) if part.get("routes") and match[3] in (None, part.get("name")))
+    return ("parts", kind, "routes", int(match[2] or 1) - 1, *((int(match[1]) - 1,) if match[1] else ()))
 
 
 def _member(raw: dict[str, Any], word: str, name: str) -> Loc:
@@ -91,15 +91,15 @@ def _named(raw: dict[str, Any], message: str) -> Loc:
     subtasks = raw.get("subtasks")
     if isinstance(subtasks, dict) and "subtasks" in message:
         return next((("subtasks", name) for name in _QUOTED.findall(message) if name in subtasks), ("subtasks",))
-    found: list[tuple[int, int, Loc]] = []
+    places: list[tuple[int, int, Loc]] = []
     for loc, value in _leaves(raw):
         names = loc[-1] == "name" and loc[0] in ("stations", "obstacles")
         if not isinstance(value, str) or not (names or re.search(r"\w\.(urdf|obj|stl)$", value, re.IGNORECASE)):
             continue
         said = re.search(rf"(?<![\w-]){re.escape(value)}(?![\w-])", message)
         if said is not None:
-            found.append((said.start(), -len(value), loc))
-    return min(found)[2] if found else ()
+            places.append((said.start(), -len(value), loc))
+    return min(places)[2] if places else ()
 
 
 def _leaves(value: Any, loc: Loc = ()) -> Iterator[tuple[Loc, Any]]:
@@ -117,7 +117,7 @@ def fields_at(model: type[BaseModel], loc: Loc) -> list[str]:
     records: list[type] = [model]
     for part in loc:
         inner = [_annotations(record)[part] for record in records if part in _annotations(record)]
-        records = [found for one in inner for found in _records(one)] or records
+        records = [record for annotation in inner for record in _records(annotation)] or records
     return sorted({str(name) for record in records for name in _annotations(record)})
 
 
@@ -131,4 +131,4 @@ def _records(annotation: Any) -> list[type]:
     """The records within a type annotation."""
     if isinstance(annotation, type) and (is_dataclass(annotation) or issubclass(annotation, BaseModel)):
         return [annotation]
-    return [found for inner in get_args(annotation) for found in _records(inner)]
+    return [record for inner in get_args(annotation) for record in _records(inner)]

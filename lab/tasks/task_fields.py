@@ -22,20 +22,20 @@ Color = Annotated[tuple[Shade, Shade, Shade], BeforeValidator(as_tuple)]
 
 MAX_PARTS = 50  # parts of a run in physics
 MOST_CELLS = (
-    100_000  # of the workspace: each is surveyed for every way, which takes seconds and a quarter of a gigabyte
+    100_000  # of the workspace: each is surveyed for every transfer, which takes seconds and a quarter of a gigabyte
 )
 MOST_THINGS = 200  # stations, stages or obstacles; a table has no room for more
 
 
 class Workspace(Record):
-    """The grid of the transfer sub-task: where the finger tips may go between stations."""
+    """The grid of the transfer sub-task: the cells in which the finger tips may move between stations."""
 
     lower_m: XYZ
     """The grid's lower corner: x, y and z [m], such as `[-0.24, -1.08, 0.15]`."""
     cell_m: Sizes
     """The edges of a cell along x, y and z [m], such as `[0.12, 0.12, 0.12]`."""
     shape: Annotated[tuple[Count, Count, Count], BeforeValidator(as_tuple)]
-    """How many cells there are along x, y and z, such as `[9, 18, 3]`; at most 100,000 in all."""
+    """The number of cells along x, y and z, such as `[9, 18, 3]`; at most 100,000 in all."""
 
     @field_validator("shape")
     @classmethod
@@ -49,13 +49,13 @@ class CameraSettings(Record):
     """The overhead camera."""
 
     position_m: Above
-    """Where the camera is, x, y and z above the table [m], such as `[0.7, 0.0, 1.6]`; it looks straight down."""
+    """The position of the camera: x, y and z above the table [m], such as `[0.7, 0.0, 1.6]`; it looks straight down."""
     field_of_view_rad: Annotated[float, Field(gt=0.01, lt=2.5)]
-    """The angle that its picture spans [rad], such as `0.9`."""
+    """The field of view across its picture [rad], such as `0.9`."""
     pixels: Annotated[int, Field(ge=64, le=4096)] = 640
     """The width and the height of its picture [pixels]."""
     calibration: Annotated[str, Field(min_length=1, max_length=200)] | None = None
-    """A file that `lab see --calibrate` wrote; the camera's place and lens are then taken from it, such as
+    """A file that `lab see --calibrate` wrote, from which the camera's position and lens are taken, such as
     `"camera.json"`.
     """
 
@@ -68,13 +68,13 @@ class CameraGrid(Record):
     cell_m: Size
     """The edge of a cell [m], such as `0.02`."""
     shape: Annotated[tuple[Count, Count], BeforeValidator(as_tuple)] = (12, 12)
-    """How many cells there are along x and y."""
+    """The number of cells along x and y."""
     start_m: XY
-    """Where the path through the grid begins: x and y [m], such as `[0.65, 0.2]`."""
+    """The point at which the path through the grid begins: x and y [m], such as `[0.65, 0.2]`."""
     height_m: Size
-    """How high the finger tips are on that path [m], such as `0.3`."""
+    """The height of the finger tips on that path [m], such as `0.3`."""
     marker_m: XYZ
-    """Where the station's cyan marker lies: off its pose along and across its axes, and above the table [m], such as
+    """The place of the station's cyan marker: offset from its pose along its axes, and height above the table [m], such as
     `[0.0, 0.038, 0.1]`.
     """
 
@@ -85,24 +85,24 @@ class Process(Record):
     grid: Annotated[
         tuple[Annotated[int, Field(ge=1, le=4)], Annotated[int, Field(ge=1, le=4)]], BeforeValidator(as_tuple)
     ]
-    """How many cells the surface has along and across, such as `[3, 3]`: each 1 to 4, 2 to 12 in all."""
+    """The number of cells of the surface along and across, such as `[3, 3]`: each 1 to 4, 2 to 12 in all."""
     dwell_s: Time = 3.0
-    """How long the head stays at each cell [s]."""
+    """The time for which the head rests at each cell [s]."""
     speed_m_s: Annotated[float, Field(ge=0.001, le=2)] = 0.02
-    """How fast it moves from cell to cell [m/s]."""
+    """The speed of the head from cell to cell [m/s]."""
     color: Color = (1.0, 0.87, 0.25)
-    """The colour of what it leaves: red, green and blue [-]."""
+    """The colour of the covered cells: red, green and blue [-]."""
     by: Literal["head", "robot"] = "head"
-    """Who covers: the machine's own head, over the side of the part that stands in it ("head"), or the empty gripper
-    ("robot").
+    """The mover of the process: the machine's own head, over the side of the part in the machine ("head"), or the empty
+    gripper ("robot").
     """
     area_m: Annotated[tuple[Size, Size], BeforeValidator(as_tuple)] | None = None
-    """The surface that the robot covers: its length and width [m], such as `[0.1, 0.08]`; of by = "robot" only, which
-    needs it.
+    """Length and width of the surface that the robot covers [m], such as `[0.1, 0.08]`; required with by = "robot", not
+    allowed otherwise.
     """
     off_m: XYZ = (0.0, 0.0, 0.0)
-    """The middle of that surface off the station's pose along its axes; z is the height of the finger tips [m], such
-    as `[0.0, 0.0, 0.2]`.
+    """The offset of that surface's middle from the station's pose along its axes; z: the height of the finger tips [m],
+    such as `[0.0, 0.0, 0.2]`.
     """
 
     @model_validator(mode="after")
@@ -122,33 +122,33 @@ class Process(Record):
 
 
 class Place(Record):
-    """Where one part stands at a station: on its floor, on a part below, or in a nest for one kind."""
+    """The place of one part at a station: on its floor, on a part below, or in a nest for one kind."""
 
     at: XYZ
-    """Where its middle is: x, y and turn off the station's pose, along its axes [m, m, rad], such as `[0.0, 0.05, 0.0]`."""
+    """The place's offset from the station's pose, along its axes: x, y and turn [m, m, rad], such as `[0.0, 0.05, 0.0]`."""
     height_m: Off = 0.0
-    """How high the part's foot is above the station's floor [m], such as `0.04`: as high as the part below it is."""
+    """The height of the part's foot above the station's floor [m], such as `0.04`: the height of the part below it."""
     kind: Name | None = None
-    """The kind that it takes, such as `"pin"`; left out: every kind that has no places of its own at the station."""
+    """The kind of part that stands there, such as `"pin"`; left out: every kind without places of its own at the station."""
 
 
 class After(Record):
-    """What has to wait: parts of a kind for parts of another one. Where parts stand on parts, their places say so already."""
+    """A precedence: parts of a kind wait for parts of another kind. Layers need none, because their places imply it."""
 
     part: Name
     """The kind that waits, such as `"label"`."""
     station: Name
-    """The station on its routes whose transfer waits, such as `"tray"`."""
+    """The station on the routes of that kind whose transfer waits, such as `"tray"`."""
     step: Literal["comes", "leaves"] = "comes"
-    """Which transfer waits: the one that brings the part to that station ("comes"), or that takes it away ("leaves")."""
+    """The transfer that waits: the one that brings the part to that station ("comes") or takes it away ("leaves")."""
     of: Name
-    """The other kind that it waits for, such as `"box"`."""
+    """The kind that is waited for, such as `"box"`."""
     of_station: Name | None = None
-    """The station to which those must have come, or which they must have left, such as `"sealer"`; left out: the same one."""
+    """The station that parts of that kind must have reached or left, such as `"sealer"`; left out: the same station."""
     of_step: Literal["comes", "leaves"] = "comes"
-    """What must have happened to those: they stand there ("comes"), or were taken away and set down elsewhere ("leaves")."""
+    """The awaited event: those parts stand there ("comes"), or were taken away and set down elsewhere ("leaves")."""
     count: Literal["each", "all"] = "each"
-    """How many of those: one for each waiting part up to and including this one ("each"), or all of the order ("all")."""
+    """The awaited number: one for each waiting part up to and including this one ("each"), or all of the order ("all")."""
 
 
 class Station(Record):
@@ -157,52 +157,52 @@ class Station(Record):
     name: Name
     """The station's name, which routes use, such as `"oven"`."""
     kind: Literal["storage", "buffer", "machine"]
-    """What it is: parts begin and end in storage, wait in a buffer, and are worked on in a machine."""
+    """The station's kind: parts begin and end in storage, wait in a buffer, and are worked on in a machine."""
     pose: XYZ
-    """Where it stands: x, y and its turn about the vertical [m, m, rad], such as `[0.6, -0.2, 0.0]`; the arm stands at
+    """The station's pose: x, y and turn about the vertical [m, m, rad], such as `[0.6, -0.2, 0.0]`; the arm stands at
     0, 0.
     """
     capacity: Count
-    """How many parts it holds at once, such as `1`. A machine works on each of them from its arrival, one with a process on one
-    at a time, and one with a batch on all together.
+    """The number of parts that the station holds at once, such as `1`. A machine works on each from its arrival, a machine
+    with a process on one at a time, and a machine with batches on all together.
     """
     batch: bool = False
     """Whether the machine works on all parts that stand in it together, such as `true`: the batch begins with the last part
-    that the order brings before one is taken out, takes the longest of their times, and nothing comes in until all are
-    out. It needs a capacity of 2 or more.
+    that the order brings before one is taken out, takes the longest of their times, and no part enters until all are
+    out. A batch needs a capacity of 2 or more.
     """
     processing_s: Time | None = None
-    """How long the machine works on each part [s], such as `60.0`; a stage of a route may have its own."""
+    """The processing time of each part [s], such as `60.0`; a stage of a route may have its own."""
     process: Name | None = None
     """The process that the machine carries out, which is learned; in place of processing_s, such as `"butter"`."""
     at_most_s: Time | None = None
-    """How long a part may stay in the machine after that before it is spoilt [s], such as `4.0`; left out: no
-    limit. In physics the stay ends when the gripper goes to the part to take it up, which takes up to 4 s more.
+    """The longest stay in the machine after processing, before the part is spoilt [s], such as `4.0`; left out: no limit.
+    In physics the stay ends when the gripper moves to the part to take it up, which takes up to 4 s more.
     """
     body: Annotated[str, Field(min_length=1, max_length=200)] | None = None
-    """What stands there: "slab", "box", or a URDF, OBJ or STL file beside the task file, such as `"toaster.urdf"`.
+    """The station's body: "slab", "box", or a URDF, OBJ or STL file beside the task file, such as `"toaster.urdf"`.
     Left out: a box for a machine, else a slab.
     """
     size_m: Sizes | None = None
-    """Length, width and height of a slab or box [m], such as `[0.12, 0.1, 0.05]`; a box needs it, a slab is fitted to
-    its parts.
+    """Length, width and height of a slab or box [m], such as `[0.12, 0.1, 0.05]`; required for a box; by default a slab
+    is fitted to its parts.
     """
     floor_m: Off | None = None
-    """How high parts stand above the table [m], such as `0.015`; left out: on top of a slab or box."""
+    """The height above the table at which parts stand [m], such as `0.015`; left out: the top of a slab or box."""
     spots: Annotated[tuple[XYZ, ...], BeforeValidator(as_tuple), Field(max_length=100)] | None = None
-    """Where parts stand: x, y and turn off the pose, along its axes, one for each part that it holds [m, m, rad], such
-    as `[[0.0, -0.05, 0.0], [0.0, 0.05, 0.0]]`; left out: in rows.
+    """The spots for parts, as many as its capacity: x, y and turn as offsets from the pose along its axes [m, m, rad],
+    such as `[[0.0, -0.05, 0.0], [0.0, 0.05, 0.0]]`; left out: in rows.
     """
     places: Annotated[tuple[Place, ...], BeforeValidator(as_tuple), Field(max_length=100)] | None = None
-    """Where parts stand, as tables `[[stations.places]]`, in place of spots: with a height for a layer, and a kind for a
+    """The spots for parts as tables `[[stations.places]]`, in place of spots, with a height for a layer and a kind for a
     nest. They are filled from the lowest on.
     """
     approach: Literal["above", "camera", "side"] = "above"
-    """From where the gripper comes: straight down ("above"), through the grid that the overhead camera looks at
-    ("camera"), or level along the yaw of the pose ("side"), with a level tool unless `robot.tool` says that it hangs.
+    """The gripper's approach: straight down ("above"), through the grid that the overhead camera looks at ("camera"), or
+    horizontally along the yaw of the pose ("side"), with a level tool unless `robot.tool` is "hanging".
     """
     grid: CameraGrid | None = None
-    """The camera's grid before the station; of approach = "camera" only, which needs it."""
+    """The camera's grid before the station; required with approach = "camera", not allowed otherwise."""
     finish: Color | None = None
     """The colour of parts that the machine has done: red, green and blue [-], such as `[0.7, 0.42, 0.16]`."""
     color: Color | None = None
@@ -291,14 +291,14 @@ class Stage(Record):
     buffer: Name | None = None
     """Where the part waits when that station is full, such as `"oven_buffer"`."""
     processing_s: Time | None = None
-    """How long the machine works on this kind [s], such as `45.0`; left out: the station's time."""
+    """The processing time of this kind [s], such as `45.0`; left out: the station's time."""
     service: Name | None = None
-    """A process by = "robot" that the robot carries out before it takes the part out, such as `"vacuum"`."""
+    """The name of a process with by = "robot" that the robot carries out before it takes the part out, such as `"vacuum"`."""
     pallet: bool = False
     """Whether the part is lifted off its pallet here."""
     at_most_s: Time | None = None
-    """How long this kind may stay in the machine after that before it is spoilt [s], such as `4.0`; left out: the
-    station's.
+    """The longest stay of this kind in the machine after processing [s], such as `4.0`; left out: the station's
+    limit.
     """
 
 
@@ -314,14 +314,14 @@ Route = Annotated[
 
 
 class Part(PartFields):
-    """A kind of part: its shape, how many there are, and the routes that one of them may take."""
+    """A kind of part: its shape, the number of parts, and the routes that a part may take."""
 
     count: Annotated[int, Field(ge=0, le=MAX_PARTS)] = 1
-    """How many there are, unless `--parts` says otherwise."""
+    """The number of parts of this kind, unless `--parts` gives another."""
     pallet: Name | None = None
-    """The kind on which it comes and goes, which has no routes of its own, such as `"carrier"`."""
+    """The kind of pallet on which the part arrives and leaves, which has no routes of its own, such as `"carrier"`."""
     routes: Annotated[tuple[Route, ...], BeforeValidator(as_tuple), Field(max_length=MOST_THINGS)] = ()
-    """The routes that one of them may take, each a list of stages, such as `[["input", "oven", "output"]]`; the order
+    """The routes that a part may take, each a list of stages, such as `[["input", "oven", "output"]]`; the order
     chooses one of them for each part.
     """
 
@@ -338,24 +338,26 @@ class Part(PartFields):
 
 
 class Obstacle(Record):
-    """What stands in the way: a stack of cubes, or a box."""
+    """An obstacle: a stack of cubes, or a box."""
 
     name: Name
     """The obstacle's name, such as `"tower"`."""
     position_m: XY
-    """Where its middle stands: x and y [m], such as `[0.5, 0.3]`."""
+    """The position of its middle: x and y [m], such as `[0.5, 0.3]`."""
     cubes: Annotated[int, Field(ge=1, le=15)] = 3
-    """How many cubes are stacked."""
+    """The number of stacked cubes."""
     edge_m: Annotated[float, Field(gt=0.005, le=0.3)] = 0.06
     """The edge of a cube [m]."""
     size_m: Sizes | None = None
     """Length, width and height of a box in place of cubes [m], such as `[0.4, 0.02, 0.2]`."""
     yaw: Number = 0.0
-    """Its turn about the vertical [rad]."""
+    """The obstacle's turn about the vertical [rad]."""
     color: Color = (0.72, 0.53, 0.33)
-    """Its colour: red, green and blue [-]."""
+    """The obstacle's colour: red, green and blue [-]."""
     area: Area = (0.0, 0.0)
-    """How far it may stand off its position along x and y, either way, drawn from the seed [m], such as `[0.04, 0.04]`."""
+    """The largest offset from its position along x and y, drawn from the seed in both directions [m], such as
+    `[0.04, 0.04]`.
+    """
 
     @property
     def size(self) -> tuple[float, float, float]:
@@ -364,4 +366,4 @@ class Obstacle(Record):
 
 
 class Subtask(Learned):
-    """How a sub-task is learned: rewards, learner and gate."""
+    """The settings of learning of a sub-task: rewards, learner and gate."""

@@ -119,35 +119,35 @@ def load_beside(word: str, asked: InstanceRequest) -> tuple[Task | CellFile | Gr
     path = None if word.startswith(RANDOM) else find(word)
     if path is not None and is_instance(path):
         return read_instance(path, asked), None if takes_case(path, asked) else asked.case
-    found = load_any(word)
+    loaded = load_any(word)
     if asked.layout is not None:
         raise BadInput(f"--layout {asked.layout} beside {word}: it is no instance file: its travel times are its own")
     if asked.robots is not None:
-        if not isinstance(found, CellFile):
+        if not isinstance(loaded, CellFile):
             raise BadInput(
                 f"--robots {asked.robots} beside {word}: it is no cell: the arm is the one that its file has"
             )
-        found = found.with_robots(asked.robots)
-    return found, asked.case
+        loaded = loaded.with_robots(asked.robots)
+    return loaded, asked.case
 
 
 def load_cell_beside(word: str, asked: InstanceRequest) -> CellFile:
     """The cell of a word with the given options; raises BadInput for anything else, and for a --case that names no instance."""
-    found, case = load_beside(word, asked)
-    if not isinstance(found, CellFile):
+    loaded, case = load_beside(word, asked)
+    if not isinstance(loaded, CellFile):
         raise BadInput(f"{word}: wanted an instance file or a cell")
     if case is not None:
         raise BadInput(f"--case {case} beside {word}: it holds one instance only")
-    return found
+    return loaded
 
 
 def describe(word: str) -> tuple[str, dict[str, Any]]:
     """The text of a task, cell or world, and the document of `lab task show --json`; a random world has no "file"."""
-    found = load_any(word)
-    if isinstance(found, GridWorld) and word.startswith(RANDOM):
-        return found.to_toml(), {"file": None, **found.model_dump(mode="json")}
+    loaded = load_any(word)
+    if isinstance(loaded, GridWorld) and word.startswith(RANDOM):
+        return loaded.to_toml(), {"file": None, **loaded.model_dump(mode="json")}
     path = find(word)
-    return read_text(path), {"file": str(path), **found.model_dump(mode="json")}
+    return read_text(path), {"file": str(path), **loaded.model_dump(mode="json")}
 
 
 def _check_wanted(word: str, kind: FileKind, wanted: FileKind | None) -> None:

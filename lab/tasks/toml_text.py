@@ -76,10 +76,10 @@ class TomlText:
             RecursionError,
         ) as error:  # besides TOMLDecodeError: numbers or nesting beyond Python's limits
             raise BadInput(f"{path}: not valid TOML: {error}") from None
-        found = cls(path, text, raw)
+        toml = cls(path, text, raw)
         if _MANY_DIGITS.search(text) and (loc := _beyond_64_bits(raw)) is not None:
-            raise found.refusal(loc, f"{'.'.join(map(str, loc))}: a whole number beyond 64 bits")
-        return found
+            raise toml.refusal(loc, f"{'.'.join(map(str, loc))}: a whole number beyond 64 bits")
+        return toml
 
     @cached_property
     def _lines(self) -> dict[Loc, int]:
@@ -220,7 +220,7 @@ class _Scan:
 def finding(error: ValidationError) -> "ErrorDetails":
     """The first finding of a validation; an unknown key comes before all others, which may follow from it."""
     findings = error.errors()
-    return next((one for one in findings if one["type"] in _NO_SUCH_KEY), findings[0])
+    return next((candidate for candidate in findings if candidate["type"] in _NO_SUCH_KEY), findings[0])
 
 
 def explain(error: ValidationError, fields: Fields | None = None, raw: Any = None) -> str:
@@ -232,9 +232,12 @@ def explain(error: ValidationError, fields: Fields | None = None, raw: Any = Non
     findings, first = error.errors(), finding(error)
     loc, message = first["loc"], _WORDS.get(first["type"], first["msg"].removeprefix("Value error, "))
     if first["type"] == "missing" and loc and isinstance(loc[-1], int):
-        loc, short = loc[:-1], [one for one in findings if one["type"] == "missing" and one["loc"][:-1] == loc[:-1]]
-        findings = [one for one in findings if one not in short[1:]]
-        message = f"wanted a list of {1 + max(int(one['loc'][-1]) for one in short)}"
+        loc, short = (
+            loc[:-1],
+            [other for other in findings if other["type"] == "missing" and other["loc"][:-1] == loc[:-1]],
+        )
+        findings = [other for other in findings if other not in short[1:]]
+        message = f"wanted a list of {1 + max(int(missing['loc'][-1]) for missing in short)}"
     elif first["type"] == "too_long" and isinstance(first["input"], tuple):
         message = f"wanted a list of {first['ctx']['max_length']}"
     where = ".".join(map(str, loc)) + _whose(raw, loc)

@@ -103,12 +103,12 @@ class OrderSession(SessionInFolder):
         if self._durations is not None or self.folder is None or not (self.folder / DURATIONS).exists():
             return self._durations
         try:
-            found = json_of(read_limited(self.folder / DURATIONS, MAX_BYTES))
+            document = json_of(read_limited(self.folder / DURATIONS, MAX_BYTES))
         except (OSError, ValueError) as error:
             raise BadInput(f"'{self.folder / DURATIONS}' cannot be read: {error}") from None
-        if not isinstance(found, dict):
+        if not isinstance(document, dict):
             raise BadInput(f"'{self.folder / DURATIONS}': it holds no durations")
-        return found
+        return document
 
     def keep(self, cell: Cell, objective: str) -> Journal:
         """The journal, once the cell is known. Raises BadInput if the cell is not that of the stored session."""

@@ -38,7 +38,9 @@ class SessionOptions:
         try:
             return TypeAdapter(cls).validate_python(record)
         except ValidationError as error:
-            wrong = [f"{'.'.join(map(str, one['loc']))}: {one['msg']}" for one in error.errors(include_url=False)]
+            wrong = [
+                f"{'.'.join(map(str, finding['loc']))}: {finding['msg']}" for finding in error.errors(include_url=False)
+            ]
             raise BadInput(f"{where}: its options are none of lab {cls.command}: {'; '.join(wrong)[:160]}") from None
 
 

@@ -85,7 +85,7 @@ class Watched:
     ):
         if rule not in NAMES:
             raise unknown("rule", rule, NAMES, "watch")
-        self._policies = [_called(one) for one in (policy if isinstance(policy, list | tuple) else [policy])]
+        self._policies = [_called(member) for member in (policy if isinstance(policy, list | tuple) else [policy])]
         if not self._policies:
             raise BadInput("policy [] (watch): wanted a policy, or a list of one or more")
         if rule == "ensemble" and len(self._policies) < 2:
@@ -200,13 +200,13 @@ def _called(policy: Any) -> Policy:
 
 def _first(answer: Any) -> Any:
     """The action in an answer of `predict`, which may be a tuple of action and state."""
-    found = answer[0] if isinstance(answer, tuple) else answer
-    return int(found) if np.ndim(found) == 0 else found
+    first = answer[0] if isinstance(answer, tuple) else answer
+    return int(first) if np.ndim(first) == 0 else first
 
 
 def _action(answers: list[Any]) -> int:
     """The majority action; ties: the lowest."""
-    votes = Counter(int(one) if np.ndim(one) == 0 else int(np.argmax(one)) for one in answers)
+    votes = Counter(int(answer) if np.ndim(answer) == 0 else int(np.argmax(answer)) for answer in answers)
     return max(votes, key=lambda action: (votes[action], -action))
 
 
@@ -214,7 +214,7 @@ def _key(observation: Any) -> Hashable:
     """A key that is equal for equal observations; floats are rounded."""
     if isinstance(observation, dict):
         return tuple((name, _key(value)) for name, value in sorted(observation.items()))
-    found = np.asarray(observation)
-    if found.dtype.kind == "f":
-        found = np.round(found, DECIMALS) + 0.0
-    return found.shape, found.tobytes()
+    values = np.asarray(observation)
+    if values.dtype.kind == "f":
+        values = np.round(values, DECIMALS) + 0.0
+    return values.shape, values.tobytes()

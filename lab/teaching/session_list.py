@@ -24,8 +24,8 @@ def session_rows(toolbox: Toolbox) -> list[dict[str, Any]]:
     changed: dict[Path, float] = {}
     for path in (toolbox.folder / SESSIONS).glob(f"*/{FILE}"):
         with suppress(OSError, RuntimeError):  # it has been removed, or links form a loop
-            found = path.resolve()
-            changed[found] = found.stat().st_mtime
+            folder = path.resolve()
+            changed[folder] = folder.stat().st_mtime
     return [_row(path) for path in sorted(changed, key=lambda path: changed[path], reverse=True)]
 
 

@@ -95,14 +95,14 @@ class StepRecord:
         buffers = [
             EpisodeBuffer(
                 id=n,
-                observations=np.array(one.states, np.int64),
-                actions=np.array(one.actions, np.int64),
-                rewards=one.rewards,
-                terminations=[*[False] * (len(one.actions) - 1), one.terminated],
-                truncations=[*[False] * (len(one.actions) - 1), not one.terminated],
-                infos={"advised": np.array([*one.advised, False])},
+                observations=np.array(episode.states, np.int64),
+                actions=np.array(episode.actions, np.int64),
+                rewards=episode.rewards,
+                terminations=[*[False] * (len(episode.actions) - 1), episode.terminated],
+                truncations=[*[False] * (len(episode.actions) - 1), not episode.terminated],
+                infos={"advised": np.array([*episode.advised, False])},
             )
-            for n, one in enumerate(self.episodes)
+            for n, episode in enumerate(self.episodes)
         ]
         try:
             with warnings.catch_warnings():
@@ -134,8 +134,8 @@ class StepRecord:
             writer = EventFileWriter(str(folder))
         except OSError as error:
             raise BadInput(f"folder '{folder}' cannot be written: {error.strerror or error}") from error
-        for n, one in enumerate(self.episodes, start=1):
-            values = {"steps": one.steps, "return": sum(one.rewards), "advised steps": sum(one.advised)}
+        for n, episode in enumerate(self.episodes, start=1):
+            values = {"steps": episode.steps, "return": sum(episode.rewards), "advised steps": sum(episode.advised)}
             said = [Summary.Value(tag=tag, simple_value=float(value)) for tag, value in values.items()]
             writer.add_event(Event(wall_time=time.time(), step=n, summary=Summary(value=said)))
         writer.close()

@@ -218,8 +218,8 @@ def _manifest(content: bytes) -> Manifest:
     try:
         head = json.loads(content)
         if not isinstance(head, dict) or head.get("format") != FORMAT:
-            found = head.get("format") if isinstance(head, dict) else head
-            raise BadInput(f"{MANIFEST} has the format {str(found)[:60]!r}, allowed '{FORMAT}'")
+            form = head.get("format") if isinstance(head, dict) else head
+            raise BadInput(f"{MANIFEST} has the format {str(form)[:60]!r}, allowed '{FORMAT}'")
         return Manifest.model_validate_json(content)
     except ValidationError as error:
         first = error.errors(include_url=False)[0]

@@ -134,15 +134,15 @@ class FolderPlace:
         return [entry.name for entry in self._entries(under)]
 
     def files(self, under: str = "") -> dict[str, FileState]:
-        found, fresh = {}, time.time_ns() - _FRESH_NS
+        stamps, fresh = {}, time.time_ns() - _FRESH_NS
         for entry in self._entries(under):
             try:
                 at = entry.stat()
             except OSError:  # gone meanwhile, or a link to nothing
                 continue
             stamp = f"{at.st_mtime_ns}-{at.st_ctime_ns}-{at.st_ino}" if at.st_ctime_ns < fresh else ""
-            found[entry.name] = FileState(at.st_size, stamp)
-        return found
+            stamps[entry.name] = FileState(at.st_size, stamp)
+        return stamps
 
     def exists(self, name: str) -> bool:
         return os.path.lexists(self.folder / name)
@@ -204,18 +204,18 @@ class FolderPlace:
     def tidy(self, older_s: float) -> list[str]:
         """Removes drafts, also those of linked sessions, and folders of sessions that never began; see `FilePlace.tidy`."""
         gone, until_s = [], time.time() - older_s
-        found = list[Path]()
+        leftovers = list[Path]()
         with suppress(OSError):  # a folder may be removed meanwhile
-            found = [*self.folder.glob("**/.*.tmp"), *self.folder.glob(f"{SESSIONS}/*/.*.tmp")]
-        for left in dict.fromkeys(found):
+            leftovers = [*self.folder.glob("**/.*.tmp"), *self.folder.glob(f"{SESSIONS}/*/.*.tmp")]
+        for left in dict.fromkeys(leftovers):
             is_draft = _DRAFT.fullmatch(left.name) is not None and left.is_file() and not left.is_symlink()
             with suppress(OSError):  # another command has removed it
                 if is_draft and left.stat().st_mtime <= until_s:
                     left.unlink()
                     gone.append(str(left))
         with suppress(OSError):
-            found = [*self.folder.glob(f"{SESSIONS}/*")]
-        for folder in found:
+            leftovers = [*self.folder.glob(f"{SESSIONS}/*")]
+        for folder in leftovers:
             with suppress(OSError):  # a folder with something else in it stays
                 if folder.is_symlink() or not folder.is_dir() or folder.stat().st_mtime > until_s or _is_begun(folder):
                     continue

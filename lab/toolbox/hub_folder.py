@@ -53,9 +53,9 @@ def header(policy: Policy, license_name: str, events: Sequence[Event]) -> str:
     """The YAML header of a card on the Hub; its result is the last evaluation."""
     lines = ["---", f"license: {_text(license_name)}", f"library_name: {LIBRARY}", "tags:"]
     lines += [f"- {tag}" for tag in TAGS]
-    found = last_evaluation(events)
-    if found is not None:
-        low, high = (end / 100 for end in found["ci95"])
+    evaluation = last_evaluation(events)
+    if evaluation is not None:
+        low, high = (end / 100 for end in evaluation["ci95"])
         lines += [
             "model-index:",
             f"- name: {_text(policy.name)}",
@@ -64,12 +64,12 @@ def header(policy: Policy, license_name: str, events: Sequence[Event]) -> str:
             "      type: reinforcement-learning",
             "      name: reinforcement-learning",
             "    dataset:",
-            f"      name: {_text('drawn scenes of ' + found['task'])}",
-            f"      type: {_text(found['task'])}",
+            f"      name: {_text('drawn scenes of ' + evaluation['task'])}",
+            f"      type: {_text(evaluation['task'])}",
             "    metrics:",
             "    - type: success_rate",
-            f"      value: {found['success_percent'] / 100:.4f}",
-            f"      name: share of {found['scenes']} scenes that succeed, 95 % interval {low:.2f} to {high:.2f}",
+            f"      value: {evaluation['success_percent'] / 100:.4f}",
+            f"      name: share of {evaluation['scenes']} scenes that succeed, 95 % interval {low:.2f} to {high:.2f}",
         ]
     return "\n".join([*lines, "---", ""])
 

@@ -68,14 +68,14 @@ class Index:
             except BadInput as error:
                 rows[name] = {"damaged": str(error)}
                 continue
-            found, made = {fact: value for fact, value in facts.items() if fact not in _LEFT_OUT}, hash_of(content)
+            row, made = {fact: value for fact, value in facts.items() if fact not in _LEFT_OUT}, hash_of(content)
             kept = numbers.get(name.removesuffix(SUFFIX), {})
-            rows[name] = {**found, "version": kept.get(made) if kept else 1, "hash": made}
+            rows[name] = {**row, "version": kept.get(made) if kept else 1, "hash": made}
         return rows
 
     def _numbers(self, states: Mapping[str, FileState]) -> dict[str, dict[str, int]]:
         """The numbers of the versions of these files, by stem and hash."""
-        found: dict[str, dict[str, int]] = {}
+        numbers: dict[str, dict[str, int]] = {}
         folders = [f"{VERSIONS}/{name.removesuffix(SUFFIX)}" for name in states]
         if len(folders) < max(_MANY, len(self._rows or ()) // _MANY):
             files = [f"{folder}/{name}" for folder in folders for name in self._place.names(folder)]
@@ -83,8 +83,8 @@ class Index:
             files = self._place.tree(VERSIONS)
         for file in files:
             if (version := deferred.version_of(file)) is not None:
-                found.setdefault(file.split("/")[1], {})[version.hash] = version.number
-        return found
+                numbers.setdefault(file.split("/")[1], {})[version.hash] = version.number
+        return numbers
 
     def _loaded(self) -> tuple[dict[str, Row], dict[str, str]]:
         """The stored rows and stamps, empty if the file is missing or damaged."""
@@ -132,9 +132,9 @@ class KnownPolicies(MutableMapping[Key, "Policy"]):
     def alike(self, subtask: str, states: int, actions: int) -> list[tuple[Key, str]]:
         """(key, name) of the solved policies of a sub-task with this table size, the newest first; no file is read."""
         wanted = {"solved": True, "states": states, "actions": actions}
-        found = [key for key, row in self._rows.items() if key[0] == subtask and row | wanted == row]
-        found.sort(key=lambda key: str(self._rows[key]["created"]), reverse=True)
-        return [(key, self._rows[key]["name"]) for key in found]
+        keys = [key for key, row in self._rows.items() if key[0] == subtask and row | wanted == row]
+        keys.sort(key=lambda key: str(self._rows[key]["created"]), reverse=True)
+        return [(key, self._rows[key]["name"]) for key in keys]
 
     def made(self) -> dict[str, str]:
         """The creation time of each policy, by "sub-task signature"."""

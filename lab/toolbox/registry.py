@@ -53,17 +53,17 @@ def load(place: FilePlace, kind: str, key: str) -> dict[str, Any] | None:
 
 def faults(place: FilePlace) -> dict[str, str]:
     """The fault of each record's file by name, "" for sound ones."""
-    found = {}
+    faulty = {}
     for folder in place.folders(FOLDER):
         for name in sorted(place.names(f"{FOLDER}/{folder}")):
             file = f"{FOLDER}/{folder}/{name}"
             if name.endswith(_SUFFIX):
                 try:
                     _read(place, file)
-                    found[file] = ""
+                    faulty[file] = ""
                 except BadInput as error:
-                    found[file] = str(error)
-    return found
+                    faulty[file] = str(error)
+    return faulty
 
 
 def _read(place: FilePlace, file: str) -> dict[str, Any]:
@@ -230,7 +230,7 @@ class Toolbox:
 
     def _lineage(self, policy: "Policy") -> Rows:
         """A row for each ancestor by warm starts, the nearest first: name, hash, scene, and whether it is in this toolbox."""
-        found: Rows = []
+        lineage: Rows = []
         seen, parent = set(), policy.parent
         while parent and parent not in seen:
             seen.add(parent)
@@ -242,9 +242,9 @@ class Toolbox:
                 elif (current := versions.in_use()) is not None and current.hash == digits:
                     ancestor = current.policy
             scene = "" if ancestor is None else ancestor.scene
-            found.append({"name": name, "hash": digits, "scene": scene, "kept": ancestor is not None})
+            lineage.append({"name": name, "hash": digits, "scene": scene, "kept": ancestor is not None})
             parent = "" if ancestor is None else ancestor.parent
-        return found
+        return lineage
 
     def versions(self, name: str) -> "Versions":
         """The versions under a name. Raises BadInput for an unknown name."""

@@ -98,11 +98,11 @@ class RemotePlace:
 
     def tree(self, under: str) -> list[str]:
         try:
-            found: list[str] = self._call("listed", self._fs.find, self._path(under))
+            listed: list[str] = self._call("listed", self._fs.find, self._path(under))
         except FileNotFoundError:
             return []
         root = f"{self._root.strip('/')}/".lstrip("/")
-        return [path.strip("/").removeprefix(root) for path in found]
+        return [path.strip("/").removeprefix(root) for path in listed]
 
     def _listed(self, under: str) -> list[dict[str, Any]]:
         try:
@@ -144,9 +144,9 @@ class RemotePlace:
                 missing.append(name)
         for first in range(0, len(missing), _AT_ONCE):
             paths = {self._path(name): name for name in missing[first : first + _AT_ONCE]}
-            found = self._call("read", self._fs.cat, list(paths), on_error="return")
+            contents = self._call("read", self._fs.cat, list(paths), on_error="return")
             for path, name in paths.items():
-                content = found.get(path)
+                content = contents.get(path)
                 if isinstance(content, bytes):
                     self._cache(name, states[name].stamp, content)
                     yield name, content
@@ -223,13 +223,13 @@ class RemotePlace:
         """The cached bytes of a file with this stamp, None if there are none; the name of the cached file has their hash."""
         if not stamp:
             return None
-        found = None
+        cached = None
         with suppress(OSError):
             for path in self._cache_folder(name).glob(f"{_cache_stem(name, stamp)}-*"):
                 content = path.read_bytes()
                 if path.name.endswith(hash_of(content)):
-                    found = content
-        return found
+                    cached = content
+        return cached
 
     def _cache(self, name: str, stamp: str, content: bytes) -> None:
         if not stamp:

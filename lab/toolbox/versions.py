@@ -147,8 +147,8 @@ class Versions:
 
     def kept(self) -> dict[str, Version]:
         """The kept versions by hash, in the order of their numbers."""
-        found = (version_of(f"{self._folder}/{name}") for name in self._place.names(self._folder))
-        return {version.hash: version for version in sorted(filter(None, found))}
+        versions = (version_of(f"{self._folder}/{name}") for name in self._place.names(self._folder))
+        return {version.hash: version for version in sorted(filter(None, versions))}
 
     def in_use(self) -> InUse | None:
         """The policy in use, None if there is none or it is damaged. Raises BadInput if the file cannot be read."""
@@ -245,17 +245,17 @@ class Versions:
 
     def faults(self) -> list[tuple[str, str]]:
         """(file, reason) of damaged versions, and of a damaged log."""
-        found = []
+        faulty = []
         for version in self.kept().values():
             try:
                 self.read(version)
             except BadInput as error:
-                found.append((version.file, str(error)))
+                faulty.append((version.file, str(error)))
         if damaged := self.events()[1]:
             where = self._place.where(self._log)
             lines = ", ".join(map(str, damaged[:_SHOWN])) + (", ..." if len(damaged) > _SHOWN else "")
-            found.append((self._log, f"log {where}: damaged lines: {lines}"))
-        return found
+            faulty.append((self._log, f"log {where}: damaged lines: {lines}"))
+        return faulty
 
     def _kept_current(self) -> tuple[InUse | None, dict[str, Version]]:
         """The policy in use, and the versions, to which it is added if necessary. The caller holds the lock."""
@@ -320,14 +320,14 @@ class Versions:
         return content
 
     def _chosen(self, wanted: str, kept: dict[str, Version]) -> Version:
-        found = [version for version in kept.values() if str(version.number) == wanted]
-        if not found and len(wanted) >= _LEAST_DIGITS:
-            found = [version for version in kept.values() if version.hash.startswith(wanted.lower())]
-        if len(found) == 1:
-            return found[0]
-        choices = found or [*kept.values()][-_SHOWN:]
+        chosen = [version for version in kept.values() if str(version.number) == wanted]
+        if not chosen and len(wanted) >= _LEAST_DIGITS:
+            chosen = [version for version in kept.values() if version.hash.startswith(wanted.lower())]
+        if len(chosen) == 1:
+            return chosen[0]
+        choices = chosen or [*kept.values()][-_SHOWN:]
         shown = ", ".join(f"{version.number} ({version.hash})" for version in choices)
-        what = "several versions" if found else "no version"
+        what = "several versions" if chosen else "no version"
         raise BadInput(f"policy {self._place.where(self.in_use_file)}: {what} '{wanted}'; there are: {shown or 'none'}")
 
 

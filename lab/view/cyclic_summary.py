@@ -12,32 +12,33 @@ from lab.errors import counted
 SAME_S = 0.005  # times that differ by less look the same when printed
 
 
-def cyclic_summary(found: Mapping[str, Any]) -> RenderableType:
+def cyclic_summary(document: Mapping[str, Any]) -> RenderableType:
     """The text at the end of `lab sequence --cyclic`, from its JSON document."""
-    mix = ", ".join(counted(count, name) for name, count in Counter(found["mix"]).items())
-    each = "" if found["parts_a_cycle"] == 1 else f", {found['per_part_s']:.2f} s a part"
+    mix = ", ".join(counted(count, name) for name, count in Counter(document["mix"]).items())
+    each = "" if document["parts_a_cycle"] == 1 else f", {document['per_part_s']:.2f} s a part"
     lines = [
-        f"every {found['period_s']:.2f} s: {mix}{each}, {found['parts_per_hour']:.1f} parts an hour (seed {found['seed']})",
-        f"{counted(found['most_in_work'], 'part')} in work at once at the most",
-        *_tried(found),
-        *(_move(move, found["parts_a_cycle"]) for move in found["moves"]),
-        *_finite(found["finite"]),
+        f"every {document['period_s']:.2f} s: {mix}{each}, {document['parts_per_hour']:.1f} parts an hour "
+        f"(seed {document['seed']})",
+        f"{counted(document['most_in_work'], 'part')} in work at once at the most",
+        *_tried(document),
+        *(_move(move, document["parts_a_cycle"]) for move in document["moves"]),
+        *_finite(document["finite"]),
     ]
-    return Group(*map(Text, [*lines, *found["files"].values()]))
+    return Group(*map(Text, [*lines, *document["files"].values()]))
 
 
-def _tried(found: Mapping[str, Any]) -> list[str]:
+def _tried(document: Mapping[str, Any]) -> list[str]:
     """The lines on what is proven about the time per part, and on the result for each number of parts per cycle."""
-    of, least_s = found["proven_of"], found["least_per_part_s"]
+    of, least_s = document["proven_of"], document["least_per_part_s"]
     lines = [f"proven: of {of} none needs less a part"]
-    if not found["proven"]:
-        lines = [f"proven: of {of} none needs less than {found['bound_per_part_s']:.2f} s a part"]
-    if found["bound_per_part_s"] - least_s > SAME_S:
+    if not document["proven"]:
+        lines = [f"proven: of {of} none needs less than {document['bound_per_part_s']:.2f} s a part"]
+    if document["bound_per_part_s"] - least_s > SAME_S:
         lines[0] += f"; of all cycles none less than {least_s:.2f} s"
-    if len(found["tried"]) > 1:
-        lines.append(f"parts a cycle: {'; '.join(map(_one_tried, found['tried']))}")
-    if found["why_no_more"] is not None:
-        lines.append(f"more parts a cycle were not tried: {found['why_no_more']}")
+    if len(document["tried"]) > 1:
+        lines.append(f"parts a cycle: {'; '.join(map(_one_tried, document['tried']))}")
+    if document["why_no_more"] is not None:
+        lines.append(f"more parts a cycle were not tried: {document['why_no_more']}")
     return lines
 
 

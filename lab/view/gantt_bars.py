@@ -87,11 +87,11 @@ class Chart:
     @cached_property
     def finished_s(self) -> dict[str, float]:
         """When each part is finished [s], by the row's name."""
-        ends, found = _ends(self.schedule.parts), dict[str, float]()
+        ends, finished = _ends(self.schedule.parts), dict[str, float]()
         for activity in self.schedule.parts:
             if activity not in ends:
-                found[activity.resource] = max(activity.end_s, found.get(activity.resource, 0.0))
-        return found
+                finished[activity.resource] = max(activity.end_s, finished.get(activity.resource, 0.0))
+        return finished
 
     @cached_property
     def products(self) -> dict[str, str]:

@@ -144,11 +144,11 @@ def _encoded(pictures: "Iterator[Image]", count: int, form: str, samples: "list[
     durations = [round(1000 / FRAMES_PER_S)] * (count - 1) + [round(1000 * STAYS_S)]
     how: dict[str, Any] = {"save_all": True, "duration": durations, "loop": 0}
     if form == "GIF":  # one palette for all, without dithering, so that unchanged areas cost nothing
-        together = Image.new("RGB", (samples[0].width, sum(one.height for one in samples)))
-        for row, one in enumerate(samples):
-            together.paste(one, (0, row * one.height))
+        together = Image.new("RGB", (samples[0].width, sum(sample.height for sample in samples)))
+        for row, sample in enumerate(samples):
+            together.paste(sample, (0, row * sample.height))
         palette = together.quantize(COLOURS, Image.Quantize.MAXCOVERAGE)
-        pictures = (one.quantize(palette=palette, dither=Image.Dither.NONE) for one in pictures)
+        pictures = (picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures)
         how |= {"optimize": False, "disposal": 1}
         how["append_images"] = pictures
     else:

@@ -83,10 +83,10 @@ def read_replay(path: Path) -> Replay:
     except (OSError, UnicodeDecodeError) as reason:
         raise BadInput(f"replay '{path}' cannot be read: {getattr(reason, 'strerror', None) or reason}") from None
     try:
-        found = _DATA.search(text)
-        if found is None:
+        match = _DATA.search(text)
+        if match is None:
             raise ValueError("it holds no replay")
-        data, title = json_of(found[1]), _TITLE.search(text)
+        data, title = json_of(match[1]), _TITLE.search(text)
         return _Reading().replay(data, "" if title is None else unescape(title[1]))
     except (ValueError, KeyError, TypeError, AttributeError, ArithmeticError, BadInput) as reason:
         why = f"no {reason}" if isinstance(reason, KeyError) else str(reason)

@@ -136,11 +136,11 @@ def laid_out(
     left, right = (side(x for x, _, _ in at.values()) for side in (min, max))
     middle = sum(side(y for _, y, _ in at.values()) for side in (min, max)) / 2
     aside = WIDE_M / 2 + tile / 2 + 0.55
-    found = {name: FloorSpot(name, *at[name], kinds[name], parts) for name in names}
+    spots = {name: FloorSpot(name, *at[name], kinds[name], parts) for name in names}
     for name, x in (("start", left - aside), ("finished", right + aside)):
         if kinds.get(name) == "tile":
-            found[name] = FloorSpot(name, x, middle, 0.0, "tile", parts)
-    return found
+            spots[name] = FloorSpot(name, x, middle, 0.0, "tile", parts)
+    return spots
 
 
 class Carrier(Protocol):

@@ -140,7 +140,7 @@ def scene_of(table: ScheduleTable, name: str) -> ScheduleScene:
 
 def _whole(rows: Sequence[TimedRow]) -> list[TimedRow]:
     """The rows with the missing origins and targets of transports filled in, from where the part is and where it is next."""
-    found, here = list[TimedRow](), dict[str, str]()
+    whole, here = list[TimedRow](), dict[str, str]()
     later = defaultdict[str, list[TimedRow]](list)
     for row in rows:
         if row.part and (row.vehicle is None or row.kind == "carry"):
@@ -150,19 +150,21 @@ def _whole(rows: Sequence[TimedRow]) -> list[TimedRow]:
         if part and (row.vehicle is None or row.kind == "carry"):
             later[part].pop(0)
             if row.kind == "carry":
-                target = row.target or next((one.origin for one in later[part] if one.origin), FINISHED)
+                target = row.target or next(
+                    (later_row.origin for later_row in later[part] if later_row.origin), FINISHED
+                )
                 row = replace(row, origin=row.origin or here.get(part, START), target=target)
             here[part] = row.target or START
-        found.append(row)
-    return found
+        whole.append(row)
+    return whole
 
 
 def _by_vehicle(rows: Iterable[TimedRow]) -> dict[str, list[TimedRow]]:
-    found = defaultdict[str, list[TimedRow]](list)
+    by_vehicle = defaultdict[str, list[TimedRow]](list)
     for row in rows:
         if row.vehicle and row.kind in MOVES and row.origin and row.target:
-            found[row.vehicle].append(row)
-    return dict(found)
+            by_vehicle[row.vehicle].append(row)
+    return dict(by_vehicle)
 
 
 def _moves(rows: Sequence[TimedRow], quick_s: float) -> list[_Move]:
@@ -234,11 +236,11 @@ def _kinds(rows: Sequence[TimedRow], stays: Sequence[_Stay]) -> dict[str, str]:
 
 
 def _by_place(stays: Iterable[Sequence[_Stay]]) -> dict[tuple[str, bool], list[_Stay]]:
-    found = defaultdict[tuple[str, bool], list[_Stay]](list)
+    by_place = defaultdict[tuple[str, bool], list[_Stay]](list)
     for own in stays:
         for stay in own:
-            found[stay.station, stay.works].append(stay)
-    return found
+            by_place[stay.station, stay.works].append(stay)
+    return by_place
 
 
 def _place(stays: Sequence[_Stay], floor: Mapping[str, FloorSpot]) -> None:

@@ -75,8 +75,8 @@ def sequence_plot(
 
 def _sessions(costs: Sequence[float] | Sequence[Sequence[float]]) -> list[Sequence[float]]:
     """The costs as a list of sessions, also when only one is given."""
-    one = [cost for cost in costs if isinstance(cost, int | float | np.number)]
-    return [one] if one else [session for session in costs if not isinstance(session, int | float)]
+    numbers = [cost for cost in costs if isinstance(cost, int | float | np.number)]
+    return [numbers] if numbers else [session for session in costs if not isinstance(session, int | float)]
 
 
 def _draw_session(axes: "Axes", costs: FloatArray, unit: str) -> None:
@@ -88,9 +88,9 @@ def _draw_session(axes: "Axes", costs: FloatArray, unit: str) -> None:
     (best,) = _best_so_far(costs)
     label = f"best so far: {_number(best[-1], unit)}" if np.isfinite(best[-1]) else "best so far: none"
     axes.step(episodes, best, where="post", color=BLUE, linewidth=1.8, label=label)
-    found = np.flatnonzero(best == best[-1])
-    if len(found):
-        axes.plot(episodes[found[0]], best[-1], "o", color=BLUE, label=f"found in episode {found[0] + 1}")
+    bests = np.flatnonzero(best == best[-1])
+    if len(bests):
+        axes.plot(episodes[bests[0]], best[-1], "o", color=BLUE, label=f"found in episode {bests[0] + 1}")
 
 
 def _draw_sessions(axes: "Axes", costs: FloatArray, unit: str) -> None:

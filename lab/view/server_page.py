@@ -39,10 +39,12 @@ class LimitedConnection(H11Protocol):
         super().connection_made(transport)
         self._number = next(_NUMBERS)
         self._look = self.loop.call_later(IDLE_S, self._still_there)
-        there = [one for one in self.connections if not getattr(one, "_cut", False)]
+        there = [connection for connection in self.connections if not getattr(connection, "_cut", False)]
         if len(there) > most_connections():
-            waiting = [one for one in there if isinstance(one, LimitedConnection) and one.waits]
-            min(waiting, key=lambda one: one._number, default=self).cut()
+            waiting = [
+                connection for connection in there if isinstance(connection, LimitedConnection) and connection.waits
+            ]
+            min(waiting, key=lambda connection: connection._number, default=self).cut()
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Forget the closed connection."""

@@ -104,7 +104,7 @@ def lesson_summary(lesson: Mapping[str, Any]) -> RenderableType:
     """The text at the end of `lab teach`, from its JSON document."""
     lines = [
         f"{lesson['skill']}: {counted(lesson['episodes'], 'episode')}   {sparkline(lesson['steps_per_episode'], 40)}",
-        f"learned way: {_way(lesson)}: {_verdict(lesson)}",
+        f"learned path: {_way(lesson)}: {_verdict(lesson)}",
         *([_advice(lesson)] if lesson["requests"] else []),  # otherwise the receipt says that nobody was asked
         *(["it went on from what was left unfinished"] if lesson["source"] == "continued" else []),
         *lesson["receipt"]["lines"],
@@ -156,7 +156,7 @@ def audit_summary(document: Mapping[str, Any]) -> RenderableType:
         for stay in document["stays"]
     ]
     claimed, delivered = len(document["claimed"]), len(document["delivered"])
-    lines = [Text(f"{one['part']}: {one['words']}") for one in document["findings"]]
+    lines = [Text(f"{finding['part']}: {finding['words']}") for finding in document["findings"]]
     said = f"delivered: {delivered} of the {counted(claimed, 'part')} that the run claims"
     return Group(table_of(rows, ("part", "station", "from_s", "to_s", "stood_s")), *lines, Text(said))
 
@@ -167,7 +167,7 @@ def _event_text(event: Mapping[str, Any]) -> str:
         case "moved":
             return f"{event['part']}: {event['origin']} to {event['target']}"
         case "met":
-            about = " at ".join(one for one in (event["part"], event["station"]) if one)
+            about = " at ".join(word for word in (event["part"], event["station"]) if word)
             return f"{about}: {event['what']}: {event['answer']}"
         case "stopped":
             stops = [f"{kind} ({why or by})" for kind, why, by in event["stops"]]
@@ -181,16 +181,16 @@ def _event_text(event: Mapping[str, Any]) -> str:
 
 def _found(skills: Sequence[Mapping[str, Any]], task: str) -> str:
     """The numbers of skills that are reused, adapted and learned, and of those that come from other tasks."""
-    found = []
+    lines = []
     for kind in ("reused", "adapted"):
         rows = [row for row in skills if row["source"] == kind]
         from_tasks = Counter(row["from_task"] for row in rows if row["from_task"] != task)
         notes = [f"{count} from {name}" for name, count in from_tasks.most_common()]
         elsewhere = sum(kind == "reused" and row["fitness"] is not None for row in rows)
         notes += [f"{elsewhere} of another problem"] if elsewhere else []
-        found += [f"{len(rows)} {kind}" + (f" ({', '.join(notes)})" if notes else "")] if rows else []
+        lines += [f"{len(rows)} {kind}" + (f" ({', '.join(notes)})" if notes else "")] if rows else []
     learned = sum(row["source"] in ("learned", "continued") for row in skills)
-    return ", ".join([*found, *([f"{learned} learned"] if learned or not found else [])])
+    return ", ".join([*lines, *([f"{learned} learned"] if learned or not lines else [])])
 
 
 def _way(lesson: Mapping[str, Any]) -> str:
@@ -198,7 +198,7 @@ def _way(lesson: Mapping[str, Any]) -> str:
     final, best, drawn = lesson["final_steps"], lesson["optimal_steps"], lesson["steps_are_means"]
     learned = "does not reach the goal" if final is None else counted(final, "step")
     learned += " on average, where it reaches the goal" if drawn and final is not None else ""
-    return learned if best is None else f"{learned}, the {'best way' if drawn else 'shortest'} takes {best}"
+    return learned if best is None else f"{learned}, the {'best path' if drawn else 'shortest'} takes {best}"
 
 
 def _verdict(lesson: Mapping[str, Any]) -> str:
@@ -210,7 +210,7 @@ def _verdict(lesson: Mapping[str, Any]) -> str:
         return "not solved"
     if lesson["steps_are_means"]:
         return (
-            "not solved" if lesson["optimal_steps"] is None else "not solved, its mean return is below the best way's"
+            "not solved" if lesson["optimal_steps"] is None else "not solved, its mean return is below the best path's"
         )
     longer = lesson["optimal_steps"] is not None and lesson["final_steps"] > lesson["optimal_steps"]
     return "not solved, it is longer" if longer else "not solved, it does not reach the goal from every start"
@@ -234,53 +234,57 @@ STOPPED = {
 }
 
 
-def sequence_summary(found: Mapping[str, Any]) -> RenderableType:
+def sequence_summary(document: Mapping[str, Any]) -> RenderableType:
     """The text at the end of `lab sequence`, from its JSON document."""
-    what, unit = _measured(found["objective"])
-    proven = "proven optimum" if found["optimum_proven"] else "proven bound"
-    best, bound = beside(found["best_cost"], found["bound_cost"], unit, 2)
-    alone = beside(found["cost"], found["bound_cost"], unit, 2)[0]
-    whose = " alone" if found["advice"] is None else {True: " with advice", False: " alone", None: ""}[found["advised"]]
+    what, unit = _measured(document["objective"])
+    proven = "proven optimum" if document["optimum_proven"] else "proven bound"
+    best, bound = beside(document["best_cost"], document["bound_cost"], unit, 2)
+    alone = beside(document["cost"], document["bound_cost"], unit, 2)[0]
+    whose = (
+        " alone"
+        if document["advice"] is None
+        else {True: " with advice", False: " alone", None: ""}[document["advised"]]
+    )
     lines = [
-        f"best order known: {what}{best} for {_ordered(found['order'])} (by {found['best_by']}; seed {found['seed']})",
-        f"{proven} {bound}{_gap(found['best_cost'], found)} ({found['bound_by']})",
-        f"{found['method']}{whose}: {what}{alone}{_gap(found['cost'], found)}, "
-        f"in episode {found['found_at_episode']} of {found['episodes']}",
-        *_order_of_transfers(found),
+        f"best order known: {what}{best} for {_ordered(document['order'])} (by {document['best_by']}; seed {document['seed']})",
+        f"{proven} {bound}{_gap(document['best_cost'], document)} ({document['bound_by']})",
+        f"{document['method']}{whose}: {what}{alone}{_gap(document['cost'], document)}, "
+        f"in episode {document['found_at_episode']} of {document['episodes']}",
+        *_order_of_transfers(document),
     ]
-    if found["stopped_by"] is not None:
-        proven = "which is proven" if found["proven"] else "which is not proven to be the best"
-        lines.insert(0, f"{STOPPED[found['stopped_by']]}: the best order until then, {proven}")
-    if found["luckiest_cost"] is not None:
-        lines.append(f"by the mean times; in its luckiest drawn episode {found['luckiest_cost']:.2f}{unit}")
-    if found["sessions"] > 1:
-        hits = "" if found["success_percent"] is None else f"optimum found in {found['success_percent']:.0f} %, "
-        lines.append(f"{found['sessions']} sessions: {hits}mean best {found['mean_best_cost']:.2f}{unit}")
-    for number, advice in enumerate(found["advice"] or [], 1):
+    if document["stopped_by"] is not None:
+        proven = "which is proven" if document["proven"] else "which is not proven to be the best"
+        lines.insert(0, f"{STOPPED[document['stopped_by']]}: the best order until then, {proven}")
+    if document["luckiest_cost"] is not None:
+        lines.append(f"by the mean times; in its luckiest drawn episode {document['luckiest_cost']:.2f}{unit}")
+    if document["sessions"] > 1:
+        hits = "" if document["success_percent"] is None else f"optimum found in {document['success_percent']:.0f} %, "
+        lines.append(f"{document['sessions']} sessions: {hits}mean best {document['mean_best_cost']:.2f}{unit}")
+    for number, advice in enumerate(document["advice"] or [], 1):
         if advice["requests"] is None:
             continue
         asked, helped = counted(advice["requests"], "episode"), counted(advice["helped_steps"], "move")
         text = f"session {number}: asked in {asked}, {helped} advised"
         episode = advice["rejected_at_episode"]
         lines.append(text if episode is None else f"{text}; rejected its advisor in episode {episode}")
-    if found["stochastic"] is not None:
-        lines += _drawn(found["stochastic"], unit)
-    return Group(*map(Text, [*lines, *found["files"].values()]))
+    if document["stochastic"] is not None:
+        lines += _drawn(document["stochastic"], unit)
+    return Group(*map(Text, [*lines, *document["files"].values()]))
 
 
-def _gap(value: float, found: Mapping[str, Any]) -> str:
+def _gap(value: float, document: Mapping[str, Any]) -> str:
     """The gap between a cost and the bound, in words; "" when they are equal or the bound is 0."""
-    bound = found["bound_cost"]
+    bound = document["bound_cost"]
     share = value / bound - 1 if bound > 0 else 0.0
     return f", gap {gap_of(share, 2)}" if share > SAME else ""
 
 
-def _order_of_transfers(found: Mapping[str, Any]) -> list[str]:
+def _order_of_transfers(document: Mapping[str, Any]) -> list[str]:
     """The best order, or the beginning of a long one: part numbers, or words if a part can continue in several ways."""
-    sequence, words = found["best_sequence"], found["best_moves"]
+    sequence, words = document["best_sequence"], document["best_moves"]
     more = len(sequence) - SHOWN_MOVES
     rest = f" and {more} more (--json has all)" if more > 0 else ""
-    if all(decision <= len(found["order"]) for decision in sequence):
+    if all(decision <= len(document["order"]) for decision in sequence):
         return [f"order of the transfers: {' '.join(map(str, sequence[:SHOWN_MOVES]))}{rest}"]
     return [
         "order of the transfers:",
@@ -363,8 +367,8 @@ def grid_summary(seen: Mapping[str, Any]) -> RenderableType:
     turned = ["  ".join(marks[rows[i][j]] for i in range(len(rows))) for j in reversed(range(len(rows[0])))]
     ends = f"start {tuple(seen['start'])}, goal {tuple(seen['goal'])}"
     blocked, markers = counted(len(seen["obstacles"]), "cell"), counted(len(seen["markers"]), "marker")
-    found = f"{ends}, {blocked} with obstacles, {markers}"
-    return Group(*map(Text, turned), Text(found))
+    size_text = f"{ends}, {blocked} with obstacles, {markers}"
+    return Group(*map(Text, turned), Text(size_text))
 
 
 def pictures_summary(record: Mapping[str, Any]) -> RenderableType:
@@ -383,7 +387,7 @@ def pictures_summary(record: Mapping[str, Any]) -> RenderableType:
         if record["marker_mean_m"] is not None:
             mean, most = 1e3 * record["marker_mean_m"], 1e3 * record["marker_max_m"]
             lines.append(f"markers seen {mean:.1f} mm off on average, {most:.1f} mm at the most")
-        lines += [f"{one['picture']}: {one['reason']}" for one in record["wrong"]]
+        lines += [f"{picture['picture']}: {picture['reason']}" for picture in record["wrong"]]
     else:
         lines = [f"{counted(record['pictures'], 'picture')} of '{record['task']}' and {record['mats']} of the mat made"]
     return Group(*map(Text, [*lines, *(f"{name}: {path}" for name, path in record.get("files", {}).items())]))

@@ -92,7 +92,7 @@ class WorldBodies:
             axis, length = int(np.argmax(abs(other - one))), float(abs(other - one).max())
             middle = vector((one + other) / 2)
             shapes.append(Shape("cylinder", (radius, length), None, BLUE, middle, _ALONG[axis]))
-        return (Body("shortest way", tuple(shapes)),)
+        return (Body("shortest path", tuple(shapes)),)
 
     def _region(self) -> tuple[Body, ...]:
         """A transparent box around the region in which an advisor with a limited view sees the robot; no body without one."""

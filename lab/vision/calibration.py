@@ -118,7 +118,7 @@ class Calibration:
     @property
     def eye_m(self) -> tuple[float, float, float]:
         """The camera's position (x, y, z) [m]."""
-        x, y, z = (float(one) for one in -np.array(self.turn).T @ np.array(self.shift))
+        x, y, z = (float(value) for value in -np.array(self.turn).T @ np.array(self.shift))
         return x, y, z
 
     def to_json(self) -> dict[str, Any]:
@@ -138,7 +138,7 @@ def calibrate(pictures: Sequence[tuple[str, Image]], mat: Mat, angle_rad: float 
     Raises BadInput for too few pictures, pictures without the mat or of different sizes, and WorkFailed when the focal
     length cannot be determined. Source: Z. Zhang, 2000.
     """
-    found = [mat.corners(image, name) for name, image in pictures]
+    corners = [mat.corners(image, name) for name, image in pictures]
     sizes = {(image.shape[1], image.shape[0]) for _, image in pictures}
     if len(sizes) > 1:
         raise BadInput(f"pictures of {len(sizes)} sizes: {sorted(sizes)}: wanted one camera's")
@@ -153,8 +153,8 @@ def calibrate(pictures: Sequence[tuple[str, Image]], mat: Mat, angle_rad: float 
     if known:
         flags |= cv2.CALIB_FIX_FOCAL_LENGTH | cv2.CALIB_FIX_PRINCIPAL_POINT | cv2.CALIB_ZERO_TANGENT_DIST
     start = pinhole(size, radians(45) if angle_rad is None else angle_rad)
-    worlds = [world.astype(np.float32)[:, None] for world, _ in found]
-    pixels = [pixel.astype(np.float32)[:, None] for _, pixel in found]
+    worlds = [world.astype(np.float32)[:, None] for world, _ in corners]
+    pixels = [pixel.astype(np.float32)[:, None] for _, pixel in corners]
     result: Any = cv2.calibrateCameraExtended(worlds, pixels, size, start.matrix, np.zeros(5), flags=flags)
     residual, matrix, terms, turns, shifts, unsure = result[:6]
     if not known and not unsure.ravel()[0] < UNSURE * matrix[0, 0]:
@@ -163,7 +163,7 @@ def calibrate(pictures: Sequence[tuple[str, Image]], mat: Mat, angle_rad: float 
             f"{matrix[0, 0]:.0f} +- {unsure.ravel()[0]:.0f} pixels: show the mat "
             "tilted in more pictures"
         )
-    k1, k2, p1, p2, k3 = (float(one) for one in np.ravel(terms)[:5])
+    k1, k2, p1, p2, k3 = (float(term) for term in np.ravel(terms)[:5])
     fx, fy, cx, cy = (float(matrix[at]) for at in ((0, 0), (1, 1), (0, 2), (1, 2)))
     lens = Lens(size, (fx, fy), (cx, cy), (k1, k2, p1, p2, k3))
     words = f"{counted(len(pictures), 'picture')} of a mat of {mat.columns} x {mat.rows} ArUco markers"
@@ -182,7 +182,9 @@ def from_corners(
         raise BadInput(f"{len(seen)} corners: wanted 4, around the rectangle in its order")
     triangles = [abs(float(np.linalg.det(np.column_stack([np.delete(seen, n, 0), np.ones(3)])))) for n in range(4)]
     if min(triangles) < 100.0:
-        raise BadInput(f"corners {[tuple(one) for one in pixels]}: three of them lie on a line: wanted a rectangle's")
+        raise BadInput(
+            f"corners {[tuple(point) for point in pixels]}: three of them lie on a line: wanted a rectangle's"
+        )
     world = np.column_stack([np.asarray(corners_m, dtype=np.float64), np.zeros(4)])
     distortion = np.array(lens.distortion)
     solve: Any = cv2.solvePnP
@@ -204,8 +206,8 @@ def _placed(lens: Lens, turn: Array, shift: Array, residual: float, points: int,
     rows = np.asarray(cv2.Rodrigues(turn)[0], dtype=float)
     return Calibration(
         lens,
-        tuple(tuple(float(one) for one in row) for row in rows),
-        tuple(float(one) for one in np.ravel(shift)),
+        tuple(tuple(float(number) for number in row) for row in rows),
+        tuple(float(value) for value in np.ravel(shift)),
         residual,
         points,
         method,
@@ -217,7 +219,7 @@ def drawn(image: Image, calibration: Calibration, mat: Mat | None = None) -> Ima
     canvas = np.array(image)
     lens = calibration.lens
     if mat is not None:
-        corners = np.concatenate([np.asarray(one, dtype=np.float64) for one in mat.board.getObjPoints()])
+        corners = np.concatenate([np.asarray(corners_m, dtype=np.float64) for corners_m in mat.board.getObjPoints()])
         for x, y in lens.projected(mat.world(corners), calibration.turn, calibration.shift):
             cv2.drawMarker(canvas, (round(x), round(y)), (0, 200, 0), cv2.MARKER_CROSS, 9, 1, cv2.LINE_AA)
     x, y = lens.middle
@@ -243,20 +245,20 @@ def read_calibration(path: Path) -> Calibration:
     try:
         record = json_of(data)
         lens, distortion = record["lens"], record["lens"]["distortion"]
-        width, height = (int(one) for one in lens["size"])
-        fx, fy = (float(one) for one in lens["focal"])
-        cx, cy = (float(one) for one in lens["middle"])
+        width, height = (int(size) for size in lens["size"])
+        fx, fy = (float(focal) for focal in lens["focal"])
+        cx, cy = (float(coordinate) for coordinate in lens["middle"])
         terms = tuple(float(distortion[term]) for term in TERMS)
         turn = np.array(record["turn"], dtype=float)
         shift = np.array(record["shift"], dtype=float)
         if turn.shape != (3, 3) or shift.shape != (3,) or not np.allclose(turn @ turn.T, np.eye(3), atol=1e-4):
             raise ValueError("turn is no rotation (3, 3), or shift has not 3 numbers")
         own = Lens((width, height), (fx, fy), (cx, cy), cast(tuple[float, float, float, float, float], terms))
-        rows = tuple(tuple(float(one) for one in row) for row in turn)
-        found = float(record["residual_px"]), int(record["points"]), str(record["method"])
+        rows = tuple(tuple(float(number) for number in row) for row in turn)
+        quality = float(record["residual_px"]), int(record["points"]), str(record["method"])
     except (ValueError, KeyError, TypeError, BadInput, RecursionError, OverflowError) as error:
         why = f"{error.args[0]!r} is missing" if isinstance(error, KeyError) else str(error)
         raise BadInput(f"{path}: no calibration: {why}: {wanted}") from None
-    if not np.isfinite([*shift, found[0]]).all():
+    if not np.isfinite([*shift, quality[0]]).all():
         raise BadInput(f"{path}: no calibration: numbers that are not finite: {wanted}")
-    return Calibration(own, rows, tuple(float(one) for one in shift), *found)
+    return Calibration(own, rows, tuple(float(value) for value in shift), *quality)

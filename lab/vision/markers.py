@@ -158,18 +158,18 @@ def find_markers(image: Image, view: View) -> tuple[tuple[Marker, ...], int]:
                 continue
             round_enough = cv2.contourArea(outline) >= ROUNDNESS * pi * radius**2
             if hidden_part(outline.reshape(-1, 2), area, view, kind):
-                found = behind_cover(outline.reshape(-1, 2), view, kind)
+                cover = behind_cover(outline.reshape(-1, 2), view, kind)
             elif area <= MAX_CELLS * view.cell_pixels and round_enough:
                 rim = [p for p in outline if abs(cv2.pointPolygonTest(hull, tuple(map(float, p[0])), True)) < RIM]
                 x, y = cv2.fitEllipse(np.array(rim))[0]
-                found = (float(x), float(y))
+                cover = (float(x), float(y))
             else:
-                found = None
-            if found is None:
+                cover = None
+            if cover is None:
                 ignored += 1
                 continue
-            place = view.place(found, kind)
-            markers.append(Marker(kind, found, place, view.cell(place)))
+            place = view.place(cover, kind)
+            markers.append(Marker(kind, cover, place, view.cell(place)))
             if len(markers) > MAX_MARKERS:
                 raise BadInput(f"picture: more than {MAX_MARKERS} round coloured spots: no picture of a grid")
     return tuple(sorted(markers, key=lambda m: (m.kind, m.cell, m.pixel))), ignored

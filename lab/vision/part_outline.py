@@ -59,7 +59,7 @@ class Outlined:
         z = np.broadcast_to(self.corners[:, 2] + self.foot_m, x.shape)
         homogeneous = np.stack([x, y, z, np.ones_like(x)], axis=-1) @ self.pixel_from_world.T
         pixels = (homogeneous[..., :2] / homogeneous[..., 2:]).astype(np.float32)
-        return np.stack([_evenly(cv2.convexHull(one)[:, 0].astype(np.float64)) for one in pixels])
+        return np.stack([_evenly(cv2.convexHull(points)[:, 0].astype(np.float64)) for points in pixels])
 
 
 def find_part(image: Image, part: Outlined, near: ArrayLike, reach_m: float, reach_rad: float) -> PartSeen | None:
@@ -118,7 +118,7 @@ def _edges(image: Image, smooth_px: float) -> Array:
     dy, dx = np.gradient(soft, axis=(0, 1))
     strong = np.hypot(dx, dy) * smooth_px
     channel = strong.argmax(axis=2)[..., None]
-    dx, dy, strong = (np.take_along_axis(one, channel, axis=2)[..., 0] for one in (dx, dy, strong))
+    dx, dy, strong = (np.take_along_axis(gradient, channel, axis=2)[..., 0] for gradient in (dx, dy, strong))
     scale = smooth_px / (strong + FAINT)
     return np.asarray(np.stack([dx * scale, dy * scale], axis=-1), dtype=np.float64)
 

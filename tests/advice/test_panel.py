@@ -231,9 +231,9 @@ def test_an_episode_that_was_broken_off_does_not_count() -> None:
 def test_bad_panels_and_names() -> None:
     with pytest.raises(BadInput, match="no member"):
         panel({})
-    with pytest.raises(BadInput, match=r"unknown way of deciding 'majorty'.*did you mean 'majority'"):
+    with pytest.raises(BadInput, match=r"unknown .*'majorty'.*did you mean 'majority'"):
         panel({"a": Says(0)}, decide="majorty")
-    with pytest.raises(BadInput, match=r"unknown way of asking 'turn'.*known: in-turn, together"):
+    with pytest.raises(BadInput, match=r"unknown .*'turn'.*known: in-turn, together"):
         panel({"a": Says(0)}, asked="turn")
     names = ("expert", "wrong", "expert", "none", "expert")
     found = members_of(names, [Says(0), Says(1), Says(2), None, Says(3)])

@@ -135,7 +135,7 @@ def test_nothing_and_no_answer() -> None:
     assert (empty.questions, empty.refused, empty.hints) == (0, {}, ())
     silent = receipt([asked(1), AdviceGiven(1, 1, 0, None, RIGHT), ended(1, 5)], corridor(), VALUES)
     assert silent.refused == {SILENT: 1}
-    assert silent.hints == ("it asked about 1 step and was never advised: an answer shows it a way at once",)
+    assert silent.hints == ("it asked about 1 step and was never advised: an answer would show it a path at once",)
     assert (silent.mean_before, silent.change_percent) == (None, None)
 
 

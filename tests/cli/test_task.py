@@ -91,7 +91,7 @@ def test_a_random_world_is_written_checked_and_learned(lab: Lab, folder: Path, t
     again = lab(*words)
     assert (again.code, again.out) == (2, "")
     assert "w.toml' (--out): there is one already: choose another name, or remove it" in again.err
-    assert lab(*words[:-1], "v.toml").out.startswith("v.toml: 9 obstacles, the shortest way takes ")
+    assert lab(*words[:-1], "v.toml").out.startswith("v.toml: 9 obstacles, the shortest path takes ")
     assert (folder / "v.toml").read_text(encoding="utf-8") == text
     assert text.endswith(lab("task", "show", "random:6x5:0.3:2").out)
     assert text.startswith("# Drawn at random. Cells are counted from 0; with two axes they are [row, column]")

@@ -37,8 +37,8 @@ def test_a_session_goes_on_from_another_folder(lab: Lab, folder: Path, monkeypat
             "SUBTASK: --resume takes its options from the session in lesson",
         ),
         ("teach world-1 --advisor recorded:lesson", "it is advice about another problem, 'w'"),
-        ("teach world-1 --ask all", "unknown way of asking 'all' (--ask): known: in-turn, together"),
-        ("teach world-1 --decide majorit", "unknown way of deciding 'majorit' (--decide): did you mean 'majority'?"),
+        ("teach world-1 --ask all", "unknown order of asking 'all' (--ask): known: in-turn, together"),
+        ("teach world-1 --decide majorit", "unknown rule of deciding 'majorit' (--decide): did you mean 'majority'?"),
         ("teach --resume lesson --ask in-turn", "--ask: --resume takes its options from the session in lesson"),
         (
             "teach --resume lesson --out other",

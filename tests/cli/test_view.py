@@ -66,7 +66,7 @@ def test_a_world_is_shown_and_written_as_a_page(tmp_path: Path) -> None:
     document = write_page("world-1", ONE, tmp_path / "w.html")
     assert document == {"file": str(tmp_path / "w.html")}
     assert {body["name"] for body in data(document["file"])["scene"]["bodies"]} == {
-        *("ground", "room", "obstacles", "start", "goal", "shortest way", "limited view", "axes")
+        *("ground", "room", "obstacles", "start", "goal", "shortest path", "limited view", "axes")
     }
 
 

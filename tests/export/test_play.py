@@ -97,7 +97,7 @@ def test_a_gripper_output_or_a_wait_that_is_wrong_is_found_out(up6: Program, lin
 def test_a_way_that_is_missing_is_found_out(up6: Program) -> None:
     commands = jbi.read(jbi.write(up6, Options()), up6.arm)
     first = next(command for command in commands if isinstance(command, Path))
-    with pytest.raises(BadInput, match="3 ways were read back, the run had 4"):
+    with pytest.raises(BadInput, match="3 paths were read back, the run had 4"):
         deviation(up6, [command for command in commands if command is not first])
 
 

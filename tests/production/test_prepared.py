@@ -54,7 +54,7 @@ def test_check_finds_what_is_wrong_with_a_world(tmp_path: Path, root: Path) -> N
     path = tmp_path / "w.toml"
     path.write_text(text.replace("max_steps = 200", "max_steps = 12"))  # the start counts as a step
     (error,) = check_task(str(path), None, 0)
-    assert error == "world 'world-1': learner.max_steps = 12: the shortest way has 12 moves and needs 13 steps"
+    assert error == "world 'world-1': learner.max_steps = 12: the shortest path has 12 moves and needs 13 steps"
     path.write_text(text.replace("goal = [8, 5, 3]", "goal = [8, 5, 30]"))
     (error,) = check_task(str(path), None, 0)
     assert error == f"{path}: goal (8, 5, 30) is outside the world: allowed are 0..9 x 0..9 x 0..9"

@@ -252,7 +252,7 @@ def test_a_second_run_learns_nothing_and_does_the_same(cold: Ran, warm: Ran) -> 
     assert "Time every move" not in warm.stderr
     reused = [line for line in warm.stderr.splitlines() if line.startswith("  reused    ")]
     assert len(reused) == 2  # of this very problem, and of another one
-    assert "of another problem: their ways are free here" in reused[1]
+    assert "of another problem: their paths are free here" in reused[1]
 
 
 def test_a_skills_log_tells_what_became_of_it(cold: Ran, warm: Ran) -> None:

@@ -121,7 +121,7 @@ def test_a_way_that_is_not_the_shortest_is_called_so(board: TabularMDP) -> None:
     )
     RunProgress(shown).hear(SkillReady("insert", known))
     longer, shortest = lines(shown)
-    assert "  6/4 steps  not the shortest way  never asked" in longer
+    assert "  6/4 steps  not the shortest path  never asked" in longer
     assert "not the shortest" not in shortest
 
 

@@ -102,7 +102,7 @@ def test_a_world_where_no_way_pays_is_refused() -> None:
     """A way of 79 moves costs more than running into the wall at once; what the values say, too."""
     dear = GridWorld(name="far", shape=(2, 80), start=(0, 0), goal=(0, 79), obstacles=((1, 0),))
     far = dear.model_copy(update={"rewards": Rewards(collision=-1.0)})
-    reason = r"rewards.collision = -1.0: .* is worth -1.00 and the way of 79 moves only -4.75: wanted a lower one"
+    reason = r"rewards.collision = -1.0: .* is worth -1.00 and the path of 79 moves only -4.75: wanted a lower one"
     with pytest.raises(BadInput, match=rf"^world 'far': {reason}"):
         far.check()
     assert not greedy_path(optimal_values(far.mdp(), 0.99), far.mdp(), 100)[2]
@@ -111,7 +111,7 @@ def test_a_world_where_no_way_pays_is_refused() -> None:
 
 def test_episodes_that_are_too_short_are_refused() -> None:
     short = SMALL.model_copy(update={"learner": LearnerSettings(max_steps=3)})
-    with pytest.raises(BadInput, match=r"learner.max_steps = 3: the shortest way has 4 moves and needs 4 steps$"):
+    with pytest.raises(BadInput, match=r"learner.max_steps = 3: the shortest path has 4 moves and needs 4 steps$"):
         short.check()
 
 

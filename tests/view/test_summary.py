@@ -162,7 +162,7 @@ LESSON: dict[str, Any] = {
 def test_a_lesson() -> None:
     assert shown(lesson_summary(LESSON)) == [
         f"insert at toaster: 4 episodes   {'█' * 10}{'▅' * 10}{'▃' * 20}",
-        "learned way: 16 steps, the shortest takes 16: solved",
+        "learned path: 16 steps, the shortest takes 16: solved",
         "asked in 5 episodes, 80 helped steps, 3 misleads",
         "advice: it asked in 5 episodes",
         "saved as 'insert at toaster 1a2b' (seed 0)",
@@ -181,16 +181,16 @@ def test_a_lesson() -> None:
         ),
         (
             {"final_steps": 1, "optimal_steps": 1, "episodes": 1},
-            "learned way: 1 step, the shortest takes 1: solved",
+            "learned path: 1 step, the shortest takes 1: solved",
         ),
         (  # Taxi: a policy that misses some starts may be quicker from the others
             {"steps_are_means": True, "final_steps": 12, "optimal_steps": 13, "solved": False},
-            "learned way: 12 steps on average, where it reaches the goal, the best way takes 13: not solved, its mean "
-            "return is below the best way's",
+            "learned path: 12 steps on average, where it reaches the goal, the best path takes 13: not solved, its mean "
+            "return is below the best path's",
         ),
         (
             {"steps_are_means": True, "final_steps": 12, "optimal_steps": None},
-            "learned way: 12 steps on average, where it reaches the goal: solved",
+            "learned path: 12 steps on average, where it reaches the goal: solved",
         ),
         (
             {"rejected_at_episode": 95, "misleads": 8},
@@ -198,15 +198,15 @@ def test_a_lesson() -> None:
         ),
         (
             {"final_steps": None, "solved": False},
-            "learned way: does not reach the goal, the shortest takes 16: not solved",
+            "learned path: does not reach the goal, the shortest takes 16: not solved",
         ),
         (
             {"final_steps": 18, "solved": False},
-            "learned way: 18 steps, the shortest takes 16: not solved, it is longer",
+            "learned path: 18 steps, the shortest takes 16: not solved, it is longer",
         ),
         (
             {"solved": False, "failure": "slice 1 slipped"},
-            "learned way: 16 steps, the shortest takes 16: not solved in physics: slice 1 slipped",
+            "learned path: 16 steps, the shortest takes 16: not solved in physics: slice 1 slipped",
         ),
     ],
 )

@@ -37,7 +37,7 @@ def body(recording: Recording, name: str) -> Body:
 def test_the_way_of_a_board_by_hand() -> None:
     """Down by a cell of 2/3 m and right by two: two tubes, a ball where they meet, a larger one at the start."""
     cell = WORLD_M / 3
-    turn, start, down, right = body(still(SMALL), "shortest way").shapes
+    turn, start, down, right = body(still(SMALL), "shortest path").shapes
     assert [shape.kind for shape in (turn, start, down, right)] == ["sphere", "sphere", "cylinder", "cylinder"]
     assert turn.position == pytest.approx((-cell, -cell / 2, cell / 2))
     assert start.position == pytest.approx((-cell, cell / 2, cell / 2))
@@ -53,7 +53,7 @@ def test_the_tubes_are_as_long_as_the_way_and_all_is_in_the_picture(in_picture: 
     recording = still(world)
     recording.check()
     size = WORLD_M / max(world.shape)
-    tubes = [shape for shape in body(recording, "shortest way").shapes if shape.kind == "cylinder"]
+    tubes = [shape for shape in body(recording, "shortest path").shapes if shape.kind == "cylinder"]
     assert sum(tube.size[1] for tube in tubes) == pytest.approx(size * (len(shortest_path(world.mdp())) - 1))
     points = np.array([shape.position for body in recording.bodies for shape in body.shapes])
     assert in_picture(recording.camera, points)

@@ -42,8 +42,8 @@ class Physics:
 MOUNTAIN_CAR, ACROBOT, CART_POLE = 1, 2, 3
 
 PHYSICS = {
-    one.name: one
-    for one in (
+    world.name: world
+    for world in (
         Physics(
             "MountainCar-v0",
             MOUNTAIN_CAR,

@@ -1,6 +1,6 @@
-"""Faults of a run, for real in physics: a part moved, dropped or gone, a machine that fails, a box in the way, a blind camera.
+"""Faults of a run, simulated in physics: a moved, dropped or missing part, a failing machine, an obstacle, a blind camera.
 
-A fault is a class in a file of this room and a row in FAULTS. Nobody tells the composer of them.
+A fault is a class in a file of this room and a row in FAULTS. The composer does not know them.
 """
 
 from lab.production.faults.fault import Fault

@@ -1,4 +1,4 @@
-"""What all faults share: when they strike, what they do in physics, how long that lasts, and what is then true."""
+"""The base of all faults: when they strike, their effect in physics, its duration, and the truth about it."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -17,7 +17,7 @@ NEVER = float("inf")
 
 @dataclass(frozen=True)
 class Happened:
-    """A fault that struck: at_s [s] of the run, what it was about ("": nothing of that sort), and the truth in words.
+    """A fault that struck at at_s [s] of the run: the affected part, station or obstacle ("": none), and the truth in words.
 
     undone: the part was taken out of a machine that had not finished it.
     """
@@ -32,48 +32,48 @@ class Happened:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """What a true reason names, one of them at least."""
+        """The names of which a true reason contains at least one."""
         said = "camera" if self.what == "camera blind" else ""
         return tuple(name for name in (self.part, self.station, self.obstacle, said) if name)
 
     def explains(self, reason: str, part: str = "", station: str = "") -> bool:
-        """Whether a reason that was given, about a part or a station, is about what this fault did."""
+        """Whether a reason about a part or a station refers to the effect of this fault."""
         return any(name in reason or name in (part, station) for name in self.names)
 
 
 class Fault:
-    """One fault of a run; a new kind is a class of these and a row in `FAULTS`."""
+    """The base class of a fault; a new kind is a subclass and a row in `FAULTS`."""
 
     what: ClassVar[str]  # its name in task files
-    help: ClassVar[str]  # what happens, in one line of plain words
+    help: ClassVar[str]  # its effect, in one line
 
     def __init__(self, fields: FaultFields, number: int) -> None:
-        """number: from 1, which fault of its run it is; it names what the fault brings along."""
+        """number: the number of the fault in its run, from 1, with which the bodies that it adds are named."""
         self.fields, self.number = fields, number
-        self.until_s = NEVER  # when `end` is due, once it has struck
+        self.until_s = NEVER  # the time at which `end` is due, after it has struck
 
     @classmethod
     def drawn(cls, task: Task, order: Order, rng: np.random.Generator) -> dict[str, object] | None:
-        """The fields of a drawn fault of this kind, without its time; None where a task has nothing that it could strike."""
+        """The fields of a drawn fault of this kind, without its time; None if it cannot strike in this task."""
         return {}
 
     def prepare(self, scene: Scene) -> None:
-        """Put out of sight what the fault will bring into the scene: bodies cannot come later."""
+        """Adds the fault's bodies to the scene out of sight, because bodies cannot be added later."""
 
     def strikes(self, floor: Floor) -> Happened | None:
-        """Let the fault happen; returns what happened, None, with nothing changed, when it cannot happen now."""
+        """Lets the fault strike and returns what happened; returns None and changes nothing if it cannot strike now."""
         raise NotImplementedError
 
     def end(self, floor: Floor) -> None:
-        """Undo what was to last only for a while."""
+        """Ends an effect of limited duration."""
 
     def parts(self, floor: Floor, *how: str) -> list[tuple[str, Whereabouts]]:
-        """The parts that the fault may strike and that are in one of these ways now, with where they are."""
+        """The parts that the fault may strike and that are in one of these states now, with their whereabouts."""
         own = self.fields.part
-        found = [(name, whereabouts(floor, name)) for name in parts_of(floor) if own in (None, name)]
-        return [(name, at) for name, at in found if at.how in how]
+        places = [(name, whereabouts(floor, name)) for name in parts_of(floor) if own in (None, name)]
+        return [(name, at) for name, at in places if at.how in how]
 
 
 def out_of_sight(number: int) -> tuple[float, float]:
-    """Where on the ground below the table the things of a fault wait, x, y [m]."""
+    """The place x, y [m] on the ground below the table where a fault's bodies wait."""
     return (-0.45 + 0.3 * (number % 6), -0.9 + 0.3 * (number // 6 % 6))

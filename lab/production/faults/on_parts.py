@@ -24,8 +24,8 @@ from lab.sim.world import PART_SPINNING
 from lab.tasks.task import Order, Task
 
 MOVED_M, OUT_OF_MACHINE_M, TURNED_RAD = (0.03, 0.08), 0.20, pi / 6
-LAID_M = 0.06  # from where it stood, where there is no room to lie
-SLIPS_S = (0.03, 0.10)  # falling for so long it sags by 0.4 to 5 cm
+LAID_M = 0.06  # distance from where it stood, if it has no room to lie there
+SLIPS_S = (0.03, 0.10)  # a part that falls for this time sags by 0.4 to 5 cm
 FAR_M = (
     (1.36, 1.34),
     (1.36, -1.34),
@@ -42,7 +42,7 @@ class PartMoved(Fault):
 
     @classmethod
     def drawn(cls, task: Task, order: Order, rng: np.random.Generator) -> dict[str, object]:
-        """3 to 8 cm away, turned by up to 30 degrees; or out of a machine and 20 cm away."""
+        """A displacement of 3 to 8 cm with a turn of up to 30 degrees, or of 20 cm out of a machine."""
         way, turn = rng.uniform(0, 2 * pi), rng.uniform(-TURNED_RAD, TURNED_RAD)
         in_machine = bool(rng.random() < 0.4)
         far = OUT_OF_MACHINE_M if in_machine else rng.uniform(*MOVED_M)
@@ -50,7 +50,7 @@ class PartMoved(Fault):
         return {"when": "in machine" if in_machine else "standing", "by_m": by_m, "turn_rad": round(turn, 3)}
 
     def strikes(self, floor: Floor) -> Happened | None:
-        """The first part for which there is room."""
+        """The fault on the first part that has room."""
         for name, where in self.parts(floor, self.fields.when or "standing"):
             bodies = stack_of(floor, name)
             x, y, _ = floor.world.pose(bodies[0])[0]
@@ -75,7 +75,7 @@ class PartGone(Fault):
     help = "a standing part is taken off the table"
 
     def strikes(self, floor: Floor) -> Happened | None:
-        """The first part that stands; its pallet stays."""
+        """The fault on the first standing part; its pallet stays."""
         how = ("standing", "in machine") if self.fields.when is None else (self.fields.when,)
         for name, where in self.parts(floor, *how):
             if is_robot_away(floor, [name]):
@@ -93,7 +93,7 @@ class PartFallen(Fault):
     help = "a standing part falls over"
 
     def strikes(self, floor: Floor) -> Happened | None:
-        """The first part that has room to lie where it stands, or beside."""
+        """The fault on the first part that has room to lie where it stands, or beside it."""
         for name, where in self.parts(floor, "standing"):
             if not is_robot_away(floor, [name]):
                 continue
@@ -109,18 +109,18 @@ class PartFallen(Fault):
 
 
 class PartSlips(Fault):
-    """The fingers' hold is gone for a moment."""
+    """The fingers lose their friction for a moment."""
 
     what = "part slips"
     help = "the part in the gripper slips for a moment, and sags or is lost"
 
     @classmethod
     def drawn(cls, task: Task, order: Order, rng: np.random.Generator) -> dict[str, object]:
-        """The part slips for 0.03 to 0.1 s."""
+        """A duration of 0.03 to 0.1 s."""
         return {"seconds": round(float(rng.uniform(*SLIPS_S)), 3)}
 
     def strikes(self, floor: Floor) -> Happened | None:
-        """The part that is carried."""
+        """The fault on the carried part."""
         for name, where in self.parts(floor, "carried"):
             self._body = floor.bench.held or name
             self._friction(floor, self.fields.share or 0.0)
@@ -129,7 +129,7 @@ class PartSlips(Fault):
         return None
 
     def end(self, floor: Floor) -> None:
-        """Let the fingers hold as before."""
+        """Restores the fingers' friction."""
         self._friction(floor, 1.0)
 
     def _friction(self, floor: Floor, share: float) -> None:
@@ -145,7 +145,7 @@ class PartDropped(Fault):
 
     @classmethod
     def drawn(cls, task: Task, order: Order, rng: np.random.Generator) -> dict[str, object]:
-        """It falls where it is, comes to stand 6 to 12 cm away, or where no arm reaches it."""
+        """The part falls where it is, or ends 6 to 12 cm away or out of reach."""
         chance, way, far = rng.random(), rng.uniform(0, 2 * pi), rng.uniform(0.06, 0.12)
         if chance < 0.4:
             return {}
@@ -154,7 +154,7 @@ class PartDropped(Fault):
         return {"at_m": FAR_M[int(rng.integers(len(FAR_M)))]}
 
     def strikes(self, floor: Floor) -> Happened | None:
-        """The part that is carried; where it is to come to stand and there is no room, it falls."""
+        """The fault on the carried part, which falls if there is no room where it should stand."""
         for name, where in self.parts(floor, "carried"):
             body = floor.bench.held or name
             bodies = [body, name] if body != name else [name]
@@ -172,4 +172,4 @@ class PartDropped(Fault):
         return None
 
 
-ABOVE_TABLE_M = IN_MACHINE_M / 2  # it falls so far where it comes down out of reach
+ABOVE_TABLE_M = IN_MACHINE_M / 2  # height of the fall of a part that ends out of reach

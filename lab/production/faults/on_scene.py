@@ -1,4 +1,4 @@
-"""Faults that strike what stands around: machines, obstacles, stations, the camera."""
+"""Faults that strike machines, obstacles, stations and the camera."""
 
 from math import pi
 
@@ -25,31 +25,31 @@ from lab.sim.scene.scene_check import places_of
 from lab.tasks.task import Order, Task
 
 SLOWER, OBSTACLE_M, STATION_M, BLIND_S = 1.5, 0.06, 0.02, (10.0, 60.0)
-BOX_M = (0.06, 0.06, 0.34)  # as high as the ways between stations
+BOX_M = (0.06, 0.06, 0.34)  # as high as the paths between stations
 BOX_RGBA = (0.75, 0.25, 0.2, 1.0)
-ROOM_M = 0.05  # that a drawn box leaves around stations
-OUT_OF_THE_WAY_M = 0.15  # of the robot, when a hand moves what is fixed
+ROOM_M = 0.05  # room around stations that a drawn box leaves
+OUT_OF_THE_WAY_M = 0.15  # least distance of the robot when a hand moves a fixed body
 DRAWS = 60
 
 
 def machines_of(task: Task) -> list[str]:
     """The machines that parts are brought to."""
-    return [one.name for one in task.stations if one.kind == "machine" and task.kinds_at(one.name)]
+    return [station.name for station in task.stations if station.kind == "machine" and task.kinds_at(station.name)]
 
 
 def one_of(names: list[str], rng: np.random.Generator) -> str:
-    """A drawn one."""
+    """A drawn name."""
     return names[int(rng.integers(len(names)))]
 
 
 def any_way(far_m: float, rng: np.random.Generator) -> tuple[float, float]:
-    """An offset so far in a drawn direction [m]."""
+    """An offset of length `far_m` [m] in a drawn direction."""
     way = rng.uniform(0, 2 * pi)
     return (round(far_m * float(np.cos(way)), 3), round(far_m * float(np.sin(way)), 3))
 
 
 class MachineSlow(Fault):
-    """A machine takes longer, from now on."""
+    """A machine takes longer from now on."""
 
     what = "machine slow"
     help = "a machine takes half as long again"
@@ -69,7 +69,7 @@ class MachineSlow(Fault):
 
 
 class MachineFails(Fault):
-    """A machine never gets done, from now on."""
+    """A machine never finishes from now on."""
 
     what = "machine fails"
     help = "a machine never gets done"
@@ -95,31 +95,31 @@ class ObstaclePut(Fault):
 
     @classmethod
     def drawn(cls, task: Task, order: Order, rng: np.random.Generator) -> dict[str, object] | None:
-        """In the workspace, clear of stations, obstacles and the cameras' grids; None where no such place was drawn."""
+        """A place in the workspace, clear of stations, obstacles and the cameras' grids; None if no such place was drawn."""
         places, grid = places_of(task), task.workspace
         kept = [room for _, room in places.kept_free(len(order))]
         for obstacle in task.obstacles:
             (a, b), (x, y), (i, j, _) = obstacle.area, obstacle.position_m, obstacle.size
             kept.append(Rectangle(x, y, a + i / 2, b + j / 2, obstacle.yaw))
-        nearest = 0.3  # [m] from the robot's foot
+        nearest = 0.3  # [m] distance from the robot's foot
         for _ in range(DRAWS):
             x, y = (
                 round(low + float(rng.random()) * count * cell, 3)
                 for low, count, cell in zip(grid.lower_m[:2], grid.shape[:2], grid.cell_m[:2], strict=True)
             )
             box = Rectangle(x, y, BOX_M[0] / 2 + ROOM_M, BOX_M[1] / 2 + ROOM_M, 0.0)
-            seen = any(in_grid(one.grid, (x, y)) for one in task.stations if one.grid is not None)
+            seen = any(in_grid(station.grid, (x, y)) for station in task.stations if station.grid is not None)
             if x * x + y * y > nearest**2 and not seen and not any(room.meets(box) for room in kept):
                 return {"at_m": (x, y)}
         return None
 
     @property
     def name(self) -> str:
-        """What the box is called."""
+        """The name of the box."""
         return f"strange box {self.number}"
 
     def prepare(self, scene: Scene) -> None:
-        """The box waits below the table, with a marker where a camera is to see it."""
+        """Puts the box below the table, with a marker if a camera must see it."""
         size, (x, y) = self.fields.size_m or BOX_M, out_of_sight(self.number)
         scene.world.box(self.name, size, (x, y, GROUND_M + size[2] / 2), BOX_RGBA)
         self.marked = _in_a_grid(scene.task, self.fields.at_m or (0.0, 0.0))
@@ -128,7 +128,7 @@ class ObstaclePut(Fault):
             scene.world.disc(f"{self.name}{MARKER}", models.MARKER_RADIUS, models.MARKER_THICK, at, models.MARKER_GREEN)
 
     def strikes(self, floor: Floor) -> Happened | None:
-        """The box is put there; None while something is in its place."""
+        """Puts the box on the table; returns None while another body is in its place."""
         (x, y), size, world = self.fields.at_m or (0.0, 0.0), self.fields.size_m or BOX_M, floor.world
         before = world.pose(self.name)[0]
         world.put(self.name, (x, y, size[2] / 2))
@@ -150,11 +150,11 @@ class ObstacleMoved(Fault):
     @classmethod
     def drawn(cls, task: Task, order: Order, rng: np.random.Generator) -> dict[str, object] | None:
         """One of the obstacles that the task says may stand elsewhere."""
-        names = [one.name for one in task.obstacles if max(one.area) > 0]
+        names = [obstacle.name for obstacle in task.obstacles if max(obstacle.area) > 0]
         return {"obstacle": one_of(names, rng), "by_m": any_way(OBSTACLE_M, rng)} if names else None
 
     def strikes(self, floor: Floor) -> Happened | None:
-        """The obstacle is moved to where there is room; None while the robot is near."""
+        """Moves the obstacle to a place with room; returns None while the robot is near."""
         name, world = str(self.fields.obstacle), floor.world
         if not is_robot_away(floor, [name], OUT_OF_THE_WAY_M):
             return None
@@ -178,7 +178,7 @@ class ObstacleGone(Fault):
     @classmethod
     def drawn(cls, task: Task, order: Order, rng: np.random.Generator) -> dict[str, object] | None:
         """One of the obstacles that the task says may stand elsewhere."""
-        names = [one.name for one in task.obstacles if max(one.area) > 0]
+        names = [obstacle.name for obstacle in task.obstacles if max(obstacle.area) > 0]
         return {"obstacle": one_of(names, rng)} if names else None
 
     def strikes(self, floor: Floor) -> Happened | None:
@@ -194,20 +194,20 @@ class ObstacleGone(Fault):
 
 
 class StationMoved(Fault):
-    """A machine is pushed, with all that stands in it."""
+    """A machine is pushed, with all parts in it."""
 
     what = "station moved"
     help = "a machine is pushed by 2 cm"
 
     @classmethod
     def drawn(cls, task: Task, order: Order, rng: np.random.Generator) -> dict[str, object] | None:
-        """One of the machines that are approached through a camera's grid, or else any."""
+        """One of the machines that are approached through a camera's grid; if there are none, any machine."""
         machines = machines_of(task)
         seen = [name for name in machines if task.station(name).grid is not None]
         return {"station": one_of(seen or machines, rng), "by_m": any_way(STATION_M, rng)} if machines else None
 
     def strikes(self, floor: Floor) -> Happened | None:
-        """Once the robot is away, in a direction in which there is room."""
+        """Moves the station in a direction with room, once the robot is away."""
         name, world = str(self.fields.station), floor.world
         if not is_robot_away(floor, [name], OUT_OF_THE_WAY_M):
             return None
@@ -224,25 +224,27 @@ class StationMoved(Fault):
 
 
 class StationFull(Fault):
-    """A part that is nobody's stands where one is to be set down."""
+    """A strange part stands where a part must be set down."""
 
     what = "station full"
     help = "a part of no order stands on a station's free spot"
 
     @classmethod
     def drawn(cls, task: Task, order: Order, rng: np.random.Generator) -> dict[str, object] | None:
-        """Any station but those where parts begin."""
+        """Any station except those where parts begin."""
         begins = {task.starts(kind) for kind in order}
-        names = [one.name for one in task.stations if one.name not in begins and task.kinds_at(one.name)]
+        names = [
+            station.name for station in task.stations if station.name not in begins and task.kinds_at(station.name)
+        ]
         return {"station": one_of(names, rng)} if names else None
 
     @property
     def name(self) -> str:
-        """What the part is called."""
+        """The name of the part."""
         return f"strange part {self.number}"
 
     def prepare(self, scene: Scene) -> None:
-        """The part waits below the table, alone in a machine and on no pallet."""
+        """Puts the part, without a pallet, below the table."""
         station = scene.task.station(str(self.fields.station))
         self.kind = next(iter(scene.task.kinds_at(station.name))).name
         own = scene.kinds[self.kind]
@@ -253,7 +255,7 @@ class StationFull(Fault):
         scene.kind_of[self.name] = own
 
     def strikes(self, floor: Floor) -> Happened | None:
-        """The first spot on which nothing stands."""
+        """Puts the part on the first free spot."""
         scene, station = floor.scene, floor.scene.task.station(str(self.fields.station))
         others = [name for name in scene.kind_of if name != self.name]
         before = floor.world.pose(self.name)
@@ -268,14 +270,14 @@ class StationFull(Fault):
 
 
 class CameraBlind(Fault):
-    """A hand is before the camera."""
+    """A hand covers the camera."""
 
     what = "camera blind"
     help = "the camera sees nothing for a while"
 
     @classmethod
     def drawn(cls, task: Task, order: Order, rng: np.random.Generator) -> dict[str, object] | None:
-        """For 10 to 60 s."""
+        """A duration of 10 to 60 s."""
         return None if task.camera is None else {"seconds": round(float(rng.uniform(*BLIND_S)), 1)}
 
     def strikes(self, floor: Floor) -> Happened:
@@ -286,7 +288,7 @@ class CameraBlind(Fault):
         return Happened(self.what, f"the camera saw nothing for {seconds:g} s", floor.now_s)
 
     def end(self, floor: Floor) -> None:
-        """Let the camera see again."""
+        """Uncovers the camera."""
         floor.world.dark = False
 
 
@@ -300,7 +302,7 @@ def _is_at(floor: Floor, part: str, station: str) -> bool:
 
 
 def _along(floor: Floor, bodies: list[str], dx: float, dy: float) -> None:
-    """Move bodies that are there as far as what they stand on was moved."""
+    """Moves bodies by the same offset as their support."""
     for body in bodies:
         if body in floor.world.names():
             (x, y, z), turn = floor.world.pose(body)

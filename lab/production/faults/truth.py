@@ -12,8 +12,8 @@ Came = Literal["delivered", "stopped", "wrong"]
 PART = ("part moved", "part gone", "part fallen", "part slips", "part dropped")
 FIXED = ("obstacle put", "obstacle moved", "obstacle gone", "station moved")
 MACHINE = ("machine slow", "machine fails")
-# what a reason may say, the faults of which that can be true, and whether it need not name what they are about, as what
-# stands elsewhere is in many ways; the first that fits counts
+# words of a reason, the faults by which it can be true, and whether it may omit the name of the affected body; the first
+# row that fits counts
 CLAIMS: tuple[tuple[str, tuple[str, ...], bool], ...] = (
     (r"not done|takes longer|out of order", MACHINE, False),
     (r"no spot of .* is free", ("station full", *PART), False),
@@ -33,8 +33,8 @@ CLAIMS: tuple[tuple[str, tuple[str, ...], bool], ...] = (
 
 @dataclass(frozen=True)
 class Verdict:
-    """What a run with faults came to, and why it is wrong; rows: of each fault, what was noticed; unexplained: what was told
-    that no fault explains."""
+    """The verdict on a run with faults, and its reason if it is "wrong"; rows: each fault and what the run noticed of it;
+    unexplained: reasons of the run that no fault explains."""
 
     came: Came
     rows: tuple[dict[str, Any], ...]
@@ -45,15 +45,15 @@ class Verdict:
 def verdict(
     happened: Sequence[Happened], heard: Sequence[Event], failure: str | None, lacking: Sequence[str]
 ) -> Verdict:
-    """What a run with faults came to.
+    """The verdict on a run with faults: delivered, stopped or wrong.
 
-    heard: what the run told. failure: why not all was delivered, as it says; None: all was. lacking: the parts that do not
+    heard: the run's events. failure: the run's reason for missing parts; None: there are none. lacking: the parts that do not
     stand at the end of their routes.
-    Delivered: all parts are there, and each was finished. Stopped: some are not there, the run said why, and each reason is
-    about a fault. Else it is wrong; a run in which nothing struck may stop for reasons that nobody can check.
+    Delivered: all parts are there and finished. Stopped: parts are missing, and each reason of the run refers to a fault.
+    Wrong: all others. If nothing struck, the reasons of a stop are not checked.
     """
     troubles = [event for event in heard if isinstance(event, TroubleMet)]
-    rows = tuple(_row(one, troubles) for one in happened)
+    rows = tuple(_row(fault, troubles) for fault in happened)
     unexplained = tuple(t.what for t in troubles if not explained(t.what, happened, t.part, t.station, t.at_s))
     why = "; ".join(_wrong(happened, heard, failure, lacking))
     came: Came = "delivered" if failure is None else "stopped"
@@ -63,10 +63,10 @@ def verdict(
 def _wrong(
     happened: Sequence[Happened], heard: Sequence[Event], failure: str | None, lacking: Sequence[str]
 ) -> Iterator[str]:
-    """What the run said, or did not say, that is not true."""
-    for one in happened:
-        if one.undone and one.part not in lacking and not _begun_again(one, heard):
-            yield f"{one.part} was delivered, and '{one.station}' had not finished it"
+    """The untrue statements of the run, and its untrue silences."""
+    for fault in happened:
+        if fault.undone and fault.part not in lacking and not _begun_again(fault, heard):
+            yield f"{fault.part} was delivered, and '{fault.station}' had not finished it"
     if failure is None and lacking:
         yield f"nothing was said of {', '.join(lacking)}"
     for piece in untrue([*pieces(failure or "")], happened) if happened else ():
@@ -74,7 +74,7 @@ def _wrong(
 
 
 def untrue(told: Sequence[str], happened: Sequence[Happened]) -> list[str]:
-    """The reasons that no fault explains, and that do not follow from one that a fault explains."""
+    """The reasons that neither a fault nor another explained reason explains."""
     true = [piece for piece in told if explained(piece, happened)]
     while following := [piece for piece in told if piece not in true and _follows(piece, true)]:
         true += following
@@ -82,45 +82,45 @@ def untrue(told: Sequence[str], happened: Sequence[Happened]) -> list[str]:
 
 
 def _follows(piece: str, true: Sequence[str]) -> bool:
-    """Whether a part has no room because of another one, of which a true reason tells why it is still there."""
+    """Whether a part has no room because of another part whose stay a true reason explains."""
     stands = re.search(r"no spot of .* is free: (.+) is there$", piece)
     return stands is not None and any(one.startswith(f"{stands[1]} ") for one in true)
 
 
-def _begun_again(one: Happened, heard: Sequence[Event]) -> bool:
-    """Whether the machine that a part was taken out of worked on it once more."""
-    begun = [event for event in heard if isinstance(event, MachineBegan) and event.at_s >= one.at_s]
-    return any(event.part == one.part for event in begun)
+def _begun_again(fault: Happened, heard: Sequence[Event]) -> bool:
+    """Whether the machine from which a part was taken worked on it again."""
+    begun = [event for event in heard if isinstance(event, MachineBegan) and event.at_s >= fault.at_s]
+    return any(event.part == fault.part for event in begun)
 
 
 def explained(reason: str, happened: Sequence[Happened], part: str = "", station: str = "", at_s: float = 1e9) -> bool:
-    """Whether a fault that had struck makes a reason true: one of those of which it can be, and about the same thing."""
-    return any(_explains(one, reason, part, station) for one in happened if one.at_s <= at_s)
+    """Whether a fault that had struck makes a reason true: it is of a possible kind and affects the same body."""
+    return any(_explains(fault, reason, part, station) for fault in happened if fault.at_s <= at_s)
 
 
-def _explains(one: Happened, reason: str, part: str, station: str) -> bool:
+def _explains(fault: Happened, reason: str, part: str, station: str) -> bool:
     claims = [(kinds, anywhere) for pattern, kinds, anywhere in CLAIMS if re.search(pattern, reason)]
     for kinds, anywhere in claims[:1]:
-        if one.what in kinds and anywhere:
+        if fault.what in kinds and anywhere:
             return True
-        if one.what not in kinds and not (anywhere and one.what in PART):
+        if fault.what not in kinds and not (anywhere and fault.what in PART):
             return False
-    return one.explains(reason, part, station)
+    return fault.explains(reason, part, station)
 
 
 def pieces(failure: str) -> Iterator[str]:
-    """The reasons of which a failure is made."""
+    """The single reasons of a failure."""
     for piece in failure.split("; "):
         if piece.strip():
             yield piece.strip()
 
 
-def _row(one: Happened, troubles: Sequence[TroubleMet]) -> dict[str, Any]:
-    """A fault, and the first that was told of it."""
-    found = next((t for t in troubles if t.at_s >= one.at_s and _explains(one, t.what, t.part, t.station)), None)
-    row: dict[str, Any] = {"what": one.what, "at_s": round(one.at_s, 3), "true_reason": one.words}
+def _row(fault: Happened, troubles: Sequence[TroubleMet]) -> dict[str, Any]:
+    """A fault, and the first trouble of the run that refers to it."""
+    noticed = next((t for t in troubles if t.at_s >= fault.at_s and _explains(fault, t.what, t.part, t.station)), None)
+    row: dict[str, Any] = {"what": fault.what, "at_s": round(fault.at_s, 3), "true_reason": fault.words}
     return row | {
-        "noticed": None if found is None else found.what,
-        "noticed_s": None if found is None else round(found.at_s, 3),
-        "answer": None if found is None else found.answer,
+        "noticed": None if noticed is None else noticed.what,
+        "noticed_s": None if noticed is None else round(noticed.at_s, 3),
+        "answer": None if noticed is None else noticed.answer,
     }

@@ -1,1 +1,1 @@
-"""The operator's side of a run: commands in words, the arm moved by hand, an order typed in, and the console's engine."""
+"""The operator's side of a run: commands in words, motions of the arm by hand, typed orders, and the console's engine."""

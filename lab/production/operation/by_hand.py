@@ -1,4 +1,4 @@
-"""The arm moved by the operator: jogged, turned, opened, closed, brought home, and told to take up what is near."""
+"""The operator's motions of the arm: jog, rotate, open, close, home, and grasp the nearest part."""
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -15,19 +15,17 @@ from lab.skills.free_way import by_free_cells
 from lab.skills.skill import Status
 from lab.skills.surveys import Surveys, way_to
 
-SLOW = 0.5  # of the arm's speed, for motions by hand
-FORCE_N = (
-    60.0  # more than this on top of what it presses on already stops a motion by hand, where the task says nothing
-)
+SLOW = 0.5  # share of the arm's speed for motions by hand
+FORCE_N = 60.0  # force beyond the present contact force that stops a motion by hand, if the task sets none
 
 Deed = Callable[[], None]  # raises WorkFailed
 
 
 @dataclass
 class ByHand:
-    """Motions of the arm on a floor that are no skill's; each is checked first (BadInput), then returned to be done.
+    """Motions of the arm by hand on a floor; each is checked (BadInput) and returned as a function that makes it.
 
-    ready: gives a skill the policy that it needs; BadInput where there is none.
+    ready: gives a skill the policy that it needs; raises BadInput if there is none.
     """
 
     floor: Floor
@@ -42,7 +40,7 @@ class ByHand:
         return self._to(self.floor.scene.robot.tool().shifted(dyaw=radians(degrees)))
 
     def move(self, to: str | tuple[float, float, float]) -> Deed:
-        """Move the tool straight to where a station is approached, or to a point [m]."""
+        """Moves the tool in a straight line to a station's approach, or to a point [m]."""
         robot, task = self.floor.scene.robot, self.floor.scene.task
         if not isinstance(to, str):
             return self._to(ToolPose(*to, robot.tool().yaw))
@@ -62,14 +60,14 @@ class ByHand:
         return lambda: self._follow(robot.follow([pose], slow=SLOW))
 
     def home(self) -> Deed:
-        """Bring the arm home, by free cells of the workspace."""
+        """Moves the arm home through free cells of the workspace."""
         floor, robot, held = self.floor, self.floor.scene.robot, self.floor.bench.held
         pose = robot.arm.forward(robot.arm.home)
         carried = "" if held is None else comes_as(floor.scene.kind_of[held].part)
         return lambda: self._follow(by_free_cells(floor.bench, self._surveys, pose, carried))
 
     def open(self) -> Deed:
-        """Open the gripper; what it holds is let go."""
+        """Opens the gripper and releases the held part."""
 
         def deed() -> None:
             self._follow(self.floor.scene.robot.release())
@@ -78,7 +76,7 @@ class ByHand:
         return deed
 
     def close(self) -> Deed:
-        """Close the gripper; a part between the fingers is held."""
+        """Closes the gripper, which then holds a part between the fingers."""
 
         def deed() -> None:
             bench = self.floor.bench
@@ -89,7 +87,7 @@ class ByHand:
         return deed
 
     def grasp(self) -> Deed:
-        """Take up the part nearest to the tool, wherever that is, by the learned skill of the station that it is nearest to."""
+        """Takes up the part nearest to the tool, with the learned skill of the station nearest to the part."""
         floor = self.floor
         if (held := floor.bench.held) is not None:
             raise BadInput(f"the robot holds {held}: open first")
@@ -101,47 +99,47 @@ class ByHand:
         ]
         if not near:
             raise BadInput("no part is here that a skill of this task takes up")
-        *_, skills, part = min(near, key=lambda found: found[:2])
+        *_, skills, part = min(near, key=lambda candidate: candidate[:2])
         return self._carried_out(skills, part)
 
     def execute(self, name: str) -> Deed:
-        """Carry one skill out, with a part where one is named after it, else the one nearest to where it takes parts up."""
+        """Carries one skill out, with the named part, or else with the part nearest to the skill's spots."""
         floor = self.floor
         skills, held = floor.skillset.skills, floor.bench.held
-        found = next((own for own in sorted(skills, key=len, reverse=True) if f"{name} ".startswith(f"{own} ")), None)
-        if found is None:
+        named = next((own for own in sorted(skills, key=len, reverse=True) if f"{name} ".startswith(f"{own} ")), None)
+        if named is None:
             raise unknown("skill", name, skills, "execute")
-        skill, part = skills[found], name[len(found) :].strip()
+        skill, part = skills[named], name[len(named) :].strip()
         if not skill.moves_arm:
-            raise BadInput(f"'{found}' is what a machine does by itself: bring a part there, and it begins")
+            raise BadInput(f"'{named}' is what a machine does by itself: bring a part there, and it begins")
         parts = self._parts(skill.kind)
         if part and part not in floor.scene.kind_of:
             raise unknown("part", part, floor.scene.kind_of, "execute")
         if part and part not in parts.values():
-            raise BadInput(f"'{found}' is not done with {part}: wanted {', '.join(parts.values()) or 'no part'}")
+            raise BadInput(f"'{named}' is not done with {part}: wanted {', '.join(parts.values()) or 'no part'}")
         if skill.carries and held is None:
-            raise BadInput(f"'{found}' begins with a part in the gripper: grasp one first")
+            raise BadInput(f"'{named}' begins with a part in the gripper: grasp one first")
         if not skill.carries and held is not None:
-            raise BadInput(f"'{found}' begins with an empty gripper, and the robot holds {held}: open first")
+            raise BadInput(f"'{named}' begins with an empty gripper, and the robot holds {held}: open first")
         if skill.carries and (held not in parts or part not in ("", parts[held])):
-            raise BadInput(f"the robot holds {held}: '{found}' carries {part or f'a {skill.kind}'}")
+            raise BadInput(f"the robot holds {held}: '{named}' carries {part or f'a {skill.kind}'}")
         if not part and parts:
             part = parts[held or min(parts, key=lambda body: self._far_m(body, self._spots(skill.station)))]
         return self._carried_out((skill,), part)
 
     def _parts(self, kind: str) -> dict[str, str]:
-        """The parts that may be carried as a kind, by the body that the gripper then holds; "": none."""
+        """The parts that may be carried as a kind, by the body that the gripper then holds; "": no part."""
         scene = self.floor.scene
         made = scene.task.made_as(kind).name if kind else ""
-        found = {scene.body_of(name, kind): name for name, own in scene.kind_of.items() if own.part.name == made}
-        return {body: name for body, name in found.items() if body in scene.kind_of}
+        parts = {scene.body_of(name, kind): name for name, own in scene.kind_of.items() if own.part.name == made}
+        return {body: name for body, name in parts.items() if body in scene.kind_of}
 
     def _spots(self, station: str) -> Sequence[Spot]:
         places = self.floor.scene.places
         return places.spots(places.task.station(station)) if station else ()
 
     def _far_m(self, body: str, places: Sequence[Spot | ToolPose]) -> float:
-        """How far a body is from the nearest of these places across the table [m]; 0 where there are none."""
+        """The distance of a body from the nearest of these places along the table [m]; 0 without places."""
         at = self.floor.bench.part_pose(body)
         return min((hypot(at.x - place.x, at.y - place.y) for place in places), default=0.0)
 
@@ -173,7 +171,7 @@ class ByHand:
 
     @contextmanager
     def _careful(self) -> Iterator[None]:
-        """What the arm presses on already, where a protective stop held it, is no new one: it may be jogged away."""
+        """A context in which the present contact force causes no protective stop, so that a stopped arm can be jogged away."""
         _, now_n = self.floor.world.pressed(NAME)
         self.floor.pressing_n = now_n if now_n > self.floor.scene.stops_at_n else 0.0
         try:

@@ -1,4 +1,4 @@
-"""The operator's commands: one table, how a typed line is read, and how those are done that are done at once.
+"""The operator's commands: their table, the parsing of a typed line, and the immediate ones.
 
 Terminal, page and pipe all send these words.
 """
@@ -23,10 +23,10 @@ OPERATOR = "operator"
 
 @dataclass(frozen=True)
 class OperatorCommand:
-    """A command: its arguments as they are typed ("": none), what it does, and when it is done.
+    """A command: its arguments as they are typed ("": none), its description, and when it is carried out.
 
-    how: "at once", whatever goes on; "by hand", a motion of the arm, when nothing moves, also in a pause; "in turn", when
-    what was said before is done; "console": it concerns the console, not the run. read: the argument that words mean.
+    how: "at once": immediately; "by hand": a motion of the arm, when nothing moves, also in a pause; "in turn": after the
+    commands before it; "console": it concerns the console, not the run. read: parses the argument from words.
     """
 
     arguments: str
@@ -37,7 +37,7 @@ class OperatorCommand:
 
 @dataclass(frozen=True)
 class Spoken:
-    """A line as it was understood: the command's word and argument; `words`: the line itself, in one form."""
+    """A parsed line: the command's word and argument; words: the line in its canonical form."""
 
     word: str
     argument: Argument
@@ -45,12 +45,12 @@ class Spoken:
 
     @property
     def how(self) -> How:
-        """When it is done."""
+        """When the command is carried out."""
         return COMMANDS[self.word].how
 
 
 def spoken(line: str) -> Spoken:
-    """What a typed line means; BadInput, in one line, for what is no command."""
+    """The command of a typed line; BadInput for a line that is none."""
     words = line.split()
     if not words:
         raise BadInput("no command: help lists them")
@@ -83,7 +83,7 @@ def _parts(rest: str) -> str:
 
 
 def _number(text: str, most: float, unit: str, least: float = -inf) -> float:
-    """A number of at most `most`, whatever its sign, and at least `least`."""
+    """A number with a magnitude of at least `least` and at most `most`."""
     try:
         number = float(text)
     except ValueError:
@@ -95,7 +95,7 @@ def _number(text: str, most: float, unit: str, least: float = -inf) -> float:
 
 
 def _jog(rest: str) -> tuple[float, float, float]:
-    """How far [m] along the world's axes: "+x 10" is ten millimetres."""
+    """The displacement [m] along the world's axes; "+x 10" means ten millimetres."""
     axis, _, far = rest.partition(" ")
     sign = _SIGN.fullmatch(axis.lower())
     if sign is None:
@@ -115,7 +115,7 @@ def _speed(rest: str) -> float | None:
 
 
 def pace(text: str) -> float | None:
-    """Simulated seconds per second that an option `--speed` means, None: as fast as it can. Raises BadInput."""
+    """The simulated seconds per second of an option `--speed`; None: unlimited. Raises BadInput."""
     try:
         return _speed(text)
     except BadInput as error:
@@ -179,14 +179,14 @@ COMMANDS: dict[str, OperatorCommand] = {
 
 
 def help_lines() -> list[str]:
-    """The commands, one a line."""
+    """The commands, one per line."""
     width = max(len(f"{word} {command.arguments}") for word, command in COMMANDS.items())
     return [f"{f'{word} {command.arguments}':{width}}  {command.help}" for word, command in COMMANDS.items()]
 
 
 @dataclass(frozen=True)
 class Done:
-    """What came of a command: refused, why it was not begun; failed, why it did not come to its end; said, what it came to."""
+    """The result of a command: refused: why it was not begun; failed: why it was not completed; said: its result in words."""
 
     words: str
     refused: str = ""
@@ -195,12 +195,12 @@ class Done:
 
     @property
     def well(self) -> bool:
-        """Whether it was carried out."""
+        """Whether the command was carried out."""
         return not (self.refused or self.failed)
 
 
 def press(controls: Controls, said: Spoken, by: str = OPERATOR) -> str:
-    """Do a command that is done at once, in any thread; why it may not be, "" when it was."""
+    """Carries out an immediate command, in any thread; returns why it was refused, or ""."""
     match said.word:
         case "stop":
             controls.emergency(by=by)

@@ -1,4 +1,4 @@
-"""Where commands are said while another thread simulates: to an operated scene, or to a run that carries itself out."""
+"""The entry of commands while another thread simulates: for an operated scene, or for a run that carries itself out."""
 
 from collections import deque
 from collections.abc import Mapping, Sequence
@@ -18,19 +18,19 @@ from lab.tasks.task import Order, Task
 from lab.teaching.events import Event, OperatorActed, Tell
 
 AT_WORK = "the robot is at work: pause first"
-LISTEN_S = 0.2  # the longest stretch of waiting, so that Ctrl-C is heard
+LISTEN_S = 0.2  # longest single wait, so that Ctrl-C is noticed
 WORDS = tuple(word for word, command in COMMANDS.items() if command.how == "at once")
 
 
 class Desk:
-    """`say` may be called in any thread, `serve` in the one that simulates.
+    """The desk of an operated scene: `say` may be called in any thread, `serve` in the one that simulates.
 
-    attended: somebody is there who goes on after a protective stop; without, what it stops has failed.
-    busy: the command under way, "" for none. What came of commands is told by the operation's `on_done`.
+    attended: whether somebody is there who releases a protective stop; otherwise a stopped command has failed.
+    busy: the current command, or "". The operation's `on_done` is called with the results of commands.
     """
 
     def __init__(self, operation: Operation, *, attended: bool = True, known: Sequence[Entry] = ()) -> None:
-        """known: what a journal says was done, which is done again first."""
+        """known: the entries of a journal, which are repeated first."""
         self.operation, self._known = operation, known
         self.busy, self.closed = "lays the scene out", False
         self._changed = Condition()
@@ -38,22 +38,22 @@ class Desk:
 
     @property
     def controls(self) -> Controls:
-        """The stops and the pace."""
+        """The stops and the pace of the run."""
         return self.operation.controls
 
     @property
     def words(self) -> tuple[str, ...]:
-        """The commands that are taken here."""
+        """The words of the commands that the desk accepts."""
         return tuple(COMMANDS)
 
     @property
     def names(self) -> Mapping[str, Sequence[str]]:
-        """What may follow some commands, by the command."""
+        """The possible arguments of some commands, by command."""
         return self.operation.scene.names()
 
     @property
     def done(self) -> Sequence[Done]:
-        """What came of all that was said."""
+        """The results of all commands."""
         return self.operation.done
 
     def now(self) -> RunStatus:
@@ -61,7 +61,7 @@ class Desk:
         return self.operation.now()
 
     def say(self, line: str, by: str = OPERATOR) -> Done | None:
-        """Take a command; what came of it, where that is known at once, else None."""
+        """Accepts a command; returns its result if it is known at once, else None."""
         try:
             said = spoken(line)
             if said.how == "at once":
@@ -79,48 +79,48 @@ class Desk:
                 return None
         except LabError as error:
             return self.operation.refuse(line, str(error), by)
-        except Left:  # said while another left
+        except Left:  # entered while another operator left
             return None
         return done
 
     @property
     def _rests(self) -> bool:
-        """Whether what is under way waits for the operator, or will after the move."""
+        """Whether the current command waits for the operator, or will after the current move."""
         return StopKind.PAUSE in self.operation.controls.stops and not self.operation.controls.holds_arm
 
     def _begin(self, by: str) -> None:
-        """A single step begins the run where nothing is under way."""
+        """Begins the run on a single step if no command is in progress."""
         if not self.busy and self.operation.scene.plan is not None:
             self.operation.waiting.append((spoken("run"), by))
 
     def leave(self) -> None:
-        """Break off what is under way, and end."""
+        """Aborts the current command, and ends."""
         self.closed = self.operation.scene.leaving = True
         self._wake()
 
     def stay(self) -> None:
-        """Wait until somebody leaves. To be called in another thread than `serve`."""
+        """Waits until somebody leaves; to be called in another thread than `serve`."""
         with self._changed:
             while not self.closed:
                 self._changed.wait(LISTEN_S)
 
     def watched(self, pages: int) -> None:
-        """So many pages are open: whether somebody attends the session does not depend on that."""
+        """Ignores the number of open pages, on which the attendance of this session does not depend."""
 
     def hear(self, event: Event) -> None:
-        """The scene itself hears what happens."""
+        """Does nothing: the scene hears events itself."""
 
     def settle(self) -> None:
-        """Wait until all that was said is done, or waits in a pause. To be called in another thread than `serve`."""
+        """Waits until all commands are done, or wait in a pause; to be called in another thread than `serve`."""
         with self._changed:
             while not (self.closed or self.still):
                 self._changed.wait(0.05)
 
     @property
     def still(self) -> bool:
-        """Whether nothing moves before somebody says something."""
+        """Whether nothing moves before the next command."""
         operation = self.operation
-        if operation.waiting:  # looked at first: what is taken from there moves
+        if operation.waiting:  # checked first, because a command that is taken from there causes motion
             return False
         return not self.busy or (operation.scene.resting and operation.controls.waits)
 
@@ -129,7 +129,7 @@ class Desk:
             self._changed.notify_all()
 
     def serve(self) -> None:
-        """Carry out what is said until somebody leaves; the scene is laid out first. Raises LabError."""
+        """Lays the scene out, and carries out commands until somebody leaves. Raises LabError."""
         operation = self.operation
         try:
             operation.repeat(self._known)
@@ -145,7 +145,7 @@ class Desk:
             self._wake()
 
     def _following(self) -> tuple[Spoken, str] | None:
-        """The next command; None when there is none for a while."""
+        """The next command and its origin, or None if there is none for a while."""
         waiting = self.operation.waiting
         with self._changed:
             self.busy = ""
@@ -159,9 +159,9 @@ class Desk:
 
 
 class RunDesk:
-    """`say` and `now` may be called in any thread; `hear`, with all that the run tells, in the run's own.
+    """The desk of a run: `say` and `now` may be called in any thread; `hear`, with every event, in the run's own.
 
-    busy and names are those of a desk where more can be said; `done`: what came of all that was said.
+    busy and names: as at the desk of an operated scene; done: the results of all commands.
     """
 
     busy = ""
@@ -169,7 +169,7 @@ class RunDesk:
     names: Mapping[str, Sequence[str]] = {}
 
     def __init__(self, task: Task, order: Order, controls: Controls, journal: RunJournal, tell: Tell) -> None:
-        """tell: who is told of a command before there is a floor."""
+        """tell: gets the events of commands before there is a floor."""
         self.controls, self._journal, self._tell = controls, journal, tell
         self.done: list[Done] = []
         self._floor: Floor | None = None
@@ -177,33 +177,33 @@ class RunDesk:
         self._unwritten = deque[Commanded]()
 
     def steering(self, conditions: Conditions) -> Conditions:
-        """These conditions, of a run that is steered from here."""
+        """The conditions of a run that is steered from this desk."""
         return replace(
             conditions, on_floor=self._on_floor, before_step=lambda floor: self._write(), meanwhile=self._write
         )
 
     def _on_floor(self, floor: Floor) -> None:
-        """The run is carried out on this floor."""
+        """Notes the floor on which the run is carried out."""
         self._floor, self._tell = floor, floor.tell
 
     def _write(self) -> bool:
-        """Write down what was said; nothing in the scene is changed by that."""
+        """Writes the commands to the journal; returns False, because the scene does not change."""
         while self._unwritten:
             self._journal.write(self._unwritten.popleft())
         return False
 
     def hear(self, event: Event) -> None:
-        """Take over what happened."""
+        """Takes an event over."""
         with self._lock:
             self._status.hear(event)
 
     def now(self) -> RunStatus:
-        """Where the run stands; a stop shows as soon as it is pressed."""
+        """The status of the run; a stop shows as soon as it is pressed."""
         with self._lock:
             return self._status.copied().under(self.controls)
 
     def say(self, line: str, by: str = OPERATOR) -> Done:
-        """Take a command; what came of it."""
+        """Accepts a command and returns its result."""
         words = line
         try:
             said = spoken(line)
@@ -220,5 +220,5 @@ class RunDesk:
         return done
 
     def watched(self, pages: int) -> None:
-        """So many pages are open: somebody is there who goes on after a protective stop, or nobody is."""
+        """Notes the number of open pages: with at least one the run is attended."""
         self.controls.attended = pages > 0

@@ -1,6 +1,6 @@
-"""A way along which a person leads the arm by hand, read as a demonstration: moves of the problem of one skill.
+"""A path along which a person leads the arm by hand, read as a demonstration: moves of the problem of one skill.
 
-Source: thesis, section 4.2: a low-level task may be given to the system by the operator's own steps, or learned with help.
+Source: thesis, section 4.2: a low-level task may be demonstrated by the operator's own steps, or learned with help.
 """
 
 from collections import deque
@@ -20,17 +20,17 @@ from lab.skills.state_words import away_in_words
 from lab.teaching.lesson_plan import Lesson
 
 OUTSIDE = -1  # of the problem's grid
-EVERY = 12  # physics steps from one look at the tool to the next
-NEAR = 2  # moves: a station is approached from a cell that is nearer than that
+EVERY = 12  # physics steps between two samples of the tool's pose
+NEAR = 2  # most moves between a station's approach and the nearest cell
 END, DROP = "end", "drop"
 
 
 @dataclass(frozen=True)
 class Demonstration:
-    """What was led: the moves (state, action) from a start of the problem on, without loops, and the state where they end.
+    """A demonstration: moves (state, action) from a start of the problem, without loops, and the state where they end.
 
-    first: another state than a start where none came near one. left: how often the tool left the grid in between; blocked:
-    the cells that it may not enter; moves lead round both.
+    first: the first state, if no start was near the path. left: how often the tool left the grid in between; blocked: the
+    visited cells that are not free; the moves lead around both.
     """
 
     skill: Skill
@@ -47,7 +47,7 @@ class Demonstration:
         return {mdp.state_label(state): mdp.action_labels[action] for state, action in self.moves.items()}
 
     def judged(self, lesson: Lesson) -> dict[str, Any]:
-        """The verdict on it: its moves beside the learned policy's and the fewest, from the start; whether it was believed."""
+        """The verdict on it: the numbers of its moves, the learned policy's and the fewest; and whether it was believed."""
         mdp, result = self.skill.problem.mdp, lesson.result
         assert result is not None
         begins = self.first in (mdp.starts or (mdp.start,))
@@ -76,7 +76,7 @@ class Demonstration:
 
 @dataclass
 class Lead:
-    """A lead under way: the states in which the tool was seen, each once, OUTSIDE for none."""
+    """A demonstration in progress: the states in which the tool was seen, without repetitions; OUTSIDE for none."""
 
     skill: Skill
     visited: list[int] = field(default_factory=list)
@@ -84,20 +84,20 @@ class Lead:
 
     @classmethod
     def of(cls, skill: Skill, where: str) -> "Lead":
-        """For a skill whose states are cells in which the tool can be; BadInput for another."""
+        """The demonstration for a skill whose states are cells of the tool; BadInput for another skill."""
         if not (skill.moves_arm and skill.problem.mdp.shape):
-            raise BadInput(f"{where}: '{skill.name}' is no way through a grid of cells: it cannot be led")
+            raise BadInput(f"{where}: '{skill.name}' is no path through a grid of cells: it cannot be led")
         return cls(skill)
 
     def see(self, pose: ToolPose) -> None:
-        """Take in where the tool is."""
+        """Adds the present tool pose."""
         self._last = Seen.of(self.skill, pose)
         state = self._last.state
         if not self.visited or self.visited[-1] != state:
             self.visited.append(state)
 
     def where(self) -> str:
-        """Where the tool was seen last, in words."""
+        """The tool's last position, in words."""
         assert self._last is not None
         skill, mdp, (state, cell, beside_m) = self.skill, self.skill.problem.mdp, self._last
         if state != OUTSIDE:
@@ -109,10 +109,10 @@ class Lead:
         return f"Outside the grid: {words[:1].lower()}{words[1:]}{off}"
 
     def demonstration(self) -> Demonstration:
-        """The moves that were led, up to the goal. Cells between two that were seen are filled in by free neighbours.
+        """The moves that were led, up to the goal. Gaps between two visited cells are filled with free neighbours.
 
-        What comes within NEAR moves of a start begins there, and what ends so near to the goal ends there: a skill goes
-        straight to where it begins, and from where it ends. Raises BadInput when fewer than two free cells were seen.
+        A path within NEAR moves of a start begins there, and one that ends within NEAR moves of the goal ends there, because a
+        skill moves straight to its start and from its end. Raises BadInput when fewer than two free cells were seen.
         """
         mdp = self.skill.problem.mdp
         free, blocked, left, gone = list[int](), dict[str, None](), 0, False
@@ -139,7 +139,7 @@ class Lead:
             else:
                 said, at = said | way, state
         moves, state = dict[int, int](), free[0] if free else OUTSIDE
-        while state in said and state not in moves:  # what was said last in a state leads out of every loop
+        while state in said and state not in moves:  # the last move in each state leads out of every loop
             moves[state] = said[state]
             state = int(mdp.successor[state, said[state]])
         if not moves:
@@ -148,8 +148,8 @@ class Lead:
 
 
 class Seen(NamedTuple):
-    """Where the tool is in a skill's grid: the state, OUTSIDE for none; the nearest cell, also beyond the border; how far from
-    that cell's line or plane [m], of a grid of one axis or two."""
+    """The tool's position in a skill's grid: the state, or OUTSIDE; the nearest cell, also beyond the border; and the distance
+    from that cell's line or plane [m] in a grid of one or two axes."""
 
     state: int
     cell: tuple[int, ...]
@@ -157,7 +157,7 @@ class Seen(NamedTuple):
 
     @classmethod
     def of(cls, skill: Skill, pose: ToolPose) -> "Seen":
-        """For a tool pose: the states' poses lie at equal steps along each axis."""
+        """The position of a tool pose; the states' poses lie at equal steps along each axis."""
         shape = skill.problem.mdp.shape
         cells = [(0,) * len(shape), *np.eye(len(shape), dtype=int)]
         first, *others = (
@@ -165,7 +165,7 @@ class Seen(NamedTuple):
         )
         steps = np.stack(others, axis=1) - first[:, None]  # (x, y, z, yaw; axes)
         off = _numbers(pose) - first
-        off[3] = (off[3] + np.pi / 2) % np.pi - np.pi / 2  # the fingers are alike
+        off[3] = (off[3] + np.pi / 2) % np.pi - np.pi / 2  # the gripper is symmetric under half a turn
         along = np.linalg.pinv(steps) @ off
         cell = tuple(np.rint(along).astype(int).tolist())
         beside_m = float(np.linalg.norm((off - steps @ along)[:3]))
@@ -175,7 +175,7 @@ class Seen(NamedTuple):
 
 
 def _from_start(mdp: TabularMDP, states: list[int]) -> list[int]:
-    """The states from the one nearest to a start on, with that start first; all of them where none is near a start."""
+    """The states from the one nearest to a start on, with that start first; all states if none is near a start."""
     starts = [*(mdp.starts or (mdp.start,))]
     far = np.where(np.isin(states, starts), 0, distances(mdp.successor, mdp.terminal, mdp.start)[states])
     least = int(far[far >= 0].min(initial=NEAR + 1))
@@ -190,7 +190,7 @@ def _numbers(pose: ToolPose) -> Array:
 
 
 def _moves_between(mdp: TabularMDP, start: int, end: int) -> dict[int, int] | None:
-    """The moves (state, action) of a shortest way by free states, None where no way leads there."""
+    """The moves (state, action) of a shortest path through free states, or None."""
     before: dict[int, tuple[int, int]] = {start: (start, 0)}
     pending = deque([start])
     while pending and end not in before:
@@ -209,22 +209,22 @@ def _moves_between(mdp: TabularMDP, start: int, end: int) -> dict[int, int] | No
 
 
 def led_in_words(row: dict[str, Any]) -> str:
-    """What came of a demonstration, in one line: `Demonstration.judged` for people."""
+    """The text of `Demonstration.judged`, in one line."""
     learned, fewest = row["learned_moves"], row["fewest_moves"]
     said = f"led {counted(row['led_moves'], 'move')}{'' if row['begins_at_start'] else ', not from the start'}"
     said += f"{'' if row['reached'] else ', not to the goal'}"
-    said += f"; learned: {'no way' if learned is None else learned}, fewest: {fewest}"
+    said += f"; learned: {'no path' if learned is None else learned}, fewest: {fewest}"
     notes: Sequence[str] = (
         row["left_grid"] and f"it left the grid {counted(row['left_grid'], 'time')}",
         row["blocked"] and f"blocked cells on it: {', '.join(row['blocked'][:4])}",
     )
     for note in filter(None, notes):
-        said += f"; {note}: gone round by free cells"
+        said += f"; {note}: led around through free cells"
     guided, misleads = counted(row["guided_episodes"], "episode"), counted(row["misleads"], "mislead")
     verdict = {
         "believed": f"believed: followed in {guided}, {counted(row['helped_steps'], 'step')}",
         "dropped": f"dropped in episode {row['rejected_at_episode']} after {misleads}",
-        "not asked for": "not asked for: the learner found a way before",
+        "not asked for": "not asked for: the learner found a path before",
     }[row["verdict"]]
     failed = f"; in physics it failed: {row['failure']}" if row["failure"] else ""
     return f"{said}; {verdict}; kept as '{row['policy']}', {row['advisor']}{failed}"

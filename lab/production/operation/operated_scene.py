@@ -39,18 +39,18 @@ from lab.teaching.events import Event, PhaseBegan, PlanMade, SkillReady, Trouble
 from lab.teaching.lesson_plan import Lesson, LessonPlan
 from lab.teaching.teacher import Teacher
 
-Deed = Callable[[], str]  # carries a checked command out, and says what came of it; raises WorkFailed
+Deed = Callable[[], str]  # carries a checked command out, and returns its result in words; raises WorkFailed
 LAY_OUT = "parts lays the scene out anew"
 PROTECTED = "a protective stop holds the robot: go first"
 
 
 class Left(KeyboardInterrupt):
-    """The operator leaves while something goes on."""
+    """The operator has left during a command."""
 
 
 @dataclass
 class Plan:
-    """What was taught, the order to carry out, what is proven of it, and how it was learned."""
+    """The taught skills, the order to carry out, its proven bound, and how it was learned."""
 
     taught: Taught
     found: SequenceResult
@@ -61,7 +61,7 @@ class Plan:
 
     @property
     def state(self) -> RunState:
-        """The job as it is carried out by this plan."""
+        """The state of the job that this plan carries out."""
         return self.production.state
 
 
@@ -76,9 +76,9 @@ class SceneCalls(NamedTuple):
 
 
 class OperatedScene:
-    """One scene and all that is in it; it belongs to the thread that simulates, but for `now` and the controls.
+    """One operated scene; except `now` and the controls it belongs to the thread that simulates.
 
-    leaving: what is under way is broken off. resting: a pause lasts. again: it is carried out once more, as a journal says.
+    leaving: the current command is aborted. resting: a pause lasts. again: the commands of a journal are repeated.
     """
 
     def __init__(
@@ -90,7 +90,7 @@ class OperatedScene:
         conditions: Conditions,
         calls: SceneCalls,
     ) -> None:
-        """Nothing is laid out before `open`. What happens is told to the teacher's listener."""
+        """Prepares a scene that `open` lays out; the teacher's listener gets its events."""
         self.task, self.order, self.seed, self.conditions = task, order, seed, conditions
         self.controls, self.journal = conditions.controls, conditions.journal
         self.leaving = self.again = self.resting = False
@@ -104,12 +104,12 @@ class OperatedScene:
         self._told, self.teacher = teacher.tell, replace(teacher, tell=self.tell)
 
     def open(self) -> None:
-        """Lay the scene out. BadInput for what cannot be."""
+        """Lays the scene out. Raises BadInput for an impossible one."""
         self.prepared: Prepared = prepare(self.task, self.order, self.seed)
         self._build(self.task.faults)
 
     def _build(self, faults: Sequence[FaultFields]) -> None:
-        """The floor, with nothing done on it yet."""
+        """Builds the floor, at the beginning of its time."""
         self.close()
         prepared, self.plan, self.lead, self.failure = self.prepared, None, None, None
         self.injector, self.heard = Injector(faults), list[Event]()
@@ -135,13 +135,13 @@ class OperatedScene:
         self.calls.on_laid_out()
 
     def close(self) -> None:
-        """Take the scene down; safe to call again."""
+        """Closes the scene; safe to call again."""
         if self._world is not None:
             self._world.close()
             self._world = None
 
     def check_leaving(self) -> None:
-        """Raises Left when the operator leaves."""
+        """Raises Left if the operator has left."""
         if self.leaving:
             raise Left("the operator left")
 
@@ -159,23 +159,23 @@ class OperatedScene:
 
     @property
     def steps(self) -> int:
-        """Physics steps since the scene was laid out."""
+        """The number of physics steps since the scene was laid out."""
         return 0 if self._world is None else self.floor.steps
 
     def tell(self, event: Event) -> None:
-        """Take an event over, and tell it on."""
+        """Takes an event over, and passes it on."""
         with self.lock:
             self._status.hear(event)
         self._told(event)
         self.check_leaving()
 
     def now(self) -> RunStatus:
-        """Where the run stands, to be looked at in any thread."""
+        """The status of the run, for any thread."""
         with self.lock:
             return self._status.copied()
 
     def names(self) -> dict[str, list[str]]:
-        """What may follow some commands: kinds of parts, and the skills that are there to be learned and carried out."""
+        """The possible arguments of some commands: kinds of parts, and the skills that can be learned and carried out."""
         if self._world is None:
             return {}
         problems = self.prepared.problems
@@ -188,13 +188,13 @@ class OperatedScene:
         }
 
     def trouble(self, why: str) -> None:
-        """Tell what went wrong in something that the operator said."""
+        """Reports a failed command."""
         self.floor.tell(TroubleMet(why, "waits for the operator", "", "", self.floor.now_s))
 
     # ---- commands --------------------------------------------------------------------------------------------------
 
     def checked(self, said: Spoken) -> Deed:
-        """A function that does what a command says, which was checked. Raises BadInput for what is not allowed."""
+        """A function that carries out a checked command. Raises BadInput for one that is not allowed."""
         word, argument = said.word, said.argument
         if word == "lead":
             return self._lead(str(argument))
@@ -206,7 +206,7 @@ class OperatedScene:
             case "run", _:
                 return self._run()
             case "order", tuple():
-                return self._order(tuple(int(one) for one in argument))
+                return self._order(tuple(int(number) for number in argument))
             case "learn", str():
                 return self._learn(argument)
             case "parts", str():
@@ -221,7 +221,7 @@ class OperatedScene:
         return f"{in_words(order)} laid out"
 
     def _moved(self, word: str, argument: object) -> Deed:
-        """A motion by hand; the run goes on from where it ends."""
+        """A motion by hand, after which the run continues from the reached state."""
         if self.controls.holds_arm and not self.again:
             raise BadInput(RESET_FIRST if StopKind.EMERGENCY in self.controls.stops else PROTECTED)
         deed = getattr(self.by_hand, word)(*(() if argument is None else (argument,)))
@@ -253,26 +253,26 @@ class OperatedScene:
             taught = teach_all(self.prepared, self.teacher, self.journal)
             self.tell(PhaseBegan("sequence", 1))
             chosen = ordered(taught.cell, self.task.sequencing, OrderAdvice(), self.seed, self.tell)
-            found, proven = chosen.found, chosen.proven
+            result, proven = chosen.found, chosen.proven
             if drawn:
                 self._build(
                     (
                         *self.task.faults,
-                        *draw(self.task, self.prepared.order, self.conditions.fault_seed or 0, found.cost),
+                        *draw(self.task, self.prepared.order, self.conditions.fault_seed or 0, result.cost),
                     )
                 )
             relearner = Relearner(self.prepared, taught, self.teacher)
             planner = Planner(self.task.sequencing, self.seed)
             production = Production.of(self.floor, RunState.of(taught.cell, self.floor.now_s), relearner, planner)
-            self.plan = Plan(taught, found, chosen.used, proven, production, chosen.learning)
-            self.plan.state.sequence = [*found.sequence]
+            self.plan = Plan(taught, result, chosen.used, proven, production, chosen.learning)
+            self.plan.state.sequence = [*result.sequence]
             self._tell_plan("")
-            return f"{len(found.sequence)} moves, {found.cost:.1f} s"
+            return f"{len(result.sequence)} moves, {result.cost:.1f} s"
 
         return deed
 
     def _tell_plan(self, why: str) -> None:
-        """The plan in use, its times counted from now on."""
+        """Tells the plan in use, with its times counted from now on."""
         plan, now_s = self._planned(), self.floor.now_s
         schedule = simulate(plan.taught.cell, plan.found.sequence).later(now_s)
         gap = plan.proven.gap(plan.found.cost)
@@ -305,7 +305,7 @@ class OperatedScene:
         return deed
 
     def _ready(self, skill: Skill) -> None:
-        """Give a skill the policy that the journal or the toolbox has for it, as `policy` would. BadInput where there is none."""
+        """Gives a skill the policy of the journal or the toolbox, as the command `policy` would. BadInput if there is none."""
         name, policies = skill.name, self.prepared.skillset.policies
         if name in policies:
             return
@@ -319,13 +319,13 @@ class OperatedScene:
         self._keep(name, lesson)
 
     def _plan(self, name: str) -> LessonPlan:
-        """How a skill is learned here."""
+        """The plan of a skill's lesson in this scene."""
         problem = self.prepared.problems[name]
         settings = self.task.subtask(problem.subtask)
         return LessonPlan(problem, settings.learner, settings.gate, self.task.name)
 
     def _keep(self, name: str, lesson: Lesson) -> None:
-        """Carry a skill out by what was found or learned now, and keep that with the run."""
+        """Gives a skill the policy of a lesson, and keeps it with the run."""
         self.prepared.skillset.policies[name] = lesson.policy
         if not self.again:
             self.journal.keep_skill(skill_row(name, lesson), lesson.policy)
@@ -349,14 +349,14 @@ class OperatedScene:
         return deed
 
     def _outdate_plan(self) -> None:
-        """Drop a plan that was not begun: its durations are those of the skills as they were before."""
+        """Drops a plan that was not begun, because its durations are those of the earlier policies."""
         if self.plan is not None and not self.plan.state.moves:
             self.plan = None
 
     # ---- what a person shows -----------------------------------------------------------------------------------------
 
     def _lead(self, name: str) -> Deed:
-        """Begin to lead a skill's way by hand, end that and learn from it, or drop it."""
+        """Begins the demonstration of a skill's path, ends it and learns from it, or drops it."""
         lead, skills = self.lead, self.prepared.skillset.skills
         if name in (END, DROP):
             if lead is None:
@@ -380,7 +380,7 @@ class OperatedScene:
         return "forgotten"
 
     def _learn_from(self, shown: Demonstration) -> str:
-        """Teach the skill with the demonstration as its advisor, whom the task's gate judges; what it came to, in words."""
+        """Teaches the skill with the demonstration as its advisor, which the task's gate judges; returns the result in words."""
         name, self.lead = shown.skill.name, None
         self.journal.keep_led(Led(self.floor.steps, name, OPERATOR, shown.said))
         by = AdvisorName(f"led by {OPERATOR}", PYTHON, itself=RecordedAdvisor(shown.moves))
@@ -416,7 +416,7 @@ class OperatedScene:
         return deed
 
     def held_first(self) -> None:
-        """Bring on first what the operator had the arm take up. Raises WorkFailed where that is not allowed."""
+        """Replans so that the part in the gripper is brought on first. Raises WorkFailed if that is not allowed."""
         held, plan = self.floor.bench.held, self.plan
         if held is None or plan is None or plan.state.under_way is not None:
             return

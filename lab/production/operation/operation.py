@@ -1,4 +1,4 @@
-"""The operator's run: commands in words, carried out one after the other in one scene, each noted before it counts.
+"""The operator's run: commands that are carried out one after the other in one scene, each journalled before it takes effect.
 
 A command takes effect at a physics step, and between two commands no simulated time goes by: the scene stands still as
 long as nobody says anything, machines under way with it. So the commands with their steps, the stops with theirs, task,
@@ -25,14 +25,14 @@ from lab.teaching.teacher import Teacher
 
 
 class Operation:
-    """What the operator does in one scene; all but `at_once` and `now` belongs to the thread that simulates.
+    """The operator's commands in one scene; except `at_once` and `now` it belongs to the thread that simulates.
 
-    waiting: commands that were said in other threads, and by whom (see `Desk`). done: what came of all that was said;
-    on_done: called with each, in the thread in which it was done.
+    waiting: commands from other threads, with their origin (see `Desk`). done: the results of all commands; on_done: called
+    with each result, in the thread of the command.
     """
 
     def __init__(self, task: Task, order: Order, seed: int, teacher: Teacher, conditions: Conditions) -> None:
-        """Nothing is laid out before `open`. What happens is told to the teacher's listener."""
+        """Prepares a scene that `open` lays out; the teacher's listener gets its events."""
         calls = SceneCalls(on_laid_out=self._laid_out, before_step=self.write, meanwhile=self._meanwhile)
         self.scene = OperatedScene(task, order, seed, teacher, conditions, calls)
         self.controls, self._journal = conditions.controls, conditions.journal
@@ -41,24 +41,24 @@ class Operation:
         self.on_done: list[Callable[[Done], None]] = []
         self._began = time.perf_counter()
         self._unwritten = deque[Commanded]()
-        self._script = deque[Stopped | Commanded]()  # of a journal, what is still to be done again
+        self._script = deque[Stopped | Commanded]()  # the entries of a journal that are still to be repeated
         self._inside = False  # a pause, carrying a command out
 
     def open(self) -> None:
-        """Lay the scene out. BadInput for what cannot be."""
+        """Lays the scene out. Raises BadInput for an impossible one."""
         self.scene.open()
 
     def close(self) -> None:
-        """Take the scene down; safe to call again."""
+        """Closes the scene; safe to call again."""
         self.write()
         self.scene.close()
 
     def now(self) -> RunStatus:
-        """Where the run stands, to be looked at in any thread; a stop shows as soon as it is pressed."""
+        """The status of the run, for any thread; a stop shows as soon as it is pressed."""
         return self.scene.now().under(self.controls)
 
     def do(self, line: str | Spoken, by: str = OPERATOR) -> Done:
-        """Carry a command out, in the thread that simulates; what is wrong with it is in what comes back."""
+        """The result of a command, which is carried out in the thread that simulates; the result contains its error."""
         words = line if isinstance(line, str) else line.words
         try:
             said = spoken(line) if isinstance(line, str) else line
@@ -77,11 +77,11 @@ class Operation:
         return self._kept(Done(words, said=told))
 
     def at_once(self, said: Spoken, by: str = OPERATOR) -> Done:
-        """A stop, or what releases it, or the pace: in any thread, without waiting for anything."""
+        """The result of an immediate command (a stop, its release, or the pace), in any thread."""
         return self._aside(Done(said.words, refused=press(self.controls, said, by)), by)
 
     def _noted(self, done: Done, by: str) -> Done:
-        """Write a command down before it takes effect, and tell it."""
+        """Writes a command to the journal before it takes effect, and passes its result on."""
         floor = self.scene.floor
         self.write()
         if not self.scene.again:
@@ -90,18 +90,18 @@ class Operation:
         return self._kept(done) if done.refused else done
 
     def refuse(self, words: str, why: str, by: str = OPERATOR) -> Done:
-        """Refuse what was said, from any thread; what came of it."""
+        """The result of a refused command, from any thread."""
         return self._aside(Done(words, refused=why), by)
 
     def _aside(self, done: Done, by: str) -> Done:
-        """Tell of what another thread did, or was refused; it is written by the one that simulates, as soon as it can."""
+        """Passes on the result of a command in another thread; the thread that simulates writes it to the journal later."""
         if not self.scene.again:
             self._unwritten.append(Commanded(self.scene.steps, done.words, by, done.refused))
         self.scene.tell(OperatorActed(done.words, by, self.scene.now().now_s, done.refused))
         return self._kept(done)
 
     def write(self) -> None:
-        """Write down what was said in other threads, in the one that simulates."""
+        """Writes commands of other threads to the journal, in the thread that simulates."""
         while self._unwritten:
             self._journal.write(self._unwritten.popleft())
 
@@ -113,7 +113,7 @@ class Operation:
         return done
 
     def _meanwhile(self) -> bool:
-        """In a pause of the run: one command that is carried out by hand, if there is any."""
+        """Carries out, in a pause of the run, one command by hand; returns whether there was one."""
         self.scene.check_leaving()
         if self._inside:
             return False
@@ -139,7 +139,7 @@ class Operation:
     # ---- once more ---------------------------------------------------------------------------------------------------
 
     def repeat(self, entries: Sequence[Entry]) -> None:
-        """Replay the commands of a journal. Raises WorkFailed where a command does not come at its physics step."""
+        """Repeats the commands of a journal. Raises WorkFailed if one does not come at its physics step."""
         self._script = deque(entry for entry in entries if isinstance(entry, Stopped) or _is_deed(entry))
         self.scene.again = True
         self.open()
@@ -155,7 +155,7 @@ class Operation:
         self.scene.again = False
 
     def _laid_out(self) -> None:
-        """Of a journal that is replayed, hand the floor the stops until the scene is laid out the next time."""
+        """Gives the floor the stops of a repeated journal up to the next layout of the scene."""
         if not self.scene.again:
             return
         stops, last = list[StopsChanged](), 0
@@ -169,7 +169,7 @@ class Operation:
         self.scene.floor.stops.again(stops, last)
 
     def _following(self) -> tuple[Spoken, str] | None:
-        """The next command of the journal, when it was given here, in this pause."""
+        """The next command of the journal if it was given in this pause, else None."""
         while self._script and isinstance(self._script[0], Stopped) and self._script[0].step <= self.scene.floor.steps:
             self._script.popleft()
         entry = self._script[0] if self._script else None
@@ -184,7 +184,7 @@ class Operation:
     # ---- what came of it ---------------------------------------------------------------------------------------------
 
     def report(self) -> Report | None:
-        """The run as `lab run` reports it; None when no plan was made."""
+        """The report of the run, as that of `lab run`; None if no plan was made."""
         scene = self.scene
         plan = scene.plan
         if plan is None:
@@ -198,12 +198,12 @@ class Operation:
             program=scene.motions.program(scene.task, scene.seed, moves, cell.part_name),
         )
         scene.recorder.take()
-        found = plan.found, plan.method, plan.proven
+        result = plan.found, plan.method, plan.proven
         return Report(
-            scene.prepared, plan.taught, *found, outcome, scene.recorder.recording, self._began, learning=plan.learning
+            scene.prepared, plan.taught, *result, outcome, scene.recorder.recording, self._began, learning=plan.learning
         )
 
 
 def _is_deed(entry: Entry) -> TypeGuard[Commanded]:
-    """Whether a line is of something that was done in its turn, or by hand: stops and the pace have lines of their own."""
+    """Whether a line is a command "in turn" or "by hand"; stops and the pace have their own lines."""
     return isinstance(entry, Commanded) and not entry.refused and spoken(entry.words).how in ("in turn", "by hand")

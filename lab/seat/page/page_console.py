@@ -81,9 +81,9 @@ def _machine_bars(moves: Sequence[Move], number: int) -> list[Json]:
     return [chart_row(bar) for bar in bars]
 
 
-def chart_row(one: Activity) -> Json:
+def chart_row(activity: Activity) -> Json:
     """An activity as a record of the page's chart."""
-    return asdict(one) | {"start_s": round(one.start_s, 2), "end_s": round(one.end_s, 2)}
+    return asdict(activity) | {"start_s": round(activity.start_s, 2), "end_s": round(activity.end_s, 2)}
 
 
 # ---- the console of a run ---------------------------------------------------------------------------------------------
@@ -152,12 +152,12 @@ def run_of(console: Console | None) -> Json | None:
         "finished": status.finished,
         "parts": [asdict(part) for part in status.parts],
         "machines": [asdict(machine) for machine in status.machines],
-        "trouble": [asdict(one) for one in status.trouble],
+        "trouble": [asdict(trouble) for trouble in status.trouble],
         "commands": list(console.words),
         "names": {word: list(names) for word, names in console.names.items()},
         "busy": console.busy,
         "said": len(done),
-        "done": [asdict(one) for one in done[-MOST_DONE:]],
+        "done": [asdict(result) for result in done[-MOST_DONE:]],
     }
 
 
@@ -173,13 +173,13 @@ def plan_of(console: Console | None) -> Json | None:
         "proven": plan.proven,
         "why": plan.why,
         "by": BESIDE_METHODS.get(plan.method, plan.method),
-        "rows": [chart_row(one) for one in plan.rows if one.resource in rows],
+        "rows": [chart_row(row) for row in plan.rows if row.resource in rows],
     }
 
 
 def measured_of(console: Console | None) -> list[Json]:
     """The activities so far, without those that machines are carrying out now."""
-    return [] if console is None else [chart_row(one) for one in console.now().measured]
+    return [] if console is None else [chart_row(activity) for activity in console.now().measured]
 
 
 def held_of(console: Console) -> Json:

@@ -183,13 +183,13 @@ def _runs(line: "Text") -> list[list[str]]:
 
 
 def _classes(line: "Text", at: int) -> str:
-    found: dict[str, str] = {}
+    classes: dict[str, str] = {}
     for span in line.spans:
         style = span.style
         if isinstance(style, str) or not span.start <= at < span.end:
             continue
-        found |= {"bold": "bold"} if style.bold else {}
+        classes |= {"bold": "bold"} if style.bold else {}
         for kind, color in (("fg", style.color), ("bg", style.bgcolor)):
             if color is not None and color.number is not None and color.number < 16:
-                found[kind] = f"{kind}-{color.number % 8}"
-    return " ".join(sorted(found.values()))
+                classes[kind] = f"{kind}-{color.number % 8}"
+    return " ".join(sorted(classes.values()))

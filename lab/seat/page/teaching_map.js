@@ -3,7 +3,7 @@
 
 const seatMap = (() => {
   const STEPS = [[-1, 0], [1, 0], [0, -1], [0, 1]]; // up, down, left, right
-  const HINT = "colours: worth; arrows: what it prefers; drag from R to draw a way";
+  const HINT = "colours: worth; arrows: what it prefers; drag from R to draw a path";
   const el = (id) => document.getElementById(id);
   let place = null, slice = null, asked = null, cell = 0, layer = null, told = { go() {}, look() {}, can: () => false };
   let way = [], view = null, pen = null; // the cells of the drawn path, the robot's first; the current view; the pointer that draws
@@ -25,7 +25,7 @@ const seatMap = (() => {
   function paint() {
     cell = seatDraw.grid(el("grid"), { place, slice, way, robot: view.at, question: asked, directions: place.directions }, view.room, view.tall);
     el("way").hidden = way.length < 2;
-    if (way.length > 1) el("way-text").textContent = `A way of ${seatStatus.count(way.length - 1, "move")}`;
+    if (way.length > 1) el("way-text").textContent = `A path of ${seatStatus.count(way.length - 1, "move")}`;
   }
 
   function inWords(at) {

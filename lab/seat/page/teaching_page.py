@@ -81,7 +81,7 @@ class SeatPage(LiveView):
         """Drop the rest of a drawn path, because the learner has gone elsewhere, with a message."""
         if left := len(self._path.left):
             with self._panel.lock:
-                text = f"The rest of your way is dropped ({counted(left, 'move')}): the learner is elsewhere now."
+                text = f"The rest of your path is dropped ({counted(left, 'move')}): the learner is elsewhere now."
                 self._panel.known.learning.notice(Told(text, "note"))
                 self._panel.known.changed("notices")
         self._path = PathAhead()

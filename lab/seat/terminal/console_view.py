@@ -105,7 +105,7 @@ def _where(part: PartStatus) -> str:
 
 
 def _troubles(status: RunStatus, width: int) -> list[Text]:
-    rows = [f"{one.at_s:7.1f} s {one.what}: {one.answer}" for one in status.trouble[-TROUBLES:]]
+    rows = [f"{trouble.at_s:7.1f} s {trouble.what}: {trouble.answer}" for trouble in status.trouble[-TROUBLES:]]
     return [Text("trouble", "bold yellow"), *(Text(row, "yellow") for row in rows)] if rows else []
 
 

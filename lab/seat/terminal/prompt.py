@@ -59,13 +59,13 @@ class OrderQuestion:
         moves = [order_text.move_of(request, decision) for decision in request.allowed]
         if self._plain or width < TABLE:
             own = ", its own choice"
-            return [*lines, *folded([f"{one}{own * (one.decision == request.own)}." for one in moves], width)]
+            return [*lines, *folded([f"{move}{own * (move.decision == request.own)}." for move in moves], width)]
         table = Table(box=None, pad_edge=False, header_style="bold")
         for column in ("move", "part", "from", "to", "ready in", ""):
             table.add_column(column, justify="right" if column in ("move", "ready in") else "left")
-        for one in moves:
-            is_own = one.decision == request.own
-            cells = (str(one.decision), one.name, one.origin, one.target, one.ready, "its own choice" * is_own)
+        for move in moves:
+            is_own = move.decision == request.own
+            cells = (str(move.decision), move.name, move.origin, move.target, move.ready, "its own choice" * is_own)
             table.add_row(*map(Text, cells), style="green" if is_own else None)
         return [*lines, table]
 

@@ -86,12 +86,12 @@ def _path(text: str, mdp: TabularMDP, asked: bool = False) -> tuple[int, ...] | 
     for count, run, lonely in _PIECE.findall(text):
         whole = None if lonely or (asked and set(run) <= set(known)) else _move(run, mdp)[0]
         part = [whole] if whole is not None else [known.get(letter, _move(letter, mdp)[0]) for letter in run]
-        found = [action for action in part if action is not None]
-        if lonely or len(found) < len(part):
+        actions = [action for action in part if action is not None]
+        if lonely or len(actions) < len(part):
             wrong = lonely or next(letter for letter, action in zip(run, part, strict=True) if action is None)
             return _no_path(text, wrong, known, mdp) if asked or _looks_like_one(text, known) else ""
         times = int(count[:6]) if count else 1
-        moves += found[:1] * times + found[1:]
+        moves += actions[:1] * times + actions[1:]
         if len(moves) > MOST_MOVES:
             return f"'{text[:20]}' has more than {MOST_MOVES} moves: a path may have {MOST_MOVES}"
     if not moves:

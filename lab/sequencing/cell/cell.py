@@ -104,7 +104,7 @@ class Cell:
             for origin, target in needed if self.track else ():
                 at = self.index(origin), self.index(target)
                 if at not in self.ways or abs(travel_s(self.ways[at]) - table[at]) > TRACK_SLACK_S:
-                    raise BadInput(f"track: no way of {table[at]:g} s leads from '{origin}' to '{target}' on it")
+                    raise BadInput(f"track: no path of {table[at]:g} s leads from '{origin}' to '{target}' on it")
 
     @classmethod
     def alike(
@@ -155,20 +155,20 @@ class Cell:
     @cached_property
     def takers(self) -> tuple[frozenset[int], ...]:
         """By station, the robots (by index) and servers (`SERVER`) that may free room there; empty with fewer than two robots."""
-        found = [set[int]() for _ in self.stations]
+        by_station = [set[int]() for _ in self.stations]
         for place in self.positions if len(self.robots) > 1 else ():
             for way in place.options:
                 for station in set(place.holds) - set(self.positions[way.to].holds):
-                    found[station].add(way.robot)
-        return tuple(map(frozenset, found))
+                    by_station[station].add(way.robot)
+        return tuple(map(frozenset, by_station))
 
     @cached_property
     def without_windows(self) -> "Cell":
         """The same cell without time windows: parts may stay in a machine as long as they are left there."""
-        stations = tuple(replace(one, at_most_s=None) for one in self.stations)
+        stations = tuple(replace(station, at_most_s=None) for station in self.stations)
         products = tuple(
-            replace(one, routes=tuple(tuple(stage.each(_no_window) for stage in route) for route in one.routes))
-            for one in self.products
+            replace(product, routes=tuple(tuple(stage.each(_no_window) for stage in route) for route in product.routes))
+            for product in self.products
         )
         return replace(self, stations=stations, products=products)
 
@@ -202,10 +202,10 @@ class Cell:
         own = [
             [n for n, at in enumerate(self.laid_out) if at.product == number] for number in range(len(self._classes))
         ]
-        found = []
-        for number, one in enumerate(self.precedences):
+        known_rules = []
+        for number, precedence in enumerate(self.precedences):
             sides = []
-            for side, step in enumerate((one.step, one.of_step)):
+            for side, step in enumerate((precedence.step, precedence.of_step)):
                 members = [n for n, (_, sign) in enumerate(self._classes) if sign[number][side]]
                 made = frozenset().union(*(made_in(self.laid_out, own[n], step, self.names) for n in members))
                 added = enumerate(self._stays_at, len(self.laid_out))
@@ -215,8 +215,8 @@ class Cell:
                     if product in members and (step.leaves if at is None else at in made)
                 }
                 sides.append(made | standing)
-            found.append(Rule(sides[0], sides[1], one.counts))
-        return tuple(found)
+            known_rules.append(Rule(sides[0], sides[1], precedence.counts))
+        return tuple(known_rules)
 
     @cached_property
     def starts(self) -> tuple[int, ...]:
@@ -232,14 +232,14 @@ class Cell:
         stay = iter(range(len(self.laid_out), len(self.laid_out) + len(self._stay)))
         end = {place.product: index for index, place in enumerate(self.laid_out) if not place.options}
         return tuple(
-            next(stay) if self._is_apart(one) else end[product] if one.position is None else one.position
-            for product, one in zip(self._products, self.begins, strict=True)
+            next(stay) if self._is_apart(begin) else end[product] if begin.position is None else begin.position
+            for product, begin in zip(self._products, self.begins, strict=True)
         )
 
     @cached_property
     def begin_s(self) -> tuple[float, ...]:
         """When each part may be picked where it begins [s]; arrivals are not included."""
-        return tuple(one.ready_s for one in self.begins) if self.begins is not None else (0.0,) * self.parts
+        return tuple(begin.ready_s for begin in self.begins) if self.begins is not None else (0.0,) * self.parts
 
     @cached_property
     def coming(self) -> tuple[int, ...]:
@@ -281,10 +281,10 @@ class Cell:
     def at_most_s(self, part: int, station: str) -> float | None:
         """How long after its processing at a station a part may be picked [s]; None: at any time."""
         product, at = self._products[part - 1], self.index(station)
-        found = [
+        limits = [
             p.at_most_s for p in self.laid_out if p.product == product and at in p.holds and p.at_most_s is not None
         ]
-        return min(found, default=None)
+        return min(limits, default=None)
 
     @cached_property
     def longest_s(self) -> float:
@@ -293,7 +293,7 @@ class Cell:
         service_s = max((option.service_s for place in self.positions for option in place.options), default=0.0)
         slowest_s /= min([robot.speed for robot in self.robots], default=1.0)
         process_s = sum(place.processing_s or 0.0 for place in self.positions)
-        change_s = [max([seconds for *_, seconds in one.setups], default=0.0) for one in self.stations]
+        change_s = [max([seconds for *_, seconds in station.setups], default=0.0) for station in self.stations]
         process_s += sum(change_s[place.station] for place in self.positions)
         come_s = (sum(self.arrivals.interval_s) if self.arrivals else 0.0) + max(0.0, *self.begin_s)
         return self.parts * (len(self.positions) * (slowest_s + service_s) + process_s) + come_s
@@ -322,21 +322,21 @@ class Cell:
     def _classes(self) -> list[tuple[int, tuple[tuple[bool, bool], ...]]]:
         """The classes of identical parts: a product (by index) and the sides of the precedences on which they stand."""
         signs = signatures(self.precedences, self.parts)
-        found = []
+        classes = []
         for number, product in enumerate(self.products):
             own = dict.fromkeys(sign for name, sign in zip(self.order, signs, strict=True) if name == product.name)
-            found += [(number, sign) for sign in own or {((False, False),) * len(self.precedences): None}]
-        return found
+            classes += [(number, sign) for sign in own or {((False, False),) * len(self.precedences): None}]
+        return classes
 
-    def _is_apart(self, one: Begins) -> bool:
+    def _is_apart(self, begin: Begins) -> bool:
         """Whether a part needs a position of its own: it stays where it is, or it is nowhere and precedences count it."""
-        return (one.stays and one.position is not None) or (one.position is None and bool(self.precedences))
+        return (begin.stays and begin.position is not None) or (begin.position is None and bool(self.precedences))
 
     @cached_property
     def _stays_at(self) -> tuple[tuple[int | None, int], ...]:
         """For each part with a position of its own, where it stands (None: nowhere) and its class."""
         begins = zip(self.begins or (), self._products, strict=False)
-        return tuple((one.position, product) for one, product in begins if self._is_apart(one))
+        return tuple((begin.position, product) for begin, product in begins if self._is_apart(begin))
 
     @cached_property
     def _stay(self) -> tuple[Position, ...]:
@@ -368,14 +368,14 @@ class Cell:
         begins = self.begins if self.begins is not None else [Begins(start) for start in self.starts]
         if len(begins) != self.parts:
             raise BadInput(f"begins has {len(begins)} parts; the order has {self.parts}")
-        for part, (one, product) in enumerate(zip(begins, self._products, strict=True), 1):
+        for part, (begin, product) in enumerate(zip(begins, self._products, strict=True), 1):
             where = f"begin of {self.part_name(part)}"
             own = [n for n, place in enumerate(self.laid_out) if place.product == product]
-            if one.position is not None and one.position not in own:
-                raise BadInput(f"{where}: position {one.position}: its routes have {own[0]} to {own[-1]}")
-            check_seconds(f"{where}: ready_s", abs(one.ready_s))
-            if self.arrivals is not None and one.position == own[0] and one.ready_s > 0:
-                raise BadInput(f"{where}: ready_s = {one.ready_s:g}, but when it comes, the arrivals say")
+            if begin.position is not None and begin.position not in own:
+                raise BadInput(f"{where}: position {begin.position}: its routes have {own[0]} to {own[-1]}")
+            check_seconds(f"{where}: ready_s", abs(begin.ready_s))
+            if self.arrivals is not None and begin.position == own[0] and begin.ready_s > 0:
+                raise BadInput(f"{where}: ready_s = {begin.ready_s:g}, but when it comes, the arrivals say")
         for part, at in enumerate(self.begin_at, 1):
             if at < len(self.laid_out) and self.laid_out[at].options and not self.positions[at].options:
                 where = f"begin of {self.part_name(part)} at '{self.names[self.positions[at].station]}'"

@@ -119,7 +119,7 @@ def check_robot_breaks(robots: int, track: bool, chance: Chance) -> None:
         raise BadInput(f"{every}, but the cell has no robots; breaks_every_s is for machines")
     if track:
         raise BadInput(
-            f"{every} and a track: a robot that stops there bars it, and a way is taken only where it is free"
+            f"{every} and a track: a robot that stops there blocks it, and a path is taken only where it is free"
         )
 
 

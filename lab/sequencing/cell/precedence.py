@@ -72,7 +72,10 @@ def missing(rule: Rule, counted: Sequence[int]) -> int:
 
 def signatures(precedences: Sequence[Precedence], parts: int) -> list[tuple[tuple[bool, bool], ...]]:
     """For each part, part 1 first, on which sides of each precedence it stands; parts that differ in it are not identical."""
-    return [tuple((part in one.parts, part in one.of) for one in precedences) for part in range(1, parts + 1)]
+    return [
+        tuple((part in precedence.parts, part in precedence.of) for precedence in precedences)
+        for part in range(1, parts + 1)
+    ]
 
 
 def made_in(
@@ -93,12 +96,12 @@ def check_precedences(
     steps: Mapping[str, Collection[RouteStep]],
 ) -> None:
     """Raises BadInput for a precedence with invalid parts, stations or counts; steps: those on every route of each product."""
-    for one in precedences:
-        where = f"precedence of {one.step} after {one.of_step}"
-        for part in (*one.parts, *one.of):
+    for precedence in precedences:
+        where = f"precedence of {precedence.step} after {precedence.of_step}"
+        for part in (*precedence.parts, *precedence.of):
             if not 1 <= part <= len(part_names):
                 raise BadInput(f"{where}: there is no part {part}, only 1 to {len(part_names)}")
-        for parts, step in ((one.parts, one.step), (one.of, one.of_step)):
+        for parts, step in ((precedence.parts, precedence.step), (precedence.of, precedence.of_step)):
             if not parts or len(set(parts)) < len(parts):
                 raise BadInput(f"{where}: parts {list(parts)}: wanted one or more, each once")
             for part in parts:
@@ -107,7 +110,11 @@ def check_precedences(
                     raise BadInput(
                         f"{where}: {part_names[part - 1]} does not {step} on every route; it does {', '.join(known)}"
                     )
-        if len(one.counts) != len(one.parts) or [*one.counts] != sorted(one.counts):
-            raise BadInput(f"{where}: needs = {list(one.needs)}: wanted {len(one.parts)} counts that do not fall")
-        if one.counts[0] < 0 or one.counts[-1] > len(one.of):
-            raise BadInput(f"{where}: needs = {list(one.counts)}: there are {len(one.of)} parts to wait for")
+        if len(precedence.counts) != len(precedence.parts) or [*precedence.counts] != sorted(precedence.counts):
+            raise BadInput(
+                f"{where}: needs = {list(precedence.needs)}: wanted {len(precedence.parts)} counts that do not fall"
+            )
+        if precedence.counts[0] < 0 or precedence.counts[-1] > len(precedence.of):
+            raise BadInput(
+                f"{where}: needs = {list(precedence.counts)}: there are {len(precedence.of)} parts to wait for"
+            )

@@ -101,10 +101,10 @@ def positions_of(
 def from_the_ends(positions: Sequence[Position], value: Callable[[int, list[Value]], Value]) -> list[Value]:
     """The value of each position, computed backwards from the ends: value(position, values that its options lead to)."""
     ahead = {number: [option.to for option in place.options] for number, place in enumerate(positions)}
-    found = dict[int, Value]()
+    values = dict[int, Value]()
     for number in TopologicalSorter(ahead).static_order():
-        found[number] = value(number, [found[to] for to in ahead[number]])
-    return [found[number] for number in range(len(positions))]
+        values[number] = value(number, [values[to] for to in ahead[number]])
+    return [values[number] for number in range(len(positions))]
 
 
 def open_ways(positions: Sequence[Position], shut: Collection[int]) -> list[Position]:

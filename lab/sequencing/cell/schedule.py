@@ -137,13 +137,15 @@ class Schedule:
             tuple(replace(a, start_s=a.start_s + by_s, end_s=a.end_s + by_s) for a in row)
             for row in (self.robot, self.machines, self.parts)
         ]
-        limits = tuple(replace(one, done_s=one.done_s + by_s, until_s=one.until_s + by_s) for one in self.fetch_by)
+        limits = tuple(
+            replace(limit, done_s=limit.done_s + by_s, until_s=limit.until_s + by_s) for limit in self.fetch_by
+        )
         return Schedule(rows[0], rows[1], rows[2], self.makespan_s + by_s, self.sequence, limits)
 
     def to_json(self) -> dict[str, Any]:
         """Plain dicts, lists, numbers and strings, for `json.dumps`."""
         rows = {name: [asdict(a) for a in getattr(self, name)] for name in _ROWS}
-        limits = {"fetch_by": [asdict(one) for one in self.fetch_by]} if self.fetch_by else {}
+        limits = {"fetch_by": [asdict(limit) for limit in self.fetch_by]} if self.fetch_by else {}
         return {"makespan_s": self.makespan_s, "sequence": list(self.sequence)} | rows | limits
 
 
@@ -204,17 +206,17 @@ def _part_activities(
 
 def _batches(cell: Cell, moves: Sequence[Move]) -> dict[tuple[int, str], tuple[float, float]]:
     """Begin and duration of each part's processing in a machine with batches [s], by part and machine."""
-    found: dict[tuple[int, str], tuple[float, float]] = {}
+    times: dict[tuple[int, str], tuple[float, float]] = {}
     for name in [cell.names[station] for station in cell.batches]:
         batch: list[Move] = []
         for move in moves:
             if move.target == name:
                 batch = [*batch, move]
-                at_s, process_s = max(one.drop_s for one in batch), max(one.process_s for one in batch)
-                found |= {(one.part, name): (at_s, process_s) for one in batch}
+                at_s, process_s = max(stay.drop_s for stay in batch), max(stay.process_s for stay in batch)
+                times |= {(stay.part, name): (at_s, process_s) for stay in batch}
             elif move.origin == name:
                 batch = []
-    return found
+    return times
 
 
 def _limits(cell: Cell, part: int, moves: Sequence[Move]) -> Iterator[FetchBy]:
@@ -270,7 +272,9 @@ def rows_of(schedule: Schedule, cell: Cell, when: Literal["planned", "measured"]
         what = (activity.kind, activity.origin, activity.target, activity.resource, robot)
         return dict(zip(COLUMNS, (*own, *what, activity.start_s, activity.end_s, when), strict=True))
 
-    rows = [row(one, one.resource) for one in schedule.robot] + [row(one, None) for one in schedule.machines]
+    rows = [row(activity, activity.resource) for activity in schedule.robot] + [
+        row(activity, None) for activity in schedule.machines
+    ]
     return sorted(rows, key=lambda one: (one["start_s"], one["end_s"]))
 
 

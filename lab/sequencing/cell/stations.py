@@ -283,7 +283,9 @@ def _check_route(stations: Sequence[Station], route: Route, one_of: str) -> None
             raise BadInput(f"{where}: alternatives of an alternative; name all of them beside one another")
         _check_stage(stage, known[stage.station], where)
     for number, stage in enumerate(route, 1):
-        if any(way.pallet for way in stage.ways) and any(one.alternatives for one in route[number - 2 : number + 1]):
+        if any(way.pallet for way in stage.ways) and any(
+            neighbour.alternatives for neighbour in route[number - 2 : number + 1]
+        ):
             raise BadInput(f"stage {number} of {one_of}: pallet = true, but it or a stage beside it has alternatives")
         if stage.pallet and not _takes_pallet(route, number - 1, kinds):
             raise BadInput(

@@ -57,7 +57,7 @@ def ways_on(track: Sequence[Stretch], names: Sequence[str]) -> Mapping[tuple[int
         a, b = number[stretch.origin], number[stretch.target]
         beside.setdefault(a, []).append((b, n, stretch.seconds))
         beside.setdefault(b, []).append((a, n, stretch.seconds))
-    found: dict[tuple[int, int], Way] = {}
+    paths: dict[tuple[int, int], Way] = {}
     for start in beside:
         ahead: list[tuple[float, int, tuple[int, ...], int, Way]] = [(0.0, 0, (), start, ())]
         reached = set[int]()
@@ -66,12 +66,12 @@ def ways_on(track: Sequence[Stretch], names: Sequence[str]) -> Mapping[tuple[int
             if here in reached:
                 continue
             reached.add(here)
-            found[start, here] = way
+            paths[start, here] = way
             for there, n, seconds in beside[here]:
                 if there not in reached:
                     held = HeldStretch(n, at_s, at_s + seconds)
                     heappush(ahead, (at_s + seconds, count + 1, (*by, n), there, (*way, held)))
-    return found
+    return paths
 
 
 def travel_s(way: Way) -> float:

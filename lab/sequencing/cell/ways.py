@@ -76,8 +76,8 @@ def distances(cell: Cell, per_s: float = TICKS_PER_S) -> list[list[int]]:
     np.fill_diagonal(table, 0)
     for via in range(len(table)):
         table = np.minimum(table, np.minimum(table[:, via : via + 1] + table[via], FAR))
-    found: list[list[int]] = table.tolist()
-    return found
+    table_ticks: list[list[int]] = table.tolist()
+    return table_ticks
 
 
 def _speed(cell: Cell) -> float:

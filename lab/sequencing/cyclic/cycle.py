@@ -113,11 +113,11 @@ class Cycle:
     @cached_property
     def passed(self) -> tuple[int, ...]:
         """By move, how many cycles have begun since its part entered."""
-        over, found, stays = 0, list[int](), {stay.pick: n for n, stay in enumerate(self.line.stays)}
+        over, passes, stays = 0, list[int](), {stay.pick: n for n, stay in enumerate(self.line.stays)}
         for number in range(len(self.line.moves)):
             over = over + self.wraps[stays[number]] if number in stays else 0
-            found.append(over)
-        return tuple(found)
+            passes.append(over)
+        return tuple(passes)
 
     def at_s(self, move: int, cycle: int = 0) -> float:
         """When a move begins for the part that enters in a given cycle, which begins at cycle * period [s]."""
@@ -160,10 +160,10 @@ class Cycle:
         return cell.products[cell.positions[move.place].product].name
 
     def _of_slots(self) -> list[list[int]]:
-        found: list[list[int]] = [[] for _ in self.line.paths]
+        by_slot: list[list[int]] = [[] for _ in self.line.paths]
         for number, move in enumerate(self.line.moves):
-            found[move.slot].append(number)
-        return found
+            by_slot[move.slot].append(number)
+        return by_slot
 
 
 def best_cycle(cell: Cell, mix: Sequence[str], time_limit_s: float = TIME_LIMIT_S, seed: int = 0) -> Cycle:
@@ -175,11 +175,11 @@ def best_cycle(cell: Cell, mix: Sequence[str], time_limit_s: float = TIME_LIMIT_
     Source: Phillips and Unger 1976, AIIE Transactions 8(2) (one hoist, time windows).
     """
     check_cyclic(cell, mix)
-    found = shortest(at_speed(cell), mix, time_limit_s, seed)
-    if found.cycle is None:
-        why = "it is proven that there is none" if found.above_s == inf else f"none was found in {time_limit_s:g} s"
+    searched = shortest(at_speed(cell), mix, time_limit_s, seed)
+    if searched.cycle is None:
+        why = "it is proven that there is none" if searched.above_s == inf else f"none was found in {time_limit_s:g} s"
         raise WorkFailed(f"no order of {counted(len(mix), 'part')} a cycle can be repeated for ever: {why}")
-    return found.cycle
+    return searched.cycle
 
 
 class ShortestCycle(NamedTuple):
@@ -207,7 +207,7 @@ def shortest(
     away = away_s(cell)
     # Of equal periods that with the fewest moves is found first, and stays.
     ahead = [(len(line.moves), max(line.bound_s(away), least_s), n, line) for n, line in enumerate(lines(cell, mix))]
-    ahead.sort(key=lambda one: one[:3])
+    ahead.sort(key=lambda entry: entry[:3])
     best: Cycle | None = None
     above_s, resolution_s = inf, 0.0
     for _, bound_s, _, line in ahead:

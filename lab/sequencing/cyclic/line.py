@@ -71,7 +71,7 @@ class Line:
     @cached_property
     def needs(self) -> tuple[LineSpan, ...]:
         """The processing times before picks, and the latest picks after them."""
-        found = list[LineSpan]()
+        spans = list[LineSpan]()
         begun: tuple[int, float] | None = None
         for number, move in enumerate(self.moves):
             at = self.cell.positions[move.place]
@@ -83,17 +83,17 @@ class Line:
             if begun is not None and move.option.waits:
                 drop, least_s = begun
                 most_s = inf if at.at_most_s is None else least_s + at.at_most_s - move.option.service_s
-                found.append(LineSpan(drop, number, least_s, most_s))
-        return tuple(found)
+                spans.append(LineSpan(drop, number, least_s, most_s))
+        return tuple(spans)
 
     @cached_property
     def holds(self) -> dict[int, tuple[int, ...]]:
         """The stays (by number) that take room at each station (by index)."""
-        found: dict[int, list[int]] = {}
+        by_station: dict[int, list[int]] = {}
         for number, stay in enumerate(self.stays):
             for station in self.cell.positions[self.moves[stay.pick].place].holds:
-                found.setdefault(station, []).append(number)
-        return {station: tuple(numbers) for station, numbers in found.items()}
+                by_station.setdefault(station, []).append(number)
+        return {station: tuple(numbers) for station, numbers in by_station.items()}
 
     def after_s(self, one: int, then: int) -> float:
         """The empty time from a move's drop to another move's begin [s]; NaN: the two never follow each other."""
@@ -108,8 +108,10 @@ class Line:
         """
         numbers = range(len(self.moves))
         least_s = {span.drop: span.least_s for span in self.needs}
-        empty_s = [max((s for to in numbers if (s := self.after_s(one, to)) < inf), default=0.0) for one in numbers]
-        return sum(self.moves[one].work_s + max(least_s.get(one, 0.0), empty_s[one]) for one in numbers)
+        empty_s = [
+            max((s for to in numbers if (s := self.after_s(number, to)) < inf), default=0.0) for number in numbers
+        ]
+        return sum(self.moves[number].work_s + max(least_s.get(number, 0.0), empty_s[number]) for number in numbers)
 
     def bound_s(self, away_s: Sequence[Sequence[float]]) -> float:
         """A lower bound of the period [s]: the robot's moves with the cheapest drives between them, and each station's needs.
@@ -152,7 +154,9 @@ def lines(cell: Cell, mix: Sequence[str]) -> Iterator[Line]:
     most = sum(count * max(len(path) for path in ways[name]) for name, count in counts.items())
     if many > MOST_LINES:
         allowed = f"allowed are {MOST_LINES}; fewer parts a cycle have fewer"
-        raise BadInput(f"--cyclic: the {counted(len(mix), 'part')} of a cycle can take {many} ways; {allowed}")
+        raise BadInput(
+            f"--cyclic: the {counted(len(mix), 'part')} of a cycle can take {many} combinations of routes; {allowed}"
+        )
     if most > MOST_MOVES:
         raise BadInput(f"--cyclic: a cycle of {counted(len(mix), 'part')} has {most} moves; allowed are {MOST_MOVES}")
     choices = [combinations_with_replacement(ways[name], count) for name, count in counts.items()]
@@ -173,7 +177,7 @@ def _paths(cell: Cell, name: str, count: int, parts: int) -> list[Path]:
 
     numbers = from_the_ends(cell.positions, lambda place, ahead: sum(ahead) or 1)
     if comb(numbers[start] + count - 1, count) > MOST_LINES:
-        told = f"product '{name}' has {numbers[start]} ways through its routes and buffers"
+        told = f"product '{name}' has {numbers[start]} paths through its routes and buffers"
         raise BadInput(f"--cyclic: {told}: too many for a cycle of {counted(parts, 'part')}")
     return list(islice(longer((), cell.positions[start], start), numbers[start]))
 

@@ -46,7 +46,7 @@ class Units(NamedTuple):
         """The units of a line's models."""
         numbers = range(len(line.moves))
         times = {move.work_s for move in line.moves} | {s for span in line.needs for s in (span.least_s, span.most_s)}
-        times |= {line.after_s(one, then) for one in numbers for then in numbers}
+        times |= {line.after_s(number, then) for number in numbers for then in numbers}
         whole = TICKS // gcd(TICKS, *(round(time * TICKS) for time in times if isfinite(time)))
         if whole > COARSE:
             fine = COARSE * FINE[0]

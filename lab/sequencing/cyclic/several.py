@@ -42,8 +42,8 @@ def least_s(cell: Cell, mix: Sequence[str], away_s: Sequence[Sequence[float]]) -
     table = coo_array((values, (rows, at)), shape=(len(names), len(columns))).tocsr()
     given = [starts.get(name[1], 0) if name[0] == "parts" else 0 for name in names]
     costs = [*[0.0] * (len(columns) - 1), 1.0]
-    found = linprog(costs, table[:busy], given[:busy], table[busy:], given[busy:], method="highs")
-    return max(0.0, float(found.fun) - SOLVER_TOLERANCE_S) if found.status == 0 else 0.0
+    solution = linprog(costs, table[:busy], given[:busy], table[busy:], given[busy:], method="highs")
+    return max(0.0, float(solution.fun) - SOLVER_TOLERANCE_S) if solution.status == 0 else 0.0
 
 
 def _moves(cell: Cell, ways: Sequence[Way]) -> Iterator[Column]:
@@ -142,7 +142,7 @@ class Rhythm:
         """A lower bound of the time per part of the cycles in `proven_of` [s]."""
         if self._is_least:
             return self.per_part_s
-        return min(self.per_part_s, max(self.least_part_s, min(one.bound_s / one.parts for one in self.tried)))
+        return min(self.per_part_s, max(self.least_part_s, min(trial.bound_s / trial.parts for trial in self.tried)))
 
     @property
     def proven(self) -> bool:
@@ -189,20 +189,22 @@ def best_rhythm(
             why = f"the {time_limit_s:g} s were over"
             break
         try:
-            found = shortest(cell, mix * times, left_s, seed, times * least_mix_s, times * mix_s)
+            searched = shortest(cell, mix * times, left_s, seed, times * least_mix_s, times * mix_s)
         except BadInput as error:
             if not tried:
                 raise
             why = str(error)
             break
-        bound_s = times * mix_s if found.proven and found.cycle is None else found.above_s
+        bound_s = times * mix_s if searched.proven and searched.cycle is None else searched.above_s
         tried.append(
-            Tried(len(mix) * times, None if found.cycle is None else found.cycle.period_s, bound_s, found.proven)
+            Tried(
+                len(mix) * times, None if searched.cycle is None else searched.cycle.period_s, bound_s, searched.proven
+            )
         )
-        if found.cycle is not None:
-            best, mix_s = found.cycle, found.cycle.period_s / times
+        if searched.cycle is not None:
+            best, mix_s = searched.cycle, searched.cycle.period_s / times
     if best is None:
-        none = all(one.bound_s == inf for one in tried)
+        none = all(trial.bound_s == inf for trial in tried)
         parts = counted(tried[-1].parts, "part") if len(tried) == 1 else f"up to {tried[-1].parts} parts"
         why = "it is proven that there is none" if none else f"none was found in {time_limit_s:g} s"
         raise WorkFailed(f"no order of {parts} a cycle can be repeated for ever: {why}")

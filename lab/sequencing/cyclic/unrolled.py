@@ -34,13 +34,13 @@ def steady(cycle: Cycle, periods: int) -> Steady:
     end_s, first = periods * cycle.period_s, -max(cycle.passed) - 1
     cycles = range(first, periods)
     robot = list(_robot(cycle, range(first, periods + 1)))
-    robot.sort(key=lambda one: one.start_s)
-    stays = [one for number in cycles for one in _stays(cycle, number, first)]
-    stays.sort(key=lambda one: (cycle.line.cell.index(one.resource), one.start_s))
-    rows = [[cut for one in row if (cut := _within(one, end_s))] for row in (robot, stays)]
-    seen = sorted({one.part for row in rows for one in row if one.part is not None})
+    robot.sort(key=lambda activity: activity.start_s)
+    stays = [stay for number in cycles for stay in _stays(cycle, number, first)]
+    stays.sort(key=lambda stay: (cycle.line.cell.index(stay.resource), stay.start_s))
+    rows = [[cut for activity in row if (cut := _within(activity, end_s))] for row in (robot, stays)]
+    seen = sorted({activity.part for row in rows for activity in row if activity.part is not None})
     number = {part: n for n, part in enumerate(seen, 1)}
-    shown = [tuple(replace(one, part=number.get(one.part or 0)) for one in row) for row in rows]
+    shown = [tuple(replace(activity, part=number.get(activity.part or 0)) for activity in row) for row in rows]
     moves = {move.slot: cycle.product(move) for move in cycle.line.moves}
     names = {number[part]: f"{moves[(part - 1) % cycle.parts]} {number[part]}" for part in seen}
     return Steady(cycle, periods, Schedule(shown[0], shown[1], (), end_s, ()), names)
@@ -171,7 +171,7 @@ def _turns(cycle: Cycle, cell: Cell) -> Iterator[_Turn]:
     moves, first = cycle.line.moves, {move.slot: number for number, move in reversed([*enumerate(cycle.line.moves)])}
     rank = {move: number for number, move in enumerate(cycle.order)}
     slots = sorted(first, key=lambda slot: rank[first[slot]])
-    found, left = list[tuple[int, int, _Turn]](), cell.parts
+    turns, left = list[tuple[int, int, _Turn]](), cell.parts
     for number in count():
         for slot in slots:
             part = next(waiting[cycle.product(moves[first[slot]])], None)
@@ -180,10 +180,10 @@ def _turns(cycle: Cycle, cell: Cell) -> Iterator[_Turn]:
             left -= 1
             for n, move in enumerate(moves):
                 if move.slot == slot:
-                    found.append((number + cycle.passed[n], rank[n], _Turn(part, move.place, move.option)))
+                    turns.append((number + cycle.passed[n], rank[n], _Turn(part, move.place, move.option)))
         if not left:
             break
-    return (turn for _, _, turn in sorted(found, key=lambda one: one[:2]))
+    return (turn for _, _, turn in sorted(turns, key=lambda one: one[:2]))
 
 
 def _numbers(cell: Cell, product: Product) -> list[int]:

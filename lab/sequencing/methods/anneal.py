@@ -72,9 +72,9 @@ def anneal(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceResu
     total = search.episodes - len(noted.costs)
     while len(noted.costs) < search.episodes:
         left = search.episodes - len(noted.costs)
-        found = annealing.advance(min(ROUND, left), 1.0 - left / max(1, total))
+        sequence = annealing.advance(min(ROUND, left), 1.0 - left / max(1, total))
         for value in annealing.costs.tolist():
-            noted.note(found, value, value < annealing.orders.stuck_cost)
+            noted.note(sequence, value, value < annealing.orders.stuck_cost)
     return SequenceResult(*noted.found(cell))
 
 
@@ -99,7 +99,7 @@ class Annealing:
     @property
     def best(self) -> tuple[int, ...]:
         """The best sequence so far."""
-        return tuple(int(one) for one in self._work.best if one)
+        return tuple(int(decision) for decision in self._work.best if decision)
 
     @property
     def best_cost(self) -> float:

@@ -42,7 +42,7 @@ class FeatureArrays(NamedTuple):
 def feature_arrays(cell: Cell, objective: str = MAKESPAN) -> FeatureArrays:
     """The arrays from which a cell's features are computed, for a policy that was learned for this objective."""
     size = len(cell.stations)
-    places = np.array([*(one.servers or one.capacity for one in cell.stations), 1], np.int64)
+    places = np.array([*(own.servers or own.capacity for own in cell.stations), 1], np.int64)
     load_s = np.zeros((len(cell.positions), size + 1))
     for place, loads in enumerate(loads_s(cell)):
         for station, seconds in loads.items():
@@ -56,7 +56,7 @@ def feature_arrays(cell: Cell, objective: str = MAKESPAN) -> FeatureArrays:
         left_s=left_s,
         moves=np.array(fewest, np.float64),
         load_s=load_s,
-        machine=np.array([size if one is None else one for one in machine], np.int64),
+        machine=np.array([size if number is None else number for number in machine], np.int64),
         following=np.array(_following(cell), np.int64),
         places=places,
         due=cell.due_s is not None and objective in WITH_DUE_TIMES,
@@ -87,7 +87,7 @@ def features(run: Run, allowed: tuple[int, ...], known: FeatureArrays) -> Floats
     options = [_way(run, decision) for decision in allowed]
     begins = [run.pick_s(part, way) - _service_s(way) for part, way in zip(parts, options, strict=True)]
     ends = [run.drop_s(part, way) for part, way in zip(parts, options, strict=True)]
-    found = np.zeros((len(allowed), len(FEATURES)))
+    table = np.zeros((len(allowed), len(FEATURES)))
     for i, (part, way) in enumerate(zip(parts, options, strict=True)):
         here, there, index = run.locations[part - 1], way.to, part - 1
         left_s, ready_s, end_s = known.left_s[here], run.ready_s[index], ends[i]
@@ -129,8 +129,8 @@ def features(run: Run, allowed: tuple[int, ...], known: FeatureArrays) -> Floats
             "load-after": survey.share(int(known.following[there])) - 1.0 if known.following[there] != last else 0.0,
         }
         for k, name in enumerate(FEATURES):
-            found[i, k] = plain[name] if name in plain else seconds[name] / known.scale_s
-    return found
+            table[i, k] = plain[name] if name in plain else seconds[name] / known.scale_s
+    return table
 
 
 class _Survey:

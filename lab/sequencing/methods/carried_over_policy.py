@@ -27,7 +27,7 @@ FEATURES: Mapping[str, str] = {
     "moves-left": "the part's moves to its end",
     "slack": "due time less the part's end if nothing stops it any more; 0 where no due times count",
     "way-on": "how long until the robot can pick another part after the drop",
-    "other-way": "how much later it ends than the same part by the best of its ways",
+    "other-way": "how much later it ends than the same part by its best option",
     "enters": "1 where the part is at the start of its route",
     "load-after": "load of the machine after the next, as a share of the highest, less 1",
     "queued-tail": "tail, with the wait in the queue",

@@ -46,15 +46,15 @@ def carried_out(cell: Cell, moves: Sequence[tuple[int, int, int]]) -> tuple[int,
     The first move of the list that is allowed now is made, until none is left, by the robot that can pick soonest; of several
     such robots the one that was busy last takes it, so that the others stay where they are.
     """
-    run, left, found = Run(cell), list(moves), list[int]()
+    run, left, sequence = Run(cell), list(moves), list[int]()
     while left:
         ready = next(((move, decision) for move in left if (decision := _soonest(run, move))), None)
         if ready is None:
             return ()
         left.remove(ready[0])
-        found.append(ready[1])
+        sequence.append(ready[1])
         run.move(ready[1])
-    return tuple(found) if run.done else ()
+    return tuple(sequence) if run.done else ()
 
 
 def _soonest(run: Run, move: tuple[int, int, int]) -> int | None:

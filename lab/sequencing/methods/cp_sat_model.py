@@ -289,12 +289,12 @@ class Model:
 
         A part that still has its step ahead has a variable for when it begins the step, and one for when it has ended.
         """
-        rule, one, model = self.cell.rules[number], self.cell.precedences[number], self.model
-        mine = {part: self._step(part - 1, rule.made) for part in one.parts if part in self.cell.unfinished}
-        theirs = {part: self._step(part - 1, rule.ended) for part in one.of if part in self.cell.unfinished}
+        rule, precedence, model = self.cell.rules[number], self.cell.precedences[number], self.model
+        mine = {part: self._step(part - 1, rule.made) for part in precedence.parts if part in self.cell.unfinished}
+        theirs = {part: self._step(part - 1, rule.ended) for part in precedence.of if part in self.cell.unfinished}
         waiting = {part: step for part, step in mine.items() if step is not None}
-        made = sum(self.cell.begin_at[part - 1] in rule.made for part in one.parts)
-        ended = sum(self.cell.begin_at[part - 1] in rule.ended for part in one.of)
+        made = sum(self.cell.begin_at[part - 1] in rule.made for part in precedence.parts)
+        ended = sum(self.cell.begin_at[part - 1] in rule.ended for part in precedence.of)
         first = {(a, b): model.new_bool_var("first") for a in waiting for b in waiting if a < b}
         for (a, b), is_first in first.items():
             model.add(waiting[b][0] >= waiting[a][1]).only_enforce_if(is_first)
@@ -305,8 +305,8 @@ class Model:
             for step in (step for other, step in theirs.items() if step is not None and other != part):
                 done.append(model.new_bool_var("ended"))
                 model.add(begin >= step[1]).only_enforce_if(done[-1])
-            counts = [*rule.counts, *(0,) * len(one.parts)]
-            needs = model.new_int_var(0, len(one.of), "needs")
+            counts = [*rule.counts, *(0,) * len(precedence.parts)]
+            needs = model.new_int_var(0, len(precedence.of), "needs")
             model.add_element(made + sum(before), counts, needs)
             model.add(ended + sum(done) >= needs)
 

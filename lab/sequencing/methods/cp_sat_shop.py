@@ -55,20 +55,20 @@ def shop_of(cell: Cell, objective: str) -> Shop | None:
         return None
     steps, layers = dict[int, tuple[ShopStep, ...]](), list[tuple[tuple[int, ...], ...]]()
     for start in cell.begin_at:
-        found: list[tuple[int, ...]] = [(start,)]
-        while any(cell.positions[stop].options for stop in found[-1]):
-            for stop in found[-1]:
+        stations: list[tuple[int, ...]] = [(start,)]
+        while any(cell.positions[stop].options for stop in stations[-1]):
+            for stop in stations[-1]:
                 if stop not in steps:
                     known = _steps(cell, stop)
                     if known is None:
                         return None
                     steps[stop] = known
-            found.append(tuple(sorted({step.to for stop in found[-1] for step in steps[stop]})))
-        stops = [stop for layer in found for stop in layer]
+            stations.append(tuple(sorted({step.to for stop in stations[-1] for step in steps[stop]})))
+        stops = [stop for layer in stations for stop in layer]
         ends = [not cell.positions[stop].options for stop in stops]
-        if len(set(stops)) < len(stops) or sum(ends) > len(found[-1]):
+        if len(set(stops)) < len(stops) or sum(ends) > len(stations[-1]):
             return None  # some routes are longer than others
-        layers.append(tuple(found))
+        layers.append(tuple(stations))
     return Shop(steps, tuple(layers))
 
 
@@ -79,20 +79,20 @@ def _rooms(cell: Cell) -> list[int]:
 
 def _steps(cell: Cell, stop: int) -> tuple[ShopStep, ...] | None:
     """The steps from a stop; None: one of its options does not occur in a shop."""
-    found, trips = list[ShopStep](), defaultdict[tuple[int, int], list[Option]](list)
+    steps, trips = list[ShopStep](), defaultdict[tuple[int, int], list[Option]](list)
     for way in cell.positions[stop].options:
         if way.if_full is not None or way.carries == "pallet":
             return None
         if way.robot == SERVER:
-            found.append(ShopStep(way.to, (), way))
+            steps.append(ShopStep(way.to, (), way))
         else:
             trips[way.target, way.to].append(way)
     for (_, to), ways in trips.items():
         works = cell.positions[to].options
         if any(work.robot != SERVER for work in works) or (works and cell.positions[to].processing_s):
             return None
-        found += [ShopStep(work.to, tuple(ways), work) for work in works] or [ShopStep(to, tuple(ways), None)]
-    return tuple(found)
+        steps += [ShopStep(work.to, tuple(ways), work) for work in works] or [ShopStep(to, tuple(ways), None)]
+    return tuple(steps)
 
 
 class _Operation(NamedTuple):
@@ -146,16 +146,16 @@ class ShopModel:
             takes = {(stop, step): model.new_bool_var("") for stop in before for step in self._shop.steps[stop]}
             model.add_exactly_one(takes.values())
             model.add_exactly_one(at.values())
-            one = _Operation(part, takes, at, self._moment(), self._moment(), self._moment())
-            model.add(one.depart >= free)
+            operation = _Operation(part, takes, at, self._moment(), self._moment(), self._moment())
+            model.add(operation.depart >= free)
             for (stop, step), taken in takes.items():
                 model.add_implication(taken, before[stop])
                 model.add_implication(taken, at[step.to])
-                model.add(one.begin >= one.depart + self._carried(step)).only_enforce_if(taken)
+                model.add(operation.begin >= operation.depart + self._carried(step)).only_enforce_if(taken)
             for stop, comes in at.items():
-                model.add(one.end == one.begin + self._worked(stop)).only_enforce_if(comes)
-            self._operations.append(one)
-            free = one.end
+                model.add(operation.end == operation.begin + self._worked(stop)).only_enforce_if(comes)
+            self._operations.append(operation)
+            free = operation.end
         return free
 
     def _carried(self, step: ShopStep) -> int:
@@ -167,10 +167,12 @@ class ShopModel:
     def _add_servers(self) -> None:
         """A server works on one part after the other."""
         spans = defaultdict[int, list[cp_model.IntervalVar]](list)
-        for one in self._operations:
-            for stop, comes in one.at.items():
+        for operation in self._operations:
+            for stop, comes in operation.at.items():
                 if stop in self._servers:
-                    span = self.model.new_optional_interval_var(one.begin, self._worked(stop), one.end, comes, "")
+                    span = self.model.new_optional_interval_var(
+                        operation.begin, self._worked(stop), operation.end, comes, ""
+                    )
                     spans[self._servers[stop]].append(span)
         for station, own in spans.items():
             servers = self.cell.stations[station].servers or 1
@@ -184,8 +186,8 @@ class ShopModel:
         model, times = self.model, self.times
         start, robots = self.cell.index(self.cell.robots[0].start), len(self.cell.robots)
         nodes, spent = list[tuple[int, int, cp_model.LiteralT]](), list[cp_model.LinearExprT]()
-        moved = [one.trips() for one in self._operations]
-        for number, (one, trips) in enumerate(zip(self._operations, moved, strict=True), 1):
+        moved = [operation.trips() for operation in self._operations]
+        for number, (operation, trips) in enumerate(zip(self._operations, moved, strict=True), 1):
             stays = model.new_bool_var("")
             if not trips:
                 nodes.append((number, number, stays))
@@ -196,11 +198,11 @@ class ShopModel:
             self._arcs[0, number], self._arcs[number, 0] = first, last
             ways = {step: times.travel(start, step.trip[0].origin) for step in trips}
             for step, taken in trips.items():
-                model.add(one.depart >= ways[step]).only_enforce_if(first, taken)
+                model.add(operation.depart >= ways[step]).only_enforce_if(first, taken)
                 spent.append(self._carried(step) * taken)
             spent.append(min(ways.values()) * first)
             for other, (then, more) in enumerate(zip(self._operations, moved, strict=True), 1):
-                if other == number or not more or (then.part == one.part and other < number):
+                if other == number or not more or (then.part == operation.part and other < number):
                     continue
                 follows = self._arcs[number, other] = model.new_bool_var("")
                 nodes.append((number, other, follows))
@@ -209,7 +211,7 @@ class ShopModel:
                 }
                 least = min(gaps.values())
                 for (step, after), gap in gaps.items():
-                    begin = one.depart + self._carried(step) + gap
+                    begin = operation.depart + self._carried(step) + gap
                     model.add(then.depart >= begin).only_enforce_if(follows, trips[step], more[after])
                 spent.append(least * follows)
         add_chains(model, nodes, len(self._operations), robots)
@@ -242,19 +244,21 @@ class ShopModel:
             while number:
                 robot[number], number = own, after[number]
         queues = defaultdict[int, list[tuple[int, int, int]]](list)  # a part's decisions, the last one first
-        for number, one in enumerate(self._operations, 1):
-            step = next(step for (_, step), takes in one.takes.items() if solver.boolean_value(takes))
+        for number, operation in enumerate(self._operations, 1):
+            step = next(step for (_, step), takes in operation.takes.items() if solver.boolean_value(takes))
             taken = [option for option in step.trip if option.robot == robot[number]]
-            begins = [(option, solver.value(one.depart), self._carried(step)) for option in taken]
+            begins = [(option, solver.value(operation.depart), self._carried(step)) for option in taken]
             if step.work is not None:
-                begins.append((step.work, solver.value(one.begin), self._worked(step.to)))
+                begins.append((step.work, solver.value(operation.begin), self._worked(step.to)))
             for option, begin, long in begins:
-                queues[one.part].append((begin, begin + long, entry(one.part + 1, option.choice, self.cell.parts)))
-        found = list[int]()
+                queues[operation.part].append(
+                    (begin, begin + long, entry(operation.part + 1, option.choice, self.cell.parts))
+                )
+        decisions = list[int]()
         waiting = {part: queue[::-1] for part, queue in queues.items()}
         while waiting:
             part = min(waiting, key=lambda part: waiting[part][-1])
-            found.append(waiting[part].pop()[-1])
+            decisions.append(waiting[part].pop()[-1])
             if not waiting[part]:
                 del waiting[part]
-        return tuple(found)
+        return tuple(decisions)

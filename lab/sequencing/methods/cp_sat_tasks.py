@@ -73,10 +73,10 @@ class LeastTimes:
 
     def by_servers(self, place: int) -> set[int]:
         """The positions that a part may reach from a position without a robot, that position included."""
-        found = [place]
-        for at in found:
-            found += [way.to for way in self._cell.positions[at].options if way.robot == SERVER]
-        return set(found)
+        places = [place]
+        for at in places:
+            places += [way.to for way in self._cell.positions[at].options if way.robot == SERVER]
+        return set(places)
 
     def _tail(self, place: int, ahead: list[int]) -> int:
         ways = self._cell.positions[place].options
@@ -84,12 +84,12 @@ class LeastTimes:
         return self.stay[place] + least
 
     def _from(self, place: int, ahead: list[dict[int, int]]) -> dict[int, int]:
-        found = {place: 0}
+        least = {place: 0}
         for way, then in zip(self._cell.positions[place].options, ahead, strict=True):
             for later, after in then.items():
                 reached = self.stay[place] + self.takes(way) + after
-                found[later] = min(found.get(later, reached), reached)
-        return found
+                least[later] = min(least.get(later, reached), reached)
+        return least
 
 
 def teams_of(cell: Cell) -> list[Team]:
@@ -198,16 +198,16 @@ class Tasks:
         return common
 
     def _leaving(self, part: int, place: int) -> list[PartTask]:
-        at, found = self.cell.positions[place], list[tuple[Option, ...]]()
+        at, leaving = self.cell.positions[place], list[tuple[Option, ...]]()
         for way in at.options:
             alike = [team for team in self.teams if team.able(way)]
             same = way.target, way.to
-            known = [n for n, own in enumerate(found) if alike and alike[0].able(own[0]) and same == _same(own[0])]
+            known = [n for n, own in enumerate(leaving) if alike and alike[0].able(own[0]) and same == _same(own[0])]
             if known:
-                found[known[0]] += (way,)
+                leaving[known[0]] += (way,)
             else:
-                found.append((way,))
-        return [self._task(part, place, options, len(found) == 1) for options in found]
+                leaving.append((way,))
+        return [self._task(part, place, options, len(leaving) == 1) for options in leaving]
 
     def _task(self, part: int, place: int, options: tuple[Option, ...], only: bool) -> PartTask:
         model, option, at = self.model, options[0], self.cell.positions[place]
@@ -298,7 +298,7 @@ def add_rooms(tasks: Tasks) -> None:
 
 def _visits(tasks: Tasks, station: int) -> list[PartVisit]:
     """Every visit of a part to a station; a route may lead to it more than once, and each visit has its own leaving tasks."""
-    positions, found = tasks.cell.positions, list[PartVisit]()
+    positions, visits = tasks.cell.positions, list[PartVisit]()
     holds = [station in place.holds for place in positions]
 
     def visit(part: int, bring: PartTask | None, begin: int) -> PartVisit:
@@ -312,10 +312,10 @@ def _visits(tasks: Tasks, station: int) -> list[PartVisit]:
 
     for part, begin in enumerate(tasks.cell.begin_at):
         if holds[begin]:
-            found.append(visit(part, None, begin))
+            visits.append(visit(part, None, begin))
         own = tasks.of(part)
-        found += [visit(part, t, t.option.to) for t in own if holds[t.option.to] and not holds[t.place]]
-    return found
+        visits += [visit(part, t, t.option.to) for t in own if holds[t.option.to] and not holds[t.place]]
+    return visits
 
 
 def _add_room(tasks: Tasks, station: int, visits: Sequence[PartVisit]) -> None:

@@ -89,13 +89,13 @@ class TransportModel:
         is not allowed yet, because a robot holds a part longer than it must, is taken as soon as it is allowed.
         """
         value, tasks = solver.value, self.tasks
-        found = [self._in_order(solver, tasks.frees, lambda task: (value(task.begin), value(task.end)))]
+        orders = [self._in_order(solver, tasks.frees, lambda task: (value(task.begin), value(task.end)))]
         if self.cell.track:
-            found.append(self._in_order(solver, tasks.frees, lambda task: (value(task.end), value(task.begin))))
+            orders.append(self._in_order(solver, tasks.frees, lambda task: (value(task.end), value(task.begin))))
         if any(self.cell.takers):
-            found += [self._in_order(solver, more, self._picked(solver)) for more in (tasks.brings, ())]
-        runs = [self._carried_out(sequence) for sequence in dict.fromkeys(found)]
-        return min(runs, key=lambda one: one[1])[0]
+            orders += [self._in_order(solver, more, self._picked(solver)) for more in (tasks.brings, ())]
+        runs = [self._carried_out(sequence) for sequence in dict.fromkeys(orders)]
+        return min(runs, key=lambda run: run[1])[0]
 
     @staticmethod
     def _picked(solver: Solution) -> Callable[[PartTask], tuple[int, int]]:
@@ -105,21 +105,21 @@ class TransportModel:
 
     def _carried_out(self, order: tuple[int, ...]) -> tuple[tuple[int, ...], float]:
         """The decisions, reordered so that each is allowed, and their cost; () and inf when they end in a deadlock."""
-        run, left, found = Windowless(self.cell), list(order), list[int]()
+        run, left, decisions = Windowless(self.cell), list(order), list[int]()
         while left:
             tried = set[int]()
             for n, decision in enumerate(left):
                 part = part_of(decision, self.cell.parts)
                 if part not in tried and run.option(decision) is not None:
                     run.move(decision)
-                    found.append(left.pop(n))
+                    decisions.append(left.pop(n))
                     break
                 tried.add(part)
             else:
                 return (), inf
-        if not run.done or spoils(self.cell, found):
+        if not run.done or spoils(self.cell, decisions):
             return (), inf
-        return tuple(found), cost(follow(self.cell, found) if self.cell.has_windows else run, self._objective)
+        return tuple(decisions), cost(follow(self.cell, decisions) if self.cell.has_windows else run, self._objective)
 
     def _in_order(
         self, solver: Solution, more: Sequence[Follows], when: Callable[[PartTask], tuple[int, int]]
@@ -142,15 +142,15 @@ class TransportModel:
             order.prepare()
         except CycleError:
             return ()
-        ready, found = list[tuple[int, int, int, PartTask]](), list[int]()
+        ready, ordered = list[tuple[int, int, int, PartTask]](), list[int]()
         while order.is_active():
             for task in order.get_ready():
                 heappush(ready, (*when(task), number[task], task))
             task = heappop(ready)[-1]
             option = next(way for way in task.options if way.robot == robot.get(task, SERVER))
-            found.append(entry(task.part + 1, option.choice, self.cell.parts))
+            ordered.append(entry(task.part + 1, option.choice, self.cell.parts))
             order.done(task)
-        return tuple(found)
+        return tuple(ordered)
 
     def moves(self, solver: Solution) -> list[tuple[int, int, int]]:
         """The tasks of the solution by time, each as part (from 0), position and next position."""
@@ -363,13 +363,13 @@ class TransportModel:
 def _routes(solver: Solution, arcs: Arcs) -> list[list[int]]:
     """The nodes of each tour without node 0."""
     taken = [pair for pair, arc in arcs.items() if solver.boolean_value(arc)]
-    after, found = {left: then for left, then in taken if left}, list[list[int]]()
+    after, routes = {left: then for left, then in taken if left}, list[list[int]]()
     for _, node in (pair for pair in taken if not pair[0]):
         tour = [node]
         while after[tour[-1]]:
             tour.append(after[tour[-1]])
-        found.append(tour)
-    return found
+        routes.append(tour)
+    return routes
 
 
 def _known(cell: Cell, times: Times, sequence: Sequence[int]) -> dict[tuple[int, int, int], tuple[int, int]]:

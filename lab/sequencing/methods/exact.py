@@ -147,7 +147,10 @@ class _Search:
     def _straight_on(self, state: MergedState) -> tuple[int, ...]:
         """The decisions of a greedy descent from a state, each to the successor of least bound; empty: it ends in a deadlock."""
         while not self.merged.done(state):
-            ahead = [(one.now + self._least.left(one), n, one) for n, one in enumerate(self.merged.successors(state))]
+            ahead = [
+                (successor.now + self._least.left(successor), n, successor)
+                for n, successor in enumerate(self.merged.successors(state))
+            ]
             self._straight += 1
             least, _, state = min(ahead, default=(FAR, 0, state))
             if least >= FAR:
@@ -225,17 +228,17 @@ def exact(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceResul
     """
     search.check(cell)
     shared = shared_of(cell, search)
-    found: Optimum | OneRobot | None = None
+    best: Optimum | OneRobot | None = None
     if search.objective == MAKESPAN and cell.serial:
-        found = optimum(cell, shared=shared)
-        shared.tell("A*", found.sequence, found.bound_s)
+        best = optimum(cell, shared=shared)
+        shared.tell("A*", best.sequence, best.bound_s)
     elif search.objective == MAKESPAN and not why_not(cell):
-        found = one_robot(cell, shared.left_s(TOURS_S), shared)
-    sequence, cost = (found.sequence, found.cost) if found else ((), inf)
-    if found is None or not found.proven:
+        best = one_robot(cell, shared.left_s(TOURS_S), shared)
+    sequence, cost = (best.sequence, best.cost) if best else ((), inf)
+    if best is None or not best.proven:
         from lab.sequencing.methods.cp_sat import TIME_LIMIT_S, cp_sat, fits  # only here: OR-Tools takes its time
 
-        if found is None or (fits(cell) and not cell.batches):
+        if best is None or (fits(cell) and not cell.batches):
             left_s = shared.left_s(TIME_LIMIT_S)
             other = cp_sat(cell, search.objective, left_s, hint=sequence or None, shared=shared)
             sequence, cost = min((cost, sequence), (other.cost, other.sequence))[::-1]

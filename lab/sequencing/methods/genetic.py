@@ -161,7 +161,7 @@ def genetic(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceRes
     while left > 0:
         costs = np.zeros(min(ROUND, left))
         evolve(orders.arrays, orders.run, population, costs, neighbours)
-        best = tuple(int(one) for one in population.best if one)
+        best = tuple(int(decision) for decision in population.best if decision)
         for value in costs.tolist():
             log.note(best, value, value < orders.stuck_cost)
         left = search.episodes - len(log.costs)
@@ -171,7 +171,7 @@ def genetic(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceRes
 def _population(orders: Orders, size: int, seed: int) -> Population:
     """The first population: the lists of the rules that end without a deadlock, the best first and at most half of all, and
     random lists."""
-    ruled = sorted((one for one in orders.begun if one.done), key=lambda one: one.cost)[: max(1, size // 2)]
+    ruled = sorted((order for order in orders.begun if order.done), key=lambda order: order.cost)[: max(1, size // 2)]
     first, stream = orders.first, np.array([seed], np.uint64)
     parts, choices = np.tile(first.parts, (size, 1)), np.tile(first.choices, (size, 1))
     most = orders.cell.most_choices

@@ -114,10 +114,10 @@ def _credits(cell: Cell, ways: Sequence[Way], gaps: dict[tuple[int, int], int]) 
     from scipy.sparse import coo_array
 
     table = coo_array((at[2].astype(float), (at[0], at[1])), shape=(len(rows), last + 1)).tocsr()
-    found = linprog(-gain, A_ub=table, b_ub=[most for _, most in rows], bounds=bounds, method="highs")
-    if found.x is None:
+    solution = linprog(-gain, A_ub=table, b_ub=[most for _, most in rows], bounds=bounds, method="highs")
+    if solution.x is None:
         return [0] * size
-    return [round(float(credit) * TICKS_PER_S) for credit in found.x[:size]]
+    return [round(float(credit) * TICKS_PER_S) for credit in solution.x[:size]]
 
 
 # ---- The highest of all bounds ----------------------------------------------------------------------------------------
@@ -292,10 +292,10 @@ def _after_arrival(cell: Cell, to_end: _Spans) -> list[int]:
         return []
     intervals = ticks([cell.arrivals.interval_s[part - 1] for part in cell.coming])
     alone = [min(after for _, after in to_end.ways[cell.starts[part - 1]]) for part in cell.coming]
-    after, found = 0, list[int]()
+    after, times = 0, list[int]()
     for interval, least in zip([*intervals[1:], 0][::-1], alone[::-1], strict=True):
         after = max(least, interval + after)
-        found.insert(0, after)
+        times.insert(0, after)
     if cell.arrivals.after == "clock":
-        return [come + least for come, least in zip(accumulate(intervals), found, strict=True)]
-    return found
+        return [come + least for come, least in zip(accumulate(intervals), times, strict=True)]
+    return times

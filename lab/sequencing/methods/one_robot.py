@@ -66,9 +66,9 @@ def why_not(cell: Cell) -> str:
         "pallets": any(way.carries == "pallet" for place in cell.positions for way in place.options),
         "room that may be full": _may_be_full(cell),
     }
-    found = next((reason for reason, holds in reasons.items() if holds), "")
-    if found or _sizes(cell) <= MOST_RESTS:
-        return found
+    reason_found = next((reason for reason, holds in reasons.items() if holds), "")
+    if reason_found or _sizes(cell) <= MOST_RESTS:
+        return reason_found
     return (
         f"too many states: the order has {_sizes(cell)} combinations of how far each part is, allowed are {MOST_RESTS}"
     )
@@ -169,13 +169,13 @@ class _SequenceSearch:
 
     def _listed(self, tour: Sequence[int], ends: dict[tuple[int, int], int]) -> tuple[int, ...]:
         """The decisions of a robot's tour through parts, with those of the servers inserted in the order of their ends."""
-        run, work, parts, found = Run(self._cell), self._work, self._cell.parts, list[int]()
+        run, work, parts, sequence = Run(self._cell), self._work, self._cell.parts, list[int]()
         at = [0] * parts
         served = set[tuple[int, int]]()
 
         def decide(part: int) -> None:
-            found.append(entry(part + 1, 0, parts))
-            run.move(found[-1])
+            sequence.append(entry(part + 1, 0, parts))
+            run.move(sequence[-1])
 
         def when(part: int) -> tuple[int, int]:
             end = ends[part, at[part]]
@@ -196,7 +196,7 @@ class _SequenceSearch:
             at[part] += 1
         for part in range(parts):
             serve(part)
-        return tuple(found)
+        return tuple(sequence)
 
 
 def _is_served(cell: Cell, place: int) -> bool:
@@ -211,11 +211,11 @@ def _may_be_full(cell: Cell) -> bool:
 
 def _ways(cell: Cell, part: int) -> list[Option]:
     """The options along a part's only route."""
-    place, found = cell.begin_at[part], list[Option]()
+    place, options = cell.begin_at[part], list[Option]()
     while cell.positions[place].options:
-        found.append(cell.positions[place].options[0])
-        place = found[-1].to
-    return found
+        options.append(cell.positions[place].options[0])
+        place = options[-1].to
+    return options
 
 
 def _sizes(cell: Cell) -> int:

@@ -115,8 +115,8 @@ def look_on(
     """
     cell, objective = shared.cell, shared.objective
     if objective == MAKESPAN and cell.serial:
-        found = optimum(cell, most, shared)
-        shared.tell("A*", found.sequence, found.bound_s)
+        best = optimum(cell, most, shared)
+        shared.tell("A*", best.sequence, best.bound_s)
         return known_of(shared)
     tell_alone(shared)
     from lab.sequencing.methods.one_robot import one_robot, why_not  # here and below: numba takes its time
@@ -156,10 +156,10 @@ def portfolio(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceR
     """The best sequence that any method finds within its time; it draws nothing from `rng`."""
     search.check(cell)
     shared = shared_of(cell, search)
-    found = look_on(shared, shared.left_s(TIME_LIMIT_S), workers=WORKERS)
-    if not found.sequence and found.bound < inf:
-        raise not_in_time(cell, "any method", found.bound)
-    return only_one(cell, search, found.sequence, found.cost, bool(found.sequence))
+    proof = look_on(shared, shared.left_s(TIME_LIMIT_S), workers=WORKERS)
+    if not proof.sequence and proof.bound < inf:
+        raise not_in_time(cell, "any method", proof.bound)
+    return only_one(cell, search, proof.sequence, proof.cost, bool(proof.sequence))
 
 
 def _look(shared: Shared, time_limit_s: float, seed: int, workers: int) -> None:
@@ -181,8 +181,10 @@ def _machines_alone(cell: Cell) -> float:
     for part in cell.unfinished:
         for station, seconds in to_come[cell.begin_at[part - 1]].items():
             total[station] = total.get(station, 0.0) + seconds
-    places = [cell.stations[one].servers or cell.capacities[one] for one in range(len(cell.stations))]
-    return max([seconds / places[one] for one, seconds in total.items() if one not in cell.batches], default=0.0)
+    places = [cell.stations[number].servers or cell.capacities[number] for number in range(len(cell.stations))]
+    return max(
+        [seconds / places[number] for number, seconds in total.items() if number not in cell.batches], default=0.0
+    )
 
 
 def _alone(cell: Cell, objective: str) -> float:
@@ -194,7 +196,7 @@ def _alone(cell: Cell, objective: str) -> float:
     late = [max(0.0, ends.get(part, 0.0) - due) for part, due in enumerate(cell.due_s or (), 1)]
     known = {MAKESPAN: max(ends.values(), default=0.0)}
     if late:
-        known |= {"mean-tardiness": sum(late) / cell.parts, "tardy-parts": float(sum(one > SAME for one in late))}
+        known |= {"mean-tardiness": sum(late) / cell.parts, "tardy-parts": float(sum(late_s > SAME for late_s in late))}
     return float(known.get(objective, 0.0))  # a Python float, since JSON has no numpy types
 
 
@@ -207,12 +209,12 @@ def _side_by_side(shared: Shared, until_s: float, seed: int, workers: int) -> No
         try:
             while perf_counter() < until_s and not shared.over.wait(WAIT_S):
                 shared.look()
-                if any(one.done() and one.exception() for one in working):
+                if any(worker.done() and worker.exception() for worker in working):
                     break
         finally:  # Ctrl-C, too
             shared.over.set()
-    for one in working:
-        one.result()
+    for worker in working:
+        worker.result()
 
 
 def _prove(shared: Shared, time_limit_s: float, seed: int, workers: int) -> None:

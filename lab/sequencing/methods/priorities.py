@@ -55,14 +55,14 @@ def _way(cell: Any, run: Any, part: int, choice: int) -> int:
     """The number of the option that a part takes now: that of its choice if allowed, else the first allowed; -1: none."""
     place = run.locations[part]
     first, last = cell.first_option[place], cell.first_option[place + 1]
-    found = -1
+    chosen = -1
     for o in range(first, last):
         if may(cell, run, part, o):
             if cell.choice[o] == choice:
                 return int(o)
-            if found < 0:
-                found = o
-    return int(found)
+            if chosen < 0:
+                chosen = o
+    return int(chosen)
 
 
 @inner
@@ -217,11 +217,11 @@ class Priorities:
     def of(cls, cell: Cell, sequence: Sequence[int]) -> "Priorities":
         """The list of a sequence, followed by entries for the moves that its parts did not need, by turns of all parts."""
         spare = moves_each(cell)
-        for one in sequence:
-            spare[part_of(one, cell.parts) - 1] -= 1
+        for decision in sequence:
+            spare[part_of(decision, cell.parts) - 1] -= 1
         rounds = [part for turn in range(max(spare)) for part in range(cell.parts) if spare[part] > turn]
-        parts = [part_of(one, cell.parts) - 1 for one in sequence] + rounds
-        choices = [choice_of(one, cell.parts) for one in sequence] + [0] * len(rounds)
+        parts = [part_of(decision, cell.parts) - 1 for decision in sequence] + rounds
+        choices = [choice_of(decision, cell.parts) for decision in sequence] + [0] * len(rounds)
         return cls(np.array(parts, np.int64), np.array(choices, np.int64))
 
 

@@ -43,11 +43,13 @@ class _Replanning:
 
     def choose(self, seen: Observed, allowed: tuple[int, ...]) -> int:
         """The first decision of the best known plan that is allowed; WAIT when there is none."""
-        found = rollout(seen, self.objective)
+        planned = rollout(seen, self.objective)
         kept = self._left(seen)
-        costs = [inf if run is None else cost(run, self.objective) for run in (_moved(seen, kept), _moved(seen, found))]
+        costs = [
+            inf if run is None else cost(run, self.objective) for run in (_moved(seen, kept), _moved(seen, planned))
+        ]
         if costs[0] > costs[1] + SAME or not kept:
-            kept, self._plan = found, _placed(seen, found)
+            kept, self._plan = planned, _placed(seen, planned)
         return first_of(seen, kept, allowed, self.objective)
 
     def _left(self, seen: Observed) -> tuple[int, ...]:
@@ -64,11 +66,11 @@ class _Replanning:
 
 def _placed(run: Run, plan: Sequence[int]) -> list[tuple[int, int]]:
     """The decisions of a plan, each with its part's position before it."""
-    ahead, found = branch(run), list[tuple[int, int]]()
+    ahead, placed = branch(run), list[tuple[int, int]]()
     for decision in plan:
-        found.append((decision, ahead.locations[part_of(decision, run.cell.parts) - 1]))
+        placed.append((decision, ahead.locations[part_of(decision, run.cell.parts) - 1]))
         ahead.move(decision)
-    return found
+    return placed
 
 
 def first_of(run: Run, plan: Sequence[int], allowed: Collection[int], objective: str = MAKESPAN) -> int:
@@ -125,11 +127,13 @@ def rollout(run: Run, objective: str = MAKESPAN, depth: int = 1) -> tuple[int, .
 def _distinct(run: Run) -> list[int]:
     """The allowed decisions that differ in position, choice or due time."""
     parts, due_s = run.cell.parts, run.cell.due_s
-    found: dict[tuple[int, int, float], int] = {}
+    distinct: dict[tuple[int, int, float], int] = {}
     for decision in sorted(run.allowed(), key=lambda decision: (run.ready_s[part_of(decision, parts) - 1], decision)):
         index = part_of(decision, parts) - 1
-        found.setdefault((run.locations[index], choice_of(decision, parts), due_s[index] if due_s else 0.0), decision)
-    return list(found.values())
+        distinct.setdefault(
+            (run.locations[index], choice_of(decision, parts), due_s[index] if due_s else 0.0), decision
+        )
+    return list(distinct.values())
 
 
 def _finish(run: Run, rule: Rule, objective: str) -> tuple[float, tuple[int, ...]]:

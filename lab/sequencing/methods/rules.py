@@ -144,7 +144,7 @@ def first_come(cell: Cell) -> tuple[int, ...]:
     run, sequence = Run(cell), list[int]()
     for part in range(1, cell.parts + 1):
         while run.finished_s[part - 1] is None:
-            own = [one for one in run.allowed() if part_of(one, cell.parts) == part]
+            own = [decision for decision in run.allowed() if part_of(decision, cell.parts) == part]
             if not own:
                 return ()
             sequence.append(own[0])
@@ -154,12 +154,12 @@ def first_come(cell: Cell) -> tuple[int, ...]:
 
 def any_order(cell: Cell) -> tuple[int, ...]:
     """A complete sequence from the first quick method that finds one; empty when none does, since rules never look ahead."""
-    if found := first_come(cell):
-        return found
+    if order := first_come(cell):
+        return order
     for rule in usable(cell).values():
-        found = dispatch(run := Run(cell), rule)
+        order = dispatch(run := Run(cell), rule)
         if run.done:
-            return found
+            return order
     return ()
 
 
@@ -198,7 +198,7 @@ def loads_s(cell: Cell, least: bool = False) -> tuple[dict[int, float], ...]:
             each.append(own)
         stations = dict.fromkeys(station for own in each for station in own)
         ways = {station: [own.get(station, 0.0) for own in each] for station in stations}
-        return {at: min(own) if least else sum(one / len(own) for one in own) for at, own in ways.items()}
+        return {at: min(own) if least else sum(load / len(own) for load in own) for at, own in ways.items()}
 
     return tuple(from_the_ends(cell.positions, loads_s))
 

@@ -230,11 +230,11 @@ def learn_compiled(cell: Cell, search: Search, seed: int, kind: type[SessionLear
     for first in range(1, search.episodes + 1, BLOCK):
         numbers = range(first, min(first + BLOCK, search.episodes + 1))
         work = _with_room(work, keys, len(numbers) * longest)
-        found = arrays.SessionOutcomes.room(1, len(numbers), longest)
+        outcomes = arrays.SessionOutcomes.room(1, len(numbers), longest)
         epsilons = np.array([learner.epsilon(episode) for episode in numbers])
-        session_kernels.advance(learning, work, seeds, epsilons, first, found)
-        sequence, final_cost = tuple(found.sequences[found.sequences > 0].tolist()), float(found.ends[0, 1])
-        for value, done in zip(found.costs[0].tolist(), found.complete[0].tolist(), strict=True):
+        session_kernels.advance(learning, work, seeds, epsilons, first, outcomes)
+        sequence, final_cost = tuple(outcomes.sequences[outcomes.sequences > 0].tolist()), float(outcomes.ends[0, 1])
+        for value, done in zip(outcomes.costs[0].tolist(), outcomes.complete[0].tolist(), strict=True):
             learner.check(value)
             noted.note(sequence, value, done)
     return LearnedSession(noted, final_cost, _table(keys, work.memory))

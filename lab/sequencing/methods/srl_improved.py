@@ -165,7 +165,7 @@ def srl_improved(cell: Cell, search: Search, rng: np.random.Generator) -> SrlImp
     while len(log.costs) < search.episodes:
         costs = np.zeros(min(longest, search.episodes - len(log.costs)))
         lesson(orders.arrays, orders.run, learned, costs, ALPHA, WARM * orders.scale)
-        best = tuple(int(one) for one in learned.best if one)
+        best = tuple(int(decision) for decision in learned.best if decision)
         for value in costs.tolist():
             log.note(best, value, value < orders.stuck_cost)
     final_cost = float(greedy(orders.arrays, orders.run, learned))

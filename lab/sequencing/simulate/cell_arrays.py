@@ -248,12 +248,12 @@ def _held(cell: Cell) -> dict[str, Any]:
     """The fields for the stretches of every path on the track."""
     pairs = [(a, b) for a in range(len(cell.stations)) for b in range(len(cell.stations))]
     ways = [cell.ways.get(pair, ()) for pair in pairs] if cell.track else []
-    held, speeds = [one for way in ways for one in way], np.array([robot.speed for robot in cell.robots])
+    held, speeds = [stretch for way in ways for stretch in way], np.array([robot.speed for robot in cell.robots])
     return {
         "first_held": np.cumsum([0, *map(len, ways)]),
-        "held": np.array([one.stretch for one in held], np.int64),
-        "held_from_s": np.array([one.from_s for one in held]) / speeds[:, None],
-        "held_until_s": np.array([one.until_s for one in held]) / speeds[:, None],
+        "held": np.array([held_stretch.stretch for held_stretch in held], np.int64),
+        "held_from_s": np.array([held_stretch.from_s for held_stretch in held]) / speeds[:, None],
+        "held_until_s": np.array([held_stretch.until_s for held_stretch in held]) / speeds[:, None],
     }
 
 

@@ -149,7 +149,7 @@ class _Network:
         if there.processing_s is not None:
             if there.station in cell.batches:  # all parts in it begin together
                 does |= {other: run.locations[other - 1] for other in run.inside(there.station)}
-            longest_s = max(run.times.processing_s(*one) for one in does.items())
+            longest_s = max(run.times.processing_s(*item) for item in does.items())
             self._ready |= dict.fromkeys(does, (begin + 1, longest_s))
 
     def waits(self) -> tuple[Wait, ...] | None:

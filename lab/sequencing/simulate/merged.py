@@ -248,11 +248,11 @@ class MergedCell:
         while state.way is not None and state.parent is not None:
             steps.append((state.way, state.nth))
             state = state.parent
-        found = []
+        allowed = []
         for way, nth in reversed(steps):
             named = self.after(named, way, nth=nth)
-            found.append(self.decision(named))
-        return tuple(found)
+            allowed.append(self.decision(named))
+        return tuple(allowed)
 
     def too_late(self, state: MergedState) -> bool:
         """Whether some part can no longer be picked in time, whatever the robot does."""
@@ -299,14 +299,14 @@ class MergedCell:
 
     def _times_to_fetch(self) -> dict[int, list[int]]:
         """By position with a latest pick and by the robot's station, the least time until a part is picked there [ticks]."""
-        far, found = distances(self.cell), dict[int, list[int]]()
+        far, times = distances(self.cell), dict[int, list[int]]()
         for place in self.latest:
             out = [way for way in self._ways[place] if way.option.waits]
             service = [way.work - self._loaded[way.option.origin][way.option.target] for way in out]
             pairs = list(zip(out, service, strict=True))
             if pairs:
-                found[place] = [min(row[way.option.origin] + more for way, more in pairs) for row in far]
-        return found
+                times[place] = [min(row[way.option.origin] + more for way, more in pairs) for row in far]
+        return times
 
     def _left_to_come(self, coming: tuple[int, ...], fetched: int, pick: int) -> tuple[int, ...]:
         """The arrivals left once the first part is picked, when the next one sets out where arrivals follow picks."""

@@ -53,7 +53,7 @@ class Rooms:
         """An independent copy."""
         return Rooms(
             {at: times_s.copy() for at, times_s in self.free_s.items()},
-            {at: one.copy() for at, one in self.robots.items()},
+            {at: robot.copy() for at, robot in self.robots.items()},
         )
 
 
@@ -103,7 +103,7 @@ def refusal(run: Decided, decision: int) -> str:
     if all(option.choice != choice for option in place.options):
         for option in cell.laid_out[run.locations[part - 1]].options:
             if option.choice == choice:
-                return f"{name} at '{where}': the way by '{cell.names[option.target]}' is closed"
+                return f"{name} at '{where}': the route by '{cell.names[option.target]}' is closed"
     waits = next((why for o in place.options if o.possible(full) and (why := run.waits_for(part, o))), "")
     if waits:
         return f"{name} at '{where}' may not {waits}"

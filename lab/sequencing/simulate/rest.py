@@ -60,14 +60,14 @@ def rest_of(run: Run, mishaps: Mishaps = NOTHING, fallback_s: float | None = Non
     closed = cell.closed if mishaps.closed is None else mishaps.closed
     begins = [_begin(run, part, mishaps) for part in range(1, cell.parts + 1)]
     stuck = _stuck(cell, begins, {cell.index(name) for name in closed})
-    begins = [replace(one, stays=n in stuck) for n, one in enumerate(begins, 1)]
-    if all(one.stays or one.position is None or not cell.laid_out[one.position].options for one in begins):
+    begins = [replace(begin, stays=n in stuck) for n, begin in enumerate(begins, 1)]
+    if all(begin.stays or begin.position is None or not cell.laid_out[begin.position].options for begin in begins):
         return Rest(None, stuck)
     arrivals, due_s = cell.arrivals, cell.due_s
     if arrivals is not None:
         arrivals = replace(arrivals, interval_s=_intervals_s(run, begins))
     if due_s is not None:
-        due_s = tuple(max(0.0, one - run.now_s) for one in due_s)
+        due_s = tuple(max(0.0, due - run.now_s) for due in due_s)
     rest = replace(
         cell,
         robots=(replace(cell.robots[0], start=robot),),
@@ -129,42 +129,44 @@ def _stuck(cell: Cell, begins: Sequence[Begins], closed: set[int]) -> dict[int, 
                 inside = next(part for part in stuck if station in cell.laid_out[begins[part - 1].position or 0].holds)
                 shut.setdefault(station, f"taken by {cell.part_name(inside)}")
         positions = open_ways(cell.laid_out, shut)
-        found = dict[int, str]()
-        for part, one in enumerate(begins, 1):
-            if part in stuck or one.position is None or not cell.laid_out[one.position].options:
+        reasons = dict[int, str]()
+        for part, begin in enumerate(begins, 1):
+            if part in stuck or begin.position is None or not cell.laid_out[begin.position].options:
                 continue
-            at, name = cell.laid_out[one.position], cell.names[cell.laid_out[one.position].station]
+            at, name = cell.laid_out[begin.position], cell.names[cell.laid_out[begin.position].station]
             broken = [station for station in at.holds if station in closed]
-            if broken and one.ready_s > 0:
-                found[part] = f"{cell.part_name(part)} is not done in '{cell.names[broken[0]]}', which is out of use"
-            elif not positions[one.position].options:
+            if broken and begin.ready_s > 0:
+                reasons[part] = f"{cell.part_name(part)} is not done in '{cell.names[broken[0]]}', which is out of use"
+            elif not positions[begin.position].options:
                 way = ", ".join(
-                    f"'{cell.names[n]}' is {why}" for n, why in shut.items() if n in _ahead(cell, one.position)
+                    f"'{cell.names[n]}' is {why}" for n, why in shut.items() if n in _ahead(cell, begin.position)
                 )
-                found[part] = f"{cell.part_name(part)} at '{name}' has no way on: {way}"
-        found = found or _waiting(cell, begins, stuck)
-        if not found:
+                reasons[part] = f"{cell.part_name(part)} at '{name}' cannot continue: {way}"
+        reasons = reasons or _waiting(cell, begins, stuck)
+        if not reasons:
             return stuck
-        stuck |= found
+        stuck |= reasons
 
 
 def _waiting(cell: Cell, begins: Sequence[Begins], stuck: Collection[int]) -> dict[int, str]:
     """The parts that can never move because a precedence waits for parts which cannot make their step, with the reason."""
-    found = dict[int, str]()
-    for rule, one in zip(cell.rules, cell.precedences, strict=True):
-        at = {part: begins[part - 1].position for part in (*one.parts, *one.of)}
+    reasons = dict[int, str]()
+    for rule, precedence in zip(cell.rules, cell.precedences, strict=True):
+        at = {part: begins[part - 1].position for part in (*precedence.parts, *precedence.of)}
         never = [
             part
-            for part in one.of
-            if (at[part] is None and not one.of_step.leaves) or (part in stuck and at[part] not in rule.ended)
+            for part in precedence.of
+            if (at[part] is None and not precedence.of_step.leaves) or (part in stuck and at[part] not in rule.ended)
         ]
-        waiting = [n for n in one.parts if at[n] is not None and at[n] not in rule.made and n not in stuck]
-        made = sum(at[part] in rule.made for part in one.parts)
-        free = sum(count <= len(one.of) - len(never) for count in rule.counts)
+        waiting = [n for n in precedence.parts if at[n] is not None and at[n] not in rule.made and n not in stuck]
+        made = sum(at[part] in rule.made for part in precedence.parts)
+        free = sum(count <= len(precedence.of) - len(never) for count in rule.counts)
         for part in waiting[max(0, free - made) :]:
             names = " and ".join(cell.part_name(other) for other in never)
-            found[part] = f"{cell.part_name(part)} may not {one.step}: {names} cannot {one.of_step} before"
-    return found
+            reasons[part] = (
+                f"{cell.part_name(part)} may not {precedence.step}: {names} cannot {precedence.of_step} before"
+            )
+    return reasons
 
 
 def _ahead(cell: Cell, place: int) -> set[int]:
@@ -174,21 +176,21 @@ def _ahead(cell: Cell, place: int) -> set[int]:
 
 def _intervals_s(run: Run, begins: Sequence[Begins]) -> tuple[float, ...]:
     """The intervals of arrivals of the parts not fetched yet, counted from now [s]."""
-    cell, came_s, found = run.cell, 0.0, list[float]()
+    cell, came_s, intervals = run.cell, 0.0, list[float]()
     first = True
-    for part, (one, start) in enumerate(zip(begins, cell.starts, strict=True), 1):
+    for part, (begin, start) in enumerate(zip(begins, cell.starts, strict=True), 1):
         interval_s = cell.arrivals.interval_s[part - 1] if cell.arrivals else 0.0
-        if one.position != start:
-            found.append(0.0)
+        if begin.position != start:
+            intervals.append(0.0)
             continue
         left_s = max(0.0, run.ready_s[part - 1] - run.now_s)
         if cell.arrivals is not None and cell.arrivals.after == "clock":
             interval_s, came_s = left_s - came_s, left_s
         elif first:
             interval_s = left_s
-        found.append(interval_s)
+        intervals.append(interval_s)
         first = False
-    return tuple(found)
+    return tuple(intervals)
 
 
 def _filled(cell: Cell, fallback_s: float) -> NDArray[np.float64]:

@@ -106,7 +106,7 @@ class Run:
     def allowed(self) -> tuple[int, ...]:
         """The decisions allowed now, ascending; empty when all parts are finished, or in a deadlock."""
         parts, full = self.cell.parts, self.full()
-        found = [
+        decisions = [
             entry(part, option.choice, parts)
             for part in range(1, parts + 1)
             if self.in_turn(part)
@@ -114,7 +114,7 @@ class Run:
             if self._possible(part, option, full) and not self.waits_for(part, option)
             if not self.too_late(part, option)
         ]
-        return tuple(sorted(found))
+        return tuple(sorted(decisions))
 
     def option(self, decision: int) -> Option | None:
         """The option that a decision takes now; None when it is not allowed."""
@@ -164,12 +164,12 @@ class Run:
     def waits_for(self, part: int, option: Option) -> str:
         """The precedence that an option waits for, in words; "" when it waits for none."""
         cell, place = self.cell, self.locations[part - 1]
-        for rule, one in zip(cell.rules, cell.precedences, strict=True):
+        for rule, precedence in zip(cell.rules, cell.precedences, strict=True):
             if rule.applies(place, option):
                 counted = [self.locations.count(n) for n in range(len(cell.positions))]
                 if count := missing(rule, counted):
-                    kinds = " or ".join(dict.fromkeys(cell.order[other - 1] for other in one.of))
-                    return f"{one.step} before {count} more of {kinds} {one.of_step}"
+                    kinds = " or ".join(dict.fromkeys(cell.order[other - 1] for other in precedence.of))
+                    return f"{precedence.step} before {count} more of {kinds} {precedence.of_step}"
         return ""
 
     def move(self, decision: int, wait: Wait = NO_WAIT) -> Move:

@@ -173,7 +173,7 @@ class Dispatch(Execution):
 
     def _open(self, seen: Observed, free: set[int]) -> tuple[int, ...]:
         """The allowed decisions for free robots, and for servers that could begin."""
-        found = []
+        decisions = []
         for decision in seen.allowed():
             option, index = seen.option(decision), part_of(decision, seen.cell.parts) - 1
             if option is None:
@@ -183,8 +183,8 @@ class Dispatch(Execution):
                 come_s = max(self.run.ready_s[index], self.run.put_s[index], self.run.free_s(option.target))
                 begins = stands and come_s <= self.now_s and self.run.option(decision) is not None
             if option.robot in free if option.robot != SERVER else begins:
-                found.append(decision)
-        return tuple(found)
+                decisions.append(decision)
+        return tuple(decisions)
 
     def _begin(self, decision: int, option: Option, seen: Observed) -> None:
         """Begins a decision: a server begins its work, or a robot picks or sets out; otherwise it stays until the next event."""

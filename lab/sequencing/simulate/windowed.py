@@ -53,11 +53,11 @@ class WindowedCell(MergedCell):
 
     def decisions(self, state: MergedState) -> tuple[int, ...]:
         """All decisions from the start to a state."""
-        found = list[int]()
+        allowed = list[int]()
         while state.parent is not None:
-            found.append(self.decision(state))
+            allowed.append(self.decision(state))
             state = state.parent
-        return tuple(found[::-1])
+        return tuple(allowed[::-1])
 
     def _picked(self, state: MergedState, way: Way, nth: int) -> MergedState | None:
         """The state delayed so that a part is ready late enough to be picked next by an option; None: no waits help."""

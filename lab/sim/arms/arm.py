@@ -15,7 +15,7 @@ from lab.sim.arms.level_tool import LevelTool
 
 Array = NDArray[np.float64]
 _WAYS_ROUND = (0, 1, -1, 2, -2, 3, -3, 4, -4)  # the half turns of the tool that are tried, in order
-_ASIDE = (0.0, 0.4, -0.4, 0.8, -0.8, 1.2, -1.2, 1.6, -1.6)  # [rad] off straight ahead, in which a level tool may wait
+_ASIDE = (0.0, 0.4, -0.4, 0.8, -0.8, 1.2, -1.2, 1.6, -1.6)  # [rad] a level tool's waiting directions
 
 
 class Kinematics(Protocol):
@@ -23,14 +23,14 @@ class Kinematics(Protocol):
 
     @property
     def home(self) -> Array:
-        """The joints (k,) in which it waits, its tool down."""
+        """The joint positions (k,) in which the arm waits, with its tool pointing down."""
 
     @property
     def spins(self) -> tuple[float, float]:
         """The signs, 1 or -1, of the tool's turn with the first and with the last joint, seen from above."""
 
     def bent(self, out: Array, up: Array) -> Array:
-        """The joints (n, k) for a tool `out` (n,) [m] ahead of the first axis and `up` (n,) [m], at yaw 0; NaN: none."""
+        """The joints (n, k) for a tool `out` (n,) [m] off the first axis, `up` (n,) [m], at yaw 0; NaN: unsolvable."""
 
     def tools(self, joints: Array) -> Array:
         """The tool poses x, y, z [m], yaw [rad] (n, 4) that joints (n, k) hold."""
@@ -40,9 +40,9 @@ class Kinematics(Protocol):
 class Arm:
     """One arm with its gripper, its foot `base_up_m` [m] above the origin.
 
-    urdf: what physics loads, checked; joints (k,) from the foot to the tool, their ranges lower, upper (k,) [rad] and speed
-    (k,) [rad/s]; tool_link, tip (4, 4): the finger tips' frame in it, x out of the gripper, y across; nearest_m: nearer to
-    its own axis than this the tool would touch the arm. level: how it holds its tool level; None: the tool hangs.
+    urdf: the checked URDF that physics loads; joints (k,) from the foot to the tool, their ranges lower, upper (k,) [rad] and
+    speed (k,) [rad/s]; tool_link, tip (4, 4): the finger tips' frame in it, x out of the gripper, y across; nearest_m: the least
+    distance of the tool from the first axis, so that it clears the arm. level: the level tool's kinematics; None: it hangs.
     """
 
     name: str
@@ -66,28 +66,28 @@ class Arm:
 
     @property
     def home(self) -> Array:
-        """The joints (k,) in which it waits, its tool hanging, or level with the wrist at the same place."""
+        """The joint positions (k,) in which the arm waits: its tool hangs, or is level with the wrist at the same place."""
         if self.level is None:
             return self.kinematics.home
         x, y, z, yaw = self.kinematics.tools(self.kinematics.home[None])[0].tolist()
         ahead = self.level.wrist_m
         for aside in _ASIDE:
             way = ahead * cos(yaw + aside), ahead * sin(yaw + aside)
-            found = self.inverse(ToolPose(x + way[0], y + way[1], z + ahead + self.base_up_m, yaw + aside))
-            if found is not None:
-                return found
+            solution = self.inverse(ToolPose(x + way[0], y + way[1], z + ahead + self.base_up_m, yaw + aside))
+            if solution is not None:
+                return solution
         raise BadInput(f"robot.tool = 'level': the wrist of arm '{self.name}' cannot hold its tool so in front of it")
 
     def inverse(self, pose: ToolPose) -> Array | None:
-        """The joints (k,) that hold the tool at `pose`, which depend on nothing else; None when out of reach or range.
+        """The joint positions (k,) that hold the tool at `pose`, a function of it alone; None if it is out of reach or range.
 
-        A gripper looks the same after half a turn: where the last joint cannot turn the tool to its yaw, it is half a turn on.
+        A gripper is symmetric under half a turn: where the last joint cannot reach the yaw, the tool is turned by half a turn.
         """
         joints = self.inverse_each(np.array([[pose.x, pose.y, pose.z, pose.yaw]]))[0]
         return None if np.isnan(joints[0]) else joints
 
     def inverse_each(self, poses: Array) -> Array:
-        """The joints (n, k) of `inverse` for each of many poses x, y, z [m], yaw [rad] (n, 4); NaN where there are none."""
+        """The joints (n, k) of `inverse` for each of many poses x, y, z [m], yaw [rad] (n, 4); NaN without a solution."""
         joints = self._bent(poses)
         last, low, high = joints[:, -1].copy(), self.lower[-1], self.upper[-1]
         best = np.full(len(joints), np.nan)
@@ -99,10 +99,10 @@ class Arm:
         return joints
 
     def inverse_path(self, poses: Array, before: Array | None = None) -> Array:
-        """The joints (n, k) along a path of poses (n, 4), the tool turning without jumps; NaN where there are none.
+        """The joints (n, k) along a path of poses (n, 4), on which the tool turns without jumps; NaN without a solution.
 
         before (k,): the joints before the path; the tool continues its turn from there if it can. If the last joint cannot turn
-        through the whole path, the tool is half a turn on along all of it.
+        through the whole path, the tool is turned by half a turn along all of it.
         """
         joints = self._bent(poses)
         reached = ~np.isnan(joints[:, 0])
@@ -120,7 +120,7 @@ class Arm:
         return joints
 
     def forward(self, joints: Array) -> ToolPose:
-        """The tool pose that joints (k,) hold; for joints that `inverse` gave, or that are near to such."""
+        """The tool pose at joint positions (k,), which `inverse` returned or that are close to such."""
         x, y, z, yaw = (float(number) for number in self.tools(joints[None])[0])
         return ToolPose(x, y, z + self.base_up_m, yaw)
 
@@ -129,19 +129,19 @@ class Arm:
         return (self.kinematics if self.level is None else self.level).tools(joints)
 
     def is_half_on(self, joints: Array, pose: ToolPose) -> bool:
-        """Whether the joints hold the tool half a turn on from the yaw of `pose`."""
+        """Whether the tool at these joint positions is half a turn away from the yaw of `pose`."""
         return abs((self.forward(joints).yaw - pose.yaw + pi) % (2 * pi) - pi) > pi / 2
 
     def reach_in_words(self, z: float) -> str:
         """The nearest and farthest reach of the tool ahead of the arm at a height [m], in words."""
         out = np.arange(self.nearest_m, 3.0, 0.01)
-        found = self.inverse_each(np.stack([out, 0 * out, 0 * out + z, 0 * out], axis=1))
-        reached = out[~np.isnan(found[:, 0])]
+        solutions = self.inverse_each(np.stack([out, 0 * out, 0 * out + z, 0 * out], axis=1))
+        reached = out[~np.isnan(solutions[:, 0])]
         at = f"at a height of {z:.2f} m{'' if self.level is None else ', its tool level and straight ahead'}"
         return f"reaches {reached[0]:.2f} to {reached[-1]:.2f} m {at}" if len(reached) else f"reaches nothing {at}"
 
     def _bent(self, poses: Array) -> Array:
-        """Joints (n, k) within all ranges but the last's, whose turn is within half a turn of its own zero; NaN: none."""
+        """Joint positions (n, k), the last within half a turn of zero, the others within their ranges; NaN: unsolvable."""
         with np.errstate(invalid="ignore"):
             poses = np.where(np.abs(poses).max(axis=1, keepdims=True) < 1e3, poses, np.nan)
             asked, poses = poses, poses if self.level is None else self.level.hanging(poses)

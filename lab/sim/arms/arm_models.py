@@ -1,4 +1,4 @@
-"""The arms that ship, and the making of any arm from its URDF: it is checked, given the camera's marker, and measured."""
+"""The arms that ship, and how any arm is made from its URDF: it is checked, gets the camera's marker, and is measured."""
 
 from dataclasses import dataclass
 from functools import lru_cache
@@ -28,13 +28,13 @@ ALONG_X = np.eye(3)  # a tool link's axes are the tool's own: x out of the gripp
 ALONG_Z = np.array([[0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]])  # the tool's axes (columns) where z points out
 FARTHEST_TURN = (
     pi - 0.15
-)  # [rad] of a first joint that could go farther: behind it, neighbours would be a whole turn apart
-OWN_NEAREST_M = 0.25  # [m] of a URDF file that says nothing
+)  # [rad] limit of the first joint: beyond it, neighbouring poses behind the arm would differ by a whole turn
+OWN_NEAREST_M = 0.25  # [m] `nearest_m` of a URDF whose task file does not set it
 
 
 @dataclass(frozen=True)
 class ArmModel:
-    """Where an arm that ships comes from: a URDF in a folder, its tool, and what no URDF says.
+    """An arm that ships: the folder of its URDF, its tool, and the data that a URDF does not hold.
 
     axes (3, 3): the tool's axes in its link; tip_m: the finger tips along x [m], with the margin that physics gives meshes;
     nearest_m: see `Arm`; flange: where the lab's own gripper is mounted, as a link and how far out [m], of an arm that has
@@ -72,10 +72,10 @@ def arm_of(settings: RobotSettings, folder: Path = Path()) -> Arm:
     changed = 0
     path = Path()
     if settings.is_file:
-        found = within(folder, settings.model)
-        if found is None:
+        urdf_path = within(folder, settings.model)
+        if urdf_path is None:
             raise BadInput(f"robot.model '{settings.model}': the URDF lies outside the task file's folder")
-        path = found
+        path = urdf_path
         if not is_file(path):
             raise BadInput(f"robot.model '{settings.model}': no such file beside the task file")
         changed = path.stat().st_mtime_ns
@@ -140,14 +140,14 @@ def _made(
 
 
 def _still(urdf: Urdf, moving: tuple[str, ...]) -> None:
-    """Fixes the joints that move neither the tool nor its fingers at zero."""
+    """Fixes at zero the joints that move neither the tool nor its fingers."""
     for name, joint in urdf.joints.items():
         if name not in moving:
             joint.set("type", "fixed")
 
 
 def _with_own_gripper(urdf: Urdf, flange: str, out_m: float) -> Urdf:
-    """The arm with the lab's own gripper on its flange, `out_m` [m] along the flange's z; its marker is on it already."""
+    """The arm with the lab's own gripper on its flange, `out_m` [m] along the flange's z; the gripper already has its marker."""
     own = settled(assets_folder() / "robot.urdf", assets_folder())
     for link in own.below("tool"):
         urdf.root.append(own.links[link])
@@ -158,7 +158,7 @@ def _with_own_gripper(urdf: Urdf, flange: str, out_m: float) -> Urdf:
 
 
 def _with_marker(urdf: Urdf, tool: str, tip: Array) -> Urdf:
-    """The arm with the outrigger that carries the camera's marker, beside and above the finger tips as on the lab's own."""
+    """The arm with an outrigger for the camera's marker, beside and above the finger tips as on the lab's own arm."""
     link = Xml.SubElement(urdf.root, "link", name="marker of the tool")
     inertial = Xml.SubElement(link, "inertial")
     Xml.SubElement(inertial, "mass", value="0.01")
@@ -200,5 +200,7 @@ def _mount(root: Xml.Element, name: str, parent: str, child: str, place: tuple[s
 
 def _again(urdf: Urdf) -> Urdf:
     """The URDF indexed again after links were added."""
-    carrying = {one.get("link", ""): joint for joint in urdf.root.findall("joint") for one in joint.findall("child")}
+    carrying = {
+        child.get("link", ""): joint for joint in urdf.root.findall("joint") for child in joint.findall("child")
+    }
     return Urdf(urdf.path, urdf.root, carrying, urdf.foot)

@@ -63,7 +63,7 @@ class Chain:
         )
 
     def ends(self, joints: Array) -> tuple[Array, Array]:
-        """Where the end is (n, 3) [m] and its axes (n, 3, 3), in the foot's frame, for joints (n, k)."""
+        """The end's position (n, 3) [m] and axes (n, 3, 3) in the foot's frame, for joint positions (n, k)."""
         at, axes, _, _ = self.along(joints)
         return at, axes
 

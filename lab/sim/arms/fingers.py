@@ -20,9 +20,9 @@ PAD_M = 0.011  # effective radius at which the friction of a finger's pad, of 3 
 class Gripper:
     """Two parallel fingers, which close along the tool's y axis [m].
 
-    opening_m: between the open fingers' pads. depth_m: from the finger tips up to the palm. width_m, thick_m: of a
-    finger, across the way it closes and along it. level: the tool is held level, not hanging. hand_m: how far what is above
-    the palm reaches from the tool's axis, across the way the fingers close and along it.
+    opening_m: the distance between the open pads. depth_m: from the finger tips up to the palm. width_m, thick_m: a
+    finger's size across the closing direction and along it. level: the tool is held level, not hanging. hand_m: how far the
+    hand above the palm reaches from the tool's axis, across the closing direction and along it.
     """
 
     opening_m: float
@@ -36,19 +36,19 @@ class Gripper:
 # ---- The joints of the fingers, and their measurement -----------------------------------------------------------------
 
 
-_STROKES = 65  # strokes that are measured between closed and open
+_STROKES = 65  # number of strokes that are measured between closed and open
 _MIMIC = {"multiplier": "1", "offset": "0"}
-_TIP_M = 0.02  # of a finger, from the tips up: what takes hold of things
+_TIP_M = 0.02  # length of a finger, from the tip up, that counts as its pad
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
 class Fingers:
-    """Fingers whose joints go together: (k,) joints, and the links that take hold, by side, left along y.
+    """Fingers whose joints move together: (k,) joints, and the links that grip, by side; left is along y.
 
-    openings (m,) [m]: each pad from the middle, growing; strokes (m, k) [rad or m]: where the joints are then. driven: of the
-    joints, those that a motor moves; the others are geared to the first one of their side, as leaders say.
+    openings (m,) [m]: increasing distances of each pad from the middle; strokes (m, k) [rad or m]: the joint positions there.
+    driven: the joints with a motor; the others are geared to the first joint of their side, listed in leaders.
     """
 
     joints: tuple[str, ...]
@@ -61,7 +61,7 @@ class Fingers:
 
     @property
     def open_m(self) -> float:
-        """Each pad from the middle when the fingers are open [m]."""
+        """The distance of each pad from the middle when the fingers are open [m]."""
         return self.gripper.opening_m / 2
 
     def ratio(self, joint: str) -> float:
@@ -70,11 +70,11 @@ class Fingers:
         return float(own / leader)
 
     def at(self, opening: float) -> Array:
-        """Where the joints are (k,) when each pad is `opening` [m] from the middle, as far as they go."""
+        """The joint positions (k,) at which each pad is `opening` [m] from the middle, within their range."""
         return np.array([np.interp(opening, self.openings, self.strokes[:, k]) for k in range(len(self.joints))])
 
     def opening(self, joints: Array) -> float:
-        """How far each pad is from the middle [m] when the joints are at (k,), by the first one."""
+        """The distance of each pad from the middle [m] at joint positions (k,), computed from the first joint."""
         order = np.argsort(self.strokes[:, 0])
         return float(np.interp(joints[0], self.strokes[order, 0], self.openings[order]))
 
@@ -90,7 +90,7 @@ class Fingers:
 def fingers_of(urdf: Urdf, named: tuple[str, ...], tool: str, tip: Array, opening_m: float | None = None) -> Fingers:
     """The fingers that the joints `named` move; `tip` (4, 4): the finger tips' frame in the link `tool`.
 
-    opening_m: between the open pads, None: all there is. BadInput when these joints do not open and close two fingers.
+    opening_m: between the open pads; None: as wide as they open. BadInput if these joints do not open and close two fingers.
     """
     leads = {name: name for name in named}
     for name in named:
@@ -131,7 +131,7 @@ class _Ends:
                 self.sides[0 if points[:, 1].mean() > 0 else 1].append(link)
 
     def _ranges(self) -> Array:
-        """Where each joint is when the fingers are closed and when they are open (k, 2); what mimics another goes with it."""
+        """The positions of each joint with closed and with open fingers (k, 2); a mimic joint follows its leader."""
         self.ranges = np.array(
             [
                 [floats(self.urdf.joints[name].find("limit"), end, "0")[0] for end in ("lower", "upper")]
@@ -153,7 +153,7 @@ class _Ends:
         return ranges
 
     def positions(self, share: float) -> Array:
-        """Where the joints are (k,) at a share of their ways from closed to open."""
+        """The joint positions (k,) at a share of their ranges from closed to open."""
         return np.asarray(self.ranges[:, 0] + share * (self.ranges[:, 1] - self.ranges[:, 0]))
 
     def points(self, link: str, share: float) -> Array:
@@ -165,21 +165,21 @@ class _Ends:
         return np.asarray((self.solids[link] @ turned.T + here - foot[0]) @ axes[0])
 
     def _ends(self, link: str, share: float) -> tuple[Array, Array]:
-        """Where a link's frame is (3,) [m], and its axes (3, 3), in the foot's."""
+        """The position (3,) [m] and axes (3, 3) of a link's frame in the foot's frame."""
         at = dict(zip(self.names, self.positions(share), strict=True))
         chain = self.chains.get(link) or Chain.of(self.urdf, link)
         here, turned = chain.ends(np.array([[at.get(name, 0.0) for name in chain.names]]))
         return here[0], turned[0]
 
     def gap(self, share: float) -> float:
-        """How far the nearer pad is from the middle [m]; NaN unless there are two sides."""
+        """The distance of the nearer pad from the middle [m]; NaN unless there are two sides."""
         left, right = ([self.points(link, share)[:, 1] for link in side] for side in self.sides)
         if not left or not right:
             return float("nan")
         return float(min(np.concatenate(left).min(), -np.concatenate(right).max()))
 
     def fingers(self, leads: dict[str, str], gaps: Array, strokes: Array, opening_m: float) -> Fingers:
-        """What was measured, with what the gripper can take; the first joint of each side is driven, the others geared."""
+        """The measured fingers and gripper; the first joint of each side is driven, the others are geared to it."""
         sides = {name: self._side(name) for name in leads}
         if len(set(sides.values())) < 2:
             raise BadInput(f"{self.urdf.path}: the finger joints {', '.join(leads)} are all on one side of the tool")
@@ -205,14 +205,14 @@ class _Ends:
         )
 
     def _side(self, name: str) -> bool:
-        """Whether a joint is left of the middle when all are half open."""
+        """Whether a joint is left of the middle when all fingers are half open."""
         foot, axes = self.tool.ends(np.zeros((1, len(self.tool.names))))
         here, _ = self._ends(child(self.urdf.joints[name]), 0.5)
         return bool(((here - foot[0]) @ axes[0])[1] > 0)
 
 
 def _multiplier(urdf: Urdf, name: str) -> float:
-    """How a joint that mimics another goes with it; BadInput for more than a multiplier."""
+    """The multiplier of a mimic joint, 1 of any other; BadInput unless it is finite and not 0, without an offset."""
     mimic = urdf.joints[name].find("mimic")
     try:
         by, offset = (float(mimic.get(key, "") or word) if mimic is not None else 1.0 for key, word in _MIMIC.items())
@@ -225,12 +225,12 @@ def _multiplier(urdf: Urdf, name: str) -> float:
 
 def solid_vertices(link: Xml.Element) -> Array:
     """The corners (n, 3) [m] of a link's collision shapes, in its own frame."""
-    found = [np.zeros((0, 3))]
+    corners = [np.zeros((0, 3))]
     for collision in link.findall("collision"):
         frame = placed(collision.find("origin"))
         points = _corners(collision)
-        found.append(points @ frame[:3, :3].T + frame[:3, 3])
-    return np.concatenate(found)
+        corners.append(points @ frame[:3, :3].T + frame[:3, 3])
+    return np.concatenate(corners)
 
 
 def _corners(collision: Xml.Element) -> Array:

@@ -23,18 +23,18 @@ from lab.sim import mesh_file
 from lab.sim.urdf_reader import check_inertial, check_joint, check_mesh, check_numbers, finite, floats, read
 
 MOVING = ("revolute", "prismatic")
-_FRAME_KG, _FRAME_KGM2 = 1e-3, 1e-7  # of a link that is only a frame: physics wants all links to weigh something
-_ROOT_KG, _ROOT_KGM2 = 1.0, 0.01  # of a foot that says nothing: it is bolted down, so that it does not matter
+_FRAME_KG, _FRAME_KGM2 = 1e-3, 1e-7  # of a link that is only a frame: physics requires a positive mass of every link
+_ROOT_KG, _ROOT_KGM2 = 1.0, 0.01  # of a foot without an inertial: its mass has no effect, because it is bolted down
 MOST_LINKS = 200
 MOST_SEEN_BYTES = 500_000  # of the meshes of one link
 _GREY = "0.8 0.8 0.8 1"
-_QUARTER_RAD = 1e-5  # so near to a quarter turn an angle is one that was written with few digits
+_QUARTER_RAD = 1e-5  # an angle this close to a quarter turn was rounded when it was written
 _PACKAGE = "package://"
 
 
 @dataclass(frozen=True, eq=False)
 class Urdf:
-    """A URDF's tree: where it came from, its XML, its joints by the link that they carry, and the link that carries all."""
+    """A URDF's tree: its origin, its XML, its joints by the link that they carry, and its root link."""
 
     path: Path
     root: Xml.Element
@@ -75,7 +75,7 @@ class Urdf:
     def below(self, link: str) -> list[str]:
         """A link and all that it carries."""
         carried = [name for name, joint in self.carrying.items() if _end(joint, "parent") == link]
-        return [link, *(name for one in carried for name in self.below(one))]
+        return [link, *(name for child_link in carried for name in self.below(child_link))]
 
 
 def child(joint: Xml.Element) -> str:
@@ -89,10 +89,10 @@ def _end(joint: Xml.Element, end: str) -> str:
 
 
 def settled(path: Path, folder: Path) -> Urdf:
-    """The URDF at `path`, whose meshes lie in `folder`, with all that physics and viewer need; BadInput says what is wrong."""
+    """The URDF at `path`, whose meshes lie in `folder`, completed for physics and viewer; BadInput names the error."""
     root = read(path)
     for element in [one for one in root if one.tag not in ("link", "joint", "material")]:
-        root.remove(element)  # transmissions, and what other simulators want to know
+        root.remove(element)  # transmissions, and elements for other simulators
     check_numbers(path, root)
     links, joints = ([one.get("name", "") for one in root.findall(kind)] for kind in ("link", "joint"))
     if len(links) > MOST_LINKS:
@@ -129,7 +129,7 @@ def _check_limits(path: Path, joint: Xml.Element) -> None:
 
 
 def _straighten(joint: Xml.Element) -> None:
-    """Rounds a joint's angles to exact quarter turns: with 1.5708, aligned wrist axes would make the wrist whirl."""
+    """Rounds a joint's angles to exact quarter turns: with 1.5708, nearly aligned wrist axes would make the wrist spin."""
     origin = joint.find("origin")
     if origin is not None:
         turns = np.array(floats(origin, "rpy", "0 0 0"))
@@ -148,15 +148,15 @@ def _tree(path: Path, root: Xml.Element, links: Sequence[str]) -> tuple[dict[str
     feet = [link for link in links if link not in carrying]
     if len(feet) != 1:
         raise BadInput(f"{path}: {len(feet)} links are carried by no joint, wanted one: {', '.join(feet)}")
-    found = Urdf(path, root, carrying, feet[0]).below(feet[0])
-    apart = [link for link in links if link not in found]
+    reached = Urdf(path, root, carrying, feet[0]).below(feet[0])
+    apart = [link for link in links if link not in reached]
     if apart:
         raise BadInput(f"{path}: link '{apart[0]}' hangs on itself: its joints lead round in a circle")
     return carrying, feet[0]
 
 
 def _fill_inertial(path: Path, link: Xml.Element, is_foot: bool, joint: Xml.Element | None) -> None:
-    """Gives frames and a massless foot a small mass, and replaces an impossible inertia by one that is near."""
+    """Gives frames and a massless foot a small mass, and replaces an impossible inertia by a close possible one."""
     name, mass = link.get("name", ""), link.find("inertial/mass")
     weightless = mass is None or finite(path, f"mass of link '{name}'", mass.get("value")) == 0.0
     is_frame = link.find("collision") is None and joint is not None and joint.get("type") == "fixed"
@@ -174,7 +174,7 @@ def _fill_inertial(path: Path, link: Xml.Element, is_foot: bool, joint: Xml.Elem
     assert inertia is not None
     xx, xy, xz, yy, yz, zz = (float(inertia.get(key, "")) for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"))
     moments, axes = np.linalg.eigh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
-    if moments[2] > moments[0] + moments[1]:  # PyBullet would take none at all
+    if moments[2] > moments[0] + moments[1]:  # PyBullet would ignore such an inertia
         moments[0] = moments[2] - moments[1] + 1e-3 * moments[2]
         moments[1] = max(moments[1], moments[0])
         _set_inertia(inertia, axes @ np.diag(moments) @ axes.T)
@@ -199,7 +199,7 @@ def _find_meshes(path: Path, link: Xml.Element, folder: Path) -> None:
         if name.startswith(_PACKAGE):
             rest = name.removeprefix(_PACKAGE)
             places = [rest, rest.partition("/")[2]]
-        place = next((one for one in places if is_file(path.parent / one)), places[0])
+        place = next((candidate for candidate in places if is_file(path.parent / candidate)), places[0])
         check_mesh(path, place, folder)
         mesh.set("filename", str((path.parent / place).resolve()))
     _lighten(link)
@@ -207,7 +207,7 @@ def _find_meshes(path: Path, link: Xml.Element, folder: Path) -> None:
 
 def _lighten(link: Xml.Element) -> None:
     """Replaces visuals with too many triangles for a browser by the link's collision shapes."""
-    solids = [(one.find("origin"), one.find("geometry")) for one in link.findall("collision")]
+    solids = [(collision.find("origin"), collision.find("geometry")) for collision in link.findall("collision")]
     if _bytes(link.findall("collision")) > MOST_SEEN_BYTES or _bytes(link.findall("visual")) <= MOST_SEEN_BYTES:
         return
     material = link.find("visual/material")
@@ -224,7 +224,7 @@ def _bytes(pieces: Sequence[Xml.Element]) -> int:
 
 
 def _paint(root: Xml.Element) -> None:
-    """Every visual says its own colour."""
+    """Gives every visual its own colour."""
     named = {}
     for material in root.iter("material"):
         color = material.find("color")
@@ -241,7 +241,7 @@ def _paint(root: Xml.Element) -> None:
 
 
 def written(root: Xml.Element, name: str) -> Path:
-    """The file of a settled URDF, in a folder that goes when this process ends."""
+    """The path of the file that a settled URDF is written to, in a folder that is removed when this process ends."""
     Xml.indent(root)
     path = Path(_folder().name) / f"{name}.urdf"
     write_whole(path, Xml.tostring(root, encoding="unicode").encode())

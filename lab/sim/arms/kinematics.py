@@ -58,7 +58,7 @@ class ClosedForm:
     spins: ClassVar[tuple[float, float]] = (1.0, -1.0)  # of the first and the last joint: how the tool turns with them
 
     def bent(self, out: Array, up: Array) -> Array:
-        """The joints (n, 6) for a tool `out` (n,) [m] ahead of the S axis and `up` (n,) [m], at yaw 0, elbow up; NaN: none."""
+        """The joints (n, 6) for a tool `out` (n,) [m] off the S axis, `up` (n,) [m], at yaw 0, elbow up; NaN: unsolvable."""
         out, up = out - SHOULDER_OUT, up + TOOL_DOWN - SHOULDER_UP
         distance = np.hypot(out, up)
         with np.errstate(invalid="ignore", divide="ignore"):  # out of reach

@@ -1,7 +1,7 @@
-"""Joints for a level tool, of any arm: the hanging tool's, turned up about its wrist step by step with Newton's method.
+"""Joint positions for any arm's level tool: those of the hanging tool, turned up about the wrist in steps of Newton's method.
 
 The wrist is the point of the tool's axis that is nearest to the last but one joint. Each step is small, so that joints are a
-function of the pose alone, and neighbouring poses have neighbouring joints. Where an arm's wrist cannot follow there are none.
+function of the pose alone, and neighbouring poses have neighbouring joints. There is no solution where the wrist cannot follow.
 """
 
 from dataclasses import dataclass
@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from lab.sim.arms.chain import Chain
 from lab.sim.arms.numeric_kinematics import damped, turn_to
 
-STEPS = 6  # from the hanging tool to the level one
+STEPS = 6  # number of steps from the hanging tool to the level one
 TRIES, LAST_TRIES = 3, 12  # of Newton's method, at each step and at the last
-EXACT = 1e-7  # [m], [rad] at which an answer holds
-MOST_RAD = 2.4  # by which a joint between first and last may turn on the way: farther on, the arm has snapped over
+EXACT = 1e-7  # [m], [rad] error at which a solution is accepted
+MOST_RAD = 2.4  # limit of the turn of an inner joint: beyond it, the arm has changed its branch of solutions
 
 Array = NDArray[np.float64]
 
@@ -40,8 +40,8 @@ class LevelTool:
         return np.column_stack([poses[:, :3] - back, poses[:, 3]])
 
     def raised(self, joints: Array, poses: Array) -> Array:
-        """The joints (n, k) for level tool poses (n, 4) in the foot's frame, from the hanging ones (n, k); NaN: none."""
-        found = np.full_like(joints, np.nan)
+        """The joints (n, k) for level tool poses (n, 4) in the foot's frame, from hanging ones (n, k); NaN: unsolvable."""
+        solved = np.full_like(joints, np.nan)
         known = ~np.isnan(joints[:, 0])
         begun, poses = joints[known], poses[known]
         now, wrist = begun.copy(), poses[:, :3] - self.wrist_m * _axes(poses[:, 3], pi / 2)[:, :, 0]
@@ -57,10 +57,10 @@ class LevelTool:
                 by = damped(moved, missed)
                 now = now + by * np.minimum(1.0, 0.4 / np.maximum(np.abs(by).max(axis=1), 1e-12))[:, None]
         good = (np.abs(missed) < EXACT).all(axis=1) & (np.abs(now - begun)[:, 1:-1].max(axis=1) < MOST_RAD)
-        if len(self.chain.names) == 6:  # through where the wrist is straight only some neighbours come
+        if len(self.chain.names) == 6:  # at a straight wrist a continuous path would be singular
             good &= np.sign(self._volume(now)) == np.sign(self._volume(begun))
-        found[known] = np.where(good[:, None], now, np.nan)
-        return found
+        solved[known] = np.where(good[:, None], now, np.nan)
+        return solved
 
     def tools(self, joints: Array) -> Array:
         """The tool poses x, y, z [m], yaw [rad] (n, 4) that joints (n, k) hold, in the foot's frame."""
@@ -68,7 +68,7 @@ class LevelTool:
         return np.column_stack([at, np.arctan2(-axes[:, 0, 1], axes[:, 1, 1])])
 
     def _volume(self, joints: Array) -> Array:
-        """The determinant (n,) of how a tool of six joints (n, 6) moves with them: its sign changes where it is singular."""
+        """The determinant (n,) of the Jacobian of a tool with six joints (n, 6): its sign changes at singularities."""
         return np.asarray(np.linalg.det(self.chain.jacobian(joints)[2]))
 
 

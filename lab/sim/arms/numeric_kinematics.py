@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from lab.errors import BadInput
 from lab.sim.arms.chain import Chain
 
-STEP_M = 0.02  # between the table's places
-WITHIN_M, WITHIN_RAD = 5e-4, 0.0087  # what is checked of every answer: 0.5 mm, 0.5 degrees
-_EXACT = 1e-9  # [m], [rad] at which Newton's method ends
-_JUMP = 0.35  # [rad or m] between two places of the table: farther apart, the arm has snapped over
+STEP_M = 0.02  # spacing of the table's entries
+WITHIN_M, WITHIN_RAD = 5e-4, 0.0087  # largest error of a solution: 0.5 mm, 0.5 degrees
+_EXACT = 1e-9  # [m], [rad] error at which Newton's method ends
+_JUMP = 0.35  # [rad or m] between two table entries: beyond it, the arm has changed its branch of solutions
 _DAMPING = 1e-5
 _SEEDS, _TRIES = 160, 60
 _UPRIGHT = 1e-6
@@ -35,7 +35,7 @@ class NumericKinematics:
         """BadInput unless the first joint turns about the vertical and the last about the tool's own axis."""
         self.chain, self.name = chain, name
         self.count = len(chain.names)
-        self.spins = self._spins()  # of the first and the last joint: 1 or -1, how the tool turns with them
+        self.spins = self._spins()  # for the first and the last joint: 1 or -1, the sign of the tool's turn
         self._rest = (chain.lower + chain.upper) / 2  # a redundant arm stays near the middle of its ranges
 
     def _spins(self) -> tuple[float, float]:
@@ -51,17 +51,17 @@ class NumericKinematics:
             raise BadInput(
                 f"arm '{self.name}': its last joint '{chain.names[-1]}' does not turn the tool about the tool's own axis"
             )
-        return float(np.sign(first[2])), -float(np.sign(last[0]))  # x points down: turned about it, the yaw falls
+        return float(np.sign(first[2])), -float(np.sign(last[0]))  # x points down: a turn about it decreases the yaw
 
     @property
     def home(self) -> Array:
-        """The joints (k,) from which its table was made: the tool down, half-way out."""
+        """The joint positions (k,) from which the table was built, with the tool down and half-way out."""
         return self._begun[1]
 
     # ---- Inverse and forward kinematics -------------------------------------------------------------------------
 
     def bent(self, out: Array, up: Array) -> Array:
-        """The joints (n, k) for a tool `out` (n,) [m] ahead of the first joint's axis and `up` (n,) [m], at yaw 0; NaN: none."""
+        """The joints (n, k) for a tool `out` (n,) [m] off the first joint's axis, `up` (n,) [m], at yaw 0; NaN: unsolvable."""
         table, low = self._table
         place = np.stack([out, up], axis=1) / STEP_M - low
         inside = np.all((place >= 0.0) & (place <= np.array(table.shape[:2]) - 1.0), axis=1)
@@ -70,10 +70,10 @@ class NumericKinematics:
         seeds, weights = np.zeros((len(out), self.count)), np.zeros(len(out))
         for i in (0, 1):
             for j in (0, 1):
-                found = table[corner[:, 0] + i, corner[:, 1] + j]
+                corner_joints = table[corner[:, 0] + i, corner[:, 1] + j]
                 weight = np.abs(1 - i - share[:, 0]) * np.abs(1 - j - share[:, 1]) + 1e-9
-                weight = np.where(np.isnan(found[:, 0]), 0.0, weight)
-                seeds += weight[:, None] * np.nan_to_num(found)
+                weight = np.where(np.isnan(corner_joints[:, 0]), 0.0, weight)
+                seeds += weight[:, None] * np.nan_to_num(corner_joints)
                 weights += weight
         known = inside & (weights > 0.0)
         joints = np.full((len(out), self.count), np.nan)
@@ -90,7 +90,7 @@ class NumericKinematics:
         return np.column_stack([at, np.arctan2(-axes[:, 0, 1], axes[:, 1, 1])])
 
     def misses(self, joints: Array, tools: Array) -> tuple[Array, Array]:
-        """How far (n,) [m] and by what angle (n,) [rad], off the vertical or in yaw, joints miss tool poses (n, 4)."""
+        """The errors (n,) [m] and (n,) [rad], in tilt or in yaw, by which joint positions miss tool poses (n, 4)."""
         at, axes = self.chain.ends(joints)
         c, s = np.cos(tools[:, 3]), np.sin(tools[:, 3])
         wanted = np.zeros_like(axes)
@@ -103,7 +103,7 @@ class NumericKinematics:
 
     @cached_property
     def _table(self) -> tuple[Array, Array]:
-        """Joints (i, j, k) by how far out and how high, NaN where there are none; and the first place's numbers (2,)."""
+        """Joint positions (i, j, k) by distance and height, NaN without a solution; and the indices (2,) of the first entry."""
         reach, foot = self._stretch
         low = np.array([1.0, np.floor((foot - reach) / STEP_M)])
         shape = (int(reach / STEP_M) + 1, int(2 * reach / STEP_M) + 2)
@@ -131,14 +131,14 @@ class NumericKinematics:
 
     @property
     def _stretch(self) -> tuple[float, float]:
-        """How far the arm reaches at most, and how high its first joint is [m]."""
+        """The arm's longest reach, and the height of its first joint [m]."""
         links = np.linalg.norm([*self.chain.roots[1:], self.chain.end[:3, 3]], axis=1).sum()
         slides = np.abs([self.chain.lower, self.chain.upper])[:, self.chain.slides].sum()
         return float(links + slides), float(self.chain.roots[0, 2])
 
     @cached_property
     def _begun(self) -> tuple[NDArray[np.int_], Array]:
-        """The first entry of the table and its joints: of all solutions found, the one whose joints are highest."""
+        """The indices of the table's first entry and its joint positions: of all solutions, the one whose joints are highest."""
         reach, foot = self._stretch
         rng = np.random.default_rng(0)
         seeds = rng.uniform(self.chain.lower, self.chain.upper, (_SEEDS, self.count))
@@ -148,7 +148,7 @@ class NumericKinematics:
                 out, up = (np.full(_SEEDS, number * STEP_M) for number in place)
                 solved, good = self._solved(seeds, out, up, _TRIES)
                 middles = self.chain.middles(solved)
-                good &= self._within(solved) & self._holds(solved, out, up) & (middles[:, 0] > 0.0)  # not over its back
+                good &= self._within(solved) & self._holds(solved, out, up) & (middles[:, 0] > 0.0)
                 if good.any():
                     solved, heights = solved[good], middles[good, 2]
                     solved[:, [0, -1]] = (solved[:, [0, -1]] + np.pi) % (2 * np.pi) - np.pi
@@ -158,7 +158,7 @@ class NumericKinematics:
         raise BadInput(f"arm '{self.name}': no joints were found that hold its tool upright in front of it")
 
     def _holds(self, joints: Array, out: Array, up: Array) -> NDArray[np.bool_]:
-        """Whether joints hold a vertical tool at `out`, 0, `up`, yaw 0, near enough."""
+        """Whether joint positions hold a vertical tool at `out`, 0, `up`, yaw 0, within the allowed error."""
         far, angle = self.misses(joints, np.stack([out, 0 * out, up, 0 * out], axis=1))
         held: NDArray[np.bool_] = (far <= WITHIN_M) & (angle <= WITHIN_RAD)
         return held
@@ -168,13 +168,13 @@ class NumericKinematics:
         return near & self._within(solved)
 
     def _within(self, joints: Array) -> NDArray[np.bool_]:
-        """Whether the joints between first and last keep to their limits, and none is lost."""
+        """Whether the joints between first and last are finite and within their limits."""
         chain = self.chain
         inside = (joints >= chain.lower - 1e-12) & (joints <= chain.upper + 1e-12)
         return np.asarray(inside[:, 1:-1].all(axis=1))
 
     def _solved(self, joints: Array, out: Array, up: Array, tries: int) -> tuple[Array, NDArray[np.bool_]]:
-        """Newton's method from `joints` (n, k) for tools at `out`, 0, `up`, yaw 0: the joints, NaN where it fails; which held."""
+        """Newton's solutions from `joints` (n, k) for tools at `out`, 0, `up`, yaw 0, NaN where it fails; which converged."""
         joints = joints.copy()
         going = np.arange(len(joints))
         for _ in range(tries):
@@ -200,7 +200,7 @@ class NumericKinematics:
 
 
 def damped(moved: Array, wanted: Array) -> Array:
-    """The joints' steps (n, k) that bring the end by `wanted` (n, 6), as far as `moved` (n, 6, k) lets them."""
+    """The damped least-squares steps (n, k) that move the end by `wanted` (n, 6); `moved` (n, 6, k): the Jacobian."""
     back = moved.transpose(0, 2, 1)
     if moved.shape[2] < 6:
         square = back @ moved + _DAMPING**2 * np.eye(moved.shape[2])

@@ -1,4 +1,4 @@
-"""The arm and its gripper: paths of the tool become joint targets, one a physics step."""
+"""The arm and its gripper: tool paths become joint targets, one per physics step."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -17,15 +17,15 @@ from lab.sim.urdf_reader import rotation
 from lab.sim.world import TIME_STEP, World
 
 NAME = "robot"
-_TURNED_RAD = pi / 2  # [rad] from here on the tool begins a path by turning on the spot
-_SETTLE_STEPS = 12  # after a path ends
-_HELD_RAD = 0.005  # farther off its targets than this something has moved the arm
+_TURNED_RAD = pi / 2  # [rad] turn above which the tool turns on the spot before it follows a path
+_SETTLE_STEPS = 12  # physics steps of rest after a path
+_HELD_RAD = 0.005  # a larger distance from the targets means that something has pushed the arm
 GRIP_STEPS = 72  # 0.3 s to close or open
-FINGER_M_S, _OPENS_N = 0.2, 60.0  # each finger, at most
-_TOUCH_RAD, _TOUCH_STEPS = 0.1, 8  # so far the tool turns before contacts are found anew; looked at every so many steps
+FINGER_M_S, _OPENS_N = 0.2, 60.0  # limits for each finger
+_TOUCH_RAD, _TOUCH_STEPS = 0.1, 8  # turn after which contacts are recomputed; steps between checks
 _PEDESTAL_M, _PEDESTAL_RGBA = 0.09, (0.22, 0.23, 0.26, 1.0)  # radius
-_POINT_M = 0.002  # the same as PAD_M where a finger touches in a point
-_FINE_ITERATIONS = 200  # of the solver: with 60 a slice creeps 2 mm a second in fingers that a linkage moves
+_POINT_M = 0.002  # effective radius, as PAD_M, of a finger's contact in a point
+_FINE_ITERATIONS = 200  # of the solver: with 60, a slice creeps 2 mm/s between fingers that a linkage moves
 
 Array = NDArray[np.float64]
 
@@ -46,7 +46,7 @@ def plan(
     blend: float | Sequence[float] = 0.0,
     before: Array | None = None,
 ) -> Trajectory:
-    """Time a path of tool poses, corners rounded by `blend` [m]: at most `speed` [m/s] and `acceleration` [m/s2], see `timed`.
+    """The timed trajectory along tool poses, corners rounded by `blend` [m], within `speed` [m/s] and `acceleration` [m/s2].
 
     Joint speeds stay within the arm's; `before` (k,) [rad] are the joints it starts from. WorkFailed names a pose out of reach.
     """
@@ -65,14 +65,14 @@ def plan(
 def _check_reached(joints: Array, poses: Array) -> None:
     lost = np.isnan(joints[:, 0])
     if lost.all() and len(poses) > 1:
-        lost[:-1] = False  # all are lost where the tool cannot turn: its end says where to
+        lost[:-1] = False  # where the tool cannot turn, all rows are NaN: the last pose names the yaw
     if lost.any():
         x, y, z, _ = poses[int(np.argmax(lost))]
         raise WorkFailed(f"the tool cannot reach ({x:.3f}, {y:.3f}, {z:.3f}) m")
 
 
 def _turned_back(turn: float, first: Array, speed: float, acceleration: float) -> Array:
-    """Rows (n, k) that turn the tool on the spot from `turn` [rad] by half turns to `first` (k,), where its range ends."""
+    """Rows (n, k) that turn the tool on the spot by half turns, from `turn` [rad] to `first` (k,), where its range ends."""
     turns = timed([ToolPose(0.0, 0.0, 0.0, turn), ToolPose(0.0, 0.0, 0.0, first[-1])], speed, acceleration)[:, 3]
     rows = np.repeat(first[None], len(turns), axis=0)
     rows[:, -1] = turns
@@ -83,19 +83,19 @@ class MotionListener(Protocol):
     """A listener to the motions that a robot carries out; see `lab.export.recorder`."""
 
     def began(self, poses: Sequence[ToolPose], blend: float, way: Trajectory, before: Array) -> None:
-        """The tool is about to follow `poses`, as planned; `before` (k,) [rad]: the joints it starts from."""
+        """The tool is about to follow `poses` on this trajectory; `before` (k,) [rad]: the joints it starts from."""
 
     def drives(self, row: int) -> None:
-        """This row of the plan is set as target now; the number of its rows: it has arrived at the last."""
+        """This row of the trajectory becomes the target; the number of its rows means that the last one was reached."""
 
     def ended(self) -> None:
-        """The tool is at rest where the motion leads."""
+        """The tool is at rest at the end of the motion."""
 
     def pressed(self, closed: bool) -> None:
-        """The fingers are about to close, or to open."""
+        """The fingers are about to close (`closed`) or to open."""
 
     def rested(self, steps: int) -> None:
-        """The arm is about to stay for so many physics steps."""
+        """The arm is about to rest for `steps` physics steps."""
 
 
 class RobotArm:
@@ -104,10 +104,10 @@ class RobotArm:
     def __init__(
         self, world: World, arm: Arm, speed: float, acceleration: float, grip_force: float, fine: bool = False
     ) -> None:
-        """Load the arm at the world's origin; `speed` [m/s], `acceleration` [m/s2], `grip_force` [N] unless `grip` is told.
+        """Load the arm at the world's origin; `speed` [m/s], `acceleration` [m/s2], `grip_force` [N] unless `grip` gets a force.
 
-        fine: its pads hold as areas do, not as points, and without creep; physics is solved in many iterations. Fingers that a
-        linkage moves always are: else light parts creep from between them.
+        fine: physics is solved in many iterations, so that pads hold as areas, not as points, and parts do not creep. Fingers
+        that a linkage moves are always solved finely, because light parts would creep out of them.
         """
         self.world, self.arm, self.grip_force = world, arm, grip_force
         self.speed, self.acceleration = speed, acceleration
@@ -125,8 +125,8 @@ class RobotArm:
         self._free = [joint for joint in fingers.joints if joint not in fingers.driven]
         self.closed = self._let_go = False
         self.listener: MotionListener | None = None
-        self._touched_at = 0.0  # the tool's yaw [rad] when the contacts of what it holds were last found anew
-        self._half_on = False  # whether the tool is half a turn on from the yaw that was asked for
+        self._touched_at = 0.0  # the tool's yaw [rad] when the contacts of the held part were last recomputed
+        self._half_on = False  # whether the tool is half a turn away from the requested yaw
         self.hold(arm.home)
         self.open_at_once()
 
@@ -155,7 +155,7 @@ class RobotArm:
         self._press(joints, 200.0)
 
     def _press(self, joints: Array, force: float) -> None:
-        """Drive the fingers to `joints` (k,), each with `force` [N] at the most; what is geared follows."""
+        """Drive the fingers to `joints` (k,), each with at most `force` [N]; geared joints follow."""
         fingers = self.arm.fingers
         now = fingers.opening(self.world.joints(NAME, fingers.joints))
         targets = [joints[fingers.joints.index(joint)] for joint in fingers.driven]
@@ -168,7 +168,7 @@ class RobotArm:
         return all(any(self.world.touching(NAME, name, link) for link in side) for side in self.arm.fingers.links)
 
     def tool(self) -> ToolPose:
-        """Where the finger tips are, as measured from the links' poses in physics; half a turn of the tool does not count."""
+        """Where the finger tips are, measured from the links' poses in physics; half turns of the tool are ignored."""
         position, turn = self.world.pose(NAME, self.arm.tool_link)
         axes = rotation(turn)
         tip, across = position + axes @ self.arm.tip[:3, 3], axes @ self.arm.tip[:3, 1]
@@ -196,7 +196,7 @@ class RobotArm:
         blends = [0.0, *np.broadcast_to(blend, len(poses)).tolist()]
         before = self.world.joints(NAME, self.arm.joints)
         if np.abs(before - self._led).max() < _HELD_RAD:
-            before = self._led  # what it was told last: from elsewhere the targets would jump
+            before = self._led  # the last targets: from other joint positions the targets would jump
         here = self.arm.forward(before)
         first = poses[0]
         turn = (self._counted(here.yaw) - first.yaw + pi) % (2 * pi) - pi
@@ -221,14 +221,14 @@ class RobotArm:
             heard.ended()
 
     def _touch_anew(self) -> None:
-        """Lets the contacts of the held part be found anew after the tool has turned with it."""
+        """Lets physics recompute the contacts of the held part after the tool has turned with it."""
         yaw = self.tool().yaw
         if abs((yaw - self._touched_at + pi) % (2 * pi) - pi) > _TOUCH_RAD:
             self._touched_at = yaw
             self.world.touch_anew(NAME, [link for side in self.arm.fingers.links for link in side])
 
     def rest(self, steps: int) -> Iterator[None]:
-        """Stay for so many physics steps."""
+        """Rest for `steps` physics steps."""
         if self.listener is not None:
             self.listener.rested(steps)
         yield from _stay(steps)
@@ -244,15 +244,15 @@ class RobotArm:
         yield from self._fingers_to(self.arm.fingers.open_m, _OPENS_N)
 
     def _fingers_to(self, opening: float, force: float) -> Iterator[None]:
-        """Move the fingers until each pad is `opening` [m] from the middle, or presses with a force [N] on what is there.
+        """Move the fingers until each pad is `opening` [m] from the middle, or presses with a force [N] on what is between them.
 
-        Faster than FINGER_M_S they would be deep in a light part before physics stops them, and throw it out.
+        Faster than FINGER_M_S they would penetrate a light part before physics stops them, and throw it out.
         """
         if self.listener is not None:
             self.listener.pressed(self.closed)
         fingers = self.arm.fingers
         now = fingers.opening(self.world.joints(NAME, fingers.joints))
-        most = max(FINGER_M_S * TIME_STEP, 1.5 * abs(opening - now) / GRIP_STEPS)  # wide ones arrive in time, too
+        most = max(FINGER_M_S * TIME_STEP, 1.5 * abs(opening - now) / GRIP_STEPS)  # wide ones are reached in time
         self._let_go = False
         for _ in range(GRIP_STEPS):
             now += min(max(opening - now, -most), most)
@@ -261,7 +261,7 @@ class RobotArm:
             yield
 
     def lose(self) -> None:
-        """Opens the fingers as when their air fails; the code that moves the arm still believes them closed."""
+        """Opens the fingers as when the air pressure fails; the code that moves the arm still takes them for closed."""
         self._let_go = True
         self._press(self.arm.fingers.at(self.arm.fingers.open_m), _OPENS_N)
 

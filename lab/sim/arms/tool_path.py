@@ -15,21 +15,21 @@ from numpy.typing import NDArray
 from lab.sim.arms.kinematics import ToolPose
 from lab.sim.world import TIME_STEP
 
-YAW_ARM = 0.15  # [m/rad] a turn of the tool counts as this much way
+YAW_ARM = 0.15  # [m/rad] path length that a turn of the tool counts as
 COUNTED = np.array([1.0, 1.0, 1.0, YAW_ARM])  # of a tool pose
-ROUNDINGS_M = (0.002, 0.004, 0.008, 0.015, 0.02, 0.03, 0.04, 0.05)  # as few as a controller's position levels
+ROUNDINGS_M = (0.002, 0.004, 0.008, 0.015, 0.02, 0.03, 0.04, 0.05)  # the radii of a controller's position levels
 _NEAR_M = 1e-9
-_STRAIGHT_RAD = 1e-4  # a corner that bends less is none
-_BACK_RAD = 3.0  # a corner that bends more is a way back
-_TURNED_RAD = 0.01  # a line that turns the tool by more is no part of a corner that is rounded
-_PARTS = 8  # of an arc, each with one acceleration along it
+_STRAIGHT_RAD = 1e-4  # a corner that bends less counts as straight
+_BACK_RAD = 3.0  # at a corner that bends more, the path turns back
+_TURNED_RAD = 0.01  # beside a line that turns the tool by more, a corner is not rounded
+_PARTS = 8  # of an arc, each with one tangential acceleration
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
 class _Piece:
-    """A straight line or a part of an arc, `length` [m] of a path; poses are counted (4,) [m], see COUNTED.
+    """A straight line or a part of an arc, `length` [m] of a path; poses are weighted (4,) [m], see COUNTED.
 
     first: where it begins; ahead: the unit vector along it there; across: the unit vector to the arc's middle; radius [m]: inf
     of a line. stops: the tool comes to rest where it begins.
@@ -44,17 +44,17 @@ class _Piece:
 
 
 def way_of(points: Array) -> Array:
-    """How far along they are (n,) [m], for points (n, 4), a turn counted as way."""
+    """The path length (n,) [m] up to each of points (n, 4), with turns counted as length."""
     steps = np.linalg.norm(np.diff(points, axis=0) * COUNTED, axis=1)
     return np.concatenate([[0.0], np.cumsum(steps)])
 
 
 def timed(poses: Sequence[ToolPose], speed: float, acceleration: float, blend: float | Sequence[float] = 0.0) -> Array:
-    """Where the tool is after each physics step (n, 4), x, y, z [m], yaw [rad], from rest at the first pose to rest at the last.
+    """The tool pose after each physics step (n, 4), x, y, z [m], yaw [rad], from rest at the first pose to rest at the last.
 
-    It goes at most at `speed` [m/s] and with `acceleration` [m/s2], along and across the path together, a turn counted as way.
-    Each corner is an arc, see `roundings`, with a `blend` [m] for all poses or one each; without, and where the path turns
-    back, the tool stops at corners.
+    The limits are `speed` [m/s] and `acceleration` [m/s2], along and across the path together, with turns counted as length.
+    Each corner is an arc, see `roundings`, with a `blend` [m] for all poses or one each; without a blend, and where the
+    path turns back, the tool stops at corners.
     """
     corners = np.array([[p.x, p.y, p.z, p.yaw] for p in poses])
     pieces = _pieces(corners * COUNTED, np.broadcast_to(np.asarray(blend, float), len(corners)))
@@ -76,7 +76,7 @@ def timed(poses: Sequence[ToolPose], speed: float, acceleration: float, blend: f
 
 
 def bending(corners: Array) -> list[int]:
-    """Which of counted poses (n, 4) a path bends at, its ends included: the others lie on straight lines between them."""
+    """The indices of the weighted poses (n, 4) at which a path bends, with its ends; the others lie on straight lines."""
     far = np.concatenate([[True], np.linalg.norm(np.diff(corners, axis=0), axis=1) > _NEAR_M])
     kept: list[int] = []
     for row in np.flatnonzero(far).tolist():
@@ -87,17 +87,17 @@ def bending(corners: Array) -> list[int]:
 
 
 def _turn(corners: Array) -> float:
-    """By what angle [rad] a path through three places (3, n) turns at the second."""
+    """The angle [rad] by which a path through three points (3, n) turns at the second."""
     ahead = np.diff(corners, axis=0)
     ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
     return 2.0 * atan2(float(np.linalg.norm(ahead[1] - ahead[0])), float(np.linalg.norm(ahead[1] + ahead[0])))
 
 
 def roundings(corners: Array, blends: Array) -> Array:
-    """How far before and behind each of counted poses (n, 4), all `bending`, the arc begins and ends (n,) [m]; 0 at both ends.
+    """The distance (n,) [m] from each of weighted poses (n, 4), all `bending`, at which its arc begins and ends; 0 at both ends.
 
-    It is the largest of ROUNDINGS_M that is no more than half a blend (n,) [m] and half of the shorter line beside it, or 0,
-    as where a line beside it turns the tool, or the path turns back.
+    It is the largest of ROUNDINGS_M that is no more than half a blend (n,) [m] and half of the shorter line beside it, or 0
+    where a line beside it turns the tool, or the path turns back.
     """
     halves = np.linalg.norm(np.diff(corners, axis=0), axis=1) / 2.0
     room = np.zeros(len(corners))
@@ -109,7 +109,7 @@ def roundings(corners: Array, blends: Array) -> Array:
 
 
 def _pieces(corners: Array, blends: Array) -> list[_Piece]:
-    """The path along counted poses (n, 4), with a blend each; none where they are all one place."""
+    """The pieces of the path along weighted poses (n, 4), with a blend each; empty if all poses are equal."""
     kept = bending(corners)
     corners = corners[kept]
     rooms = roundings(corners, blends[kept]).tolist()
@@ -117,7 +117,7 @@ def _pieces(corners: Array, blends: Array) -> list[_Piece]:
     lengths = np.linalg.norm(legs, axis=1)
     ahead = legs / lengths[:, None]
     pieces: list[_Piece] = []
-    begun, stops = 0.0, False  # how far into the leg its line begins, and whether from rest
+    begun, stops = 0.0, False  # where on the leg its line begins, and whether from rest
     none = np.zeros(4)
     for number, (corner, along, length) in enumerate(zip(corners[:-1], ahead, lengths.tolist(), strict=True)):
         if number == len(legs) - 1:
@@ -148,7 +148,7 @@ def _arc(first: Array, along: Array, then: Array, turn: float, radius: float) ->
 
 
 def _squares(pieces: Sequence[_Piece], speed: float, acceleration: float) -> list[float]:
-    """The squares of the speeds where pieces begin, and where the last one ends: there and where it begins 0."""
+    """The squared speeds at the beginnings of pieces and at the end of the last one; the first and the last are 0."""
     most = [min(speed**2, acceleration * piece.radius) for piece in pieces]
     caps = [
         0.0,
@@ -160,15 +160,15 @@ def _squares(pieces: Sequence[_Piece], speed: float, acceleration: float) -> lis
 
 
 def _pass(pieces: Sequence[_Piece], caps: Sequence[float], acceleration: float) -> list[float]:
-    """The squares of the speeds, at most `caps`, that can be reached from the one before, faster and faster."""
-    found = [caps[0]]
+    """The squared speeds, at most `caps`, that can be reached by accelerating from the previous ones."""
+    squares = [caps[0]]
     for piece, cap in zip(pieces, caps[1:], strict=True):
-        found.append(min(cap, found[-1] + 2.0 * piece.length * _gain(found[-1], piece, acceleration)))
-    return found
+        squares.append(min(cap, squares[-1] + 2.0 * piece.length * _gain(squares[-1], piece, acceleration)))
+    return squares
 
 
 def _gain(square: float, piece: _Piece, acceleration: float) -> float:
-    """The acceleration [m/s2] along a piece with which the whole one, across it too, is within its limit up to its end."""
+    """The tangential acceleration [m/s2] of a piece that keeps the total acceleration within its limit up to the piece's end."""
     if piece.radius == inf:
         return acceleration
     across, grows = square / piece.radius, 2.0 * piece.length / piece.radius
@@ -180,7 +180,7 @@ def _gain(square: float, piece: _Piece, acceleration: float) -> float:
 
 
 def _ticks(pieces: Sequence[_Piece], squares: Sequence[float], speed: float, acceleration: float) -> Array:
-    """The way [m] after each physics step."""
+    """The path length [m] after each physics step."""
     begun, way = [0.0], [0.0]
     speeds, gains = list[float](), list[float]()
 

@@ -1,7 +1,7 @@
 """The grip of a two-finger gripper on a part: computed from the part's shape, or checked where a file gives it.
 
-The fingers come straight down on both sides; those of a level tool come along the part's x axis, the palm behind it, which is
-as from above on the part laid on its front. A flat pad that closes on a convex body touches it where that is widest
+The fingers come straight down on both sides. Those of a level tool come along the part's x axis, with the palm behind it, which
+equals a grip from above on the part laid on its front. A flat pad that closes on a convex body touches it where that is widest
 across the pad; where this is at the pad's edge the body slopes away, and slips out unless friction holds it.
 """
 
@@ -18,27 +18,27 @@ from lab.sim.arms.fingers import Gripper
 from lab.sim.parts.part_shape import PartShape
 from lab.tasks.part_fields import GripFields
 
-HEADINGS = 36  # over half a turn
-DEEP_M = 0.030  # [m] fingers reach so far below the top of a part with flat sides
-PAD_M = 0.024  # [m] of the pads, upwards from the tips, that touch
-OVER_FLOOR_M = 0.005  # [m] of the finger tips above the foot, at least
-HOLD_M = 0.006  # [m] of the pads on the part, at least
-BESIDE_M = 0.004  # [m] between an open finger and the part, at least, on its way down
-PALM_M = 0.002  # [m] between the palm and the part's top, at least
-UNDER_PALM_M = 0.006  # the same where a grip is chosen: what surveys want beside a part, and the margin of its hull
-FLAT_M = 0.0004  # [m] what is so little narrower than the widest place touches the pad, too
-FLAT_WIDE_M = 0.006  # [m] of the pad along which a flat side touches
-SHARE = 0.8  # of what friction would hold is relied on
-LEVELS, ACROSS = 7, 7  # places on a pad, upwards and across, at which the part is measured
+HEADINGS = 36  # headings of the fingers that are tried over half a turn
+DEEP_M = 0.030  # [m] depth of the finger tips below the top of a part with flat sides
+PAD_M = 0.024  # [m] length of the pads that touch, upwards from the tips
+OVER_FLOOR_M = 0.005  # [m] least height of the finger tips above the foot
+HOLD_M = 0.006  # [m] least length of the pads that is on the part
+BESIDE_M = 0.004  # [m] least clearance between an open finger and the part as it comes down
+PALM_M = 0.002  # [m] least clearance between the palm and the part's top
+UNDER_PALM_M = 0.006  # the same for a chosen grip: the clearance of surveys, and the margin of the hull
+FLAT_M = 0.0004  # [m] places narrower than the widest one by at most this touch the pad, too
+FLAT_WIDE_M = 0.006  # [m] least width of the pad along which a flat side touches
+SHARE = 0.8  # the share of the theoretical friction that is relied on
+LEVELS, ACROSS = 7, 7  # points on a pad, upwards and across, at which the part is measured
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Grip:
-    """How the tool holds a standing part: turned by yaw [rad], tips up_m above its foot, its axis x, y [m] off the part's.
+    """The tool's pose on a standing part: yaw [rad], height up_m of the tips above its foot, and x, y [m] off the part's axis.
 
-    width_m: between the fingers. period: the turn after which the gripper holds it just so again [rad]; 0: any.
+    width_m: between the fingers. period: the turn after which the grip is the same again [rad]; 0: any turn.
     """
 
     yaw: float
@@ -50,7 +50,7 @@ class Grip:
 
 
 def grip_of(shape: PartShape, gripper: Gripper, friction: float, given: GripFields | None = None) -> Grip:
-    """The grip on a standing part: where it is narrow, its sides do not slope, and it hangs well.
+    """The grip on a standing part, at a narrow place with upright sides from which the part hangs stably.
 
     Raises BadInput, with the part's widths, for a part that cannot be gripped, and for a `given` grip that does not fit.
     """
@@ -67,27 +67,27 @@ def grip_of(shape: PartShape, gripper: Gripper, friction: float, given: GripFiel
     slopes: list[float] = []
     headings = [0.0] if _is_round(shape) else [pi * n / HEADINGS for n in range(HEADINGS)]
     for number, up_m in enumerate(_heights(shape, gripper)):
-        found: list[tuple[tuple[float, ...], Grip]] = []
+        rated_grips: list[tuple[tuple[float, ...], Grip]] = []
         for yaw in headings:
             pads = sections.between(yaw, up_m, gripper.width_m, gripper.opening_m - 2 * BESIDE_M)
             if pads is None:
                 continue
             if pads.slope > atan(SHARE * friction):
                 slopes.append(pads.slope)
-            elif pads.flat or number > 0:  # what has no flat sides swings when it is held near its top
-                found.append(
+            elif pads.flat or number > 0:  # a part without flat sides swings if it is held near its top
+                rated_grips.append(
                     (
                         (not pads.flat, round(pads.slope, 3), round(pads.width_m, 4), min(yaw, pi - yaw)),
                         _grip(shape, pads, yaw, up_m),
                     )
                 )
-        if found:
-            return min(found, key=lambda one: one[0])[1]
+        if rated_grips:
+            return min(rated_grips, key=lambda rated: rated[0])[1]
     raise BadInput(_refusal(sections, gripper, friction, slopes))
 
 
 def _level(shape: PartShape, gripper: Gripper, friction: float, given: GripFields | None) -> Grip:
-    """The grip of a level tool: as near to the middle as can be, the pads' middle at the part's axis."""
+    """The grip of a level tool: as near to the middle as possible, with the pads' middle at the part's axis."""
     if given is not None:
         raise BadInput(
             f"part '{shape.name}': grip is for a tool that hangs; here it is level, by robot.tool "
@@ -143,7 +143,7 @@ def _as_given(shape: PartShape, gripper: Gripper, given: GripFields) -> Grip:
 
 
 def _heights(shape: PartShape, gripper: Gripper) -> list[float]:
-    """Where the finger tips may be above the foot [m]: near the top, for flat sides; near the middle; anywhere else."""
+    """Heights [m] of the finger tips above the foot to try: near the top, for flat sides; near the middle; all others."""
     low = max(OVER_FLOOR_M, shape.height_m - gripper.depth_m + UNDER_PALM_M)
     high = shape.height_m - HOLD_M
     if high < low - 1e-9:
@@ -162,7 +162,7 @@ def _grip(shape: PartShape, pads: "_Pads", yaw: float, up_m: float) -> Grip:
 
 
 def _is_round(shape: PartShape) -> bool:
-    """Whether it is a cylinder that stands upright: alike from all sides."""
+    """Whether the shape is an upright cylinder, which is equal from all sides."""
     x, y, _, _ = shape.turn
     return shape.solid == "cylinder" and abs(x) < 1e-6 and abs(y) < 1e-6
 
@@ -192,8 +192,8 @@ def _refusal(sections: "_Sections", gripper: Gripper, friction: float, slopes: l
 class _Pads:
     """The contact of two pads that close on a part.
 
-    width_m: between the pads; middle_m: their middle, relative to the part's axis. passing_m: the opening that they need on their
-    way down. slope: of the part's sides at the pads [rad], 0 where they touch flat. flat: whether they touch along a width.
+    width_m: between the pads; middle_m: their middle, relative to the part's axis. passing_m: the opening that they need as
+    they come down. slope: of the part's sides at the pads [rad], 0 where they touch flat. flat: whether they touch along a width.
     """
 
     width_m: float
@@ -223,7 +223,7 @@ class _Sections:
         return corners[edges[:, 0]], corners[edges[:, 1]]
 
     def at_height(self, up_m: float) -> Array | None:
-        """The corners (n, 2) of the section at a height above the foot, in order around it; None: there is none."""
+        """The corners (n, 2) of the section at a height above the foot, in order; None if it is empty."""
         key = round(up_m, 6)
         if key not in self._known:
             z = up_m - self.shape.foot_m
@@ -236,11 +236,11 @@ class _Sections:
         return self._known[key]
 
     def wide(self, yaw: float) -> float:
-        """How wide the part is across a heading [m]."""
+        """The part's width across a heading [m]."""
         return float(np.ptp(self.shape.hull[:, :2] @ _across(yaw)))
 
     def between(self, yaw: float, up_m: float, wide_m: float, most_m: float = inf) -> _Pads | None:
-        """The contact of pads at a heading and a height; None when nothing is between them, or more than `most_m`."""
+        """The contact of pads at a heading and a height; None if the part is not between them or is wider than `most_m`."""
         top = self.shape.height_m
         above = self._profile(yaw, np.linspace(up_m, top - 1e-5, LEVELS), wide_m)
         if above is None or np.nanmax(above[..., 1]) - np.nanmin(above[..., 0]) > most_m:
@@ -260,14 +260,14 @@ class _Sections:
         return _Pads(high - low, middle, passing, slope, flat)
 
     def _profile(self, yaw: float, heights: Array, wide_m: float) -> Array | None:
-        """From where to where the part reaches (levels, ACROSS, 2) [m] across a heading; NaN: not there. None: nowhere."""
-        found = np.full((len(heights), ACROSS, 2), np.nan)
+        """The part's extent (levels, ACROSS, 2) [m] across a heading, NaN where it is absent; None if it is nowhere."""
+        extent = np.full((len(heights), ACROSS, 2), np.nan)
         at = np.linspace(-wide_m / 2, wide_m / 2, ACROSS)
         for level, up_m in enumerate(heights):
             section = self.at_height(float(up_m))
             if section is not None:
-                found[level] = _crossed(section @ np.array([cos(yaw), sin(yaw)]), section @ _across(yaw), at)
-        return None if np.isnan(found).all() else found
+                extent[level] = _crossed(section @ np.array([cos(yaw), sin(yaw)]), section @ _across(yaw), at)
+        return None if np.isnan(extent).all() else extent
 
 
 def _across(yaw: float) -> Array:
@@ -288,20 +288,20 @@ def _around(points: Array) -> Array | None:
 
 
 def _crossed(along: Array, across: Array, at: Array) -> Array:
-    """From where to where (m, 2) a convex outline (n,), (n,) reaches across, at places `at` (m,) along; NaN: not there."""
+    """The extent (m, 2) of a convex outline (n,), (n,) across, at places `at` (m,) along; NaN where it is absent."""
     after, beyond = np.roll(along, -1), np.roll(across, -1)
     level = after == along
     share = (at[:, None] - along) / np.where(level, 1.0, after - along)  # (m, n)
     values = np.where((share >= 0) & (share <= 1) & ~level, across + share * (beyond - across), np.nan)
     reached = ~np.isnan(values).all(axis=1)
-    found = np.full((len(at), 2), np.nan)
+    extent = np.full((len(at), 2), np.nan)
     if reached.any():
-        found[reached] = np.stack([np.nanmin(values[reached], axis=1), np.nanmax(values[reached], axis=1)], axis=1)
-    return found
+        extent[reached] = np.stack([np.nanmin(values[reached], axis=1), np.nanmax(values[reached], axis=1)], axis=1)
+    return extent
 
 
 def _slope(side: Array, step: tuple[float, float]) -> float:
-    """How much a side (levels, across) [m] falls off from where a pad touches it [rad]; 0 when that is within the pad."""
+    """The slope [rad] of a side (levels, across) [m] at a pad's edge; 0 if the pad touches it within its area."""
     touching = np.nan_to_num(side, nan=-np.inf)
     level, column = np.unravel_index(int(np.argmax(touching)), side.shape)
     near = touching > touching[level, column] - FLAT_M

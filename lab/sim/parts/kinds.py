@@ -17,7 +17,7 @@ from lab.sim.urdf_reader import rotation
 from lab.tasks.task import Task
 from lab.tasks.task_fields import Part
 
-PALM_M = 0.002  # [m] of room between the palm and what stands between the fingers
+PALM_M = 0.002  # [m] clearance between the palm and what stands between the fingers
 
 
 @dataclass(frozen=True)
@@ -30,13 +30,13 @@ class Spot:
     yaw: float
 
     def raised(self, by_m: float) -> "Spot":
-        """The spot that lies so much higher."""
+        """The spot `by_m` [m] higher."""
         return replace(self, z=self.z + by_m)
 
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of part, or a pallet with its part on it: then the gripper holds the pallet, and `rider` stands on that."""
+    """A kind of part, or a pallet with a part (`rider`) on it; the gripper then holds the pallet."""
 
     name: str
     part: Part
@@ -47,22 +47,22 @@ class Kind:
 
     @property
     def height_m(self) -> float:
-        """From the foot to the top."""
+        """The height from the foot to the top [m]."""
         return sum(kind.shape.height_m for kind in self.stack())
 
     @property
     def finger_m(self) -> float:
-        """How far an open finger reaches beyond the part's side [m]."""
+        """The distance that an open finger reaches beyond the part's side [m]."""
         return (self.gripper.opening_m - self.grip.width_m) / 2 + self.gripper.thick_m
 
     @property
     def palm_up_m(self) -> float:
-        """How high above the part's foot the palm of a hanging tool is that holds it [m]."""
+        """The height of a hanging tool's palm above the foot of the part that it holds [m]."""
         return self.grip.up_m + self.gripper.depth_m
 
     @property
     def gyration_m(self) -> float:
-        """The radius of gyration [m] about the axis along which the fingers close, of what they hold alone."""
+        """The radius of gyration [m] about the axis along which the fingers close, without its rider."""
         across = np.array([-sin(self.grip.yaw), cos(self.grip.yaw), 0.0]) @ rotation(self.shape.turn)
         return float(np.sqrt(across**2 @ self.shape.inertia_m2))
 
@@ -76,7 +76,7 @@ class Kind:
         return ToolPose(x, y, spot.z + self.grip.up_m, spot.yaw + self.grip.yaw)
 
     def foot_at(self, pose: ToolPose) -> Spot:
-        """Where a part's foot is that the tool at `pose` holds."""
+        """The spot of the foot of a part that the tool at `pose` holds."""
         yaw = pose.yaw - self.grip.yaw
         x, y = beside((pose.x, pose.y), yaw, (-self.grip.x, -self.grip.y))
         return Spot(x, y, pose.z - self.grip.up_m, yaw)
@@ -109,12 +109,12 @@ class Kind:
         return abs(self.grip.x) + c * wide + s * thick, abs(self.grip.y) + s * wide + c * thick
 
     def margins_m(self, beside: float, closing: float) -> tuple[float, float]:
-        """`beside` [m] along both of the part's axes, and so much more, `closing` [m], along the way the fingers close."""
+        """Margins [m] along the part's axes: `beside` on both, plus `closing` along the direction in which the fingers close."""
         return beside + closing * abs(sin(self.grip.yaw)), beside + closing * abs(cos(self.grip.yaw))
 
 
 def beside(at: Sequence[float], yaw: float, off: Sequence[float]) -> tuple[float, float]:
-    """The point (x, y) [m] that lies `off` along and across from `at`, by axes that are turned by `yaw` [rad]."""
+    """The point (x, y) [m] at `at` plus the offset `off` along axes that are turned by `yaw` [rad]."""
     c, s = cos(yaw), sin(yaw)
     return at[0] + c * off[0] - s * off[1], at[1] + s * off[0] + c * off[1]
 
@@ -131,9 +131,9 @@ def on_its_pallet(task: Task, kind: str, station: str) -> bool:
 
 
 def kinds_of(task: Task, gripper: Gripper) -> dict[str, Kind]:
-    """What the gripper may have to hold, by name: parts, pallets, and pallets with their parts.
+    """The kinds that the gripper may hold, by name: parts, pallets, and pallets with their parts.
 
-    BadInput for a shape that cannot be, and for a part that the gripper cannot take, with its widths.
+    Raises BadInput for an impossible shape, and, with its widths, for a part that the gripper cannot take.
     """
     kinds = {part.name: _kind(part, task.folder, gripper) for part in task.parts}
     for part in task.made:

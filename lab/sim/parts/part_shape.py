@@ -1,7 +1,7 @@
 """The shape of a part for physics and gripper: hull, standing pose, inertia and looks, from a record of a task file.
 
-Physics knows a part as a box, a cylinder or a convex hull: hollows of a mesh are seen and weighed, not felt. A mesh that is
-a box is one, too: a box touches a flat side with four corners at once, a hull with one after the other.
+Physics knows a part as a box, a cylinder or a convex hull: hollows of a mesh are visible and count for its mass, but
+not for contacts. A mesh that is a box becomes a box, which touches a flat side with four corners at once, unlike a hull.
 """
 
 from collections.abc import Callable, Sequence
@@ -26,12 +26,12 @@ if TYPE_CHECKING:
     from trimesh import Trimesh
 
 
-MOST_TEXT = 40_000  # triangles of an STL in text: PyBullet, which reads none, is handed them one by one
-MOST_HULL = 256  # vertices: more make physics slow and no rounder
+MOST_TEXT = 40_000  # triangles of an STL in text, which PyBullet cannot read and gets one by one
+MOST_HULL = 256  # vertices: more make physics slower, not rounder
 LARGEST_M, SMALLEST_M = 2.0, 0.002  # of a part's longest edge: beyond them its unit is not the metre
-MARGIN_M = 0.001  # around a hull that is not thin: with less, where it touches is found less surely
+MARGIN_M = 0.001  # around a hull that is not thin: with less, contacts are less reliable
 ROUND = 64  # sides of a cylinder's hull
-BOX_SHARE = 0.999  # a mesh that fills so much of the smallest box around it is that box
+BOX_SHARE = 0.999  # a mesh that fills this share of its smallest bounding box counts as that box
 
 Array = NDArray[np.float64]
 
@@ -80,19 +80,19 @@ class PartShape:
 
     @property
     def foot_m(self) -> float:
-        """How far the origin is above the foot [m]."""
+        """The height of the origin above the foot [m]."""
         return -float(self.low[2])
 
     @property
     def height_m(self) -> float:
-        """From foot to top [m]."""
+        """The height from foot to top [m]."""
         return float(self.high[2] - self.low[2])
 
 
 def shape_of(part: PartFields, folder: Path) -> PartShape:
     """The shape that a record describes; its files lie in `folder`, the task file's, or in the lab's assets.
 
-    Raises BadInput, in one line, for a file that is missing, too large, no mesh, has holes, or is in another unit.
+    Raises BadInput for a file that is missing, too large or no mesh, that has holes or is in another unit.
     """
     tilt, (r, g, b) = _tilt(*part.stands), part.color
     size: tuple[float, ...] = part.size_m or ()
@@ -109,14 +109,14 @@ def shape_of(part: PartFields, folder: Path) -> PartShape:
             solid, axes = "box", np.array(around.transform)[:3, edges]
             size = tuple(float(edge) for edge in around.extents[edges])
             moments = _box(size)[1]
-        axes = axes * np.sign(np.linalg.det(axes))  # a turn, not a mirror
+        axes = axes * np.sign(np.linalg.det(axes))  # a rotation, not a reflection
         seen = Shape("mesh", (part.scale,) * 3, path, (r, g, b, 1.0))
     else:
         middle, axes = np.zeros(3), np.eye(3)
         hull, moments = _box(size) if part.shape == "box" else _cylinder(size)
         seen = Shape(part.shape, size if part.shape == "box" else (size[0] / 2, size[1]), None, (r, g, b, 1.0))
     looks = (seen,) if part.look is None else _look(part, folder)
-    x, y, z = (float(f"{one:.12g}") for one in moments)  # without the noise of the last bits
+    x, y, z = (float(f"{moment:.12g}") for moment in moments)  # without rounding noise
     return PartShape(
         part.name,
         solid,
@@ -124,19 +124,19 @@ def shape_of(part: PartFields, folder: Path) -> PartShape:
         _quaternion(tilt @ axes),
         hull @ tilt.T,
         (x, y, z),
-        tuple(_placed(one, tilt, middle) for one in looks),
+        tuple(_placed(look, tilt, middle) for look in looks),
     )
 
 
 def visual_arrays(looks: Sequence[Shape]) -> dict[str, Any]:
     """The arguments of PyBullet's createVisualShapeArray except kinds and places; unused entries are blank."""
     return {
-        "halfExtents": [[edge / 2 for edge in one.size] if one.kind == "box" else [0.0] * 3 for one in looks],
-        "radii": [one.size[0] if one.kind in ("cylinder", "sphere") else 0.0 for one in looks],
-        "lengths": [one.size[1] if one.kind == "cylinder" else 0.0 for one in looks],
-        "fileNames": [str(one.mesh or "") for one in looks],
-        "meshScales": [list(one.size or (1, 1, 1)) if one.kind == "mesh" else [1, 1, 1] for one in looks],
-        "rgbaColors": [list(one.rgba) for one in looks],
+        "halfExtents": [[edge / 2 for edge in look.size] if look.kind == "box" else [0.0] * 3 for look in looks],
+        "radii": [look.size[0] if look.kind in ("cylinder", "sphere") else 0.0 for look in looks],
+        "lengths": [look.size[1] if look.kind == "cylinder" else 0.0 for look in looks],
+        "fileNames": [str(look.mesh or "") for look in looks],
+        "meshScales": [list(look.size or (1, 1, 1)) if look.kind == "mesh" else [1, 1, 1] for look in looks],
+        "rgbaColors": [list(look.rgba) for look in looks],
     }
 
 
@@ -153,13 +153,13 @@ def _quaternion(turn: Array) -> Quaternion:
         return (0.0, 0.0, 0.0, 1.0)
     from scipy.spatial.transform import Rotation
 
-    x, y, z, w = (float(one) + 0.0 for one in Rotation.from_matrix(turn).as_quat(canonical=True))
+    x, y, z, w = (float(value) + 0.0 for value in Rotation.from_matrix(turn).as_quat(canonical=True))
     return x, y, z, w
 
 
 def _placed(look: Shape, tilt: Array, middle: Array) -> Shape:
-    """What is seen, from the axes of size, file or URDF to the part's; it has no turn of its own."""
-    x, y, z = (float(one) + 0.0 for one in tilt @ (np.array(look.position) - middle))
+    """A visible shape without a turn of its own, moved from the axes of size, file or URDF to the part's."""
+    x, y, z = (float(value) + 0.0 for value in tilt @ (np.array(look.position) - middle))
     return replace(look, position=(x, y, z), quaternion=_quaternion(tilt))
 
 
@@ -181,7 +181,7 @@ def _cylinder(size: tuple[float, ...]) -> tuple[Array, Array]:
 
 
 def _few(hull: Array) -> Array:
-    """The corners (n, 3) of a hull, at most about MOST_HULL: those that lie farthest in many directions."""
+    """The corners (n, 3) of a hull that lie farthest in many directions, at most about MOST_HULL."""
     if len(hull) <= MOST_HULL:
         return hull
     count = 2 * MOST_HULL
@@ -196,7 +196,7 @@ def _few(hull: Array) -> Array:
 
 
 def _found(part: PartFields, field: str, name: str, folder: Path) -> Path:
-    """The file of a field, beside the task file or of the assets; what leads out of both, as a link may, is refused."""
+    """The file of a field, beside the task file or in the assets; BadInput for a path or link that leads out of both."""
     where = f"part '{part.name}': {field} = '{name}'"
     for place in (folder, assets_folder()):
         if not is_file(place / name):
@@ -227,11 +227,11 @@ def _mesh(part: PartFields, path: Path) -> "Trimesh":
     where = f"part '{part.name}': file = '{part.file}'"
     try:
         kind = path.suffix.lower().removeprefix(".")
-        raw: dict[str, Any] = {"process": False, "skip_materials": True}  # as it is; and no other file is opened
+        raw: dict[str, Any] = {"process": False, "skip_materials": True}  # unchanged, and without other files
         data = readable(path)
         mesh: Any = trimesh.load(BytesIO(data), kind, force="mesh", **raw)
         points: Array = np.asarray(mesh.vertices, dtype=float)
-    except Exception as error:  # whatever a reader of meshes comes to over a stranger's file
+    except Exception as error:  # a mesh reader may raise anything for a foreign file
         raise BadInput(f"{where}: it cannot be read as {kind.upper()}: {type(error).__name__}: {error}") from None
     if points.shape[1:] != (3,):
         raise BadInput(f"{where}: its vertices are not three numbers each")
@@ -266,7 +266,7 @@ def _mesh(part: PartFields, path: Path) -> "Trimesh":
     return mesh
 
 
-_UNITS_M = {"mm": 0.001, "cm": 0.01, "inches": 0.0254, "m": 1.0}  # what a mesh's numbers may be
+_UNITS_M = {"mm": 0.001, "cm": 0.01, "inches": 0.0254, "m": 1.0}  # units that a mesh may have
 
 
 def _check_size(part: PartFields, where: str, longest: float) -> None:
@@ -285,7 +285,7 @@ def _check_size(part: PartFields, where: str, longest: float) -> None:
 
 
 def _check_closed(where: str, mesh: "Trimesh") -> None:
-    """A mesh with holes encloses nothing: neither mass nor inertia are known."""
+    """Raises BadInput for a mesh with holes, which has neither mass nor inertia."""
     if mesh.is_watertight:
         return
     shared = np.unique(mesh.edges_sorted, axis=0, return_counts=True)[1]
@@ -326,6 +326,8 @@ def seen_of(engine: Any, call: Call, shape: PartShape) -> int:
         return int(call("createVisualShape", engine.GEOM_MESH, **place))
     arrays = visual_arrays(shape.looks)
     kinds = [getattr(engine, f"GEOM_{look.kind.upper()}") for look in shape.looks]
-    at, turns = ([list(one) for one in ways] for ways in zip(*places, strict=True))  # PyBullet crashes over tuples
+    at, turns = (
+        [list(values) for values in ways] for ways in zip(*places, strict=True)
+    )  # PyBullet crashes over tuples
     arrays |= {"shapeTypes": kinds, "visualFramePositions": at, "visualFrameOrientations": turns}
     return int(call("createVisualShapeArray", **arrays))

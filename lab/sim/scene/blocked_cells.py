@@ -14,8 +14,8 @@ from lab.sim.scene.scene import TABLE, Scene
 
 OUT_OF_REACH = "out of reach"
 CARRIED = "carried part"
-FINGERS_OFF_M = 0.0005  # [m] of a finger off a part that is put between them
-FOREARM = 3  # the links from here on come near the table with a level tool; the first ones stand on it
+FINGERS_OFF_M = 0.0005  # [m] gap between a finger and a part that is put between the fingers
+FOREARM = 3  # the first link that a level tool brings near the table; the links before it stand on the table
 _AWAY = Spot(0.0, 0.0, -5.0, 0.0)
 
 
@@ -31,12 +31,12 @@ class Survey:
         return np.asarray(self.causes != "")
 
     def names(self, cells: Sequence[tuple[int, ...]]) -> list[str]:
-        """What blocks these cells, each cause once, in order of the alphabet."""
+        """The causes that block these cells, each once, in alphabetical order."""
         return sorted({str(self.causes[cell]) for cell in cells} - {""})
 
 
 def in_the_way(causes: Sequence[str], station: str) -> str:
-    """The words of an error about bodies that block a station; for the station's own body, with the fields to change."""
+    """The text of an error about bodies that block a station; for the station's own body, with the fields to change."""
     if [*causes] == [OUT_OF_REACH]:
         return OUT_OF_REACH
     named = ", ".join(f"{cause} itself" if cause == station else cause for cause in causes)
@@ -48,7 +48,7 @@ class Surveyor:
     """Places the arm at poses in a scene, with or without a part in the fingers, and measures distances to all bodies."""
 
     def __init__(self, scene: Scene, carried: str | None, *, clearance: float, ignore: Sequence[str] = ()) -> None:
-        """carried: the kind in the fingers; `clearance` [m] is how far everything must stay away; `ignore` may be touched."""
+        """carried: the kind in the fingers; clearance: the least distance to every body [m], except those of `ignore`."""
         self.scene, self.carried, self.clearance = scene, carried, clearance
         self.solid = [name for name in scene.solid if name not in ignore]
         self.moving = [NAME]
@@ -58,7 +58,7 @@ class Surveyor:
             scene.robot.open_at_once(scene.kinds[carried].grip.width_m / 2 + FINGERS_OFF_M)
 
     def cause(self, pose: ToolPose) -> str:
-        """'' when the tool can be at `pose`, else why not."""
+        """The cause that keeps the tool from `pose`; '' if there is none."""
         return next(self._causes([pose]))
 
     def free(self, poses: Sequence[ToolPose]) -> bool:
@@ -66,7 +66,7 @@ class Surveyor:
         return not any(self._causes(poses))
 
     def _causes(self, poses: Sequence[ToolPose]) -> Iterator[str]:
-        """The cause of each of many poses: their joints are found all at once."""
+        """The cause of each of many poses, whose joint positions are computed together."""
         robot = self.scene.robot
         joints = robot.arm.inverse_each(np.array([[p.x, p.y, p.z, p.yaw] for p in poses]))  # (n, k)
         for pose, own in zip(poses, joints, strict=True):
@@ -77,7 +77,7 @@ class Surveyor:
             yield self._touched(pose)
 
     def _touched(self, pose: ToolPose) -> str:
-        """'' when the arm, which is at `pose`, and what it carries are clear of everything, else what is too near."""
+        """The body that is too near to the arm at `pose` or to its part; '' if there is none."""
         world = self.scene.world
         if self.carried is not None:
             self.scene.put(CARRIED, self.carried, pose)

@@ -1,4 +1,4 @@
-"""Plain records of a cell seen from above: what stands where, what the arm reaches, which cells are blocked and by what.
+"""Plain records of a cell seen from above: its bodies, the arm's reach, and the blocked cells with their causes.
 
 Knows no simulator and no plot: `lab/skills/cell_outline.py` fills these, `lab/view/cell_plan.py` draws them. Metres, radians.
 """
@@ -36,7 +36,7 @@ class Block:
 
 @dataclass(frozen=True)
 class Ring:
-    """The reach of an arm's tool at one height: distances from its axis, and turns from ahead to both sides."""
+    """The reach of an arm's tool at one height: distances from the arm's axis, and turns to both sides."""
 
     nearest_m: float
     farthest_m: float
@@ -46,7 +46,7 @@ class Ring:
 
 @dataclass(frozen=True)
 class PlannedSpot:
-    """Where a part may stand; `used`: parts of this order do, `reached`: the arm can take it there."""
+    """A spot for a part; used: a part of this order stands there; reached: the arm can take it there."""
 
     block: Block
     used: bool = True
@@ -65,7 +65,7 @@ class PlannedStation:
 
 @dataclass(frozen=True)
 class PlannedObstacle:
-    """An obstacle where the seed has put it, and the rectangle that its whole body stays in, wherever a seed puts it."""
+    """An obstacle at the place drawn from the seed, and the rectangle that contains its body for every seed."""
 
     name: str
     stands: Block
@@ -73,7 +73,7 @@ class PlannedObstacle:
 
     @property
     def moves(self) -> bool:
-        """Whether another seed may put it elsewhere."""
+        """Whether another seed may place it elsewhere."""
         return bool(np.any(np.ptp(self.stays_in.corners(), axis=0) > np.ptp(self.stands.corners(), axis=0) + 1e-9))
 
 
@@ -88,7 +88,7 @@ class BlockedCells:
 
 @dataclass(frozen=True)
 class CameraCells:
-    """The grid that an overhead camera looks at, and where the tool comes to be before it goes through it."""
+    """The grid that an overhead camera looks at, and the tool's position before it enters the grid."""
 
     origin: XY
     cell: float
@@ -98,7 +98,7 @@ class CameraCells:
 
 @dataclass(frozen=True)
 class Approach:
-    """The end of a transfer to a station, and the middle of the last cell before it; None: there is no such cell."""
+    """The end of a transfer to a station, and the middle of the last cell before it; None without such a cell."""
 
     station: str
     at: XY
@@ -107,12 +107,12 @@ class Approach:
 
 @dataclass(frozen=True)
 class GroundPlan:
-    """A cell from above, as far as it is known; `fault` says what is wrong with it, `at_fault` names what that is about."""
+    """A cell from above, as far as it is known; fault: its error in words; at_fault: the names that the error is about."""
 
     title: str
     table: Block
     reach: Ring | None = None
-    height_m: float = 0.0  # of the finger tips, where the reach is shown
+    height_m: float = 0.0  # height of the finger tips for which the reach is shown
     stations: tuple[PlannedStation, ...] = ()
     obstacles: tuple[PlannedObstacle, ...] = ()
     blocked: BlockedCells | None = None
@@ -127,16 +127,16 @@ class GroundPlan:
 
 Inverse = Callable[[ToolPose], NDArray[np.float64] | None]
 
-MOST_M = 2.5  # no arm of a table's size reaches farther
+MOST_M = 2.5  # upper limit of the reach of an arm on a table
 STEP_M, STEP_RAD = 0.04, pi / 18
-HALVINGS = 8  # of a step: the ring's edges are right within 0.2 mm and 0.04 degrees
+HALVINGS = 8  # bisections of a step: the ring's edges are exact to 0.2 mm and 0.04 degrees
 
 
 def ring_of(inverse: Inverse, height_m: float, nearest_m: float = 0.0) -> Ring | None:
-    """The ring around the arm's axis that a vertical tool reaches at a height; None where it reaches nothing.
+    """The ring around the arm's axis that a vertical tool reaches at a height; None if it reaches nothing.
 
-    `nearest_m`: nearer to its axis the tool never goes. It is looked for straight ahead, and the way the arm can turn in the
-    ring's middle; of several rings the widest counts.
+    nearest_m: the least distance of the tool from the arm's axis. The distances are searched straight ahead, the turns in the
+    ring's middle; of several rings the widest is returned.
     """
 
     def ahead(far: float) -> bool:
@@ -166,7 +166,7 @@ def _turn(turned: Callable[[float], bool]) -> float:
 
 
 def _edge(holds: Callable[[float], bool], inside: float, outside: float) -> float:
-    """Where `holds` ends between a value for which it is true and one for which it is not, on the true side."""
+    """The boundary of `holds` between a value for which it is true and one for which it is false, on the true side."""
     for _ in range(HALVINGS):
         middle = (inside + outside) / 2
         inside, outside = (middle, outside) if holds(middle) else (inside, middle)

@@ -1,6 +1,6 @@
 """Trials in physics, before any work, of whether the fingers hold a part: it is taken up, swung, turned and set down.
 
-It is carried at least as far as in the task, since a part that creeps between the fingers creeps all the way.
+The part is carried at least as far as in the task, because a part that creeps between the fingers does so along the whole path.
 """
 
 from collections.abc import Iterator, Sequence
@@ -20,27 +20,27 @@ from lab.sim.world import World
 from lab.tasks.robot_fields import RobotSettings
 
 LIFT_M, SWING_M, CORNER_M, TURN_RAD = 0.1, 0.25, 0.2, pi / 4
-LAP_M = 1.2  # at least, of carrying it from side to side once
-BLEND_M = 0.1  # of its corner, as in transfers
-OUT = (0.5, 0.62, 0.75, 0.4, 0.9, 0.3)  # [m] ahead of the arm, the first that it reaches all over
-OFF = (0.002, 0.002, 0.04)  # [m], [rad] the part stands off where the fingers expect it: parts do, after some transfers
-FOOT_M = 0.1  # [m] the part's foot above the table
-SLIPPED_M, TILTED = 0.008, 0.96  # of what the fingers hold: off where they took it; cosine of its turn towards its side
-NEAR_M = 0.012  # a part is set down so near to where it should stand
-SETTLE_STEPS, HELD_STEPS = 60, 240  # of physics, before and after; that it hangs in the air
-GENTLER = (0.5, 0.25, 0.12)  # of a force with which a part is lost: these are tried
+LAP_M = 1.2  # least length of a lap from side to side
+BLEND_M = 0.1  # radius of its corner, as in transfers
+OUT = (0.5, 0.62, 0.75, 0.4, 0.9, 0.3)  # [m] distances ahead of the arm; the first that it reaches everywhere is taken
+OFF = (0.002, 0.002, 0.04)  # [m], [rad] error of the part's pose under the fingers, as after some transfers
+FOOT_M = 0.1  # [m] height of the part's foot above the table
+SLIPPED_M, TILTED = 0.008, 0.96  # limits of a held part: its shift in the fingers, and the cosine of its tilt
+NEAR_M = 0.012  # largest error of the place where a part is set down
+SETTLE_STEPS, HELD_STEPS = 60, 240  # physics steps before and after a trial; steps in which the part hangs in the air
+GENTLER = (0.5, 0.25, 0.12)  # shares of a force with which a part is lost that are tried next
 BLOCK, RGBA = "block", (0.8, 0.8, 0.8, 1.0)
-BESIDE_M = 0.03  # [m] of the block around the foot
-ABOVE_M = 0.0005  # [m] between what stands on one another, at first
+BESIDE_M = 0.03  # [m] margin of the block around the foot
+ABOVE_M = 0.0005  # [m] initial gap between bodies that stand on one another
 
 
 def held(
     robot: RobotSettings, arm: Arm, kinds: Sequence[Kind], way_m: float = 0.0, turn_rad: float = TURN_RAD
 ) -> RobotSettings:
-    """The robot as it holds all kinds: with a gentler force where they creep from the one that is chosen; one given is kept.
+    """The robot with a grip force that holds all kinds: smaller than the chosen one if parts creep; a given force is kept.
 
-    Only what is unusual is tried. way_m: how far parts are carried at most [m]; turn_rad: how far the tool turns with them.
-    BadInput where friction cannot hold a part, and where one is lost in a trial; it names a gentler force that holds, if any.
+    Only unusual kinds are tried. way_m: the longest path of a carried part [m]; turn_rad: the turn of the tool with it.
+    BadInput if friction cannot hold a part, or if a part is lost in a trial; it names a smaller force that holds, if any.
     """
     for kind, went in _lost(robot, arm, kinds, way_m, turn_rad):
         gentler = _gentler(robot, arm, kinds, way_m, turn_rad)
@@ -58,7 +58,7 @@ def held(
 def _lost(
     robot: RobotSettings, arm: Arm, kinds: Sequence[Kind], way_m: float, turn_rad: float
 ) -> Iterator[tuple[Kind, str]]:
-    """The kinds that are lost in a trial, and how; BadInput for those that friction cannot hold."""
+    """The kinds that are lost in a trial, with the failure in words; BadInput for those that friction cannot hold."""
     fine, laps = needs_fine(robot, kinds), max(1, ceil(way_m / LAP_M))
     loads = [Load.of(kind) for kind in kinds]
     for load in loads:
@@ -74,7 +74,7 @@ def _lost(
 def _gentler(
     robot: RobotSettings, arm: Arm, kinds: Sequence[Kind], way_m: float, turn_rad: float
 ) -> RobotSettings | None:
-    """The robot with a gentler force with which all kinds are held: what is pressed too hard creeps from between the fingers."""
+    """The robot with a smaller force that holds all kinds, or None: a part that is pressed too hard creeps out of the fingers."""
     now_n = max(grip_force_n(robot, Load.of(kind)) for kind in kinds)
     for share in GENTLER:
         gentler = robot.model_copy(update={"grip_force_n": float(f"{share * now_n:.2g}")})
@@ -85,7 +85,7 @@ def _gentler(
 
 
 class HoldTrial(NamedTuple):
-    """A kind that an arm takes up with a force [N], moving as fast [m/s] and speeding up as much [m/s2] as in its task.
+    """A trial of a kind, a grip force [N], and the speed [m/s] and acceleration [m/s2] of its task.
 
     laps: how often it is carried from side to side, round a corner, and turned, by turn_rad.
     """
@@ -102,7 +102,7 @@ class HoldTrial(NamedTuple):
 
 @lru_cache(maxsize=64)
 def tried(trial: HoldTrial) -> str:
-    """The failure of a trial, in a world of its own, in words; "" for none, and where the arm has no room for the trial."""
+    """The failure in words of a trial in its own world; "" if it succeeds or the arm has no room for it."""
     place = _place(trial)
     if place is None:
         return ""
@@ -122,7 +122,7 @@ def tried(trial: HoldTrial) -> str:
 
 
 def _place(trial: HoldTrial) -> Spot | None:
-    """The spot of the part: ahead of the arm, where the arm reaches the whole path; None: there is none."""
+    """The spot ahead of the arm from which it reaches the whole path of the trial, or None."""
     for out in OUT:
         spot = Spot(out, 0.0, FOOT_M, 0.0)
         if all(trial.arm.inverse(pose) is not None for pose in _way(trial, spot)):
@@ -131,7 +131,7 @@ def _place(trial: HoldTrial) -> Spot | None:
 
 
 def _way(trial: HoldTrial, spot: Spot) -> list[ToolPose]:
-    """The tool poses: at the part, above it, to one side, to the other and round a corner, turned above it."""
+    """The tool poses of the trial: at the part, above it, to one side, to the other, around a corner, and turned above it."""
     at = trial.kind.held_at(spot)
     up = at.shifted(dz=LIFT_M)
     side = up.shifted(dy=-SWING_M)
@@ -139,7 +139,7 @@ def _way(trial: HoldTrial, spot: Spot) -> list[ToolPose]:
 
 
 def _built(world: World, kind: Kind, spot: Spot) -> list[str]:
-    """The part on a block that is larger than its foot, and what rides on it; their names from the foot upwards."""
+    """Builds the part, with its rider, on a block larger than its foot, and returns their names from the foot upwards."""
     along, across = (2 * (half + BESIDE_M) for half in kind.footprint_m())
     world.box(BLOCK, (along, across, spot.z), (spot.x, spot.y, spot.z / 2), RGBA)
     names, foot_m = [], spot.z + ABOVE_M
@@ -159,13 +159,13 @@ class _Hand:
     robot: RobotArm
     kind: Kind
     body: str
-    low_m: float = 0.0  # of the part's middle under the tool when it was taken
+    low_m: float = 0.0  # [m] depth of the part's middle under the tool when it was gripped
 
     def took(self) -> None:
         self.low_m = self._low_m()
 
     def check(self, doing: str) -> None:
-        """WorkFailed when the part is no longer where the fingers took it."""
+        """Raises WorkFailed if the part is no longer where the fingers gripped it."""
         tool = self.robot.tool()
         position, (x, y, *_) = self.world.pose(self.body)
         spot = self.kind.foot_at(tool)
@@ -205,7 +205,7 @@ def _motion(hand: _Hand, way: Sequence[ToolPose], laps: int) -> Iterator[None]:
 
 
 def _ended(world: World, kind: Kind, bodies: Sequence[str], spot: Spot) -> str:
-    """What is wrong with how the part stands where it was set down."""
+    """The error in words of the part's pose after it was set down; "" if there is none."""
     foot_m = spot.z
     for body, own in zip(bodies, kind.stack(), strict=True):
         position, (x, y, *_) = world.pose(body)

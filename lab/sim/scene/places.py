@@ -1,4 +1,4 @@
-"""The places in a task's cell: the spots for parts at each station, the room that they take, and the layout of a seed."""
+"""The places in a task's cell: the spots for parts at each station, the room that they need, and the layout of a seed."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -14,20 +14,20 @@ from lab.sim.scene import station_bodies
 from lab.tasks.task import Order, Task
 from lab.tasks.task_fields import Obstacle, Station
 
-SLAB = 0.012  # [m] plates and buffers are slabs this thick, where the file says nothing else
-COLUMNS = 4  # of a storage
-BETWEEN_M, FINGERS_M = 0.02, 0.02  # [m] between parts at a station, and as much more where a finger comes between them
-AROUND_M, OPEN_M = 0.01, 0.0325  # [m] kept free around a part, and as much more where the fingers are open beside it
+SLAB = 0.012  # [m] default thickness of the slabs of plates and buffers
+COLUMNS = 4  # most columns of a storage
+BETWEEN_M, FINGERS_M = 0.02, 0.02  # [m] gap between parts at a station, and extra gap for fingers
+AROUND_M, OPEN_M = 0.01, 0.0325  # [m] room around a part, and extra room for open fingers beside it
 SLAB_M, CLOSING_M = (
     0.06,
     0.025,
-)  # [m] that a slab is larger than what stands on it, and as much more where fingers close
-APART_M = 0.002  # [m] between parts where they begin, at least
-FREE_M = 0.0125  # [m] beyond an open finger to what stands beside, at least
-UNDER_M = 0.005  # [m] of the palm over what stands beside a part, at least
-MAX_DRAWS = 100  # of an obstacle's place
-ON_TOP_M = 0.002  # between the top of a part and the foot of the one that stands on it, at most [m]
-SPARE_SPOTS = 4  # so many spots of a station are reckoned with, however few parts there are
+)  # [m] margin of a slab around its parts, and extra margin where fingers close
+APART_M = 0.002  # [m] least gap between parts at the start
+FREE_M = 0.0125  # [m] least clearance between an open finger and a body beside it
+UNDER_M = 0.005  # [m] least height of the palm above a body beside the part
+MAX_DRAWS = 100  # draws of an obstacle's place before it counts as impossible
+ON_TOP_M = 0.002  # [m] largest gap between the top of a part and the foot of the part on it
+SPARE_SPOTS = 4  # spots of a station that are always considered, even with fewer parts
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class Rectangle:
     yaw: float
 
     def meets(self, other: "Rectangle") -> bool:
-        """Whether the two overlap: no side of either has the other wholly beyond it."""
+        """Whether the two overlap, by the separating axes of their sides."""
         dx, dy = other.x - self.x, other.y - self.y
         for yaw in (self.yaw, self.yaw + pi / 2, other.yaw, other.yaw + pi / 2):
             apart = abs(cos(yaw) * dx + sin(yaw) * dy)
@@ -68,20 +68,20 @@ class Rectangle:
 
 
 class Places:
-    """The stations of a task as places for parts of its kinds."""
+    """The spots at the stations of a task for parts of its kinds."""
 
     def __init__(self, task: Task, kinds: Mapping[str, Kind]) -> None:
         self.task, self.kinds = task, kinds
 
     def kinds_at(self, station: str) -> list[Kind]:
         """The kinds that may stand at a station, with their pallets where they come on one."""
-        found = []
+        kinds = []
         for part in self.task.kinds_at(station):
-            found.append(self.kinds[part.name if self.task.station(station).kind == "machine" else comes_as(part)])
-        return found
+            kinds.append(self.kinds[part.name if self.task.station(station).kind == "machine" else comes_as(part)])
+        return kinds
 
     def floor(self, station: Station) -> float:
-        """How high a part's foot is above the table at this station [m]."""
+        """The height of a part's foot above the table at this station [m]."""
         if station.floor_m is not None:
             return station.floor_m
         if station.stands_on == "box" and station.size_m is not None:
@@ -91,7 +91,7 @@ class Places:
     def spots(self, station: Station, kind: str = "") -> list[Spot]:
         """The places for parts at a station, the middle or lowest ones first; as many as its capacity.
 
-        kind: only those that take parts of this kind, which may be named as it comes, on its pallet.
+        kind: only those for parts of this kind, by its own name or by that on its pallet.
         """
         at, yaw, high = station.pose[:2], station.pose[2], self.floor(station)
         if given := station.own_places:
@@ -110,7 +110,7 @@ class Places:
         return [Spot(*beside(at, yaw, off), high, yaw) for off in offsets[: station.capacity]]
 
     def _has_columns(self, station: Station) -> bool:
-        """Whether parts stand before and behind one another there, too: the palm of a level tool is behind its part."""
+        """Whether parts also stand behind one another there; the palm of a level tool, which is behind its part, forbids it."""
         return station.kind == "storage" and self.task.robot.tool != "level"
 
     def raised(self, kind: str, station: Station, spot: Spot) -> Spot:
@@ -124,8 +124,8 @@ class Places:
         rows = ceil(station.capacity / columns)
         column_m, row_m = self.pitch(station)
         grid = product(range(columns), range(rows))
-        found = [((c - (columns - 1) / 2) * column_m, (r - (rows - 1) // 2) * row_m) for c, r in grid]
-        return sorted(found, key=lambda at: (round(hypot(*at), 6), at))
+        offsets = [((c - (columns - 1) / 2) * column_m, (r - (rows - 1) // 2) * row_m) for c, r in grid]
+        return sorted(offsets, key=lambda at: (round(hypot(*at), 6), at))
 
     def pitch(self, station: Station) -> tuple[float, float]:
         """The distances from spot to spot, along and across [m], with room for fingers and hand between parts."""
@@ -139,13 +139,13 @@ class Places:
         return pitch_m
 
     def room(self, station: Station) -> tuple[float, float]:
-        """How far a part and the gripper around it reach from a spot, along and across [m]."""
+        """The extent of a part and the gripper around it from a spot, along and across [m]."""
         return self._largest(station, AROUND_M, lambda kind: max(OPEN_M, kind.finger_m - AROUND_M + FREE_M), 1.0)
 
     def _largest(
         self, station: Station, beside_m: float, closing_m: Callable[[Kind], float], times: float
     ) -> tuple[float, float]:
-        """So many times what the kinds at a station reach, and so much beside them, more where their fingers close [m]."""
+        """`times` the largest extent of the kinds at a station, plus margins, larger where their fingers close [m]."""
         sizes = []
         for kind in self.kinds_at(station.name):
             reach, margins = kind.footprint_m(), kind.margins_m(beside_m, closing_m(kind))
@@ -154,12 +154,12 @@ class Places:
         return float(x), float(y)
 
     def used_spots(self, station: Station, parts: int, kind: str = "") -> list[Spot]:
-        """The spots that so many parts can ever need, and a few more for a plate; nests all, for each takes its kind."""
-        found = self.spots(station, kind)
-        return found if station.places is not None else found[: max(parts, SPARE_SPOTS)]
+        """The spots that so many parts can need, and a few more for a plate; all nests, because each takes only its kind."""
+        usable = self.spots(station, kind)
+        return usable if station.places is not None else usable[: max(parts, SPARE_SPOTS)]
 
     def top_m(self, station: Station) -> float:
-        """How high what stands at a station reaches above the table at most [m]."""
+        """The largest height above the table of the parts at a station [m]."""
         tops = [
             spot.z + kind.height_m for kind in self.kinds_at(station.name) for spot in self.spots(station, kind.name)
         ]
@@ -178,24 +178,24 @@ class Places:
         ]
 
     def below(self, station: Station, spot: Spot) -> list[tuple[str, Spot]]:
-        """What has to stand for a part to stand on a spot: kinds and their spots, the lowest first."""
-        found = dict[Spot, str]()
+        """The kinds and spots of the parts that must stand below a spot, the lowest first."""
+        by_spot = dict[Spot, str]()
         for under in self.carriers(station, spot):
-            found |= {other: kind for kind, other in self.below(station, under)}
-            found[under] = next(
+            by_spot |= {other: kind for kind, other in self.below(station, under)}
+            by_spot[under] = next(
                 kind.name
                 for kind, _ in self.grounds(station, under)
                 if abs(under.z + kind.height_m - spot.z) <= ON_TOP_M
             )
-        return [(kind, other) for other, kind in found.items()]
+        return [(kind, other) for other, kind in by_spot.items()]
 
     def grounds(self, station: Station, spot: Spot) -> list[tuple[Kind, Rectangle]]:
         """The kinds that may stand on a spot, with the ground that a part of each covers there."""
-        found = []
+        covered = []
         for kind in self.kinds_at(station.name):
             if spot in self.spots(station, kind.name):
-                found.append((kind, Rectangle(spot.x, spot.y, *kind.footprint_m(), spot.yaw)))
-        return found
+                covered.append((kind, Rectangle(spot.x, spot.y, *kind.footprint_m(), spot.yaw)))
+        return covered
 
     def slab(self, station: Station, parts: int) -> tuple[Vector, Vector]:
         """Size and centre [m] of the slab under the spots that so many parts can need, turned as the station is."""
@@ -210,7 +210,7 @@ class Places:
         return (length, width, self.floor(station)), (*middle, self.floor(station) / 2)
 
     def body(self, station: Station, parts: int) -> Rectangle:
-        """The ground that a station's body takes."""
+        """The ground that a station's body covers."""
         x, y, yaw = station.pose
         if station.stands_on in ("slab", "box"):
             size, middle = self.slab(station, parts)
@@ -237,19 +237,19 @@ class Places:
     def draw(self, order: Order, rng: np.random.Generator) -> Layout:
         """A layout drawn uniformly within the areas that the task gives its obstacles and parts.
 
-        An obstacle drawn onto a station, and a part drawn into another one, is drawn again; BadInput names what an area
-        leaves no room for.
+        An obstacle that overlaps a station, or a part that overlaps another one, is drawn again; BadInput names one for which
+        its area leaves no room.
         """
         kept = self.kept_free(len(order))
         places = [_draw_place(obstacle, kept, rng) for obstacle in self.task.obstacles]
         stand: list[tuple[float, Rectangle]] = []
-        offsets = [self._draw_off(*one, stand, rng) for one in zip(order, self.begins(order), strict=True)]
+        offsets = [self._draw_off(*placed, stand, rng) for placed in zip(order, self.begins(order), strict=True)]
         return Layout(tuple(places), tuple(offsets))
 
     def _draw_off(
         self, kind: str, spot: Spot, stand: list[tuple[float, Rectangle]], rng: np.random.Generator
     ) -> tuple[float, float, float]:
-        """How far a part stands off its spot, clear of those that `stand` already as high [m], to which it is added."""
+        """A drawn offset of a part from its spot, clear of the parts in `stand` at its height [m]; the part is added to them."""
         part = self.task.part(kind)
         along, across = (reach + APART_M / 2 for reach in self.kinds[comes_as(part)].footprint_m())
         for _ in range(MAX_DRAWS):
@@ -266,23 +266,23 @@ class Places:
     def begins(self, order: Order) -> list[Spot]:
         """The spot on which each part of an order stands at the start, part 1 first: the stations' first ones.
 
-        BadInput where nothing is there to carry one.
+        BadInput for a part that no other part carries.
         """
-        found: list[Spot] = []
+        first_spots: list[Spot] = []
         for kind in order:
             own = self.spots(self.task.station(self.task.starts(kind)), kind)
-            found.append(next(spot for spot in own if spot not in found))
-        for kind, spot in zip(order, found, strict=True):
+            first_spots.append(next(spot for spot in own if spot not in first_spots))
+        for kind, spot in zip(order, first_spots, strict=True):
             station = self.task.station(self.task.starts(kind))
-            if lacks := [name for name, under in self.below(station, spot) if under not in found]:
+            if lacks := [name for name, under in self.below(station, spot) if under not in first_spots]:
                 raise BadInput(
                     f"part '{kind}': count: at '{station.name}' {counted(order.count(kind), kind)} would stand on more than "
                     f"{counted(order.count(lacks[0]), lacks[0])}: wanted more of '{lacks[0]}', or fewer of '{kind}'"
                 )
-        return found
+        return first_spots
 
     def neighbours(self, station: Station, spot: Spot) -> dict[str, tuple[str, Spot]]:
-        """Parts that may stand beside one spot, their kind and spots by name; where there is one place only there are none."""
+        """Parts that may stand beside one spot, their kind and spots by name; empty at a station with one place."""
         kinds = outermost(self.kinds_at(station.name))
         if not kinds or station.capacity == 1:
             return {}
@@ -300,26 +300,28 @@ class Places:
         }
 
     def _seen_from(self, station: Station, spot: Spot) -> list[tuple[str, Spot]]:
-        """The outermost kinds on each other spot of the station and where that lies as seen from any of them, from this one.
+        """The outermost kinds on each other spot of the station, with the position of that spot relative to this one.
 
-        Lower layers are left away: they are no higher than what this spot lies on; and so is what this one carries.
+        Lower layers are left out, because they are no higher than the support of this spot, and so are parts on top of this one.
         """
-        found: dict[tuple[str | float, ...], tuple[str, Spot]] = {}
-        stand = {one: [kind for kind, _ in self.grounds(station, one)] for one in self.spots(station)}
-        for one, own in stand.items():
+        seen_once: dict[tuple[str | float, ...], tuple[str, Spot]] = {}
+        stand = {
+            other_spot: [kind for kind, _ in self.grounds(station, other_spot)] for other_spot in self.spots(station)
+        }
+        for spot_there, own in stand.items():
             for other, kinds in stand.items():
-                # the places of a kind are filled from the lowest on: above it stands none of its own yet
-                up = other.z - one.z
-                if other == one or not own or not kinds or up < 0.0 or (up > 0.0 and own == kinds):
+                # the places of a kind are filled from the lowest on, so none of its own stands above it yet
+                up = other.z - spot_there.z
+                if other == spot_there or not own or not kinds or up < 0.0 or (up > 0.0 and own == kinds):
                     continue
-                if up > 0.0 and one in [under for _, under in self.below(station, other)]:
+                if up > 0.0 and spot_there in [under for _, under in self.below(station, other)]:
                     continue
-                along, across = beside((0.0, 0.0), -one.yaw, (other.x - one.x, other.y - one.y))
+                along, across = beside((0.0, 0.0), -spot_there.yaw, (other.x - spot_there.x, other.y - spot_there.y))
                 x, y = beside((spot.x, spot.y), spot.yaw, (along, across))
-                seen = Spot(x, y, spot.z + up, spot.yaw + other.yaw - one.yaw)
-                key = round(along, 4), round(across, 4), round(up, 4), round(other.yaw - one.yaw, 4)
-                found |= {(kind.name, *key): (kind.name, seen) for kind in outermost(kinds)}
-        return list(found.values())
+                seen = Spot(x, y, spot.z + up, spot.yaw + other.yaw - spot_there.yaw)
+                key = round(along, 4), round(across, 4), round(up, 4), round(other.yaw - spot_there.yaw, 4)
+                seen_once |= {(kind.name, *key): (kind.name, seen) for kind in outermost(kinds)}
+        return list(seen_once.values())
 
 
 def outermost(kinds: Sequence[Kind]) -> list[Kind]:

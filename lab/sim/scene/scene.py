@@ -20,19 +20,19 @@ TABLE, MARKER = "table", " marker"  # the name of the table; the ending of marke
 TABLE_RGBA = (0.86, 0.85, 0.83, 1.0)
 TABLE_M, TABLE_MIDDLE_M = (2.2, 2.9, 0.04), (0.35, 0.0, -0.02)
 MARKER_ABOVE = 0.002  # [m] a marker's centre above what it lies on
-STOPS_AT_N, STOPS_AT_GRIPS = 150.0, 6.0  # a protective stop, at least; closing fingers reach four times their own force
-ABOVE_FOOT_M = 0.0005  # [m] a part is put so high above its spot
+STOPS_AT_N, STOPS_AT_GRIPS = 150.0, 6.0  # a protective stop's least force, and least multiple of the grip force
+ABOVE_FOOT_M = 0.0005  # [m] initial height of a part above its spot
 
 
 class Scene:
     """The cell of `task` with the parts of an order, laid out as `layout` says; the first part is called 'slice 1'."""
 
     def __init__(self, world: World, task: Task, order: Order, layout: Layout, parts: int = 0) -> None:
-        """parts: for how many the stations are built, where these are more than those of the order."""
+        """parts: the number of parts for which stations are built, if larger than that of the order."""
         self.world, self.task, self.order, self.layout = world, task, order, layout
         self._parts = max(parts, len(order))
-        self.solid: list[str] = []  # what the arm must not touch
-        self.kind_of: dict[str, Kind] = {}  # of each part in the scene, by its name
+        self.solid: list[str] = []  # names of the bodies that the arm must not touch
+        self.kind_of: dict[str, Kind] = {}  # the kind of each part in the scene, by the part's name
         arm = arm_of(task.robot, task.folder)
         self.kinds = kinds_of(task, arm.gripper)
         self.places = Places(task, self.kinds)
@@ -67,7 +67,7 @@ class Scene:
         self.world.disc(f"{name}{MARKER}", models.MARKER_RADIUS, models.MARKER_THICK, at, rgba)
 
     def add(self, name: str, kind: str, spot: Spot, off: Sequence[float] = (0.0, 0.0, 0.0)) -> None:
-        """Stand a part called `name` on `spot`, `off` it by x, y [m] and yaw [rad]; on its pallet when the kind is so."""
+        """Adds a part called `name` on `spot`, offset by x, y [m] and yaw [rad]; on its pallet if the kind includes one."""
         at = beside((spot.x, spot.y), spot.yaw, off)
         foot = Spot(*at, spot.z + ABOVE_FOOT_M, spot.yaw + off[2])
         for body, own in zip(self.bodies_of(name, kind), self.kinds[kind].stack(), strict=True):
@@ -85,7 +85,7 @@ class Scene:
         return [pallet_of(name), name] if self.kinds[kind].rider is not None else [self.body_of(name, kind)]
 
     def put(self, name: str, kind: str, pose: ToolPose) -> None:
-        """Put a part at once to where the tool at `pose` would hold it: to survey or show a scene, without physics."""
+        """Moves a part without physics to where the tool at `pose` would hold it, to survey or show a scene."""
         foot = self.kinds[kind].foot_at(pose)
         turn = (0.0, 0.0, sin(foot.yaw / 2), cos(foot.yaw / 2))
         for body, own in zip(self.bodies_of(name, kind), self.kinds[kind].stack(), strict=True):

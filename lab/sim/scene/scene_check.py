@@ -1,4 +1,4 @@
-"""Checks of a task's cell before it is surveyed: reach, heights, layers, and stations in each other's way."""
+"""Checks of a task's cell before it is surveyed: reach, heights, layers, and stations that overlap."""
 
 from itertools import combinations, product
 from math import ceil, cos, hypot, pi, sin
@@ -20,22 +20,22 @@ from lab.sim.scene.scene import in_grid, marker_of
 from lab.tasks.task import Task
 from lab.tasks.task_fields import CameraGrid, Station
 
-ACROSS = 0.3  # sine of the angle at most between the fingers and the way in
-DETOUR = 1.5  # times the straight way along the axes, at most, around the arm and obstacles
-OVER_M = 0.01  # [m] between a carried part and what stands below its way
-ON_M = 1e-6  # by what a part may reach beyond what it stands on: sums of lengths differ by less
-RESTS = 0.25  # of the way from a part's middle to its sides: so far at least reaches what carries it
-TURNS = 17  # places of a turn that are looked at
-INTO_M = 0.005  # [m] the same above a machine that it is let down into
+ACROSS = 0.3  # sine of the largest angle between the fingers and the direction of entry
+DETOUR = 1.5  # longest path around the arm and obstacles, as a multiple of the path along the axes
+OVER_M = 0.01  # [m] clearance between a carried part and the bodies below its path
+ON_M = 1e-6  # largest overhang of a part over its support: rounding errors are smaller
+RESTS = 0.25  # share of the distance from a part's middle to its sides that its support must cover
+TURNS = 17  # samples of a turn that are checked
+INTO_M = 0.005  # [m] the same above a machine into which the part is lowered
 
 
 def places_of(task: Task) -> Places:
-    """The stations of a task as places for its parts, as its robot grips them. Raises BadInput."""
+    """The places at a task's stations for its parts as the robot grips them. Raises BadInput."""
     return Places(task, kinds_of(task, arm_of(task.robot, task.folder).gripper))
 
 
 def check_scene(task: Task) -> Task:
-    """The task, gripping more gently where its parts would creep; the force that its file gives is kept.
+    """The task, with a smaller grip force where its parts would creep; a force that its file gives is kept.
 
     BadInput when a part cannot be gripped or held, spots are out of the arm's reach, or transfers would sweep parts.
     """
@@ -62,9 +62,9 @@ def check_scene(task: Task) -> Task:
 
 
 def _turn_rad(task: Task) -> float:
-    """How far the tool turns with a part in the trial of its grip: one that hangs about as far as any does, as easily.
+    """The turn of the tool with a part in the trial of its grip [rad].
 
-    A level tool turns the whole arm, which few postures do gently: as far as the stations are turned.
+    A turn of a level tool moves the whole arm, which few postures allow: it turns only as far as the stations do.
     """
     if task.robot.tool != "level":
         return TURN_RAD
@@ -72,16 +72,16 @@ def _turn_rad(task: Task) -> float:
 
 
 def _check_level(task: Task) -> None:
-    """BadInput for what only a hanging tool can do, in a task whose tool is level."""
+    """Raises BadInput if a task with a level tool needs what only a hanging tool can do."""
     if task.robot.tool != "level":
         return
     grids = [f"station '{station.name}': approach = 'camera'" for station in task.stations if station.grid is not None]
     covers = [f"processes.{name}: by = 'robot'" for name, process in task.processes.items() if process.by == "robot"]
     seen = ["perception = 'camera'"] if task.perception == "camera" else []
-    if found := [*grids, *covers, *seen]:
+    if refused := [*grids, *covers, *seen]:
         sides = [station.name for station in task.stations if station.approach == "side"]
         why = f", for '{sides[0]}' has approach = 'side'" if sides else ""
-        raise BadInput(f"{found[0]} is for a tool that hangs; robot.tool is 'level'{why}")
+        raise BadInput(f"{refused[0]} is for a tool that hangs; robot.tool is 'level'{why}")
 
 
 def _check_on_body(places: Places, station: Station) -> None:
@@ -90,7 +90,7 @@ def _check_on_body(places: Places, station: Station) -> None:
     A slab without a size is drawn under all its spots. A body from a file has to reach below the middle of each spot, unless
     parts stand on the table there.
     """
-    (x, y, yaw), needed = station.pose, [0.0, 0.0]  # half the length and width that are needed [m]
+    (x, y, yaw), needed = station.pose, [0.0, 0.0]  # needed half length and half width [m]
     for spot in places.spots(station):
         middle, turn = beside((0.0, 0.0), -yaw, (spot.x - x, spot.y - y)), spot.yaw - yaw
         if station.stands_on not in ("slab", "box") and spot.z > 0.0:
@@ -108,7 +108,7 @@ def _check_on_body(places: Places, station: Station) -> None:
 
 
 def check_places(places: Places, station: Station) -> None:
-    """BadInput for places that the file gives where parts would stand in one another, and on a layer with nothing below."""
+    """Raises BadInput for places of the file at which parts would overlap, or of a layer with nothing below."""
     if station.places is None:
         return
     on_file_body = station.stands_on not in ("slab", "box")
@@ -130,7 +130,7 @@ def check_places(places: Places, station: Station) -> None:
 
 
 def _check_carried(places: Places, station: Station, spot: Spot, below: list[Spot]) -> None:
-    """BadInput for a place of a layer when what is below does not carry it, whatever kinds stand there."""
+    """Raises BadInput for a place of a layer that the places below do not support with every kind that may stand there."""
     where, own = _place_in_words(places, station, spot), places.grounds(station, spot)
     carriers = places.carriers(station, spot)
     if not carriers:
@@ -154,12 +154,12 @@ def _check_carried(places: Places, station: Station, spot: Spot, below: list[Spo
 
 
 def _rests(ground: Rectangle, below: list[Rectangle]) -> bool:
-    """Whether what carries a part reaches beyond the middle of its foot to all four sides, by a quarter of the way at least."""
+    """Whether a part's support extends from the middle of its foot to all four sides by at least a quarter of its half size."""
     shares = [n / 8 for n in range(-8, 9)]
     held = []
     for along, across in product(shares, shares):
         at = beside((ground.x, ground.y), ground.yaw, (along * ground.half_along, across * ground.half_across))
-        if any(one.meets(Rectangle(*at, 0.0, 0.0, 0.0)) for one in below):
+        if any(support.meets(Rectangle(*at, 0.0, 0.0, 0.0)) for support in below):
             held.append((along, across))
     return bool(held) and all(min(axis) <= -RESTS and max(axis) >= RESTS for axis in zip(*held, strict=True))
 
@@ -196,7 +196,7 @@ def longest_way_m(places: Places) -> float:
 
 
 def _check_lowest(places: Places, low: float) -> None:
-    """BadInput when what is carried in the lowest cells would meet what stands at the stations."""
+    """Raises BadInput if a part that is carried in the lowest cells would hit a part at a station."""
     standing = {station.name: places.top_m(station) for station in places.task.stations}
     where = max(standing, key=lambda name: standing[name])
     for kind in (places.kinds[comes_as(part)] for part in places.task.made):
@@ -264,7 +264,7 @@ def _check_reach(arm: Arm, station: Station, at: ToolPose) -> None:
 
 
 def _check_turn(arm: Arm, station: Station, above: ToolPose) -> None:
-    """BadInput when the last joint ends before the tool has turned over a station to its yaw, or over a spot to the grip's."""
+    """Raises BadInput if the last joint's range ends before the tool reaches a station's yaw, or the grip's yaw over a spot."""
     x, y, yaw = station.pose
     came, over = ToolPose(x, y, above.z, 0.0), ToolPose(x, y, above.z, yaw)
     for begun, ended in ((came, over), (over, above)):
@@ -295,12 +295,12 @@ def check_apart(task: Task, parts: int) -> None:
 
 
 def _ground(places: Places, station: Station, parts: int) -> list[Rectangle]:
-    """What a station takes: its machine's body, and around each spot in use a part and the gripper."""
+    """The ground that a station covers: its machine's body, and a part with the gripper around each spot in use."""
     along, across = places.room(station)
 
     def around(spot: Spot) -> Rectangle:
         return Rectangle(spot.x, spot.y, along, across, spot.yaw)
 
     spots = places.spots(station)
-    found = [around(spot) for spot in (spots if station.places is not None else spots[:parts])]
-    return [*found, places.body(station, parts)] if station.kind == "machine" else found
+    areas = [around(spot) for spot in (spots if station.places is not None else spots[:parts])]
+    return [*areas, places.body(station, parts)] if station.kind == "machine" else areas

@@ -24,7 +24,7 @@ RGBA: dict[str, Rgba] = {
 FRICTION = {"storage": 0.8, "buffer": 0.8, "machine": 0.5}
 MESHES = (".obj", ".stl")
 SMALLEST_M, LARGEST_M = 0.01, 3.0  # of a body's longest edge: beyond them its unit is not the metre
-HEAD_JOINTS, HEAD_LINK = ("head_x", "head_z"), "head"  # of a machine's own head, across and up
+HEAD_JOINTS, HEAD_LINK = ("head_x", "head_z"), "head"  # the joints of a machine's own head, across and up, and its link
 Array = NDArray[np.float64]
 
 
@@ -44,13 +44,13 @@ def build(world: World, station: Station, slab: tuple[Vector, Vector], folder: P
 
 
 def stands_at(station: Station, slab: tuple[Vector, Vector]) -> tuple[Vector, float]:
-    """Where a station's body is put [m], and how it is turned [rad]; `slab` as for `build`."""
+    """The position [m] and yaw [rad] of a station's body; `slab` as for `build`."""
     x, y, yaw = station.pose
     return (slab[1] if station.stands_on in ("slab", "box") else (x, y, 0.0)), yaw
 
 
 def check(station: Station, folder: Path) -> None:
-    """BadInput for a body from a file that cannot be read or is in another unit, and for one without the head that it needs."""
+    """Raises BadInput for a body file that cannot be read or is in another unit, or that lacks the head that it needs."""
     is_file = station.stands_on not in ("slab", "box")
     if is_file:
         low, high = bounds(station, folder)
@@ -63,7 +63,11 @@ def check(station: Station, folder: Path) -> None:
     if station.process is None:
         return
     root = urdf_reader.read(_file(station, folder)) if station.stands_on.lower().endswith(".urdf") else None
-    names = {} if root is None else {kind: [one.get("name") for one in root.iter(kind)] for kind in ("joint", "link")}
+    names = (
+        {}
+        if root is None
+        else {kind: [element.get("name") for element in root.iter(kind)] for kind in ("joint", "link")}
+    )
     lacking = [f"joint '{name}'" for name in HEAD_JOINTS if name not in names.get("joint", [])]
     lacking += [f"link '{HEAD_LINK}'"] if HEAD_LINK not in names.get("link", []) else []
     if lacking:
@@ -99,7 +103,7 @@ def _mesh_bounds(path: Path) -> tuple[Array, Array]:
         )  # opens no other file
         points = np.asarray(mesh.vertices, dtype=float)
         faces = len(mesh.faces)
-    except Exception as error:  # whatever a reader of meshes comes to over a stranger's file
+    except Exception as error:  # a mesh reader may raise anything for a foreign file
         raise BadInput(f"it cannot be read as {kind.upper()}: {type(error).__name__}: {error}") from None
     if faces < 1 or len(points) < 3 or points.shape[1:] != (3,) or not np.isfinite(points).all():
         raise BadInput(

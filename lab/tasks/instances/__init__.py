@@ -84,14 +84,14 @@ def _source(path: Path) -> Source:
 def format_of(source: Source) -> str:
     """The format of a file by its content, or by its ending where that is unclear; raises BadInput for no known format."""
     rows = [*source.rows()]
-    found = None if not rows else _of_text(source) or _of_numbers(source)
-    if found is None:
+    form_name = None if not rows else _of_text(source) or _of_numbers(source)
+    if form_name is None:
         suffix = source.path.suffix.lower()
-        found = next((name for name, one in INSTANCES.items() if suffix in one.suffixes), None)
-    if found is None or not rows:
+        form_name = next((name for name, form in INSTANCES.items() if suffix in form.suffixes), None)
+    if form_name is None or not rows:
         line, got = (rows[0][0], " ".join(rows[0][1])) if rows else (1, None)
         raise source.refusal(line, f"an instance ({', '.join(INSTANCES)})" + ("" if rows else ": it is empty"), got)
-    return found
+    return form_name
 
 
 def _of_text(source: Source) -> str | None:

@@ -45,17 +45,17 @@ def _sets(source: Source) -> dict[str, dict[tuple[int, int], tuple[str, float, i
     line, header = next(rows, (1, []))
     if tuple(word.lower() for word in header) != HEADER:
         raise source.refusal(line, ",".join(HEADER), ",".join(header))
-    found: dict[str, dict[tuple[int, int], tuple[str, float, int]]] = {}
+    sets: dict[str, dict[tuple[int, int], tuple[str, float, int]]] = {}
     for line, row in rows:
         if len(row) != len(HEADER):
             raise source.refusal(line, f"{len(HEADER)} values ({','.join(HEADER)})", ",".join(row))
         job = source.whole(row[1], line, "the job", 1, MAX_PARTS)
         key = job, source.whole(row[2], line, "the operation", 1, MOST_OPERATIONS)
-        own = found.setdefault(row[0], {})
+        own = sets.setdefault(row[0], {})
         if key in own:
             raise source.refusal(line, f"operation {key[1]} of job {job} of set {row[0]} once: this is the second")
         own[key] = row[3], source.time(row[4], line, "the time"), line
-    return found
+    return sets
 
 
 def _shop(source: Source, rows: Rows, machines: "tuple[str, ...] | list[str]") -> JobShop:
@@ -70,5 +70,5 @@ def _shop(source: Source, rows: Rows, machines: "tuple[str, ...] | list[str]") -
             raise source.refusal(line, f"operation {len(jobs[job])} of job {job} before", f"{operation}")
         if job != len(jobs):
             raise BadInput(f"{source.path}: line {line}: wanted job {len(jobs)} before job {job}: it has no row")
-    found = [[(one,) for one in job.values()] for job in jobs.values()]
-    return JobShop(len(machines), found, [*lines.values()])
+    operations = [[(one,) for one in job.values()] for job in jobs.values()]
+    return JobShop(len(machines), operations, [*lines.values()])

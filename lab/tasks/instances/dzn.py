@@ -65,7 +65,7 @@ def tokens(source: Source) -> Iterator[Token]:
 
 def values(source: Source) -> dict[str, Value]:
     """The value of each name; sets and strings are skipped. Raises BadInput, with line, for invalid MiniZinc data."""
-    words, found = [*tokens(source)], dict[str, Value]()
+    words, by_name = [*tokens(source)], dict[str, Value]()
     end, at = Token("the end of the file", words[-1].line if words else 1, "end"), 0
     while at < len(words):
         name, equals = words[at], words[at + 1] if at + 1 < len(words) else end
@@ -76,11 +76,11 @@ def values(source: Source) -> dict[str, Value]:
         stop = next((n for n in range(at + 2, len(words)) if words[n].text in (";", "=")), len(words))
         if stop < len(words) and words[stop].text == "=":
             raise source.refusal(words[stop].line, f"';' after the value of '{name.text}'", words[stop].text)
-        if name.text in found:
+        if name.text in by_name:
             raise source.refusal(name.line, f"'{name.text}' once: this is the second", name.text)
-        found[name.text] = _value(source, name, words[at + 2 : stop])
+        by_name[name.text] = _value(source, name, words[at + 2 : stop])
         at = stop + 1
-    return found
+    return by_name
 
 
 def _value(source: Source, name: Token, words: list[Token]) -> Value:
@@ -147,17 +147,17 @@ class _Data:
 
     def line(self, what: str) -> int | None:
         """The line where a value begins."""
-        found = self._value(what)
-        return None if found is None else found[1].line
+        named_value = self._value(what)
+        return None if named_value is None else named_value[1].line
 
     def count(self, what: str, default: int | None, most: int) -> int:
         """The value as an integer from 1 to `most`; default None: it is required."""
-        found = self._value(what)
-        if found is None:
+        named_value = self._value(what)
+        if named_value is None:
             if default is None:
                 raise self.source.refusal(None, f"a value of '{NAMES[what][0]}': there is none")
             return default
-        name, value = found
+        name, value = named_value
         if not value.single:
             raise self.source.refusal(value.line, f"one number as '{name}'", " ".join(w.text for w in value.rows[0]))
         return self.source.whole(value.rows[0][0].text, value.line, f"'{name}'", 1, most)
@@ -177,10 +177,10 @@ class _Data:
         return [times[count * n : count * (n + 1)] for n in range(count)]
 
     def _numbers(self, what: str, count: int) -> tuple[Value, list[float]]:
-        found = self._value(what)
-        if found is None:
+        named_value = self._value(what)
+        if named_value is None:
             raise self.source.refusal(None, f"a value of '{' or '.join(NAMES[what])}': there is none")
-        name, value = found
+        name, value = named_value
         words = [word for row in value.rows for word in row]
         if len(words) != count or value.single:
             raise self.source.refusal(value.line, f"{count} times as '{name}'", f"{len(words)}")

@@ -14,19 +14,19 @@ def read(source: Source, asked: InstanceRequest) -> CellFile:
     if len(rows) != 1 + jobs:
         line = rows[-1][0] if len(rows) <= jobs else rows[1 + jobs][0]
         raise source.refusal(line, f"{jobs} rows, one for each job", f"{len(rows) - 1} rows")
-    found = [_job(source, number, line, words, machines) for number, (line, words) in enumerate(rows[1:], 1)]
-    return cell_of_shop(source, JobShop(machines, found, [line for line, _ in rows[1:]]), asked)
+    operations = [_job(source, number, line, words, machines) for number, (line, words) in enumerate(rows[1:], 1)]
+    return cell_of_shop(source, JobShop(machines, operations, [line for line, _ in rows[1:]]), asked)
 
 
 def _job(source: Source, job: int, line: int, words: Sequence[str], machines: int) -> list[Operation]:
-    """The operations of a row, which holds their number and, for each, the number of machines and each machine's time."""
+    """The operations of a row, which contains their number and, for each, the number of machines and each machine's time."""
     rest = iter(words)
 
     def word(what: str) -> str:
-        found = next(rest, None)
-        if found is None:
+        following = next(rest, None)
+        if following is None:
             raise source.refusal(line, f"{what}: the row ends before it")
-        return found
+        return following
 
     what = f"how many operations job {job} has"
     operations = list[Operation]()

@@ -120,11 +120,11 @@ def _cell(
 def built(source: Source, raw: Mapping[str, Any]) -> CellFile:
     """The cell file of these fields; raises BadInput, beginning with the instance's file, for an invalid cell."""
     try:
-        found = CellFile.model_validate(raw)
+        cell_file = CellFile.model_validate(raw)
     except ValidationError as error:
         raise BadInput(f"{source.path}: {explain(error)}") from None
     try:
-        found.cell()
+        cell_file.cell()
     except BadInput as error:
         raise BadInput(f"{source.path}: {error}") from None
-    return found
+    return cell_file

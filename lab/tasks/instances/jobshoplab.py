@@ -43,17 +43,17 @@ class _Yaml:
         where = f"{self.where}.{key}" if self.where else key
         if not isinstance(self.node, yaml.MappingNode):
             raise self.source.refusal(self.line, f"a mapping under '{self.where}', with '{key}'")
-        found = [value for name, value in self.node.value if name.value == key]
-        return _Yaml(self.source, found[0], where) if found else None
+        values = [value for name, value in self.node.value if name.value == key]
+        return _Yaml(self.source, values[0], where) if values else None
 
     def need(self, *keys: str) -> "_Yaml":
         """The value under a path of keys; raises BadInput, with line, where one is missing."""
         at = self
         for key in keys:
-            found = at.get(key)
-            if found is None:
+            below = at.get(key)
+            if below is None:
                 raise self.source.refusal(at.line, f"'{key}' in '{at.where or 'the file'}': it has none")
-            at = found
+            at = below
         return at
 
     def table(self) -> Iterator[tuple[int, str]]:
@@ -93,8 +93,8 @@ def read(source: Source, asked: InstanceRequest) -> CellFile:
     """The cell of such a file; raises BadInput, with file and line, for a damaged one and for outages, tools and drawn times."""
     config = _parsed(source).need("instance_config")
     for key in _LEFT_OUT:
-        if (found := config.get(key)) is not None:
-            raise source.refusal(found.line, f"an instance without '{key}': the lab's cells do not have them")
+        if (refused := config.get(key)) is not None:
+            raise source.refusal(refused.line, f"an instance without '{key}': the lab's cells do not have them")
     logistics = config.need("logistics")
     for part in (config.need("instance"), logistics):
         behaviour = part.get("time_behavior")
@@ -131,7 +131,7 @@ def _jobs(source: Source, spec: _Yaml) -> tuple[int, list[list[Operation]], list
         raise source.refusal(line, f"a head such as (m0,t)|(m1,t), up to {MOST_MACHINES} machines", head)
     if not 1 <= len(rows) - 1 <= MAX_PARTS:
         raise source.refusal(line, f"1 to {MAX_PARTS} jobs below it", len(rows) - 1)
-    found = list[list[Operation]]()
+    jobs = list[list[Operation]]()
     for number, (line, text) in enumerate(rows[1:]):
         match = _JOB.fullmatch(text)
         if match is None or int(match[1]) != number:
@@ -145,8 +145,8 @@ def _jobs(source: Source, spec: _Yaml) -> tuple[int, list[list[Operation]], list
             which = f"of operation {step} of job {number}"
             at = source.whole(machine, line, f"the machine {which}", 0, machines - 1)
             operations.append(((at, source.time(time, line, f"the time {which}")),))
-        found.append(operations)
-    return machines, found, [line for line, _ in rows[1:]]
+        jobs.append(operations)
+    return machines, jobs, [line for line, _ in rows[1:]]
 
 
 def _travel(source: Source, spec: _Yaml, machines: int) -> TravelTimes:

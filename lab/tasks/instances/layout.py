@@ -76,24 +76,24 @@ def _listed(
     source: Source, rows: Iterator[tuple[int, list[str]]], header: list[str], case: str | None
 ) -> dict[str, dict[str, float]]:
     """The times of rows of from, to, time, with the layout in a first column if the header has one."""
-    found: dict[str, dict[str, dict[str, float]]] = {}
+    layouts: dict[str, dict[str, dict[str, float]]] = {}
     for line, row in rows:
         if len(row) != len(header):
             raise source.refusal(line, f"{len(header)} values ({','.join(header)})", ",".join(row))
-        travel = found.setdefault(row[0] if len(header) > 3 else "", {})
+        travel = layouts.setdefault(row[0] if len(header) > 3 else "", {})
         origin, target, word = row[-3:]
         if target in travel.get(origin, {}):
             raise source.refusal(line, f"one time from '{origin}' to '{target}': this is the second")
         travel.setdefault(origin, {})[target] = source.time(word, line, f"the time from '{origin}' to '{target}'")
     if len(header) == 3:
-        return found.get("", {})
-    if case is None and len(found) == 1:
-        return next(iter(found.values()))
-    if case not in found:
-        known = ", ".join([*found][:20]) or "none"
+        return layouts.get("", {})
+    if case is None and len(layouts) == 1:
+        return next(iter(layouts.values()))
+    if case not in layouts:
+        known = ", ".join([*layouts][:20]) or "none"
         said = "say which with --case SET:LAYOUT" if case is None else f"there is no layout '{case}' (--case)"
         raise source.refusal(None, f"one layout; the file has {known}: {said}")
-    return found[case]
+    return layouts[case]
 
 
 def _matrix(

@@ -72,10 +72,10 @@ def read(source: Source, asked: InstanceRequest) -> CellFile:
     _check_plain(document, {"jobs": jobs, "resources": resources, "tasks": tasks})
     ways = _ways(tasks, modes, len(resources))
     orders = _orders(document, jobs, tasks)
-    servers = {number: _servers(one) for number, one in enumerate(resources)}
-    due = [one.get("due_date") for one in jobs]
-    if any(one.value is None for one in due) and not all(one.value is None for one in due):
-        none = next(one for one in due if one.value is None)
+    servers = {number: _servers(resource) for number, resource in enumerate(resources)}
+    due = [job.get("due_date") for job in jobs]
+    if any(due_date.value is None for due_date in due) and not all(due_date.value is None for due_date in due):
+        none = next(due_date for due_date in due if due_date.value is None)
         raise none.refusal("a due date, as other jobs have one,", "null")
     shop = JobShop(
         len(resources),
@@ -83,8 +83,8 @@ def read(source: Source, asked: InstanceRequest) -> CellFile:
         [None] * len(jobs),
         servers,
         _setups(document, orders, len(resources)),
-        _unless_none([one.get("release_date", 0).whole(int(MOST_TIME)) for one in jobs], 0),
-        _unless_none([None if one.value is None else one.whole(int(MOST_TIME)) for one in due], None),
+        _unless_none([job.get("release_date", 0).whole(int(MOST_TIME)) for job in jobs], 0),
+        _unless_none([None if due_date.value is None else due_date.whole(int(MOST_TIME)) for due_date in due], None),
     )
     return cell_of_shop(source, shop, asked)
 
@@ -96,17 +96,17 @@ def _unless_none(values: Sequence[Any], none: Any) -> tuple[float, ...] | None:
 def _check_plain(document: _Json, lists: Mapping[str, Sequence[_Json]]) -> None:
     """Raises BadInput for features that the lab does not support."""
     for name, plain in PLAIN.items():
-        for one in lists[name]:
+        for item in lists[name]:
             for key, value in plain.items():
-                if (found := one.get(key, value)).value != value:
-                    raise found.refusal(
-                        f"{json.dumps(value)}, all that the lab's cells can have,", json.dumps(found.value)
+                if (given := item.get(key, value)).value != value:
+                    raise given.refusal(
+                        f"{json.dumps(value)}, all that the lab's cells can have,", json.dumps(given.value)
                     )
-    late = [one.get("deadline", NEVER) for one in lists["jobs"]]
-    late += [one.get(key, NEVER) for one in lists["tasks"] for key in ("latest_start", "latest_end")]
-    for found in late:
-        if found.whole(2**62) < NEVER:
-            raise found.refusal("no deadline, which the lab's cells do not have,", json.dumps(found.value))
+    late = [job.get("deadline", NEVER) for job in lists["jobs"]]
+    late += [task.get(key, NEVER) for task in lists["tasks"] for key in ("latest_start", "latest_end")]
+    for given in late:
+        if given.whole(2**62) < NEVER:
+            raise given.refusal("no deadline, which the lab's cells do not have,", json.dumps(given.value))
     constraints = document.get("constraints", {})
     for name, value in constraints.value.items() if isinstance(constraints.value, dict) else ():
         if value and name not in READ:
@@ -128,34 +128,34 @@ def _servers(resource: _Json) -> int:
 
 def _ways(tasks: Sequence[_Json], modes: Sequence[_Json], resources: int) -> list[Operation]:
     """The machines that can do each task, with their times."""
-    found: list[list[tuple[int, float]]] = [[] for _ in tasks]
+    choices_of: list[list[tuple[int, float]]] = [[] for _ in tasks]
     for mode in modes:
         used, demands = mode.get("resources", []), mode.get("demands", [])
         if len(used.each(resources)) != 1:
             raise used.refusal("one resource", json.dumps(used.value))
-        if any(one.value not in (0, 1) for one in demands.each(1)):
+        if any(demand.value not in (0, 1) for demand in demands.each(1)):
             raise demands.refusal("a demand of 0 or 1", json.dumps(demands.value))
         task = mode.get("task").whole(len(tasks) - 1)
         machine = used.each(1)[0].whole(resources - 1)
-        found[task].append((machine, float(mode.get("duration").whole(int(MOST_TIME)))))
-    for place, one in zip(tasks, found, strict=True):
-        if not one:
+        choices_of[task].append((machine, float(mode.get("duration").whole(int(MOST_TIME)))))
+    for place, machines in zip(tasks, choices_of, strict=True):
+        if not machines:
             raise place.refusal("a mode of this task: there is none")
-    return [tuple(one) for one in found]
+    return [tuple(choices) for choices in choices_of]
 
 
 def _orders(document: _Json, jobs: Sequence[_Json], tasks: Sequence[_Json]) -> list[list[int]]:
     """The tasks of each job in the order that the constraints `end_before_start` determine."""
     after: dict[int, set[int]] = {}
-    for one in document.get("constraints", {}).get("end_before_start", []).each(LISTS["modes"]):
-        if (delay := one.get("delay", 0)).value != 0:
+    for constraint in document.get("constraints", {}).get("end_before_start", []).each(LISTS["modes"]):
+        if (delay := constraint.get("delay", 0)).value != 0:
             raise delay.refusal("no delay, so 0,", json.dumps(delay.value))
-        first, then = (one.get(name).whole(len(tasks) - 1) for name in ("task1", "task2"))
+        first, then = (constraint.get(name).whole(len(tasks) - 1) for name in ("task1", "task2"))
         after.setdefault(first, set()).add(then)
     seen: set[int] = set()
     orders: list[list[int]] = []
     for job in jobs:
-        own = [one.whole(len(tasks) - 1) for one in job.get("tasks", []).each(MOST_OPERATIONS)]
+        own = [number.whole(len(tasks) - 1) for number in job.get("tasks", []).each(MOST_OPERATIONS)]
         if len({*own}) < len(own) or seen & {*own} or not own:
             raise job.get("tasks").refusal("tasks of this job's own, each once", json.dumps(job.get("tasks").value))
         seen |= {*own}
@@ -180,29 +180,29 @@ def _orders(document: _Json, jobs: Sequence[_Json], tasks: Sequence[_Json]) -> l
 
 def _reached(after: Mapping[int, set[int]], task: int) -> set[int]:
     """All tasks that must follow a task."""
-    found: set[int] = set()
+    following: set[int] = set()
     ahead = [*after.get(task, ())]
     while ahead:
-        if (one := ahead.pop()) not in found:
-            found.add(one)
+        if (one := ahead.pop()) not in following:
+            following.add(one)
             ahead += after.get(one, ())
-    return found
+    return following
 
 
 def _setups(document: _Json, orders: Sequence[Sequence[int]], machines: int) -> dict[int, dict[tuple[int, int], float]]:
     """The setup times of each machine: (job before, job after) -> time; a job has a single task on such a machine."""
     job_of = {task: number for number, order in enumerate(orders) for task in order}
-    found: dict[int, dict[tuple[int, int], float]] = {}
-    for one in document.get("constraints", {}).get("setup_times", []).each(LISTS["modes"]):
-        machine = one.get("machine").whole(machines - 1)
-        first, then = (one.get(name).whole(len(job_of) - 1) for name in ("task1", "task2"))
+    setups: dict[int, dict[tuple[int, int], float]] = {}
+    for setup in document.get("constraints", {}).get("setup_times", []).each(LISTS["modes"]):
+        machine = setup.get("machine").whole(machines - 1)
+        first, then = (setup.get(name).whole(len(job_of) - 1) for name in ("task1", "task2"))
         before, after = job_of[first], job_of[then]
-        seconds = float(one.get("duration").whole(int(MOST_TIME)))
-        if found.setdefault(machine, {}).get((before, after), seconds) != seconds:
-            raise one.refusal(f"one setup time from job {before} to job {after} on a machine", f"{seconds:g}, too")
+        seconds = float(setup.get("duration").whole(int(MOST_TIME)))
+        if setups.setdefault(machine, {}).get((before, after), seconds) != seconds:
+            raise setup.refusal(f"one setup time from job {before} to job {after} on a machine", f"{seconds:g}, too")
         if first != then:
-            found[machine][before, after] = seconds
-    return {machine: times for machine, times in found.items() if any(times.values())}
+            setups[machine][before, after] = seconds
+    return {machine: times for machine, times in setups.items() if any(times.values())}
 
 
 def write(file: CellFile) -> str:
@@ -241,11 +241,11 @@ def _document(file: CellFile) -> dict[str, Any]:
         kind = {"type": "machine"} if station.servers == 1 else {"type": "renewable", "capacity": station.servers}
         resources.append(kind | {"name": station.name})
     setups = [
-        {"machine": index[station.name], "task1": one, "task2": two, "duration": _whole(station.setup_s[a][b])}
+        {"machine": index[station.name], "task1": task, "task2": two, "duration": _whole(station.setup_s[a][b])}
         for station in machines
-        for a, one in on_machine.get(index[station.name], ())
+        for a, task in on_machine.get(index[station.name], ())
         for b, two in on_machine[index[station.name]]
-        if one != two and station.setup_s.get(a, {}).get(b)
+        if task != two and station.setup_s.get(a, {}).get(b)
     ]
     constraints = {"end_before_start": follow, "setup_times": setups}
     document = {"jobs": jobs, "resources": resources, "tasks": tasks, "modes": modes}

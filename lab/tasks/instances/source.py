@@ -48,10 +48,10 @@ class Source:
 
     def refusal(self, line: int | None, wanted: str, got: object = None) -> BadInput:
         """The error for a value that is not as expected; got: the value; None: there is none to show."""
-        found = str(got) if got is not None else ""
-        found = found if len(found) <= _SHOWN else f"{found[:_SHOWN]} ..."
+        shown = str(got) if got is not None else ""
+        shown = shown if len(shown) <= _SHOWN else f"{shown[:_SHOWN]} ..."
         where = f"{self.path}: " + ("" if line is None else f"line {line}: ")
-        return BadInput(f"{where}wanted {wanted}" + (f", not '{found}'" if got is not None else ""))
+        return BadInput(f"{where}wanted {wanted}" + (f", not '{shown}'" if got is not None else ""))
 
     def whole(self, word: str, line: int, what: str, least: int, most: int) -> int:
         """A word as an integer from `least` to `most`; raises BadInput, naming `what`, for anything else."""

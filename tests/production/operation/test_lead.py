@@ -102,7 +102,7 @@ def show(operation: Operation, *by_hand: str) -> None:
     for line in (f"lead {WAY}", *by_hand):
         done = operation.do(line)
         assert done.well, done
-        assert "the end of its way" in done.said
+        assert "the end of its path" in done.said
 
 
 def test_a_good_lead_is_learned_from_kept_and_carried_out(made: Made, tmp_path: Path) -> None:

@@ -178,18 +178,18 @@ def test_a_whole_way_is_drawn_shown_discarded_and_sent(tab: "Page", page: SeatPa
         tab.mouse.up()
 
     draw((0, 0), (0, 2), (1, 2))
-    assert tab.inner_text("#way-text") == "A way of 3 moves"
+    assert tab.inner_text("#way-text") == "A path of 3 moves"
     tab.keyboard.press("Escape")
     assert tab.is_hidden("#way")
     draw((0, 0), (1, 0), (0, 1))  # not through the wall
     draw((0, 1), (0, 2), (1, 2))  # on from where it ends
-    assert tab.inner_text("#way-text") == "A way of 3 moves"
+    assert tab.inner_text("#way-text") == "A path of 3 moves"
     tab.click("#way-send")
     until(tab, says(1, 2))
     assert "Episode 1 reached the goal in 3 steps" in tab.inner_text("#notices")
     for key in ("ArrowRight", "ArrowRight", "ArrowLeft", "ArrowRight", "ArrowDown"):  # one of them back, and on again
         tab.keyboard.press(f"Shift+{key}")
-    assert tab.inner_text("#way-text") == "A way of 3 moves"
+    assert tab.inner_text("#way-text") == "A path of 3 moves"
     tab.keyboard.press("Enter")
     until(tab, says(1, 3))
     tab.keyboard.press("a")

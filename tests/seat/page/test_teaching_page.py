@@ -312,7 +312,7 @@ def test_a_whole_way_answers_the_questions_along_it(page: SeatPage, request_1: A
         assert again.result(20) == RIGHT
         elsewhere = meanwhile(page.ask, replace(request_1, episode=2, step=2))  # it stayed in state 0
         seat = browser.hear_until(lambda seat: seat["question"] and "dropped" in str(seat["notices"]))
-        assert seat["notices"][-1]["text"].startswith("The rest of your way is dropped (2 moves)")
+        assert seat["notices"][-1]["text"].startswith("The rest of your path is dropped (2 moves)")
         assert browser.refused({"answer": {"question": seat["question"]["number"], "path": [RIGHT, 4]}})
         answer(browser, seat["question"]["number"], path=[0])
         assert elsewhere.result(20) == 0

@@ -85,8 +85,8 @@ def test_without_a_track_nobody_waits_for_it() -> None:
         ((Stretch("in", "a", 0.0),), "wanted two stations, and more than 0 s"),
         ((Stretch("in", "a", -1.0),), "track 'in' - 'a'"),
         ((*LINE, Stretch("a", "in", 3.0)), "track 'a' - 'in': it is there twice"),
-        (LINE[:2], "no way of .* s leads from .* to .* on it"),
-        ((*LINE[:2], Stretch("b", "out", 11.0)), "no way of .* s leads from .* to .* on it"),
+        (LINE[:2], "no path of .* s leads from .* to .* on it"),
+        ((*LINE[:2], Stretch("b", "out", 11.0)), "no path of .* s leads from .* to .* on it"),
     ],
 )
 def test_what_cannot_be_a_track(track: tuple[Stretch, ...], fault: str) -> None:

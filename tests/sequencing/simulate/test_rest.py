@@ -232,7 +232,7 @@ def test_out_of_use_the_other_oven_does_it() -> None:
     assert cell.unfinished == (2, 3)
     assert Run(cell).occupied[1] == 1
     assert Run(cell).refusal(1) == "toast 1 stays at 'left'"
-    assert Run(cell).refusal(3) == "toast 3 at 'in': the way by 'left' is closed"
+    assert Run(cell).refusal(3) == "toast 3 at 'in': the route by 'left' is closed"
     best = optimum(cell)
     assert best.sequence == (2, 3 + 3, 3)
     assert best.cost == cp_sat(cell).cost == 10.0 + 2.0 + 1.0 + 2.0 + 10.0 + 2.0
@@ -254,7 +254,7 @@ def test_a_stuck_part_shuts_others_out(oven_cell: CellMaker) -> None:
     assert rest.cell is None
     assert rest.stuck == {
         1: "toast 1 is not done in 'oven', which is out of use",
-        2: "toast 2 at 'in' has no way on: 'oven' is out of use",
+        2: "toast 2 at 'in' cannot continue: 'oven' is out of use",
     }
 
 
