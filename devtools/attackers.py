@@ -44,25 +44,25 @@ class Attack:
         except OSError:
             return None
 
-    def say(self, one: socket.socket, words: bytes) -> bool:
+    def say(self, connection: socket.socket, words: bytes) -> bool:
         """Whether the words could be sent."""
         try:
-            one.sendall(words)
+            connection.sendall(words)
         except OSError:
             return False
         return True
 
     def asked(self, words: bytes, wait_s: float = ANSWER_S) -> bytes:
         """The beginning of what the server answers, empty if it ends the connection."""
-        one = self.connect()
-        if one is None:
+        connection = self.connect()
+        if connection is None:
             return b""
-        with one:
-            if not self.say(one, words):
+        with connection:
+            if not self.say(connection, words):
                 return b""
-            one.settimeout(wait_s)
+            connection.settimeout(wait_s)
             try:
-                return one.recv(1 << 16)
+                return connection.recv(1 << 16)
             except TimeoutError:
                 return b"no answer"
             except OSError:
@@ -122,11 +122,11 @@ def flood(attack: Attack, words: bytes = b"", again: bytes = b"") -> None:
     """As many connections as possible, each of which sends something, and a little more from time to time."""
     held: list[tuple[socket.socket, Iterator[bytes]]] = []
     while attack.goes_on:
-        one = socket.socket()
-        one.setblocking(False)
-        one.connect_ex((HOST, attack.port))
+        opened = socket.socket()
+        opened.setblocking(False)
+        opened.connect_ex((HOST, attack.port))
         attack.tries += 1
-        held.append((one, chain([words], repeat(again))))
+        held.append((opened, chain([words], repeat(again))))
         other, says = held[attack.chance.randrange(len(held))]
         if words and select([], [other], [], 0)[1] and not attack.say(other, next(says)):
             held = [pair for pair in held if pair[0] is not other]
@@ -154,14 +154,14 @@ def large(attack: Attack) -> None:
     """Heads and bodies without end."""
     begun = b"POST / HTTP/1.1\r\nHost: 127.0.0.1\r\nTransfer-Encoding: chunked\r\n\r\n"
     while attack.goes_on:
-        one = attack.connect()
-        if one is None:
+        connection = attack.connect()
+        if connection is None:
             continue
-        with one:
+        with connection:
             chunked = attack.chance.random() < 0.5
-            attack.say(one, begun if chunked else b"GET / HTTP/1.1\r\nX: ")
+            attack.say(connection, begun if chunked else b"GET / HTTP/1.1\r\nX: ")
             while attack.goes_on and attack.say(
-                one, (b"10000\r\n" + b"x" * 65536 + b"\r\n") if chunked else b"x" * 65536
+                connection, (b"10000\r\n" + b"x" * 65536 + b"\r\n") if chunked else b"x" * 65536
             ):
                 pass
 
@@ -219,8 +219,8 @@ def pages(attack: Attack) -> None:
     while attack.goes_on:
         held.append(_page(attack))
         if len(held) > 40:
-            for one in filter(None, held[:20]):
-                one.close_socket()
+            for page in filter(None, held[:20]):
+                page.close_socket()
             held = held[20:]
 
 

@@ -54,7 +54,7 @@ def copied(evidence: Evidence) -> Evidence:
 
 def worked(evidence: Evidence) -> list[tuple[PartStays, Stay, float]]:
     """The stays of claimed parts in machines that work for a time, and for how long they do [s]."""
-    found = []
+    worked_stays = []
     for seen in evidence.parts:
         for stage in (stage for route in evidence.task.part(seen.kind).routes[:1] for stage in route):
             work_s = evidence.work_s(seen.kind, stage)
@@ -65,15 +65,15 @@ def worked(evidence: Evidence) -> list[tuple[PartStays, Stay, float]]:
                 and seen.name in evidence.claimed
                 and evidence.task.station(stage.station).process is None
             ):
-                found.append((seen, max(own, key=lambda stay: stay.seconds), work_s))
-    return found
+                worked_stays.append((seen, max(own, key=lambda stay: stay.seconds), work_s))
+    return worked_stays
 
 
-def drawn(rng: np.random.Generator, found: list[Any]) -> Any:
+def drawn(rng: np.random.Generator, choices: list[Any]) -> Any:
     """A random element; Impossible when there is none."""
-    if not found:
+    if not choices:
         raise Impossible
-    return found[int(rng.integers(len(found)))]
+    return choices[int(rng.integers(len(choices)))]
 
 
 def without(evidence: Evidence, from_s: float, to_s: float, rows: bool) -> Evidence:
@@ -123,33 +123,33 @@ def time_hidden(evidence: Evidence, rng: np.random.Generator) -> Violated:
 def station_swapped(evidence: Evidence, rng: np.random.Generator) -> Violated:
     """A part comes to two stations of its route in the wrong order."""
     pairs = [
-        (seen, one, other)
+        (seen, earlier, other)
         for seen in evidence.parts
-        for n, one in enumerate(seen.stays)
+        for n, earlier in enumerate(seen.stays)
         for other in seen.stays[n + 1 :]
-        if one.station != other.station and _stages(evidence, seen, one) and _stages(evidence, seen, other)
+        if earlier.station != other.station and _stages(evidence, seen, earlier) and _stages(evidence, seen, other)
     ]
-    seen, one, other = drawn(rng, pairs)
-    return _swapped(copied(evidence), seen, one, other)
+    seen, earlier, later = drawn(rng, pairs)
+    return _swapped(copied(evidence), seen, earlier, later)
 
 
 def _stages(evidence: Evidence, seen: PartStays, stay: Stay) -> bool:
     """Whether a stay is at a stage of the part's only route, and the only one there."""
     routes = evidence.task.part(seen.kind).routes
-    own = sum(one.station == stay.station for one in seen.stays)
+    own = sum(each.station == stay.station for each in seen.stays)
     return len(routes) == 1 and own == 1 and stay.station in [stage.station for stage in routes[0]]
 
 
-def _swapped(evidence: Evidence, seen: PartStays, one: Stay, other: Stay) -> Violated:
+def _swapped(evidence: Evidence, seen: PartStays, earlier: Stay, later: Stay) -> Violated:
     tracks, body = evidence.tracks, evidence.tracks.number(seen.name)
-    here, there = (stay.frames(evidence.tracks) for stay in (one, other))
+    here, there = (stay.frames(evidence.tracks) for stay in (earlier, later))
     at, elsewhere = tracks.poses[here, body][-1].copy(), tracks.poses[there, body][0].copy()
     tracks.poses[here, body], tracks.poses[there, body] = elsewhere, at
-    names = {one.station: other.station, other.station: one.station}
+    names = {earlier.station: later.station, later.station: earlier.station}
     for row in evidence.rows:
         if row["part"] == seen.name:
             row["station"], row["target"] = (names.get(row[field], row[field]) for field in ("station", "target"))
-    words = f"{seen.name} comes to {one.station} and {other.station} in the wrong order"
+    words = f"{seen.name} comes to {earlier.station} and {later.station} in the wrong order"
     return Violated(replace(evidence), seen.name, ("route", "end", "processing"), words)
 
 
@@ -164,19 +164,19 @@ def station_left_out(evidence: Evidence, rng: np.random.Generator) -> Violated:
 
 def overfull(evidence: Evidence, rng: np.random.Generator) -> Violated:
     """A part stands where others fill a station."""
-    found = []
+    guests = []
     for number, station in enumerate(evidence.task.stations):
         there = np.array([seen.occupies == number for seen in evidence.parts])
         full = np.flatnonzero(there.sum(axis=0) == station.capacity)
         runs = [run for run in np.split(full, np.flatnonzero(np.diff(full) > 1) + 1) if len(run) > 20]
         for run in runs:
-            found += [
+            guests += [
                 (station.name, run, seen) for seen, at in zip(evidence.parts, there, strict=True) if not at[run].any()
             ]
-    station, run, seen = drawn(rng, found)
+    station, run, seen = drawn(rng, guests)
     own = copied(evidence)
     tracks, place = own.tracks, next(n for n, s in enumerate(own.task.stations) if s.name == station)
-    inside = [one for one in evidence.parts if (one.occupies[run] == place).all()]
+    inside = [part for part in evidence.parts if (part.occupies[run] == place).all()]
     host = drawn(rng, inside)
     body = own.tracks.number(host.name if (host.at[run] == place).all() else f"{host.name}'s pallet")
     guest, first = tracks.number(seen.name), int(rng.integers(len(run) - 12))
@@ -249,18 +249,18 @@ def elsewhere(evidence: Evidence, rng: np.random.Generator) -> Violated:
 
 def two_in_hand(evidence: Evidence, rng: np.random.Generator) -> Violated:
     """The gripper carries two parts."""
-    pairs = [(one, other) for one in evidence.parts for other in evidence.parts if one is not other]
-    one, other = drawn(rng, pairs)
-    way = np.flatnonzero(one.carried)
+    pairs = [(carried, other) for carried in evidence.parts for other in evidence.parts if carried is not other]
+    carried, other = drawn(rng, pairs)
+    way = np.flatnonzero(carried.carried)
     if len(way) < 20:
         raise Impossible
     first = int(rng.integers(len(way) - 10))
     span, own = way[first : first + 10], copied(evidence)
     own.tracks.poses[span, own.tracks.number(other.name), :3] = own.tracks.poses[
-        span, own.tracks.number(one.name), :3
+        span, own.tracks.number(carried.name), :3
     ] + (0.0, 0.0, 0.1)
     return Violated(
-        replace(own), other.name, ("gripper", "schedule"), f"{one.name} and {other.name} are carried at once"
+        replace(own), other.name, ("gripper", "schedule"), f"{carried.name} and {other.name} are carried at once"
     )
 
 
@@ -320,12 +320,12 @@ def off_its_foot(evidence: Evidence, rng: np.random.Generator) -> Violated:
 
 def changed_places(evidence: Evidence, rng: np.random.Generator) -> Violated:
     """Two parts of one kind stand on each other's spots, for as long as both are at a station."""
-    found = []
+    shared_spans = []
     for one, other in ((a, b) for a in evidence.parts for b in evidence.parts if a.name < b.name and a.kind == b.kind):
         both = np.flatnonzero((one.at >= 0) & (one.at == other.at))
         runs = [run for run in np.split(both, np.flatnonzero(np.diff(both) > 1) + 1) if len(run) > 10]
-        found += [(one, other, run) for run in runs if run[0] > 0 or run[-1] < len(one.at) - 1]
-    one, other, run = drawn(rng, found)
+        shared_spans += [(one, other, run) for run in runs if run[0] > 0 or run[-1] < len(one.at) - 1]
+    one, other, run = drawn(rng, shared_spans)
     own = copied(evidence)
     a, b = own.tracks.number(one.name), own.tracks.number(other.name)
     own.tracks.poses[np.ix_(run, np.array([a, b]))] = own.tracks.poses[np.ix_(run, np.array([b, a]))]
@@ -379,15 +379,15 @@ def plan_changed(evidence: Evidence, rng: np.random.Generator) -> Violated:
     """The plan has two transfers in another order."""
     moves = [row for row in evidence.planned if row["operation"] == "carry"]
     pairs = [(a, b) for a, b in pairwise(moves) if (a["part"], a["station"]) != (b["part"], b["station"])]
-    one, other = drawn(rng, pairs)
+    first, second = drawn(rng, pairs)
     own = copied(evidence)
     rows = [dict(row) for row in own.planned]
     for row in rows:
-        for this, that in ((one, other), (other, one)):
+        for this, that in ((first, second), (second, first)):
             if all(row[key] == this[key] for key in ("operation", "part", "start_s")):
                 row |= {"start_s": that["start_s"], "end_s": that["end_s"]}
     return Violated(
-        replace(own, planned=rows), "", ("schedule",), f"{one['part']} and {other['part']} in another order"
+        replace(own, planned=rows), "", ("schedule",), f"{first['part']} and {second['part']} in another order"
     )
 
 
@@ -417,11 +417,13 @@ def evidence_of(folder: Path) -> Evidence:
 
 def missed(violated: Violated) -> str:
     """Why a violation was not found; "" when it was."""
-    found = audit(violated.evidence)
-    said = [one for one in found.findings if violated.part in ("", one.part) and one.rule in violated.rules]
-    if said and violated.part not in found.delivered:
+    report = audit(violated.evidence)
+    said = [
+        finding for finding in report.findings if violated.part in ("", finding.part) and finding.rule in violated.rules
+    ]
+    if said and violated.part not in report.delivered:
         return ""
-    return f"{violated.words}: the audit says {[(one.rule, one.words) for one in found.findings][:3]}"
+    return f"{violated.words}: the audit says {[(finding.rule, finding.words) for finding in report.findings][:3]}"
 
 
 def _prepare(room: Path, seed: int) -> int | None:
@@ -439,8 +441,8 @@ def _attempt(number: int, seed: int, room: Path) -> Outcome:
     runs = sorted(path.parent for path in room.glob("*/run.json"))
     if number < len(runs):
         folder = runs[number]
-        found = audit(evidence_of(folder)).findings
-        return Outcome("sound", folder.name, "; ".join(one.words for one in found))
+        findings = audit(evidence_of(folder)).findings
+        return Outcome("sound", folder.name, "; ".join(finding.words for finding in findings))
     rng = np.random.default_rng([seed, number])
     kind = VIOLATIONS[number % len(VIOLATIONS)]
     for _ in range(100):

@@ -25,7 +25,7 @@ METHODS = tuple(SEQUENCERS)
 def prepare(room: Path, seed: int) -> int:
     """Writes the shops; as many attempts as methods, EACH times."""
     for name in (SHOP, LATE):
-        kind = next(one for one in KINDS if one.name == name)
+        kind = next(known for known in KINDS if known.name == name)
         (room / name).mkdir(exist_ok=True)
         words, _ = written(drawn(kind, seed), kind, room / name)
         (room / name / "words.json").write_text(json.dumps(words), encoding="utf-8")
@@ -77,17 +77,17 @@ def judged(ended: Ended) -> str:
         return broke
     if ended.stdout.count("\n") != 1:
         return f"{ended.stdout.count(chr(10))} lines instead of one document"
-    found = json.loads(ended.stdout)
-    if "error" in found:
-        return f"no order: {found['error']}"
-    if (found["stopped_by"], found["interrupted"]) != ("Ctrl-C", True):
-        return f"stopped by {found['stopped_by']}"
-    if not found["best_sequence"] or len(found["best_moves"]) != len(found["best_sequence"]):
+    document = json.loads(ended.stdout)
+    if "error" in document:
+        return f"no order: {document['error']}"
+    if (document["stopped_by"], document["interrupted"]) != ("Ctrl-C", True):
+        return f"stopped by {document['stopped_by']}"
+    if not document["best_sequence"] or len(document["best_moves"]) != len(document["best_sequence"]):
         return "its order is empty"
-    if not 0 < found["bound_cost"] <= found["best_cost"] + SAME and found["objective"] == "makespan":
-        return f"bound {found['bound_cost']}, best {found['best_cost']}"
-    if found["optimum_proven"] != (found["best_cost"] <= found["bound_cost"] + SAME):
-        return f"proven: {found['optimum_proven']}, bound {found['bound_cost']}, best {found['best_cost']}"
+    if not 0 < document["bound_cost"] <= document["best_cost"] + SAME and document["objective"] == "makespan":
+        return f"bound {document['bound_cost']}, best {document['best_cost']}"
+    if document["optimum_proven"] != (document["best_cost"] <= document["bound_cost"] + SAME):
+        return f"proven: {document['optimum_proven']}, bound {document['bound_cost']}, best {document['best_cost']}"
     return ""
 
 

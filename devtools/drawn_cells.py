@@ -157,7 +157,7 @@ def written(cell: DrawnCell, poses: dict[str, list[float]], places: Places | Non
         robot |= {"opening_m": round(widest + FINGERS_M, 4)} if widest + FINGERS_M < most else {}
     more = {name: table for name, table in cell.more.items() if name != "pallet"}
     if "obstacles" in more:
-        more["obstacles"] = [{**one, "position_m": _midway(poses)} for one in more["obstacles"]]
+        more["obstacles"] = [{**obstacle, "position_m": _midway(poses)} for obstacle in more["obstacles"]]
     workspace = _workspace(cell, poses, places)
     tables = {"robot": robot, "parts": parts, "workspace": workspace, "stations": stations, **more}
     return "\n".join(['name = "drawn"', "", *_lines(tables)])
@@ -166,8 +166,8 @@ def written(cell: DrawnCell, poses: dict[str, list[float]], places: Places | Non
 def _midway(poses: dict[str, list[float]]) -> list[float]:
     """Between the two neighbours that are farthest apart, a little farther out than they are [m]."""
     at = list(poses.values())
-    one, other = max(pairwise(at), key=lambda pair: hypot(pair[0][0] - pair[1][0], pair[0][1] - pair[1][1]))
-    return [round(0.55 * (a + b), 3) for a, b in zip(one[:2], other[:2], strict=True)]
+    here, there = max(pairwise(at), key=lambda pair: hypot(pair[0][0] - pair[1][0], pair[0][1] - pair[1][1]))
+    return [round(0.55 * (a + b), 3) for a, b in zip(here[:2], there[:2], strict=True)]
 
 
 def _station(cell: DrawnCell, name: str, pose: list[float], places: Places | None) -> Table:
@@ -216,15 +216,15 @@ def _workspace(cell: DrawnCell, poses: dict[str, list[float]], places: Places | 
 
 def _lines(tables: Table) -> Iterator[str]:
     for name, table in tables.items():
-        for one in table if isinstance(table, list) else [table]:
+        for entry in table if isinstance(table, list) else [table]:
             yield f"[[{name}]]" if isinstance(table, list) else f"[{name}]"
-            yield from (f"{key} = {_value(value)}" for key, value in one.items())
+            yield from (f"{key} = {_value(value)}" for key, value in entry.items())
             yield ""
 
 
 def _value(value: Any) -> str:
     if isinstance(value, dict):
-        return "{ " + ", ".join(f"{key} = {_value(one)}" for key, one in value.items()) + " }"
+        return "{ " + ", ".join(f"{key} = {_value(inner)}" for key, inner in value.items()) + " }"
     if isinstance(value, list):
-        return f"[{', '.join(_value(one) for one in value)}]"
+        return f"[{', '.join(_value(inner) for inner in value)}]"
     return json.dumps(value)

@@ -104,7 +104,7 @@ def cover(cell: DrawnCell) -> bool:
     for key in ("processing_s", "high_m"):
         del table[key]
     table |= {"process": "glue", "capacity": 1, "body": "applier.urdf", "floor_m": 0.02}
-    grid = [int(one) for one in cell.rng.integers(1, 4, 2)]
+    grid = [int(count) for count in cell.rng.integers(1, 4, 2)]
     cell.more.setdefault("processes", {})["glue"] = {"grid": grid, "dwell_s": 1.0, "speed_m_s": 0.03}
     return True
 
@@ -137,7 +137,7 @@ def pallets(cell: DrawnCell) -> bool:
     for name in cell.machines():  # an empty pallet is carried from the buffer before a machine to the one after it
         cell.stations[name] |= {"pallet": True}
         cell.stations[name].pop("buffer", None)
-    cell.stations = {name: one for name, one in cell.stations.items() if one["kind"] != "buffer"}
+    cell.stations = {name: table for name, table in cell.stations.items() if table["kind"] != "buffer"}
     route = ["in"]
     for name in cell.route[1:-1]:
         for beside_it in (f"{name}-in", f"{name}-out"):
@@ -211,9 +211,9 @@ def level_tool(cell: DrawnCell) -> bool:
     for part in cell.parts:
         part.table.pop("grip", None)
     ends = {name: cell.stations[name] | {"high_m": shelf} for name in ("in", "out")}
-    for one in ends.values():
-        one.pop("places", None)
-        one["capacity"] = cell.count()
+    for table in ends.values():
+        table.pop("places", None)
+        table["capacity"] = cell.count()
     furnace = {"kind": "machine", "capacity": 1, "processing_s": 20.0, "body": "furnace.urdf", "floor_m": 0.12,
                "approach": "side"}  # fmt: skip
     cell.stations = {"in": ends["in"], "furnace": furnace, "out": ends["out"]}

@@ -44,10 +44,10 @@ def evenly(rng: np.random.Generator, ends: tuple[float, float]) -> str:
 def drawn(text: str, rng: np.random.Generator) -> str:
     """A task file with other masses, frictions, grip, speeds, and stations somewhere near."""
 
-    def moved(found: re.Match[str]) -> str:
-        x, y, yaw = json.loads(found[2])
+    def moved(match: re.Match[str]) -> str:
+        x, y, yaw = json.loads(match[2])
         dx, dy, turn = rng.uniform(-1, 1, 3) * (MOVED_M, MOVED_M, TURNED_RAD)
-        return f"{found[1]}[{x + dx:.4f}, {y + dy:.4f}, {yaw + turn:.4f}] "
+        return f"{match[1]}[{x + dx:.4f}, {y + dy:.4f}, {yaw + turn:.4f}] "
 
     for line, ends in (
         (MASS, MASS_KG),
@@ -55,9 +55,9 @@ def drawn(text: str, rng: np.random.Generator) -> str:
         (SPEED, SPEED_M_S),
         (ACCELERATION, ACCELERATION_M_S2),
     ):
-        text = line.sub(lambda found, ends=ends: found[1] + evenly(rng, ends) + " ", text)  # type: ignore[misc]
+        text = line.sub(lambda match, ends=ends: match[1] + evenly(rng, ends) + " ", text)  # type: ignore[misc]
     most = int(rng.integers(1, PARTS + 1))
-    text = COUNT.sub(lambda found: f"count = {min(int(found[1]), most)}", text)
+    text = COUNT.sub(lambda match: f"count = {min(int(match[1]), most)}", text)
     force = f"grip_force_n = {evenly(rng, FORCE_N)}" if rng.random() < 0.5 else ""
     text = FORCE.sub(force, text)
     return POSE.sub(moved, text) if rng.random() < 0.5 else text
@@ -75,7 +75,7 @@ def attempt(number: int, seed: int, room: Path) -> Outcome:
     rmtree(folder, ignore_errors=True)
     if number % SHIPPED == 0:
         name = TASKS[number // SHIPPED % len(TASKS)]
-        copytree(find(name).parent, folder, ignore=lambda _, names: [one for one in names if one.endswith(".toml")])
+        copytree(find(name).parent, folder, ignore=lambda _, names: [name for name in names if name.endswith(".toml")])
         text = drawn(find(name).read_text(encoding="utf-8"), rng)
     else:
         folder.mkdir(parents=True)

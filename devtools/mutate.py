@@ -126,11 +126,11 @@ def _lines(content: bytes, chance: Random) -> bytes:
 
 
 def _replaced(content: bytes, chance: Random, pattern: re.Pattern[bytes], by: Callable[[bytes], bytes]) -> bytes:
-    found = list(pattern.finditer(content[:200_000]))
-    if not found:
+    matches = list(pattern.finditer(content[:200_000]))
+    if not matches:
         return _flip(content, chance)
-    one = chance.choice(found)
-    return content[: one.start()] + by(one[0]) + content[one.end() :]
+    match = chance.choice(matches)
+    return content[: match.start()] + by(match[0]) + content[match.end() :]
 
 
 def _number(content: bytes, chance: Random) -> bytes:

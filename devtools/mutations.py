@@ -38,7 +38,7 @@ def read_batch(room: Path, name: str, seed: int, first: int, tries: int, folder:
     """What came of so many damaged files of a kind; a process that a file has killed is followed by another."""
     home = room / folder
     home.mkdir(exist_ok=True)
-    found: Counter[str] = Counter()
+    counts: Counter[str] = Counter()
     broke: list[dict[str, str]] = []
     figures = {"s": 0.0, "MB": 0.0}
     at, end = first, first + tries
@@ -52,7 +52,7 @@ def read_batch(room: Path, name: str, seed: int, first: int, tries: int, folder:
             last: dict[str, Any] = json.loads(lines[-1])
             broke += last.pop("broke")
             figures = {"s": max(figures["s"], last.pop("slowest_s")), "MB": max(figures["MB"], last.pop("most_mb"))}
-            found.update(last)
+            counts.update(last)
             break
         if not lines or death == MOST_DEATHS:
             raise RuntimeError(f"{name}: no batch: exit {ended.code}: {ended.stderr[-600:]}")
@@ -60,20 +60,20 @@ def read_batch(room: Path, name: str, seed: int, first: int, tries: int, folder:
         broke.append(
             {"case": f"{name} {killer}", "why": f"the process ended with {ended.code}: {ended.stderr[-200:]!r}"}
         )
-        found.update(tries=killer + 1 - at)
+        counts.update(tries=killer + 1 - at)
         at = killer + 1
         if at == end:
             break
     case = f"{name}, {tries} files from {first}, seed {seed}"
-    shares = {f"{what} %": round(100 * found[what] / tries) for what in ("read", "refused")}
-    return Outcome(name, case, told_of(broke, tries), found["tries"], {**figures, **shares})
+    shares = {f"{what} %": round(100 * counts[what] / tries) for what in ("read", "refused")}
+    return Outcome(name, case, told_of(broke, tries), counts["tries"], {**figures, **shares})
 
 
 def told_of(broke: list[dict[str, str]], tries: int) -> str:
     """What broke, each sort of fault with how often it came and its first case; empty if nothing did."""
     sorts: dict[str, list[dict[str, str]]] = {}
-    for one in broke:
-        sorts.setdefault(one["why"].partition(" (")[2] or one["why"][:60], []).append(one)
+    for fault in broke:
+        sorts.setdefault(fault["why"].partition(" (")[2] or fault["why"][:60], []).append(fault)
     told = [f"{len(same)} x {same[0]['case']}: {same[0]['why']}" for same in sorts.values()]
     return f"{len(broke)} of {tries}: {'; '.join(told[:MOST_TOLD])}" if broke else ""
 

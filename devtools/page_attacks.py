@@ -89,8 +89,8 @@ def lesson(
 def _address(child: "subprocess.Popen[bytes]", said: Path) -> tuple[int, str]:
     """Port and token of the page, once the lesson has printed them."""
     for _ in range(600):
-        if found := re.search(r"127\.0\.0\.1:(\d+)/\?token=(\S+)", said.read_text(errors="replace")):
-            return int(found[1]), found[2]
+        if match := re.search(r"127\.0\.0\.1:(\d+)/\?token=(\S+)", said.read_text(errors="replace")):
+            return int(match[1]), match[2]
         if child.poll() is not None:
             break
         time.sleep(0.1)

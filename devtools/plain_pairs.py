@@ -63,8 +63,8 @@ def drawn(kind: Kind, seed: int) -> dict[str, Any]:
         more = [rng.choice(kind.machines, int(rng.integers(1, kind.choices + 1)), replace=False) for _ in first]
         jobs.append(
             [
-                {int(m): int(rng.integers(3, 31)) for m in {one, *others[1:]}}
-                for one, others in zip(first, more, strict=True)
+                {int(m): int(rng.integers(3, 31)) for m in {own_machine, *choices[1:]}}
+                for own_machine, choices in zip(first, more, strict=True)
             ]
         )
     points = rng.integers(0, 12, (kind.machines + 1, 2))
@@ -86,7 +86,7 @@ def written(shop: dict[str, Any], kind: Kind, folder: Path) -> tuple[list[str], 
     plain.write_text(json.dumps(shop), encoding="utf-8")
     if kind.due:
         tasks = [(job, times) for job, own in enumerate(jobs) for times in own]
-        numbers = [[n for n, (job, _) in enumerate(tasks) if job == one] for one in range(len(jobs))]
+        numbers = [[n for n, (job, _) in enumerate(tasks) if job == number] for number in range(len(jobs))]
         document = {
             "jobs": [{"tasks": own, "due_date": due} for own, due in zip(numbers, shop["due"], strict=True)],
             "resources": [{"type": "machine"} for _ in range(kind.machines)],
@@ -169,16 +169,16 @@ def main() -> None:
             spent: list[list[float]] = [[], []]
             for _ in range(asked.rounds):
                 for at, command in enumerate((plain, ours)):
-                    wall, cpu, found = timed(command)
+                    wall, cpu, printed = timed(command)
                     walls[at].append(wall)
                     spent[at].append(cpu)
                     if at == 0:
                         cost, proven = (
-                            found["cost"] / (len(shop["jobs"]) if kind.due else 1),
-                            found["status"] == "OPTIMAL",
+                            printed["cost"] / (len(shop["jobs"]) if kind.due else 1),
+                            printed["status"] == "OPTIMAL",
                         )
                     else:
-                        lab_cost, lab_proven = found["best_cost"], found["optimum_proven"]
+                        lab_cost, lab_proven = printed["best_cost"], printed["optimum_proven"]
             if proven and (lab_cost < cost - SAME or (lab_proven and abs(lab_cost - cost) > SAME)):
                 wrong += 1
             middle = [statistics.median(each) for each in (*walls, *spent)]

@@ -48,9 +48,9 @@ def sound_files(folder: Path, room: Path, kind: Kind) -> list[Path]:
     """The kind's sound files in a folder of their own, those that are to be damaged."""
     folder.mkdir(parents=True, exist_ok=True)
     kind.made(folder, room)
-    found = sorted(path for path in folder.glob(kind.which) if path.is_file())
-    assert found, f"no file {kind.which}"
-    return found
+    files = sorted(path for path in folder.glob(kind.which) if path.is_file())
+    assert files, f"no file {kind.which}"
+    return files
 
 
 def verdict(kind: Kind, path: Path) -> tuple[str, str]:
@@ -77,7 +77,7 @@ def _where() -> str:
     """The last line of the lab's own code that an exception came through."""
     from lab.files import PACKAGE
 
-    frames = [(Path(one.filename), one.lineno) for one in traceback.extract_tb(sys.exc_info()[2])]
+    frames = [(Path(frame.filename), frame.lineno) for frame in traceback.extract_tb(sys.exc_info()[2])]
     own = [(path.relative_to(PACKAGE), line) for path, line in frames if path.is_relative_to(PACKAGE)]
     return "{}:{}".format(*own[-1]) if own else "outside the lab"
 
@@ -149,8 +149,8 @@ def main(room: str, name: str, seed: str, first: str, count: str, told: str) -> 
             faulthandler.dump_traceback_later(HANGS_S, exit=True)
 
         try:
-            found = batch(Path(room), name, int(seed), range(int(first), int(first) + int(count)), say, folder)
-            lines.write(json.dumps(asdict(found)) + "\n")
+            told_at_last = batch(Path(room), name, int(seed), range(int(first), int(first) + int(count)), say, folder)
+            lines.write(json.dumps(asdict(told_at_last)) + "\n")
         finally:
             shutil.rmtree(folder, ignore_errors=True)
 

@@ -385,7 +385,7 @@ def _program(path: Path) -> object:
 def _read_back(path: Path) -> object:
     from lab.export import FORMATS
 
-    texts = {one.name: one.read_bytes().decode("utf-8", "replace") for one in path.parent.iterdir()}
+    texts = {file.name: file.read_bytes().decode("utf-8", "replace") for file in path.parent.iterdir()}
     return FORMATS[path.parent.name].read(texts, _up6())
 
 
@@ -466,8 +466,8 @@ def _lens(path: Path) -> object:
     from lab.vision import read_picture
     from lab.vision.calibration import read_calibration
 
-    found = read_calibration(path)
-    return found.lens.straightened(read_picture(path.with_name("00001.png")))
+    calibration = read_calibration(path)
+    return calibration.lens.straightened(read_picture(path.with_name("00001.png")))
 
 
 def _scored(path: Path) -> object:

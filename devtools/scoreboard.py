@@ -16,15 +16,15 @@ SHOWN = 12  # of what broke, told under the table; all of it is in the files
 
 def written(file: Path) -> dict[int, Outcome]:
     """The outcomes in a file, by number; a line that was cut short is not counted."""
-    found = {}
+    outcomes = {}
     for line in file.read_text(encoding="utf-8").splitlines() if file.exists() else ():
         try:
             row = json.loads(line)
         except json.JSONDecodeError:
             continue
         number = row.pop("number")
-        found[number] = Outcome(**row)
-    return found
+        outcomes[number] = Outcome(**row)
+    return outcomes
 
 
 def line(number: int, outcome: Outcome) -> str:
@@ -38,14 +38,14 @@ def rows(outcomes: Iterable[Outcome]) -> Iterator[dict[str, Any]]:
     for outcome in outcomes:
         groups.setdefault(outcome.group, []).append(outcome)
     for group, members in sorted(groups.items()):
-        broken = [one for one in members if one.broke]
+        broken = [member for member in members if member.broke]
         figures: dict[str, float] = {}
-        for one in members:
-            for name, value in (one.figures or {}).items():
+        for member in members:
+            for name, value in (member.figures or {}).items():
                 figures[name] = max(value, figures.get(name, value))
-        tries = sum(one.tries for one in members)
+        tries = sum(member.tries for member in members)
         yield {"group": group, "tries": tries, "broke": len(broken), "most": figures,
-               "broken": [{"case": one.case, "broke": one.broke} for one in broken]}  # fmt: skip
+               "broken": [{"case": member.case, "broke": member.broke} for member in broken]}  # fmt: skip
 
 
 def show(parts: dict[str, Part], folder: Path, console: Console) -> bool:
@@ -58,7 +58,7 @@ def show(parts: dict[str, Part], folder: Path, console: Console) -> bool:
         for n, row in enumerate(counted):
             most = ", ".join(f"{figure} {value:.4g}" for figure, value in row["most"].items())
             table.add_row("" if n else name, row["group"], str(row["tries"]), str(row["broke"]), most)
-            broken += [f"{name}: {one['case']}: {one['broke']}" for one in row["broken"]]
+            broken += [f"{name}: {attempt['case']}: {attempt['broke']}" for attempt in row["broken"]]
         if counted:
             total, lost = (sum(row[key] for row in counted) for key in ("tries", "broke"))
             table.add_row(

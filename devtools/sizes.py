@@ -108,9 +108,11 @@ def _cell(path: Path) -> None:
     lines += [json.dumps(["in", *machines[14 * way : 14 * way + 14], "out"]) + "," for way in range(7)]
     lines += ["]", "[travel]"]
     stations = ["in", *machines, "out"]
-    for one in stations:
+    for station in stations:
         lines.append(
-            f"{one} = {{ " + ", ".join(f"{other} = {rng.randint(5, 30)}" for other in stations if other != one) + " }"
+            f"{station} = {{ "
+            + ", ".join(f"{target} = {rng.randint(5, 30)}" for target in stations if target != station)
+            + " }"
         )
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 

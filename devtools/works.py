@@ -205,7 +205,7 @@ def undisturbed(name: str, room: Path) -> Undisturbed:
 
 def state(home: Path) -> dict[str, str]:
     """What is in a home, by a name that is the same in any home and whatever the time."""
-    found: Counter[str] = Counter()
+    counts: Counter[str] = Counter()
     for path in sorted(home.rglob("*")):
         inside = path.relative_to(home).as_posix()
         if (
@@ -219,15 +219,15 @@ def state(home: Path) -> dict[str, str]:
             folder = inside.rpartition("/")[0]
             try:
                 held = decode(path.read_bytes(), inside)
-                found[f"{folder}: policy {held.name}: {_fingerprint(held)}"] += 1
+                counts[f"{folder}: policy {held.name}: {_fingerprint(held)}"] += 1
             except BadInput:
-                found[f"{inside}: damaged"] += 1
+                counts[f"{inside}: damaged"] += 1
         elif inside.startswith("toolbox/sessions/") or path.name == "events.jsonl":
-            found[f"session's {path.name}: {_digest(content)}"] += 1
+            counts[f"session's {path.name}: {_digest(content)}"] += 1
         else:
             content = _timeless(content) if path.suffix == ".json" else content
-            found[f"{inside}: {_digest(content)}"] += 1
-    return {what: str(many) for what, many in found.items()}
+            counts[f"{inside}: {_digest(content)}"] += 1
+    return {what: str(many) for what, many in counts.items()}
 
 
 def _fingerprint(held: Policy) -> str:
@@ -320,9 +320,9 @@ def unsound(home: Path) -> str:
 
 def leftovers(home: Path) -> str:
     """What commands should have taken away: drafts, and folders of sessions without a session; "" for nothing."""
-    found = [path for pattern in _LEFT for path in home.rglob(pattern)]
-    found += [folder for folder in home.glob("toolbox/sessions/*") if not _is_session(folder)]
-    return f"left over: {found[0].relative_to(home)}" if found else ""
+    remains = [path for pattern in _LEFT for path in home.rglob(pattern)]
+    remains += [folder for folder in home.glob("toolbox/sessions/*") if not _is_session(folder)]
+    return f"left over: {remains[0].relative_to(home)}" if remains else ""
 
 
 def _is_session(folder: Path) -> bool:

@@ -30,8 +30,8 @@ class _In:
 
     def __call__(self, job: "Job", reading: Mapping[str, Any]) -> "Findings":
         function = getattr(import_module(f"{__name__}.{self.module}"), self.function)
-        found: Findings = function(job, reading, *self.given)
-        return found
+        findings: Findings = function(job, reading, *self.given)
+        return findings
 
 
 STUDIES: dict[str, Study] = {

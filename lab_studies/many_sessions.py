@@ -62,11 +62,11 @@ def run_sessions(
     search.check(cell)
     seeds = session_seeds(seed, sessions)
     size = max(1, CHUNK // search.episodes)
-    found = []
+    chunks = []
     for n in range(0, sessions, size):
         chunk = _chunk(cell, METHODS[method], search, seeds[n : n + size])
-        found.append(chunk if keep_costs else chunk._replace(costs=chunk.costs[:0]))
-    return Sessions(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
+        chunks.append(chunk if keep_costs else chunk._replace(costs=chunk.costs[:0]))
+    return Sessions(*(np.concatenate(parts) for parts in zip(*chunks, strict=True)))
 
 
 def evaluate(
@@ -103,16 +103,18 @@ def _chunk(cell: Cell, kind: type[SessionLearner], search: Search, seeds: NDArra
     """Some sessions, with all their costs."""
     keys, moves = kind.keys(cell, search.settings), most_moves(cell)
     if keys is None or min(keys.size, search.episodes * moves) > MOST_ROWS:
-        found = SessionOutcomes.room(len(seeds), search.episodes, moves)
+        outcomes = SessionOutcomes.room(len(seeds), search.episodes, moves)
         for n, seed in enumerate(seeds.tolist()):
             learned = learn(cell, replace(search, on_episode=None), seed, kind)
-            found.costs[n], found.ends[n] = learned.log.costs, (learned.log.best_cost, learned.final_cost)
-            found.sequences[n, : len(learned.log.best)] = learned.log.best
+            outcomes.costs[n], outcomes.ends[n] = learned.log.costs, (learned.log.best_cost, learned.final_cost)
+            outcomes.sequences[n, : len(learned.log.best)] = learned.log.best
     else:
-        found = _together(cell, kind(search), search, keys, seeds)
+        outcomes = _together(cell, kind(search), search, keys, seeds)
     if kind is SessionLearner:
-        found.ends[:, 1] = np.nan
-    return Sessions(found.ends[:, 0], found.ends[:, 1], _convergence(found.costs), found.sequences, found.costs)
+        outcomes.ends[:, 1] = np.nan
+    return Sessions(
+        outcomes.ends[:, 0], outcomes.ends[:, 1], _convergence(outcomes.costs), outcomes.sequences, outcomes.costs
+    )
 
 
 def _together(
@@ -120,11 +122,11 @@ def _together(
 ) -> SessionOutcomes:
     """Sessions in one compiled call."""
     moves, epsilons = most_moves(cell), [learner.epsilon(episode) for episode in range(1, search.episodes + 1)]
-    found = SessionOutcomes.room(len(seeds), search.episodes, moves)
+    outcomes = SessionOutcomes.room(len(seeds), search.episodes, moves)
     work = session_arrays(cell, value_table(keys.size, search.episodes * moves, learner.first))
-    session_kernels.advance(learner.learning(cell, keys), work, seeds, np.array(epsilons), 1, found)
-    learner.check(float(found.costs.min()))
-    return found
+    session_kernels.advance(learner.learning(cell, keys), work, seeds, np.array(epsilons), 1, outcomes)
+    learner.check(float(outcomes.costs.min()))
+    return outcomes
 
 
 def _convergence(costs: Floats) -> Ints:

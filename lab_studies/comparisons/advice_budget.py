@@ -25,7 +25,9 @@ VIEWS: tuple[Literal["full", "limited"], ...] = ("full", "limited")
 WRONG, NOBODY = "wrong", "nobody"
 ADVISORS = (*SKILL_TAUS, WRONG)
 CCRL = ("ccrl",)
-ASKING = tuple(gate for gate, one in GATES.items() if gate != "never" and not (one.compiled and one.compiled.weighs))
+ASKING = tuple(
+    gate for gate, known in GATES.items() if gate != "never" and not (known.compiled and known.compiled.weighs)
+)
 AGAINST = {False: "alone", True: "alone, with memory"}
 TARGETS = {"expert": (99.0, 24.0), "moderate": (98.0, 60.0), "limited": (85.0, 150.0), "novice": (63.0, 10.0)}
 MOST_BELOW = -2.0  # points of success that an advisor may cost against learning alone: the target
@@ -58,18 +60,18 @@ WORST = (
 
 def advice_budget(job: Job, reading: Mapping[str, Any]) -> Findings:
     """Every gate, advisor and world, with and without memory; advisors know the exact values unless read otherwise."""
-    cells = {cell: tuple(replace(one, **reading) for one in ones) for cell, ones in settings().items()}
+    cells = {cell: tuple(replace(setting, **reading) for setting in group) for cell, group in settings().items()}
     outcomes = _outcomes(job, cells)
     table = next(iter(cells.values()))[0].advisor_table
-    rows = [one for cell, outcome in outcomes.items() for one in rows_of(cell, outcome, table)]
+    rows = [result for cell, outcome in outcomes.items() for result in rows_of(cell, outcome, table)]
     below = [
-        one
+        result
         for gates in (CCRL, ASKING)
         for place in PLACES
         for view in VIEWS
-        for one in worst(outcomes, place, view, gates)
+        for result in worst(outcomes, place, view, gates)
     ]
-    shown = [one for one in rows if one["world"] in WORLDS and one["view"] == "full"]
+    shown = [result for result in rows if result["world"] in WORLDS and result["view"] == "full"]
     pictures = {
         "Success against helped steps, all gates": of_gates(shown),
         "Success against helped steps, CCRL without and with memory": of_ccrl(shown, TARGETS),
@@ -108,25 +110,25 @@ def settings() -> dict[Asked, tuple[AdviceSetting, ...]]:
                     for name in ADVISORS:
                         tau = SKILL_TAUS["expert" if name == WRONG else name]
                         cells[Asked(place, view, gate, name, memory)] = tuple(
-                            replace(one, view=view, gate=gate, tau=tau, wrong=name == WRONG) for one in alone
+                            replace(setting, view=view, gate=gate, tau=tau, wrong=name == WRONG) for setting in alone
                         )
     return cells
 
 
 def _outcomes(job: Job, cells: Mapping[Asked, tuple[AdviceSetting, ...]]) -> dict[Asked, AdviceOutcome]:
     """The outcome of each cell; those of one world are kept in the job's folder."""
-    single = {cell: ones[0] for cell, ones in cells.items() if cell.world != RANDOM}
-    found = measured(job, list(single.values()))
+    single = {cell: group[0] for cell, group in cells.items() if cell.world != RANDOM}
+    outcomes = measured(job, list(single.values()))
     share = max(1, job.sessions // len(RANDOM_WORLDS))
     joined = job.each(
         partial(_joined, sessions=share, seed=job.seed), [cells[cell] for cell in cells if cell not in single]
     )
-    return {cell: found[single[cell]] if cell in single else joined[ones] for cell, ones in cells.items()}
+    return {cell: outcomes[single[cell]] if cell in single else joined[group] for cell, group in cells.items()}
 
 
-def _joined(ones: tuple[AdviceSetting, ...], sessions: int, seed: int) -> AdviceOutcome:
+def _joined(group: tuple[AdviceSetting, ...], sessions: int, seed: int) -> AdviceOutcome:
     """So many sessions of each setting, as one outcome."""
-    parts = [sessions_of(one, sessions, seed) for one in ones]
+    parts = [sessions_of(setting, sessions, seed) for setting in group]
     return AdviceOutcome(
         *(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(AdviceOutcome))
     )
@@ -149,17 +151,17 @@ def rows_of(cell: Asked, outcome: AdviceOutcome, table: str) -> list[Row]:
         mean_row(named, "AR_requests", outcome.requests),
     ]
     if cell == Asked("world-1", "full", "ccrl", cell.advisor, True) and cell.advisor in TARGETS:
-        for one, target in zip(rows, TARGETS[cell.advisor], strict=False):
-            one["target"] = target
+        for result, target in zip(rows, TARGETS[cell.advisor], strict=False):
+            result["target"] = target
     return rows
 
 
-def difference(one: AdviceOutcome, other: AdviceOutcome) -> tuple[float, float, float]:
+def difference(outcome: AdviceOutcome, other: AdviceOutcome) -> tuple[float, float, float]:
     """The difference of two settings' success rates with the low and the high end of its interval, in percentage points.
 
     Source: R. G. Newcombe, Statistics in Medicine 17 (1998), 873-890, method 10.
     """
-    (percent, low, high), (than, than_low, than_high) = share(one.success), share(other.success)
+    (percent, low, high), (than, than_low, than_high) = share(outcome.success), share(other.success)
     gap = percent - than
     return gap, gap - hypot(percent - low, than_high - than), gap + hypot(high - percent, than - than_low)
 
@@ -185,7 +187,7 @@ def worst(
 def in_short(rows: Sequence[Row], below: Sequence[Row]) -> Row:
     """The targets beside what was measured, nobody, the worst advisor against nobody, what memory saves."""
     of = ("world", "view", "gate", "advisor", "memory", "measure")
-    value = {tuple(one[name] for name in of): one["value"] for one in rows}
+    value = {tuple(result[name] for name in of): result["value"] for result in rows}
 
     def cell(place: str, gate: str, name: str, memory: bool) -> tuple[float, float]:
         cell = (place, "full", gate, name, memory)
@@ -193,10 +195,12 @@ def in_short(rows: Sequence[Row], below: Sequence[Row]) -> Row:
 
     says: Row = {}
     for name, (sp, hs) in TARGETS.items():
-        found, without = (cell("world-1", "ccrl", name, memory) for memory in (True, False))
-        missed = [what for what, kept in (("success", found[0] >= sp), ("steps", found[1] <= hs)) if not kept]
+        remembering, without = (cell("world-1", "ccrl", name, memory) for memory in (True, False))
+        missed = [
+            what for what, kept in (("success", remembering[0] >= sp), ("steps", remembering[1] <= hs)) if not kept
+        ]
         verdict = f"{' and '.join(missed)} missed" if missed else "met"
-        says[f"{name}, target {_both(sp, hs)}"] = f"{_both(*found)}: {verdict} (without memory {_both(*without)})"
+        says[f"{name}, target {_both(sp, hs)}"] = f"{_both(*remembering)}: {verdict} (without memory {_both(*without)})"
     for place in PLACES:
         for memory, against in AGAINST.items():
             says[f"{place}: {against}"] = f"{cell(place, 'never', NOBODY, memory)[0]:.1f} %"
@@ -218,16 +222,16 @@ def _both(success: float, helped: float) -> str:
 def _worst_in_short(below: Sequence[Row]) -> Row:
     says: Row = {}
     for memory, against in AGAINST.items():
-        lowest = min(those(below, against=against), key=lambda one: float(one["value"]))
+        lowest = min(those(below, against=against), key=lambda result: float(result["value"]))
         name = "worst_below_alone_with_memory" if memory else "worst_below_alone"
         says[name] = round(float(lowest["value"]), 1)
         says[f"{name} target"] = f"at least {MOST_BELOW:g} points: {verdict(lowest)}"
-    for one in below:
-        low, high = one["ci95"]
-        which = one["advisor"] if one["over"] == one["gate"] else f"{one['gate']}, {one['advisor']}"
-        place = f"{one['world']}, {one['view']} view"
-        says[f"{place}: worst with {one['over']} against {one['against']} [points]"] = (
-            f"{one['value']:+.1f} ({low:+.1f} to {high:+.1f}): {which}"
+    for result in below:
+        low, high = result["ci95"]
+        which = result["advisor"] if result["over"] == result["gate"] else f"{result['gate']}, {result['advisor']}"
+        place = f"{result['world']}, {result['view']} view"
+        says[f"{place}: worst with {result['over']} against {result['against']} [points]"] = (
+            f"{result['value']:+.1f} ({low:+.1f} to {high:+.1f}): {which}"
         )
     return says
 

@@ -59,7 +59,7 @@ def of_ccrl(rows: Sequence[Row], targets: Mapping[str, tuple[float, float]]) -> 
                 }
                 axes.annotate(name, targets[name][::-1], color=INK, **offset)
 
-    shown = [one for one in rows if one["gate"] in ("ccrl", "never")]
+    shown = [row for row in rows if row["gate"] in ("ccrl", "never")]
     return _panels(shown, draw, _ccrl_keys())
 
 
@@ -96,8 +96,8 @@ def _name_ticks(axes: "Axes") -> None:
 
 def _points(rows: Sequence[Row]) -> list[Point]:
     of: dict[tuple[str, str, bool], dict[str, float]] = {}
-    for one in rows:
-        of.setdefault((one["gate"], one["advisor"], one["memory"]), {})[one["measure"]] = one["value"]
+    for row in rows:
+        of.setdefault((row["gate"], row["advisor"], row["memory"]), {})[row["measure"]] = row["value"]
     return [(*cell, measured["HS_steps"], measured["SP_percent"]) for cell, measured in of.items()]
 
 

@@ -100,15 +100,15 @@ def advice_worth(job: Job, reading: Mapping[str, Any]) -> Findings:
     """Every skill of the toast task with every advisor, and nobody."""
     skills = list(scene().problems)
     pupils = [Pupil(skill, advisor) for skill in skills for advisor in ADVISORS]
-    found = job.each(partial(taught, lessons=min(job.sessions, MOST), seed=job.seed), pupils)
+    costs_by_pupil = job.each(partial(taught, lessons=min(job.sessions, MOST), seed=job.seed), pupils)
     subtasks = dict.fromkeys(problem.subtask for problem in scene().problems.values())
     costs: dict[str, dict[str, Cost]] = {}
     rows: list[Row] = []
     for skill in skills:
-        rows += [one for advisor in ADVISORS for one in rows_of(skill, advisor, found)]
+        rows += [result for advisor in ADVISORS for result in rows_of(skill, advisor, costs_by_pupil)]
     for subtask in subtasks:
         of = [skill for skill in skills if scene().problems[skill].subtask == subtask]
-        costs[subtask] = {name: joined([found[Pupil(skill, name)] for skill in of]) for name in ADVISORS}
+        costs[subtask] = {name: joined([costs_by_pupil[Pupil(skill, name)] for skill in of]) for name in ADVISORS}
     pictures = {
         f"{subtask}: lessons that are solved after so many moves": solved_after(of) for subtask, of in costs.items()
     }
@@ -134,19 +134,19 @@ def taught(pupil: Pupil, *, lessons: int, seed: int) -> Cost:
         watch = Watch.over(problem.mdp)
         Sessions(plan, advising, int(own), Journal(), watch.hear).run()
         watches.append(watch)
-    columns = zip(*((one.solved, one.episodes, one.moves, one.helped) for one in watches), strict=True)
+    columns = zip(*((watch.solved, watch.episodes, watch.moves, watch.helped) for watch in watches), strict=True)
     solved, episodes, moves, helped = (np.array(column) for column in columns)
     return Cost(solved, episodes, moves, helped)
 
 
 def joined(costs: Sequence[Cost]) -> Cost:
     """The costs of several skills' lessons, joined."""
-    return Cost(*(np.concatenate([getattr(one, name) for one in costs]) for name in Cost.__dataclass_fields__))
+    return Cost(*(np.concatenate([getattr(cost, name) for cost in costs]) for name in Cost.__dataclass_fields__))
 
 
-def rows_of(skill: str, advisor: str, found: Mapping[Pupil, Cost]) -> list[Row]:
+def rows_of(skill: str, advisor: str, costs_by_pupil: Mapping[Pupil, Cost]) -> list[Row]:
     """The measures of a skill and an advisor, and what it saves over nobody."""
-    of, alone = found[Pupil(skill, advisor)], found[Pupil(skill, NOBODY)]
+    of, alone = costs_by_pupil[Pupil(skill, advisor)], costs_by_pupil[Pupil(skill, NOBODY)]
     named: Row = {
         "skill": skill,
         "subtask": scene().problems[skill].subtask,

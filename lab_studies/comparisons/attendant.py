@@ -42,7 +42,7 @@ class Attendant(Controls):
     def on_floor(self, floor: Floor) -> None:
         """Record the places of fixed bodies on the attended floor, from its conditions."""
         task = floor.scene.task
-        fixed = [one.name for one in task.stations] + [one.name for one in task.obstacles]
+        fixed = [thing.name for thing in task.stations] + [thing.name for thing in task.obstacles]
         for body in [body for name in fixed for body in (name, f"{name}{MARKER}") if body in floor.world.names()]:
             (x, y, z), (i, j, k, w) = floor.world.pose(body)
             self._stood[body] = (float(x), float(y), float(z)), (float(i), float(j), float(k), float(w))
@@ -90,9 +90,9 @@ class Attendant(Controls):
         for number, body in enumerate(dict.fromkeys([*boxes, *parts])):
             if world.pose(body)[0][2] < 0:
                 continue
-            for one in (body, f"{body}{MARKER}"):
-                if one in world.names():
-                    world.put(one, (*out_of_sight(number), 1.5 * GROUND_M))
+            for name in (body, f"{body}{MARKER}"):
+                if name in world.names():
+                    world.put(name, (*out_of_sight(number), 1.5 * GROUND_M))
             yield f"took {body} away"
 
     def _put_back(self, floor: Floor, why: str) -> Iterator[str]:
@@ -104,12 +104,12 @@ class Attendant(Controls):
             if body.endswith(MARKER) or not named or float(np.abs(off).max()) < MOVED_M:
                 continue
             near = [name for name in parts_of(floor) if floor.world.nearest(name, body, NEAR_M) < NEAR_M]
-            for one in (part for name in near for part in stack_of(floor, name) if body in floor.machines):
-                where, how = world.pose(one)
-                world.put(one, tuple(np.asarray(where) + off), how)
-            for one in (body, f"{body}{MARKER}"):
-                if one in self._stood:
-                    world.put(one, *self._stood[one])
+            for moved in (part for name in near for part in stack_of(floor, name) if body in floor.machines):
+                where, how = world.pose(moved)
+                world.put(moved, tuple(np.asarray(where) + off), how)
+            for moved in (body, f"{body}{MARKER}"):
+                if moved in self._stood:
+                    world.put(moved, *self._stood[moved])
             yield f"put '{body}' back"
 
 

@@ -64,8 +64,8 @@ def carried_over(job: Job, reading: Mapping[str, Any]) -> Findings:
     cells = unseen()
     surveys = _kept(job, "surveyed", cells, surveyed, partial(record_of, Surveyed))
     rows: list[Row] = []
-    for group in dict.fromkeys((one.family, one.group) for one in cells):
-        rows += rows_of(*group, {one: surveys[one] for one in cells if (one.family, one.group) == group}, learned)
+    for group in dict.fromkeys((cell.family, cell.group) for cell in cells):
+        rows += rows_of(*group, {cell: surveys[cell] for cell in cells if (cell.family, cell.group) == group}, learned)
     if job.folder is not None:
         for family, policy in learned.items():
             write_policy(job.folder / f"policy-{family.replace(' ', '-')}.json", policy)
@@ -78,19 +78,19 @@ def carried_over(job: Job, reading: Mapping[str, Any]) -> Findings:
 
 def _kept(job: Job, kind: str, items: Sequence[Any], work: Any, read: Any) -> dict[Any, Any]:
     """The result of `work`, a module's function, for each item; results in the folder are read, new ones are kept there."""
-    names = {_key(job, kind, one): one for one in items}
+    names = {_key(job, kind, item): item for item in items}
     done = job.kept_as(lambda entry: (names[entry["key"]], read(entry["found"])) if entry["key"] in names else None)
-    left = [one for one in items if one not in done]
+    left = [item for item in items if item not in done]
     job.progress(len(done), len(items))
-    for one, found in job.computed(work, left):
-        done[one] = read(found)
-        job.keep({"key": _key(job, kind, one), "found": found})
+    for item, result in job.computed(work, left):
+        done[item] = read(result)
+        job.keep({"key": _key(job, kind, item), "found": result})
         job.progress(len(done), len(items))
-    return {one: done[one] for one in items}
+    return {item: done[item] for item in items}
 
 
-def _key(job: Job, kind: str, one: Any) -> str:
-    return f"{kind}: {one}, {job.sessions} cells, seed {job.seed}" if kind == "learned" else f"{kind}: {asdict(one)}"
+def _key(job: Job, kind: str, item: Any) -> str:
+    return f"{kind}: {item}, {job.sessions} cells, seed {job.seed}" if kind == "learned" else f"{kind}: {asdict(item)}"
 
 
 def _learned(family: str, sessions: int, seed: int) -> dict[str, Any]:
@@ -104,42 +104,42 @@ def _policy_of(held: dict[str, Any]) -> CarriedPolicy:
     return CarriedPolicy(held["weights"], MAKESPAN, held["learned_on"])
 
 
-def surveyed(one: Unseen) -> dict[str, Any]:
+def surveyed(larger: Unseen) -> dict[str, Any]:
     """`Surveyed` of a larger cell, as the folder keeps it."""
-    cell, rules, rules_s, moves = unseen_cell(one), dict[str, float](), dict[str, float](), 0
+    cell, rules, rules_s, moves = unseen_cell(larger), dict[str, float](), dict[str, float](), 0
     for name, rule in usable(cell).items():
         run, began = Run(cell), time.process_time()
         moves = max(moves, len(dispatch(run, rule)))
         rules_s[name] = time.process_time() - began
         rules[name] = cost(run, MAKESPAN)
-    if one.printed is not None:
-        best, bound = one.printed, one.printed
+    if larger.printed is not None:
+        best, bound = larger.printed, larger.printed
     else:
-        found = best_known(cell, MAKESPAN, TIME_LIMIT_S)
-        best, bound = found.cost, found.bound
+        reference = best_known(cell, MAKESPAN, TIME_LIMIT_S)
+        best, bound = reference.cost, reference.bound
     return {"best": best, "bound": bound, "rules": rules, "moves": moves, "rules_s": rules_s}
 
 
 def rows_of(
-    family: str, group: str, found: Mapping[Unseen, Surveyed], learned: Mapping[str, CarriedPolicy]
+    family: str, group: str, surveys: Mapping[Unseen, Surveyed], learned: Mapping[str, CarriedPolicy]
 ) -> list[Row]:
     """The rows of a group: every rule, and every policy, that of the group's own family first."""
-    proven = sum(one.proven for one in found.values())
-    named: Row = {"table": f"{family}: {group}", "cells": len(found), "proven": proven}
+    proven = sum(survey.proven for survey in surveys.values())
+    named: Row = {"table": f"{family}: {group}", "cells": len(surveys), "proven": proven}
     gaps = {
-        rule: [100.0 * gap(one.rules[rule], one.bound) for one in found.values()]
-        for rule in next(iter(found.values())).rules
+        rule: [100.0 * gap(survey.rules[rule], survey.bound) for survey in surveys.values()]
+        for rule in next(iter(surveys.values())).rules
     }
     best = min(gaps, key=lambda rule: np.mean(gaps[rule]))
     rows: list[Row] = []
     for rule, own in gaps.items():
-        seconds = sum(one.rules_s[rule] for one in found.values())
+        seconds = sum(survey.rules_s[rule] for survey in surveys.values())
         said = named | {"method": rule, "best_rule": rule == best}
-        rows += _measured(said, own, sum(one.moves for one in found.values()) / max(seconds, 1e-9))
-    deciders = {one: Decider(unseen_cell(one)) for one in found}
+        rows += _measured(said, own, sum(survey.moves for survey in surveys.values()) / max(seconds, 1e-9))
+    deciders = {cell: Decider(unseen_cell(cell)) for cell in surveys}
     for learned_on in sorted(learned, key=lambda name: name != family):
         weights = learned[learned_on].vector
-        own = [100.0 * gap(float(deciders[o].costs(weights[None])[0]), s.bound) for o, s in found.items()]
+        own = [100.0 * gap(float(deciders[o].costs(weights[None])[0]), s.bound) for o, s in surveys.items()]
         said = named | {"method": CARRIED, "learned_on": learned_on}
         rows += _measured(said, own, decisions_per_s(deciders.values(), learned[learned_on]))
         rows.append(row(said, "of best rule's gap_percent", 100.0 * float(np.mean(own) / np.mean(gaps[best]))))
@@ -167,17 +167,17 @@ def _measured(named: Row, gaps: Sequence[float], rate: float) -> list[Row]:
 def in_short(rows: Sequence[Row]) -> Row:
     """By group: the mean gap of the family's own policy, that of the best rule, and the slowest policy's speed."""
     told: Row = {}
-    for table in dict.fromkeys(one["table"] for one in rows):
+    for table in dict.fromkeys(result["table"] for result in rows):
         own = those(rows, table=table, method=CARRIED, measure="mean gap_percent")[0]["value"]
         rule = those(rows, table=table, best_rule=True, measure="mean gap_percent")[0]
         told[f"{table} [%]"] = f"{own:.2f} carried over, {rule['value']:.2f} by {rule['method']}"
-    rates = [one["value"] for one in those(rows, method=CARRIED, measure="decisions_per_s")]
+    rates = [result["value"] for result in those(rows, method=CARRIED, measure="decisions_per_s")]
     return told | {"decisions a second, the slowest": round(min(rates))}
 
 
 def picture(rows: Sequence[Row]) -> bytes:
     """Bars by group: the best rule, the family's own policy, and that of all families."""
-    tables = [*dict.fromkeys(one["table"] for one in rows)]
+    tables = [*dict.fromkeys(result["table"] for result in rows)]
     gaps = [those(rows, table=table, measure="mean gap_percent") for table in tables]
     lines = {
         "best rule": [those(own, best_rule=True)[0] for own in gaps],

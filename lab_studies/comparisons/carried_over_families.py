@@ -43,10 +43,10 @@ def shop(rng: np.random.Generator, least: int, most: int) -> Cell:
     products = []
     for job in range(1, jobs + 1):
         visited = rng.permutation(machines)[: rng.integers(2, machines + 1)]
-        stages = [Stage(names[one], processing_s=float(rng.integers(6, 21))) for one in visited]
+        stages = [Stage(names[machine], processing_s=float(rng.integers(6, 21))) for machine in visited]
         products.append(Product(f"job {job}", ((Stage("LU"), *stages),)))
     robots = tuple(Robot(f"vehicle {number}", "LU") for number in (1, 2))
-    return Cell(stations, tuple(products), tuple(one.name for one in products), times, times, robots)
+    return Cell(stations, tuple(products), tuple(product.name for product in products), times, times, robots)
 
 
 def toasts(rng: np.random.Generator, least: int, most: int) -> Cell:
@@ -69,12 +69,12 @@ def manufactured(rng: np.random.Generator, least: int, most: int) -> Cell:
     factors = dict(zip(("rook", "sign"), rng.uniform(0.6, 1.5, 2), strict=True))
     products = tuple(
         replace(
-            one,
+            product,
             routes=tuple(
-                tuple(s.each(partial(_slower, factor=factors[one.name])) for s in route) for route in one.routes
+                tuple(s.each(partial(_slower, factor=factors[product.name])) for s in route) for route in product.routes
             ),
         )
-        for one in cell.products
+        for product in cell.products
     )
     assert cell.arrivals is not None  # App. III has them
     interval_s = (round(200.0 * rng.uniform(0.3, 1.5), 1),) * cell.parts
@@ -105,7 +105,7 @@ THESIS_TOASTS, DRAWN_TOASTS, ORDERS = (
 
 def unseen() -> tuple[Unseen, ...]:
     """The larger cells, the same ones whatever the study's seed."""
-    printed = [one.printed for one in board() if one.family == PRINTED]
+    printed = [instance.printed for instance in board() if instance.family == PRINTED]
     return (
         *(Unseen(SHOP, BILGE_ULUSOY, number, value) for number, value in enumerate(printed)),
         *(Unseen(SHOP, MORE_JOBS, number) for number in range(12)),
@@ -116,14 +116,14 @@ def unseen() -> tuple[Unseen, ...]:
 
 
 @lru_cache(maxsize=256)
-def unseen_cell(one: Unseen) -> Cell:
+def unseen_cell(cell: Unseen) -> Cell:
     """The cell."""
-    rng = np.random.default_rng([2026, [*GROUPS].index(one.group), one.number])
-    return GROUPS[one.group](one.number, rng)
+    rng = np.random.default_rng([2026, [*GROUPS].index(cell.group), cell.number])
+    return GROUPS[cell.group](cell.number, rng)
 
 
 GROUPS: Mapping[str, Callable[[int, np.random.Generator], Cell]] = {
-    BILGE_ULUSOY: lambda number, rng: cell_of([one for one in board() if one.family == PRINTED][number]),
+    BILGE_ULUSOY: lambda number, rng: cell_of([instance for instance in board() if instance.family == PRINTED][number]),
     MORE_JOBS: lambda number, rng: shop(rng, 10, 20),
     THESIS_TOASTS: lambda number, rng: robot_cell(CASES[number // 5], 20 + 10 * (number % 5)),
     DRAWN_TOASTS: lambda number, rng: toasts(rng, 20, 60),

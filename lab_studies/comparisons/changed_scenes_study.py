@@ -74,12 +74,14 @@ def changed_scenes(job: Job, reading: Mapping[str, Any]) -> Findings:
     """The results of changed scenes, equally many of each kind; the reading has no effect."""
     kinds = [*KINDS]
     scenes = [Scene(kinds[number % len(kinds)], number // len(kinds), job.seed) for number in range(job.sessions)]
-    found = job.each(tried, scenes)
+    outcomes = job.each(tried, scenes)
     rows = [
-        one for kind in (None, *KINDS) for one in rows_of(kind, [found[s] for s in scenes if kind in (None, s.kind)])
+        result
+        for kind in (None, *KINDS)
+        for result in rows_of(kind, [outcomes[s] for s in scenes if kind in (None, s.kind)])
     ]
-    rows += [one for order, scene in enumerate(scenes, 1) for one in rows_of_scene(order, scene, found[scene])]
-    drawn_again = sum(one.refused_draws for one in found.values())
+    rows += [result for order, scene in enumerate(scenes, 1) for result in rows_of_scene(order, scene, outcomes[scene])]
+    drawn_again = sum(outcome.refused_draws for outcome in outcomes.values())
     notes = (ABOUT.format(len(scenes), drawn_again), COLUMNS, CHECKS)
     return Findings(rows, in_short(rows), {"What becomes of a skill": _picture(rows)}, notes)
 
@@ -93,9 +95,9 @@ def learned_here() -> tuple[Prepared, Known, Known]:
     task = load(TASK)
     prepared = prepare(task, task.order(TOASTS), 0)
     problems = distinct(prepared)
-    lessons = [one.lesson for one in taught(prepared, {}, problems)]
+    lessons = [skill.lesson for skill in taught(prepared, {}, problems)]
     anew = {key_of(problem): _from_nothing(prepared, problem) for problem in problems}
-    return prepared, {(one.policy.subtask, one.policy.signature): one.policy for one in lessons}, anew
+    return prepared, {(skill.policy.subtask, skill.policy.signature): skill.policy for skill in lessons}, anew
 
 
 def tried(scene: Scene) -> Outcome:
@@ -105,10 +107,10 @@ def tried(scene: Scene) -> Outcome:
     problems = distinct(prepared)
     here = taught(prepared, known, problems)
     anew = [learned.get(key_of(problem)) or _from_nothing(prepared, problem) for problem in problems]
-    ways = [_way(one.lesson) for one in here]
+    ways = [_way(skill.lesson) for skill in here]
     tallies = {}
     for way in WAYS:
-        own = [n for n, one in enumerate(ways) if one == way]
+        own = [n for n, met in enumerate(ways) if met == way]
         costs = [spent(here[n].lesson) for n in own]
         tallies[way] = Tally(
             len(own),
@@ -117,7 +119,7 @@ def tried(scene: Scene) -> Outcome:
             sum(here[n].wall_s for n in own),
             (sum(len(anew[n].curve) for n in own), sum(anew[n].helped_steps for n in own)),
         )
-    lessons = [one.lesson for one in here]
+    lessons = [skill.lesson for skill in here]
     failing = [fails(prepared, problem, lesson.policy) for problem, lesson in zip(problems, lessons, strict=True)]
     return Outcome(
         words,
@@ -133,7 +135,7 @@ def tried(scene: Scene) -> Outcome:
             for problem, lesson, policy in zip(problems, lessons, anew, strict=True)
         ),
         unsolved=(
-            sum(not works(problem, one.policy) for problem, one in zip(problems, lessons, strict=True)),
+            sum(not works(problem, lesson.policy) for problem, lesson in zip(problems, lessons, strict=True)),
             sum(not works(problem, policy) for problem, policy in zip(problems, anew, strict=True)),
         ),
     )
@@ -170,27 +172,22 @@ def rows_of(kind: str | None, outcomes: Sequence[Outcome]) -> list[Row]:
     rows = [_share(named | {"source": way}, "skills_percent", _sum(outcomes, way), skills) for way in WAYS]
     for measure, ways in (("saved", WAYS), ("saved_in_changed_problems", WAYS[1:])):
         for number, what in enumerate(("episodes", "helped_steps")):
-            spent = [sum(getattr(one.tallies[way], what) for way in ways) for one in outcomes]
-            anew = [sum(one.tallies[way].anew[number] for way in ways) for one in outcomes]
+            spent = [sum(getattr(outcome.tallies[way], what) for way in ways) for outcome in outcomes]
+            anew = [sum(outcome.tallies[way].anew[number] for way in ways) for outcome in outcomes]
             shares = [100.0 * (1 - now / then) for now, then in zip(spent, anew, strict=True) if then]
             rows += _mean(named, f"{measure}_{what}_percent", shares)
     rows += [
-        _share(
-            named, "accepted_failing_percent", sum(one.accepted_failing for one in outcomes), _sum(outcomes, "used")
-        ),
-        _share(
-            named, "adapted_failing_percent", sum(one.adapted_failing for one in outcomes), _sum(outcomes, "adapted")
-        ),
-        _share(
-            named, "refused_working_percent", sum(one.refused_working for one in outcomes), _sum(outcomes, "refused")
-        ),
-        _share(named, "longer_percent", sum(one.longer for one in outcomes), skills),
-        _share(named, "success_percent", skills - sum(one.unsolved[0] for one in outcomes), skills),
+        _share(named, f"{what}_percent", sum(getattr(outcome, what) for outcome in outcomes), _sum(outcomes, way))
+        for what, way in (("accepted_failing", "used"), ("adapted_failing", "adapted"), ("refused_working", "refused"))
+    ]
+    return [
+        *rows,
+        _share(named, "longer_percent", sum(outcome.longer for outcome in outcomes), skills),
+        _share(named, "success_percent", skills - sum(outcome.unsolved[0] for outcome in outcomes), skills),
         _share(
             named | {"source": "all anew"}, "success_percent", skills - sum(o.unsolved[1] for o in outcomes), skills
         ),
     ]
-    return rows
 
 
 def rows_of_scene(order: int, scene: Scene, outcome: Outcome) -> list[Row]:
@@ -218,7 +215,7 @@ def rows_of_scene(order: int, scene: Scene, outcome: Outcome) -> list[Row]:
 
 
 def _sum(outcomes: Sequence[Outcome], way: str) -> int:
-    return sum(one.tallies[way].skills for one in outcomes)
+    return sum(outcome.tallies[way].skills for outcome in outcomes)
 
 
 def _share(named: Row, measure: str, count: int, of: int) -> Row:
@@ -239,9 +236,9 @@ def _mean(named: Row, measure: str, values: Sequence[float]) -> list[Row]:
 def in_short(rows: Sequence[Row]) -> Row:
     """The figures over all scenes."""
     says = {}
-    for one in those(rows, kind="all"):
-        name = " ".join(filter(None, (one.get("source", ""), one["measure"])))
-        says[name] = round(one["value"], 2)
+    for result in those(rows, kind="all"):
+        name = " ".join(filter(None, (result.get("source", ""), result["measure"])))
+        says[name] = round(result["value"], 2)
     return says
 
 

@@ -88,27 +88,28 @@ def faults(job: Job, reading: Mapping[str, Any]) -> Findings:
     """The results of as many runs as there are sessions, divided among TASKS; the reading has no effect."""
     names = [*TASKS]
     settings = [Setting(names[n % len(names)], job.seed + n) for n in range(job.sessions)]
-    found = measured(job, settings)
-    rows = [*rows_of("task", {name: [r for s, r in found.items() if s.task == name] for name in names})]
+    runs = measured(job, settings)
+    rows = [*rows_of("task", {name: [r for s, r in runs.items() if s.task == name] for name in names})]
     kinds = [*FAULTS, "none"]
-    rows += rows_of("fault", {kind: [r for r in found.values() if kind in struck(r)] for kind in kinds})
-    rows += rows_of("", {"all": [*found.values()]})
-    wrong = [f"{s.task}, seed {s.seed}: {r.why}" for s, r in found.items() if r.came == "wrong"]
-    words = ABOUT.format(runs=len(found), tasks=", ".join(names), longest=LONGEST, comes=COMES_AFTER_S)
+    rows += rows_of("fault", {kind: [r for r in runs.values() if kind in struck(r)] for kind in kinds})
+    rows += rows_of("", {"all": [*runs.values()]})
+    wrong = [f"{s.task}, seed {s.seed}: {r.why}" for s, r in runs.items() if r.came == "wrong"]
+    words = ABOUT.format(runs=len(runs), tasks=", ".join(names), longest=LONGEST, comes=COMES_AFTER_S)
     figures = {"What came of the runs, by task": picture(rows, "task"), "and by fault": picture(rows, "fault")}
-    return Findings(rows, in_short([*found.values()]), figures, (words, COLUMNS, *(f"Wrong: {one}." for one in wrong)))
+    return Findings(rows, in_short([*runs.values()]), figures, (words, COLUMNS, *(f"Wrong: {why}." for why in wrong)))
 
 
 def struck(ran: Ran) -> list[str]:
     """The kinds of the faults that struck; "none"."""
-    return [str(one["what"]) for one in ran.rows] or ["none"]
+    return [str(fault["what"]) for fault in ran.rows] or ["none"]
 
 
 def measured(job: Job, settings: Sequence[Setting]) -> dict[Setting, Ran]:
     """The outcome of every run; those that the job's folder holds are read, the others are carried out and kept there."""
     kept = job.kept_as(lambda entry: (record_of(Setting, entry["setting"]), record_of(Ran, entry["ran"])))
     done: dict[Setting, Ran] = {setting: ran for setting, ran in kept.items() if setting in settings}
-    left = sorted((one for one in settings if one not in done), key=lambda one: (one.task, one.seed))
+    left = [setting for setting in settings if setting not in done]
+    left.sort(key=lambda setting: (setting.task, setting.seed))
     job.progress(len(done), len(settings))
     for setting, ran in job.computed(carried_out, left):
         done[setting] = ran
@@ -161,8 +162,8 @@ def _ready(name: str) -> _Ready:
     prepared = prepare(task, task.ordered(parts=TASKS.get(name)), 0)
     teacher = Teacher(Toolbox(Path(folder.name)))
     taught = teach_all(prepared, teacher)
-    found = find_sequence(taught.cell, task.sequencing.method, search_for(task.sequencing), 0)
-    return _Ready(prepared, taught, teacher, tuple(found.sequence), found.cost, folder)
+    order = find_sequence(taught.cell, task.sequencing.method, search_for(task.sequencing), 0)
+    return _Ready(prepared, taught, teacher, tuple(order.sequence), order.cost, folder)
 
 
 def carried_out(setting: Setting) -> Ran:
@@ -186,7 +187,7 @@ def _carried_out(setting: Setting, person: Attendant | None) -> Ran:
     prepared, planned_s = ready.prepared, ready.planned_s
     drawn = draw(prepared.task, prepared.order, setting.seed, planned_s)
 
-    ran = Ran("wrong", "", "", [], [], [one.what for one in drawn], 0, len(prepared.order), 0.0, planned_s, 0.0)
+    ran = Ran("wrong", "", "", [], [], [fault.what for fault in drawn], 0, len(prepared.order), 0.0, planned_s, 0.0)
     try:
         conditions = Conditions(faults=drawn, viewer=_Clock(LONGEST * planned_s))
         if person is not None:
@@ -196,22 +197,22 @@ def _carried_out(setting: Setting, person: Attendant | None) -> Ran:
     except Exception as error:  # whatever a run comes to that is no way to end one
         return replace(ran, why=f"{type(error).__name__}: {error}", wall_s=time.perf_counter() - began)
     cell = ready.taught.cell
-    found = outcome.verdict([cell.part_name(part) for part in range(1, cell.parts + 1)])
-    wrong = [found.why] if found.came == "wrong" else []
+    verdict = outcome.verdict([cell.part_name(part) for part in range(1, cell.parts + 1)])
+    wrong = [verdict.why] if verdict.came == "wrong" else []
     if not outcome.happened and outcome.failure is not None:  # then no reason can be true
         wrong.append("it stopped, and no fault had struck")
     if outcome.audit is not None and outcome.audit.findings:
         wrong.append(str(outcome.audit.failure))
     called = [why.removesuffix(PUT_RIGHT) for why in (person.asked if person else ()) if why.endswith(PUT_RIGHT)]
     asked = [piece for why in called for piece in pieces(why)]
-    wrong += [f"no fault explains what it asked: {one}" for one in untrue(asked, outcome.happened)]
+    wrong += [f"no fault explains what it asked: {reason}" for reason in untrue(asked, outcome.happened)]
     return replace(
         ran,
-        came="wrong" if wrong else found.came,
+        came="wrong" if wrong else verdict.came,
         why="; ".join(wrong),
         failure=outcome.failure or "",
-        rows=[*found.rows],
-        unexplained=[*found.unexplained],
+        rows=[*verdict.rows],
+        unexplained=[*verdict.unexplained],
         delivered=len(outcome.delivered),
         makespan_s=outcome.sim_s,
         wall_s=time.perf_counter() - began,
@@ -229,7 +230,7 @@ def rows_of(by: str, groups: Mapping[str, Sequence[Ran]]) -> list[Row]:
             percent, *ends = share([ran.came == came for ran in runs])
             rows.append(row(named, f"{came}_percent", percent, ends))
         noticed = [
-            one["noticed"] is not None for ran in runs for one in ran.rows if by != "fault" or one["what"] == name
+            fault["noticed"] is not None for ran in runs for fault in ran.rows if by != "fault" or fault["what"] == name
         ]
         if noticed:
             percent, *ends = share(noticed)
@@ -254,13 +255,13 @@ def in_short(runs: Sequence[Ran]) -> Row:
 
 def picture(rows: Sequence[Row], by: str) -> bytes:
     """A bar for each task or kind of fault: how its runs came out."""
-    names = list(dict.fromkeys(one[by] for one in rows if by in one))
+    names = list(dict.fromkeys(result[by] for result in rows if by in result))
 
     def draw(figure: "Figure") -> None:
         axes = figure.add_subplot()
         left = [0.0] * len(names)
         for came, colour in CAME.items():
-            own = {one[by]: one["value"] for one in rows if one.get(by) and one["measure"] == f"{came}_percent"}
+            own = {row[by]: row["value"] for row in rows if row.get(by) and row["measure"] == f"{came}_percent"}
             values = [own[name] for name in names]
             axes.barh(names, values, left=left, color=colour, edgecolor=INK, linewidth=0.5, label=came)
             left = [a + b for a, b in zip(left, values, strict=True)]

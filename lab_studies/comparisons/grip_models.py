@@ -105,10 +105,10 @@ def written(model: Model, folder: Path) -> PartFields:
 
 
 def _models() -> Path:
-    found = find_spec("pybullet_data")  # its folder is enough: it is not imported
-    if found is None or not found.submodule_search_locations:
+    package = find_spec("pybullet_data")  # its folder is enough: it is not imported
+    if package is None or not package.submodule_search_locations:
         raise WorkFailed("PyBullet's models are not there: install pybullet again")
-    return Path(found.submodule_search_locations[0])
+    return Path(package.submodule_search_locations[0])
 
 
 def _fitting(path: Path, own: float) -> float:

@@ -94,7 +94,7 @@ class Outcome:
 
 def tried(setting: Setting) -> Outcome:
     """The outcome of a model in all its poses; without poses if its grip is rejected."""
-    model = next(one for one in MODELS if one.name == setting.model)
+    model = next(known for known in MODELS if known.name == setting.model)
     rng = np.random.default_rng([setting.seed, MODELS.index(model)])
     with TemporaryDirectory(prefix="lab-grips-") as name:
         folder = Path(name)
@@ -105,8 +105,8 @@ def tried(setting: Setting) -> Outcome:
             grip = kinds_of(tasks[0], arm_of(ARM).gripper)[part.name].grip
         except BadInput as error:
             return Outcome(str(error), (), (), edges, widths, None)
-        found = [carried(task, model.rolls) for task in tasks]
-        return Outcome("", tuple(why for why, _ in found), tuple(off for _, off in found), edges, widths, grip)
+        trials = [carried(task, model.rolls) for task in tasks]
+        return Outcome("", tuple(why for why, _ in trials), tuple(off for _, off in trials), edges, widths, grip)
 
 
 def measured(part: PartFields, folder: Path) -> tuple[tuple[float, ...], tuple[float, ...]]:
@@ -133,7 +133,7 @@ def drawn(rng: np.random.Generator) -> tuple[Place, Place]:
     """Two places CARRY_M apart, x, y [m] and yaw [rad] each, 0.5 to 1.05 m from the arm's axis and ahead of it."""
     while True:
         x, y = float(rng.uniform(0.35, 0.9)), float(rng.uniform(-0.6, 0.6))
-        way, yaw, turn = (float(one) for one in rng.uniform([-pi, -pi, -pi / 2], [pi, pi, pi / 2]))
+        way, yaw, turn = (float(number) for number in rng.uniform([-pi, -pi, -pi / 2], [pi, pi, pi / 2]))
         there = x + CARRY_M * cos(way), y + CARRY_M * sin(way)
         if all(0.5 < hypot(*at) < 1.05 and at[0] > 0.3 for at in ((x, y), there)):
             return (x, y, yaw), (*there, yaw + turn)

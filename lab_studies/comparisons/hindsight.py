@@ -27,8 +27,8 @@ def in_hindsight(cell: Cell, times: Episode, max_expanded: int = 20_000) -> Hind
     """
     known, whole = known_cell(cell, times), not times.chance.robot_breaks_every_s
     if cell.serial:
-        found = optimum(known, max_expanded)
-        return Hindsight(found.bound_s, found.proven and whole)
+        proof = optimum(known, max_expanded)
+        return Hindsight(proof.bound_s, proof.proven and whole)
     best = cp_sat(known, time_limit_s=SECONDS)
     rounding_s = 2.0 * known.possible_moves * best.rounded_s  # of which times it is a bound
     return Hindsight(max(0.0, best.bound - rounding_s), best.status == "optimal" and whole)
@@ -55,7 +55,7 @@ def known_cell(cell: Cell, times: Episode) -> Cell:
 
 
 def _as_drawn(cell: Cell, times: Episode, part: int) -> Product:
-    product = next(one for one in cell.products if one.name == cell.order[part - 1])
+    product = next(known for known in cell.products if known.name == cell.order[part - 1])
     number = cell.positions[cell.starts[part - 1]].product
     working = {station.name for station in cell.stations if station.kind == "machine"}
     # The positions in which work begins stand in the order of the routes and their stages.

@@ -51,11 +51,11 @@ def speed(job: Job, reading: Mapping[str, Any]) -> Findings:
             return f"{name}: not measured: {error}"
 
     rows = [_row("kernel", partial(learned, GateSettings("never"))), _row("kernel gated", partial(learned, *GATES))]
-    found = job.in_turn([partial(against, name) for name in RIVALS])
-    rivals = [one for one in found if not isinstance(one, str)]
-    fastest = max((one["value"] for one in rivals), default=inf)
+    measured = job.in_turn([partial(against, name) for name in RIVALS])
+    rivals = [result for result in measured if not isinstance(result, str)]
+    fastest = max((row["value"] for row in rivals), default=inf)
     lanes = those(rivals, name=C_LANES)
-    missing = [one for one in found if isinstance(one, str)]
+    missing = [result for result in measured if isinstance(result, str)]
     summary = agreement(rows + rivals) | {
         "kernel to the fastest rival": round(rows[0]["value"] / fastest, 2) if rivals else None,
         "kernel to C lanes": round(rows[0]["value"] / lanes[0]["value"], 2) if lanes else None,
@@ -65,5 +65,5 @@ def speed(job: Job, reading: Mapping[str, Any]) -> Findings:
 
 def _row(name: str, run: Callable[[], Measured]) -> Row:
     run()  # compiles
-    rates = [found.moves / found.seconds / 1e6 for found in (run() for _ in range(REPEATS))]
+    rates = [measured.moves / measured.seconds / 1e6 for measured in (run() for _ in range(REPEATS))]
     return median_row({"name": name, "world": "world-1"}, "speed_million steps per s", rates)

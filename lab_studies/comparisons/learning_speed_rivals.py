@@ -134,12 +134,12 @@ def _compiled(source: str, near: type, real: type, seed: type) -> Any:
         raise Missing("no C compiler: `cc` is not on the path")
     learn = _library(source, compiler, C_FLAGS).learn
     array: Any = np.ctypeslib.ndpointer
-    whole, one = ctypes.c_int64, ctypes.c_float if real is np.float32 else ctypes.c_double
-    live = [whole] if source == LANES_SOURCE else []
-    rules = (whole, one, one, one, whole, array(real), whole, whole)
-    learned = (whole, array(seed), array(real), ctypes.POINTER(whole))
-    learn.argtypes = (whole, array(near), *live, array(real), array(np.uint8), *rules, *learned)
-    learn.restype = whole
+    whole_type, real_type = ctypes.c_int64, ctypes.c_float if real is np.float32 else ctypes.c_double
+    live = [whole_type] if source == LANES_SOURCE else []
+    rules = (whole_type, real_type, real_type, real_type, whole_type, array(real), whole_type, whole_type)
+    learned = (whole_type, array(seed), array(real), ctypes.POINTER(whole_type))
+    learn.argtypes = (whole_type, array(near), *live, array(real), array(np.uint8), *rules, *learned)
+    learn.restype = whole_type
     return learn
 
 

@@ -68,10 +68,10 @@ def learned(mdp: TabularMDP, place: Any, rng: np.random.Generator) -> Taught:
     tables, seen = [], list[int]()
     learner = place.learner.__class__(**(vars(place.learner) | {"episodes": LEARNED}))
     for number, own in enumerate(rng.spawn(TABLES)):
-        one = Session(mdp, learner, GateSettings("never"), None, own).run()
-        tables.append(one.q)
+        session = Session(mdp, learner, GateSettings("never"), None, own).run()
+        tables.append(session.q)
         if number == 0:
-            seen = np.repeat(np.arange(mdp.n_states), one.visits.sum(axis=1)).tolist()
+            seen = np.repeat(np.arange(mdp.n_states), session.visits.sum(axis=1)).tolist()
     return Taught(np.array(tables), seen)
 
 
@@ -109,13 +109,13 @@ def one_policy(where: Place, seed: int) -> Tally:
         return [walked(mdp, place, asks, policy, rng) for _ in range(count)]
 
     labelled = [steps for _, _, steps in episodes(lambda state: False, LABELLED)]
-    found: Tally = {}
+    tally: Tally = {}
 
     def judged(rule: str, share: float, asks: Any) -> None:
         tried = episodes(asks, TRIED)
-        solved, questions = found.setdefault((rule, share), ([], []))
-        solved.append(float(np.mean([one[0] for one in tried])))
-        questions.append(float(np.mean([one[1] for one in tried])))
+        solved, questions = tally.setdefault((rule, share), ([], []))
+        solved.append(float(np.mean([episode[0] for episode in tried])))
+        questions.append(float(np.mean([episode[1] for episode in tried])))
 
     judged(NEVER, 0.0, lambda state: False)
     judged(ALWAYS, 1.0, lambda state: True)
@@ -125,7 +125,7 @@ def one_policy(where: Place, seed: int) -> Tally:
         for rule, threshold in FIXED.items():
             watched = _watched(taught, rule, threshold).calibrate(labelled, share=share)
             judged(rule, share, _asks(watched))
-    return found
+    return tally
 
 
 def _asks(watched: Watched) -> Asks:
@@ -145,24 +145,24 @@ def _watched(taught: Taught, rule: str, threshold: float) -> Watched:
 
 def policies_of(where: Place, policies: int, seed: int) -> Tally:
     """So many policies in a layout."""
-    found: Tally = {}
+    tally: Tally = {}
     for own in seeds_of(where, policies, seed):
         for key, (solved, questions) in one_policy(where, int(own)).items():
-            both = found.setdefault(key, ([], []))
+            both = tally.setdefault(key, ([], []))
             both[0].extend(solved)
             both[1].extend(questions)
-    return found
+    return tally
 
 
 def mentor(job: Job, reading: Mapping[str, Any]) -> Findings:
     """Every layout; a session is a policy. Nothing is read."""
     places = [Place(layout) for layout in LAYOUTS]
-    found = job.each(partial(policies_of, policies=job.sessions, seed=job.seed), places)
-    rows = [one for place in places for one in rows_of(place.layout, found[place])]
+    tallies = job.each(partial(policies_of, policies=job.sessions, seed=job.seed), places)
+    rows = [row for place in places for row in rows_of(place.layout, tallies[place])]
     says: Row = {}
     for layout in LAYOUTS:
         for rule in FIXED:
-            gains = [one["value"] for one in those(rows, problem=layout, rule=rule, measure="gain_percent")]
+            gains = [row["value"] for row in those(rows, problem=layout, rule=rule, measure="gain_percent")]
             says[f"{layout}: {rule} over chance at equal questions [points of success]"] = round(
                 float(np.mean(gains)), 1
             )
@@ -195,7 +195,7 @@ def _picture(rows: Sequence[Row]) -> bytes:
     def draw(figure: "Figure") -> None:
         axes = figure.add_subplot()
         for rule, colour in looks.items():
-            shares = [one["share"] for one in those(rows, rule=rule, measure="questions")]
+            shares = [row["share"] for row in those(rows, rule=rule, measure="questions")]
             at = [
                 (_value(rows, rule, share, "questions"), _value(rows, rule, share, "solved_percent"))
                 for share in shares

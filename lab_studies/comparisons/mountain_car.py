@@ -110,7 +110,7 @@ class Outcome:
     @property
     def to_solve(self) -> NDArray[np.int64]:
         """The episodes after which the last hundred were quick enough, (N,)."""
-        return np.array([episodes_to_solve(one) for one in self.steps])
+        return np.array([episodes_to_solve(episodes) for episodes in self.steps])
 
 
 @dataclass
@@ -155,13 +155,15 @@ def span_of(places: int = 20) -> float:
 def mountain_car(job: Job, reading: Mapping[str, Any]) -> Findings:
     """Every rule, for both students."""
     settings = [Setting(student, rule) for student in STUDENTS for rule in RULES]
-    found = job.each(partial(taught, sessions=job.sessions, seed=job.seed), settings)
-    rows = [one for setting, outcome in found.items() for one in rows_of(setting, outcome, found)]
+    outcomes = job.each(partial(taught, sessions=job.sessions, seed=job.seed), settings)
+    rows = [result for setting, outcome in outcomes.items() for result in rows_of(setting, outcome, outcomes)]
     pictures = {
-        f"Mountain Car: steps of an episode, {student}": curves({rule: found[Setting(student, rule)] for rule in RULES})
+        f"Mountain Car: steps of an episode, {student}": curves(
+            {rule: outcomes[Setting(student, rule)] for rule in RULES}
+        )
         for student in STUDENTS
     }
-    return Findings(rows, in_short(found), pictures, (MEASURES, STARTS, DIFFERS))
+    return Findings(rows, in_short(outcomes), pictures, (MEASURES, STARTS, DIFFERS))
 
 
 def student_of(name: str) -> LearnerSettings:
@@ -187,12 +189,12 @@ def _told(setting: Setting, learner: LearnerSettings, seeds: NDArray[np.uint64])
     steps, helped, tables = [], [], []
     for seed in seeds.tolist():
         teacher = Teacher(known, TEACHERS[setting.rule], span_of())
-        one = Session(world(), learner, GATE, teacher, stream(seed)).run()
-        if one.interrupted:
+        session = Session(world(), learner, GATE, teacher, stream(seed)).run()
+        if session.interrupted:
             raise KeyboardInterrupt
-        steps.append(one.steps)
-        helped.append(one.helped_steps)
-        tables.append(one.q)
+        steps.append(session.steps)
+        helped.append(session.helped_steps)
+        tables.append(session.q)
     return Outcome(np.array(steps), np.array(helped), _solved(tables, learner))
 
 
@@ -207,7 +209,7 @@ def episodes_to_solve(steps: NDArray[np.int64]) -> int:
     return int(quick[0]) + SOLVED_OF if len(quick) else len(steps)
 
 
-def rows_of(setting: Setting, of: Outcome, found: Mapping[Setting, Outcome]) -> list[Row]:
+def rows_of(setting: Setting, of: Outcome, outcomes: Mapping[Setting, Outcome]) -> list[Row]:
     """The measures of a setting, and how many steps an episode it saves over nobody."""
     named: Row = {"student": setting.student, "rule": setting.rule, "sessions": len(of.steps)}
     rows = [
@@ -219,14 +221,14 @@ def rows_of(setting: Setting, of: Outcome, found: Mapping[Setting, Outcome]) -> 
     ]
     if setting.rule == NOBODY:
         return rows
-    alone = found[replace(setting, rule=NOBODY)]
+    alone = outcomes[replace(setting, rule=NOBODY)]
     return [*rows, mean_row(named, "saved_steps", alone.steps.mean(axis=1) - of.steps.mean(axis=1))]
 
 
-def in_short(found: Mapping[Setting, Outcome]) -> Row:
+def in_short(outcomes: Mapping[Setting, Outcome]) -> Row:
     """The area under the curve, its beginning, and when it is solved, by student and rule."""
     says: Row = {"span": round(span_of(), 2)}
-    for setting, of in found.items():
+    for setting, of in outcomes.items():
         which = f"{setting.student}, {setting.rule}"
         says[f"{which}: mean steps"] = round(float(of.steps.mean()), 1)
         says[f"{which}: first 100"] = round(float(of.steps[:, :100].mean()), 1)

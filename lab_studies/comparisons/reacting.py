@@ -82,17 +82,17 @@ class Reacted:
 def reacting(job: Job, reading: Mapping[str, Any]) -> Findings:
     """Every cell with every trouble; the reading changes nothing here."""
     settings = [Setting(cell, order, trouble) for cell, order in WORKS for trouble in TROUBLES]
-    found = job.each(partial(reacted, episodes=job.sessions, seed=job.seed), settings)
-    rows = [line for setting in settings for line in rows_of(setting, found[setting])]
+    outcomes = job.each(partial(reacted, episodes=job.sessions, seed=job.seed), settings)
+    rows = [line for setting in settings for line in rows_of(setting, outcomes[setting])]
     figures = {f"{cell}, {order}": _picture(rows, cell) for cell, order in WORKS}
-    alike = [(one["table"], one["trouble"]) for one in those(rows, measure="makespan_s", method=ROLLING)]
-    alike = [one for one in alike if one[1] != ROBOTS]  # there hindsight is a bound
+    alike = [(result["table"], result["trouble"]) for result in those(rows, measure="makespan_s", method=ROLLING)]
+    alike = [pair for pair in alike if pair[1] != ROBOTS]  # there hindsight is a bound
     says: Row = {}
     for name in (LIST, RULE, ANEW, ROLLING) if alike else ():
         over = those(rows, measure="over hindsight_percent", method=name)
-        mean = np.mean([one["value"] for one in over if (one["table"], one["trouble"]) in alike])
+        mean = np.mean([result["value"] for result in over if (result["table"], result["trouble"]) in alike])
         says[f"{name}: mean over hindsight, one robot that never breaks down [%]"] = round(float(mean), 2)
-    took_s = [one.decision_s for one in found.values() if one.decision_s is not None]
+    took_s = [outcome.decision_s for outcome in outcomes.values() if outcome.decision_s is not None]
     says["milliseconds a rolling decision"] = round(1e3 * float(np.mean(took_s)), 1) if took_s else None
     notes = (ABOUT.format(episodes=job.sessions, futures=FUTURES), KINDS, LIMITS)
     return Findings(rows, says, figures, notes)
@@ -120,21 +120,21 @@ def reacted(setting: Setting, episodes: int, seed: int) -> Reacted:
 
 def _hindsight(cell: Cell, chance: Chance, episodes: int, seed: int) -> tuple[Floats, int]:
     rng = np.random.default_rng(seed)  # the episodes of `replicate`
-    found = [in_hindsight(cell, Episode(cell, chance, drawn_seed(rng))) for _ in range(episodes)]
-    return np.array([one.cost for one in found]), sum(one.proven for one in found)
+    hindsights = [in_hindsight(cell, Episode(cell, chance, drawn_seed(rng))) for _ in range(episodes)]
+    return np.array([hindsight.cost for hindsight in hindsights]), sum(hindsight.proven for hindsight in hindsights)
 
 
-def rows_of(setting: Setting, found: Reacted) -> list[Row]:
+def rows_of(setting: Setting, outcome: Reacted) -> list[Row]:
     """The mean of each policy, what it saves over the list, and how far it is from hindsight."""
     rows: list[Row] = []
-    least = float(found.costs[HINDSIGHT].mean())
-    for name, costs in found.costs.items():
+    least = float(outcome.costs[HINDSIGHT].mean())
+    for name, costs in outcome.costs.items():
         named: Row = {"table": setting.cell, "order": setting.order, "trouble": setting.trouble, "method": name}
         if name == RULE:
-            named["rule"] = found.rule
+            named["rule"] = outcome.rule
         rows.append(mean_row(named, "makespan_s", costs))
         if name not in (LIST, HINDSIGHT):
-            rows.append(mean_row(named, "saved over the list_s", found.costs[LIST] - costs))
+            rows.append(mean_row(named, "saved over the list_s", outcome.costs[LIST] - costs))
         rows.append(row(named, "over hindsight_percent", 100.0 * (float(costs.mean()) / least - 1.0)))
     return rows
 

@@ -99,10 +99,10 @@ def reuse(job: Job, reading: Mapping[str, Any]) -> Findings:
     orders = orders_of(TASKS, job.sessions, job.seed)
     pairs = [(TASKS[0], other) for other in (*TASKS[1:], OTHER_ARM)]
     alone = [(task,) for task in (*TASKS, OTHER_ARM)]
-    found = job.each(tried, [Life(order, job.seed) for order in (*orders, *pairs, *alone)])
-    anew = {task: found[Life((task,), job.seed)][0] for (task,) in alone}
-    lives = [found[Life(order, job.seed)] for order in orders]
-    after = {other: found[Life((first, other), job.seed)][1] for first, other in pairs}
+    places = job.each(tried, [Life(order, job.seed) for order in (*orders, *pairs, *alone)])
+    anew = {task: places[Life((task,), job.seed)][0] for (task,) in alone}
+    lives = [places[Life(order, job.seed)] for order in orders]
+    after = {other: places[Life((first, other), job.seed)][1] for first, other in pairs}
     rows = [*rows_of(lives, anew), *rows_after(after, anew), *rows_of_lives(lives, anew)]
     figures = {"Saved, by place in the order": by_place(rows), "What becomes of the skills of a task": by_task(rows)}
     words = f"{len(orders)} orders" if len(orders) > 1 else "1 order"
@@ -114,10 +114,10 @@ def orders_of(tasks: Sequence[str], count: int, seed: int) -> list[tuple[str, ..
     """So many orders of the tasks, none twice: the one given, then drawn ones; BadInput when there are not so many."""
     if not 1 <= count <= factorial(len(tasks)):
         raise BadInput(f"{count} orders (--sessions) of {len(tasks)} tasks: allowed are 1 to {factorial(len(tasks))}")
-    rng, found = np.random.default_rng([seed, len(tasks)]), {tuple(tasks): None}
-    while len(found) < count:
-        found[tuple(tasks[at] for at in rng.permutation(len(tasks)))] = None
-    return [*found]
+    rng, orders = np.random.default_rng([seed, len(tasks)]), {tuple(tasks): None}
+    while len(orders) < count:
+        orders[tuple(tasks[at] for at in rng.permutation(len(tasks)))] = None
+    return [*orders]
 
 
 def tried(life: Life) -> tuple[Place, ...]:
@@ -133,9 +133,9 @@ def _lived(life: Life) -> tuple[tuple[Place, ...], Known]:
     before, known = _lived(Life(life.order[:-1], life.seed))
     prepared = _prepared(life.order[-1], life.seed)
     problems = distinct(prepared)
-    lessons = taught(prepared, known, problems, life.seed)
-    place = tuple(outcome_of(prepared, problem, one) for problem, one in zip(problems, lessons, strict=True))
-    policies = [one.lesson.policy for one in lessons]
+    skills = taught(prepared, known, problems, life.seed)
+    place = tuple(outcome_of(prepared, problem, skill) for problem, skill in zip(problems, skills, strict=True))
+    policies = [skill.lesson.policy for skill in skills]
     learned = {(policy.subtask, policy.signature): policy for policy in policies}
     return (*before, place), {**known, **learned}
 
@@ -146,10 +146,10 @@ def _prepared(name: str, seed: int) -> Prepared:
     return prepare(task, task.order(), seed)
 
 
-def outcome_of(prepared: Prepared, problem: Problem, one: Taught) -> Outcome:
+def outcome_of(prepared: Prepared, problem: Problem, skill: Taught) -> Outcome:
     """What is counted of a lesson; a policy of an earlier task is tried in physics."""
-    lesson, (episodes, helped_steps) = one.lesson, spent(one.lesson)
-    found = Outcome(
+    lesson, (episodes, helped_steps) = skill.lesson, spent(skill.lesson)
+    outcome = Outcome(
         prepared.task.name,
         problem.subtask,
         lesson.source if lesson.source in SOURCES else "learned",
@@ -157,11 +157,11 @@ def outcome_of(prepared: Prepared, problem: Problem, one: Taught) -> Outcome:
         episodes,
         helped_steps,
         0 if lesson.result is None else int(lesson.result.visits.sum()),
-        one.wall_s,
-        one.cpu_s,
+        skill.wall_s,
+        skill.cpu_s,
         unsolved=not works(problem, lesson.policy),
     )
-    return replace(found, failing=found.carried and fails(prepared, problem, lesson.policy))
+    return replace(outcome, failing=outcome.carried and fails(prepared, problem, lesson.policy))
 
 
 # ---- rows ----------------------------------------------------------------------------------------------------------
@@ -177,7 +177,7 @@ def rows_of(lives: Sequence[Sequence[Place]], anew: Mapping[str, Place]) -> list
     for place in range(1, len(lives[0])):
         rows += measures({"place": place + 1}, at(slice(place, place + 1)))
     rows += measures({"place": LATER}, at(later)) + _growth(lives, anew)
-    for subtask in dict.fromkeys(one.subtask for place in anew.values() for one in place):
+    for subtask in dict.fromkeys(outcome.subtask for place in anew.values() for outcome in place):
         rows += measures({"place": LATER, "subtask": subtask}, at(later, subtask=subtask))
     for task in anew:
         rows += measures({"place": LATER, "task": task}, at(later, task=task))
@@ -201,7 +201,9 @@ def rows_after(after: Mapping[str, Place], anew: Mapping[str, Place]) -> list[Ro
     """The measures of each task that finds the skills of the first one alone."""
     first = TASKS[0]
     return [
-        one for task, place in after.items() for one in measures({"after": first, "task": task}, [(place, anew[task])])
+        result
+        for task, place in after.items()
+        for result in measures({"after": first, "task": task}, [(place, anew[task])])
     ]
 
 
@@ -214,7 +216,7 @@ def rows_of_lives(lives: Sequence[Sequence[Place]], anew: Mapping[str, Place]) -
             for source in ("all", *SOURCES):
                 own = [pair for pair in pairs if source in ("all", pair[0].source)]
                 named: Row = {"order": order, "place": place, "task": skills[0].task, "source": source}
-                rows += [_row_of(named, [one for one, _ in own], [other for _, other in own])] if own else []
+                rows += [_row_of(named, [outcome for outcome, _ in own], [other for _, other in own])] if own else []
     return rows
 
 
@@ -223,7 +225,7 @@ def _row_of(named: Row, now: Sequence[Outcome], anew: Sequence[Outcome]) -> Row:
     spent_now = {what: round(_sum(now, what), 3) for what in COSTS}
     spent_anew = {f"{what}_anew": round(_sum(anew, what), 3) for what in COSTS}
     saved = None if not then else 100.0 * (1 - _sum(now, "episodes") / then)
-    carried = sum(one.carried for one in now)
+    carried = sum(outcome.carried for outcome in now)
     return row(
         {**named, "from_earlier": carried, **spent_now, "saved_percent": saved, **spent_anew}, "skills", len(now)
     )
@@ -233,29 +235,31 @@ def _beside(places: Iterable[Place], anew: Mapping[str, Place], wanted: Mapping[
     """The skills of some places that have what is wanted, and the same ones from nothing."""
     pairs = [pair for place in places for pair in zip(place, anew[place[0].task], strict=True)]
     pairs = [pair for pair in pairs if all(getattr(pair[0], name) == value for name, value in wanted.items())]
-    return [one for one, _ in pairs], [other for _, other in pairs]
+    return [outcome for outcome, _ in pairs], [other for _, other in pairs]
 
 
 def measures(named: Row, orders: Sequence[Beside]) -> list[Row]:
     """What became of skills and what that saved, in percent, with an interval over the orders where it varies."""
-    orders = [one for one in orders if one[0]]
+    orders = [order for order in orders if order[0]]
     rows = []
     for fate in FATES:
-        rows += _mean(named, f"{fate}_percent", [_share([one.fate == fate for one in now]) for now, _ in orders])
+        rows += _mean(
+            named, f"{fate}_percent", [_share([outcome.fate == fate for outcome in now]) for now, _ in orders]
+        )
     for what in COSTS:
         costs = [(_sum(now, what), _sum(anew, what)) for now, anew in orders]
         rows += _mean(named, f"saved_{what}_percent", [100.0 * (1 - now / then) for now, then in costs if then])
-    failing = [[one.failing for one in now if one.carried] for now, _ in orders]
-    rows += _mean(named, "taken_failing_percent", [_share(found) for found in failing if found])
-    return rows + _mean(named, "unsolved_percent", [_share([one.unsolved for one in now]) for now, _ in orders])
+    failing = [[outcome.failing for outcome in now if outcome.carried] for now, _ in orders]
+    rows += _mean(named, "taken_failing_percent", [_share(flags) for flags in failing if flags])
+    return rows + _mean(named, "unsolved_percent", [_share([outcome.unsolved for outcome in now]) for now, _ in orders])
 
 
-def _share(found: Sequence[bool]) -> float:
-    return 100.0 * sum(found) / len(found)
+def _share(flags: Sequence[bool]) -> float:
+    return 100.0 * sum(flags) / len(flags)
 
 
 def _sum(outcomes: Iterable[Outcome], what: str) -> float:
-    total: float = sum(getattr(one, what) for one in outcomes)
+    total: float = sum(getattr(outcome, what) for outcome in outcomes)
     return total
 
 
@@ -268,12 +272,20 @@ def _mean(named: Row, measure: str, values: Sequence[float]) -> list[Row]:
 
 def in_short(rows: Sequence[Row], orders: int) -> Row:
     """Whether a lab that has lived longer learns less, and what carries over, in words and numbers."""
-    whole = [one for one in rows if one.get("place") is not None and not (one.get("subtask") or one.get("task"))]
-    later = {one["measure"]: one for one in those(whole, place=LATER)}
-    saved = [one for one in rows if one["measure"] == "saved_episodes_percent"]
-    places = [f"{ordinal(one['place'])} {percent(one)}" for one in saved if isinstance(one.get("place"), int)]
-    tasks = [f"{one['task']} {percent(one)}" for one in saved if one.get("place") == LATER and one.get("task")]
-    after = [f"{one['task']} {percent(one)}" for one in saved if one.get("after")]
+    whole = [
+        result
+        for result in rows
+        if result.get("place") is not None and not (result.get("subtask") or result.get("task"))
+    ]
+    later = {result["measure"]: result for result in those(whole, place=LATER)}
+    saved = [result for result in rows if result["measure"] == "saved_episodes_percent"]
+    places = [
+        f"{ordinal(result['place'])} {percent(result)}" for result in saved if isinstance(result.get("place"), int)
+    ]
+    tasks = [
+        f"{result['task']} {percent(result)}" for result in saved if result.get("place") == LATER and result.get("task")
+    ]
+    after = [f"{result['task']} {percent(result)}" for result in saved if result.get("after")]
     shares = _carried(rows)
     says: Row = {
         "orders": orders,
@@ -297,12 +309,12 @@ def _named(shares: Mapping[str, float], wanted: Callable[[float], bool]) -> str:
 
 def _answer(later: Mapping[str, Row]) -> str:
     """The verdict over all tasks that are not the first of their order, from their measures."""
-    found = later.get("saved_episodes_percent")
-    if found is None:
+    saved = later.get("saved_episodes_percent")
+    if saved is None:
         return "one task alone has nothing to take over"
-    ends = found["ci95"] or [found["value"]] * 2
+    ends = saved["ci95"] or [saved["value"]] * 2
     verdict = "yes" if ends[0] > 0 else "no" if ends[1] <= 0 else "not shown"
-    said = f"{verdict}: later tasks of an order save {percent(found)} of the episodes that they take from nothing"
+    said = f"{verdict}: later tasks of an order save {percent(saved)} of the episodes that they take from nothing"
     growth = later.get(GROWTH)
     if growth is None:
         return said
@@ -312,18 +324,18 @@ def _answer(later: Mapping[str, Row]) -> str:
 
 def _carried(rows: Sequence[Row]) -> dict[str, float]:
     """By sub-task, how many of its skills are taken or adapted from earlier tasks [%]; the most first."""
-    later = [one for one in rows if one.get("place") == LATER and one.get("subtask")]
+    later = [result for result in rows if result.get("place") == LATER and result.get("subtask")]
     shares: dict[str, float] = {}
-    for one in later:
-        if one["measure"] in ("taken_percent", "adapted_percent"):
-            shares[one["subtask"]] = shares.get(one["subtask"], 0.0) + one["value"]
+    for result in later:
+        if result["measure"] in ("taken_percent", "adapted_percent"):
+            shares[result["subtask"]] = shares.get(result["subtask"], 0.0) + result["value"]
     return dict(sorted(shares.items(), key=lambda pair: -pair[1]))
 
 
-def percent(one: Row) -> str:
+def percent(result: Row) -> str:
     """A measure and its interval, such as "31 % (20 to 42)"."""
-    ends = "" if one["ci95"] is None else f" ({one['ci95'][0]:.0f} to {one['ci95'][1]:.0f})"
-    return f"{one['value']:.0f} %{ends}"
+    ends = "" if result["ci95"] is None else f" ({result['ci95'][0]:.0f} to {result['ci95'][1]:.0f})"
+    return f"{result['value']:.0f} %{ends}"
 
 
 def ordinal(number: int) -> str:

@@ -69,14 +69,14 @@ class _Rolling:
     def choose(self, seen: Observed, allowed: tuple[int, ...]) -> int:
         """The decision with the least mean cost."""
         self._decisions += 1
-        first = next((one for one in self._left if one in allowed), allowed[0])
+        first = next((decision for decision in self._left if decision in allowed), allowed[0])
         chosen = first
         if len(allowed) > 1:
             seeds = np.array([self._seed_of(future) for future in range(self.futures)], np.uint64)
-            ready_s = np.array([self._ready_s(seen, int(one)) for one in seeds])
+            ready_s = np.array([self._ready_s(seen, int(seed)) for seed in seeds])
             _put(self._now, seen, self._arrays.rooms)
-            others = [one for one in allowed if one != first]
-            chosen = min([first, *others], key=lambda one: self._mean_cost(seen, one, ready_s, seeds))
+            others = [decision for decision in allowed if decision != first]
+            chosen = min([first, *others], key=lambda decision: self._mean_cost(seen, decision, ready_s, seeds))
         self._left = self._without(chosen)
         return chosen
 
@@ -98,17 +98,17 @@ class _Rolling:
     def _without(self, decision: int) -> list[int]:
         """The rest of the list without a decision: its own entry, or the next one of its part."""
         parts = self.cell.parts
-        own = [n for n, one in enumerate(self._left) if part_of(one, parts) == part_of(decision, parts)]
+        own = [n for n, entry in enumerate(self._left) if part_of(entry, parts) == part_of(decision, parts)]
         same = [n for n in own if self._left[n] == decision]
         used = next(iter([*same, *own]), len(self._left))
-        return [one for n, one in enumerate(self._left) if n != used]
+        return [entry for n, entry in enumerate(self._left) if n != used]
 
     def _order(self, tail: Sequence[int]) -> OrderArrays:
         """A list of priorities: the tail, and after it moves that its parts did not need."""
         parts = self.cell.parts
         spare = [part for _ in range(max(moves_each(self.cell))) for part in range(parts)]
-        own = np.array([part_of(one, parts) - 1 for one in tail] + spare, np.int64)
-        choices = np.array([choice_of(one, parts) for one in tail] + [0] * len(spare), np.int64)
+        own = np.array([part_of(decision, parts) - 1 for decision in tail] + spare, np.int64)
+        choices = np.array([choice_of(decision, parts) for decision in tail] + [0] * len(spare), np.int64)
         size = len(own)
         left_s = np.zeros(len(self.cell.positions))
         return OrderArrays(own, choices, np.zeros(size, np.bool_), np.zeros(size, np.int64), left_s)

@@ -49,10 +49,10 @@ def sequencing_speed(job: Job, reading: Mapping[str, Any]) -> Findings:
         *(partial(near_rows, case, job) for case in CASES),
         *(partial(solved_rows, case, job.seed) for case in CASES),
     ]
-    found = job.in_turn(steps)
-    rates, learned, solved = found[:3], found[-2 * len(CASES) : -len(CASES)], found[-len(CASES) :]
+    measured = job.in_turn(steps)
+    rates, learned, solved = measured[:3], measured[-2 * len(CASES) : -len(CASES)], measured[-len(CASES) :]
     notes = (ABOUT.format(job.sessions), ABOUT_MANY.format(CP_SAT_LIMIT_S))
-    rows = list(chain(*found))
+    rows = list(chain(*measured))
     summary = ratios(*(list(chain(*some)) for some in (rates, learned, solved)))
     return Findings(rows, summary | agreement(rows), {}, notes)
 
@@ -100,7 +100,7 @@ def _proof(case: str, toasts: int) -> list[Row]:
 
 def near_rows(case: str, job: Job) -> list[Row]:
     """The share of srl-time's sessions that came near enough, and where all did, their seconds until then."""
-    cell, found = robot_cell(case, MANY), list[float]()
+    cell, seconds = robot_cell(case, MANY), list[float]()
     wanted = (1.0 + NEAR) * optimum(cell).bound_s
     for session in range(min(job.sessions, MANY_SESSIONS)):
         reached, began = [inf], time.perf_counter()
@@ -111,8 +111,8 @@ def near_rows(case: str, job: Job) -> list[Row]:
 
         rng = np.random.default_rng([job.seed, session])
         SEQUENCERS["srl-time"](cell, Search(MANY_EPISODES, on_episode=listen), rng)
-        found.append(reached[0])
-    return rows_of_near(case, found)
+        seconds.append(reached[0])
+    return rows_of_near(case, seconds)
 
 
 def rows_of_near(case: str, seconds: list[float]) -> list[Row]:
@@ -125,22 +125,22 @@ def rows_of_near(case: str, seconds: list[float]) -> list[Row]:
 def solved_rows(case: str, seed: int) -> list[Row]:
     """CP-SAT's gap after its limit."""
     cell = robot_cell(case, MANY)
-    best, found = optimum(cell), cp_sat(cell, time_limit_s=CP_SAT_LIMIT_S, seed=seed)
+    best, solved = optimum(cell), cp_sat(cell, time_limit_s=CP_SAT_LIMIT_S, seed=seed)
     named: Row = {"name": "cp-sat", "case": case, "toasts": MANY, "limit_s": CP_SAT_LIMIT_S}
-    gap = max(0.0, 100.0 * best.gap(found.cost))
-    return [row(named, "gap_percent", gap), row(named, SECONDS, found.wall_s)]
+    gap = max(0.0, 100.0 * best.gap(solved.cost))
+    return [row(named, "gap_percent", gap), row(named, SECONDS, solved.wall_s)]
 
 
 def ratios(rates: list[Row], learned: list[Row], solved: list[Row]) -> Row:
     """How many times as fast; CP-SAT's seconds are at least those of its limit where its sequence was not near yet."""
-    fast, random, slow = (one["value"] for one in rates)
+    fast, random, slow = (result["value"] for result in rates)
     says: Row = {
         "compiled to readable SRL": round(fast / slow, 1),
         "random search to SRL, both compiled": round(random / fast, 2),
     }
-    for one in those(learned, measure=SECONDS):
-        other = {own["measure"]: own["value"] for own in those(solved, case=one["case"])}
+    for result in those(learned, measure=SECONDS):
+        other = {own["measure"]: own["value"] for own in those(solved, case=result["case"])}
         far = other.get("gap_percent", 0.0) > 100.0 * NEAR
-        ratio = round(other[SECONDS] / one["value"]) if far else None
-        says[f"CP-SAT's seconds to srl-time's, case {one['case']}, at least"] = ratio
+        ratio = round(other[SECONDS] / result["value"]) if far else None
+        says[f"CP-SAT's seconds to srl-time's, case {result['case']}, at least"] = ratio
     return says

@@ -84,16 +84,16 @@ def advisors(job: Job, reading: Mapping[str, Any]) -> Findings:
     nobody = PanelSetting((), None, lesson)
     together = {(panel, way): PanelSetting(panel, way, lesson) for panel in PANELS for way in (*DECISIONS, IN_TURN)}
     settings = [*together.values(), *alone.values(), nobody]
-    found = job.each(
+    outcomes = job.each(
         partial(tried, sessions=min(job.sessions, MOST), seed=job.seed),
-        sorted(settings, key=lambda one: -len(one.members)),  # those that take longest first
+        sorted(settings, key=lambda setting: -len(setting.members)),  # those that take longest first
     )
-    cells = {(panel, way): ("", found[setting]) for (panel, way), setting in together.items()}
+    cells = {(panel, way): ("", outcomes[setting]) for (panel, way), setting in together.items()}
     for panel in PANELS:
-        ranked = sorted(dict.fromkeys(panel), key=lambda name: _merit(found[alone[name]]))
-        cells |= {(panel, way): (name, found[alone[name]]) for way, name in ((BEST, ranked[-1]), (WORST, ranked[0]))}
-    rows = [one for panel in PANELS for way in WAYS for one in rows_of(panel, way, *cells[panel, way])]
-    rows += rows_of((), "nobody", "", found[nobody])
+        ranked = sorted(dict.fromkeys(panel), key=lambda name: _merit(outcomes[alone[name]]))
+        cells |= {(panel, way): (name, outcomes[alone[name]]) for way, name in ((BEST, ranked[-1]), (WORST, ranked[0]))}
+    rows = [row for panel in PANELS for way in WAYS for row in rows_of(panel, way, *cells[panel, way])]
+    rows += rows_of((), "nobody", "", outcomes[nobody])
     pictures = {
         f"Sessions that end on the shortest way; nobody: {_value(rows, (), 'nobody', 'SP_percent'):.0f} %": _picture(
             rows, "SP_percent", "sessions that end optimal [%]"
@@ -103,8 +103,8 @@ def advisors(job: Job, reading: Mapping[str, Any]) -> Findings:
     return Findings(rows, in_short(rows), pictures, (MEASURES, WAYS_NOTE, known(reading), LIMITS))
 
 
-def _merit(found: PanelOutcome) -> tuple[float, float]:
-    return float(found.success.mean()), -float(found.helped_steps.mean())
+def _merit(outcome: PanelOutcome) -> tuple[float, float]:
+    return float(outcome.success.mean()), -float(outcome.helped_steps.mean())
 
 
 def tried(setting: PanelSetting, *, sessions: int, seed: int) -> PanelOutcome:
@@ -162,22 +162,22 @@ def _advice(name: str, lesson: AdviceSetting) -> Advice:
     return Advice.of(advice_chances(-values if wrong else values, SKILL_TAUS["expert" if wrong else name]))
 
 
-def rows_of(panel: Sequence[str], way: str, who: str, found: PanelOutcome) -> list[Row]:
+def rows_of(panel: Sequence[str], way: str, who: str, outcome: PanelOutcome) -> list[Row]:
     """The measures of one panel and way; who: the member that was asked alone."""
-    sessions = len(found.success)
+    sessions = len(outcome.success)
     named: Row = {"table": "World I", "panel": ", ".join(panel) or None, "way": way, "asked": who or None}
     named = {name: value for name, value in named.items() if value is not None} | {"sessions": sessions}
-    rows = [share_row(named, "SP_percent", found.success), varying_row(named, "HS_steps", found.helped_steps)]
+    rows = [share_row(named, "SP_percent", outcome.success), varying_row(named, "HS_steps", outcome.helped_steps)]
     if way not in (*DECISIONS, IN_TURN):
         return rows
     never = np.zeros(sessions, np.int64)
     rows += [
-        varying_row(named, "dropped", sum(found.dropped.values(), never)),
-        varying_row(named, "readmitted", found.readmitted),
-        varying_row(named, "disagreed_steps", found.disagreed),
+        varying_row(named, "dropped", sum(outcome.dropped.values(), never)),
+        varying_row(named, "readmitted", outcome.readmitted),
+        varying_row(named, "disagreed_steps", outcome.disagreed),
     ]
     for name in names_in(panel):
-        rows.append(share_row(named | {"advisor": name}, "ever_dropped_percent", found.dropped.get(name, never) > 0))
+        rows.append(share_row(named | {"advisor": name}, "ever_dropped_percent", outcome.dropped.get(name, never) > 0))
     return rows
 
 
@@ -205,9 +205,9 @@ def in_short(rows: Sequence[Row]) -> Row:
             says[f"{way}: mean {unit} of {len(PANELS)} panels"] = round(float(mean), 1)
     for way in (*DECISIONS, IN_TURN):
         behind = [_value(rows, panel, BEST, "SP_percent") - _value(rows, panel, way, "SP_percent") for panel in PANELS]
-        says[f"{way}: panels within {POINTS:g} points of their best member"] = sum(one <= POINTS for one in behind)
+        says[f"{way}: panels within {POINTS:g} points of their best member"] = sum(gap <= POINTS for gap in behind)
     for name in ("wrong", "expert"):
-        shares = [one["value"] for one in rows if str(one.get("advisor", "")).split(" ")[0] == name]
+        shares = [row["value"] for row in rows if str(row.get("advisor", "")).split(" ")[0] == name]
         says[f"{name}: sessions that drop it [%]"] = round(float(np.mean(shares)), 1)
     return says
 

@@ -40,15 +40,15 @@ def distinct(prepared: Prepared) -> list[Problem]:
 
 def taught(prepared: Prepared, known: Known, problems: Iterable[Problem], seed: int = 0) -> list[Taught]:
     """A lesson of a run for each problem; what one learns the next ones know."""
-    found, so_far = [], KnownPolicies.of(known.values())
+    lessons, so_far = [], KnownPolicies.of(known.values())
     with TemporaryDirectory() as folder:
         teacher = Teacher(Toolbox(Path(folder)), seed=seed, trial=trial_of(prepared))
         for problem in problems:
             wall, cpu, how = time.perf_counter(), time.process_time(), prepared.task.subtask(problem.subtask)
             lesson = teacher.find_or_teach(LessonPlan(problem, how.learner, how.gate, prepared.task.name), so_far)
             so_far[lesson.policy.subtask, lesson.policy.signature] = lesson.policy
-            found.append(Taught(lesson, time.perf_counter() - wall, time.process_time() - cpu))
-    return found
+            lessons.append(Taught(lesson, time.perf_counter() - wall, time.process_time() - cpu))
+    return lessons
 
 
 def spent(lesson: Lesson) -> tuple[int, int]:

@@ -61,9 +61,9 @@ def srl_time_study(job: Job, reading: Mapping[str, Any]) -> Findings:
     """Toasts, few and many, and orders of the FMS, by every method. The reading changes nothing here."""
     works = works_of()
     settings = [setting for work in works for setting in settings_of(work)]
-    longest_first = sorted(settings, key=lambda one: -(one.work.cell.parts * (one.episodes or 0)))
-    found = job.each(partial(tried, sessions=job.sessions, seed=job.seed), longest_first)
-    rows = [one for setting in settings for one in rows_of(setting, found[setting])]
+    longest_first = sorted(settings, key=lambda setting: -(setting.work.cell.parts * (setting.episodes or 0)))
+    outcomes = job.each(partial(tried, sessions=job.sessions, seed=job.seed), longest_first)
+    rows = [result for setting in settings for result in rows_of(setting, outcomes[setting])]
     pictures = {
         "Sessions that find the optimum, by their length (bands: 95 % intervals)": by_episodes(rows, "SP_percent"),
         "Sessions whose greedy policy at the end is the optimum": by_episodes(rows, "final_SP_percent"),
@@ -82,17 +82,17 @@ def works_of() -> list[Instance]:
 def settings_of(work: Instance) -> list[MethodSetting]:
     """Every method with this work, at every session length."""
     lengths = ORDER_EPISODES if work.order is not None else FEW.get(work.toasts or 0, MANY_EPISODES)
-    found = []
+    settings = []
     for method in LEARNING:
         if work.size == "many" and method == "mc":
             continue  # no better than srl there, and as slow
         for factor in _factors(work, method):
-            found += [
+            settings += [
                 MethodSetting(work, method, episodes, factor)
                 for episodes in lengths
                 if method != "srl" or (work.toasts or 0) < READABLE_FROM or episodes <= LONGEST_READABLE
             ]
-    return found + [MethodSetting(work, method) for method in single(work)]
+    return settings + [MethodSetting(work, method) for method in single(work)]
 
 
 def _factors(work: Instance, method: str) -> tuple[str | None, ...]:
@@ -101,15 +101,15 @@ def _factors(work: Instance, method: str) -> tuple[str | None, ...]:
     return FACTORS if work.size == "few" else ("B",)
 
 
-def rows_of(setting: MethodSetting, found: MethodOutcome) -> list[Row]:
+def rows_of(setting: MethodSetting, outcome: MethodOutcome) -> list[Row]:
     """Success, gap and seconds of a setting."""
-    named, rows = _described(setting, len(found.gap)), []
-    for measure, gaps in (("SP_percent", found.gap), ("final_SP_percent", found.final_gap)):
+    named, rows = _described(setting, len(outcome.gap)), []
+    for measure, gaps in (("SP_percent", outcome.gap), ("final_SP_percent", outcome.final_gap)):
         if np.isfinite(gaps).all():
             percent = share_row(named, measure, gaps <= EXACT_TO)
             rows.append(percent if setting.method in LEARNING else row(named, measure, percent["value"]))
-    rows.append(varying_row(named, "gap_percent", 100.0 * np.maximum(found.gap, 0.0)))
-    return [*rows, varying_row(named, "wall_s", found.wall_s)]
+    rows.append(varying_row(named, "gap_percent", 100.0 * np.maximum(outcome.gap, 0.0)))
+    return [*rows, varying_row(named, "wall_s", outcome.wall_s)]
 
 
 def _described(setting: MethodSetting, sessions: int) -> Row:
@@ -134,19 +134,19 @@ def in_short(rows: Sequence[Row]) -> Row:
     says: Row = {}
     for table, longest in _longest(those(rows, method="srl-time")):
         of = those(rows, method="srl-time", table=table, measure="SP_percent", episodes=longest)
-        says[f"srl-time, {table}: least SP in {longest} episodes [%]"] = round(min(one["value"] for one in of), 1)
+        says[f"srl-time, {table}: least SP in {longest} episodes [%]"] = round(min(result["value"] for result in of), 1)
     for table, longest in _longest(rows):
         for method in LEARNING:
             if of := those(rows, method=method, table=table, measure="gap_percent", episodes=longest):
-                mean = float(np.mean([one["value"] for one in of]))
+                mean = float(np.mean([result["value"] for result in of]))
                 says[f"{method}, {table}: mean gap in {longest} episodes [%]"] = round(mean, 2)
-    proofs = [one["value"] for one in those(rows, method="exact", measure="wall_s")]
+    proofs = [result["value"] for result in those(rows, method="exact", measure="wall_s")]
     return says | {"exact: longest proof [s]": round(max(proofs), 2)}
 
 
 def _longest(rows: Iterable[Row]) -> list[tuple[str, int]]:
-    found: dict[str, int] = {}
-    for one in rows:
-        if "episodes" in one:
-            found[one["table"]] = max(found.get(one["table"], 0), one["episodes"])
-    return list(found.items())
+    longest: dict[str, int] = {}
+    for result in rows:
+        if "episodes" in result:
+            longest[result["table"]] = max(longest.get(result["table"], 0), result["episodes"])
+    return list(longest.items())

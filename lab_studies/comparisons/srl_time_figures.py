@@ -33,9 +33,9 @@ PANEL_INCH = 2.9, 2.5
 
 def by_episodes(rows: Sequence[Row], measure: str) -> bytes:
     """A percentage by session length, a plot for each case and number of few toasts."""
-    of = [one for one in those(rows, measure=measure) if "episodes" in one and "case" in one]
-    counts = sorted({one["toasts"] for one in of if one["toasts"] <= 4})
-    cases = sorted({one["case"] for one in of})
+    of = [row for row in those(rows, measure=measure) if "episodes" in row and "case" in row]
+    counts = sorted({row["toasts"] for row in of if row["toasts"] <= 4})
+    cases = sorted({row["case"] for row in of})
     panels = {f"{count} toasts, case {case}": those(of, toasts=count, case=case) for count in counts for case in cases}
     ylabel = "sessions that find the optimum [%]" if measure == "SP_percent" else "sessions that end optimal [%]"
 
@@ -48,9 +48,9 @@ def by_episodes(rows: Sequence[Row], measure: str) -> bytes:
 
 def of_orders(rows: Sequence[Row]) -> bytes:
     """The gap by session length for each order and interval of the FMS; methods with one sequence as lines across."""
-    of = [one for one in those(rows, measure="gap_percent") if "order" in one]
-    means = sorted({one["interval_s"] for one in of})
-    orders = list(dict.fromkeys(one["order"] for one in of))
+    of = [row for row in those(rows, measure="gap_percent") if "order" in row]
+    means = sorted({row["interval_s"] for row in of})
+    orders = list(dict.fromkeys(row["order"] for row in of))
     panels = {
         f"{order}, every {mean:g} s": those(of, order=order, interval_s=mean) for mean in means for order in orders
     }
@@ -58,7 +58,7 @@ def of_orders(rows: Sequence[Row]) -> bytes:
     def draw(axes: "Axes", shown: Sequence[Row]) -> None:
         _curves(axes, shown)
         fifo = those(shown, method="fifo")[0]["value"]
-        rule = min(one["value"] for one in shown if "episodes" not in one and one["method"] not in ("fifo", "exact"))
+        rule = min(row["value"] for row in shown if "episodes" not in row and row["method"] not in ("fifo", "exact"))
         axes.axhline(fifo, color=INK, linestyle="--", linewidth=1.0, label="FIFO")
         axes.axhline(rule, color=SKY, linestyle=":", linewidth=1.6, label="best dispatching rule")
         axes.set_ylim(bottom=-0.04 * axes.get_ylim()[1])
@@ -68,17 +68,17 @@ def of_orders(rows: Sequence[Row]) -> bytes:
 
 def by_wall_time(rows: Sequence[Row]) -> bytes:
     """The gap by the seconds of a session for many toasts: a line for each case and method, a mark for one sequence."""
-    of = [one for one in rows if one.get("toasts", 0) > 4]
-    counts = sorted({one["toasts"] for one in of})
+    of = [row for row in rows if row.get("toasts", 0) > 4]
+    counts = sorted({row["toasts"] for row in of})
     panels = {f"{count} toasts": those(of, toasts=count) for count in counts}
 
     def draw(axes: "Axes", shown: Sequence[Row]) -> None:
         looks = LOOKS | {(method, None): look for method, look in SINGLE.items()}
         for look, (colour, marker, name) in looks.items():
             size = 9 if marker == "*" else 5
-            for case in sorted({one["case"] for one in shown}):
+            for case in sorted({row["case"] for row in shown}):
                 mine = those(shown, case=case, method=look[0], reward_factor=look[1])
-                walls, gaps = ([one["value"] for one in those(mine, measure=m)] for m in ("wall_s", "gap_percent"))
+                walls, gaps = ([row["value"] for row in those(mine, measure=m)] for m in ("wall_s", "gap_percent"))
                 if walls:
                     axes.plot(walls, gaps, color=colour, marker=marker, markersize=size, linewidth=0.9, label=name)
         axes.set(xscale="log", xlabel="seconds of a session")
@@ -106,11 +106,11 @@ def _grid(panels: Mapping[str, Sequence[Row]], columns: int, draw: Any, ylabel: 
 
 def _curves(axes: "Axes", rows: Sequence[Row]) -> None:
     """The methods that learn by session length: the lengths themselves are the ticks of a logarithmic axis."""
-    tried = [one for one in rows if "episodes" in one]
+    tried = [row for row in rows if "episodes" in row]
     for (method, factor), look in LOOKS.items():
         if of := those(tried, method=method, reward_factor=factor):
             curve(axes, of, "episodes", look)
-    lengths = sorted({one["episodes"] for one in tried})
+    lengths = sorted({row["episodes"] for row in tried})
     axes.set(xscale="log", xlabel="episodes")
     axes.set_xticks(lengths, [f"{length:g}" for length in lengths])
     axes.set_xticks([], minor=True)

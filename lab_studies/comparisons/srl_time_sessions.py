@@ -94,9 +94,9 @@ def tried(setting: MethodSetting, *, sessions: int, seed: int) -> MethodOutcome:
         cell = setting.work.cell
         run_sessions(cell, setting.method, Search(1, settings=search.settings), 1, 0)  # it may have to be compiled
         began = time.perf_counter()
-        found = run_sessions(cell, setting.method, search, count, int(seeds[0]))
+        sessions_done = run_sessions(cell, setting.method, search, count, int(seeds[0]))
         wall_s = (time.perf_counter() - began) / count
-        return _tried(best, found.best_cost, found.final_cost, np.full(count, wall_s))
+        return _tried(best, sessions_done.best_cost, sessions_done.final_cost, np.full(count, wall_s))
     runs = [_timed(setting, search, int(own)) for own in seeds]
     costs = np.array([result.cost for result, _ in runs])
     finals = np.array([result.final_cost if isinstance(result, LearnedSequence) else np.nan for result, _ in runs])

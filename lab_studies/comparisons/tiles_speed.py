@@ -52,7 +52,7 @@ def tiles_speed(job: Job, reading: Mapping[str, Any]) -> Findings:
         "gymnasium alone": lambda: _by_chance(job.seed),
     }
     rows = job.in_turn([lambda name=name, run=run: _row(name, run) for name, run in runs.items()])  # type: ignore[misc]
-    rates = {one["name"]: one["value"] for one in rows}
+    rates = {row["name"]: row["value"] for row in rows}
     summary: Row = {f"kernel to {name}": round(rates["kernel"] / rates[name], 1) for name in rates if name != "kernel"}
     return Findings(rows, summary, {}, (ABOUT,))
 

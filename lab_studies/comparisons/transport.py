@@ -52,63 +52,63 @@ def transport(job: Job, reading: Mapping[str, Any]) -> Findings:
     seconds = float(reading.get("seconds", SECONDS))
     instances = own(reading["instances"]) if "instances" in reading else board()
     entries = entries_of(instances, reading.get("methods", ()), seconds, job.seed)
-    found = measured(job, entries)
+    results = measured(job, entries)
     notes = [MEASURES, TIMES.format(seconds=seconds), LEARNERS, CHECKED.format(shown=CYCLES_SHOWN)]
     says: Row = {}
     if reading.get("verify"):
-        says["schedules that the checker found right"] = verified(found)
-    rows = [line for one, of in by_instance(found).items() for line in rows_of(one, of)]
-    rows = [*in_all(found), *rows]
-    orders = {entry: one for entry, one in found.items() if entry.method != CYCLIC}
+        says["schedules that the checker found right"] = verified(results)
+    rows = [line for instance, of in by_instance(results).items() for line in rows_of(instance, of)]
+    rows = [*in_all(results), *rows]
+    orders = {entry: result for entry, result in results.items() if entry.method != CYCLIC}
     figures = {
         "How many instances a method solves within a gap": profile(gaps_of(orders)),
         "The mean gap, second by second": by_seconds(
-            orders, {one: least(one, of) for one, of in by_instance(orders).items()}
+            orders, {instance: least(instance, of) for instance, of in by_instance(orders).items()}
         ),
     }
-    refused = {(e.method, f.refused) for e, f in found.items() if f.cost is None}
+    refused = {(e.method, f.refused) for e, f in results.items() if f.cost is None}
     notes += [f"Left out: {method}: {why}." for method, why in sorted(refused)[:12]]
-    return Findings(rows, in_short(found) | says, figures, tuple(notes))
+    return Findings(rows, in_short(results) | says, figures, tuple(notes))
 
 
 def entries_of(instances: Sequence[Instance], methods: Sequence[str], seconds: float, seed: int) -> list[Entry]:
     """Every method that is asked for (none: all) on every instance that it may be tried on."""
-    known = dict.fromkeys(method for one in instances for method in methods_for(one))
+    known = dict.fromkeys(method for instance in instances for method in methods_for(instance))
     for name in methods:
         if name not in known:
             raise unknown("method", name, known, "--methods")
     return [
-        Entry(one, method, seconds, seed)
-        for one in instances
-        for method in methods_for(one)
+        Entry(instance, method, seconds, seed)
+        for instance in instances
+        for method in methods_for(instance)
         if not methods or method in methods
     ]
 
 
 def measured(job: Job, entries: Sequence[Entry]) -> dict[Entry, Found]:
     """What came of every entry; those that the job's folder holds are read, the others are measured and kept there."""
-    names = {_key(one): one for one in entries}
+    names = {_key(entry): entry for entry in entries}
     done: dict[Entry, Found] = job.kept_as(lambda line: (names[line["entry"]], Found.of_json(line["found"])))
-    left = [one for one in entries if one not in done]
+    left = [entry for entry in entries if entry not in done]
     job.progress(len(done), len(entries))
-    for entry, found in job.computed(carried_out, left, most=1):  # seconds each: a kill loses one a process
-        done[entry] = found
-        job.keep({"entry": _key(entry), "found": asdict(found)})
+    for entry, result in job.computed(carried_out, left, most=1):  # seconds each: a kill loses one a process
+        done[entry] = result
+        job.keep({"entry": _key(entry), "found": asdict(result)})
         job.progress(len(done), len(entries))
-    return {one: done[one] for one in entries}
+    return {entry: done[entry] for entry in entries}
 
 
 def _key(entry: Entry) -> str:
     return json.dumps(asdict(entry), sort_keys=True)
 
 
-def verified(found: Board) -> str:
+def verified(results: Board) -> str:
     """How many kept schedules the checker holds right, of how many; WorkFailed names the first that are not."""
     wrong, right = list[str](), 0
-    for entry, one in found.items():
-        if one.cost is None:
+    for entry, result in results.items():
+        if result.cost is None:
             continue
-        said = faults_of(entry, one)
+        said = faults_of(entry, result)
         right += not said
         wrong += [f"{entry.instance.name}, {entry.method}: {said[0]}"] if said else []
     if wrong:
@@ -119,22 +119,22 @@ def verified(found: Board) -> str:
     return f"{right} of {right}"
 
 
-def faults_of(entry: Entry, found: Found) -> list[str]:
+def faults_of(entry: Entry, result: Found) -> list[str]:
     """What the checker finds wrong with a kept schedule, and with the cost that is claimed for it."""
     plain = cell_file(entry.instance).model_dump()
     if entry.method == CYCLIC:
-        names = list(dict.fromkeys(plain["order"] or [one["name"] for one in plain["products"]]))
-        plain |= {"parts": None, "order": [names[n % len(names)] for n in range(found.parts)]}
-    elif abs(found.ends_s - (found.cost or 0.0)) > SAME:
-        return [f"it ends at {found.ends_s:g}, not at {found.cost:g}"]
+        names = list(dict.fromkeys(plain["order"] or [product["name"] for product in plain["products"]]))
+        plain |= {"parts": None, "order": [names[n % len(names)] for n in range(result.parts)]}
+    elif abs(result.ends_s - (result.cost or 0.0)) > SAME:
+        return [f"it ends at {result.ends_s:g}, not at {result.cost:g}"]
     try:
         return faults(
             plain,
             [
-                dict.fromkeys(("product", "resource", "when")) | dict(zip(KEPT, one, strict=True))
-                for one in found.schedule
+                dict.fromkeys(("product", "resource", "when")) | dict(zip(KEPT, values, strict=True))
+                for values in result.schedule
             ],
-            found.ends_s,
+            result.ends_s,
         )
     except (KeyError, TypeError, ValueError, StopIteration) as error:
         return [f"it cannot be read: {type(error).__name__}: {error}"]
@@ -143,30 +143,30 @@ def faults_of(entry: Entry, found: Found) -> list[str]:
 # ---- what is told of it ------------------------------------------------------------------------------------------------
 
 
-def by_instance(found: Board) -> dict[Instance, dict[str, Found]]:
+def by_instance(results: Board) -> dict[Instance, dict[str, Found]]:
     """What each method found, instance by instance."""
     return {
-        one: {entry.method: found[entry] for entry in of}
-        for one, of in groupby(found, key=lambda entry: entry.instance)
+        instance: {entry.method: results[entry] for entry in of}
+        for instance, of in groupby(results, key=lambda entry: entry.instance)
     }
 
 
 def least(instance: Instance, of: Mapping[str, Found]) -> float:
     """The least cost that is known of an instance; infinite where nothing is."""
-    return min([one.cost for one in of.values() if one.cost is not None] + [instance.printed or inf])
+    return min([result.cost for result in of.values() if result.cost is not None] + [instance.printed or inf])
 
 
 def highest(of: Mapping[str, Found]) -> tuple[float, str]:
     """The highest bound, and whose it is; 0 by nobody."""
-    return max(((one.bound, one.bound_by) for one in of.values()), key=lambda one: one[0], default=(0.0, ""))
+    return max(((result.bound, result.bound_by) for result in of.values()), key=lambda pair: pair[0], default=(0.0, ""))
 
 
 def rows_of(instance: Instance, of: Mapping[str, Found]) -> list[Row]:
     """A line a method: what it found, how far that is from the best known, and what is proven."""
     best, (bound, by) = least(instance, of), highest(of)
     rows: list[Row] = []
-    for method, one in of.items():
-        if one.cost is None:
+    for method, result in of.items():
+        if result.cost is None:
             continue
         named: Row = {
             "table": instance.family,
@@ -175,35 +175,37 @@ def rows_of(instance: Instance, of: Mapping[str, Found]) -> list[Row]:
             "printed": instance.printed,
             "printed as": instance.printed_is or None,
             "bound": bound,
-            "proven": one.cost <= bound + SAME,
-            "proven by": by if one.cost <= bound + SAME else None,
+            "proven": result.cost <= bound + SAME,
+            "proven by": by if result.cost <= bound + SAME else None,
             "method": method,
-            "found_by": one.found_by if one.found_by != method else None,
-            "seconds": round(one.trace[-1][0] if one.trace else one.wall_s, 3),
+            "found_by": result.found_by if result.found_by != method else None,
+            "seconds": round(result.trace[-1][0] if result.trace else result.wall_s, 3),
         }
-        rows += [row(named, "cost", one.cost), row(named, "gap_percent", 100.0 * gap(one.cost, best))]
+        rows += [row(named, "cost", result.cost), row(named, "gap_percent", 100.0 * gap(result.cost, best))]
     return rows
 
 
-def gaps_of(found: Board) -> dict[str, list[float]]:
+def gaps_of(results: Board) -> dict[str, list[float]]:
     """By method, the gaps [%] to the best known of the instances that it took."""
     gaps = dict[str, list[float]]()
-    for instance, of in by_instance(found).items():
-        for method, one in of.items():
-            if one.cost is not None:
-                gaps.setdefault(method, []).append(100.0 * gap(one.cost, least(instance, of)))
+    for instance, of in by_instance(results).items():
+        for method, result in of.items():
+            if result.cost is not None:
+                gaps.setdefault(method, []).append(100.0 * gap(result.cost, least(instance, of)))
     return gaps
 
 
-def in_all(found: Board) -> list[Row]:
+def in_all(results: Board) -> list[Row]:
     """A line a method and family: its mean and worst gap, how often it found the best known, and how often it proved one."""
     rows: list[Row] = []
-    families = dict.fromkeys(one.instance.family for one in found)
+    families = dict.fromkeys(entry.instance.family for entry in results)
     for family in families:
-        part = {entry: one for entry, one in found.items() if entry.instance.family == family}
+        part = {entry: result for entry, result in results.items() if entry.instance.family == family}
         proofs = {
             method: sum(
-                one.cost is not None and one.cost <= one.bound + SAME for e, one in part.items() if e.method == method
+                result.cost is not None and result.cost <= result.bound + SAME
+                for e, result in part.items()
+                if e.method == method
             )
             for method in dict.fromkeys(entry.method for entry in part)
         }
@@ -211,7 +213,7 @@ def in_all(found: Board) -> list[Row]:
             named: Row = {
                 "table": f"All of {family}",
                 "method": method,
-                "best known found": f"{sum(one <= 100 * SAME for one in gaps)} of {len(gaps)}",
+                "best known found": f"{sum(gap_percent <= 100 * SAME for gap_percent in gaps)} of {len(gaps)}",
                 "proven alone": f"{proofs[method]} of {len(gaps)}",
             }
             rows.append(row(named, "mean gap_percent", sum(gaps) / len(gaps)))
@@ -219,16 +221,19 @@ def in_all(found: Board) -> list[Row]:
     return rows
 
 
-def in_short(found: Board) -> Row:
+def in_short(results: Board) -> Row:
     """How many instances there are, how many optima are proven, and how the best compare with what is printed."""
-    boards = by_instance(found)
-    told: Row = {"instances": len(boards), "entries": len(found)}
-    proven = [one for one, of in boards.items() if least(one, of) <= highest(of)[0] + SAME]
+    boards = by_instance(results)
+    told: Row = {"instances": len(boards), "entries": len(results)}
+    proven = [instance for instance, of in boards.items() if least(instance, of) <= highest(of)[0] + SAME]
     told["optima proven here"] = len(proven)
-    mine = {one: min((f.cost for f in of.values() if f.cost is not None), default=inf) for one, of in boards.items()}
-    printed = [one for one in boards if one.printed is not None]
+    mine = {
+        instance: min((f.cost for f in of.values() if f.cost is not None), default=inf)
+        for instance, of in boards.items()
+    }
+    printed = [instance for instance in boards if instance.printed is not None]
     if printed:
-        equal = sum(abs(mine[one] - (one.printed or 0.0)) <= SAME for one in printed)
-        better = [one.name for one in printed if mine[one] < (one.printed or 0.0) - SAME]
+        equal = sum(abs(mine[instance] - (instance.printed or 0.0)) <= SAME for instance in printed)
+        better = [instance.name for instance in printed if mine[instance] < (instance.printed or 0.0) - SAME]
         told |= {"with a printed figure": len(printed), "as printed": equal, "better than printed": len(better)}
     return told

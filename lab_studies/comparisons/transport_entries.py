@@ -59,9 +59,9 @@ class Found:
     parts: int = field(default=0)
 
     @classmethod
-    def of_json(cls, found: Mapping[str, Any]) -> "Found":
+    def of_json(cls, kept: Mapping[str, Any]) -> "Found":
         """As it was kept. Raises ValueError for what is something else."""
-        return record_of(cls, found)
+        return record_of(cls, kept)
 
 
 def methods_for(instance: Instance) -> tuple[str, ...]:
@@ -117,8 +117,8 @@ def _by_episodes(entry: Entry, cell: Cell) -> Found:
         while True:
             began_s = watch.past_s
             search = Search(episodes, on_episode=watch.hear)
-            found = find_sequence(cell, entry.method, search, entry.seed, session)
-            if len(found.episode_costs) < episodes:
+            sequenced = find_sequence(cell, entry.method, search, entry.seed, session)
+            if len(sequenced.episode_costs) < episodes:
                 break  # a rule has one sequence
             left, took_s = entry.seconds - watch.past_s, max(watch.past_s - began_s, 1e-6)
             episodes, session = int(episodes * min(GROWS, SHARE * left / took_s)), session + 1
@@ -133,21 +133,21 @@ def _proven(entry: Entry, cell: Cell, prove: "Callable[[Entry, Cell], Proof]") -
     began_s = perf_counter()
     sequence, found_by, bound, bound_by = prove(entry, cell)
     wall_s = perf_counter() - began_s
-    found = Found(found_by=found_by, bound=bound, bound_by=bound_by, wall_s=wall_s)
-    done = _measured(cell, sequence, found)
+    result = Found(found_by=found_by, bound=bound, bound_by=bound_by, wall_s=wall_s)
+    done = _measured(cell, sequence, result)
     return replace(done, trace=() if done.cost is None else ((wall_s, done.cost),))
 
 
-def _measured(cell: Cell, sequence: tuple[int, ...], found: Found) -> Found:
+def _measured(cell: Cell, sequence: tuple[int, ...], result: Found) -> Found:
     """With the cost of the sequence, and its schedule as rows."""
     if not sequence:
-        return replace(found, refused=found.refused or "no order was found in its time")
-    return replace(_with_schedule(cell, simulate(cell, sequence), found), cost=follow(cell, sequence).end_s)
+        return replace(result, refused=result.refused or "no order was found in its time")
+    return replace(_with_schedule(cell, simulate(cell, sequence), result), cost=follow(cell, sequence).end_s)
 
 
-def _with_schedule(cell: Cell, schedule: Schedule, found: Found) -> Found:
-    rows = tuple(tuple(one[name] for name in KEPT) for one in rows_of(schedule, cell, "planned"))
-    return replace(found, schedule=rows, ends_s=schedule.makespan_s, parts=cell.parts)
+def _with_schedule(cell: Cell, schedule: Schedule, result: Found) -> Found:
+    rows = tuple(tuple(row[name] for name in KEPT) for row in rows_of(schedule, cell, "planned"))
+    return replace(result, schedule=rows, ends_s=schedule.makespan_s, parts=cell.parts)
 
 
 def _cyclic(entry: Entry, cell: Cell) -> Found:
@@ -159,8 +159,8 @@ def _cyclic(entry: Entry, cell: Cell) -> Found:
     cycle = best_cycle(cell, mix, entry.seconds, entry.seed)
     wall_s = perf_counter() - began_s
     shown = unrolled(cycle, of_parts(cell, mix, CYCLES_SHOWN))
-    found = Found(cycle.period_s, CYCLIC, cycle.bound_s, CYCLIC, ((wall_s, cycle.period_s),), wall_s)
-    return _with_schedule(shown.cell, shown.schedule, found)
+    result = Found(cycle.period_s, CYCLIC, cycle.bound_s, CYCLIC, ((wall_s, cycle.period_s),), wall_s)
+    return _with_schedule(shown.cell, shown.schedule, result)
 
 
 def _exact(entry: Entry, cell: Cell) -> Proof:
@@ -179,15 +179,15 @@ def _exact(entry: Entry, cell: Cell) -> Proof:
 def _cp_sat(entry: Entry, cell: Cell) -> Proof:
     from lab.sequencing.methods.cp_sat import cp_sat
 
-    found = cp_sat(cell, MAKESPAN, entry.seconds, entry.seed, None, CP_SAT_WORKERS)
-    return found.sequence, "CP-SAT", found.bound, "CP-SAT"
+    solved = cp_sat(cell, MAKESPAN, entry.seconds, entry.seed, None, CP_SAT_WORKERS)
+    return solved.sequence, "CP-SAT", solved.bound, "CP-SAT"
 
 
 def _portfolio(entry: Entry, cell: Cell) -> Proof:
     from lab.sequencing.methods.portfolio import best_known
 
-    found = best_known(cell, MAKESPAN, entry.seconds, entry.seed, CP_SAT_WORKERS)
-    return found.sequence, found.found_by, found.bound, found.bound_by
+    solved = best_known(cell, MAKESPAN, entry.seconds, entry.seed, CP_SAT_WORKERS)
+    return solved.sequence, solved.found_by, solved.bound, solved.bound_by
 
 
 PROVERS: dict[str, Callable[[Entry, Cell], Proof]] = {"exact": _exact, "cp-sat": _cp_sat, "portfolio": _portfolio}

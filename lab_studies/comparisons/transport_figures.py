@@ -39,14 +39,14 @@ def profile(gaps: Mapping[str, Sequence[float]]) -> bytes:
     return picture_bytes(draw, 7.0, 4.2)
 
 
-def by_seconds(found: "Mapping[Entry, Found]", least: "Mapping[Instance, float]") -> bytes:
+def by_seconds(results: "Mapping[Entry, Found]", least: "Mapping[Instance, float]") -> bytes:
     """The mean gap of each method's best order so far, by the seconds since it began."""
-    ends = [entry.seconds for entry in found]
+    ends = [entry.seconds for entry in results]
     seconds = np.geomspace(0.01, max(ends, default=1.0), POINTS)
     lines = dict[str, list[np.ndarray]]()
-    for entry, one in found.items():
-        if one.cost is not None:
-            lines.setdefault(entry.method, []).append(_gaps_at(seconds, one.trace, least[entry.instance]))
+    for entry, result in results.items():
+        if result.cost is not None:
+            lines.setdefault(entry.method, []).append(_gaps_at(seconds, result.trace, least[entry.instance]))
 
     def draw(figure: "Figure") -> None:
         axes = figure.add_subplot()
@@ -73,7 +73,7 @@ def _gaps_at(seconds: np.ndarray, trace: Sequence[tuple[float, float]], least: f
 def _ranked(gaps: Mapping[str, Sequence[float]]) -> list[tuple[int, tuple[str, Sequence[float]]]]:
     """The methods, least mean gap first, each with the number of its look, which is the same in both pictures."""
     looks = {method: number for number, method in enumerate(sorted(gaps))}
-    ranked = sorted(gaps.items(), key=lambda one: float(np.mean(one[1])))
+    ranked = sorted(gaps.items(), key=lambda pair: float(np.mean(pair[1])))
     return [(looks[method], (method, values)) for method, values in ranked]
 
 

@@ -44,25 +44,25 @@ def board() -> tuple[Instance, ...]:
     with (FOLDER / "board.csv").open(encoding="utf-8", newline="") as file:
         return tuple(
             Instance(
-                **{name: one[name] for name in ("family", "name", "file", "layout", "case", "printed_is")},
-                robots=int(one["robots"]) if one["robots"] else None,
-                printed=float(one["printed"]) if one["printed"] else None,
+                **{name: line[name] for name in ("family", "name", "file", "layout", "case", "printed_is")},
+                robots=int(line["robots"]) if line["robots"] else None,
+                printed=float(line["printed"]) if line["printed"] else None,
             )
-            for one in csv.DictReader(file)
+            for line in csv.DictReader(file)
         )
 
 
 def own(paths: Sequence[Path]) -> tuple[Instance, ...]:
     """An instance of each file, and of each file in a folder; BadInput for what is not there or cannot be read."""
-    found = list[Instance]()
+    instances = list[Instance]()
     for path in paths:
         if not path.exists():
             raise BadInput(f"instance '{path}' (--instances): there is no such file or folder")
-        files = [path] if path.is_file() else sorted(one for one in path.iterdir() if one.is_file())
-        found += [Instance(OWN, one.name, str(one)) for one in files]
-    for one in found:
-        cell_file(one)
-    return tuple(found)
+        files = [path] if path.is_file() else sorted(inside for inside in path.iterdir() if inside.is_file())
+        instances += [Instance(OWN, file.name, str(file)) for file in files]
+    for instance in instances:
+        cell_file(instance)
+    return tuple(instances)
 
 
 @lru_cache(maxsize=256)

@@ -57,10 +57,10 @@ class Told(NamedTuple):
 
 def settings() -> list[Setting]:
     """All that is run; none asked: nobody."""
-    found = [Setting(name, LIMITED, "never", 0) for name in PROBLEMS]
-    found += [Setting(name, LIMITED, gate, 1) for name in PROBLEMS for gate in GATES]
-    found += [Setting(name, LIMITED, gate, 3, decide) for name in PROBLEMS for gate in GATES for decide in DECISIONS]
-    return found + [Setting(name, RANKED, gate, len(RELIABILITIES)) for name in PROBLEMS for gate in GATES]
+    every = [Setting(name, LIMITED, "never", 0) for name in PROBLEMS]
+    every += [Setting(name, LIMITED, gate, 1) for name in PROBLEMS for gate in GATES]
+    every += [Setting(name, LIMITED, gate, 3, decide) for name in PROBLEMS for gate in GATES for decide in DECISIONS]
+    return every + [Setting(name, RANKED, gate, len(RELIABILITIES)) for name in PROBLEMS for gate in GATES]
 
 
 def reliable(values: FloatArray, share: float) -> FloatArray:
@@ -68,15 +68,15 @@ def reliable(values: FloatArray, share: float) -> FloatArray:
     best = values >= values.max(axis=1, keepdims=True) - BEST_IN_A_STATE
     count, actions = best.sum(axis=1, keepdims=True), values.shape[1]
     chances = np.where(best, share / count, (1.0 - share) / np.maximum(actions - count, 1))
-    found: FloatArray = np.where(count == actions, 1.0 / actions, chances)
-    return found
+    mixed: FloatArray = np.where(count == actions, 1.0 / actions, chances)
+    return mixed
 
 
 def sessions_of(setting: Setting, sessions: int, seed: int) -> Told:
     """So many sessions of a setting."""
     seeds = seeds_of(Setting(setting.problem, LIMITED, "never", 0), sessions, seed)  # each with the same chances
     runs = [_one(setting, int(own)) for own in seeds]
-    return Told(*(np.array([one[n] for one in runs]) for n in range(3)))
+    return Told(*(np.array([outcome[n] for outcome in runs]) for n in range(3)))
 
 
 def _one(setting: Setting, seed: int) -> tuple[float, float, list[float]]:
@@ -89,7 +89,7 @@ def _one(setting: Setting, seed: int) -> tuple[float, float, list[float]]:
         reliable(place.values, RELIABILITIES[n]) if ranked else advice_chances(place.values, SKILL_TAUS["limited"])
         for n in range(setting.members)
     ]
-    members = [TableAdvisor(Advice.of(one), uniforms(own)) for one, own in zip(chances, streams, strict=False)]
+    members = [TableAdvisor(Advice.of(table), uniforms(own)) for table, own in zip(chances, streams, strict=False)]
     advisor: Advisor | None = members[0] if members else None
     panel = None
     if len(members) > 1:
@@ -101,16 +101,16 @@ def _one(setting: Setting, seed: int) -> tuple[float, float, list[float]]:
             tell=lambda event: None,
         )
     gate = GateSettings(setting.gate, first_episode=10, spare_best=True)
-    one = Session(place.mdp, place.learner, gate, advisor, streams[-1]).run()
+    session = Session(place.mdp, place.learner, gate, advisor, streams[-1]).run()
     most = place.learner.max_steps + 1
-    points = float((100.0 * (most - one.steps) / (most - place.par)).mean())
-    return points, one.helped_steps, [] if panel is None else [member.trust for member in panel.standing()]
+    points = float((100.0 * (most - session.steps) / (most - place.par)).mean())
+    return points, session.helped_steps, [] if panel is None else [member.trust for member in panel.standing()]
 
 
 def whom_to_believe(job: Job, reading: Mapping[str, Any]) -> Findings:
     """Every setting; nothing is read."""
-    found = job.each(partial(sessions_of, sessions=job.sessions, seed=job.seed), settings())
-    rows = [one for setting, told in found.items() for one in rows_of(setting, told, found)]
+    outcomes = job.each(partial(sessions_of, sessions=job.sessions, seed=job.seed), settings())
+    rows = [result for setting, told in outcomes.items() for result in rows_of(setting, told, outcomes)]
     right = [_row(rows, name, RANKED, "always") for name in PROBLEMS]
     gains = {
         f"{gate}, {'one' if members == 1 else 'three'}": [
@@ -120,21 +120,23 @@ def whom_to_believe(job: Job, reading: Mapping[str, Any]) -> Findings:
         for members in (1, 3)
     }
     says: Row = {
-        "ranking of seven right, asked always [%]": ", ".join(f"{one['problem']} {one['value']:.0f}" for one in right),
+        "ranking of seven right, asked always [%]": ", ".join(
+            f"{result['problem']} {result['value']:.0f}" for result in right
+        ),
         "three limited over nobody, gate earned-trust [points]": ", ".join(
-            f"{one['problem']} {one['value']:+.1f} ({one['ci95'][0]:+.1f} to {one['ci95'][1]:+.1f})"
-            for one in gains[f"{EARNED}, three"]
+            f"{result['problem']} {result['value']:+.1f} ({result['ci95'][0]:+.1f} to {result['ci95'][1]:+.1f})"
+            for result in gains[f"{EARNED}, three"]
         ),
     }
     pictures = {"Points of limited advisors": bars(PROBLEMS, _lifted(gains, rows), "points", label="")}
     return Findings(rows, says, pictures, (MEASURES,))
 
 
-def rows_of(setting: Setting, told: Told, found: Mapping[Setting, Told]) -> list[Row]:
+def rows_of(setting: Setting, told: Told, outcomes: Mapping[Setting, Told]) -> list[Row]:
     """The measures of a setting."""
     named: Row = {"problem": setting.problem, "advisors": setting.kind, "gate": setting.gate}
     named |= {"members": setting.members, "decide": setting.decide, "answers": float(told.answers.mean())}
-    nobody = found[Setting(setting.problem, LIMITED, "never", 0)]
+    nobody = outcomes[Setting(setting.problem, LIMITED, "never", 0)]
     rows = [mean_row(named, "points", told.points)]
     if setting.members:
         mean, *ends = interval(told.points - nobody.points)
@@ -155,6 +157,6 @@ def _lifted(gains: Mapping[str, Sequence[Row]], rows: Sequence[Row]) -> dict[str
     """Points in place of gains, with nobody's beside them: bars begin at 0."""
     shown = {"nobody": [those(rows, problem=name, gate="never", measure="points")[0] for name in PROBLEMS]}
     for words, of in gains.items():
-        same = ({key: one[key] for key in ("problem", "advisors", "gate", "members", "decide")} for one in of)
-        shown[words] = [those(rows, measure="points", **one)[0] for one in same]
+        same = ({key: result[key] for key in ("problem", "advisors", "gate", "members", "decide")} for result in of)
+        shown[words] = [those(rows, measure="points", **names)[0] for names in same]
     return shown

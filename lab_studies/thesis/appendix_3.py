@@ -79,25 +79,28 @@ def appendix_iii(job: Job, reading: Mapping[str, Any]) -> Findings:
     """All orders by all methods; the larger ones are drawn by the study's seed. The reading changes nothing here."""
     orders = orders_of(job.seed)
     mixes = [Mix(order, mean_s) for parts in reversed(SIZES) for order in orders[parts] for mean_s in MEANS_S]
-    found = job.each(partial(made, sessions=job.sessions, seed=job.seed), mixes)
+    makespans = job.each(partial(made, sessions=job.sessions, seed=job.seed), mixes)
     rows: list[Row] = []
     for group in product(SIZES, LAWS, MEANS_S):
-        rows += _rows(group, [found[Mix(order, group[2])] for order in orders[group[0]]])
-    rows += _example_rows(orders, found)
-    summary = {"proven optima": f"{sum(one.proven for one in found.values())} of {len(found)}", **_in_short(rows)}
+        rows += _rows(group, [makespans[Mix(order, group[2])] for order in orders[group[0]]])
+    rows += _example_rows(orders, makespans)
+    summary = {
+        "proven optima": f"{sum(mix.proven for mix in makespans.values())} of {len(makespans)}",
+        **_in_short(rows),
+    }
     notes = (SYMBOLS, FIFOS, PRINTED, METHODS_NOTE, HOW_MANY)
     return Findings(rows, summary | agreement(rows), _pictures(rows), notes)
 
 
 def orders_of(seed: int) -> dict[int, list[str]]:
     """The orders by size: all of 3 parts, of larger ones MIXES different ones, drawn."""
-    found: dict[int, list[str]] = {}
+    orders: dict[int, list[str]] = {}
     for parts in SIZES:
         every = ["".join(letters) for letters in product("RS", repeat=parts)]
         rng = np.random.default_rng([seed, parts])
         drawn = sorted(rng.choice(len(every), min(MIXES, len(every)), replace=False).tolist())
-        found[parts] = every if len(every) <= MIXES else [every[index] for index in drawn]
-    return found
+        orders[parts] = every if len(every) <= MIXES else [every[index] for index in drawn]
+    return orders
 
 
 def _rows(group: Group, of: Sequence[Made]) -> list[Row]:
@@ -118,16 +121,16 @@ def _rows(group: Group, of: Sequence[Made]) -> list[Row]:
 
 def _measured(named: Row, law: str, method: str, of: Sequence[Made]) -> list[Row]:
     """The mean makespan, and with constant arrivals the gap to the optimum."""
-    rows = [mean_row(named, "makespan_s", [one.makespans_s[method, law].mean() for one in of])]
+    rows = [mean_row(named, "makespan_s", [mix.makespans_s[method, law].mean() for mix in of])]
     if law == "constant":
-        rows.append(mean_row(named, "gap_percent", [100.0 * one.gaps[method] for one in of]))
+        rows.append(mean_row(named, "gap_percent", [100.0 * mix.gaps[method] for mix in of]))
     return rows
 
 
 def _improvements(named: Row, group: Group, of: Sequence[Made]) -> list[Row]:
     """IP (III.1) and the difference of the makespans over a FIFO, both over the replications that the method has."""
     method, start, law = named["method"], named["fifo"], group[1]
-    pairs = [(one.makespans_s[FIFO[start], law], one.makespans_s[method, law]) for one in of]
+    pairs = [(mix.makespans_s[FIFO[start], law], mix.makespans_s[method, law]) for mix in of]
     fifo_s, own_s = np.array([(other[: len(own)].mean(), own.mean()) for other, own in pairs]).T
     p = float(f"{paired_p(fifo_s - own_s):.2g}")
     printed = method == "srl" and start == "listing"
@@ -148,13 +151,13 @@ def paired_p(differences: Floats) -> float:
     return float(2 * t.sf(abs(differences.mean()) / error, len(differences) - 1))
 
 
-def _example_rows(orders: Mapping[int, Sequence[str]], found: Mapping[Mix, Made]) -> list[Row]:
+def _example_rows(orders: Mapping[int, Sequence[str]], makespans: Mapping[Mix, Made]) -> list[Row]:
     """Every order of 3 parts by itself, constant arrivals of the shorter mean (fig. III.4)."""
     methods: list[tuple[str, Row]] = [(method, {"method": "fifo", "fifo": start}) for start, method in FIFO.items()]
     methods += [(method, {"method": method}) for method in ("srl", "srl-time", "exact")]
     rows = []
     for order in orders.get(3, ()):
-        of = found[Mix(order, MEANS_S[0])].makespans_s
+        of = makespans[Mix(order, MEANS_S[0])].makespans_s
         named: Row = {"table": "Figure III.4", "order": order, "arrivals": "constant", "interval_s": MEANS_S[0]}
         rows += [row(named | own, "makespan_s", float(of[name, "constant"][0])) for name, own in methods]
     return rows
@@ -164,7 +167,7 @@ def _in_short(rows: Sequence[Row]) -> Row:
     """The range of IP over the cells, for SRL with both FIFO, and for other methods with the FIFO as listed."""
     says: Row = {}
     for method, start in (("srl", "listing"), ("srl", "idle-start"), *((m, "listing") for m in BESIDE)):
-        of = [one["value"] for one in those(rows, method=method, fifo=start, measure="IP_percent")]
+        of = [result["value"] for result in those(rows, method=method, fifo=start, measure="IP_percent")]
         says[f"IP of {method} over {FIFO_NAMES[start]} [%]"] = f"{min(of):.1f} to {max(of):.1f}"
     return says
 

@@ -73,18 +73,18 @@ def made(mix: Mix, *, sessions: int, seed: int) -> Made:
     best = optimum(cell)
     lists, greedy_s = _lists(cell, sessions, rng)
     lists["exact"] = [best.sequence]
-    found: dict[tuple[str, str], Floats] = {("srl greedy", "constant"): greedy_s}
+    makespans_s: dict[tuple[str, str], Floats] = {("srl greedy", "constant"): greedy_s}
     for law in LAWS:
         chance, count = Chance("constant", law, SPREAD), 1 if law == "constant" else REPLICATIONS
         for method, sequences in lists.items():
-            found[method, law] = evaluate(cell, sequences, times_seeds(times_seed, count), chance).mean(axis=0)
+            makespans_s[method, law] = evaluate(cell, sequences, times_seeds(times_seed, count), chance).mean(axis=0)
         for start, method in FIFO.items():
-            found[method, law] = replicate(cell, queued_fifo(start), chance, count, times_seed)
+            makespans_s[method, law] = replicate(cell, queued_fifo(start), chance, count, times_seed)
         few = min(count, max(1, REACTIONS.get(cell.parts, 1) * sessions // ASKED))
         for method, policy in REACTING.items() if law == UNKNOWN else ():
-            found[method, law] = replicate(cell, policy or reacting(cell), chance, few, times_seed)
-    gaps = {method: best.gap(float(costs.mean())) for (method, law), costs in found.items() if law == "constant"}
-    return Made(found, gaps, best.proven)
+            makespans_s[method, law] = replicate(cell, policy or reacting(cell), chance, few, times_seed)
+    gaps = {method: best.gap(float(costs.mean())) for (method, law), costs in makespans_s.items() if law == "constant"}
+    return Made(makespans_s, gaps, best.proven)
 
 
 def times_seeds(seed: int, episodes: int) -> list[int]:

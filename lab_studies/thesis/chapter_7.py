@@ -72,9 +72,9 @@ def best_results(job: Job, changes: Changes, case: str) -> Findings:
     """One of the tables 7.4-7.6: three methods by session length in a case."""
     cells = _of_case(_changed(printed(SESSION_LENGTHS), changes), case)
     table = TABLES[case]
-    rows, found = _compared(Measured(job, [cell.setting for cell in cells]), cells, table)
+    rows, comparisons = _compared(Measured(job, [cell.setting for cell in cells]), cells, table)
     pictures = figures.lengths(rows, figures.of_case(case, table))
-    notes = (SYMBOLS, READ_AS, SHADED, HOW_MANY, _assumptions([*found.values()]), *examples(found))
+    notes = (SYMBOLS, READ_AS, SHADED, HOW_MANY, _assumptions([*comparisons.values()]), *examples(comparisons))
     return _findings(rows, job, pictures, notes)
 
 
@@ -103,7 +103,7 @@ def chapter_7(job: Job, changes: Changes) -> Findings:
         rows += _compared(measured, _of_case(cells, case), table)[0]
     factors = _compared(measured, [cell for cell in cells if cell.setting.method == "srl"], FACTOR_TABLE)[0]
     pictures |= figures.lengths([*rows, *factors], figures.COMPARED) | appendix_4.pictures()
-    rows += [one for one in factors if one.get("reward_factor") != "B"]  # type B stands in the other tables
+    rows += [result for result in factors if result.get("reward_factor") != "B"]  # type B stands in the other tables
     notes = (SYMBOLS, READ_AS, FACTORS, DECAY, SAYS_7, SHADED, HOW_MANY)
     return _findings(rows, job, pictures, notes)
 
@@ -123,8 +123,8 @@ def readings(job: Job, changes: Changes) -> Findings:
         named = {key: value for key, value in describe(same).items() if key not in ("episodes", "beta")}
         rows += [row(named, "off_points", off), row(named, "chance_points", chance)]
     notes = (DISTANCES, SYMBOLS, READ_AS)
-    found = {"readings": len(READINGS), "cells": 0, "within": 0}
-    return Findings(rows, found, figures.readings(rows), notes)
+    counts = {"readings": len(READINGS), "cells": 0, "within": 0}
+    return Findings(rows, counts, figures.readings(rows), notes)
 
 
 def _findings(rows: list[Row], job: Job, pictures: Mapping[str, bytes], notes: tuple[str, ...]) -> Findings:
@@ -162,15 +162,15 @@ def _compared(measured: Measured, cells: Sequence[PrintedFigure], table: str) ->
     groups: dict[SequencingSetting, list[SequencingSetting]] = {}
     for cell in cells:
         groups.setdefault(_length(cell.setting), []).append(cell.setting)
-    found = {same: measured.compared(settings) for same, settings in groups.items()}
+    comparisons = {same: measured.compared(settings) for same, settings in groups.items()}
     rows = []
     for cell in cells:
-        ranks, name = found[_length(cell.setting)].ranks, short_name(cell.setting)
+        ranks, name = comparisons[_length(cell.setting)].ranks, short_name(cell.setting)
         beaten = any(rank[0] != "1" for rank in ranks.values())
         more = {"rank": ranks[name], "shaded": ranks[name] == "1" and beaten}
         rows.append(measured.row(table, cell.setting, cell.measure, cell.value, **more))
-    rows += [one for same, test in found.items() for one in _tests(f"{table}: tests", same, test)]
-    return rows, found
+    rows += [result for same, test in comparisons.items() for result in _tests(f"{table}: tests", same, test)]
+    return rows, comparisons
 
 
 def _length(setting: SequencingSetting) -> SequencingSetting:
@@ -178,30 +178,30 @@ def _length(setting: SequencingSetting) -> SequencingSetting:
     return replace(setting, method="", reward_factor=None, beta=None)
 
 
-def _tests(table: str, same: SequencingSetting, found: Comparison) -> list[Row]:
+def _tests(table: str, same: SequencingSetting, comparison: Comparison) -> list[Row]:
     """The p values behind the ranks at one session length (Appendix II)."""
     named = {"table": table} | {name: value for name, value in describe(same).items() if name != "method"}
-    pairs = [({**named, "method": f"{one} - {other}"}, p) for (one, other), p in found.tukey.items()]
-    return [row(named, "ANOVA_p", found.p), *(row(pair, "Tukey_p", p) for pair, p in pairs)]
+    pairs = [({**named, "method": f"{first} - {second}"}, p) for (first, second), p in comparison.tukey.items()]
+    return [row(named, "ANOVA_p", comparison.p), *(row(pair, "Tukey_p", p) for pair, p in pairs)]
 
 
-def _assumptions(found: Sequence[Comparison]) -> str:
+def _assumptions(comparisons: Sequence[Comparison]) -> str:
     """How many comparisons do not meet what the F-test assumes (Appendix II)."""
-    unequal = sum(one.levene < SIGNIFICANT for one in found)
-    tested = [p for one in found for p in one.normality.values() if p is not None]
+    unequal = sum(comparison.levene < SIGNIFICANT for comparison in comparisons)
+    tested = [p for comparison in comparisons for p in comparison.normality.values() if p is not None]
     skewed = sum(p < SIGNIFICANT for p in tested)
     return (
         f"What the F-test assumes, tested as in Appendix II: Levene's test finds unequal variances in {unequal} of "
-        f"{len(found)} comparisons, the Kolmogorov-Smirnov test no normal distribution in {skewed} of {len(tested)} groups."
+        f"{len(comparisons)} comparisons, the Kolmogorov-Smirnov test no normal distribution in {skewed} of {len(tested)} groups."
     )
 
 
-def examples(found: Mapping[SequencingSetting, Comparison]) -> list[str]:
+def examples(comparisons: Mapping[SequencingSetting, Comparison]) -> list[str]:
     """Our test beside the one that Appendix II shows, where it is among these."""
     return [
         f"Appendix II's example (case I, 3 toasts, 30 episodes): {EXAMPLE} printed; here F = {test.f:.1f}, "
         + ", ".join(f"{name} {mean:.1f} %" for name, mean in test.means.items())
-        for same, test in found.items()
+        for same, test in comparisons.items()
         if (same.case, same.toasts, same.episodes, same.environment) == ("I", 3, 30, "deterministic")
     ]
 
@@ -213,10 +213,10 @@ def deviation(rows: Sequence[Row], sessions: int) -> tuple[float, float]:
     average. Rounding of the printed figures is left out.
     """
     off, chance = [], []
-    for one in rows:
-        theirs = printed_sessions(one["table"], one["toasts"])
-        error = (one["ci95"][1] - one["ci95"][0]) / 2 / 1.96
-        off.append(abs(one["value"] - one["thesis"]))
+    for result in rows:
+        theirs = printed_sessions(result["table"], result["toasts"])
+        error = (result["ci95"][1] - result["ci95"][0]) / 2 / 1.96
+        off.append(abs(result["value"] - result["thesis"]))
         chance.append(sqrt(2 / pi) * error * sqrt(1 + sessions / theirs))
     return float(np.mean(off)), float(np.mean(chance))
 
@@ -224,9 +224,9 @@ def deviation(rows: Sequence[Row], sessions: int) -> tuple[float, float]:
 def summary(rows: Sequence[Row], sessions: int) -> Row:
     """How many cells agree with print, and how far off they are, by table, toasts and measure."""
     groups: dict[str, list[Row]] = {}
-    for one in rows:
-        if one["thesis"] is not None:
-            groups.setdefault(f"{one['table']}, {one['toasts']} toasts: {one['measure']}", []).append(one)
+    for result in rows:
+        if result["thesis"] is not None:
+            groups.setdefault(f"{result['table']}, {result['toasts']} toasts: {result['measure']}", []).append(result)
     off = {}
     for name, group in groups.items():
         mean, chance = deviation(group, sessions)

@@ -123,7 +123,9 @@ def _decay_cells(line: dict[str, str]) -> list[PrintedFigure]:
 def optimum_s(case: str, toasts: int) -> float:
     """The shortest makespan as printed [s]."""
     lines = printed_lines("optimal-makespans.csv")
-    return next(float(one["optimum_seconds"]) for one in lines if (one["case"], one["toasts"]) == (case, str(toasts)))
+    return next(
+        float(line["optimum_seconds"]) for line in lines if (line["case"], line["toasts"]) == (case, str(toasts))
+    )
 
 
 @lru_cache(maxsize=16)
@@ -153,8 +155,8 @@ def sessions_of(setting: SequencingSetting, sessions: int, seed: int) -> Sequenc
         )
         printed = run_sessions(cell, setting.method, search, sessions, int(seeds[0]))
         return SequencingOutcome(printed.best_cost, printed.final_cost, printed.convergence)
-    found = listing.run_sessions(listed(setting, SPREAD if drawn else 0.0), epsilons(setting), seeds)
-    return SequencingOutcome(found.best_s, found.last_s, found.converged)
+    outcomes = listing.run_sessions(listed(setting, SPREAD if drawn else 0.0), epsilons(setting), seeds)
+    return SequencingOutcome(outcomes.best_s, outcomes.last_s, outcomes.converged)
 
 
 def listed(setting: SequencingSetting, spread: float = 0.0) -> listing.Listed:
@@ -182,11 +184,13 @@ class Measured:
         named, outcome = {"table": table, **describe(setting), **more}, self.outcomes[setting]
         theirs = printed_sessions(table, setting.toasts)
         if measure in ("BR_s", "CE_episode"):
-            found = mean_row(named, measure, outcome.best_s if measure == "BR_s" else outcome.converged, thesis, theirs)
+            result = mean_row(
+                named, measure, outcome.best_s if measure == "BR_s" else outcome.converged, thesis, theirs
+            )
         else:
             times_s = outcome.last_s if measure == "final_percent" else outcome.best_s
-            found = share_row(named, measure, self.succeeds(setting, times_s), thesis, theirs)
-        return found if thesis is None else found | {"used": is_used_7(table, setting.reward_factor, setting.toasts)}
+            result = share_row(named, measure, self.succeeds(setting, times_s), thesis, theirs)
+        return result if thesis is None else result | {"used": is_used_7(table, setting.reward_factor, setting.toasts)}
 
     def replicated(self, setting: SequencingSetting) -> Floats:
         """SP [%] of each of ten replications, or BR [s] where times are left to chance."""

@@ -72,12 +72,12 @@ def _by_length(rows: Sequence[Row], shown: Compared) -> bytes:
         axes = figure.add_subplot()
         for name, colour, marker in zip(shown.names, COLOURS, "os^", strict=False):
             of = {
-                one["episodes"]: one
-                for one in those(rows, case=shown.case, toasts=shown.toasts, environment=shown.environment)
-                if one["thesis"] is not None
-                and _method(one) == name
-                and one["measure"] in ("SP_percent", "BR_s")
-                and one["table"] != "Table IV.1"
+                row["episodes"]: row
+                for row in those(rows, case=shown.case, toasts=shown.toasts, environment=shown.environment)
+                if row["thesis"] is not None
+                and _method(row) == name
+                and row["measure"] in ("SP_percent", "BR_s")
+                and row["table"] != "Table IV.1"
             }
             _beside_print(axes, [of[episodes] for episodes in sorted(of)], "episodes", (colour, marker, NAMES[name]))
         title = f"{shown.toasts} toasts, case {shown.case}"
@@ -97,7 +97,7 @@ def _beside_print(axes: "Axes", rows: Sequence[Row], by: str, look: Look) -> Non
     """The values of rows against one of their settings, and what is printed as open markers on a dotted line."""
     curve(axes, rows, by, look)
     printed = PRINTED | {"marker": look[1], "linestyle": ":", "linewidth": 0.9, "markeredgecolor": look[0]}
-    axes.plot([one[by] for one in rows], [one["thesis"] for one in rows], color=look[0], **printed)
+    axes.plot([row[by] for row in rows], [row["thesis"] for row in rows], color=look[0], **printed)
 
 
 def by_beta(rows: Sequence[Row]) -> bytes:
@@ -139,9 +139,9 @@ def alone(seed: int) -> dict[str, bytes]:
 
 def session(seed: int) -> tuple[NDArray[np.float64], list[int]]:
     """The times (E,) of the first session that settles on the optimum [s], and the toasts that its best episode moves."""
-    found = run_sessions(listed(SESSION), epsilons(SESSION), seeds_of(SESSION, TRIED, seed), keep_times=True)
-    n = int(np.argmin(found.last_s))
-    return found.times_s[n], [toast for toast in found.sequences[n].tolist() if toast]
+    sessions = run_sessions(listed(SESSION), epsilons(SESSION), seeds_of(SESSION, TRIED, seed), keep_times=True)
+    n = int(np.argmin(sessions.last_s))
+    return sessions.times_s[n], [toast for toast in sessions.sequences[n].tolist() if toast]
 
 
 def convergence(times_s: NDArray[np.float64]) -> bytes:
@@ -174,8 +174,8 @@ def _places(cell: Cell, sequence: Sequence[int]) -> bytes:
         axes = figure.add_subplot()
         for part, colour in zip(range(1, cell.parts + 1), COLOURS, strict=False):
             own = [activity for activity in schedule.parts if activity.part == part]
-            times = [time for one in own for time in (one.start_s, one.end_s)]
-            places = [cell.index(name) for one in own for name in (one.origin, one.target)]
+            times = [time for activity in own for time in (activity.start_s, activity.end_s)]
+            places = [cell.index(name) for activity in own for name in (activity.origin, activity.target)]
             lifted = np.array(places) + 0.09 * (part - (cell.parts + 1) / 2)  # or equal lines hide each other
             axes.plot(times, lifted, color=colour, linewidth=2.2, label=f"toast {part}", solid_capstyle="butt")
         names = [f"{number}  {name.replace('_', ' ')}" for number, name in enumerate(cell.names, 1)]
@@ -206,7 +206,7 @@ def _exploration() -> bytes:
 
 def readings(rows: Sequence[Row]) -> dict[str, bytes]:
     """How far each reading is from the printed SP: bars by method, a picture for each number of toasts."""
-    off = {(one["reading"], one["toasts"], _method(one)): one for one in those(rows, measure="off_points")}
+    off = {(row["reading"], row["toasts"], _method(row)): row for row in those(rows, measure="off_points")}
     groups = [fill(name, 14) for name in READINGS]
     return {
         f"Distance from the printed SP by reading, {toasts} toasts, case I": bars(
@@ -218,5 +218,5 @@ def readings(rows: Sequence[Row]) -> dict[str, bytes]:
     }
 
 
-def _method(one: Row) -> str:
-    return " ".join(filter(None, (one["method"], one.get("reward_factor"))))
+def _method(row: Row) -> str:
+    return " ".join(filter(None, (row["method"], row.get("reward_factor"))))

@@ -123,7 +123,7 @@ def run_sessions(
         raise BadInput("episodes = 0: allowed are whole numbers from 1")
     sessions, episodes = len(seeds), len(epsilons)
     tried = np.ones(episodes) if listed.rules.method == RANDOM else np.asarray(epsilons, np.float64)
-    found = kernels.Found(
+    outcomes = kernels.Found(
         times_s=np.zeros((sessions if keep_times else 1, episodes)),
         best_s=np.zeros(sessions),
         last_s=np.zeros(sessions),
@@ -131,8 +131,8 @@ def run_sessions(
         sequences=np.zeros((sessions, LONGEST * listed.count), np.int64),
     )
     work = work_of(listed.count)
-    kernels.run_sessions(listed.toasts, listed.rules, work, tried, np.asarray(seeds, np.uint64), found)
-    return found if keep_times else found._replace(times_s=found.times_s[:0])
+    kernels.run_sessions(listed.toasts, listed.rules, work, tried, np.asarray(seeds, np.uint64), outcomes)
+    return outcomes if keep_times else outcomes._replace(times_s=outcomes.times_s[:0])
 
 
 def work_of(toasts: int) -> Workspace:

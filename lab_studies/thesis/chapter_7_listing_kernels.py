@@ -245,19 +245,19 @@ def learn(rules: Any, work: Any, time_s: float, best_s: float) -> None:
 
 
 @without_refcounts
-def run_sessions(toasts: Any, rules: Any, work: Any, epsilons: Any, seeds: Any, found: Any) -> None:
+def run_sessions(toasts: Any, rules: Any, work: Any, epsilons: Any, seeds: Any, outcomes: Any) -> None:
     """A session for each seed (N,), with exploration epsilons (E,); what they come to is written to `found`."""
     for n in range(len(seeds)):
-        row, best_s = n % len(found.times_s), inf
+        row, best_s = n % len(outcomes.times_s), inf
         work.values[:], work.counts[:], work.stream[0] = 1.0, 0, seeds[n]
         for episode in range(len(epsilons)):
             time_s = _episode(toasts, rules, work, epsilons[episode])
             if time_s < best_s:
                 best_s = time_s
                 for m in range(len(work.moved)):
-                    found.sequences[n, m] = work.moved[m]
-            if episode > 0 and time_s != found.times_s[row, episode - 1]:
-                found.converged[n] = episode + 1
-            found.times_s[row, episode] = time_s
+                    outcomes.sequences[n, m] = work.moved[m]
+            if episode > 0 and time_s != outcomes.times_s[row, episode - 1]:
+                outcomes.converged[n] = episode + 1
+            outcomes.times_s[row, episode] = time_s
             learn(rules, work, time_s, best_s)
-        found.best_s[n], found.last_s[n] = best_s, found.times_s[row, len(epsilons) - 1]
+        outcomes.best_s[n], outcomes.last_s[n] = best_s, outcomes.times_s[row, len(epsilons) - 1]

@@ -87,7 +87,7 @@ def readings(job: Job, reading: Reading) -> Findings:
         cells = appendix(job, [TABLES["table-9.2"], TABLES["table-9.3"]], changes)
         for view in ("full", "limited"):
             for measure in ("SP_percent", "HS_steps", "score"):
-                agree = [one["within"] for one in those(cells, view=view, measure=measure)]
+                agree = [row["within"] for row in those(cells, view=view, measure=measure)]
                 named = {"reading": name, "world": "world-1", "view": view}
                 rows.append(share_row(named, f"{measure.split('_')[0]}_agreement_percent", agree))
     summary = {"readings": len(READINGS)} | agreement(rows) | by_seed(rows)
@@ -97,12 +97,12 @@ def readings(job: Job, reading: Reading) -> Findings:
 def by_seed(rows: Sequence[Row]) -> Row:
     """What the choice of the advisor's table is worth: agreement with the chosen seed beside the range of the others."""
     said: Row = {}
-    for one in those(rows, reading=CHOSEN):
-        same = {name: one[name] for name in ("view", "measure")}
+    for row in those(rows, reading=CHOSEN):
+        same = {name: row[name] for name in ("view", "measure")}
         others = [other["value"] for other in those(rows, **same) if other["reading"].startswith(OTHER_SEED)]
         if others:
-            name = f"{one['measure'].removesuffix('_agreement_percent')} agreement in {one['view']} view"
-            chosen, low, high = one["value"], min(others), max(others)
+            name = f"{row['measure'].removesuffix('_agreement_percent')} agreement in {row['view']} view"
+            chosen, low, high = row["value"], min(others), max(others)
             said[name] = f"{chosen:.0f} % with the chosen table, {low:.0f} to {high:.0f} % with {len(others)} others"
     return said
 

@@ -118,7 +118,7 @@ class Grid:
             mean_row(named, "HS_steps", helped, cell.hs, PRINTED_SESSIONS),
             mean_row(named, "score", self.scores(cell), cell.score, REPLICATIONS * PRINTED_SESSIONS / len(helped)),
         ]
-        rows = [one | {"used": is_used(setting.world, named["tau"])} for one in rows]
+        rows = [result | {"used": is_used(setting.world, named["tau"])} for result in rows]
         if setting.gate == "ccrl":
             asked = np.mean([outcome.requests for outcome in outcomes], axis=0)
             rows.append(mean_row(named, "AR_requests", asked))
@@ -143,7 +143,7 @@ def describe(setting: AdviceSetting, tau: float | str | None = None) -> Row:
 def appendix(job: Job, places: Iterable[tuple[str, View]], reading: Mapping[str, Any]) -> list[Row]:
     """Every line of Appendix V for these worlds and views."""
     grids = (Grid(job, place, view, reading) for place, view in places)
-    return marked(one for grid in grids for cell in grid.cells for one in grid.rows(cell))
+    return marked(result for grid in grids for cell in grid.cells for result in grid.rows(cell))
 
 
 def table(job: Job, name: str, reading: Mapping[str, Any]) -> list[Row]:
@@ -154,25 +154,27 @@ def table(job: Job, name: str, reading: Mapping[str, Any]) -> list[Row]:
     tests: list[Row] = []
     for tau in (*TAUS, None):
         chosen = [cell for cell in grid.best if cell.setting.tau == tau]
-        found = compare({cell.setting.gate: grid.scores(cell) for cell in chosen})
+        comparison = compare({cell.setting.gate: grid.scores(cell) for cell in chosen})
         for cell in chosen:
-            ranked = {"rank": found.ranks[cell.setting.gate], "thesis_rank": cell.rank}
-            rows += [{**one, **ranked} for one in grid.rows(cell)]
+            ranked = {"rank": comparison.ranks[cell.setting.gate], "thesis_rank": cell.rank}
+            rows += [{**result, **ranked} for result in grid.rows(cell)]
         about = {
             "table": "comparison of scores",
             "world": place,
             "view": view,
             "tau": ALL_ADVISORS if tau is None else tau,
         }
-        tests += _tests(about, found)
+        tests += _tests(about, comparison)
     return marked(rows) + tests
 
 
-def _tests(named: Row, found: Comparison) -> list[Row]:
+def _tests(named: Row, comparison: Comparison) -> list[Row]:
     """The tests behind the ranks: their p values (Appendix II)."""
-    rows = [row(named, "ANOVA_p", found.p), row(named, "Levene_p", found.levene)]
-    rows += [row({**named, "gate": f"{one} - {other}"}, "Tukey_p", p) for (one, other), p in found.tukey.items()]
-    return rows + [row({**named, "gate": gate}, "KS_p", p) for gate, p in found.normality.items() if p is not None]
+    rows = [row(named, "ANOVA_p", comparison.p), row(named, "Levene_p", comparison.levene)]
+    rows += [
+        row({**named, "gate": f"{first} - {second}"}, "Tukey_p", p) for (first, second), p in comparison.tukey.items()
+    ]
+    return rows + [row({**named, "gate": gate}, "KS_p", p) for gate, p in comparison.normality.items() if p is not None]
 
 
 def by_beta(job: Job) -> list[Row]:
@@ -183,8 +185,8 @@ def by_beta(job: Job) -> list[Row]:
         best, percent = BEST_BETA[setting.world]
         named = {"table": "Figure 9.4", **describe(setting)}
         if setting.beta == best:
-            one = share_row(named, "SP_percent", outcome.success, percent, PRINTED_SESSIONS)
-            rows.append(one | {"used": is_used(setting.world, None)})
+            result = share_row(named, "SP_percent", outcome.success, percent, PRINTED_SESSIONS)
+            rows.append(result | {"used": is_used(setting.world, None)})
         else:
             rows.append(share_row(named, "SP_percent", outcome.success))
     return marked(rows)

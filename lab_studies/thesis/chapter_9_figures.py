@@ -79,7 +79,7 @@ def _compared(job: Job, reading: Mapping[str, Any], caption: str, series: Series
             ]
             for name, line in asked.items()
         }
-        rows += [one for line in lines.values() for one in line]
+        rows += [row for line in lines.values() for row in line]
         pictures[f"{caption}: {what}"] = bars(groups, lines, what, xlabel=xlabel)
     return rows, pictures
 
@@ -87,7 +87,7 @@ def _compared(job: Job, reading: Mapping[str, Any], caption: str, series: Series
 def compared() -> dict[str, Series]:
     """What figures 9.7-9.13 compare, by caption."""
     by_skill = dict(zip(ADVISORS, TAUS, strict=True))
-    one = AdviceSetting("world-1", "limited", "ccrl", 0.01, 0.05, 1)
+    in_world_1 = AdviceSetting("world-1", "limited", "ccrl", 0.01, 0.05, 1)
     two = AdviceSetting("world-2", "limited", "ccrl", 0.01, 0.05, 7)
     introspecting = AdviceSetting("world-2", "limited", "ia", 0.01, psi=1.0)
 
@@ -104,11 +104,11 @@ def compared() -> dict[str, Series]:
             "Omega 7": by_threshold(two),
         },
         "Figures 9.8 and 9.9: CCRL without and with the assessment of advice, world I, limited view": {
-            "never rejects": skills(replace(one, omega=NEVER_REJECTS)),
-            "Omega 1": skills(one),
+            "never rejects": skills(replace(in_world_1, omega=NEVER_REJECTS)),
+            "Omega 1": skills(in_world_1),
         },
         "Figure 9.10: CCRL by Omega, world I, limited view": {
-            f"Omega {omega}": skills(replace(one, omega=omega)) for omega in (1, 3, 5, 7)
+            f"Omega {omega}": skills(replace(in_world_1, omega=omega)) for omega in (1, 3, 5, 7)
         },
         "Figure 9.11: IA by Psi, expert, world II, limited view": {
             "IA": {f"{psi:g}": replace(introspecting, psi=psi) for psi in (0.1, 0.3, 0.7, 1.0, 1.3)}
@@ -130,7 +130,7 @@ def walks(reading: Mapping[str, Any]) -> list[Row]:
         named = {"table": "Figure 9.1", "world": "world-1", "advisor": "alone", "tau": tau, "advisor_table": known}
         share, mean = PRINTED_WALKS.get(tau, (None, None))
         more = [share_row(named, "SP_percent", steps == OPTIMUM, share), mean_row(named, "mean_steps", steps, mean)]
-        rows += [one if one["thesis"] is None else one | {"used": is_used("world-1", tau)} for one in more]
+        rows += [row if row["thesis"] is None else row | {"used": is_used("world-1", tau)} for row in more]
     return rows
 
 
@@ -143,7 +143,7 @@ def by_beta(rows: Sequence[Row]) -> bytes:
             curve(axes, those(rows, world=place), "beta", (*look, place))
             axes.plot(*best, label="printed", zorder=3, **PRINTED)
         axes.set(xlabel="β (softmax temperature $n^{-β}$ in episode n)", ylabel="sessions that end optimal [%]")
-        axes.set_ylim(0, 1.08 * max(20.0, *(one["ci95"][1] for one in rows)))
+        axes.set_ylim(0, 1.08 * max(20.0, *(row["ci95"][1] for row in rows)))
         axes.grid()
         legend_below(figure)
 
@@ -152,9 +152,9 @@ def by_beta(rows: Sequence[Row]) -> bytes:
 
 def ranked(rows: Sequence[Row]) -> bytes:
     """Scores by advisor and method, the rank of each on its bar, from the rows of one of the tables 9.2-9.5."""
-    found = {(one["gate"], one["tau"]): one for one in those(rows, measure="score")}
+    score_rows = {(row["gate"], row["tau"]): row for row in those(rows, measure="score")}
     groups = [*ADVISORS, "all"]
-    lines = {name: [found[gate, tau] for tau in (*TAUS, "all")] for gate, name in METHODS.items()}
+    lines = {name: [score_rows[gate, tau] for tau in (*TAUS, "all")] for gate, name in METHODS.items()}
     return bars(groups, lines, "score", xlabel="advisor, number on a bar: rank among the methods", label="rank")
 
 
@@ -194,7 +194,9 @@ def draw_steps(axes: "Axes", steps: NDArray[np.int64], guided: NDArray[np.bool_]
 
 def draw_rate(axes: "Axes", steps: Sequence[int], window: int, threshold: float | None) -> None:
     """The improvement rate that the learner knows before each episode; it exists from episode 2K + 1 on."""
-    known = [(n + 1, found.rate) for n in range(len(steps)) if (found := improvement(steps[:n], window)) is not None]
+    known = [
+        (n + 1, improved.rate) for n in range(len(steps)) if (improved := improvement(steps[:n], window)) is not None
+    ]
     if known:
         axes.plot(*zip(*known, strict=True), color=INK, linewidth=0.9)
         cut = [(episode, LOWEST_RATE) for episode, rate in known if rate < LOWEST_RATE]

@@ -130,13 +130,13 @@ def branches_of(cell: Cell, nodes: Iterable[tuple[Sequence[int], str]], optimal:
     nodes: each after its parent, the root, with no decisions, first; optimal: the decisions of the optimum. Raises
     BadInput for a node before its parent and for a decision that may not be taken.
     """
-    found: list[Branch] = []
+    nodes_drawn: list[Branch] = []
     index: dict[tuple[int, ...], int] = {}
     for decisions, end in nodes:
         taken = tuple(decisions)
         if taken and taken[:-1] not in index:
             raise BadInput(f"search tree: node {list(taken)} comes before its parent {list(taken[:-1])}")
-        index[taken] = len(found)
+        index[taken] = len(nodes_drawn)
         run = Run(cell)
         move = [run.move(decision) for decision in taken][-1:]
         name = f"{cell.part_name(move[0].part)} \N{RIGHTWARDS ARROW} {move[0].target}" if move else "start"
@@ -146,8 +146,10 @@ def branches_of(cell: Cell, nodes: Iterable[tuple[Sequence[int], str]], optimal:
         parts = ", ".join(f"{cell.part_name(part)} at {place}" for part, place in enumerate(places, 1))
         says = f"after {list(taken)}, {seconds(run.now_s)}: {parts}"
         on_way = taken == tuple(optimal[: len(taken)])
-        found.append(Branch(index.get(taken[:-1]) if taken else None, name, seconds(run.now_s), says, end, on_way))
-    return found
+        nodes_drawn.append(
+            Branch(index.get(taken[:-1]) if taken else None, name, seconds(run.now_s), says, end, on_way)
+        )
+    return nodes_drawn
 
 
 def _near(branches: Sequence[Branch]) -> list[Branch]:
@@ -156,16 +158,16 @@ def _near(branches: Sequence[Branch]) -> list[Branch]:
     for index in reversed(range(1, len(branches))):
         below[branches[index].parent or 0] += 1 + below[index]
     new: dict[int, int] = {}
-    found: list[Branch] = []
+    nodes_near: list[Branch] = []
     for index, branch in enumerate(branches):
         if branch.parent is None or branch.optimal or branches[branch.parent].optimal:
             hidden = 0 if branch.optimal or branch.parent is None else below[index]
             parent = None if branch.parent is None else new[branch.parent]
-            new[index] = len(found)
-            found.append(
+            new[index] = len(nodes_near)
+            nodes_near.append(
                 replace(branch, parent=parent, when=branch.when + f" (+{counted(hidden, 'node')})" * (hidden > 0))
             )
-    return found
+    return nodes_near
 
 
 def layout(branches: Sequence[Branch]) -> tuple[list[int], list[float]]:

@@ -49,16 +49,16 @@ def reconstruct(seed: int, progress: Progress = lambda done, total: None) -> Gri
     """A world like world II, the same for the same seed; takes minutes. WorkFailed when none is found."""
     rng = np.random.default_rng(seed)
     full, limited = ([c for c in printed("appendix-v.csv") if is_compared(c, view)] for view in ("full", "limited"))
-    found: list[tuple[float, GridWorld, FloatArray]] = []
+    layouts: list[tuple[float, GridWorld, FloatArray]] = []
     for world in _alike(rng, seed):
         table = learned_table(world)
-        found.append((distance(world, table, full), world, table))
-        progress(len(found), LAYOUTS + VIEWS)
-        if len(found) == LAYOUTS:
+        layouts.append((distance(world, table, full), world, table))
+        progress(len(layouts), LAYOUTS + VIEWS)
+        if len(layouts) == LAYOUTS:
             break
-    if not found:
+    if not layouts:
         raise WorkFailed(f"seed {seed}: no layout like world II among {MAX_TRIES}: try another seed")
-    _, world, table = min(found, key=lambda entry: entry[0])
+    _, world, table = min(layouts, key=lambda entry: entry[0])
     view = best_view(world, rng, lambda view: distance(_with(world, view), table, limited), progress)
     return _with(world, view)
 

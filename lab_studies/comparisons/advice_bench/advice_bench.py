@@ -73,8 +73,8 @@ def advice_bench(job: Job, reading: Mapping[str, Any]) -> Findings:
             if advisor not in ADVISORS:
                 advice_of(advisor, place)
     cases = [Case(name, advisor) for name in problems for advisor in (None, *advisors)]
-    found = measured(job, cases, rules)
-    rows = [one for name in problems for one in rows_of(name, found, advisors, rules)]
+    outcomes = measured(job, cases, rules)
+    rows = [result for name in problems for result in rows_of(name, outcomes, advisors, rules)]
     says, pictures = in_short(rows, problems, rules)
     return Findings(rows, says, pictures, (MEASURES, RULES_NOTE, CHOSEN, RANKED))
 
@@ -85,24 +85,24 @@ def measured(job: Job, cases: Sequence[Case], rules: tuple[str, ...]) -> dict[Ca
 
     def read(entry: Any) -> tuple[Case, Outcomes] | None:
         case = Case(*entry["case"])
-        found = {(str(rule), str(budget)): Outcome.from_json(lists) for (rule, budget), lists in entry["found"]}
-        return (case, found) if entry["of"] == mark and case in cases else None
+        outcomes = {(str(rule), str(budget)): Outcome.from_json(lists) for (rule, budget), lists in entry["found"]}
+        return (case, outcomes) if entry["of"] == mark and case in cases else None
 
     done: dict[Case, Outcomes] = job.kept_as(read)
     left = [case for case in cases if case not in done]
     job.progress(len(done), len(cases))
     work = partial(tried, sessions=job.sessions, seed=job.seed, rules=rules)
-    for case, found in job.computed(work, left, 1):
-        done[case] = found
+    for case, outcomes in job.computed(work, left, 1):
+        done[case] = outcomes
         entry = {"case": [case.problem, case.advisor], "of": mark}
-        job.keep(entry | {"found": [[list(key), one.to_json()] for key, one in found.items()]})
+        job.keep(entry | {"found": [[list(key), outcome.to_json()] for key, outcome in outcomes.items()]})
         job.progress(len(done), len(cases))
     return done
 
 
-def rows_of(name: str, found: Mapping[Case, Outcomes], advisors: Sequence[str], rules: Sequence[str]) -> list[Row]:
+def rows_of(name: str, outcomes: Mapping[Case, Outcomes], advisors: Sequence[str], rules: Sequence[str]) -> list[Row]:
     """One row for nobody, and one for each advisor, budget and rule in a problem."""
-    nobody = found[Case(name, None)][NOBODY, "any"]
+    nobody = outcomes[Case(name, None)][NOBODY, "any"]
     group = {"held_out": name in HELD_OUT}
     alone = {
         "problem": name,
@@ -116,27 +116,27 @@ def rows_of(name: str, found: Mapping[Case, Outcomes], advisors: Sequence[str], 
     for advisor in advisors:
         for budget in BUDGETS:
             for rule in rules:
-                one = found[Case(name, advisor)][rule, budget]
+                outcome = outcomes[Case(name, advisor)][rule, budget]
                 named = {"problem": name, "advisor": advisor, "budget": budget, "rule": rule, **group}
-                mean, *ends = interval(one.points - nobody.points)
-                rows.append(row(named | _shown(one, nobody, name), "gain_points", mean, ends))
+                mean, *ends = interval(outcome.points - nobody.points)
+                rows.append(row(named | _shown(outcome, nobody, name), "gain_points", mean, ends))
     return rows
 
 
-def _shown(one: Outcome, nobody: Outcome, name: str) -> Row:
+def _shown(outcome: Outcome, nobody: Outcome, name: str) -> Row:
     """The measures that are shown beside the gain."""
-    later = _recovered(one, nobody, name), _recovered(nobody, nobody, name)
+    later = _recovered(outcome, nobody, name), _recovered(nobody, nobody, name)
     return {
-        "points": round(float(one.points.mean()), 2),
-        "last": round(float(one.last.mean()), 2),
-        "answers": round(float(one.answers.mean()), 1),
+        "points": round(float(outcome.points.mean()), 2),
+        "last": round(float(outcome.last.mean()), 2),
+        "answers": round(float(outcome.answers.mean()), 1),
         "later": None if None in later else round(later[0] - later[1]),  # type: ignore[operator]
     }
 
 
-def _recovered(one: Outcome, nobody: Outcome, name: str) -> float | None:
+def _recovered(outcome: Outcome, nobody: Outcome, name: str) -> float | None:
     """The episode from which on the mean curve stays at nine tenths of nobody's last points, None: it does not."""
-    enough = one.curve >= LEVEL * nobody.last.mean()
+    enough = outcome.curve >= LEVEL * nobody.last.mean()
     below = np.flatnonzero(~enough)
     first = 0 if len(below) == 0 else int(below[-1]) + 1
     return None if first == BINS else first * problem(name).learner.episodes / BINS
@@ -144,20 +144,20 @@ def _recovered(one: Outcome, nobody: Outcome, name: str) -> float | None:
 
 def in_short(rows: Sequence[Row], problems: Sequence[str], rules: Sequence[str]) -> tuple[Row, dict[str, bytes]]:
     """The ranks and the harm on the problems used for development and on those held out; with pictures."""
-    advised = [one for one in rows if one["rule"] != NOBODY]
-    alone = {one["problem"]: one["points"] for one in rows if one["rule"] == NOBODY}
+    advised = [result for result in rows if result["rule"] != NOBODY]
+    alone = {result["problem"]: result["points"] for result in rows if result["rule"] == NOBODY}
     scores: dict[str, dict[Cell, float]] = {rule: {} for rule in rules}
     scores[NOBODY] = {}
-    for one in advised:
-        cell = one["problem"], one["advisor"], one["budget"]
-        scores[one["rule"]][cell], scores[NOBODY][cell] = one["points"], alone[one["problem"]]
-    says: Row = {"rules": len(rules), "advisors": len({one["advisor"] for one in advised})}
+    for result in advised:
+        cell = result["problem"], result["advisor"], result["budget"]
+        scores[result["rule"]][cell], scores[NOBODY][cell] = result["points"], alone[result["problem"]]
+    says: Row = {"rules": len(rules), "advisors": len({result["advisor"] for result in advised})}
     pictures: dict[str, bytes] = {}
     groups = {"": [name for name in problems if name not in HELD_OUT], "held out: ": [*filter(HELD_OUT.get, problems)]}
     for words, those in groups.items():
         if not those:
             continue
-        here = [one for one in advised if one["problem"] in those]
+        here = [result for result in advised if result["problem"] in those]
         ranked = ranks(scores, those, OURS)
         says |= _ranked(words, ranked) | _harm(words, here, rules)
         where = "held-out problems" if words else "problems"
@@ -186,10 +186,10 @@ def _harm(words: str, rows: Sequence[Row], rules: Sequence[str]) -> Row:
     """In how many cells each rule's interval reaches below the target, and the worst of them."""
     says: Row = {}
     for rule in rules:
-        own = [one for one in rows if one["rule"] == rule]
-        below = sum(one["ci95"][0] < MOST_BELOW for one in own)
-        surely = sum(one["ci95"][1] < MOST_BELOW for one in own)
-        worst = min(own, key=lambda one: one["ci95"][0])
+        own = [result for result in rows if result["rule"] == rule]
+        below = sum(result["ci95"][0] < MOST_BELOW for result in own)
+        surely = sum(result["ci95"][1] < MOST_BELOW for result in own)
+        worst = min(own, key=lambda result: result["ci95"][0])
         place = f"{worst['problem']}, {worst['advisor']}, budget {worst['budget']}"
         says[f"{words}harm by {rule}"] = (
             f"{below} of {len(own)} intervals reach below {MOST_BELOW:g}, {surely} lie there whole; "

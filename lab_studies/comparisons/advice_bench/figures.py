@@ -37,8 +37,8 @@ def distances(ranked: Ranks) -> bytes:
 
 def gains(rows: Sequence[Row], rules: Sequence[str]) -> bytes:
     """A map for each budget: rules by advisors, the mean gain over nobody as colour and number."""
-    advisors = list(dict.fromkeys(one["advisor"] for one in rows))
-    shown = [rule for rule in rules if any(one["rule"] == rule for one in rows)]
+    advisors = list(dict.fromkeys(row["advisor"] for row in rows))
+    shown = [rule for rule in rules if any(row["rule"] == rule for row in rows)]
 
     def draw(figure: "Figure") -> None:
         both = figure.subplots(1, len(BUDGETS), sharey=True)
@@ -57,7 +57,7 @@ def gains(rows: Sequence[Row], rules: Sequence[str]) -> bytes:
 
 
 def _mean(rows: Sequence[Row], budget: str, rule: str, advisor: str) -> float:
-    those = [one["value"] for one in rows if (one["budget"], one["rule"], one["advisor"]) == (budget, rule, advisor)]
+    those = [row["value"] for row in rows if (row["budget"], row["rule"], row["advisor"]) == (budget, rule, advisor)]
     return float(np.mean(those))
 
 
@@ -65,16 +65,16 @@ def worst_cells(rows: Sequence[Row], rules: Sequence[str], target: float) -> byt
     """For each rule the cell with the lowest end of its interval, and the target."""
     lowest = {}
     for rule in rules:
-        own = [one for one in rows if one["rule"] == rule]
+        own = [row for row in rows if row["rule"] == rule]
         if own:
-            lowest[rule] = min(own, key=lambda one: one["ci95"][0])
+            lowest[rule] = min(own, key=lambda row: row["ci95"][0])
 
     def draw(figure: "Figure") -> None:
         axes = figure.add_subplot()
-        for line, (rule, one) in enumerate(lowest.items()):
+        for line, (rule, row) in enumerate(lowest.items()):
             colour = ORANGE if rule == OURS else BLUE
-            axes.hlines(line, *one["ci95"], color=colour, linewidth=1.6)
-            axes.plot(one["value"], line, "o", color=colour, markersize=4)
+            axes.hlines(line, *row["ci95"], color=colour, linewidth=1.6)
+            axes.plot(row["value"], line, "o", color=colour, markersize=4)
         axes.axvline(target, color=RED, linewidth=1.0, linestyle="--", label=f"target {target:g}")
         axes.axvline(0.0, color=GREY, linewidth=0.8)
         axes.set_yticks(range(len(lowest)), lowest)
@@ -92,8 +92,8 @@ def answers_and_gain(rows: Sequence[Row], rules: Sequence[str]) -> bytes:
         axes = figure.add_subplot()
         for budget, marker in zip(BUDGETS, "ox", strict=True):
             for rule in rules:
-                own = [one for one in rows if (one["rule"], one["budget"]) == (rule, budget)]
-                at = max(1.0, float(np.mean([one["answers"] for one in own]))), np.mean([one["value"] for one in own])
+                own = [row for row in rows if (row["rule"], row["budget"]) == (rule, budget)]
+                at = max(1.0, float(np.mean([row["answers"] for row in own]))), np.mean([row["value"] for row in own])
                 axes.plot(*at, marker, color=ORANGE if rule == OURS else BLUE, markersize=5)
                 if budget == "any" or rule == OURS:
                     axes.annotate(rule, at, xytext=(4, 2), textcoords="offset points", fontsize=6.5)

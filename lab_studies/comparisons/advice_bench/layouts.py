@@ -37,20 +37,20 @@ class At(NamedTuple):
 def explored(start: Any, actions: Sequence[str], leads: Leads) -> TabularMDP:
     """The states that can be reached from one, by number in the order found, as a decision problem with the lab's rewards."""
     rewards, queue = Rewards(), [start]
-    found: dict[Any, int] = {start: 0}
+    numbers: dict[Any, int] = {start: 0}
     rows: list[list[int]] = []
     for state in queue:
         ends = state in (WON, LOST)
         row = []
         for action in range(len(actions)):
             entered = state if ends else leads(state, action)
-            if entered not in found:
-                found[entered] = len(found)
+            if entered not in numbers:
+                numbers[entered] = len(numbers)
                 queue.append(entered)
-            row.append(found[entered])
+            row.append(numbers[entered])
         rows.append(row)
     successor = np.array(rows, np.int32)
-    goal, lost = (np.array([state == end for state in found]) for end in (WON, LOST))
+    goal, lost = (np.array([state == end for state in numbers]) for end in (WON, LOST))
     reward = np.where(goal[successor], rewards.goal, np.where(lost[successor], rewards.collision, rewards.step))
     reward[goal | lost] = 0.0
     return TabularMDP(successor, reward, goal | lost, goal, 0, tuple(actions))
@@ -103,8 +103,8 @@ def toast_order() -> TabularMDP:
         moved = None
         if action < TOASTS:
             stage, _ = toasts[action]
-            room = sum(one[0] in (IN_TOASTER, TOASTED) for one in toasts) < SLOTS
-            free = all(one[0] not in (IN_APPLIER, BUTTERED) for one in toasts)
+            room = sum(toast[0] in (IN_TOASTER, TOASTED) for toast in toasts) < SLOTS
+            free = all(toast[0] not in (IN_APPLIER, BUTTERED) for toast in toasts)
             if stage == BREAD and room:
                 moved = (IN_TOASTER, TOASTING)
             elif stage == TOASTED and free:

@@ -42,7 +42,7 @@ def ranks(scores: Mapping[str, Mapping[Cell, float]], problems: Sequence[str], o
     mean, (n, k) = by_problem.mean(axis=0), by_problem.shape
     critical = float(studentized_range.ppf(0.95, k, np.inf) / np.sqrt(2.0) * np.sqrt(k * (k + 1) / (6.0 * n)))
     p = float(friedmanchisquare(*by_problem.T).pvalue) if n > 1 and k > 2 else None
-    ordered = sorted(zip(rules, mean.tolist(), strict=True), key=lambda one: one[1])
+    ordered = sorted(zip(rules, mean.tolist(), strict=True), key=lambda pair: pair[1])
     means = {
         rule: np.array([np.mean([of[cell] for cell in cells if cell[0] == name]) for name in dict.fromkeys(problems)])
         for rule, of in scores.items()
@@ -54,8 +54,8 @@ def ranks(scores: Mapping[str, Mapping[Cell, float]], problems: Sequence[str], o
 
 def holm(single: Mapping[str, float]) -> dict[str, float]:
     """Single p values corrected for their number (Holm 1979)."""
-    found, least = {}, 0.0
-    for number, (name, p) in enumerate(sorted(single.items(), key=lambda one: one[1])):
+    corrected, least = {}, 0.0
+    for number, (name, p) in enumerate(sorted(single.items(), key=lambda pair: pair[1])):
         least = max(least, min(1.0, p * (len(single) - number)))
-        found[name] = least
-    return found
+        corrected[name] = least
+    return corrected

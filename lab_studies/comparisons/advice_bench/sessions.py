@@ -76,13 +76,15 @@ class Outcome(NamedTuple):
 
     def to_json(self) -> list[list[float]]:
         """Plain lists."""
-        return [one.tolist() for one in self]
+        return [values.tolist() for values in self]
 
     @classmethod
     def from_json(cls, lists: Any) -> "Outcome":
         """What `to_json` wrote. Raises TypeError or ValueError for anything else."""
-        points, last, answers, curve = (np.array(one, np.float64) for one in lists)
-        if any(one.ndim != 1 for one in (points, last, answers, curve)) or not len(points) == len(last) == len(answers):
+        points, last, answers, curve = (np.array(values, np.float64) for values in lists)
+        if any(values.ndim != 1 for values in (points, last, answers, curve)) or not len(points) == len(last) == len(
+            answers
+        ):
             raise ValueError("three lists of one length, and a curve, are wanted")
         return cls(points, last, answers, curve)
 
@@ -97,12 +99,12 @@ def tried(case: Case, sessions: int, seed: int, rules: tuple[str, ...] = tuple(R
     rng = np.random.default_rng([seed, crc32(case.problem.encode())])
     seeds = rng.integers(2**64, size=sessions, dtype=np.uint64)
     shares = np.array_split(seeds, worlds)
-    found: dict[tuple[str, str], list[Any]] = {}
+    parts_of: dict[tuple[str, str], list[Any]] = {}
     for world, own in enumerate(shares):
         place = problem(case.problem, world)
         for key, part in _of_place(place, case.advisor, rules, own).items():
-            found.setdefault(key, []).append(part)
-    return {key: _joined(parts) for key, parts in found.items()}
+            parts_of.setdefault(key, []).append(part)
+    return {key: _joined(parts) for key, parts in parts_of.items()}
 
 
 def _of_place(
@@ -111,7 +113,7 @@ def _of_place(
     if advisor is None:
         return {(NOBODY, "any"): _points(place, GateSettings("never"), None, seeds)}
     advice = advice_of(advisor, place)
-    found = {}
+    outcomes = {}
     for name in rules:
         rule = RULES[name]
         spoken = advice
@@ -119,8 +121,8 @@ def _of_place(
             region = advice.region & importance(place)
             spoken = replace(advice, region=region, speaks=rule.speaks)
         for budget, most in BUDGETS.items():
-            found[name, budget] = _points(place, replace(rule.gate, budget=most), spoken, seeds)
-    return found
+            outcomes[name, budget] = _points(place, replace(rule.gate, budget=most), spoken, seeds)
+    return outcomes
 
 
 def _points(place: Benched, gate: GateSettings, advice: Advice | None, seeds: np.ndarray) -> Any:
@@ -131,8 +133,8 @@ def _points(place: Benched, gate: GateSettings, advice: Advice | None, seeds: np
 
 
 def _joined(parts: list[Any]) -> Outcome:
-    points, answers = np.concatenate([one[0] for one in parts]), np.concatenate([one[1] for one in parts])
+    points, answers = np.concatenate([part[0] for part in parts]), np.concatenate([part[1] for part in parts])
     last = max(1, round(LAST * points.shape[1]))
     curve = np.array([part.mean() for part in np.array_split(points.mean(axis=0), BINS)])
-    found = points.mean(axis=1), points[:, -last:].mean(axis=1), answers.astype(np.float64), curve
-    return Outcome(*(np.round(one, 2) for one in found))  # to a hundredth of a point: so they are kept
+    values = points.mean(axis=1), points[:, -last:].mean(axis=1), answers.astype(np.float64), curve
+    return Outcome(*(np.round(array, 2) for array in values))  # to a hundredth of a point: so they are kept

@@ -68,9 +68,9 @@ def _session(problem: _Problem, settings: FlatSettings, budgets: Count, cap: int
                 for step in range(length - 1, -1, -1):
                     _learn(problem, settings, q, episode[step, 0], episode[step, 1])
                 state, length, number = problem.start, 0, number + 1
-        found = min(best, _greedy_steps(problem, q, cap))
-        if found <= cap:
-            makespans[stop] = found
+        shortest = min(best, _greedy_steps(problem, q, cap))
+        if shortest <= cap:
+            makespans[stop] = shortest
     return makespans
 
 

@@ -80,10 +80,10 @@ def flat(job: Job, reading: Mapping[str, Any]) -> Findings:
     """Makespan against budget for both, 1 to 3 toasts, beside the exact optimum; at most SESSIONS sessions of each."""
     sessions = min(job.sessions, SESSIONS)
     skills = [_skills(job.seed, session) for session in range(sessions)]
-    found = job.in_turn([partial(_measured, toasts, job.seed, skills) for toasts in TOASTS])
-    rows = [one for some, _ in found for one in some]
+    measured = job.in_turn([partial(_measured, toasts, job.seed, skills) for toasts in TOASTS])
+    rows = [result for results, _ in measured for result in results]
     summary: Row = {"sessions": sessions}
-    for _, says in found:
+    for _, says in measured:
         summary |= says
     notes = (ABOUT, ABOUT_FLAT, ABOUT_TWO_LEVELS, ABOUT_LOSS)
     return Findings(rows, summary | agreement(rows), {CAPTION: _picture(rows)}, notes)
@@ -109,10 +109,10 @@ def _exact(world: FlatWorld, toasts: int) -> list[Row]:
     """The optimum of the flat problem, and that of the cell whose transfers are all shortest; how large both are."""
     empty, loaded = KITCHEN.needed(toasts)
     ways = {way: shortest_steps(KITCHEN.way(way)) for way in (*empty, *loaded)}
-    found = optimum(KITCHEN.cell(toasts, ways))
+    best = optimum(KITCHEN.cell(toasts, ways))
     figures = {
         ("flat", "makespan_steps"): shortest_steps(world.mdp),
-        ("two levels", "makespan_steps"): found.cost,
+        ("two levels", "makespan_steps"): best.cost,
         ("flat", "problem_states"): world.mdp.n_states,
         ("two levels", "problem_subtasks"): len(ways),
     }
@@ -147,11 +147,11 @@ def _two_level_rows(asked: _Asked, skills: Skills) -> list[Row]:
     learners = [TwoLevels(KITCHEN, asked.world, asked.toasts, *own) for own in zip(skills, seeds, strict=True)]
     for name in (ALL_STEPS, LOW_STEPS):
         for budget in asked.budgets:
-            found = [learner.outcome(budget, CAP, name == ALL_STEPS) for learner in learners]
+            outcomes = [learner.outcome(budget, CAP, name == ALL_STEPS) for learner in learners]
             named = _named(("two-level", name), asked.toasts, budget)
-            makespans = np.array([-1 if one.makespan is None else one.makespan for one in found])
+            makespans = np.array([-1 if outcome.makespan is None else outcome.makespan for outcome in outcomes])
             rows += rows_of(named, makespans, asked.best)
-            rows.append(row(named, "used_steps", float(np.mean([one.used for one in found]))))
+            rows.append(row(named, "used_steps", float(np.mean([outcome.used for outcome in outcomes]))))
     return rows
 
 
@@ -174,14 +174,14 @@ def _in_short(rows: Sequence[Row], toasts: int, exact: Sequence[Row]) -> Row:
     """The optimum, and with which budget all sessions of a method first finish, on average near it."""
     table = exact[0]["table"]
     says = ("optimum, flat", "optimum, two levels", "states of the flat problem", "sub-tasks")
-    found: Row = {f"{table}: {what}": int(one["value"]) for what, one in zip(says, exact, strict=True)}
+    told: Row = {f"{table}: {what}": int(result["value"]) for what, result in zip(says, exact, strict=True)}
     for method, setting in METHODS:
         of = those(rows, method=method, setting=setting)
-        sure = {one["budget"] for one in those(of, measure="finished_percent", value=100.0)}
-        near = [one["budget"] for one in those(of, measure="gap_percent") if one["value"] <= NEAR_PERCENT]
+        sure = {result["budget"] for result in those(of, measure="finished_percent", value=100.0)}
+        near = [result["budget"] for result in those(of, measure="gap_percent") if result["value"] <= NEAR_PERCENT]
         steps = min((budget for budget in near if budget in sure), default=None)
-        found[f"{table}: steps to within {NEAR_PERCENT:g} %, {method}, {setting}"] = steps
-    return found
+        told[f"{table}: steps to within {NEAR_PERCENT:g} %, {method}, {setting}"] = steps
+    return told
 
 
 def _picture(rows: Sequence[Row]) -> bytes:
@@ -199,16 +199,16 @@ def _picture(rows: Sequence[Row]) -> bytes:
 
 def _draw(axes: "Axes", rows: Sequence[Row]) -> None:
     finished = {
-        (one["method"], one["setting"], one["budget"]): one["value"] == 100.0
-        for one in those(rows, measure="finished_percent")
+        (result["method"], result["setting"], result["budget"]): result["value"] == 100.0
+        for result in those(rows, measure="finished_percent")
     }
     for (method, setting), (colour, marker, name) in METHODS.items():
         line = those(rows, method=method, setting=setting, measure="makespan_steps")
         curve(axes, line, "budget", (colour, marker, name))
-        for one in line:
-            if not finished[method, setting, one["budget"]]:
+        for result in line:
+            if not finished[method, setting, result["budget"]]:
                 look: dict[str, Any] = {"color": colour, "markerfacecolor": "white", "markersize": 4.5, "zorder": 3}
-                axes.plot(one["budget"], one["value"], marker, **look)
+                axes.plot(result["budget"], result["value"], marker, **look)
     best = those(rows, method="exact")[0]["value"]
     axes.axhline(best, color=INK, linestyle="--", linewidth=1.0, label="exact optimum")
     axes.set(xscale="log", xlabel="steps of learning", title=f"{rows[0]['table']}, optimum {best:.0f}")

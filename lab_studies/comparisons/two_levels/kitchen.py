@@ -55,8 +55,8 @@ class Kitchen:
     @cached_property
     def places(self) -> dict[str, tuple[int, int]]:
         """The cell (row, column) of each station, by its name."""
-        found = {letter: (r, c) for r, row in enumerate(self.rows) for c, letter in enumerate(row)}
-        return {name: found[letter] for letter, name in LETTERS.items()}
+        cells = {letter: (r, c) for r, row in enumerate(self.rows) for c, letter in enumerate(row)}
+        return {name: cells[letter] for letter, name in LETTERS.items()}
 
     def needed(self, parts: int) -> tuple[tuple[Way, ...], tuple[Way, ...]]:
         """The transfers that some allowed order of so many toasts may contain: empty ones and loaded ones."""

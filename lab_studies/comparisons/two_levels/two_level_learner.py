@@ -108,8 +108,8 @@ class TwoLevels:
             return BudgetOutcome(None, low)
         if (stage, tries) not in self._tried:
             self._tried[stage, tries] = self._sequenced(stage, tries, cap)
-        found = self._tried[stage, tries]
-        return replace(found, used=low + found.used * count_simulated)
+        outcome = self._tried[stage, tries]
+        return replace(outcome, used=low + outcome.used * count_simulated)
 
     @cached_property
     def _low_steps(self) -> list[int]:
@@ -123,12 +123,12 @@ class TwoLevels:
 
     def _sequenced(self, stage: int, tries: int, cap: int) -> BudgetOutcome:
         cell = self._cell(stage, cap)
-        found = srl_time(cell, Search(tries), np.random.default_rng(self._seed))
-        simulated = round(sum(found.episode_costs) + found.final_cost)
-        if found.cost > cap:
+        learned = srl_time(cell, Search(tries), np.random.default_rng(self._seed))
+        simulated = round(sum(learned.episode_costs) + learned.final_cost)
+        if learned.cost > cap:
             return BudgetOutcome(None, simulated)
         moves = {way: skill[stage].moves or () for way, skill in self._skills.items()}
-        makespan = carried_out(self._world, cell, found.sequence, moves, cap)
+        makespan = carried_out(self._world, cell, learned.sequence, moves, cap)
         return BudgetOutcome(makespan if makespan <= cap else None, simulated)
 
 
