@@ -12,7 +12,8 @@ from typing import Any
 
 from devtools.commands import environment, lab, module
 from devtools.parts import Outcome, Part
-from devtools.read_files import KINDS, make_sound
+from devtools.read_files import KINDS
+from devtools.sound_files import make_sound
 
 FILES = 100_000
 BATCH_S = 3600.0
