@@ -1,4 +1,4 @@
-"""Ctrl-C while `lab sequence` looks for an order: each time there is one, with its bound, and exit 130."""
+"""Part `ctrl-c`: Ctrl-C during a search of `lab sequence`, which must still print an order with its bound, and exit with 130."""
 
 import json
 import random
@@ -14,16 +14,16 @@ from lab.sequencing import SEQUENCERS
 from lab.sequencing.search import SAME
 
 EACH = 20  # times that each method is stopped
-LATEST_S = 2.5  # after the search has begun
+LATEST_S = 2.5  # the longest time from the begin of a search to Ctrl-C
 MOST_S = 60.0
-BEGINS = "Find the order"  # how the line begins that a search begins with
-SHOP, LATE = "larger job shop, 1 vehicle", "larger job shop, due dates"  # what is drawn
-ON = {"earliest-due": LATE, "srl-time": "toast-case-2"}  # which method is not made for SHOP, and what it is stopped on
+BEGINS = "Find the order"  # the first words of the line that a search prints when it begins
+SHOP, LATE = "larger job shop, 1 vehicle", "larger job shop, due dates"  # kinds of `plain_pairs`
+ON = {"earliest-due": LATE, "srl-time": "toast-case-2"}  # what methods that do not take SHOP order
 METHODS = tuple(SEQUENCERS)
 
 
 def prepare(room: Path, seed: int) -> int:
-    """Writes the shops; as many attempts as methods, EACH times."""
+    """Write the shops; return the number of attempts, EACH for every method."""
     for name in (SHOP, LATE):
         kind = next(known for known in KINDS if known.name == name)
         (room / name).mkdir(exist_ok=True)
@@ -33,11 +33,11 @@ def prepare(room: Path, seed: int) -> int:
 
 
 def attempt(number: int, seed: int, room: Path) -> Outcome:
-    """Stops one method at a drawn moment."""
+    """Stop one method at a drawn moment."""
     method, after_s = METHODS[number % len(METHODS)], LATEST_S * random.Random(f"{seed} {number}").random()
-    on = ON.get(method, SHOP)
-    file = room / on / "words.json"
-    words = json.loads(file.read_text(encoding="utf-8")) if file.exists() else [on, "--toasts", "24"]
+    shop = ON.get(method, SHOP)
+    file = room / shop / "words.json"
+    words = json.loads(file.read_text(encoding="utf-8")) if file.exists() else [shop, "--toasts", "24"]
     more = ["--method", method, "--seconds", f"{MOST_S / 2:g}", "--episodes", "100000", "--json"]
     ended = stopped(["sequence", *words, *more], after_s, room)
     (room / f"{number}.txt").write_text(ended.stderr, encoding="utf-8")
@@ -49,7 +49,7 @@ def attempt(number: int, seed: int, room: Path) -> Outcome:
 
 
 def stopped(words: list[str], after_s: float, room: Path) -> Ended:
-    """The command, sent SIGINT so long after its search has begun; seconds: from then to its end."""
+    """The end of a command that is sent SIGINT `after_s` after its search has begun; its `seconds` count from then."""
     child = subprocess.Popen(
         [*LAB, *words], cwd=room, env=environment(room, PYTHONFAULTHANDLER="1"), text=True, start_new_session=True,
         stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
@@ -72,7 +72,7 @@ def stopped(words: list[str], after_s: float, room: Path) -> Ended:
 
 
 def judged(ended: Ended) -> str:
-    """What is wrong with how it ended; empty if nothing is."""
+    """What is wrong with how a stopped command ended; "" if nothing is."""
     if broke := ended.fault((130,)):
         return broke
     if ended.stdout.count("\n") != 1:
@@ -83,7 +83,7 @@ def judged(ended: Ended) -> str:
     if (document["stopped_by"], document["interrupted"]) != ("Ctrl-C", True):
         return f"stopped by {document['stopped_by']}"
     if not document["best_sequence"] or len(document["best_moves"]) != len(document["best_sequence"]):
-        return "its order is empty"
+        return "the order is empty, or its moves are not those of the order"
     if not 0 < document["bound_cost"] <= document["best_cost"] + SAME and document["objective"] == "makespan":
         return f"bound {document['bound_cost']}, best {document['best_cost']}"
     if document["optimum_proven"] != (document["best_cost"] <= document["bound_cost"] + SAME):
@@ -93,7 +93,7 @@ def judged(ended: Ended) -> str:
 
 PART = Part(
     what="Ctrl-C at any time of a search, for each method of `lab sequence`",
-    target="an order each time, with its bound",
+    target="every command prints an order with its bound",
     count=None,
     prepare=prepare,
     attempt=attempt,
