@@ -36,25 +36,25 @@ from devtools.works import (
 )
 
 COUNT = 1000
-LATE = 12  # calls at the end of a command, among which every other kill is
-ALONE = 40  # one in so many is a process of its own; the others are forked from one that has the lab loaded
-COLD = 2 * ALONE  # one in so many finds nothing compiled, and keeps what it compiles in its home
-AT_RANDOM = 0.1  # of the kills are at any time
+LATE = 12  # every second kill is at one of so many last calls of a command
+ALONE = 40  # one command in so many is a process of its own; the others are forked from one that has loaded the lab
+COLD = 2 * ALONE  # one command in so many finds nothing compiled, and keeps what it compiles in its home
+AT_RANDOM = 0.1  # the share of kills at any time
 
 
 def prepare(room: Path, seed: int) -> None:
-    """The shim, and the home that every command begins in."""
+    """Build the shim, and the home that every command begins in."""
     built(room)
     base(room)
 
 
 def attempt(number: int, seed: int, room: Path) -> Outcome:
-    """One kill and what comes next."""
+    """Kill one command, and judge what it left and the next command."""
     chance = random.Random(f"{seed} {number}")
     shuffled = list(names())
     random.Random(seed).shuffle(shuffled)
     name = shuffled[number % len(shuffled)]
-    expected = known_as(name, room)
+    expected = expected_result(name, room)
     home = fresh(room / f"kill-{number}", room, WORKS[name])
     carried_out = by_itself if number % ALONE == 0 or "workers" in name else forked(built(room), room)
     share = chance.random() if chance.random() < AT_RANDOM else None
@@ -71,7 +71,7 @@ def attempt(number: int, seed: int, room: Path) -> Outcome:
 
 
 @cache
-def known_as(name: str, room: Path) -> Undisturbed:
+def expected_result(name: str, room: Path) -> Undisturbed:
     """The result of an undisturbed command, read once."""
     return undisturbed(name, room)
 
@@ -86,7 +86,7 @@ def forked_s(name: str, room: Path) -> float:
 
 
 def drawn(calls: dict[str, int], chance: random.Random) -> Strike | None:
-    """A kill at some call of one kind, early or late; None for a command that makes none."""
+    """A kill at a random call of a random kind; None for a command without such calls."""
     kinds = [letter for letter, many in calls.items() if many]
     if not kinds:
         return None
@@ -99,7 +99,7 @@ def drawn(calls: dict[str, int], chance: random.Random) -> Strike | None:
 def judged(
     name: str, expected: Undisturbed, home: Path, killed: Ended, room: Path, carried_out: CarriedOut = by_itself
 ) -> str:
-    """What is wrong after a kill, and after the command that comes next; "" if nothing is."""
+    """What is wrong after a kill or after the next command; "" if nothing is."""
     before, changes = kept_before(room), WORKS[name].changes
     if killed.code >= 0 and killed.code != expected.code:
         return f"it was not killed: exit {killed.code}: {killed.stderr[-200:]}"
@@ -111,7 +111,7 @@ def judged(
     said = f"then lab {' '.join(words)}"
     if fault := then.fault((0, expected.code)):
         return f"{said}: {fault}"
-    is_over = words[:2] == ("toolbox", "verify") and WORKS[name].session  # pictures and receipt are not made once more
+    is_over = words[:2] == ("toolbox", "verify") and WORKS[name].session  # pictures and receipt are not made again
     wrong = (
         lost(before, home, changes) or unsound(home) or leftovers(home) or ("" if is_over else reached(expected, home))
     )

@@ -1,6 +1,6 @@
 """Part `mutations`: damaged files of every kind that the lab reads, given to the lab's own readers.
 
-An attempt is a batch of one kind in a process of its own. Each file must be read, or refused by the lab's own error in one
+An attempt is a batch of one kind in a process of its own. Each file must be read or rejected with the lab's own error in one
 line, within 5 s of CPU time and 1 GB.
 """
 
@@ -17,26 +17,26 @@ from devtools.sound_files import make_sound
 
 FILES = 100_000
 BATCH_S = 3600.0
-MOST_DEATHS = 20  # of a batch's processes, each of which a file has killed
-MOST_TOLD = 4  # sorts of faults of a batch
+MOST_DEATHS = 20  # the most processes of a batch that files may kill
+MOST_TOLD = 4  # the most kinds of faults that a batch reports
 
 
 def prepare(room: Path, seed: int) -> None:
-    """The sound files that only runs of the lab leave."""
+    """Make the sound files that only runs of the lab leave, once."""
     if not (room / "sound").exists():
         make_sound(room)
         (room / "sound").touch()
 
 
 def attempt(number: int, seed: int, room: Path) -> Outcome:
-    """One batch: of the kinds in turn, each with other files every time."""
+    """Read one batch; the kinds take turns, and no two batches of a kind have the same files."""
     name = [*KINDS][number % len(KINDS)]
     tries = KINDS[name].tries
     return read_batch(room, name, seed, number // len(KINDS) * tries, tries, str(number))
 
 
 def read_batch(room: Path, name: str, seed: int, first: int, tries: int, folder: str) -> Outcome:
-    """What came of so many damaged files of a kind; a process that a file has killed is followed by another."""
+    """The outcome of `tries` damaged files of a kind; where a file kills the process, another one continues."""
     home = room / folder
     home.mkdir(exist_ok=True)
     counts: Counter[str] = Counter()
@@ -71,7 +71,7 @@ def read_batch(room: Path, name: str, seed: int, first: int, tries: int, folder:
 
 
 def told_of(broke: list[dict[str, str]], tries: int) -> str:
-    """What broke, each sort of fault with how often it came and its first case; empty if nothing did."""
+    """The faults in words, each kind with its number and its first case; "" if there are none."""
     sorts: dict[str, list[dict[str, str]]] = {}
     for fault in broke:
         sorts.setdefault(fault["why"].partition(" (")[2] or fault["why"][:60], []).append(fault)
@@ -82,7 +82,7 @@ def told_of(broke: list[dict[str, str]], tries: int) -> str:
 ROUNDS = -(-FILES // sum(kind.tries for kind in KINDS.values()))
 PART = Part(
     "damaged files of every kind",
-    "read or refused in a line, under 5 s, under 1 GB",
+    "read, or rejected in a line, under 5 s, under 1 GB",
     ROUNDS * len(KINDS),
     prepare,
     attempt,

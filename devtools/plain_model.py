@@ -2,8 +2,8 @@
 
     python -m devtools.plain_model SHOP.json [SECONDS [WORKERS]]
 
-It reads `jobs`, for each operation a table from machine to time; `due`, a time for each job, or none; `travel`, a matrix of
-times whose first place is where jobs and vehicles begin and whose others are the machines, or none; `vehicles`.
+It reads `jobs`, for each operation a table from machine to time; `due`, a time for each job, or null; `travel`, a matrix of
+times between the place where jobs and vehicles begin (first) and the machines, or null; `vehicles`, their number.
 """
 
 import json
@@ -14,7 +14,7 @@ from time import perf_counter
 
 from ortools.sat.python import cp_model
 
-Trip = tuple[cp_model.IntVar, cp_model.IntVar, dict[tuple[int, int], cp_model.IntVar]]  # departs, arrives, by which way
+Trip = tuple[cp_model.IntVar, cp_model.IntVar, dict[tuple[int, int], cp_model.IntVar]]  # departure, arrival, its ways
 
 
 def main() -> None:
@@ -76,7 +76,7 @@ def main() -> None:
 
 
 def _add_vehicles(model: cp_model.CpModel, carried: list[Trip], travel: list[list[int]], vehicles: int) -> None:
-    """Each vehicle goes one route through the trips that it makes, and drives empty between them."""
+    """Let each vehicle make its trips one after another, and drive empty between them."""
     arcs, out = list[tuple[int, int, cp_model.IntVar]](), list[cp_model.IntVar]()
     for number, (depart, arrive, ways) in enumerate(carried, 1):
         none = model.new_bool_var("")

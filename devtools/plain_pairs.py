@@ -3,7 +3,7 @@
     python -m devtools.plain_pairs [--seed 1] [--each 5] [--rounds 3] [--seconds 60] [--out FOLDER]
 
 Shops are drawn: job shops, with due dates, flexible, and with vehicles. The plain program (`plain_model.py`) is one that
-somebody writes in an hour. Both are new processes on the same machine in turn; what each pays before it searches is counted.
+somebody writes in an hour. Both run in turn in new processes on the same machine; the time before their search counts.
 """
 
 import argparse
@@ -27,7 +27,7 @@ SAME = 1e-6
 
 @dataclass(frozen=True)
 class Kind:
-    """What is drawn. operations: of a job; choices: machines an operation at most; vehicles: None, there is no travel."""
+    """A kind of random shop. operations: of each job; choices: the most machines for an operation; vehicles None: no travel."""
 
     name: str
     jobs: int
@@ -55,7 +55,7 @@ KINDS = (
 
 
 def drawn(kind: Kind, seed: int) -> dict[str, Any]:
-    """A shop as `plain_model.py` reads it."""
+    """A random shop as `plain_model.py` reads it."""
     rng = np.random.default_rng([KINDS.index(kind), seed])
     jobs = []
     for _ in range(kind.jobs):
@@ -81,7 +81,7 @@ def drawn(kind: Kind, seed: int) -> dict[str, Any]:
 
 
 def written(shop: dict[str, Any], kind: Kind, folder: Path) -> tuple[list[str], Path]:
-    """The files of a shop: the arguments of `lab sequence`, and the plain program's file."""
+    """The arguments of `lab sequence` for a shop, and the plain program's file; both files are written to `folder`."""
     plain, jobs = folder / "plain.json", shop["jobs"]
     plain.write_text(json.dumps(shop), encoding="utf-8")
     if kind.due:
@@ -127,7 +127,7 @@ def written(shop: dict[str, Any], kind: Kind, folder: Path) -> tuple[list[str], 
 def timed(command: list[str]) -> tuple[float, float, dict[str, Any]]:
     """Wall and processor seconds of a new process, and the last line that it prints, as JSON."""
     before, began = os.times(), time.perf_counter()
-    without = ("PYTHONDONTWRITEBYTECODE",)  # users keep what Python compiled
+    without = ("PYTHONDONTWRITEBYTECODE",)  # users keep the bytecode that Python compiles
     keeps = {name: value for name, value in os.environ.items() if name not in without}
     done = subprocess.run(command, capture_output=True, text=True, check=True, env=keeps)
     wall, after = time.perf_counter() - began, os.times()

@@ -1,8 +1,8 @@
-"""Drawn cells of every kind that a cell file can say: what the lab proves of them against an oracle that shares no code with it.
+"""Part `proofs`: the lab's proofs and plans for random cells against an oracle that shares no code with it.
 
-The oracle and the draw are in `tests/sequencing`. One attempt is one cell: all methods that prove something, and plans of others.
-What a plan breaks, or a plan of the oracle beats, is made smaller as long as it stays so. The smallest cell is written into the
-part's folder, and what it has is the row that counts it.
+The oracle and the random cells are in `tests/sequencing`. An attempt is one cell, with all methods that prove something and
+plans of others. A cell with a wrong proof or plan is made smaller while it stays wrong; the smallest one is written into the
+part's folder, and its features are the row that counts it.
 """
 
 import sys
@@ -22,11 +22,11 @@ COUNT = 1000
 
 
 def prepare(room: Path, seed: int) -> None:
-    """Nothing: each cell is drawn by itself."""
+    """Do nothing: each attempt draws its own cell."""
 
 
 def attempt(number: int, seed: int, room: Path) -> Outcome:
-    """One cell."""
+    """Compare one cell with the oracle."""
     raw = drawn(seed, number)
     try:
         comparison = compared(raw)
@@ -62,7 +62,7 @@ def _said(comparison: Compared, kind: str) -> str:
 
 
 PART = Part(
-    what="drawn cells: proofs, bounds and plans against an oracle",
+    what="random cells: proofs, bounds and plans against an oracle",
     target="no proof is beaten, no rule broken",
     count=COUNT,
     prepare=prepare,

@@ -1,4 +1,4 @@
-"""Outcomes on disk, a line each, and the table they come to."""
+"""Outcomes as lines of a file, and the table that sums them up."""
 
 import json
 from collections.abc import Iterable, Iterator
@@ -11,11 +11,11 @@ from rich.table import Table
 
 from devtools.parts import Outcome, Part
 
-SHOWN = 12  # of what broke, told under the table; all of it is in the files
+SHOWN = 12  # broken attempts that are printed below the table; the files hold all of them
 
 
 def written(file: Path) -> dict[int, Outcome]:
-    """The outcomes in a file, by number; a line that was cut short is not counted."""
+    """The outcomes in a file, by number, without a last line that was cut short."""
     outcomes = {}
     for line in file.read_text(encoding="utf-8").splitlines() if file.exists() else ():
         try:
@@ -28,12 +28,12 @@ def written(file: Path) -> dict[int, Outcome]:
 
 
 def line(number: int, outcome: Outcome) -> str:
-    """An outcome as its line in the file."""
+    """The line of an outcome in the file."""
     return json.dumps({"number": number, **asdict(outcome)}) + "\n"
 
 
 def rows(outcomes: Iterable[Outcome]) -> Iterator[dict[str, Any]]:
-    """A row for each group: tries, how many held, what broke, the most of each figure."""
+    """A row for each group: its tries, the number and the cases of broken attempts, the largest value of each figure."""
     groups: dict[str, list[Outcome]] = {}
     for outcome in outcomes:
         groups.setdefault(outcome.group, []).append(outcome)
@@ -49,7 +49,7 @@ def rows(outcomes: Iterable[Outcome]) -> Iterator[dict[str, Any]]:
 
 
 def show(parts: dict[str, Part], folder: Path, console: Console) -> bool:
-    """Prints and writes (`scoreboard.json`) what the folder's outcomes come to; whether all held."""
+    """Print the table of the folder's outcomes, and write it to `scoreboard.json`; return whether all held."""
     table = Table("part", "what", "tries", "broke", "most")
     document, broken = {}, []
     for name, part in parts.items():

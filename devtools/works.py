@@ -1,4 +1,4 @@
-"""Commands of the lab that write, what they begin from, and what they come to when nobody disturbs them."""
+"""Commands of the lab that write, the home that they begin from, and their results when nothing disturbs them."""
 
 import fnmatch
 import json
@@ -27,8 +27,8 @@ from lab.toolbox.policy import Policy
 from lab.toolbox.policy_file import decode
 from lab.toolbox.registry import Toolbox
 
-STOPPED = "toolbox/sessions/world-1-1"  # the session in the base that was killed
-AGED_S = 3600  # what a killed command left is so old when the next one comes
+STOPPED = "toolbox/sessions/world-1-1"  # the killed session in the base
+AGED_S = 3600  # the age of all files when a command begins
 REPAIR = ("toolbox", "verify", "--repair")
 LONGEST_S = 300.0
 _LEFT = (".*.tmp", ".run-*")
@@ -40,8 +40,8 @@ Files = dict[str, bytes]
 class Work:
     """A command.
 
-    share: of a thousand kills; changes: patterns of files in the base that it may change; session: it keeps one, by which it
-    goes on ("teach" or "run"); left: files that other commands have left before it.
+    share: how many of a thousand kills it gets; changes: patterns of files in the base that it may change; session: the command
+    that resumes its session, "teach" or "run"; left: files that other commands have left before it.
     """
 
     words: tuple[str, ...]
@@ -86,7 +86,7 @@ WORKS: dict[str, Work] = {
 
 @dataclass(frozen=True)
 class Undisturbed:
-    """What a command comes to: its exit code, what is there then (see `state`), its calls by kind, how long it takes."""
+    """The result of an undisturbed command: its exit code, the `state` of its home, its calls by kind, and its time [s]."""
 
     code: int
     state: dict[str, str]
@@ -94,11 +94,11 @@ class Undisturbed:
     seconds: float
 
 
-# ---- what the commands begin from
+# ---- the home that commands begin from
 
 
 def base(room: Path) -> Path:
-    """The home that every command begins in: policies in versions, one removed, an archive, leftovers, a killed session."""
+    """The home that every command begins in: policies with versions, a removed one, an archive and a killed session."""
     home = room / "base"
     if home.exists():
         return home
@@ -120,7 +120,7 @@ def base(room: Path) -> Path:
 
 
 def policy(name: str, value: float) -> Policy:
-    """A small solved policy."""
+    """A small policy of a solved problem."""
     q = np.full((4, 2), value)
     return Policy(
         name, "world", "drawn", q, np.ones((4, 2), np.int64), ("left", "right"), (4,), 0, "0123456789abcdef", {"learner": "q"},
@@ -130,12 +130,12 @@ def policy(name: str, value: float) -> Policy:
 
 
 def own_folder(room: Path, name: str) -> Path:
-    """A new empty folder that no other worker has: several may measure the same command at the same time."""
+    """A new empty folder for this worker alone, as several may measure the same command at the same time."""
     return Path(mkdtemp(prefix=f"{name}-", dir=room))
 
 
 def fresh(folder: Path, room: Path, work: Work) -> Path:
-    """The home in a folder, made anew, that a command begins from."""
+    """The home in a folder that is made anew for a command, a copy of the base."""
     home = folder / "home"
     shutil.rmtree(folder, ignore_errors=True)
     shutil.copytree(base(room), home, symlinks=True)
@@ -146,7 +146,7 @@ def fresh(folder: Path, room: Path, work: Work) -> Path:
 
 
 def by_itself(words: tuple[str, ...], home: Path, env: Mapping[str, str], timeout_s: float) -> Ended:
-    """A command as a process of its own."""
+    """The end of a command in a process of its own."""
     return lab(*words, cwd=home, env=env, timeout_s=timeout_s)
 
 
@@ -162,28 +162,28 @@ def disturbed(
     timeout_s: float = LONGEST_S,
     carried_out: CarriedOut = by_itself,
 ) -> Ended:
-    """A command in a home, under the shim; what it writes is counted in `counts` beside the home."""
+    """The end of a command in a home, under the shim, which counts calls in a file beside the home."""
     said = shimmed(library, home, home.parent / f"{home.name}-counts", strike)
     return carried_out(words, home, environment_in(home, caches) | said, timeout_s)
 
 
 def environment_in(home: Path, caches: Path) -> dict[str, str]:
-    """The environment of a command in a home; what can be had again, such as what is compiled, is kept elsewhere."""
+    """The environment of a command in a home; caches, such as compiled code, are kept in `caches`."""
     return environment(home, MPLCONFIGDIR=str(caches / "matplotlib"), XDG_CACHE_HOME=str(caches / "cache"))
 
 
 def age(home: Path) -> None:
-    """Makes everything in a home look an hour old."""
+    """Make everything in a home look an hour old."""
     then = time.time() - AGED_S
     for path in (home, *home.rglob("*")):
         os.utime(path, (then, then), follow_symlinks=False)
 
 
-# ---- what they come to
+# ---- results
 
 
 def undisturbed(name: str, room: Path) -> Undisturbed:
-    """What a command comes to by itself, measured once; of its files those that come out the same each time."""
+    """The result of an undisturbed command, measured once; its state has what two runs have in common."""
     file = room / f"{re.sub('[^a-z0-9]+', '-', name)}.json"
     if not file.exists():
         states, code, calls, took_s = list[dict[str, str]](), 0, dict[str, int](), 0.0
@@ -204,7 +204,7 @@ def undisturbed(name: str, room: Path) -> Undisturbed:
 
 
 def state(home: Path) -> dict[str, str]:
-    """What is in a home, by a name that is the same in any home and whatever the time."""
+    """The number of each file in a home, by a name that depends neither on the home nor on the time."""
     counts: Counter[str] = Counter()
     for path in sorted(home.rglob("*")):
         inside = path.relative_to(home).as_posix()
@@ -231,7 +231,7 @@ def state(home: Path) -> dict[str, str]:
 
 
 def _fingerprint(held: Policy) -> str:
-    """A policy without the time at which it was made."""
+    """A hash of a policy without its time of creation."""
     facts = asdict(replace(held, created="", parent=held.parent.rpartition("@")[0]))
     tables = b"".join(np.ascontiguousarray(facts.pop(name)).tobytes() for name in ("q", "visits", "ends"))
     return _digest(tables + json.dumps(facts, sort_keys=True).encode())
@@ -254,14 +254,14 @@ def _digest(content: bytes) -> str:
 
 
 def reached(expected: Undisturbed, home: Path) -> str:
-    """What an undisturbed command leaves and is not there; "" where nothing is missing."""
+    """What an undisturbed command leaves and is missing in a home; "" if nothing is."""
     there = state(home)
     missing = [what for what in expected.state if what not in there]
     return f"not as undisturbed: {len(missing)} missing: {missing[0]}" if missing else ""
 
 
 def next_words(name: str, expected: Undisturbed, home: Path) -> tuple[str, ...]:
-    """What a person types after a command was killed: nothing more to do but repair, go on with it, or the same again."""
+    """The command that a person types after a kill: a repair if all was done, --resume, or the same again."""
     work = WORKS[name]
     if not reached(expected, home):
         return REPAIR
@@ -289,7 +289,7 @@ def _sessions(work: Work, home: Path) -> list[Path]:
     return sorted(set(home.glob("toolbox/sessions/*")) - {home / STOPPED})
 
 
-# ---- what may not have happened
+# ---- losses
 
 
 def kept_before(room: Path) -> Files:
@@ -299,7 +299,7 @@ def kept_before(room: Path) -> Files:
 
 
 def lost(before: Files, home: Path, changes: tuple[str, ...]) -> str:
-    """What was in the base and is not any more as it was; a log may have grown. "" if nothing."""
+    """The first file of the base that is missing or changed, apart from `changes` and logs that grew; "" if none is."""
     for name, content in before.items():
         if any(fnmatch.fnmatch(name, pattern) for pattern in changes):
             continue
@@ -313,13 +313,13 @@ def lost(before: Files, home: Path, changes: tuple[str, ...]) -> str:
 
 
 def unsound(home: Path) -> str:
-    """What `toolbox verify` finds; "" if all is sound."""
+    """The first fault that `toolbox verify` finds; "" if all is sound."""
     wrong = [reason for _, ok, reason in Toolbox(home / "toolbox").verify() if not ok]
     return f"toolbox verify: {wrong[0]}" if wrong else ""
 
 
 def leftovers(home: Path) -> str:
-    """What commands should have taken away: drafts, and folders of sessions without a session; "" for nothing."""
+    """The first draft, or session folder without a session, that commands should have removed; "" if there is none."""
     remains = [path for pattern in _LEFT for path in home.rglob(pattern)]
     remains += [folder for folder in home.glob("toolbox/sessions/*") if not _is_session(folder)]
     return f"left over: {remains[0].relative_to(home)}" if remains else ""
