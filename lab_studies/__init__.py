@@ -1,4 +1,4 @@
-"""What was measured with the lab: the thesis's tables and figures again (`thesis`), and comparisons of our own (`comparisons`).
+"""Studies made with the lab: the thesis's tables and figures measured again (`thesis`), and our own `comparisons`.
 
 The lab never imports this package. It comes in as any plug-in does, by the entry point "teaching_lab.studies", and is the
 largest example of how to build on the lab. A study is a function of a job and a reading (changes to all settings) that

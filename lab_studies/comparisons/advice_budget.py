@@ -28,38 +28,41 @@ CCRL = ("ccrl",)
 ASKING = tuple(
     gate for gate, known in GATES.items() if gate != "never" and not (known.compiled and known.compiled.weighs)
 )
-AGAINST = {False: "alone", True: "alone, with memory"}
+AGAINST = {False: "alone", True: "alone, with memory"}  # learning without advice, by memory
 TARGETS = {"expert": (99.0, 24.0), "moderate": (98.0, 60.0), "limited": (85.0, 150.0), "novice": (63.0, 10.0)}
-MOST_BELOW = -2.0  # points of success that an advisor may cost against learning alone: the target
+MOST_BELOW = -2.0  # the target: points of success that an advisor may cost compared with learning alone
 
 MEASURES = (
-    "SP: sessions whose last episode took the shortest way. HS: helped steps, those that were asked for and followed; what is "
-    "done again from memory is none. AR: episodes in which advice was asked for. Each gate is at its defaults (those of "
-    "the world's file), not at the best of the thesis's grid. Wrong: takes the worst action for the best. World 'random': "
-    f"{len(RANDOM_WORLDS)} random worlds, {RANDOM_WORLDS[0]} and on, which share the sessions; there a limited view is the "
-    "middle half of each axis. Without memory only full view in worlds I and II is measured, and nobody everywhere."
+    "SP: sessions whose last episode took the shortest path. HS: helped steps, in which advice was asked for and followed; "
+    "steps repeated from memory do not count. AR: episodes in which advice was asked for. Each gate has its default settings "
+    "(those of the world's file), not the best of the thesis's grid. Wrong: an advisor that takes the worst action for the "
+    f"best. World 'random': {len(RANDOM_WORLDS)} random worlds from {RANDOM_WORLDS[0]} on, which share the sessions; there a "
+    "limited view is the middle half of each axis. Without memory, advice is measured with full view in worlds I and II only, "
+    "and learning alone everywhere."
 )
 LAST = (
-    "With memory nobody is asked in the last 15 % of the episodes, the last one's way is what counts, and there the learner "
-    "takes the moves that its table rates best. Without it chance still has a say in the last episode, in world II in every "
-    "fifth or so; CCRL and the combined method do not ask there either, but the other gates may: part of their success, or "
-    "failure, is the advisor's own walk."
+    "With memory nobody is asked in the last 15 % of the episodes, and in the last one, whose path counts, the learner takes "
+    "the moves of the highest value. Without memory its choice is still random in the last episode, in world II in about every "
+    "fifth; CCRL and the combined method do not ask there either, but other gates may, so that part of their success or "
+    "failure is the advisor's."
 )
 OWN_MEMORY = (
-    "Mind the rows 'nobody, memory': a learner that nobody advises remembers all of its own moves, and practises the "
-    "shortest way through them before the end. Much of what weak and wrong advisors seem to give with memory is the "
-    "learner's own: they are to be held against these rows, and only what lies above them is the advisor's. Memory changes "
-    "the learner, not only the gate."
+    "Mind the rows 'nobody, memory': a learner without advice remembers all of its own moves, and practises the shortest path "
+    "through them before the end. Much of what weak and wrong advisors seem to give with memory is the learner's own; compare "
+    "them with these rows, as only what lies above them is the advisor's. Memory changes the learner, not only the gate."
 )
 WORST = (
-    "worst_below_alone: the lowest success with memory over all advisors, with CCRL or with any gate, less that of learning "
+    "worst_below_alone: the lowest success with memory over all advisors, with CCRL or with any gate, minus that of learning "
     "alone, without and with memory, with Newcombe's 95 % interval. The lowest of many is below its true value on average. "
-    "Targets: those of the project, not the thesis's."
+    "Targets are the project's, not the thesis's."
 )
 
 
 def advice_budget(job: Job, reading: Mapping[str, Any]) -> Findings:
-    """Every gate, advisor and world, with and without memory; advisors know the exact values unless read otherwise."""
+    """The results of every gate, advisor and world, with and without memory; the reading changes all settings.
+
+    Advisors know the exact values unless the reading says otherwise.
+    """
     cells = {cell: tuple(replace(setting, **reading) for setting in group) for cell, group in settings().items()}
     outcomes = _outcomes(job, cells)
     table = next(iter(cells.values()))[0].advisor_table
@@ -88,7 +91,7 @@ def advice_budget(job: Job, reading: Mapping[str, Any]) -> Findings:
 
 
 class Asked(NamedTuple):
-    """A cell of the study: gate, advisor, view of the advisor (full for nobody), and memory."""
+    """A cell of the study: world, view of the advisor (full for nobody), gate, advisor and memory."""
 
     world: str
     view: Literal["full", "limited"]
@@ -127,7 +130,7 @@ def _outcomes(job: Job, cells: Mapping[Asked, tuple[AdviceSetting, ...]]) -> dic
 
 
 def _joined(group: tuple[AdviceSetting, ...], sessions: int, seed: int) -> AdviceOutcome:
-    """So many sessions of each setting, as one outcome."""
+    """The outcome of `sessions` sessions of each setting, joined."""
     parts = [sessions_of(setting, sessions, seed) for setting in group]
     return AdviceOutcome(
         *(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(AdviceOutcome))
@@ -135,7 +138,7 @@ def _joined(group: tuple[AdviceSetting, ...], sessions: int, seed: int) -> Advic
 
 
 def rows_of(cell: Asked, outcome: AdviceOutcome, table: str) -> list[Row]:
-    """The measures of one cell; where the project has a target it stands beside them."""
+    """The measures of one cell, with the project's target if there is one."""
     named: Row = {
         "world": cell.world,
         "view": cell.view,
@@ -157,7 +160,7 @@ def rows_of(cell: Asked, outcome: AdviceOutcome, table: str) -> list[Row]:
 
 
 def difference(outcome: AdviceOutcome, other: AdviceOutcome) -> tuple[float, float, float]:
-    """The difference of two settings' success rates with the low and the high end of its interval, in percentage points.
+    """The difference of two settings' success rates, and the low and the high end of its interval, in percentage points.
 
     Source: R. G. Newcombe, Statistics in Medicine 17 (1998), 873-890, method 10.
     """
@@ -169,7 +172,7 @@ def difference(outcome: AdviceOutcome, other: AdviceOutcome) -> tuple[float, flo
 def worst(
     outcomes: Mapping[Asked, AdviceOutcome], place: str, view: Literal["full", "limited"], gates: Sequence[str] = CCRL
 ) -> list[Row]:
-    """The advisor (and gate) with whom sessions with memory succeed least, against nobody, without and with memory."""
+    """Rows of the advisor and gate with the least success with memory, compared with nobody without and with memory."""
     cells = [Asked(place, view, gate, name, True) for gate in gates for name in ADVISORS]
     lowest = min(cells, key=lambda cell: float(outcomes[cell].success.mean()))
     rows = []
@@ -185,7 +188,7 @@ def worst(
 
 
 def in_short(rows: Sequence[Row], below: Sequence[Row]) -> Row:
-    """The targets beside what was measured, nobody, the worst advisor against nobody, what memory saves."""
+    """The targets and what was measured, success alone, the worst advisor against that, and what memory saves."""
     of = ("world", "view", "gate", "advisor", "memory", "measure")
     value = {tuple(result[name] for name in of): result["value"] for result in rows}
 
@@ -237,8 +240,8 @@ def _worst_in_short(below: Sequence[Row]) -> Row:
 
 
 def verdict(lowest: Row) -> str:
-    """Whether the worst advisor keeps to the target, as far as the interval says."""
+    """Whether the worst advisor meets the target, as far as the interval says."""
     low, high = lowest["ci95"]
     if low >= MOST_BELOW:
         return "met, with its interval"
-    return "missed" if high < MOST_BELOW else "open: the interval holds it"
+    return "missed" if high < MOST_BELOW else "open: the interval contains it"

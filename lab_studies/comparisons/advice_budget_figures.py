@@ -1,4 +1,4 @@
-"""Pictures of what advice costs: success against helped steps, a panel a world."""
+"""Pictures of the cost of advice: success against helped steps, a panel for each world."""
 
 from collections.abc import Mapping, Sequence
 from itertools import cycle
@@ -23,7 +23,7 @@ Point = tuple[str, str, bool, float, float]  # gate, advisor, memory, helped ste
 
 
 def of_gates(rows: Sequence[Row]) -> bytes:
-    """Every gate and advisor: hollow without memory, filled with it; lines across: nobody to ask."""
+    """A picture of every gate and advisor: hollow marks without memory, filled ones with it; horizontal lines: nobody."""
 
     def draw(axes: "Axes", place: str, points: Sequence[Point]) -> None:
         for gate, name, memory, helped, success in points:
@@ -39,7 +39,7 @@ def of_gates(rows: Sequence[Row]) -> bytes:
 
 
 def of_ccrl(rows: Sequence[Row], targets: Mapping[str, tuple[float, float]]) -> bytes:
-    """CCRL alone: an arrow for each advisor from without memory to with it; stars: the project's targets in world I."""
+    """A picture of CCRL: an arrow for each advisor from no memory to memory; stars: the project's targets in world I."""
 
     def draw(axes: "Axes", place: str, points: Sequence[Point]) -> None:
         at = {(name, memory): (hs, sp) for gate, name, memory, hs, sp in points}
@@ -64,7 +64,7 @@ def of_ccrl(rows: Sequence[Row], targets: Mapping[str, tuple[float, float]]) -> 
 
 
 def _panels(rows: Sequence[Row], draw: Any, keys: Sequence[Any]) -> bytes:
-    """A panel for each world, with a line across for nobody, without and with memory."""
+    """A picture with a panel for each world, and in it horizontal lines for nobody, without and with memory."""
     by_world = {place: _points(those(rows, world=place)) for place in ("world-1", "world-2")}
 
     def whole(figure: "Figure") -> None:

@@ -31,19 +31,18 @@ TASK, TOASTS, SCENE_SEED = "toast", 3, 0
 NOBODY = "none"
 ADVISORS = (NOBODY, *SKILL_TAUS, "wrong")
 COLOURS = dict(zip(ADVISORS, (INK, BLUE, GREEN, SKY, ORANGE, RED), strict=True))
-MOST = 40  # lessons a skill and advisor
-LOOKED = 10  # with several starts, whose ways take longer to look at, the table is looked at in every tenth episode
+MOST = 40  # the most lessons for a skill and an advisor
+LOOKED = 10  # with several starts, whose paths take longer to check, the table is checked every tenth episode
 
 MEASURES = (
-    "A lesson is what lab run gives: sessions one after the other, with the task file's learner and gate. It is solved when the "
-    "greedy way from every start is a shortest one. Episodes and moves: those of the learner until then, walks with advice "
-    f"counted (looked at after each episode, after every {LOOKED}th where episodes begin in several places). Helped: advised "
-    "steps until then. Saved: by how much fewer moves it takes than with nobody, of the means, with the interval of the "
-    "difference (Welch)."
+    "A lesson is that of lab run: sessions one after the other, with the task file's learner and gate. It is solved when the "
+    "greedy path from every start is a shortest one. Episodes and moves: the learner's until then, advised ones included "
+    f"(checked after each episode, after every {LOOKED}th where episodes begin in several places). Helped: advised steps until "
+    "then. Saved: how many fewer moves it takes than without advice, by the means, with the interval of the difference (Welch)."
 )
 SCENE = (
-    f"Task {TASK}, {TOASTS} toasts, the scene of seed {SCENE_SEED}; at most {MOST} lessons a skill and advisor. A simulated "
-    "advisor knows the optimal values, which nobody does in a kitchen; wrong: takes the worst action for the best."
+    f"Task {TASK}, {TOASTS} toasts, the scene of seed {SCENE_SEED}; at most {MOST} lessons for a skill and an advisor. A "
+    "simulated advisor knows the optimal values, which nobody does in a kitchen; 'wrong' takes the worst action for the best."
 )
 
 
@@ -57,7 +56,7 @@ class Pupil:
 
 @dataclass(frozen=True, eq=False)
 class Cost:
-    """The cost of N lessons until they were solved, (N,) each; a lesson that was never solved counts with its whole cost."""
+    """The cost of N lessons until they were solved, (N,) each; an unsolved lesson counts with its whole cost."""
 
     solved: NDArray[np.bool_]
     episodes: NDArray[np.int64]
@@ -67,7 +66,7 @@ class Cost:
 
 @dataclass
 class Watch:
-    """Listens to a lesson until its table is as good as can be."""
+    """A listener that counts the cost of a lesson until its greedy paths are shortest."""
 
     mdp: TabularMDP
     fewest: FloatArray
@@ -78,11 +77,11 @@ class Watch:
 
     @classmethod
     def over(cls, mdp: TabularMDP) -> "Watch":
-        """Of a problem, from every place in which an episode may begin."""
+        """A watch on lessons of a problem, from every state in which an episode may begin."""
         return cls(mdp, fewest_moves(mdp))
 
     def hear(self, event: Event) -> None:
-        """Counts an episode, and looks at what was learned by it."""
+        """Count an episode, and check the table after it."""
         if isinstance(event, SessionBegan):
             self.session, self.before = event.session, self.moves
         if self.solved or not isinstance(event, LessonEvent) or not isinstance(event.event, EpisodeEnded):
@@ -97,7 +96,7 @@ class Watch:
 
 
 def advice_worth(job: Job, reading: Mapping[str, Any]) -> Findings:
-    """Every skill of the toast task with every advisor, and nobody."""
+    """The results of every skill of the toast task with every advisor and nobody; the reading has no effect."""
     skills = list(scene().problems)
     pupils = [Pupil(skill, advisor) for skill in skills for advisor in ADVISORS]
     costs_by_pupil = job.each(partial(taught, lessons=min(job.sessions, MOST), seed=job.seed), pupils)
@@ -145,7 +144,7 @@ def joined(costs: Sequence[Cost]) -> Cost:
 
 
 def rows_of(skill: str, advisor: str, costs_by_pupil: Mapping[Pupil, Cost]) -> list[Row]:
-    """The measures of a skill and an advisor, and what it saves over nobody."""
+    """The measures of a skill and an advisor, and what the advisor saves compared with nobody."""
     of, alone = costs_by_pupil[Pupil(skill, advisor)], costs_by_pupil[Pupil(skill, NOBODY)]
     named: Row = {
         "skill": skill,

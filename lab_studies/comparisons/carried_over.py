@@ -25,18 +25,18 @@ from lab_studies.comparisons.carried_over_learning import CarriedLearning, learn
 ALL = "all families"
 CARRIED = "carried over"
 SETTINGS = CarriedLearning()
-TIME_LIMIT_S = 20.0  # of CP-SAT, for each of the larger cells that A* does not take
-REPEATS = 20  # of each run whose time is measured
+TIME_LIMIT_S = 20.0  # CP-SAT's, for each larger cell that A* does not take
+REPEATS = 20  # of each run that is timed
 ABOUT = (
-    "Policies are linear: {features} features of a decision, learned by CMA-ES from the costs of greedy runs alone, on {cells} "
-    "drawn small cells of a family ({generations} generations). They are tried on larger cells, none of which was "
-    "learned on. No search: one decision after the other, the one of highest value. The best rule is the one with the "
-    "lowest mean gap in the very cells of a row's group."
+    "Policies are linear: {features} features of a decision, with weights learned by CMA-ES from the costs of greedy runs "
+    "alone, on {cells} random small cells of a family ({generations} generations). They are tested on larger cells, of which "
+    "none was learned on. Nothing is searched: each decision is the one of the highest value. The best rule is the one with "
+    "the lowest mean gap in the cells of a row's group themselves."
 )
 GAPS = (
     "Gap: above the printed value (Bilge and Ulusoy), else above what is proven: the optimum by A*, or the bound of CP-SAT "
-    "after {limit:g} s. 'proven': how many of the references are optima, or printed as such. A run that gets stuck counts as "
-    "ten times the longest. Speeds: one core, CPU time, features and moves together, making the tables of a cell left out."
+    "after {limit:g} s. 'proven': how many references are optima, or printed as such. A run that ends in a deadlock costs ten "
+    "times the longest. Speeds: CPU time on one core, features and moves together, without the tables of a cell."
 )
 POLICIES = "The policies stand beside this report (policy-....json): lab sequence CELL --method carried --policy FILE uses one."
 
@@ -58,7 +58,7 @@ class Surveyed:
 
 
 def carried_over(job: Job, reading: Mapping[str, Any]) -> Findings:
-    """Policies of each family and of all of them, on as many small cells as there are sessions; the reading changes nothing."""
+    """The results of policies of each family and of all, learned on `job.sessions` small cells; the reading has no effect."""
     families = [*SMALL, ALL]
     learned = _kept(job, "learned", families, partial(_learned, sessions=job.sessions, seed=job.seed), _policy_of)
     cells = unseen()
@@ -77,7 +77,7 @@ def carried_over(job: Job, reading: Mapping[str, Any]) -> Findings:
 
 
 def _kept(job: Job, kind: str, items: Sequence[Any], work: Any, read: Any) -> dict[Any, Any]:
-    """The result of `work`, a module's function, for each item; results in the folder are read, new ones are kept there."""
+    """The result of `work`, a module's function, for each item; the job's folder keeps the results."""
     names = {_key(job, kind, item): item for item in items}
     done = job.kept_as(lambda entry: (names[entry["key"]], read(entry["found"])) if entry["key"] in names else None)
     left = [item for item in items if item not in done]
@@ -94,7 +94,7 @@ def _key(job: Job, kind: str, item: Any) -> str:
 
 
 def _learned(family: str, sessions: int, seed: int) -> dict[str, Any]:
-    """The weights of a family's policy, as the folder keeps them."""
+    """The learned policy of a family, as the folder keeps it."""
     said = f"{sessions} small cells: {family}; lab study run carried-over --sessions {sessions} --seed {seed}"
     policy = learn_policy(small_cells(family, sessions, seed), MAKESPAN, SETTINGS, seed, said)
     return {"weights": dict(policy.weights), "learned_on": said}
@@ -123,7 +123,7 @@ def surveyed(larger: Unseen) -> dict[str, Any]:
 def rows_of(
     family: str, group: str, surveys: Mapping[Unseen, Surveyed], learned: Mapping[str, CarriedPolicy]
 ) -> list[Row]:
-    """The rows of a group: every rule, and every policy, that of the group's own family first."""
+    """The rows of a group: every rule, then every policy, that of the group's family first."""
     proven = sum(survey.proven for survey in surveys.values())
     named: Row = {"table": f"{family}: {group}", "cells": len(surveys), "proven": proven}
     gaps = {
@@ -147,7 +147,7 @@ def rows_of(
 
 
 def decisions_per_s(deciders: Iterable[Decider], policy: CarriedPolicy) -> float:
-    """The decisions per second of one core that a policy takes in runs of these cells."""
+    """The decisions per second that a policy takes on one core in runs of these cells."""
     made, began = 0, time.process_time()
     for decider in deciders:
         for _ in range(REPEATS):

@@ -12,17 +12,17 @@ from lab.tasks.task_file import load_cell
 from lab_studies.comparisons.transport_instances import board, cell_of
 from lab_studies.thesis.chapter_7_cells import robot_cell
 
-PRINTED = "Bilge and Ulusoy, two robots"  # of the board's families
+PRINTED = "Bilge and Ulusoy, two robots"  # a family of the board
 CASES = ("I", "II", "III")
 SHOP, TOAST, FMS = "job shops with two vehicles", "toast cells", "manufacturing cells"
-JOBS, TOASTS, PARTS = (3, 5), (3, 8), (3, 8)  # of the small ones, least and most
+JOBS, TOASTS, PARTS = (3, 5), (3, 8), (3, 8)  # the least and the most in small cells
 
 
 @dataclass(frozen=True)
 class Unseen:
-    """A larger cell: its family, the group that it is reported with, its number there.
+    """A larger cell: its family, the group that it is reported in, and its number there.
 
-    printed: the best value that others print; None: it has to be found.
+    printed: the best published value; None: it has to be computed.
     """
 
     family: str
@@ -32,7 +32,7 @@ class Unseen:
 
 
 def shop(rng: np.random.Generator, least: int, most: int) -> Cell:
-    """A drawn job shop in the manner of Bilge and Ulusoy: four machines, two vehicles, ways one way longer than the other."""
+    """A random job shop like Bilge and Ulusoy's: four machines, two vehicles, travel times that depend on the direction."""
     machines, jobs = 4, int(rng.integers(least, most + 1))
     at = rng.uniform(0.0, 1.0, (machines + 1, 2))
     ways = np.abs(at[:, None] - at[None]).sum(axis=-1) * rng.uniform(0.7, 1.3, (machines + 1, machines + 1))
@@ -50,7 +50,7 @@ def shop(rng: np.random.Generator, least: int, most: int) -> Cell:
 
 
 def toasts(rng: np.random.Generator, least: int, most: int) -> Cell:
-    """A case of the thesis's toast cell with other times: each machine up to twice as slow or fast, all moves a little."""
+    """A random case of the thesis's toast cell: each machine up to twice as slow or fast, all moves a little slower or faster."""
     cell = robot_cell(CASES[rng.integers(len(CASES))], int(rng.integers(least, most + 1)))
     factor = rng.uniform(0.7, 1.4)
     return replace(
@@ -64,7 +64,7 @@ def toasts(rng: np.random.Generator, least: int, most: int) -> Cell:
 
 
 def manufactured(rng: np.random.Generator, least: int, most: int) -> Cell:
-    """The manufacturing cell of App. III with a drawn order, other processing times, and parts that come sooner or later."""
+    """The manufacturing cell of App. III with a random order, random processing times and another interval of arrivals."""
     cell = _fms(rng, int(rng.integers(least, most + 1)))
     factors = dict(zip(("rook", "sign"), rng.uniform(0.6, 1.5, 2), strict=True))
     products = tuple(
@@ -83,7 +83,7 @@ def manufactured(rng: np.random.Generator, least: int, most: int) -> Cell:
 
 def _fms(rng: np.random.Generator, parts: int) -> Cell:
     order = tuple(str(name) for name in rng.choice(["rook", "sign"], parts))
-    return replace(load_cell("fms").cell(order), due_s=None)  # the makespan alone is asked for
+    return replace(load_cell("fms").cell(order), due_s=None)  # only the makespan counts
 
 
 def _slower(stage: Stage, factor: float) -> Stage:
@@ -104,7 +104,7 @@ THESIS_TOASTS, DRAWN_TOASTS, ORDERS = (
 
 
 def unseen() -> tuple[Unseen, ...]:
-    """The larger cells, the same ones whatever the study's seed."""
+    """The larger cells, which do not depend on the study's seed."""
     printed = [instance.printed for instance in board() if instance.family == PRINTED]
     return (
         *(Unseen(SHOP, BILGE_ULUSOY, number, value) for number, value in enumerate(printed)),
@@ -117,7 +117,7 @@ def unseen() -> tuple[Unseen, ...]:
 
 @lru_cache(maxsize=256)
 def unseen_cell(cell: Unseen) -> Cell:
-    """The cell."""
+    """The cell that is meant, the same every time."""
     rng = np.random.default_rng([2026, [*GROUPS].index(cell.group), cell.number])
     return GROUPS[cell.group](cell.number, rng)
 
@@ -132,7 +132,7 @@ GROUPS: Mapping[str, Callable[[int, np.random.Generator], Cell]] = {
 
 
 def small_cells(family: str, count: int, seed: int) -> list[Cell]:
-    """`count` drawn small cells of a family; for an unknown family, of all families in turn."""
+    """`count` random small cells of a family; for an unknown family, of all families in turn."""
     drawn = [SMALL[family]] if family in SMALL else [*SMALL.values()]
     rng = np.random.default_rng([seed, 2, [*SMALL].index(family) if family in SMALL else len(SMALL)])
     return [drawn[number % len(drawn)](rng) for number in range(count)]

@@ -14,16 +14,16 @@ from lab.skills.prepared_scene import Prepared, prepare
 from lab.tasks.task import Order, Task
 from lab.tasks.task_fields import Obstacle
 
-NEAREST_M, FARTHEST_M = 0.01, 0.10  # how far a thing is moved
-TURN_RAD = 0.15  # how far every other station that is moved is turned, too
-HIGHEST = 7  # cubes of a stack that is added
-SEEN = 3  # cubes of each stack in the camera's grid, which must be equally high
-MAX_DRAWS = 50  # of a scene that cannot be surveyed
+NEAREST_M, FARTHEST_M = 0.01, 0.10  # the least and the largest distance that a body is moved
+TURN_RAD = 0.15  # the largest turn of a moved station; every second one is turned
+HIGHEST = 7  # the most cubes of an added stack
+SEEN = 3  # the cubes of each stack in the camera's grid, where all stacks must have one height
+MAX_DRAWS = 50  # the most draws for a scene that can be surveyed
 
 
 @dataclass(frozen=True)
 class Scene:
-    """One changed scene: its kind, its number among those of the kind, and the study's seed."""
+    """One changed scene: its kind of change, its number within the kind, and the study's seed."""
 
     kind: str
     number: int
@@ -32,7 +32,7 @@ class Scene:
 
 @dataclass(frozen=True)
 class Changed:
-    """What was drawn: the task, the seed that lays it out, and the change in words."""
+    """A changed task, the seed that lays it out, and the change in words."""
 
     task: Task
     seed: int
@@ -40,15 +40,15 @@ class Changed:
 
 
 def still(task: Task, layout: Layout) -> Task:
-    """The task with its obstacles where they were laid out, whatever else is drawn."""
+    """The task with its obstacles fixed where they were laid out."""
     stand = zip(task.obstacles, layout.obstacles, strict=True)
     return _with(task, obstacles=tuple(o.model_copy(update={"position_m": p, "area": (0.0, 0.0)}) for o, p in stand))
 
 
 def surveyed(scene: Scene, task: Task, layout: Layout, seed: int, order: Order) -> tuple[Prepared, str, int]:
-    """A changed scene, surveyed; the change in words; how many draws before it could not be surveyed.
+    """The survey of a changed scene, the change in words, and the number of earlier draws that could not be surveyed.
 
-    task, layout, seed: those of the scene that is changed. BadInput when no draw can be surveyed.
+    task, layout, seed: those of the scene that is changed. Raises BadInput if no draw can be surveyed.
     """
     rng = np.random.default_rng([scene.seed, crc32(scene.kind.encode()), scene.number])
     for refused in range(MAX_DRAWS):
@@ -71,7 +71,7 @@ def _seen(task: Task, place: tuple[float, float]) -> bool:
 
 
 def _shift(rng: np.random.Generator) -> tuple[float, float, float]:
-    """A way in the plane and its length [m]."""
+    """A random shift in the plane: x, y and its length [m]."""
     far, angle = rng.uniform(NEAREST_M, FARTHEST_M), rng.uniform(0, 2 * pi)
     return far * cos(angle), far * sin(angle), far
 

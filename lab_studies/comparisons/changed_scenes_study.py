@@ -21,21 +21,21 @@ TASK, TOASTS = "toast", 3
 WAYS = ("the same", "used", "adapted", "refused", "learned")  # what becomes of a skill in a changed scene
 
 ABOUT = (
-    f"{{}} changed scenes of the task '{TASK}', as many of each kind; seed 0 is what the skills were learned in, all with the "
-    "advisor 'expert'. In each scene all skills are found, adapted or learned, and for comparison all are learned from nothing. "
-    "A problem that several skills share counts once. {} scenes could not be surveyed (something overlaps, or nothing leads "
-    "to it) and were drawn again."
+    f"{{}} changed scenes of the task '{TASK}', equally many of each kind; the skills were learned in the scene of seed 0, all "
+    "with the advisor 'expert'. In each scene all skills are reused, fine-tuned or learned, and for comparison all are learned "
+    "from scratch. A problem that several skills share counts once. {} scenes could not be surveyed (bodies overlap, or no path "
+    "leads to one) and were drawn again."
 )
 COLUMNS = (
-    "The same: exactly the problem that it was learned in. Used: another problem, in which its ways are free and as short as "
-    "any. Adapted: learned on from it. Refused: learned from nothing, though there was a policy with its states and moves. "
-    "Learned: there was none. saved_percent: of the episodes that learning from nothing took for the same skills."
+    "The same: exactly the problem that the policy was learned in. Used: another problem, in which its paths are free and "
+    "shortest. Adapted: fine-tuned from it. Refused: learned from scratch, though there was a policy with the same states and "
+    "moves. Learned: there was none. saved_percent: of the episodes that learning from scratch took for the same skills."
 )
 CHECKS = (
-    "Checks, none of which the verdict has seen: accepted_failing: policies used as they are that miss the goal from a start "
-    "step by step, or that fail when they are carried out in physics (all are, grasps before they are used, too); "
-    "refused_working: skills whose policies were refused although one of the toolbox leads from all starts to the goal; "
-    "longer: skills whose way is longer than the one learned from nothing; success: skills that reach their goals."
+    "Checks that play no part in the verdict: accepted_failing: policies used as they are that miss the goal from a start "
+    "step by step, or fail when they are carried out in physics (all are; grasps also before they are used); "
+    "refused_working: skills whose policies were rejected although one of the toolbox leads from all starts to the goal; "
+    "longer: skills whose path is longer than the one learned from scratch; success: skills that reach their goals."
 )
 
 
@@ -43,7 +43,7 @@ CHECKS = (
 class Tally:
     """The results of a scene's skills with the same source; wall_s: time [s] for finding or learning them.
 
-    anew: episodes and helped steps from nothing.
+    anew: episodes and helped steps from scratch.
     """
 
     skills: int
@@ -55,9 +55,9 @@ class Tally:
 
 @dataclass(frozen=True)
 class Outcome:
-    """The results of one changed scene, by `WAYS`; the counts of skills are those of the checks.
+    """The results of one changed scene, by `WAYS`, and the numbers of skills by check (see CHECKS).
 
-    unsolved: skills without a way to the goal, found or learned here, and learned from nothing.
+    unsolved: skills without a path to the goal, as found or learned here, and as learned from scratch.
     """
 
     words: str
@@ -159,12 +159,12 @@ def _any_works(known: Known, problem: Problem) -> bool:
 
 
 def _moves(problem: Problem, policy: Policy) -> int:
-    """Moves of the greedy way from the problem's start."""
+    """The moves of the greedy path from the problem's start."""
     return len(greedy_path(policy.q, problem.mdp, problem.mdp.n_states)[1])
 
 
 def rows_of(kind: str | None, outcomes: Sequence[Outcome]) -> list[Row]:
-    """The measures of the scenes of one kind, None: of all."""
+    """The measures of the scenes of one kind; None: of all kinds."""
     if not outcomes:
         return []
     named: Row = {"kind": kind or "all", "scenes": len(outcomes)}
@@ -191,7 +191,7 @@ def rows_of(kind: str | None, outcomes: Sequence[Outcome]) -> list[Row]:
 
 
 def rows_of_scene(order: int, scene: Scene, outcome: Outcome) -> list[Row]:
-    """What came of one scene, a row for each way that a skill took in it."""
+    """The results of one scene, a row for each of WAYS that a skill took in it."""
     return [
         row(
             {
@@ -219,7 +219,7 @@ def _sum(outcomes: Sequence[Outcome], way: str) -> int:
 
 
 def _share(named: Row, measure: str, count: int, of: int) -> Row:
-    """So many of all, in percent; of none, 0 without an interval."""
+    """`count` of `of` in percent, with an interval; 0 without one if there are none."""
     return (
         share_row(named | {"of": of}, measure, [True] * count + [False] * (of - count))
         if of
@@ -243,7 +243,7 @@ def in_short(rows: Sequence[Row]) -> Row:
 
 
 def _picture(rows: Sequence[Row]) -> bytes:
-    """Bars by kind, a bar for each way."""
+    """A picture with bars by kind, a bar for each of WAYS."""
     kinds = [kind for kind in KINDS if those(rows, kind=kind, measure="skills_percent")]
     lines = {way: [those(rows, kind=kind, source=way, measure="skills_percent")[0] for kind in kinds] for way in WAYS}
     return bars(kinds, lines, "skills [%]")

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from lab.skills.prepared_scene import Prepared
     from lab.teaching.teacher import Teacher
 
-TASKS: dict[str, str | None] = {  # and how many parts, None: as many as its file says
+TASKS: dict[str, str | None] = {  # task -> its parts; None: as many as its file says
     "toast": "slice=2",
     "toast-panda": "slice=2",
     "toast-xarm6": "slice=2",
@@ -37,20 +37,20 @@ TASKS: dict[str, str | None] = {  # and how many parts, None: as many as its fil
     "fms-arm": None,
 }
 CAME = {"delivered": BLUE, "attended": GREEN, "stopped": ORANGE, "wrong": RED}
-LONGEST = 20.0  # times the predicted time: then a run counts as one that hangs
+LONGEST = 20.0  # a run that takes so many times the planned time counts as hanging
 ABOUT = (
-    "{runs} runs of {tasks}. Each has one or two faults, drawn from its seed: which, on what, and when. They are carried out "
-    "in physics, and nobody tells the composer. Delivered: all parts stand at the end of their routes, and nobody helped. A run "
-    "that stops is carried out once more with a scripted person, who comes {comes:g} s after each stop, does what the run asks "
-    "for (stands a part up, brings it back, repairs a machine, takes away what is in the way) and lets it go on. Attended: all "
-    "parts were delivered then. Stopped: some were not, and each reason that the run gives is about a fault that had struck, "
-    "and can be true of one of its kind. Wrong: a reason or a question that no fault explains, a part that is missing without a "
-    "word, anything that the audit finds, or a run that lasts {longest:g} times as long as planned."
+    "{runs} runs of {tasks}. Each has one or two faults; what happens, to what and when is drawn from its seed. They are "
+    "carried out in physics, and the composer is not told of them. Delivered: all parts stand at the end of their routes, and "
+    "nobody helped. A run that stops is carried out once more with a scripted person, who comes {comes:g} s after each stop, "
+    "does what the run asks for (stands a part up, brings it back, repairs a machine, removes an obstacle) and lets it "
+    "continue. Attended: all parts were delivered then. Stopped: some were not, and each reason that the run gives is about a "
+    "fault that had struck, and can be true of its kind. Wrong: a reason or a request that no fault explains, a part that is "
+    "missing without a reason, a finding of the audit, or a run that takes {longest:g} times as long as planned."
 )
 COLUMNS = (
-    "A run counts under each kind of fault that struck in it. noticed_percent: of the faults of a kind, those that something "
-    "was told of; one that needs no answer, as a box that stands in nobody's way, may go unnoticed. "
-    "None: no fault found its chance, as where nothing was carried any more."
+    "A run counts under each kind of fault that struck in it. noticed_percent: the faults of a kind that the run reported; one "
+    "that needs no answer, such as a box that blocks no path, may go unnoticed. "
+    "None: no fault could strike, for example because nothing was carried any more."
 )
 
 
@@ -66,7 +66,7 @@ class Setting:
 class Ran:
     """The outcome of a run: one of CAME, and why; rows: its faults, see `verdict`. Times in seconds.
 
-    asked: the requests to the person who attended the run; did: what they did. Both are empty for runs without a person.
+    asked: the requests to the person who attended the run; did: what the person did. Both are empty for runs without one.
     """
 
     came: str
@@ -100,12 +100,12 @@ def faults(job: Job, reading: Mapping[str, Any]) -> Findings:
 
 
 def struck(ran: Ran) -> list[str]:
-    """The kinds of the faults that struck; "none"."""
+    """The kinds of the faults that struck, or ["none"]."""
     return [str(fault["what"]) for fault in ran.rows] or ["none"]
 
 
 def measured(job: Job, settings: Sequence[Setting]) -> dict[Setting, Ran]:
-    """The outcome of every run; those that the job's folder holds are read, the others are carried out and kept there."""
+    """The outcome of every run; the job's folder keeps them."""
     kept = job.kept_as(lambda entry: (record_of(Setting, entry["setting"]), record_of(Ran, entry["ran"])))
     done: dict[Setting, Ran] = {setting: ran for setting, ran in kept.items() if setting in settings}
     left = [setting for setting in settings if setting not in done]
@@ -124,22 +124,22 @@ class _TooLong(Exception):
 
 @dataclass
 class _Clock:
-    """Watches a run as a viewer does, and ends one that lasts too long."""
+    """A viewer that ends a run which takes too long."""
 
     limit_s: float
 
     def show(self, bodies: "tuple[Body, ...]") -> None:
-        """Nothing to see."""
+        """Do nothing."""
 
     def update(self, frame: "Frame") -> None:
-        """Raises _TooLong."""
+        """Raise _TooLong once the limit is passed."""
         if frame.time_s > self.limit_s:
-            raise _TooLong(f"it still went on after {frame.time_s:.0f} s")
+            raise _TooLong(f"the run had not ended after {frame.time_s:.0f} s")
 
 
 @dataclass
 class _Ready:
-    """A task that is prepared and taught, once for all runs of a process."""
+    """A task that was prepared and taught once, for all runs of a process."""
 
     prepared: "Prepared"
     taught: "Taught"
@@ -167,7 +167,7 @@ def _ready(name: str) -> _Ready:
 
 
 def carried_out(setting: Setting) -> Ran:
-    """One run with its drawn faults: by itself, and where it stops, once more with a person."""
+    """The outcome of one run with its random faults, repeated with a person if it stops."""
     alone = _carried_out(setting, None)
     if alone.came != "stopped":
         return alone
@@ -178,7 +178,7 @@ def carried_out(setting: Setting) -> Ran:
 
 
 def _carried_out(setting: Setting, person: Attendant | None) -> Ran:
-    """One run, attended by a person, or None."""
+    """The outcome of one run, attended by a person, or by nobody (None)."""
     from lab.production.composer import Conditions, carry_out
     from lab.production.faults.injector import draw
     from lab.production.taught import Relearner
@@ -194,12 +194,12 @@ def _carried_out(setting: Setting, person: Attendant | None) -> Ran:
             conditions = replace(conditions, controls=person, on_floor=person.on_floor, before_step=person.before_step)
         relearner = Relearner(prepared, ready.taught, ready.teacher)
         outcome, _ = carry_out(prepared, ready.taught.cell, ready.sequence, conditions, relearner=relearner)
-    except Exception as error:  # whatever a run comes to that is no way to end one
+    except Exception as error:  # a run may end with no exception at all
         return replace(ran, why=f"{type(error).__name__}: {error}", wall_s=time.perf_counter() - began)
     cell = ready.taught.cell
     verdict = outcome.verdict([cell.part_name(part) for part in range(1, cell.parts + 1)])
     wrong = [verdict.why] if verdict.came == "wrong" else []
-    if not outcome.happened and outcome.failure is not None:  # then no reason can be true
+    if not outcome.happened and outcome.failure is not None:  # without a fault no reason can be true
         wrong.append("it stopped, and no fault had struck")
     if outcome.audit is not None and outcome.audit.findings:
         wrong.append(str(outcome.audit.failure))
@@ -254,7 +254,7 @@ def in_short(runs: Sequence[Ran]) -> Row:
 
 
 def picture(rows: Sequence[Row], by: str) -> bytes:
-    """A bar for each task or kind of fault: how its runs came out."""
+    """A picture with a bar for each task or kind of fault: the shares of the outcomes of its runs."""
     names = list(dict.fromkeys(result[by] for result in rows if by in result))
 
     def draw(figure: "Figure") -> None:

@@ -184,12 +184,12 @@ def test_two_workers_measure_a_command_in_homes_of_their_own(room: Path, monkeyp
     ("ended", "said"),
     [
         (Ended(0, "{}", "", 0.1, 0), ""),
-        (Ended(1, "{}", "", 0.1, 0), "exit 1 without a word"),
+        (Ended(1, "{}", "", 0.1, 0), "exit 1 without a"),
         (Ended(1, "{}", "lab: no room\n", 0.1, 0), ""),
         (Ended(2, "{}", "lab: no room\n", 0.1, 0), "exit 2, but it has kept toolbox/trash"),
         (
             Ended(1, '{"saved_as": "more"}', "lab: no room\n", 0.1, 0),
-            "it says that it kept 'more', and it is not there",
+            "'more', which is not there",
         ),
         (Ended(1, "{}", "Traceback (most recent call last):\nKeyError", 0.1, 0), "traceback: KeyError"),
         (Ended(0, "{}", "Exception ignored in: <_io>", 0.1, 0), "stderr says 'Exception ignored"),

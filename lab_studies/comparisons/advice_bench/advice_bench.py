@@ -26,40 +26,42 @@ from lab_studies.comparisons.advice_bench.sessions import (
     tried,
 )
 
-MOST_BELOW = -2.0  # points below nobody that an interval may reach: the project's own target
-LEVEL = 0.9  # of nobody's last points: where a learner has recovered
+MOST_BELOW = -2.0  # the project's target: no interval of the gain reaches below it
+LEVEL = 0.9  # a learner has recovered at this share of nobody's last points
 MEASURES = (
-    "Points: the mean over all episodes (the area under the learning curve), 100 as the best policy walks on average, 0 an "
-    "episode that fails; in between by its steps. gain_points: less those of nobody's sessions with the same seeds, with the "
-    "95 % interval of the paired differences; below 0 is harm. last: points of the last tenth of the episodes. answers: what the "
-    "advisor said in a session. later: episodes until the mean curve reaches nine tenths of nobody's last points, less "
-    "nobody's own; empty: it never does. Budget: answers of a session. Where moves are left to chance (lake) there are four "
-    "times as many sessions."
+    "Points: the mean over all episodes (the area under the learning curve); 100 is the best policy's mean, 0 an episode that "
+    "fails, and steps count in between. gain_points: points minus those of nobody's sessions with the same seeds, with the "
+    "95 % interval of the paired differences; below 0 is harm. last: points of the last tenth of the episodes. answers: the "
+    "advisor's answers in a session. later: episodes until the mean curve reaches nine tenths of nobody's last points, minus "
+    "nobody's own; empty if it never does. Budget: answers of a session. Where moves are random (lake) there are four times as "
+    "many sessions."
 )
 RULES_NOTE = (
-    "always is early advising where there is a budget. importance (teacher's), correcting and predictive: the advisor speaks "
-    "only in the half of the states where most is at stake, there only against what the learner would do (which it "
-    "announces), or did when last there (Torrey and Taylor 2013; their prediction is a classifier). importance (learner's): "
+    "always with a budget is early advising. importance (teacher's): the advisor speaks only in the half of the states where "
+    "most is at stake; correcting: there only against the move that the learner announces; predictive: there only against the "
+    "learner's last move in the state (Torrey and Taylor 2013, who predict with a classifier). importance (learner's): "
     "Clouse's and Amir's. uncertainty: RCMP with five tables. novelty: advice novelty. reliability: CLUE with one advisor. two "
-    "levels: ADMIRAL's successor, with one. shaping: policy shaping with a fixed consistency. fading: confidence decay. Those "
-    "that the literature gives for deep learners are their idea in a table."
+    "levels: ADMIRAL's successor, with one. shaping: policy shaping with a fixed consistency. fading: confidence decay. Rules "
+    "that the literature gives for deep learners are carried over to tables."
 )
 CHOSEN = (
     "Chosen on the problems that are not held out: the constants of 'earned-trust' (with seed 0, so that its figures there "
     "flatter it), the rivals' settings (the best mean gain of three to six values each, with seed 7), and the learner's "
-    "settings, so that nobody learns best. Held out, nothing was chosen on them: " + ", ".join(HELD_OUT) + "."
+    "settings (the best for learning without advice). Nothing was chosen on the problems held out: "
+    + ", ".join(HELD_OUT)
+    + "."
 )
 RANKED = (
-    "Ranks: of the points in each cell (problem, advisor, budget), ties shared, averaged within each problem, then over "
-    "problems; the critical difference is Nemenyi's at 5 %, with problems as blocks. Points above others': Wilcoxon's signed "
-    "ranks of the problems' means, Holm's correction."
+    "Ranks: the ranks of the points in each cell (problem, advisor, budget), ties shared, averaged within each problem, then "
+    "over problems; the critical difference is Nemenyi's at 5 %, with problems as blocks. Whether points are above others': "
+    "Wilcoxon's signed ranks of the problems' means with Holm's correction."
 )
 
 
 def advice_bench(job: Job, reading: Mapping[str, Any]) -> Findings:
-    """The bench; reading: "problem", "methods" (rules) and "advisors", lists of names, in place of all.
+    """The results of the bench; reading: lists "problem", "methods" (rules) and "advisors" of names, which replace all.
 
-    Raises BadInput for a problem that cannot be a table, an unknown rule or advisor.
+    Raises BadInput for a problem that cannot be a table, and for an unknown rule or advisor.
     """
     rules = tuple(reading.get("methods", RULES))
     for name in rules:
@@ -135,7 +137,7 @@ def _shown(outcome: Outcome, nobody: Outcome, name: str) -> Row:
 
 
 def _recovered(outcome: Outcome, nobody: Outcome, name: str) -> float | None:
-    """The episode from which on the mean curve stays at nine tenths of nobody's last points, None: it does not."""
+    """The episode from which the mean curve stays above nine tenths of nobody's last points; None if it does not."""
     enough = outcome.curve >= LEVEL * nobody.last.mean()
     below = np.flatnonzero(~enough)
     first = 0 if len(below) == 0 else int(below[-1]) + 1
@@ -143,7 +145,7 @@ def _recovered(outcome: Outcome, nobody: Outcome, name: str) -> float | None:
 
 
 def in_short(rows: Sequence[Row], problems: Sequence[str], rules: Sequence[str]) -> tuple[Row, dict[str, bytes]]:
-    """The ranks and the harm on the problems used for development and on those held out; with pictures."""
+    """The ranks and the harm, and their pictures, on the problems used for development and on those held out."""
     advised = [result for result in rows if result["rule"] != NOBODY]
     alone = {result["problem"]: result["points"] for result in rows if result["rule"] == NOBODY}
     scores: dict[str, dict[Cell, float]] = {rule: {} for rule in rules}
@@ -183,7 +185,7 @@ def _ranked(words: str, ranked: Ranks) -> Row:
 
 
 def _harm(words: str, rows: Sequence[Row], rules: Sequence[str]) -> Row:
-    """In how many cells each rule's interval reaches below the target, and the worst of them."""
+    """The number of cells in which each rule's interval reaches below the target, and the worst cell."""
     says: Row = {}
     for rule in rules:
         own = [result for result in rows if result["rule"] == rule]

@@ -14,8 +14,8 @@ from lab.mdp import BoolArray, FloatArray
 from lab_studies.comparisons.advice_bench.problems import Benched
 
 EXPERT = SKILL_TAUS["expert"]
-WRONG_THERE, SILENT = 0.25, 0.75  # shares of the states
-DRIFTS = 50  # steps in which an expert becomes contrary
+WRONG_THERE, SILENT = 0.25, 0.75  # the shares of states with wrong and without answers
+DRIFTS = 50  # the steps in which an expert becomes contrary
 Made = Callable[[Benched], Advice]
 
 
@@ -24,29 +24,29 @@ def _skill(tau: float) -> Made:
 
 
 def contrary(of: Benched) -> Advice:
-    """Takes the worst action for the best."""
+    """An advisor that takes the worst action for the best."""
     return Advice.of(advice_chances(-of.values, EXPERT))
 
 
 def wrong_there(of: Benched) -> Advice:
-    """An expert that is contrary in a quarter of the states, drawn once and for all."""
+    """An expert that is contrary in a quarter of the states, which are drawn once."""
     there = _drawn(of, WRONG_THERE)
     return Advice.of(advice_chances(np.where(there[:, None], -of.values, of.values), EXPERT))
 
 
 def late(of: Benched) -> Advice:
-    """An expert whose answer is for the previous question."""
+    """An expert that answers the previous question."""
     return replace(Advice.of(advice_chances(of.values, EXPERT)), late=True)
 
 
 def stuck(of: Benched) -> Advice:
-    """Gives everywhere the action that is best at the start."""
+    """An advisor that always gives the action that is best at the start."""
     always = int(of.values[of.mdp.start].argmax())
     return Advice.of(np.tile(np.eye(of.mdp.n_actions)[always], (of.mdp.n_states, 1)))
 
 
 def drifting(of: Benched) -> Advice:
-    """An expert at first; the chance of a contrary answer grows to 1 over the session."""
+    """An expert whose chance of a contrary answer grows from 0 to 1 over the session."""
     good, bad = advice_chances(of.values, EXPERT), advice_chances(-of.values, EXPERT)
     rows = np.minimum(np.arange(of.learner.episodes) * DRIFTS // of.learner.episodes, DRIFTS - 1)
     shares = np.linspace(0.0, 1.0, DRIFTS)[rows]
@@ -54,7 +54,7 @@ def drifting(of: Benched) -> Advice:
 
 
 def long_winded(of: Benched) -> Advice:
-    """Half of its answers are the best action, the others any action without failure: it arrives, but by detours."""
+    """An advisor that gives the best action in half of its answers, else any action without failure: it makes detours."""
     best = advice_chances(of.values, EXPERT)
     mdp = of.mdp
     safe = (~(mdp.terminal & ~mdp.goal)[mdp.successor]).astype(np.float64)
@@ -63,7 +63,7 @@ def long_winded(of: Benched) -> Advice:
 
 
 def silent(of: Benched) -> Advice:
-    """An expert that says nothing in three quarters of the states, drawn once and for all."""
+    """An expert that is silent in three quarters of the states, which are drawn once."""
     return Advice.of(advice_chances(of.values, EXPERT), ~_drawn(of, SILENT))
 
 
@@ -85,7 +85,7 @@ ADVISORS: Mapping[str, Made] = {
 
 
 def advice_of(name: str, of: Benched) -> Advice:
-    """The advice of an advisor of the bench, or of any other whose answer to a question is constant, such as a recorded one.
+    """The advice of an advisor of the bench, or of another one that always answers a question alike, such as a recorded one.
 
     Raises BadInput for an unknown advisor, and for a record of another problem.
     """
@@ -108,7 +108,7 @@ def advice_of(name: str, of: Benched) -> Advice:
 
 
 def importance(of: Benched, share: float = 0.5) -> BoolArray:
-    """Whether a state is important (S,) bool: of the half with the widest range of values (Torrey and Taylor 2013)."""
+    """Whether each state is among the half with the widest range of values, (S,) bool (Torrey and Taylor 2013)."""
     live = ~of.mdp.terminal
     width: FloatArray = of.values.max(axis=1) - of.values.min(axis=1)
     wide: BoolArray = width >= np.quantile(width[live], 1.0 - share)

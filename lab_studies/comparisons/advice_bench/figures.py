@@ -17,7 +17,7 @@ LARGEST = 40.0  # points, where the colours of the gains end
 
 
 def distances(ranked: Ranks) -> bytes:
-    """Mean ranks, best first, each with a bar of the critical difference; ranks within it do not differ significantly."""
+    """A picture of the mean ranks, best first, with the critical difference as bars; ranks within one do not differ."""
     rules = list(ranked.mean)
 
     def draw(figure: "Figure") -> None:
@@ -36,7 +36,7 @@ def distances(ranked: Ranks) -> bytes:
 
 
 def gains(rows: Sequence[Row], rules: Sequence[str]) -> bytes:
-    """A map for each budget: rules by advisors, the mean gain over nobody as colour and number."""
+    """A map of rules by advisors for each budget, with the mean gain over nobody as colour and number."""
     advisors = list(dict.fromkeys(row["advisor"] for row in rows))
     shown = [rule for rule in rules if any(row["rule"] == rule for row in rows)]
 
@@ -62,7 +62,7 @@ def _mean(rows: Sequence[Row], budget: str, rule: str, advisor: str) -> float:
 
 
 def worst_cells(rows: Sequence[Row], rules: Sequence[str], target: float) -> bytes:
-    """For each rule the cell with the lowest end of its interval, and the target."""
+    """A picture of each rule's cell with the lowest end of its interval, and of the target."""
     lowest = {}
     for rule in rules:
         own = [row for row in rows if row["rule"] == rule]
@@ -86,7 +86,7 @@ def worst_cells(rows: Sequence[Row], rules: Sequence[str], target: float) -> byt
 
 
 def answers_and_gain(rows: Sequence[Row], rules: Sequence[str]) -> bytes:
-    """The answers that each rule uses and its gain, by budget, as means over all cells."""
+    """A picture of each rule's answers and gain, as means over all cells, by budget."""
 
     def draw(figure: "Figure") -> None:
         axes = figure.add_subplot()

@@ -15,8 +15,8 @@ from lab_studies.comparisons.advice_bench.bad_advisors import advice_of, importa
 from lab_studies.comparisons.advice_bench.problems import RANDOM_WORLDS, SEVERAL, Benched, problem
 
 BUDGETS = {"100": 100, "any": GateSettings.budget}  # answers of a session
-CHANCE_TIMES = 4  # as many sessions where moves are left to chance: their points vary more
-LAST = 0.1  # the share of the episodes that shows what was learned
+CHANCE_TIMES = 4  # times as many sessions where moves are random, as their points vary more
+LAST = 0.1  # the share of the episodes, at the end, that shows what was learned
 BINS = 40  # of a learning curve
 NOBODY, OURS = "nobody", "earned-trust"
 
@@ -25,7 +25,7 @@ class Rule(NamedTuple):
     """A rule of when to ask: the gate with its settings, and the states in which the advisor itself gives no answer."""
 
     gate: GateSettings
-    important: bool = False  # it speaks only where most is at stake
+    important: bool = False  # the advisor speaks only where most is at stake
     speaks: int = 0
 
 
@@ -35,7 +35,7 @@ def _gate(gate: str, **settings: Any) -> GateSettings:
 
 EARLY: Any = {"first_episode": 1}
 CCRL: Any = {"first_episode": 10, "lambda_threshold": 0.2, "omega": 3}
-# settings: of a few values each, those with the highest mean gain over the problems that are not held out, with another seed
+# each setting is, of a few values, the one with the highest mean gain over the problems not held out, with another seed
 RULES: Mapping[str, Rule] = {
     "always": Rule(_gate("always")),
     "random": Rule(_gate("random", rate=0.02, **EARLY)),
@@ -60,7 +60,7 @@ RULES: Mapping[str, Rule] = {
 
 @dataclass(frozen=True)
 class Case:
-    """An advisor in a problem; None: nobody."""
+    """An advisor in a problem; None: nobody advises."""
 
     problem: str
     advisor: str | None
@@ -85,7 +85,7 @@ class Outcome(NamedTuple):
         if any(values.ndim != 1 for values in (points, last, answers, curve)) or not len(points) == len(last) == len(
             answers
         ):
-            raise ValueError("three lists of one length, and a curve, are wanted")
+            raise ValueError("expected three lists of one length, and a curve")
         return cls(points, last, answers, curve)
 
 
@@ -93,7 +93,7 @@ Outcomes = dict[tuple[str, str], Outcome]  # by rule and budget
 
 
 def tried(case: Case, sessions: int, seed: int, rules: tuple[str, ...] = tuple(RULES)) -> Outcomes:
-    """Every rule at every budget, the same chances for each; of nobody one outcome, ("nobody", "any")."""
+    """The outcomes of every rule at every budget, with the same seeds for each; for nobody the one of ("nobody", "any")."""
     worlds = min(RANDOM_WORLDS, sessions) if case.problem in SEVERAL else 1
     sessions *= CHANCE_TIMES if problem(case.problem).chances is not None else 1
     rng = np.random.default_rng([seed, crc32(case.problem.encode())])
@@ -137,4 +137,4 @@ def _joined(parts: list[Any]) -> Outcome:
     last = max(1, round(LAST * points.shape[1]))
     curve = np.array([part.mean() for part in np.array_split(points.mean(axis=0), BINS)])
     values = points.mean(axis=1), points[:, -last:].mean(axis=1), answers.astype(np.float64), curve
-    return Outcome(*(np.round(array, 2) for array in values))  # to a hundredth of a point: so they are kept
+    return Outcome(*(np.round(array, 2) for array in values))  # kept to a hundredth of a point
