@@ -83,7 +83,7 @@ def judged(ended: Ended) -> str:
     if (document["stopped_by"], document["interrupted"]) != ("Ctrl-C", True):
         return f"stopped by {document['stopped_by']}"
     if not document["best_sequence"] or len(document["best_moves"]) != len(document["best_sequence"]):
-        return "the order is empty, or its moves are not those of the order"
+        return "the order is empty, or moves are missing"
     if not 0 < document["bound_cost"] <= document["best_cost"] + SAME and document["objective"] == "makespan":
         return f"bound {document['bound_cost']}, best {document['best_cost']}"
     if document["optimum_proven"] != (document["best_cost"] <= document["bound_cost"] + SAME):

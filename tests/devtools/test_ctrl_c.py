@@ -32,7 +32,7 @@ def test_an_order_with_its_bound_is_well() -> None:
     ("told", "why"),
     [
         (ended(0), "exit 0, allowed 130"),
-        (ended(best_sequence=[], best_moves=[]), "order is empty"),
+        (ended(best_sequence=[], best_moves=[]), "the order is empty"),
         (ended(bound_cost=0.0, optimum_proven=False), "bound 0.0, best 14.0"),
         (ended(bound_cost=12.0), "proven: True, bound 12.0, best 14.0"),
         (ended(error="stopped by Ctrl-C"), "no order: stopped by Ctrl-C"),
