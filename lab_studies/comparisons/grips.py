@@ -1,4 +1,4 @@
-"""Grips computed from the shapes of parts from elsewhere: do they hold in physics?"""
+"""Grips computed from the shapes of parts that others made, tested in physics."""
 
 from collections.abc import Mapping, Sequence
 from math import degrees
@@ -22,13 +22,13 @@ COLUMNS = 5  # of the picture
 CAPTION = "Widths by heading; grey: what the gripper takes; dots: the grips"
 ABOUT = (
     f"{len(MODELS)} models of pybullet_data and trimesh, {MASS_KG} kg each, friction {FRICTION}; each stands as it comes "
-    f"to rest in physics. A model keeps its own size where the middle one of its three extents is up to {GRASPABLE_M} m, else "
-    f"that is made {FITTED_M} m. Physics has convex hulls, as it has of every mesh that is a part."
+    f"to rest in physics. A model keeps its own size if the middle one of its three extents is at most {GRASPABLE_M} m, else "
+    f"it is scaled until that is {FITTED_M} m. Physics uses convex hulls, as for every part with a mesh."
 )
 POSES = (
-    f"{{}} poses of each: taken from above, lifted, carried {CARRY_M} m, turned by up to a quarter turn, set down as it hangs, "
-    f"let go. It arrives when it stands within {NEAR_M} m of its place a second later; balls, and what else has no upright, "
-    f"within {ROLLED_M} m, however it lies. Both places and yaws are drawn from the seed."
+    f"{{}} poses of each: a part is taken from above, lifted, carried {CARRY_M} m, turned by up to a quarter turn, set down and "
+    f"released. It arrives if it stands within {NEAR_M} m of its place a second later; a part without an upright pose, such as "
+    f"a ball, if it lies within {ROLLED_M} m. Both places and yaws are drawn from the seed."
 )
 
 
@@ -46,7 +46,7 @@ def grips(job: Job, reading: Mapping[str, Any]) -> Findings:
 
 
 def rows_of(name: str, outcome: Outcome) -> list[Row]:
-    """One model's rows: whether it can be gripped, and how many of its poses arrived."""
+    """The rows of one model: whether it is graspable, and the share of its poses that arrived."""
     low, high = min(outcome.widths_m), max(outcome.widths_m)
     named: Row = {"part": name, "narrowest_m": round(low, 4), "widest_m": round(high, 4)}
     named["high_m"] = round(outcome.edges_m[2], 4)

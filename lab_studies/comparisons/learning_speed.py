@@ -20,17 +20,17 @@ from lab_studies.thesis.chapter_9_sessions import learned_table, world
 SESSIONS = 500
 ABOUT = (
     "{} sessions of 200 episodes in world I, one process on one core, median of five runs; compile time is not counted. "
-    "The kernel walks many sessions side by side, so a few of them leave it half empty; 'c scalar' does one after the other, "
-    "'c lanes' one in each SIMD lane of the processor, in single precision. Rivals run at most 500 sessions, the tutorial "
-    "loop 5: their figure is a rate."
+    "The kernel runs many sessions side by side, so that a few of them leave it half empty; 'c scalar' runs one after the "
+    "other, 'c lanes' one in each SIMD lane of the processor, in single precision. Rivals run at most 500 sessions, the "
+    "tutorial loop 5, as their figure is a rate."
 )
-FEW = {"gymnasium tutorial loop": 5}  # sessions of a rival so slow that its rate shows with few
+FEW = {"gymnasium tutorial loop": 5}  # the sessions of a rival so slow that few show its rate
 REPEATS = 5
 GATES = (GateSettings("ccrl", omega=1), GateSettings("ia"), GateSettings("combined", omega=1))
 
 
 def speed(job: Job, reading: Mapping[str, Any]) -> Findings:
-    """Million environment steps a second in world I, median of five runs; the reading changes nothing here."""
+    """The speeds in world I [million environment steps per second], median of five runs; the reading has no effect."""
     place = world("world-1")
     mdp, learner = place.mdp(), place.learner
     advice = Advice.of(advice_chances(learned_table(place), 0.1))
@@ -43,7 +43,7 @@ def speed(job: Job, reading: Mapping[str, Any]) -> Findings:
         return Measured(moves, time.perf_counter() - began)
 
     def against(name: str) -> Row | str:
-        """The row of a rival, or why there is none."""
+        """The row of a rival, or the reason why there is none."""
         sessions = min(FEW.get(name, SESSIONS), job.sessions)
         try:
             return _row(name, lambda: RIVALS[name](mdp, learner, sessions, job.seed))
