@@ -1,4 +1,4 @@
-"""Pictures of the curriculum: what is saved at each place of an order, and what becomes of the skills of each task."""
+"""Pictures of the curriculum: the savings at each place of an order, and what becomes of the skills of each task."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
@@ -19,11 +19,11 @@ FATES = {
 }
 # colour and marker of each task, by name
 TASKS = ((BLUE, "o"), (ORANGE, "s"), (GREEN, "^"), (PURPLE, "D"), (YELLOW, "v"), (RED, "P"), (SKY, "X"))
-SHOWN = 12.0  # [%] a part of a bar from which on its number fits into it
+SHOWN = 12.0  # [%] the least part of a bar that has room for its number
 
 
 def by_place(rows: Sequence[Row]) -> bytes:
-    """Episodes saved against the place in the order: each order with its tasks, and the mean of all with its interval."""
+    """A picture of the episodes saved by place: each order with its tasks, and the mean of all with its interval."""
     means = [
         row for row in those(rows, subtask=None, task=None, measure="saved_episodes_percent") if row["place"] != "later"
     ]
@@ -57,7 +57,7 @@ def by_place(rows: Sequence[Row]) -> bytes:
 
 
 def by_task(rows: Sequence[Row]) -> bytes:
-    """For each task after the first of its order, a bar of what became of its skills, mean of the orders."""
+    """A picture with a bar for each task after the first of its order: what became of its skills, the mean of the orders."""
     tasks = [*dict.fromkeys(row["task"] for row in rows if row.get("place") == "later" and row.get("task"))]
 
     def draw(figure: "Figure") -> None:

@@ -1,7 +1,7 @@
-"""Whether a schedule keeps to its cell, from first principles: plain data in, faults in words out, nothing of the simulators.
+"""Checks a schedule against its cell from first principles: plain data in, faults in words out, without the simulators.
 
-cell: what a cell file says, as TOML's values (`tomllib.load`, `CellFile.model_dump`). rows: what `--schedule` writes as JSON.
-Not looked at: whether a buffer for when the machine ahead is full (buffers = "busy") was used only then.
+cell: the values of a cell file (`tomllib.load`, `CellFile.model_dump`). rows: what `--schedule` writes as JSON. It is not
+checked that a buffer for when the machine ahead is full (buffers = "busy") was used only then.
 """
 
 from collections.abc import Mapping, Sequence
@@ -18,14 +18,14 @@ Rooms = list[tuple[str, float, float]]  # station, from, to [s]
 
 
 def faults(cell: Row, rows: Sequence[Row], makespan_s: float) -> list[str]:
-    """What is wrong with a schedule that claims this makespan [s], a line each; none: it is right."""
+    """The faults of a schedule that claims this makespan [s], in words; an empty list if there are none."""
     robots = {robot.get("name") or "robot": robot for robot in cell.get("robots") or [cell.get("robot")] if robot}
     order = cell.get("order") or [cell["products"][0]["name"]] * cell["parts"]
     parts, arrivals = [f"{name} {n}" for n, name in enumerate(order, 1)], cell.get("arrivals") or {}
     for row in rows:
         known = row["part"] in (*parts, None) and (row["robot"] in robots or row["operation"] in ("process", "blocked"))
         if not (known and 0 <= row["start_s"] <= row["end_s"] < NEVER):
-            return [f"a row that cannot be: {row}"]
+            return [f"an impossible row: {row}"]
     errors, taken, end_s, came_s = list[str](), Rooms(), 0.0, 0.0
     rows = [row for row in rows if row["operation"] != "service" or row["end_s"] > row["start_s"] + EPS]
     rows.sort(key=lambda row: (row["start_s"], row["end_s"]))
@@ -48,12 +48,14 @@ def faults(cell: Row, rows: Sequence[Row], makespan_s: float) -> list[str]:
     return errors + ([] if abs(end_s - makespan_s) <= EPS else [f"the makespan is {end_s:g}, not {makespan_s:g}"])
 
 
-Spans = list[tuple[int, float, float]]  # a stretch of the track, from when until when a robot is on it [s]
-MOST_CHOICES = 256  # of when robots set out
+Spans = list[
+    tuple[int, float, float]
+]  # a stretch of the track, and the times from and until which a robot is on it [s]
+MOST_CHOICES = 256  # combinations of the times at which robots set out
 
 
 def _ways(cell: Row) -> dict[str, dict[str, list[tuple[int, float, float]]]]:
-    """The shortest way on the track between any two stations: its stretches, from when until when one is on each [s]."""
+    """The shortest way on the track between any two stations: its stretches with the times from and until [s]."""
     stretches = [
         (n, a, b, seconds)
         for n, stretch in enumerate(cell["track"]["stretches"])
@@ -70,10 +72,10 @@ def _ways(cell: Row) -> dict[str, dict[str, list[tuple[int, float, float]]]]:
 
 
 def _collisions(cell: Row, robots: Row, rows: Sequence[Row]) -> list[str]:
-    """Two robots on one stretch at a time, whenever they set out: all drive without stopping from then on.
+    """The faults where two robots are on one stretch at a time, whenever they set out; all drive without stopping.
 
-    With a part a robot sets out as it has picked, or when a stretch that it needs is free, at the latest so that it comes there
-    just in time: rows do not say when.
+    A robot with a part sets out after the pick or when a stretch is free, at the latest so that it arrives in time: rows do
+    not say when.
     """
     ways, chosen = _ways(cell), [Spans()]
     worst = list[str]()
@@ -93,10 +95,10 @@ def _collisions(cell: Row, robots: Row, rows: Sequence[Row]) -> list[str]:
 
 
 def _met(held: Spans, more: Spans) -> list[str]:
-    """Where spans of one robot are those of others."""
+    """The faults where new spans overlap held ones on the same stretch."""
     pairs = [(n, min(end, until)) for n, begin, end in more for m, since, until in held
              if n == m and max(begin, since) < min(end, until) - EPS]  # fmt: skip
-    return [f"two on stretch {n} of the track at {until_s:g}" for n, until_s in pairs]
+    return [f"two robots on stretch {n} of the track at {until_s:g}" for n, until_s in pairs]
 
 
 def _travel_s(cell: Row, robot: Row, ends: Sequence[str], tables: Sequence[str] = ("travel",)) -> float:
@@ -110,7 +112,7 @@ def _travel_s(cell: Row, robot: Row, ends: Sequence[str], tables: Sequence[str] 
 def _way(
     cell: Row, robots: Row, route: Any, rows: Sequence[Row], free_s: float
 ) -> tuple[list[str], Rooms, float, float]:
-    """A part on a route: what does not fit, the rooms it takes, when it is finished, and when it was first taken [s]."""
+    """The faults of a part on a route, the room that it takes, and the times of its end and its first pick [s]."""
     stations = {station["name"]: station for station in cell["stations"]}
     wrong, rooms, left = list[str](), Rooms(), [*rows]
 
@@ -127,7 +129,7 @@ def _way(
 
     stages: list[Row] = [{"station": entry} if isinstance(entry, str) else entry for entry in route]
     at, since_s, ready_s, first_s, most_s, service_s = stages[0]["station"], NEVER, free_s, NEVER, NEVER, 0.0
-    pallet: list[tuple[str, float]] = []  # where the part's own one stands, and since when, if it waits for it
+    pallet: list[tuple[str, float]] = []  # the station of the part's waiting pallet, and since when it is there
     for entry in stages[1:]:
         stage = _taken(entry, left)
         place, own_s, buffer = stations[stage["station"]], stage.get("processing_s"), stage.get("buffer")
@@ -138,7 +140,7 @@ def _way(
             served_s = take("service", at) if service_s > EPS else (ready_s, pick_s)
             within(f"service in '{at}'", service_s, min(served_s[1], pick_s) - max(served_s[0], ready_s))
             rooms, since_s, ready_s, kept = [*rooms, (at, since_s, pick_s)], came_s, came_s, (at, since_s)
-            for before, stood_s in pallet:  # it goes ahead of the part, from the station before to the one after
+            for before, stood_s in pallet:  # the pallet goes ahead, from the station before to the one after
                 left_s, since_s = take("pallet", before, target)
                 within("pallet picked", kept[1], left_s, pick_s)
                 within("pallet dropped", left_s, since_s, pick_s)
@@ -159,7 +161,7 @@ def _way(
 
 
 def _taken(stage: Row, rows: Sequence[Row]) -> Row:
-    """Which of a stage and its alternatives a part took, by what is left of its rows: where it is worked on, or goes to, next."""
+    """The one of a stage and its alternatives that a part took, by the next station in the rest of its rows."""
     ways = [
         {"station": entry} if isinstance(entry, str) else entry for entry in (stage, *stage.get("alternatives", ()))
     ]
@@ -170,13 +172,13 @@ def _taken(stage: Row, rows: Sequence[Row]) -> Row:
 
 
 def _crowd(station: Row, spans: Sequence[tuple[float, float]]) -> list[str]:
-    """Whether there are ever more parts in a station than it has room for."""
+    """The fault of a station that ever holds more parts than it has room for."""
     most = max((sum(a <= begin < b - EPS for a, b in spans) for begin, _ in spans), default=0)
     return [f"'{station['name']}' holds {most}"] * (station["capacity"] != "unlimited" and most > station["capacity"])
 
 
 def _overload(station: Row, work: Sequence[Row]) -> list[str]:
-    """Whether more servers are at work than a machine has, setups counted: the fewest chains that cover all its work."""
+    """The fault of a machine that needs more servers than it has, setups included: the fewest chains that cover its work."""
     follows, setups = np.zeros((len(work), len(work)), dtype=bool), station.get("setup_s") or {}
     for (i, first), (j, then) in combinations(enumerate(work), 2):
         setup_s = setups.get(first["product"], {}).get(then["product"], 0.0)
@@ -186,7 +188,7 @@ def _overload(station: Row, work: Sequence[Row]) -> list[str]:
 
 
 def _trips(cell: Row, robot: Row, rows: Sequence[Row]) -> list[str]:
-    """Where a robot would have to be at two places, drive too fast, leave its service, or work where it does not serve."""
+    """The faults where a robot is at two places, drives too fast, leaves its service, or works where it does not serve."""
     at, free_s, errors, serves, busy = robot["start"], 0.0, list[str](), robot.get("serves"), None
     for row in rows:
         ends, carries = (row["station"], row["target"]), row["operation"] in ("carry", "pallet")

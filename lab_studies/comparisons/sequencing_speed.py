@@ -1,4 +1,4 @@
-"""How fast the sequencers are: episodes a second, seconds to the optimum and to a proof, all in one run on one core."""
+"""The speed of the sequencers: episodes per second, seconds to the optimum and to a proof, in one run on one core."""
 
 import time
 from collections.abc import Callable, Mapping
@@ -22,27 +22,27 @@ from lab_studies.thesis.chapter_7_cells import robot_cell
 
 CASES = ("I", "II", "III")
 EPISODES, TOASTS = 400, 4  # of the sessions whose rate is measured
-READABLE_SESSIONS = 3  # its rate shows with few
+READABLE_SESSIONS = 3  # few sessions show the rate of readable ones
 PROVEN = (30, 100)  # toasts
 MANY, MANY_EPISODES, MANY_SESSIONS = 30, 1000, 10
-NEAR = 0.01  # above the optimum, as a fraction
+NEAR = 0.01  # the gap to the optimum, as a fraction, that counts as near
 CP_SAT_LIMIT_S = 60.0
 REPEATS = 5
 RATE, SECONDS = "speed_thousand episodes per s", "wall_s"
 ABOUT = (
-    f"One process on one core, median of {REPEATS} runs, lowest and highest beside it; compiling is not counted. Rates: SRL of "
-    f"type B and random search, {{}} sessions of {EPISODES} episodes, {TOASTS} toasts in case I; 'readable' is the same session "
-    f"in plain Python, {READABLE_SESSIONS} of them. exact: seconds to the proof."
+    f"One process on one core, the median of {REPEATS} runs with the lowest and the highest; compiling is not counted. Rates: "
+    f"SRL of type B and random search, {{}} sessions of {EPISODES} episodes, {TOASTS} toasts in case I; 'readable' is the same "
+    f"session in plain Python, {READABLE_SESSIONS} of them. exact: seconds to the proof."
 )
 ABOUT_MANY = (
-    f"{MANY} toasts: srl-time's seconds until its best sequence is within {NEAR:.0%} of the optimum, median of the sessions "
+    f"{MANY} toasts: the seconds of srl-time until its best sequence is within {NEAR:.0%} of the optimum, median of the sessions "
     f"({MANY_SESSIONS} at most; the interval is the fastest and the slowest). CP-SAT: the gap of its best sequence after "
-    "{:g} s with one thread, building the model not counted; it begins with the sequence of first come, first served."
+    "{:g} s with one thread, without building the model; it begins with the sequence of first come, first served."
 )
 
 
 def sequencing_speed(job: Job, reading: Mapping[str, Any]) -> Findings:
-    """Rates, seconds and their ratios; the reading changes nothing here."""
+    """Rates, seconds and their ratios; the reading has no effect."""
     steps: list[Callable[[], list[Row]]] = [
         *(partial(_rate, name, run) for name, run in _rated(job).items()),
         *(partial(_proof, case, toasts) for toasts in PROVEN for case in CASES),
@@ -58,7 +58,7 @@ def sequencing_speed(job: Job, reading: Mapping[str, Any]) -> Findings:
 
 
 def _rated(job: Job) -> dict[str, Callable[[], int]]:
-    """What is timed, by name; each returns how many episodes it was."""
+    """The functions that are timed, by name; each returns the number of its episodes."""
     cell, search = robot_cell("I", TOASTS), Search(EPISODES, settings=SrlSettings(beta=0.5, factor="B"))
 
     def compiled(method: str) -> int:
@@ -88,7 +88,7 @@ def _rate(name: str, run: Callable[[], int]) -> list[Row]:
 
 
 def _proof(case: str, toasts: int) -> list[Row]:
-    """Seconds to the proof; of a search that gives up, to that, under another name."""
+    """The row of the seconds to the proof, or, under another name, to the end of a search without one."""
     cell, seconds, proven = robot_cell(case, toasts), list[float](), True
     for _ in range(REPEATS):
         began = time.perf_counter()
@@ -99,7 +99,7 @@ def _proof(case: str, toasts: int) -> list[Row]:
 
 
 def near_rows(case: str, job: Job) -> list[Row]:
-    """The share of srl-time's sessions that came near enough, and where all did, their seconds until then."""
+    """Rows of the share of srl-time's sessions that come near the optimum, and, if all do, of the seconds until then."""
     cell, seconds = robot_cell(case, MANY), list[float]()
     wanted = (1.0 + NEAR) * optimum(cell).bound_s
     for session in range(min(job.sessions, MANY_SESSIONS)):
@@ -116,14 +116,14 @@ def near_rows(case: str, job: Job) -> list[Row]:
 
 
 def rows_of_near(case: str, seconds: list[float]) -> list[Row]:
-    """Of the seconds of each session, inf where it never came near."""
+    """The rows of the sessions' seconds until they came near, inf for one that never did."""
     named: Row = {"name": "srl-time, near the optimum", "case": case, "toasts": MANY}
     near = row(named, "near_percent", 100.0 * sum(map(isfinite, seconds)) / len(seconds))
     return [near, median_row(named, SECONDS, seconds)] if near["value"] == 100.0 else [near]
 
 
 def solved_rows(case: str, seed: int) -> list[Row]:
-    """CP-SAT's gap after its limit."""
+    """The rows of CP-SAT's gap after its time limit, and of its seconds."""
     cell = robot_cell(case, MANY)
     best, solved = optimum(cell), cp_sat(cell, time_limit_s=CP_SAT_LIMIT_S, seed=seed)
     named: Row = {"name": "cp-sat", "case": case, "toasts": MANY, "limit_s": CP_SAT_LIMIT_S}
@@ -132,7 +132,7 @@ def solved_rows(case: str, seed: int) -> list[Row]:
 
 
 def ratios(rates: list[Row], learned: list[Row], solved: list[Row]) -> Row:
-    """How many times as fast; CP-SAT's seconds are at least those of its limit where its sequence was not near yet."""
+    """The ratios of speeds; CP-SAT needs at least its time limit where its sequence was not near the optimum by then."""
     fast, random, slow = (result["value"] for result in rates)
     says: Row = {
         "compiled to readable SRL": round(fast / slow, 1),

@@ -1,4 +1,4 @@
-"""Several advisors at once: whom to follow when they disagree, beside the best and the worst of them alone, and nobody."""
+"""Several advisors at once: whom to follow when they disagree, compared with the best and the worst alone, and with nobody."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -39,27 +39,27 @@ PANELS: tuple[tuple[str, ...], ...] = (
 )
 IN_TURN, BEST, WORST = "in turn", "best alone", "worst alone"
 WAYS = (*DECISIONS, IN_TURN, BEST, WORST)
-MOST = 100  # sessions a setting: they are run one by one in plain Python
-# points of success that a panel may stay below the best of its members alone and still be called as good
-POINTS = 2.0
+MOST = 100  # the most sessions of a setting, as they are run one by one in plain Python
+POINTS = 2.0  # a panel counts as good as its best member alone if its success is at most so many points below
 
 MEASURES = (
-    "SP: sessions whose last episode took the shortest way. HS: helped steps. Dropped and readmitted: how often advisors were, "
-    "mean of a session; by advisor: sessions in which that one was dropped at least once. Nothing of this is printed in the "
-    "thesis, which proposes it as future work (section 10.2.4)."
+    "SP: sessions whose last episode took the shortest path. HS: helped steps. Dropped and readmitted: how often advisors were, "
+    "the mean of a session; by advisor: sessions in which it was dropped at least once. The thesis prints none of this, and "
+    "proposes it as future work (section 10.2.4)."
 )
 WAYS_NOTE = (
-    "All are asked about each step, and one decision follows: majority, best-trusted or trust-weighted; in turn: one advisor an "
-    "episode. Between two advisors the three decisions are the same, since a tie goes to the more trusted. Best and worst "
-    "alone: that member of the panel, asked without a panel, whose sessions succeeded most and least often. Wrong: takes the "
-    "worst action for the best. World I, full view, CCRL with the world's own Lambda and Omega, which rejects a panel as one."
+    "All advisors are asked in each step, and one decision follows: majority, best-trusted or trust-weighted; in turn: one "
+    "advisor in each episode. Between two advisors the three decisions are the same, since the more trusted one decides a tie. "
+    "Best and worst alone: the member of the panel, asked without it, whose sessions succeeded most and least often. Wrong: an "
+    "advisor that takes the worst action for the best. World I, full view, CCRL with the world's own Lambda and Omega, which "
+    "rejects a panel as one advisor."
 )
-LIMITS = f"At most {MOST} sessions a setting: they are run in plain Python, a tenth of a second each."
+LIMITS = f"At most {MOST} sessions of a setting, as they are run in plain Python, a tenth of a second each."
 
 
 @dataclass(frozen=True)
 class PanelSetting:
-    """Who is asked and how: a row of DECISIONS or IN_TURN; way None: the first member alone, or nobody."""
+    """The advisors that are asked, and how: one of DECISIONS or IN_TURN; way None: the first member alone, or nobody."""
 
     members: tuple[str, ...]
     way: str | None
@@ -68,7 +68,7 @@ class PanelSetting:
 
 @dataclass(frozen=True, eq=False)
 class PanelOutcome:
-    """What N sessions came to, (N,) each; dropped: by member, how often; readmitted, disagreed: how often in all."""
+    """The results of N sessions, (N,) each. dropped: how often, by member; readmitted, disagreed: how often in all."""
 
     success: NDArray[np.bool_]
     helped_steps: NDArray[np.int64]
@@ -78,7 +78,7 @@ class PanelOutcome:
 
 
 def advisors(job: Job, reading: Mapping[str, Any]) -> Findings:
-    """Every panel by every way of deciding; the reading changes the lesson, as in chapter 9."""
+    """The results of every panel with every way to decide; the reading changes the lesson, as in chapter 9."""
     lesson = replace(AdviceSetting(WORLD, gate="ccrl"), **reading)
     alone = {name: PanelSetting((name,), None, lesson) for panel in PANELS for name in panel}
     nobody = PanelSetting((), None, lesson)
@@ -108,8 +108,8 @@ def _merit(outcome: PanelOutcome) -> tuple[float, float]:
 
 
 def tried(setting: PanelSetting, *, sessions: int, seed: int) -> PanelOutcome:
-    """So many sessions of a setting."""
-    seeds = seeds_of(replace(setting, way=None), sessions, seed)  # every way of a panel has the same chances
+    """The outcome of `sessions` sessions of a setting."""
+    seeds = seeds_of(replace(setting, way=None), sessions, seed)  # every way of a panel has the same seeds
     runs = [one_session(setting, int(own)) for own in seeds]
     events = [told for _, _, told in runs]
     names = sorted({event.advisor for told in events for event in told if isinstance(event, AdvisorDropped)})
@@ -133,7 +133,7 @@ def tried(setting: PanelSetting, *, sessions: int, seed: int) -> PanelOutcome:
 
 
 def one_session(setting: PanelSetting, seed: int) -> tuple[bool, int, list[Event]]:
-    """One session: whether its last episode took the shortest way, helped steps, and what the panel told."""
+    """One session: whether its last episode took the shortest path, its helped steps, and the panel's events."""
     lesson, mdp, told = setting.lesson, problem(setting.lesson.world), list[Event]()
     rng = np.random.default_rng(seed)
     streams = rng.spawn(len(setting.members) + 2)
@@ -163,7 +163,7 @@ def _advice(name: str, lesson: AdviceSetting) -> Advice:
 
 
 def rows_of(panel: Sequence[str], way: str, who: str, outcome: PanelOutcome) -> list[Row]:
-    """The measures of one panel and way; who: the member that was asked alone."""
+    """The measures of one panel and way; who: the member that was asked alone, or ""."""
     sessions = len(outcome.success)
     named: Row = {"table": "World I", "panel": ", ".join(panel) or None, "way": way, "asked": who or None}
     named = {name: value for name, value in named.items() if value is not None} | {"sessions": sessions}
@@ -182,7 +182,7 @@ def rows_of(panel: Sequence[str], way: str, who: str, outcome: PanelOutcome) -> 
 
 
 def names_in(panel: Sequence[str]) -> list[str]:
-    """What the members are called in the panel: "wrong", "wrong 2"."""
+    """The names of the members in the panel, such as "wrong" and "wrong 2"."""
     return [
         name if not panel[:n].count(name) else f"{name} {panel[:n].count(name) + 1}" for n, name in enumerate(panel)
     ]
@@ -197,7 +197,7 @@ def _value(rows: Sequence[Row], panel: Sequence[str], way: str, measure: str) ->
 
 
 def in_short(rows: Sequence[Row]) -> Row:
-    """Means over the panels, by way, and how often a panel is as good as its best member."""
+    """The means over the panels, by way, and the number of panels that are as good as their best member."""
     says: Row = {"nobody: SP [%]": round(_value(rows, (), "nobody", "SP_percent"), 1)}
     for way in WAYS:
         for measure, unit in (("SP_percent", "SP [%]"), ("HS_steps", "HS [steps]")):
@@ -213,6 +213,6 @@ def in_short(rows: Sequence[Row]) -> Row:
 
 
 def _picture(rows: Sequence[Row], measure: str, ylabel: str) -> bytes:
-    """Bars by panel, a bar for each way."""
+    """A picture with bars by panel, a bar for each way."""
     lines = {way: [_row(rows, panel, way, measure) for panel in PANELS] for way in WAYS}
     return bars([",\n".join(panel) for panel in PANELS], lines, ylabel)

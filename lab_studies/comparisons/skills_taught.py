@@ -1,4 +1,4 @@
-"""The skills of a scene found, adapted or learned one after another, as a run does, without its durations and its order."""
+"""The skills of a scene reused, fine-tuned or learned one after another, as in a run, but without durations and an order."""
 
 import time
 from collections.abc import Iterable, Mapping
@@ -21,7 +21,7 @@ Known = Mapping[Key, Policy]
 
 
 class Taught(NamedTuple):
-    """A lesson, and how long it took: as the clock has it, and on the processor, whatever else that does [s]."""
+    """A lesson, its time by the clock, and its time on the processor [s]."""
 
     lesson: Lesson
     wall_s: float
@@ -29,17 +29,17 @@ class Taught(NamedTuple):
 
 
 def key_of(problem: Problem) -> Key:
-    """What a policy of this problem is known by."""
+    """The key of a policy for this problem."""
     return problem.subtask, problem.mdp.signature
 
 
 def distinct(prepared: Prepared) -> list[Problem]:
-    """The problems of a scene, each once, under the skill that meets it first."""
+    """The different problems of a scene, each under the name of the skill that has it first."""
     return [*reversed({key_of(problem): problem for problem in reversed(prepared.problems.values())}.values())]
 
 
 def taught(prepared: Prepared, known: Known, problems: Iterable[Problem], seed: int = 0) -> list[Taught]:
-    """A lesson of a run for each problem; what one learns the next ones know."""
+    """A lesson for each problem, as in a run; later lessons know the policies of earlier ones."""
     lessons, so_far = [], KnownPolicies.of(known.values())
     with TemporaryDirectory() as folder:
         teacher = Teacher(Toolbox(Path(folder)), seed=seed, trial=trial_of(prepared))
@@ -52,12 +52,12 @@ def taught(prepared: Prepared, known: Known, problems: Iterable[Problem], seed: 
 
 
 def spent(lesson: Lesson) -> tuple[int, int]:
-    """Episodes and helped steps of a lesson; none where the skill was there."""
+    """The episodes and helped steps of a lesson; (0, 0) if the policy was reused."""
     return (0, 0) if lesson.result is None else (len(lesson.result.steps), lesson.result.helped_steps)
 
 
 def works(problem: Problem, policy: Policy) -> bool:
-    """Whether greedy steps lead to the goal from each start, gone one by one."""
+    """Whether the greedy path leads to the goal from each start."""
     mdp = problem.mdp
     if policy.q.shape != mdp.successor.shape:
         return False
@@ -65,6 +65,6 @@ def works(problem: Problem, policy: Policy) -> bool:
 
 
 def fails(prepared: Prepared, problem: Problem, policy: Policy) -> bool:
-    """Whether a policy misses the goal step by step, or fails when its skill is carried out in physics."""
+    """Whether a policy's greedy path misses the goal, or its skill fails in physics."""
     skill = prepared.skillset.skills[problem.name]
     return not works(problem, policy) or try_out(prepared, skill, policy) is not None

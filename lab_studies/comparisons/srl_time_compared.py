@@ -1,4 +1,4 @@
-"""srl-time beside every rival: how often it finds the optimum, how near it comes, in how many episodes and seconds."""
+"""srl-time compared with every rival: how often it finds the optimum, its gap, and its episodes and seconds."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
@@ -25,40 +25,40 @@ from lab_studies.comparisons.srl_time_sessions import (
 CASES = ("I", "II", "III")
 FEW = {3: (5, 15, 30, 60, 200), 4: (15, 50, 100, 400)}  # session lengths by number of toasts
 MANY, MANY_EPISODES = (10, 20, 30), (200, 1000)
-LONGEST_READABLE = 200  # episodes of SRL where its states are too many to be compiled
-READABLE_FROM = 30  # toasts
+LONGEST_READABLE = 200  # the most episodes of SRL that is not compiled
+READABLE_FROM = 30  # toasts from which SRL has too many states to be compiled
 ORDERS, MEANS_S, ORDER_EPISODES = ("RSR", "SSRSR", "RRSRR", "SRRSRRSS"), (100.0, 200.0), (50, 200, 1000)
 FACTORS = ("A", "B")
-EXACT_TO = 1e-9  # a gap below it, as a fraction, is rounding
+EXACT_TO = 1e-9  # a smaller gap, as a fraction, is due to rounding
 
 MEASURES = (
-    "SP: sessions whose best sequence is the optimum; final SP: sessions whose greedy policy at the end is. Gap: of the best "
-    "sequence above the proven optimum. All by the mean times. Nothing of this is printed in the thesis in this form."
+    "SP: sessions whose best sequence is optimal; final SP: sessions whose final greedy policy is optimal. Gap: how far the best "
+    "sequence is above the proven optimum. All times are means. The thesis prints none of this in this form."
 )
 METHODS = (
-    "srl A, srl B: fig. 5.1 with both reward factors (α .05, γ .9, β 1 for 3 toasts and .5 for more; in the FMS as App. III "
-    "has it: values per next state of the stations); mc: Monte Carlo averages; ga: a genetic algorithm "
-    "begun with the dispatching rules, each child improved. srl-time starts from a lower bound of the whole model, which the "
-    "learners that only see episodes do not have: the row without the bound is the one to set beside them. "
-    "fifo and the dispatching rules have one sequence each, exact and cp-sat prove theirs. A rule may do as well as any "
+    "srl A, srl B: fig. 5.1 with both reward factors (α .05, γ .9, β 1 for 3 toasts and .5 for more; in the FMS, as in "
+    "App. III, with values per next state of the stations); mc: Monte Carlo averages; ga: a genetic algorithm that begins "
+    "with the dispatching rules and improves each child. srl-time starts from a lower bound of the whole model, which learners "
+    "that see only episodes do not have; compare them with its row without the bound. "
+    "fifo and the dispatching rules have one sequence each, exact and cp-sat prove theirs. A rule may be as good as any "
     "learner: nearest-ready's sequences are optimal in case III."
 )
 WALLS = (
-    "Seconds are those of one session on one core, other processes of the study beside it; compiling is not counted. srl, mc "
-    "and random are compiled and run many sessions at once; ga is compiled, one session after the other; srl-time, the rules "
-    "and exact are plain Python. srl-time takes its lower bound's table into the count. exact proves the optimum of all these "
-    "jobs in less time than 200 episodes of srl-time take: a learner is of use where there is no such proof."
+    "Seconds are those of one session on one core, while other processes of the study run; compiling is not counted. srl, mc "
+    "and random are compiled and run many sessions at once; ga is compiled and runs one after another; srl-time, the rules "
+    "and exact are plain Python. srl-time's seconds include its table of lower bounds. exact proves the optimum of all these "
+    "jobs in less time than 200 episodes of srl-time take: a learner is useful where there is no such proof."
 )
 LIMITS = (
-    f"Sessions at most: {CAPS['few']['srl-time']} of srl-time, with and without the bound, with few toasts; with 10 and more "
-    f"{CAPS['many']['srl-time']}, and {CAPS['many'][COMPILED]} of the compiled ones; in the FMS {CAPS['order']['srl-time']} "
-    f"and {CAPS['order'][COMPILED]}. SRL with {READABLE_FROM} toasts has "
-    f"more states than 63 bits count and is not compiled: {CAPS['many'][READABLE]} sessions of {LONGEST_READABLE} episodes."
+    f"Most sessions: {CAPS['few']['srl-time']} of srl-time, with and without the bound, with few toasts; with 10 and more "
+    f"{CAPS['many']['srl-time']}, and {CAPS['many'][COMPILED]} of the compiled methods; in the FMS {CAPS['order']['srl-time']} "
+    f"and {CAPS['order'][COMPILED]}. SRL with {READABLE_FROM} toasts has more states than 63 bits can number and is not "
+    f"compiled: {CAPS['many'][READABLE]} sessions of {LONGEST_READABLE} episodes."
 )
 
 
 def srl_time_study(job: Job, reading: Mapping[str, Any]) -> Findings:
-    """Toasts, few and many, and orders of the FMS, by every method. The reading changes nothing here."""
+    """The results of every method with few and many toasts, and with orders of the FMS; the reading has no effect."""
     works = works_of()
     settings = [setting for work in works for setting in settings_of(work)]
     longest_first = sorted(settings, key=lambda setting: -(setting.work.cell.parts * (setting.episodes or 0)))
@@ -74,13 +74,13 @@ def srl_time_study(job: Job, reading: Mapping[str, Any]) -> Findings:
 
 
 def works_of() -> list[Instance]:
-    """All that is sequenced."""
+    """All instances."""
     toasts = [Instance(case, number) for number, case in product((*FEW, *MANY), CASES)]
     return toasts + [Instance(order=order, interval_s=mean_s) for order, mean_s in product(ORDERS, MEANS_S)]
 
 
 def settings_of(work: Instance) -> list[MethodSetting]:
-    """Every method with this work, at every session length."""
+    """Every method with an instance, at every session length."""
     lengths = ORDER_EPISODES if work.order is not None else FEW.get(work.toasts or 0, MANY_EPISODES)
     settings = []
     for method in LEARNING:
@@ -130,7 +130,7 @@ def _described(setting: MethodSetting, sessions: int) -> Row:
 
 
 def in_short(rows: Sequence[Row]) -> Row:
-    """The worst cells of srl-time, and the mean gaps of all methods in the longest sessions, by kind of work."""
+    """The least success of srl-time, and the mean gaps of all methods in the longest sessions, by table."""
     says: Row = {}
     for table, longest in _longest(those(rows, method="srl-time")):
         of = those(rows, method="srl-time", table=table, measure="SP_percent", episodes=longest)

@@ -20,7 +20,7 @@ LOOKS: dict[tuple[str, str | None], Look] = {  # by method and reward factor
     ("random", None): (GREY, "v", "random search"),
     ("ga", None): (PURPLE, "X", "genetic"),
 }
-SINGLE: dict[str, Look] = {  # one sequence, no episodes
+SINGLE: dict[str, Look] = {  # methods with one sequence and no episodes
     "fifo": (INK, "P", "FIFO"),
     "nearest-ready": (SKY, "<", "nearest-ready"),
     "shortest-move": (SKY, ">", "shortest-move"),
@@ -32,7 +32,7 @@ PANEL_INCH = 2.9, 2.5
 
 
 def by_episodes(rows: Sequence[Row], measure: str) -> bytes:
-    """A percentage by session length, a plot for each case and number of few toasts."""
+    """A picture of a percentage by session length, a plot for each case and small number of toasts."""
     of = [row for row in those(rows, measure=measure) if "episodes" in row and "case" in row]
     counts = sorted({row["toasts"] for row in of if row["toasts"] <= 4})
     cases = sorted({row["case"] for row in of})
@@ -47,7 +47,7 @@ def by_episodes(rows: Sequence[Row], measure: str) -> bytes:
 
 
 def of_orders(rows: Sequence[Row]) -> bytes:
-    """The gap by session length for each order and interval of the FMS; methods with one sequence as lines across."""
+    """A picture of the gap by session length for each order and interval of the FMS; horizontal lines: single sequences."""
     of = [row for row in those(rows, measure="gap_percent") if "order" in row]
     means = sorted({row["interval_s"] for row in of})
     orders = list(dict.fromkeys(row["order"] for row in of))
@@ -67,7 +67,7 @@ def of_orders(rows: Sequence[Row]) -> bytes:
 
 
 def by_wall_time(rows: Sequence[Row]) -> bytes:
-    """The gap by the seconds of a session for many toasts: a line for each case and method, a mark for one sequence."""
+    """A picture of the gap by the seconds of a session for many toasts: a line for each case and method."""
     of = [row for row in rows if row.get("toasts", 0) > 4]
     counts = sorted({row["toasts"] for row in of})
     panels = {f"{count} toasts": those(of, toasts=count) for count in counts}
@@ -88,7 +88,7 @@ def by_wall_time(rows: Sequence[Row]) -> bytes:
 
 
 def _grid(panels: Mapping[str, Sequence[Row]], columns: int, draw: Any, ylabel: str, tall: float = 1.0) -> bytes:
-    """A plot for each of the panels, title -> rows, row by row, and one legend below."""
+    """A picture with a plot for each of the panels, title -> rows, and one legend below."""
     lines = -(-len(panels) // columns)
 
     def whole(figure: "Figure") -> None:
@@ -105,7 +105,7 @@ def _grid(panels: Mapping[str, Sequence[Row]], columns: int, draw: Any, ylabel: 
 
 
 def _curves(axes: "Axes", rows: Sequence[Row]) -> None:
-    """The methods that learn by session length: the lengths themselves are the ticks of a logarithmic axis."""
+    """Draw the methods that learn by session length, on a logarithmic axis with the lengths as ticks."""
     tried = [row for row in rows if "episodes" in row]
     for (method, factor), look in LOOKS.items():
         if of := those(tried, method=method, reward_factor=factor):

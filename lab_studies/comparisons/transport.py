@@ -1,4 +1,4 @@
-"""Orders of work on the instances that the field measures itself with: every method beside the best known and the printed."""
+"""Orders of work on the field's benchmark instances: every method compared with the best known and the published values."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -19,35 +19,35 @@ from lab_studies.comparisons.transport_instances import Instance, board, cell_fi
 SECONDS = 10.0
 Board = Mapping[Entry, Found]
 MEASURES = (
-    "Costs are makespans (of a cyclic order: the period) in the instance's unit of time. Best: the least that anything on this "
-    "board found, or that is printed. Gap: above the best. Bound: the highest that anything on this board proved; an order "
-    "that reaches it is an optimum, proven; without a proof, a printed figure or a prover beside it, the best may be far from "
-    "that. Seconds: when a method found the last of its improvements. One seed each. JobShopLab's vehicles set out for a job "
-    "only when the operation before has begun; here they may set out earlier, so that its PPO's schedules are allowed here, "
-    "and those here not always there."
+    "Costs are makespans (for a cyclic order, the period) in the instance's unit of time. Best: the lowest cost that anything on "
+    "this board found or that is published. Gap: above the best. Bound: the highest that anything on this board proved; an "
+    "order that reaches it is a proven optimum. Without a proof, a published value or a proving method the best may be far from "
+    "optimal. Seconds: the time of a method's last improvement. One seed each. JobShopLab's vehicles set out for a job only when "
+    "the operation before has begun; here they may set out earlier, so that its PPO's schedules are allowed here, but those "
+    "from here not always there."
 )
 TIMES = (
-    "Each method has {seconds:g} s an instance, by the clock of this machine, other entries of the study beside it: with more "
-    "time, or alone, each finds more. Methods that try sequences begin again with ever longer sessions until the time is over; "
-    "compiling does not count, building CP-SAT's model does not either. Rules have one sequence. CP-SAT has six threads."
+    "Each method has {seconds:g} s for an instance, by the clock, while other entries of the study run: with more time, or "
+    "alone, each finds more. Methods that try sequences start ever longer sessions until the time is over; neither compiling "
+    "nor building CP-SAT's model counts. Rules have one sequence. CP-SAT has six threads."
 )
 LEARNERS = (
-    "srl and mc learn from the costs of whole sequences alone; srl-time is given a lower bound of the whole cell besides, and "
-    "takes cells with one robot only. srl-improved learns from sequences that a short annealing has improved, so that much of "
-    "what it finds is that search's. anneal, ga and random search learn nothing; exact, cp-sat and portfolio know the "
-    "cell's model."
+    "srl and mc learn from the costs of whole sequences alone; srl-time also has a lower bound of the whole cell, and takes only "
+    "cells with one robot. srl-improved learns from sequences that a short annealing has improved, to which it owes much of its "
+    "result. anneal, ga and random search learn nothing; exact, cp-sat and portfolio know the cell's model."
 )
 CHECKED = (
-    "--verify holds each kept schedule against its instance with a checker that shares no code with the simulators or the "
+    "--verify checks each kept schedule against its instance with a checker that shares no code with the simulators or the "
     "methods (lab_studies/comparisons/schedule_checker.py): every operation in its turn, on its machine, long enough, no "
-    "machine, place or robot in two places at once, and the end as it is claimed. Of the cyclic order it is shown {shown} parts."
+    "machine, place or robot used twice at a time, and the claimed end. Of a cyclic order it checks {shown} parts."
 )
 
 
 def transport(job: Job, reading: Mapping[str, Any]) -> Findings:
-    """Every method on every instance; reading: "seconds" a method, "methods", "instances" of one's own instead, "verify".
+    """The results of every method on every instance.
 
-    Raises BadInput for an unknown method and for instances that cannot be read, WorkFailed where a schedule is found wrong.
+    reading: "seconds" for each method, "methods", the user's "instances" in place of all, and "verify". Raises BadInput for an
+    unknown method and for instances that cannot be read, WorkFailed if "verify" finds a wrong schedule.
     """
     seconds = float(reading.get("seconds", SECONDS))
     instances = own(reading["instances"]) if "instances" in reading else board()
@@ -72,7 +72,7 @@ def transport(job: Job, reading: Mapping[str, Any]) -> Findings:
 
 
 def entries_of(instances: Sequence[Instance], methods: Sequence[str], seconds: float, seed: int) -> list[Entry]:
-    """Every method that is asked for (none: all) on every instance that it may be tried on."""
+    """The entries of the methods that are asked for (none: all) on every instance that they may be tried on."""
     known = dict.fromkeys(method for instance in instances for method in methods_for(instance))
     for name in methods:
         if name not in known:
@@ -86,12 +86,14 @@ def entries_of(instances: Sequence[Instance], methods: Sequence[str], seconds: f
 
 
 def measured(job: Job, entries: Sequence[Entry]) -> dict[Entry, Found]:
-    """What came of every entry; those that the job's folder holds are read, the others are measured and kept there."""
+    """The result of every entry; the job's folder keeps them."""
     names = {_key(entry): entry for entry in entries}
     done: dict[Entry, Found] = job.kept_as(lambda line: (names[line["entry"]], Found.of_json(line["found"])))
     left = [entry for entry in entries if entry not in done]
     job.progress(len(done), len(entries))
-    for entry, result in job.computed(carried_out, left, most=1):  # seconds each: a kill loses one a process
+    for entry, result in job.computed(
+        carried_out, left, most=1
+    ):  # entries take seconds: a kill loses one in each process
         done[entry] = result
         job.keep({"entry": _key(entry), "found": asdict(result)})
         job.progress(len(done), len(entries))
@@ -103,7 +105,7 @@ def _key(entry: Entry) -> str:
 
 
 def verified(results: Board) -> str:
-    """How many kept schedules the checker holds right, of how many; WorkFailed names the first that are not."""
+    """The number of schedules that the checker finds right, such as "12 of 12". Raises WorkFailed if any is wrong."""
     wrong, right = list[str](), 0
     for entry, result in results.items():
         if result.cost is None:
@@ -120,7 +122,7 @@ def verified(results: Board) -> str:
 
 
 def faults_of(entry: Entry, result: Found) -> list[str]:
-    """What the checker finds wrong with a kept schedule, and with the cost that is claimed for it."""
+    """The faults that the checker finds in a kept schedule and in its claimed cost."""
     plain = cell_file(entry.instance).model_dump()
     if entry.method == CYCLIC:
         names = list(dict.fromkeys(plain["order"] or [product["name"] for product in plain["products"]]))
@@ -140,11 +142,11 @@ def faults_of(entry: Entry, result: Found) -> list[str]:
         return [f"it cannot be read: {type(error).__name__}: {error}"]
 
 
-# ---- what is told of it ------------------------------------------------------------------------------------------------
+# ---- rows --------------------------------------------------------------------------------------------------------------
 
 
 def by_instance(results: Board) -> dict[Instance, dict[str, Found]]:
-    """What each method found, instance by instance."""
+    """The results by instance and method."""
     return {
         instance: {entry.method: results[entry] for entry in of}
         for instance, of in groupby(results, key=lambda entry: entry.instance)
@@ -152,17 +154,17 @@ def by_instance(results: Board) -> dict[Instance, dict[str, Found]]:
 
 
 def least(instance: Instance, of: Mapping[str, Found]) -> float:
-    """The least cost that is known of an instance; infinite where nothing is."""
+    """The least known cost of an instance, inf if none is known."""
     return min([result.cost for result in of.values() if result.cost is not None] + [instance.printed or inf])
 
 
 def highest(of: Mapping[str, Found]) -> tuple[float, str]:
-    """The highest bound, and whose it is; 0 by nobody."""
+    """The highest bound and the method that proved it; 0 and "" without one."""
     return max(((result.bound, result.bound_by) for result in of.values()), key=lambda pair: pair[0], default=(0.0, ""))
 
 
 def rows_of(instance: Instance, of: Mapping[str, Found]) -> list[Row]:
-    """A line a method: what it found, how far that is from the best known, and what is proven."""
+    """The rows of each method on an instance: its cost, its gap to the best known, and what is proven."""
     best, (bound, by) = least(instance, of), highest(of)
     rows: list[Row] = []
     for method, result in of.items():
@@ -186,7 +188,7 @@ def rows_of(instance: Instance, of: Mapping[str, Found]) -> list[Row]:
 
 
 def gaps_of(results: Board) -> dict[str, list[float]]:
-    """By method, the gaps [%] to the best known of the instances that it took."""
+    """By method, the gaps [%] to the best known costs of the instances that it solved."""
     gaps = dict[str, list[float]]()
     for instance, of in by_instance(results).items():
         for method, result in of.items():
@@ -196,7 +198,7 @@ def gaps_of(results: Board) -> dict[str, list[float]]:
 
 
 def in_all(results: Board) -> list[Row]:
-    """A line a method and family: its mean and worst gap, how often it found the best known, and how often it proved one."""
+    """The rows of each method and family: its mean and worst gap, and how often it found the best known and proved one."""
     rows: list[Row] = []
     families = dict.fromkeys(entry.instance.family for entry in results)
     for family in families:
@@ -222,7 +224,7 @@ def in_all(results: Board) -> list[Row]:
 
 
 def in_short(results: Board) -> Row:
-    """How many instances there are, how many optima are proven, and how the best compare with what is printed."""
+    """The number of instances, of proven optima, and of costs as published or better."""
     boards = by_instance(results)
     told: Row = {"instances": len(boards), "entries": len(results)}
     proven = [instance for instance, of in boards.items() if least(instance, of) <= highest(of)[0] + SAME]

@@ -1,4 +1,4 @@
-"""One entry of the board: a method on an instance for so many seconds, what it finds when, and its schedule as plain rows."""
+"""One entry of the board: a method on an instance for some seconds, its improvements by time, and its schedule as plain rows."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
@@ -17,21 +17,21 @@ from lab.studies.runner import record_of
 from lab_studies.comparisons.transport_instances import Instance, cell_of
 
 CYCLIC = "cyclic"
-FIRST, GROWS, SHARE = (
-    50,
+FIRST = 50  # episodes of the first session
+GROWS, SHARE = (
     10.0,
     0.9,
-)  # episodes of a first session, how much longer the next may be, of the time that is left
-CP_SAT_WORKERS = 6  # threads that look in different ways, also on two cores
-CYCLES_SHOWN = 12  # parts of a cyclic order that the checker is shown
-KEPT = ("part", "operation", "station", "target", "robot", "start_s", "end_s")  # of a schedule's rows
+)  # a session may be so many times longer than the one before, and take this share of the time left
+CP_SAT_WORKERS = 6  # threads with different searches, also on two cores
+CYCLES_SHOWN = 12  # parts of a cyclic order in its schedule
+KEPT = ("part", "operation", "station", "target", "robot", "start_s", "end_s")  # the fields of a schedule's rows
 
-Proof = tuple[tuple[int, ...], str, float, str]  # a sequence, by whom; a bound, by whom
+Proof = tuple[tuple[int, ...], str, float, str]  # a sequence and who found it; a bound and who proved it
 
 
 @dataclass(frozen=True)
 class Entry:
-    """What is measured: a method on an instance, for so long [s], with a seed."""
+    """A method on an instance, its time [s], and its seed."""
 
     instance: Instance
     method: str
@@ -41,10 +41,10 @@ class Entry:
 
 @dataclass(frozen=True)
 class Found:
-    """What came of it, in the instance's unit of time. trace: (seconds, cost), each better than the one before.
+    """The result of an entry, in the instance's unit of time. trace: (seconds, cost) of each improvement.
 
-    refused: why the method takes no such cell, or found nothing. schedule: rows by KEPT of an order that ends at `ends_s`; a
-    cyclic order's cost is its period, and its schedule that of CYCLES_SHOWN parts.
+    refused: why the method does not take the cell or found nothing, else "". schedule: rows with the fields KEPT of an order
+    that ends at `ends_s`; a cyclic order's cost is its period, and its schedule has CYCLES_SHOWN parts.
     """
 
     cost: float | None = None
@@ -60,7 +60,7 @@ class Found:
 
     @classmethod
     def of_json(cls, kept: Mapping[str, Any]) -> "Found":
-        """As it was kept. Raises ValueError for what is something else."""
+        """The result that was kept as JSON. Raises ValueError for anything else."""
         return record_of(cls, kept)
 
 
@@ -70,7 +70,7 @@ def methods_for(instance: Instance) -> tuple[str, ...]:
 
 
 def carried_out(entry: Entry) -> Found:
-    """One entry; what a method does not take is told in `refused`."""
+    """The result of one entry; if its method does not take the cell, `refused` says why."""
     try:
         cell = cell_of(entry.instance)
         if entry.method == CYCLIC:
@@ -83,12 +83,12 @@ def carried_out(entry: Entry) -> Found:
 
 
 class _Over(Exception):
-    """The time is over."""
+    """Raised when the time is over."""
 
 
 @dataclass
 class _Watch:
-    """Hears every episode; raises _Over after so many seconds."""
+    """A listener that records improvements, and raises _Over after so many seconds."""
 
     seconds: float
     began_s: float = field(default_factory=perf_counter)
@@ -110,7 +110,7 @@ class _Watch:
 
 
 def _by_episodes(entry: Entry, cell: Cell) -> Found:
-    """Sessions that grow until the time is over; compiling, in a first one of one episode, does not count."""
+    """The result of ever longer sessions until the time is over; compiling, in a first episode, does not count."""
     find_sequence(cell, entry.method, Search(1), entry.seed)
     watch, episodes, session = _Watch(entry.seconds), FIRST, 1
     try:
@@ -139,7 +139,7 @@ def _proven(entry: Entry, cell: Cell, prove: "Callable[[Entry, Cell], Proof]") -
 
 
 def _measured(cell: Cell, sequence: tuple[int, ...], result: Found) -> Found:
-    """With the cost of the sequence, and its schedule as rows."""
+    """The result with the cost of the sequence and its schedule."""
     if not sequence:
         return replace(result, refused=result.refused or "no order was found in its time")
     return replace(_with_schedule(cell, simulate(cell, sequence), result), cost=follow(cell, sequence).end_s)

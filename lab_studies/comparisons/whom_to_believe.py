@@ -1,4 +1,4 @@
-"""Whom to believe: advisors of known reliability ranked by a panel, and limited advisors together beside one and nobody."""
+"""Whom to believe: advisors of known reliability ranked by a panel, and three limited advisors compared with one and nobody."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -22,23 +22,23 @@ from lab.studies.runner import Job, seeds_of
 from lab_studies.comparisons.advice_bench.problems import problem
 
 PROBLEMS = ("world-1", "world-2", "insert", "transfer")
-RELIABILITIES = (0.0, 0.1, 0.25, 0.5, 0.75, 0.9, 1.0)  # CLUE's full panel
+RELIABILITIES = (0.0, 0.1, 0.25, 0.5, 0.75, 0.9, 1.0)  # those of CLUE's full panel
 RANKED, LIMITED = "ranked", "limited"
 EARNED = "earned-trust"
 GATES = ("always", "ccrl", EARNED)
 BEST_IN_A_STATE = 1e-9  # values that differ by less are equally good
 MEASURES = (
-    "Ranked: seven advisors whose answers are right (among the best actions) in 0 to 100 % of the cases, else wrong, all asked "
-    "about each question; ranking_right_percent: sessions in which the panel's trust has all seven in their order at "
-    "the end. In CLUE's setting every step is asked about: gate always. It is a session of many steps here, a decision of one "
-    "step there. Limited: one advisor of tau 0.3, or three as a panel; points as in AdviceBench: 100 the best policy, 0 "
-    "failure, means over all episodes; gain_points: over nobody, both with the same seeds, with a 95 % interval."
+    "Ranked: seven advisors whose answers are right (among the best actions) in 0 to 100 % of the cases, else wrong; all answer "
+    "each question. ranking_right_percent: sessions in which the panel's final trust ranks all seven rightly. In CLUE's setting "
+    "every step is asked about, as with the gate always; a session has many steps here, but one decision there. Limited: one "
+    "advisor of tau 0.3, or three as a panel; points as in AdviceBench: 100 is the best policy, 0 failure, means over all "
+    "episodes; gain_points: points above nobody's with the same seeds, with a 95 % interval."
 )
 
 
 @dataclass(frozen=True)
 class Setting:
-    """Who is asked in a problem, and when: kind RANKED or LIMITED, so many members, how a panel decides."""
+    """The advisors in a problem, and when they are asked: kind RANKED or LIMITED, their number, how a panel decides."""
 
     problem: str
     kind: str
@@ -48,7 +48,7 @@ class Setting:
 
 
 class Told(NamedTuple):
-    """What N sessions came to: points (N,), answers (N,), the panel's trusts (N, members)."""
+    """The results of N sessions: points (N,), answers (N,), and the panel's final trusts (N, members)."""
 
     points: FloatArray
     answers: FloatArray
@@ -56,7 +56,7 @@ class Told(NamedTuple):
 
 
 def settings() -> list[Setting]:
-    """All that is run; none asked: nobody."""
+    """All settings; those with 0 members have nobody to ask."""
     every = [Setting(name, LIMITED, "never", 0) for name in PROBLEMS]
     every += [Setting(name, LIMITED, gate, 1) for name in PROBLEMS for gate in GATES]
     every += [Setting(name, LIMITED, gate, 3, decide) for name in PROBLEMS for gate in GATES for decide in DECISIONS]
@@ -64,7 +64,7 @@ def settings() -> list[Setting]:
 
 
 def reliable(values: FloatArray, share: float) -> FloatArray:
-    """The chances (S, A) of an advisor that is right in a share of the cases, each right or wrong action alike."""
+    """The chances (S, A) of the answers of an advisor that is right in `share` of the cases; right ones are equally likely."""
     best = values >= values.max(axis=1, keepdims=True) - BEST_IN_A_STATE
     count, actions = best.sum(axis=1, keepdims=True), values.shape[1]
     chances = np.where(best, share / count, (1.0 - share) / np.maximum(actions - count, 1))
@@ -73,14 +73,14 @@ def reliable(values: FloatArray, share: float) -> FloatArray:
 
 
 def sessions_of(setting: Setting, sessions: int, seed: int) -> Told:
-    """So many sessions of a setting."""
-    seeds = seeds_of(Setting(setting.problem, LIMITED, "never", 0), sessions, seed)  # each with the same chances
-    runs = [_one(setting, int(own)) for own in seeds]
+    """The results of `sessions` sessions of a setting."""
+    seeds = seeds_of(Setting(setting.problem, LIMITED, "never", 0), sessions, seed)  # all settings have the same seeds
+    runs = [_session(setting, int(own)) for own in seeds]
     return Told(*(np.array([outcome[n] for outcome in runs]) for n in range(3)))
 
 
-def _one(setting: Setting, seed: int) -> tuple[float, float, list[float]]:
-    """Points, answers and trusts of a session."""
+def _session(setting: Setting, seed: int) -> tuple[float, float, list[float]]:
+    """The points, answers and trusts of a session."""
     place = problem(setting.problem)
     rng = np.random.default_rng(seed)
     streams = rng.spawn(setting.members + 2)
@@ -108,7 +108,7 @@ def _one(setting: Setting, seed: int) -> tuple[float, float, list[float]]:
 
 
 def whom_to_believe(job: Job, reading: Mapping[str, Any]) -> Findings:
-    """Every setting; nothing is read."""
+    """The results of every setting; the reading has no effect."""
     outcomes = job.each(partial(sessions_of, sessions=job.sessions, seed=job.seed), settings())
     rows = [result for setting, told in outcomes.items() for result in rows_of(setting, told, outcomes)]
     right = [_row(rows, name, RANKED, "always") for name in PROBLEMS]
@@ -128,7 +128,7 @@ def whom_to_believe(job: Job, reading: Mapping[str, Any]) -> Findings:
             for result in gains[f"{EARNED}, three"]
         ),
     }
-    pictures = {"Points of limited advisors": bars(PROBLEMS, _lifted(gains, rows), "points", label="")}
+    pictures = {"Points of limited advisors": bars(PROBLEMS, _points_of(gains, rows), "points", label="")}
     return Findings(rows, says, pictures, (MEASURES,))
 
 
@@ -153,8 +153,8 @@ def _row(rows: Sequence[Row], name: str, kind: str, gate: str, **more: Any) -> R
     return those(rows, problem=name, advisors=kind, gate=gate, measure=measure, **more)[0]
 
 
-def _lifted(gains: Mapping[str, Sequence[Row]], rows: Sequence[Row]) -> dict[str, list[Row]]:
-    """Points in place of gains, with nobody's beside them: bars begin at 0."""
+def _points_of(gains: Mapping[str, Sequence[Row]], rows: Sequence[Row]) -> dict[str, list[Row]]:
+    """The rows of points that belong to rows of gains, and nobody's, as bars begin at 0."""
     shown = {"nobody": [those(rows, problem=name, gate="never", measure="points")[0] for name in PROBLEMS]}
     for words, of in gains.items():
         same = ({key: result[key] for key in ("problem", "advisors", "gate", "members", "decide")} for result in of)
