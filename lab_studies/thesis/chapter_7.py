@@ -1,4 +1,4 @@
-"""The studies of chapter 7: which cells and pictures belong together, and what is to be said about them."""
+"""The studies of chapter 7: their cells, pictures and notes."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -34,42 +34,44 @@ SIGNIFICANT = 0.05
 EXAMPLE = "F = 93.8, srl B 72.5 %, random 68.8 %, mc 49.9 %"
 
 SYMBOLS = (
-    "SP: sessions that find the optimum; BR: mean best time of a session, where processing times are drawn (10 %); CE: the "
-    "first episode from which on the time stays the same; final: sessions whose last episode takes the optimum's time. "
+    "SP: sessions that find the optimum; BR: the mean best time of a session with random processing times (10 %); CE: the "
+    "first episode from which the time stays the same; final: sessions whose last episode takes the optimum's time. "
     "β: episode n explores with probability 1/n^β. srl A, srl B: SRL with a reward factor of type A, type B; mc: Monte Carlo."
 )
 READ_AS = (
-    "The reading 'listing' is what the listings of App. VI do, and other than fig. 5.1: values are kept per next state; the "
-    "robot may choose a next state to which the toast cannot go now, or a toast that has to stay; Monte Carlo keeps what the "
-    "last episode gave instead of an average. SRL's printed lead over Monte Carlo and random search rests on that: see the "
-    "study readings-7. Fig. 5.1 as printed is what lab sequence has as srl."
+    "The reading 'listing' does what the listings of App. VI do, which differs from fig. 5.1: values are kept per next state; "
+    "the robot may choose a next state to which the toast cannot go now, or a toast that has to stay; Monte Carlo keeps the "
+    "value of the last episode instead of an average. SRL's printed lead over Monte Carlo and random search is due to that: "
+    "see the study readings-7. Fig. 5.1 as printed is the method srl of lab sequence."
 )
 HOW_MANY = (
     "The thesis ran 10 replications of 100 sessions for three toasts, of 30 for four, and 100 sessions for table IV.1. Here "
-    "the sessions of a cell are split into ten replications, too. 'off by': the mean distance from print, beside what the "
-    "sampling errors of both would make it if the reading were exact; times of 15 % off count as inside, so it says more."
+    "the sessions of a cell are split into ten replications, too. 'off by': the mean distance from the printed values, and in "
+    "brackets its expectation from the sampling errors of both if the reading were exact; as times that are 15 % off count as "
+    "agreeing, this distance says more."
 )
 SHADED = (
     "Ranks are Tukey's (95 %) among the methods at one session length, after an F-test; shaded: significantly better than "
-    "another one, as the printed tables mark in grey."
+    "another method, as in the grey cells of the printed tables."
 )
 FACTORS = (
-    "Type A is 1 / (T - T* + a) + b: for three toasts with the listing's a = 5 s and b = .8; for four toasts none is printed, "
+    "Type A is 1 / (T - T* + a) + b: for three toasts with the listing's a = 5 s and b = .8; for four toasts none are printed, "
     "and a = 10 s, b = .95 were chosen because they come nearest to table IV.2. In case III the printed times of type A with "
-    "three toasts come out as random search's, not SRL's: probably a wrong row in the thesis."
+    "three toasts are those of random search here, not SRL's, which is probably a wrong row in the thesis."
 )
 DISTANCES = (
-    "Case I, times not drawn: 'off' is the mean distance from print over the session lengths of one line of tables 7.4 and "
-    "IV.2, in points of SP; 'chance' what it would be by the sampling errors alone. In fig. 5.1 no state is banned, either."
+    "Case I with certain times: 'off' is the mean distance from the printed values over the session lengths of one line of "
+    "tables 7.4 and IV.2, in points of SP; 'chance' is its expectation from the sampling errors alone. In fig. 5.1 no state is "
+    "banned, either."
 )
 DECAY = (
-    "The thesis does not say which reward factor table IV.1 has. Type A comes out; with type B practically every session finds "
-    "the optimum at every β, but with β = 1 many do not end with it."
+    "The thesis does not say which reward factor table IV.1 has. Type A gives its values; with type B practically every session "
+    "finds the optimum at every β, but with β = 1 many do not end with it."
 )
 
 
 def best_results(job: Job, changes: Changes, case: str) -> Findings:
-    """One of the tables 7.4-7.6: three methods by session length in a case."""
+    """The results of one of the tables 7.4-7.6: three methods by session length in a case."""
     cells = _of_case(_changed(printed(SESSION_LENGTHS), changes), case)
     table = TABLES[case]
     rows, comparisons = _compared(Measured(job, [cell.setting for cell in cells]), cells, table)
@@ -79,14 +81,14 @@ def best_results(job: Job, changes: Changes, case: str) -> Findings:
 
 
 def table_iv_1(job: Job, changes: Changes) -> Findings:
-    """Table IV.1 and fig. 7.5: beta."""
+    """The results of table IV.1 and fig. 7.5, by beta."""
     rows = _decay_rows(Measured(job, _decay_settings(changes)), changes)
     pictures = {"Figure 7.5: SP and CE by beta": figures.by_beta(rows)}
     return _findings(rows, job, pictures, (SYMBOLS, READ_AS, DECAY, SAYS_7, HOW_MANY))
 
 
 def table_iv_2(job: Job, changes: Changes) -> Findings:
-    """Table IV.2 and figs. 7.7 and 7.8: reward factors."""
+    """The results of table IV.2 and figs. 7.7 and 7.8, by reward factor."""
     cells = _changed([cell for cell in printed(SESSION_LENGTHS) if cell.setting.method == "srl"], changes)
     rows, _ = _compared(Measured(job, [cell.setting for cell in cells]), cells, FACTOR_TABLE)
     pictures = figures.lengths(rows, {name: figures.COMPARED[name] for name in figures.OF_FACTORS})
@@ -94,7 +96,7 @@ def table_iv_2(job: Job, changes: Changes) -> Findings:
 
 
 def chapter_7(job: Job, changes: Changes) -> Findings:
-    """All tables and figures 7.3 to 7.12 and IV.1 to IV.3; each cell is measured once."""
+    """The results of all tables and of figures 7.3 to 7.12 and IV.1 to IV.3; each cell is measured once."""
     cells = _changed(printed(SESSION_LENGTHS), changes)
     measured = Measured(job, [*(cell.setting for cell in cells), *_decay_settings(changes)])
     rows = _decay_rows(measured, changes)
@@ -109,7 +111,7 @@ def chapter_7(job: Job, changes: Changes) -> Findings:
 
 
 def readings(job: Job, changes: Changes) -> Findings:
-    """Case I's success percentages of tables 7.4 and IV.2 under several readings of what SRL and Monte Carlo do."""
+    """The success percentages of case I in tables 7.4 and IV.2 under several readings of SRL and Monte Carlo."""
     shown = [cell for cell in printed(SESSION_LENGTHS) if cell.measure == "SP_percent" and cell.setting.case == "I"]
     asked = [cell for name in READINGS for cell in _changed(shown, {**changes, "reading": name})]
     measured = Measured(job, [cell.setting for cell in asked])
@@ -146,7 +148,7 @@ def _decay_settings(changes: Changes) -> list[SequencingSetting]:
 
 
 def _decay_rows(measured: Measured, changes: Changes) -> list[Row]:
-    """Table IV.1, and the same with type B, for which nothing is printed; both with the sessions that end optimal."""
+    """The rows of table IV.1, and the same with type B, which is not printed; both with the sessions that end optimal."""
     rows = []
     for factor in ("A", "B"):
         for cell in _changed(printed(DECAY_FACTORS), changes):
@@ -158,7 +160,7 @@ def _decay_rows(measured: Measured, changes: Changes) -> list[Row]:
 
 
 def _compared(measured: Measured, cells: Sequence[PrintedFigure], table: str) -> tuple[list[Row], Comparisons]:
-    """The rows of these cells with their ranks at each session length, then the tests behind these; the comparisons."""
+    """The rows of these cells with their ranks at each session length, then those of the tests; and the comparisons."""
     groups: dict[SequencingSetting, list[SequencingSetting]] = {}
     for cell in cells:
         groups.setdefault(_length(cell.setting), []).append(cell.setting)
@@ -174,30 +176,30 @@ def _compared(measured: Measured, cells: Sequence[PrintedFigure], table: str) ->
 
 
 def _length(setting: SequencingSetting) -> SequencingSetting:
-    """What those that are compared have in common."""
+    """What the settings that are compared have in common."""
     return replace(setting, method="", reward_factor=None, beta=None)
 
 
 def _tests(table: str, same: SequencingSetting, comparison: Comparison) -> list[Row]:
-    """The p values behind the ranks at one session length (Appendix II)."""
+    """The rows of the p values behind the ranks at one session length (Appendix II)."""
     named = {"table": table} | {name: value for name, value in describe(same).items() if name != "method"}
     pairs = [({**named, "method": f"{first} - {second}"}, p) for (first, second), p in comparison.tukey.items()]
     return [row(named, "ANOVA_p", comparison.p), *(row(pair, "Tukey_p", p) for pair, p in pairs)]
 
 
 def _assumptions(comparisons: Sequence[Comparison]) -> str:
-    """How many comparisons do not meet what the F-test assumes (Appendix II)."""
+    """The sentence on the comparisons that do not meet the assumptions of the F-test (Appendix II)."""
     unequal = sum(comparison.levene < SIGNIFICANT for comparison in comparisons)
     tested = [p for comparison in comparisons for p in comparison.normality.values() if p is not None]
     skewed = sum(p < SIGNIFICANT for p in tested)
     return (
-        f"What the F-test assumes, tested as in Appendix II: Levene's test finds unequal variances in {unequal} of "
+        f"The assumptions of the F-test, tested as in Appendix II: Levene's test finds unequal variances in {unequal} of "
         f"{len(comparisons)} comparisons, the Kolmogorov-Smirnov test no normal distribution in {skewed} of {len(tested)} groups."
     )
 
 
 def examples(comparisons: Mapping[SequencingSetting, Comparison]) -> list[str]:
-    """Our test beside the one that Appendix II shows, where it is among these."""
+    """The sentence that compares our test with the example of Appendix II, if that is among these."""
     return [
         f"Appendix II's example (case I, 3 toasts, 30 episodes): {EXAMPLE} printed; here F = {test.f:.1f}, "
         + ", ".join(f"{name} {mean:.1f} %" for name, mean in test.means.items())
@@ -207,10 +209,10 @@ def examples(comparisons: Mapping[SequencingSetting, Comparison]) -> list[str]:
 
 
 def deviation(rows: Sequence[Row], sessions: int) -> tuple[float, float]:
-    """Mean distance of rows from print, and what it would be by chance alone, each measured with so many sessions.
+    """The mean distance of rows, each measured with so many sessions, from the printed values, and its expectation by chance.
 
-    By chance: both figures have the standard error of their sessions, and a normal error is sqrt(2/pi) standard errors on
-    average. Rounding of the printed figures is left out.
+    By chance: both values have the standard error of their sessions, and a normal error is sqrt(2/pi) standard errors on
+    average. Rounding of the printed values is left out.
     """
     off, chance = [], []
     for result in rows:
@@ -222,7 +224,7 @@ def deviation(rows: Sequence[Row], sessions: int) -> tuple[float, float]:
 
 
 def summary(rows: Sequence[Row], sessions: int) -> Row:
-    """How many cells agree with print, and how far off they are, by table, toasts and measure."""
+    """The number of cells that agree with the printed values, and their distance, by table, toasts and measure."""
     groups: dict[str, list[Row]] = {}
     for result in rows:
         if result["thesis"] is not None:

@@ -1,4 +1,4 @@
-"""Figures 7.3 to 7.12 of the thesis as SVG: what was measured as lines with intervals, what is printed as open markers."""
+"""Figures 7.3 to 7.12 of the thesis as SVG: measured values are lines with intervals, printed ones open markers."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -33,7 +33,7 @@ SIZE_INCH = 7.0, 4.0
 
 
 class Compared(NamedTuple):
-    """What one picture by session length shows."""
+    """The case, toasts, environment and methods that one picture by session length shows."""
 
     case: str
     toasts: int
@@ -53,7 +53,7 @@ OF_FACTORS = tuple(caption for caption, shown in COMPARED.items() if shown.names
 
 
 def of_case(case: str, table: str) -> dict[str, Compared]:
-    """The four pictures of one of the tables 7.4-7.6, by caption."""
+    """What the four pictures of one of the tables 7.4-7.6 show, by caption."""
     words = {"deterministic": "", "stochastic": ", times drawn"}
     return {
         f"{table}: {toasts} toasts, case {case}{word}": Compared(case, toasts, environment)
@@ -63,7 +63,7 @@ def of_case(case: str, table: str) -> dict[str, Compared]:
 
 
 def lengths(rows: Sequence[Row], wanted: Mapping[str, Compared]) -> dict[str, bytes]:
-    """A picture by session length for each caption: SP, or the mean best time where times are drawn."""
+    """Pictures by session length, by caption: SP, or the mean best time if times are random."""
     return {caption: _by_length(rows, shown) for caption, shown in wanted.items()}
 
 
@@ -94,14 +94,14 @@ def _by_length(rows: Sequence[Row], shown: Compared) -> bytes:
 
 
 def _beside_print(axes: "Axes", rows: Sequence[Row], by: str, look: Look) -> None:
-    """The values of rows against one of their settings, and what is printed as open markers on a dotted line."""
+    """Draw the values of rows against one of their settings, and the printed ones as open markers on a dotted line."""
     curve(axes, rows, by, look)
     printed = PRINTED | {"marker": look[1], "linestyle": ":", "linewidth": 0.9, "markeredgecolor": look[0]}
     axes.plot([row[by] for row in rows], [row["thesis"] for row in rows], color=look[0], **printed)
 
 
 def by_beta(rows: Sequence[Row]) -> bytes:
-    """SP and CE by beta with type A, a line for each case. Source: thesis fig. 7.5."""
+    """A picture of SP and CE by beta with type A, a line for each case. Source: thesis fig. 7.5."""
     shown = those(rows, table="Table IV.1", reward_factor="A")
 
     def draw(figure: "Figure") -> None:
@@ -127,7 +127,7 @@ def by_beta(rows: Sequence[Row]) -> bytes:
 
 
 def alone(seed: int) -> dict[str, bytes]:
-    """Figures 7.3 and 7.4, of one session, and 7.6."""
+    """Figures 7.3 and 7.4, of one session, and 7.6, by caption."""
     times_s, sequence = session(seed)
     cell = robot_cell(SESSION.case, SESSION.toasts)
     return {
@@ -145,6 +145,7 @@ def session(seed: int) -> tuple[NDArray[np.float64], list[int]]:
 
 
 def convergence(times_s: NDArray[np.float64]) -> bytes:
+    """A picture of the times (E,) of a session's episodes [s]. Source: thesis fig. 7.3."""
     best_s = optimum_s(SESSION.case, SESSION.toasts)
     changes = np.flatnonzero(times_s[1:] != times_s[:-1])
     settles = int(changes[-1]) + 2 if len(changes) else 1
@@ -167,7 +168,7 @@ def convergence(times_s: NDArray[np.float64]) -> bytes:
 
 
 def _places(cell: Cell, sequence: Sequence[int]) -> bytes:
-    """The station of each toast over time; sloping where the robot carries it."""
+    """A picture of the station of each toast over time; its line slopes while the robot carries it."""
     schedule = simulate(cell, sequence)
 
     def draw(figure: "Figure") -> None:
@@ -176,7 +177,9 @@ def _places(cell: Cell, sequence: Sequence[int]) -> bytes:
             own = [activity for activity in schedule.parts if activity.part == part]
             times = [time for activity in own for time in (activity.start_s, activity.end_s)]
             places = [cell.index(name) for activity in own for name in (activity.origin, activity.target)]
-            lifted = np.array(places) + 0.09 * (part - (cell.parts + 1) / 2)  # or equal lines hide each other
+            lifted = np.array(places) + 0.09 * (
+                part - (cell.parts + 1) / 2
+            )  # so that equal lines do not hide each other
             axes.plot(times, lifted, color=colour, linewidth=2.2, label=f"toast {part}", solid_capstyle="butt")
         names = [f"{number}  {name.replace('_', ' ')}" for number, name in enumerate(cell.names, 1)]
         axes.set_yticks(range(len(names)), names)
@@ -190,7 +193,7 @@ def _places(cell: Cell, sequence: Sequence[int]) -> bytes:
 
 
 def _exploration() -> bytes:
-    """Eq. 5.1 for the betas that the thesis compares."""
+    """A picture of eq. 5.1 for the betas that the thesis compares."""
 
     def draw(figure: "Figure") -> None:
         axes = figure.add_subplot()
@@ -205,7 +208,7 @@ def _exploration() -> bytes:
 
 
 def readings(rows: Sequence[Row]) -> dict[str, bytes]:
-    """How far each reading is from the printed SP: bars by method, a picture for each number of toasts."""
+    """Pictures of the distance of each reading from the printed SP, bars by method, one for each number of toasts."""
     off = {(row["reading"], row["toasts"], _method(row)): row for row in those(rows, measure="off_points")}
     groups = [fill(name, 14) for name in READINGS]
     return {

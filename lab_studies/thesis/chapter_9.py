@@ -1,4 +1,4 @@
-"""The studies of chapter 9: which cells and pictures belong together, and what is to be said about them."""
+"""The studies of chapter 9: their cells, pictures and notes."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
@@ -15,22 +15,22 @@ RANKED = ("ranks as printed", "ranks", "ranks as printed by chance", "pairs in t
 AGREEMENT = "Each value is the share of Appendix V's cells of world I that agree with the printed ones under a reading."
 BY_BETA = "Figure 9.4 (bands: 95 % intervals)"
 SYMBOLS = (
-    "SP: sessions whose last episode takes the shortest way; HS: steps of a session in which advice was followed; AR: episodes "
+    "SP: sessions whose last episode takes the shortest path; HS: steps of a session in which advice was followed; AR: episodes "
     "in which advice was asked for; score: eq. 9.4, success against effort. β: how fast the learner's softmax cools; τ: the "
-    "advisor's temperature, .01 an expert, 1 a novice; Λ: the improvement below which CCRL asks; Ω: the misleads that it "
-    "tolerates; Ψ: the width of values below which IA asks."
+    "advisor's temperature, .01 for an expert, 1 for a novice; Λ: the improvement below which CCRL asks; Ω: the misleads that "
+    "it tolerates; Ψ: the range of values below which IA asks."
 )
 RECONSTRUCTED = (
-    "World II of the thesis is not printed but as a picture; the one here, tasks/world-2.toml, is reconstructed from the figures "
-    "that it is compared with: by what learning alone does there, by success and by helped steps of experts and novices (lab "
-    "task reconstruct). Differences there say little about the methods."
+    "The thesis prints world II only as a picture; the one here, tasks/world-2.toml, is reconstructed from the values that it is "
+    "compared with: from success without advice, and from success and helped steps with experts and novices (lab study run "
+    "world-2). Differences there say little about the methods."
 )
 EXACT = "Advisors know the exact optimal values; without --advisor-table exact they know a learned table."
 ADVISOR = (
-    "In full view all agreement with chapter 9 hangs on one table that the thesis loads and does not print: what its "
-    "advisors know. Here it is learned by an autonomous session of 1000 episodes that begin anywhere (beta .7, seed "
-    f"{LEARNED_SEED}, chosen among 36 seeds by how near world I comes to the printed figures, one choice for all cells); "
-    "--advisor-table exact takes the exact optimal values. The study 'readings' compares these and other readings."
+    "In full view all agreement with chapter 9 depends on one table that the thesis loads but does not print: what its "
+    "advisors know. Here it is learned by a session without advice of 1000 episodes that begin anywhere (beta .7, seed "
+    f"{LEARNED_SEED}, chosen among 36 seeds as the one with which world I comes nearest to the printed values, one choice for "
+    "all cells); --advisor-table exact takes the exact optimal values. The study 'readings' compares these and other readings."
 )
 
 
@@ -46,26 +46,26 @@ READINGS: dict[str, dict[str, Any]] = {
 
 
 def best_scores(job: Job, reading: Reading, name: str) -> Findings:
-    """One of the tables 9.2-9.5, with a picture of its scores and ranks."""
+    """The results of one of the tables 9.2-9.5, with a picture of its scores and ranks."""
     rows = table(job, name, reading)
     pictures = {f"{name}: scores and ranks": figures.ranked(rows)}
     return Findings(rows, agreement(rows), pictures, _notes([TABLES[name][0]], reading))
 
 
 def appendix_v(job: Job, reading: Reading) -> Findings:
-    """All cells of Appendix V."""
+    """The results of all cells of Appendix V."""
     rows = appendix(job, TABLES.values(), reading)
     return Findings(rows, agreement(rows), {}, _notes(BEST_BETA, reading))
 
 
 def figure_9_4(job: Job, reading: Reading) -> Findings:
-    """Learning alone with several decay factors; the reading, which is about advisors, changes nothing here."""
+    """The results of learning alone with several decay factors; the reading, which is about advisors, has no effect."""
     rows = by_beta(job)
     return Findings(rows, agreement(rows), {BY_BETA: figures.by_beta(rows)}, (RECONSTRUCTED, SAYS["world-2"]))
 
 
 def chapter_9(job: Job, reading: Reading) -> Findings:
-    """All of it: Appendix V, the four tables' ranks, and the figures; with a folder, cells that several need are run once."""
+    """The results of Appendix V, of the four tables' ranks, and of the figures; with a folder each cell is measured once."""
     cells, alone = appendix(job, TABLES.values(), reading), by_beta(job)
     pictures = {BY_BETA: figures.by_beta(alone)}
     ranks: Row = {}
@@ -81,7 +81,7 @@ def chapter_9(job: Job, reading: Reading) -> Findings:
 
 
 def readings(job: Job, reading: Reading) -> Findings:
-    """Appendix V's world I under several readings of what the thesis leaves open."""
+    """The agreement of Appendix V's world I under several readings of what the thesis leaves open."""
     rows: list[Row] = []
     for name, changes in READINGS.items():
         cells = appendix(job, [TABLES["table-9.2"], TABLES["table-9.3"]], changes)
@@ -95,7 +95,7 @@ def readings(job: Job, reading: Reading) -> Findings:
 
 
 def by_seed(rows: Sequence[Row]) -> Row:
-    """What the choice of the advisor's table is worth: agreement with the chosen seed beside the range of the others."""
+    """The agreement with the chosen seed of the advisor's table, and the range with the others, by view and measure."""
     said: Row = {}
     for row in those(rows, reading=CHOSEN):
         same = {name: row[name] for name in ("view", "measure")}
@@ -108,7 +108,7 @@ def by_seed(rows: Sequence[Row]) -> Row:
 
 
 def known(reading: Reading) -> str:
-    """The remark on what advisors know, and where that comes from."""
+    """The note on what advisors know."""
     return EXACT if reading.get("advisor_table") == "exact" else ADVISOR
 
 

@@ -24,18 +24,18 @@ if TYPE_CHECKING:
 
 ADVISORS = tuple(f"{name} ({tau:g})" for name, tau in SKILL_TAUS.items())
 METHODS = {"ccrl": "CCRL", "ia": "IA", "combined": "combined"}
-NEVER_REJECTS = 1_000_000  # Omega: nobody misleads so often
+NEVER_REJECTS = 1_000_000  # an Omega that no advisor reaches
 OPTIMUM = 13  # steps in world I
-WALKERS = (0.01, 0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 1.0)  # of fig. 9.1: tau
-PRINTED_WALKS = {0.01: (100.0, 13.0), 1.0: (None, 178.0)}  # share of shortest ways [%], mean steps
-LOWEST_RATE = -2.0  # improvement rates below are drawn as a mark at the edge
+WALKERS = (0.01, 0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 1.0)  # the taus of fig. 9.1
+PRINTED_WALKS = {0.01: (100.0, 13.0), 1.0: (None, 178.0)}  # tau -> share of shortest paths [%], mean steps
+LOWEST_RATE = -2.0  # lower improvement rates are drawn as a mark at the edge
 WINDOW = 5  # K of the improvement rate
 
 Series = Mapping[str, Mapping[str, AdviceSetting]]  # of a figure: series -> group -> setting
 
 
 def figures(job: Job, reading: Mapping[str, Any]) -> tuple[list[Row], dict[str, bytes]]:
-    """Figures 9.1, 9.3 and 9.5-9.13: their cells and pictures."""
+    """The rows of figures 9.1, 9.3 and 9.5-9.13, and their pictures by caption."""
     rows = walks(reading)
     pictures = {
         "Figure 9.1: an advisor's own way by tau": bars(
@@ -63,7 +63,7 @@ def figures(job: Job, reading: Mapping[str, Any]) -> tuple[list[Row], dict[str, 
 
 
 def _compared(job: Job, reading: Mapping[str, Any], caption: str, series: Series) -> tuple[list[Row], dict[str, bytes]]:
-    """Success and helped steps of one of the figures 9.7-9.13."""
+    """The rows of success and helped steps of one of the figures 9.7-9.13, and their pictures."""
     asked = {name: [replace(setting, **reading) for setting in line.values()] for name, line in series.items()}
     outcomes = measured(job, [setting for line in asked.values() for setting in line])
     groups = list(next(iter(series.values())))
@@ -85,7 +85,7 @@ def _compared(job: Job, reading: Mapping[str, Any], caption: str, series: Series
 
 
 def compared() -> dict[str, Series]:
-    """What figures 9.7-9.13 compare, by caption."""
+    """The series of figures 9.7-9.13, by caption."""
     by_skill = dict(zip(ADVISORS, TAUS, strict=True))
     in_world_1 = AdviceSetting("world-1", "limited", "ccrl", 0.01, 0.05, 1)
     two = AdviceSetting("world-2", "limited", "ccrl", 0.01, 0.05, 7)
@@ -121,7 +121,7 @@ def compared() -> dict[str, Series]:
 
 
 def walks(reading: Mapping[str, Any]) -> list[Row]:
-    """Figure 9.1: how often advisors of several skills take the shortest way themselves, and in how many steps they arrive."""
+    """The rows of fig. 9.1: how often advisors of several skills take the shortest path themselves, and their mean steps."""
     known = reading.get("advisor_table", "learned")
     place, table = world("world-1"), table_of(AdviceSetting("world-1", advisor_table=known))
     rows = []
@@ -135,7 +135,7 @@ def walks(reading: Mapping[str, Any]) -> list[Row]:
 
 
 def by_beta(rows: Sequence[Row]) -> bytes:
-    """Success percentage against beta with intervals, one curve a world. Source: thesis fig. 9.4."""
+    """A picture of the success percentage against beta with intervals, a curve for each world. Source: thesis fig. 9.4."""
 
     def draw(figure: "Figure") -> None:
         axes = figure.add_subplot()
@@ -151,7 +151,7 @@ def by_beta(rows: Sequence[Row]) -> bytes:
 
 
 def ranked(rows: Sequence[Row]) -> bytes:
-    """Scores by advisor and method, the rank of each on its bar, from the rows of one of the tables 9.2-9.5."""
+    """A picture of scores by advisor and method, with ranks on the bars, from the rows of one of the tables 9.2-9.5."""
     score_rows = {(row["gate"], row["tau"]): row for row in those(rows, measure="score")}
     groups = [*ADVISORS, "all"]
     lines = {name: [score_rows[gate, tau] for tau in (*TAUS, "all")] for gate, name in METHODS.items()}
@@ -159,9 +159,9 @@ def ranked(rows: Sequence[Row]) -> bytes:
 
 
 def convergence(steps: Sequence[int], guided: Sequence[bool], optimum: int, threshold: float | None = None) -> bytes:
-    """Steps of each episode (n,) of one session, guided ones marked, above the improvement rate before each episode.
+    """A picture of the steps (n,) of a session's episodes, with guided ones marked, above the improvement rate before each.
 
-    optimum: fewest possible steps; threshold: Lambda, below which the learner asks. Raises BadInput without episodes,
+    optimum: the fewest possible steps; threshold: Lambda, below which the learner asks. Raises BadInput without episodes,
     and for lengths that differ. Source: thesis figs. 9.3, 9.5, 9.6; eq. 6.1.
     """
     if not len(steps) or len(steps) != len(guided):
@@ -177,7 +177,7 @@ def convergence(steps: Sequence[int], guided: Sequence[bool], optimum: int, thre
 
 
 def draw_steps(axes: "Axes", steps: NDArray[np.int64], guided: NDArray[np.bool_], optimum: int) -> None:
-    """The steps of each episode (n,)."""
+    """Draw the steps of each episode (n,)."""
     from matplotlib.ticker import MaxNLocator
 
     episodes = np.arange(1, len(steps) + 1)
@@ -193,7 +193,7 @@ def draw_steps(axes: "Axes", steps: NDArray[np.int64], guided: NDArray[np.bool_]
 
 
 def draw_rate(axes: "Axes", steps: Sequence[int], window: int, threshold: float | None) -> None:
-    """The improvement rate that the learner knows before each episode; it exists from episode 2K + 1 on."""
+    """Draw the improvement rate that the learner knows before each episode; it exists from episode 2K + 1."""
     known = [
         (n + 1, improved.rate) for n in range(len(steps)) if (improved := improvement(steps[:n], window)) is not None
     ]
