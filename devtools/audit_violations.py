@@ -51,8 +51,8 @@ def worked(evidence: Evidence) -> list[tuple[PartStays, Stay, float]]:
         for stage in (stage for route in evidence.task.part(seen.kind).routes[:1] for stage in route):
             work_s = evidence.work_s(seen.kind, stage)
             own = [stay for stay in seen.stays if stay.station == stage.station]
-            timed = work_s and evidence.task.station(stage.station).process is None
-            if timed and own and seen.name in evidence.claimed:
+            has_time = evidence.task.station(stage.station).process is None
+            if work_s and own and has_time and seen.name in evidence.claimed:
                 worked_stays.append((seen, max(own, key=lambda stay: stay.seconds), work_s))
     return worked_stays
 
