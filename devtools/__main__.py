@@ -22,7 +22,7 @@ from devtools.page_attacks import PART as REQUESTS
 from devtools.parts import Part
 from devtools.proofs import PART as PROOFS
 from devtools.resources import PART as RESOURCES
-from devtools.scoreboard import line, show, written
+from devtools.scoreboard import outcome_line, read_outcomes, show
 from devtools.sizes import PART as SIZES
 
 PARTS: dict[str, Part] = {
@@ -73,7 +73,7 @@ def attempts(name: str, part: Part, count: int | None, seed: int, workers: int, 
     assert most is not None, f"part {name} has no count, and its prepare returns none"
     numbers = range(min(count or most, available or count or most))
     file = out / f"{name}.jsonl"
-    todo = [number for number in numbers if number not in written(file)]
+    todo = [number for number in numbers if number not in read_outcomes(file)]
     with (
         Progress(console=console) as progress,
         ThreadPoolExecutor(workers) as pool,
@@ -83,7 +83,7 @@ def attempts(name: str, part: Part, count: int | None, seed: int, workers: int, 
         running = {pool.submit(part.attempt, number, seed, room): number for number in todo}
         try:
             for ended in as_completed(running):
-                lines.write(line(running[ended], ended.result()))
+                lines.write(outcome_line(running[ended], ended.result()))
                 lines.flush()
                 progress.advance(bar)
         except BaseException:

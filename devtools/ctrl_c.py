@@ -9,7 +9,7 @@ from pathlib import Path
 
 from devtools.commands import LAB, Ended, environment, kill_session
 from devtools.parts import Outcome, Part
-from devtools.plain_pairs import KINDS, drawn, written
+from devtools.plain_pairs import KINDS, random_shop, shop_files
 from lab.sequencing import SEQUENCERS
 from lab.sequencing.search import SAME
 
@@ -27,7 +27,7 @@ def prepare(room: Path, seed: int) -> int:
     for name in (SHOP, LATE):
         kind = next(known for known in KINDS if known.name == name)
         (room / name).mkdir(exist_ok=True)
-        words, _ = written(drawn(kind, seed), kind, room / name)
+        words, _ = shop_files(random_shop(kind, seed), kind, room / name)
         (room / name / "words.json").write_text(json.dumps(words), encoding="utf-8")
     return EACH * len(METHODS)
 
@@ -39,16 +39,16 @@ def attempt(number: int, seed: int, room: Path) -> Outcome:
     file = room / shop / "words.json"
     words = json.loads(file.read_text(encoding="utf-8")) if file.exists() else [shop, "--toasts", "24"]
     more = ["--method", method, "--seconds", f"{MOST_S / 2:g}", "--episodes", "100000", "--json"]
-    ended = stopped(["sequence", *words, *more], after_s, room)
+    ended = stopped_command(["sequence", *words, *more], after_s, room)
     (room / f"{number}.txt").write_text(ended.stderr, encoding="utf-8")
     if ended.code == 0:
         return Outcome(f"{method}: it had ended", f"{method} after {after_s:.2f} s")
     return Outcome(
-        method, f"{method} after {after_s:.2f} s", judged(ended), figures={"until_end_s": round(ended.seconds, 2)}
+        method, f"{method} after {after_s:.2f} s", fault_of(ended), figures={"until_end_s": round(ended.seconds, 2)}
     )
 
 
-def stopped(words: list[str], after_s: float, room: Path) -> Ended:
+def stopped_command(words: list[str], after_s: float, room: Path) -> Ended:
     """The end of a command that is sent SIGINT `after_s` after its search has begun; its `seconds` count from then."""
     child = subprocess.Popen(
         [*LAB, *words], cwd=room, env=environment(room, PYTHONFAULTHANDLER="1"), text=True, start_new_session=True,
@@ -71,7 +71,7 @@ def stopped(words: list[str], after_s: float, room: Path) -> Ended:
     return Ended(child.returncode, out, "".join([*said, rest]), time.monotonic() - begun, 0, late)
 
 
-def judged(ended: Ended) -> str:
+def fault_of(ended: Ended) -> str:
     """What is wrong with how a stopped command ended; "" if nothing is."""
     if broke := ended.fault((130,)):
         return broke

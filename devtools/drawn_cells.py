@@ -80,9 +80,9 @@ def laid_out(cell: DrawnCell, path: Path) -> str:
     """The file's text with the first layout whose stations are apart and within reach, else with the last one."""
     text = ""
     for poses in layouts(cell):
-        text = written(cell, poses, None)
+        text = cell_text(cell, poses, None)
         try:
-            text = written(cell, poses, places_of(task_of_text(path, text)))
+            text = cell_text(cell, poses, places_of(task_of_text(path, text)))
             if _is_fit(task_of_text(path, text)):
                 break
         except BadInput:
@@ -145,7 +145,7 @@ def _is_fit(task: Task) -> bool:
     return True
 
 
-def written(cell: DrawnCell, poses: dict[str, list[float]], places: Places | None) -> str:
+def cell_text(cell: DrawnCell, poses: dict[str, list[float]], places: Places | None) -> str:
     """The file's text with stations at `poses`; sizes that follow from the parts are computed if `places` is known."""
     parts = [{**part.table, "routes": cell.routes()} for part in cell.parts]
     parts += [cell.more["pallet"]] if "pallet" in cell.more else []

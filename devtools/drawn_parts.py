@@ -55,7 +55,7 @@ def drawn_part(rng: Rng, number: int, opening_m: float, folder: Path) -> DrawnPa
     elif form == "cylinder":
         table |= {"shape": "cylinder", "size_m": [round(edge, 4) for edge in (x, z)]}
     else:
-        table |= {"shape": "mesh"} | written(mesh, table["name"], rng, folder)
+        table |= {"shape": "mesh"} | mesh_fields(mesh, table["name"], rng, folder)
     kg = float(np.clip(mesh.volume * rng.choice(KG_M3), *MASS_KG))
     table |= {"mass_kg": float(f"{kg:.3g}"), "friction": round(float(rng.uniform(*FRICTION)), 2)}
     if rng.random() < 0.5:
@@ -65,7 +65,7 @@ def drawn_part(rng: Rng, number: int, opening_m: float, folder: Path) -> DrawnPa
     return DrawnPart(table, form, (x, y, z))
 
 
-def written(mesh: Mesh, name: str, rng: Rng, folder: Path) -> Table:
+def mesh_fields(mesh: Mesh, name: str, rng: Rng, folder: Path) -> Table:
     """The fields of a mesh file, which is written as STL or OBJ, in metres or millimetres, upright or lying."""
     fields: Table = {}
     mesh = mesh.copy()

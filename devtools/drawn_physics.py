@@ -37,7 +37,7 @@ COUNT = re.compile(r"^count = (\d+)", re.MULTILINE)
 FORCE = re.compile(r"^grip_force_n = [^#\n]+", re.MULTILINE)
 
 
-def drawn(text: str, rng: np.random.Generator) -> str:
+def varied_task(text: str, rng: np.random.Generator) -> str:
     """A task file with other masses, frictions, grip force and speeds, and with stations moved a little."""
 
     def moved(match: re.Match[str]) -> str:
@@ -72,7 +72,7 @@ def attempt(number: int, seed: int, room: Path) -> Outcome:
     if number % SHIPPED == 0:
         name = TASKS[number // SHIPPED % len(TASKS)]
         copytree(find(name).parent, folder, ignore=lambda _, names: [name for name in names if name.endswith(".toml")])
-        text = drawn(find(name).read_text(encoding="utf-8"), rng)
+        text = varied_task(find(name).read_text(encoding="utf-8"), rng)
     else:
         folder.mkdir(parents=True)
         text, name = drawn_cell(rng, folder)
@@ -81,14 +81,14 @@ def attempt(number: int, seed: int, room: Path) -> Outcome:
     env = environment(folder)
     seeded = ("--seed", str(int(rng.integers(1000))))
     ran = lab("run", task, "--json", *seeded, cwd=folder, env=env, timeout_s=RUN_S)
-    group, broke = judged(ran, lambda: lab("task", "check", task, *seeded, cwd=folder, env=env, timeout_s=RUN_S))
+    group, broke = verdict(ran, lambda: lab("task", "check", task, *seeded, cwd=folder, env=env, timeout_s=RUN_S))
     if not broke:
         rmtree(folder)
     said = f": {ran.stderr.strip().splitlines()[-1][:300]}" if group == "refused" else ""
     return Outcome(group, f"number {number}, {name}{said}", broke, figures={"seconds": ran.seconds})
 
 
-def judged(ran: Ended, check: Callable[[], Ended]) -> tuple[str, str]:
+def verdict(ran: Ended, check: Callable[[], Ended]) -> tuple[str, str]:
     """The group that a run counts in, and what is wrong with it ("": nothing); check: called if the run was refused."""
     if fault := ran.fault():
         return "broke", fault

@@ -67,10 +67,10 @@ def read_batch(room: Path, name: str, seed: int, first: int, tries: int, folder:
             break
     case = f"{name}, {tries} files from {first}, seed {seed}"
     shares = {f"{what} %": round(100 * counts[what] / tries) for what in ("read", "refused")}
-    return Outcome(name, case, told_of(broke, tries), counts["tries"], {**figures, **shares})
+    return Outcome(name, case, faults_in_words(broke, tries), counts["tries"], {**figures, **shares})
 
 
-def told_of(broke: list[dict[str, str]], tries: int) -> str:
+def faults_in_words(broke: list[dict[str, str]], tries: int) -> str:
     """The faults in words, each kind with its number and its first case; "" if there are none."""
     sorts: dict[str, list[dict[str, str]]] = {}
     for fault in broke:

@@ -31,7 +31,7 @@ DESCRIPTORS = (1024, 256)
 
 
 @dataclass(frozen=True)
-class Taught:
+class LessonResult:
     """The result of a finished lesson, and the time and memory that it took.
 
     learned: a hash of the steps of its episodes and of its table; slowest_s: the longest wait for a question.
@@ -46,7 +46,7 @@ class Taught:
 
 
 @dataclass(frozen=True)
-class Told:
+class AttackReport:
     """An attacker's report: how often it tried, and what got in."""
 
     tries: int
@@ -55,7 +55,7 @@ class Told:
 
 def lesson(
     folder: Path, descriptors: int, attacked: Callable[[int, str, int], Any] = lambda port, token, process: None
-) -> Taught:
+) -> LessonResult:
     """Teach a lesson through its page, and return its result; `attacked` runs in a thread once the lesson has begun.
 
     attacked: called with port, token and process. Raises RuntimeError if the lesson ends early or asks no more.
@@ -81,7 +81,7 @@ def lesson(
         for name, table in sorted(load_file(file).items()):
             learned.update(name.encode() + table.tobytes())
     said = re.sub(r"\d{4,}|token=\S+", "", (folder / "stderr").read_text(errors="replace"))
-    return Taught(
+    return LessonResult(
         child.returncode, learned.hexdigest(), said, slowest_s, used.ru_utime + used.ru_stime, used.ru_maxrss / 1024
     )
 
@@ -139,9 +139,9 @@ def attempt(number: int, seed: int, room: Path) -> Outcome:
     """Attack one lesson in one way."""
     kind = [*ATTACKS][number % len(ATTACKS)]
     descriptors = DESCRIPTORS[number // len(ATTACKS) % len(DESCRIPTORS)]
-    quiet = Taught(**json.loads((room / "quiet.json").read_text()))
+    quiet = LessonResult(**json.loads((room / "quiet.json").read_text()))
     folder = room / f"{number}"
-    told = Told(0, ["the attacker did not begin"])
+    told = AttackReport(0, ["the attacker did not begin"])
 
     def attacked(port: int, token: str, process: int) -> None:
         nonlocal told
@@ -151,7 +151,11 @@ def attempt(number: int, seed: int, room: Path) -> Outcome:
             [*module("attackers"), kind, str(port), str(ATTACK_S), str(seed), str(process), *uid],
             input=token, capture_output=True, text=True, timeout=300, env=env,
         )  # fmt: skip
-        told = Told(**json.loads(attacker.stdout)) if attacker.returncode == 0 else Told(0, [attacker.stderr[-300:]])
+        told = (
+            AttackReport(**json.loads(attacker.stdout))
+            if attacker.returncode == 0
+            else AttackReport(0, [attacker.stderr[-300:]])
+        )
 
     group, case = ATTACKS[kind][1], f"{kind}, {descriptors} descriptors, seed {seed}"
     try:
@@ -163,10 +167,10 @@ def attempt(number: int, seed: int, room: Path) -> Outcome:
         "MB": round(taught.peak_mb),
         "more CPU s": round(taught.cpu_s - quiet.cpu_s, 2),
     }
-    return Outcome(group, case, judged(taught, quiet, told.inside), told.tries, figures)
+    return Outcome(group, case, fault_of(taught, quiet, told.inside), told.tries, figures)
 
 
-def judged(taught: Taught, quiet: Taught, inside: list[str]) -> str:
+def fault_of(taught: LessonResult, quiet: LessonResult, inside: list[str]) -> str:
     """What is wrong with an attacked lesson compared with the quiet one; "" if nothing is."""
     if inside:
         return f"{len(inside)} got in, the first: {inside[0]}"

@@ -54,7 +54,7 @@ KINDS = (
 )
 
 
-def drawn(kind: Kind, seed: int) -> dict[str, Any]:
+def random_shop(kind: Kind, seed: int) -> dict[str, Any]:
     """A random shop as `plain_model.py` reads it."""
     rng = np.random.default_rng([KINDS.index(kind), seed])
     jobs = []
@@ -80,7 +80,7 @@ def drawn(kind: Kind, seed: int) -> dict[str, Any]:
     }
 
 
-def written(shop: dict[str, Any], kind: Kind, folder: Path) -> tuple[list[str], Path]:
+def shop_files(shop: dict[str, Any], kind: Kind, folder: Path) -> tuple[list[str], Path]:
     """The arguments of `lab sequence` for a shop, and the plain program's file; both files are written to `folder`."""
     plain, jobs = folder / "plain.json", shop["jobs"]
     plain.write_text(json.dumps(shop), encoding="utf-8")
@@ -124,7 +124,7 @@ def written(shop: dict[str, Any], kind: Kind, folder: Path) -> tuple[list[str], 
     return [str(file), "--layout", str(layout), "--robots", str(kind.vehicles)], plain
 
 
-def timed(command: list[str]) -> tuple[float, float, dict[str, Any]]:
+def timed_command(command: list[str]) -> tuple[float, float, dict[str, Any]]:
     """Wall and processor seconds of a new process, and the last line that it prints, as JSON."""
     before, began = os.times(), time.perf_counter()
     without = ("PYTHONDONTWRITEBYTECODE",)  # users keep the bytecode that Python compiles
@@ -160,8 +160,8 @@ def main() -> None:
         for number in range(asked.each):
             folder = room / f"{kind.name.replace(', ', '-').replace(' ', '-')}-{number}"
             folder.mkdir(parents=True, exist_ok=True)
-            shop = drawn(kind, 1000 * asked.seed + number)
-            words, file = written(shop, kind, folder)
+            shop = random_shop(kind, 1000 * asked.seed + number)
+            words, file = shop_files(shop, kind, folder)
             plain = [sys.executable, str(HERE / "plain_model.py"), str(file), f"{asked.seconds}", f"{asked.workers}"]
             ours = [sys.executable, "-c", "from lab.cli import main; main()", "sequence", *words]
             ours += ["--method", asked.method, "--seconds", f"{asked.seconds}", "--json"]
@@ -169,7 +169,7 @@ def main() -> None:
             spent: list[list[float]] = [[], []]
             for _ in range(asked.rounds):
                 for at, command in enumerate((plain, ours)):
-                    wall, cpu, printed = timed(command)
+                    wall, cpu, printed = timed_command(command)
                     walls[at].append(wall)
                     spent[at].append(cpu)
                     if at == 0:

@@ -33,7 +33,7 @@ class TooLong(BaseException):
 
 
 @dataclass
-class Told:
+class BatchResults:
     """The results of a batch: files tried, read and rejected, the longest time, the most memory, and the faults."""
 
     tries: int = 0
@@ -82,9 +82,9 @@ def _where() -> str:
     return "{}:{}".format(*own[-1]) if own else "outside the lab"
 
 
-def batch(room: Path, name: str, seed: int, numbers: range, say: Any, folder: Path) -> Told:
+def batch(room: Path, name: str, seed: int, numbers: range, say: Any, folder: Path) -> BatchResults:
     """Damage and read the files of these numbers, and return the results; `say` is called with each number first."""
-    kind, told = KINDS[name], Told()
+    kind, told = KINDS[name], BatchResults()
     paths = sound_files(folder, room, kind)
     contents = [path.read_bytes() for path in paths]
     for path in paths[:40]:

@@ -21,7 +21,7 @@ from devtools.commands import LAB, Ended, lab
 from devtools.forked import forked
 from devtools.kills import ALONE, expected_result
 from devtools.parts import Outcome, Part
-from devtools.shim import KINDS, Strike, built, shimmed
+from devtools.shim import KINDS, Strike, built_shim, shim_environment
 from devtools.works import (
     LONGEST_S,
     WORKS,
@@ -31,15 +31,15 @@ from devtools.works import (
     base,
     by_itself,
     environment_in,
-    fresh,
+    first_fault,
+    first_leftover,
+    first_loss,
+    first_missing,
+    fresh_home,
+    home_state,
     kept_before,
-    leftovers,
-    lost,
     names,
     next_words,
-    reached,
-    state,
-    unsound,
 )
 from lab.toolbox.registry import Toolbox
 
@@ -224,7 +224,7 @@ FAULTS: dict[
 
 def prepare(room: Path, seed: int) -> None:
     """Build the shim, and the home that every command begins in."""
-    built(room)
+    built_shim(room)
     base(room)
 
 
@@ -237,15 +237,15 @@ def attempt(number: int, seed: int, room: Path) -> Outcome:
     make, _, works = FAULTS[kind]
     name = chance.choice(works or [*names()])
     case = Case(name, room / f"resource-{number}" / "home", expected_result(name, room), chance)
-    fresh(case.home.parent, room, WORKS[name])
+    fresh_home(case.home.parent, room, WORKS[name])
     make(case)
     told = f"{number}, seed {seed}: {name}: {case.said}"
     if case.room_kb and not BARE:
         return Outcome(kind, f"{told}: only root can make one", tries=0)
-    quickly = by_itself if "study" in name else forked(built(room), room)
+    quickly = by_itself if "study" in name else forked(built_shim(room), room)
     with _disk(case, room):
         ended = carried_out(case, room, quickly if case.strike is not None and number % ALONE else None)
-        broke = judged(case, ended, room, quickly)
+        broke = fault_of(case, ended, room, quickly)
     if not broke:
         shutil.rmtree(case.home.parent)
     return Outcome(kind, told, broke, figures={"seconds": ended.seconds})
@@ -279,7 +279,7 @@ def carried_out(case: Case, room: Path, quickly: CarriedOut | None) -> Ended:
     if case.env is not None:
         said = {name: value for name, value in said.items() if value and name not in ("MPLCONFIGDIR", "XDG_CACHE_HOME")}
     if case.strike is not None:
-        said |= shimmed(built(room), case.home, case.home.parent / "counts", case.strike)
+        said |= shim_environment(built_shim(room), case.home, case.home.parent / "counts", case.strike)
     if quickly is not None:
         return quickly(WORKS[case.name].words, case.home, said, LONGEST_S)
     folder, after_s = case.loses
@@ -317,7 +317,7 @@ def _receipts(case: Case) -> int:
     return len([*case.home.glob(f"{_SESSION_OF[case.name]}/receipt.json")])
 
 
-def judged(case: Case, ended: Ended, room: Path, carried_out: CarriedOut = by_itself) -> str:
+def fault_of(case: Case, ended: Ended, room: Path, carried_out: CarriedOut = by_itself) -> str:
     """What is wrong with how a command ended, what it left, or what it does once nothing is missing; "" if nothing is."""
     wrong = ended.fault((0, 1, 2)) or _noise(ended)
     if case.unheard and not ended.late and ended.code in (0, 1, 2) and "Traceback" not in ended.stderr:
@@ -327,13 +327,18 @@ def judged(case: Case, ended: Ended, room: Path, carried_out: CarriedOut = by_it
     if wrong:
         return wrong
     changes = (*WORKS[case.name].changes, *((f"{case.loses[0]}/*",) if case.loses[0] else ()))
-    if wrong := lost(kept_before(room), case.home, changes) or unsound(case.home):
+    if wrong := first_loss(kept_before(room), case.home, changes) or first_fault(case.home):
         return f"exit {ended.code}: {wrong}"
     if case.loses[0] and ended.code == 0 and not case.was_whole and not _receipts(case):
         return "exit 0 without its session"
-    if ended.code == 0 and not case.unheard and not case.loses[0] and (wrong := reached(case.expected, case.home)):
+    if (
+        ended.code == 0
+        and not case.unheard
+        and not case.loses[0]
+        and (wrong := first_missing(case.expected, case.home))
+    ):
         return f"exit 0: {wrong}"
-    if ended.code == 2 and (more := _kept(state(case.home)) - _kept(state(base(room)))):
+    if ended.code == 2 and (more := _kept(home_state(case.home)) - _kept(home_state(base(room)))):
         return f"exit 2, but it has kept {min(more)}: {ended.stderr[-160:]}"
     if not case.loses[0] and (wrong := _said_kept(ended, case.home)):
         return f"exit {ended.code}: {wrong}"
@@ -378,9 +383,9 @@ def _goes_on(case: Case, room: Path, carried_out: CarriedOut, same: bool) -> str
     if fault := then.fault((0, case.expected.code)):
         return f"{said}: {fault}"
     is_over = words[:2] == ("toolbox", "verify") and WORKS[case.name].session
-    wrong = unsound(case.home) or leftovers(case.home)
+    wrong = first_fault(case.home) or first_leftover(case.home)
     if same and not wrong and not is_over:
-        wrong = reached(case.expected, case.home)
+        wrong = first_missing(case.expected, case.home)
     return f"{said}: {wrong}" if wrong else ""
 
 

@@ -14,7 +14,7 @@ from devtools.parts import Outcome, Part
 SHOWN = 12  # broken attempts that are printed below the table; the files hold all of them
 
 
-def written(file: Path) -> dict[int, Outcome]:
+def read_outcomes(file: Path) -> dict[int, Outcome]:
     """The outcomes in a file, by number, without a last line that was cut short."""
     outcomes = {}
     for line in file.read_text(encoding="utf-8").splitlines() if file.exists() else ():
@@ -27,7 +27,7 @@ def written(file: Path) -> dict[int, Outcome]:
     return outcomes
 
 
-def line(number: int, outcome: Outcome) -> str:
+def outcome_line(number: int, outcome: Outcome) -> str:
     """The line of an outcome in the file."""
     return json.dumps({"number": number, **asdict(outcome)}) + "\n"
 
@@ -53,7 +53,7 @@ def show(parts: dict[str, Part], folder: Path, console: Console) -> bool:
     table = Table("part", "what", "tries", "broke", "most")
     document, broken = {}, []
     for name, part in parts.items():
-        counted = list(rows(written(folder / f"{name}.jsonl").values()))
+        counted = list(rows(read_outcomes(folder / f"{name}.jsonl").values()))
         document[name] = {"target": part.target, "rows": counted}
         for n, row in enumerate(counted):
             most = ", ".join(f"{figure} {value:.4g}" for figure, value in row["most"].items())

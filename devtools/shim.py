@@ -37,7 +37,7 @@ class Strike:
         return f"{names} {self.at}: {done}"
 
 
-def built(folder: Path) -> Path:
+def built_shim(folder: Path) -> Path:
     """The path of the shim's library, which is compiled into a folder once. Raises RuntimeError if that fails."""
     library, compiler = folder / "write_shim.so", shutil.which("gcc") or shutil.which("cc")
     if compiler is None:
@@ -55,7 +55,7 @@ def built(folder: Path) -> Path:
     return library
 
 
-def shimmed(library: Path, under: Path, counts: Path, strike: Strike | None = None) -> dict[str, str]:
+def shim_environment(library: Path, under: Path, counts: Path, strike: Strike | None = None) -> dict[str, str]:
     """The environment variables that load and instruct the shim; counts: the file of its counters, which is reset."""
     counts.write_bytes(bytes(_COUNTS.size))
     said = {"LD_PRELOAD": str(library), "LAB_SHIM_UNDER": str(under.resolve()), "LAB_SHIM_COUNTS": str(counts)}
@@ -65,6 +65,6 @@ def shimmed(library: Path, under: Path, counts: Path, strike: Strike | None = No
     return said
 
 
-def counted(counts: Path) -> dict[str, int]:
+def shim_counts(counts: Path) -> dict[str, int]:
     """The number of calls of each kind, by its letter."""
     return dict(zip(KINDS.values(), _COUNTS.unpack(counts.read_bytes()), strict=False))

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from devtools.commands import Ended, environment, lab
-from devtools.shim import Strike, built, counted, shimmed
+from devtools.shim import Strike, built_shim, shim_counts, shim_environment
 from lab.advice.entries import read_journal
 from lab.errors import BadInput
 from lab.production.run_journal import RunEnded, read_run
@@ -86,7 +86,7 @@ WORKS: dict[str, Work] = {
 
 @dataclass(frozen=True)
 class Undisturbed:
-    """The result of an undisturbed command: its exit code, the `state` of its home, its calls by kind, and its time [s]."""
+    """The result of an undisturbed command: its exit code, the `home_state` of its home, its calls by kind, and its time [s]."""
 
     code: int
     state: dict[str, str]
@@ -111,7 +111,7 @@ def base(room: Path) -> Path:
     box.remove("gone")
     box.save_record("durations", "kept", {"seconds": 12.5})
     (half / "others.zip").write_bytes(pack([policy("doubled", 5.0), policy("other", 6.0), policy("third", 7.0)])[0])
-    ended = disturbed(half, _TEACH, built(room), Strike("w", 300, "after"), room)
+    ended = disturbed(half, _TEACH, built_shim(room), Strike("w", 300, "after"), room)
     assert ended.code < 0, ended.stderr
     assert not read_journal(half / STOPPED, "the base").closed
     age(half)
@@ -134,7 +134,7 @@ def own_folder(room: Path, name: str) -> Path:
     return Path(mkdtemp(prefix=f"{name}-", dir=room))
 
 
-def fresh(folder: Path, room: Path, work: Work) -> Path:
+def fresh_home(folder: Path, room: Path, work: Work) -> Path:
     """The home in a folder that is made anew for a command, a copy of the base."""
     home = folder / "home"
     shutil.rmtree(folder, ignore_errors=True)
@@ -163,7 +163,7 @@ def disturbed(
     carried_out: CarriedOut = by_itself,
 ) -> Ended:
     """The end of a command in a home, under the shim, which counts calls in a file beside the home."""
-    said = shimmed(library, home, home.parent / f"{home.name}-counts", strike)
+    said = shim_environment(library, home, home.parent / f"{home.name}-counts", strike)
     return carried_out(words, home, environment_in(home, caches) | said, timeout_s)
 
 
@@ -182,17 +182,17 @@ def age(home: Path) -> None:
 # ---- results
 
 
-def undisturbed(name: str, room: Path) -> Undisturbed:
+def undisturbed_result(name: str, room: Path) -> Undisturbed:
     """The result of an undisturbed command, measured once; its state has what two runs have in common."""
     file = room / f"{re.sub('[^a-z0-9]+', '-', name)}.json"
     if not file.exists():
         states, code, calls, took_s = list[dict[str, str]](), 0, dict[str, int](), 0.0
         for turn in ("to compile what it needs", "first", "second"):
-            home = fresh(own_folder(room, f"{file.stem}-{turn.split()[0]}"), room, WORKS[name])
-            ended = disturbed(home, WORKS[name].words, built(room), None, room)
+            home = fresh_home(own_folder(room, f"{file.stem}-{turn.split()[0]}"), room, WORKS[name])
+            ended = disturbed(home, WORKS[name].words, built_shim(room), None, room)
             assert not ended.fault((0, 1)), f"{name}: {ended.fault((0, 1))}"
-            code, calls, took_s = ended.code, counted(home.parent / "home-counts"), ended.seconds
-            states.append(state(home))
+            code, calls, took_s = ended.code, shim_counts(home.parent / "home-counts"), ended.seconds
+            states.append(home_state(home))
             shutil.rmtree(home.parent)
         _, *states = states
         common = {what: value for what, value in states[0].items() if states[1].get(what) == value}
@@ -203,7 +203,7 @@ def undisturbed(name: str, room: Path) -> Undisturbed:
     return Undisturbed(**json.loads(file.read_text()))
 
 
-def state(home: Path) -> dict[str, str]:
+def home_state(home: Path) -> dict[str, str]:
     """The number of each file in a home, by a name that depends neither on the home nor on the time."""
     counts: Counter[str] = Counter()
     for path in sorted(home.rglob("*")):
@@ -253,9 +253,9 @@ def _digest(content: bytes) -> str:
     return sha256(content).hexdigest()[:16]
 
 
-def reached(expected: Undisturbed, home: Path) -> str:
+def first_missing(expected: Undisturbed, home: Path) -> str:
     """What an undisturbed command leaves and is missing in a home; "" if nothing is."""
-    there = state(home)
+    there = home_state(home)
     missing = [what for what in expected.state if what not in there]
     return f"not as undisturbed: {len(missing)} missing: {missing[0]}" if missing else ""
 
@@ -263,7 +263,7 @@ def reached(expected: Undisturbed, home: Path) -> str:
 def next_words(name: str, expected: Undisturbed, home: Path) -> tuple[str, ...]:
     """The command that a person types after a kill: a repair if all was done, --resume, or the same again."""
     work = WORKS[name]
-    if not reached(expected, home):
+    if not first_missing(expected, home):
         return REPAIR
     if work.session == "run":
         try:
@@ -298,7 +298,7 @@ def kept_before(room: Path) -> Files:
     return {path.relative_to(home).as_posix(): path.read_bytes() for path in home.rglob("*") if path.is_file()}
 
 
-def lost(before: Files, home: Path, changes: tuple[str, ...]) -> str:
+def first_loss(before: Files, home: Path, changes: tuple[str, ...]) -> str:
     """The first file of the base that is missing or changed, apart from `changes` and logs that grew; "" if none is."""
     for name, content in before.items():
         if any(fnmatch.fnmatch(name, pattern) for pattern in changes):
@@ -312,13 +312,13 @@ def lost(before: Files, home: Path, changes: tuple[str, ...]) -> str:
     return ""
 
 
-def unsound(home: Path) -> str:
+def first_fault(home: Path) -> str:
     """The first fault that `toolbox verify` finds; "" if all is sound."""
     wrong = [reason for _, ok, reason in Toolbox(home / "toolbox").verify() if not ok]
     return f"toolbox verify: {wrong[0]}" if wrong else ""
 
 
-def leftovers(home: Path) -> str:
+def first_leftover(home: Path) -> str:
     """The first draft, or session folder without a session, that commands should have removed; "" if there is none."""
     remains = [path for pattern in _LEFT for path in home.rglob(pattern)]
     remains += [folder for folder in home.glob("toolbox/sessions/*") if not _is_session(folder)]

@@ -13,7 +13,7 @@ from lab.learning.gates import GATES
 from lab.statistics import share
 from lab.studies.findings import Findings, Row, mean_row, row, share_row, those
 from lab.studies.runner import Job
-from lab_studies.comparisons.advice_budget_figures import of_ccrl, of_gates
+from lab_studies.comparisons.advice_budget_figures import ccrl_picture, gates_picture
 from lab_studies.thesis.chapter_9 import ADVISOR, EXACT, RECONSTRUCTED
 from lab_studies.thesis.chapter_9_sessions import AdviceOutcome, AdviceSetting, measured, sessions_of
 
@@ -72,12 +72,12 @@ def advice_budget(job: Job, reading: Mapping[str, Any]) -> Findings:
         for gates in (CCRL, ASKING)
         for place in PLACES
         for view in VIEWS
-        for result in worst(outcomes, place, view, gates)
+        for result in worst_advisor_rows(outcomes, place, view, gates)
     ]
     shown = [result for result in rows if result["world"] in WORLDS and result["view"] == "full"]
     pictures = {
-        "Success against helped steps, all gates": of_gates(shown),
-        "Success against helped steps, CCRL without and with memory": of_ccrl(shown, TARGETS),
+        "Success against helped steps, all gates": gates_picture(shown),
+        "Success against helped steps, CCRL without and with memory": ccrl_picture(shown, TARGETS),
     }
     notes = (
         MEASURES,
@@ -90,7 +90,7 @@ def advice_budget(job: Job, reading: Mapping[str, Any]) -> Findings:
     return Findings(rows + below, in_short(rows, below), pictures, notes)
 
 
-class Asked(NamedTuple):
+class BudgetCell(NamedTuple):
     """A cell of the study: world, view of the advisor (full for nobody), gate, advisor and memory."""
 
     world: str
@@ -100,25 +100,25 @@ class Asked(NamedTuple):
     memory: bool
 
 
-def settings() -> dict[Asked, tuple[AdviceSetting, ...]]:
+def settings() -> dict[BudgetCell, tuple[AdviceSetting, ...]]:
     """The measured settings by cell, one for each of its worlds; for nobody, the gate never asks."""
-    cells: dict[Asked, tuple[AdviceSetting, ...]] = {}
+    cells: dict[BudgetCell, tuple[AdviceSetting, ...]] = {}
     for place in PLACES:
         worlds = RANDOM_WORLDS if place == RANDOM else (place,)
         for memory in (False, True):
             alone = [AdviceSetting(world, memory=memory, advisor_table="exact") for world in worlds]
-            cells[Asked(place, "full", "never", NOBODY, memory)] = tuple(alone)
+            cells[BudgetCell(place, "full", "never", NOBODY, memory)] = tuple(alone)
             for view in VIEWS if memory else ("full",) if place in WORLDS else ():
                 for gate in ASKING:
                     for name in ADVISORS:
                         tau = SKILL_TAUS["expert" if name == WRONG else name]
-                        cells[Asked(place, view, gate, name, memory)] = tuple(
+                        cells[BudgetCell(place, view, gate, name, memory)] = tuple(
                             replace(setting, view=view, gate=gate, tau=tau, wrong=name == WRONG) for setting in alone
                         )
     return cells
 
 
-def _outcomes(job: Job, cells: Mapping[Asked, tuple[AdviceSetting, ...]]) -> dict[Asked, AdviceOutcome]:
+def _outcomes(job: Job, cells: Mapping[BudgetCell, tuple[AdviceSetting, ...]]) -> dict[BudgetCell, AdviceOutcome]:
     """The outcome of each cell; those of one world are kept in the job's folder."""
     single = {cell: group[0] for cell, group in cells.items() if cell.world != RANDOM}
     outcomes = measured(job, list(single.values()))
@@ -137,7 +137,7 @@ def _joined(group: tuple[AdviceSetting, ...], sessions: int, seed: int) -> Advic
     )
 
 
-def rows_of(cell: Asked, outcome: AdviceOutcome, table: str) -> list[Row]:
+def rows_of(cell: BudgetCell, outcome: AdviceOutcome, table: str) -> list[Row]:
     """The measures of one cell, with the project's target if there is one."""
     named: Row = {
         "world": cell.world,
@@ -153,7 +153,7 @@ def rows_of(cell: Asked, outcome: AdviceOutcome, table: str) -> list[Row]:
         mean_row(named, "HS_steps", outcome.helped_steps),
         mean_row(named, "AR_requests", outcome.requests),
     ]
-    if cell == Asked("world-1", "full", "ccrl", cell.advisor, True) and cell.advisor in TARGETS:
+    if cell == BudgetCell("world-1", "full", "ccrl", cell.advisor, True) and cell.advisor in TARGETS:
         for result, target in zip(rows, TARGETS[cell.advisor], strict=False):
             result["target"] = target
     return rows
@@ -169,15 +169,18 @@ def difference(outcome: AdviceOutcome, other: AdviceOutcome) -> tuple[float, flo
     return gap, gap - hypot(percent - low, than_high - than), gap + hypot(high - percent, than - than_low)
 
 
-def worst(
-    outcomes: Mapping[Asked, AdviceOutcome], place: str, view: Literal["full", "limited"], gates: Sequence[str] = CCRL
+def worst_advisor_rows(
+    outcomes: Mapping[BudgetCell, AdviceOutcome],
+    place: str,
+    view: Literal["full", "limited"],
+    gates: Sequence[str] = CCRL,
 ) -> list[Row]:
     """Rows of the advisor and gate with the least success with memory, compared with nobody without and with memory."""
-    cells = [Asked(place, view, gate, name, True) for gate in gates for name in ADVISORS]
+    cells = [BudgetCell(place, view, gate, name, True) for gate in gates for name in ADVISORS]
     lowest = min(cells, key=lambda cell: float(outcomes[cell].success.mean()))
     rows = []
     for memory in (False, True):
-        gap, low, high = difference(outcomes[lowest], outcomes[Asked(place, "full", "never", NOBODY, memory)])
+        gap, low, high = difference(outcomes[lowest], outcomes[BudgetCell(place, "full", "never", NOBODY, memory)])
         named: Row = {
             **lowest._asdict(),
             "over": "any gate" if len(gates) > 1 else lowest.gate,
@@ -203,7 +206,9 @@ def in_short(rows: Sequence[Row], below: Sequence[Row]) -> Row:
             what for what, kept in (("success", remembering[0] >= sp), ("steps", remembering[1] <= hs)) if not kept
         ]
         verdict = f"{' and '.join(missed)} missed" if missed else "met"
-        says[f"{name}, target {_both(sp, hs)}"] = f"{_both(*remembering)}: {verdict} (without memory {_both(*without)})"
+        says[f"{name}, target {_in_units(sp, hs)}"] = (
+            f"{_in_units(*remembering)}: {verdict} (without memory {_in_units(*without)})"
+        )
     for place in PLACES:
         for memory, against in AGAINST.items():
             says[f"{place}: {against}"] = f"{cell(place, 'never', NOBODY, memory)[0]:.1f} %"
@@ -218,7 +223,7 @@ def in_short(rows: Sequence[Row], below: Sequence[Row]) -> Row:
     return says | _worst_in_short(below)
 
 
-def _both(success: float, helped: float) -> str:
+def _in_units(success: float, helped: float) -> str:
     return f"{round(success, 1):g} % / {round(helped, 1):g} steps"
 
 

@@ -22,7 +22,7 @@ YLABEL = "sessions that end optimal [%]"
 Point = tuple[str, str, bool, float, float]  # gate, advisor, memory, helped steps, success [%]
 
 
-def of_gates(rows: Sequence[Row]) -> bytes:
+def gates_picture(rows: Sequence[Row]) -> bytes:
     """A picture of every gate and advisor: hollow marks without memory, filled ones with it; horizontal lines: nobody."""
 
     def draw(axes: "Axes", place: str, points: Sequence[Point]) -> None:
@@ -38,7 +38,7 @@ def of_gates(rows: Sequence[Row]) -> bytes:
     return _panels(rows, draw, _gate_keys())
 
 
-def of_ccrl(rows: Sequence[Row], targets: Mapping[str, tuple[float, float]]) -> bytes:
+def ccrl_picture(rows: Sequence[Row], targets: Mapping[str, tuple[float, float]]) -> bytes:
     """A picture of CCRL: an arrow for each advisor from no memory to memory; stars: the project's targets in world I."""
 
     def draw(axes: "Axes", place: str, points: Sequence[Point]) -> None:

@@ -99,7 +99,7 @@ def advice_worth(job: Job, reading: Mapping[str, Any]) -> Findings:
     """The results of every skill of the toast task with every advisor and nobody; the reading has no effect."""
     skills = list(scene().problems)
     pupils = [Pupil(skill, advisor) for skill in skills for advisor in ADVISORS]
-    costs_by_pupil = job.each(partial(taught, lessons=min(job.sessions, MOST), seed=job.seed), pupils)
+    costs_by_pupil = job.each(partial(lessons_cost, lessons=min(job.sessions, MOST), seed=job.seed), pupils)
     subtasks = dict.fromkeys(problem.subtask for problem in scene().problems.values())
     costs: dict[str, dict[str, Cost]] = {}
     rows: list[Row] = []
@@ -107,12 +107,12 @@ def advice_worth(job: Job, reading: Mapping[str, Any]) -> Findings:
         rows += [result for advisor in ADVISORS for result in rows_of(skill, advisor, costs_by_pupil)]
     for subtask in subtasks:
         of = [skill for skill in skills if scene().problems[skill].subtask == subtask]
-        costs[subtask] = {name: joined([costs_by_pupil[Pupil(skill, name)] for skill in of]) for name in ADVISORS}
+        costs[subtask] = {name: joined_costs([costs_by_pupil[Pupil(skill, name)] for skill in of]) for name in ADVISORS}
     pictures = {
-        f"{subtask}: lessons that are solved after so many moves": solved_after(of) for subtask, of in costs.items()
+        f"{subtask}: lessons that are solved after so many moves": solved_picture(of) for subtask, of in costs.items()
     }
     return Findings(
-        rows, in_short(costs), {"Moves until a lesson is solved": moves_of(costs)} | pictures, (MEASURES, SCENE)
+        rows, in_short(costs), {"Moves until a lesson is solved": moves_picture(costs)} | pictures, (MEASURES, SCENE)
     )
 
 
@@ -123,7 +123,7 @@ def scene() -> Prepared:
     return prepare(task, task.order(TOASTS), SCENE_SEED)
 
 
-def taught(pupil: Pupil, *, lessons: int, seed: int) -> Cost:
+def lessons_cost(pupil: Pupil, *, lessons: int, seed: int) -> Cost:
     """The cost of `lessons` lessons of a skill with an advisor."""
     problem = scene().problems[pupil.skill]
     how, advising = scene().task.subtask(problem.subtask), Advising.of([pupil.advisor])
@@ -138,7 +138,7 @@ def taught(pupil: Pupil, *, lessons: int, seed: int) -> Cost:
     return Cost(solved, episodes, moves, helped)
 
 
-def joined(costs: Sequence[Cost]) -> Cost:
+def joined_costs(costs: Sequence[Cost]) -> Cost:
     """The costs of several skills' lessons, joined."""
     return Cost(*(np.concatenate([getattr(cost, name) for cost in costs]) for name in Cost.__dataclass_fields__))
 
@@ -182,14 +182,14 @@ def in_short(costs: Mapping[str, Mapping[str, Cost]]) -> Row:
     return says
 
 
-def moves_of(costs: Mapping[str, Mapping[str, Cost]]) -> bytes:
+def moves_picture(costs: Mapping[str, Mapping[str, Cost]]) -> bytes:
     """Bars of the moves until a lesson is solved, by sub-task and advisor."""
     lines = {name: [varying_row({}, "moves_to_solve", of[name].moves) for of in costs.values()] for name in ADVISORS}
     named = {("nobody" if name == NOBODY else name): line for name, line in lines.items()}
     return bars(list(costs), named, "moves until it is solved")
 
 
-def solved_after(of: Mapping[str, Cost]) -> bytes:
+def solved_picture(of: Mapping[str, Cost]) -> bytes:
     """The share of lessons that are solved after so many moves, a curve for each advisor."""
 
     def draw(figure: "Figure") -> None:

@@ -19,7 +19,7 @@ from lab.studies.charts import bars
 from lab.studies.findings import Findings, Row, row, those, varying_row
 from lab.studies.runner import Job, record_of
 from lab.tasks.sequencing import write_policy
-from lab_studies.comparisons.carried_over_families import SMALL, Unseen, small_cells, unseen, unseen_cell
+from lab_studies.comparisons.carried_over_families import SMALL, LargerCell, larger_cell, larger_cells, small_cells
 from lab_studies.comparisons.carried_over_learning import CarriedLearning, learn_policy
 
 ALL = "all families"
@@ -42,7 +42,7 @@ POLICIES = "The policies stand beside this report (policy-....json): lab sequenc
 
 
 @dataclass(frozen=True)
-class Surveyed:
+class Survey:
     """The reference of a larger cell: the best cost and the bound, and the cost, moves and CPU time [s] of each rule's run."""
 
     best: float
@@ -60,9 +60,11 @@ class Surveyed:
 def carried_over(job: Job, reading: Mapping[str, Any]) -> Findings:
     """The results of policies of each family and of all, learned on `job.sessions` small cells; the reading has no effect."""
     families = [*SMALL, ALL]
-    learned = _kept(job, "learned", families, partial(_learned, sessions=job.sessions, seed=job.seed), _policy_of)
-    cells = unseen()
-    surveys = _kept(job, "surveyed", cells, surveyed, partial(record_of, Surveyed))
+    learned = _kept_results(
+        job, "learned", families, partial(_policy_record, sessions=job.sessions, seed=job.seed), _policy_of
+    )
+    cells = larger_cells()
+    surveys = _kept_results(job, "surveyed", cells, survey_record, partial(record_of, Survey))
     rows: list[Row] = []
     for group in dict.fromkeys((cell.family, cell.group) for cell in cells):
         rows += rows_of(*group, {cell: surveys[cell] for cell in cells if (cell.family, cell.group) == group}, learned)
@@ -76,7 +78,7 @@ def carried_over(job: Job, reading: Mapping[str, Any]) -> Findings:
     )
 
 
-def _kept(job: Job, kind: str, items: Sequence[Any], work: Any, read: Any) -> dict[Any, Any]:
+def _kept_results(job: Job, kind: str, items: Sequence[Any], work: Any, read: Any) -> dict[Any, Any]:
     """The result of `work`, a module's function, for each item; the job's folder keeps the results."""
     names = {_key(job, kind, item): item for item in items}
     done = job.kept_as(lambda entry: (names[entry["key"]], read(entry["found"])) if entry["key"] in names else None)
@@ -93,7 +95,7 @@ def _key(job: Job, kind: str, item: Any) -> str:
     return f"{kind}: {item}, {job.sessions} cells, seed {job.seed}" if kind == "learned" else f"{kind}: {asdict(item)}"
 
 
-def _learned(family: str, sessions: int, seed: int) -> dict[str, Any]:
+def _policy_record(family: str, sessions: int, seed: int) -> dict[str, Any]:
     """The learned policy of a family, as the folder keeps it."""
     said = f"{sessions} small cells: {family}; lab study run carried-over --sessions {sessions} --seed {seed}"
     policy = learn_policy(small_cells(family, sessions, seed), MAKESPAN, SETTINGS, seed, said)
@@ -104,9 +106,9 @@ def _policy_of(held: dict[str, Any]) -> CarriedPolicy:
     return CarriedPolicy(held["weights"], MAKESPAN, held["learned_on"])
 
 
-def surveyed(larger: Unseen) -> dict[str, Any]:
-    """`Surveyed` of a larger cell, as the folder keeps it."""
-    cell, rules, rules_s, moves = unseen_cell(larger), dict[str, float](), dict[str, float](), 0
+def survey_record(larger: LargerCell) -> dict[str, Any]:
+    """`Survey` of a larger cell, as the folder keeps it."""
+    cell, rules, rules_s, moves = larger_cell(larger), dict[str, float](), dict[str, float](), 0
     for name, rule in usable(cell).items():
         run, began = Run(cell), time.process_time()
         moves = max(moves, len(dispatch(run, rule)))
@@ -121,7 +123,7 @@ def surveyed(larger: Unseen) -> dict[str, Any]:
 
 
 def rows_of(
-    family: str, group: str, surveys: Mapping[Unseen, Surveyed], learned: Mapping[str, CarriedPolicy]
+    family: str, group: str, surveys: Mapping[LargerCell, Survey], learned: Mapping[str, CarriedPolicy]
 ) -> list[Row]:
     """The rows of a group: every rule, then every policy, that of the group's family first."""
     proven = sum(survey.proven for survey in surveys.values())
@@ -136,7 +138,7 @@ def rows_of(
         seconds = sum(survey.rules_s[rule] for survey in surveys.values())
         said = named | {"method": rule, "best_rule": rule == best}
         rows += _measured(said, own, sum(survey.moves for survey in surveys.values()) / max(seconds, 1e-9))
-    deciders = {cell: Decider(unseen_cell(cell)) for cell in surveys}
+    deciders = {cell: Decider(larger_cell(cell)) for cell in surveys}
     for learned_on in sorted(learned, key=lambda name: name != family):
         weights = learned[learned_on].vector
         own = [100.0 * gap(float(deciders[o].costs(weights[None])[0]), s.bound) for o, s in surveys.items()]

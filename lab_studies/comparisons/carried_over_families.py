@@ -19,7 +19,7 @@ JOBS, TOASTS, PARTS = (3, 5), (3, 8), (3, 8)  # the least and the most in small 
 
 
 @dataclass(frozen=True)
-class Unseen:
+class LargerCell:
     """A larger cell: its family, the group that it is reported in, and its number there.
 
     printed: the best published value; None: it has to be computed.
@@ -63,7 +63,7 @@ def toasts(rng: np.random.Generator, least: int, most: int) -> Cell:
     )
 
 
-def manufactured(rng: np.random.Generator, least: int, most: int) -> Cell:
+def manufacturing(rng: np.random.Generator, least: int, most: int) -> Cell:
     """The manufacturing cell of App. III with a random order, random processing times and another interval of arrivals."""
     cell = _fms(rng, int(rng.integers(least, most + 1)))
     factors = dict(zip(("rook", "sign"), rng.uniform(0.6, 1.5, 2), strict=True))
@@ -93,7 +93,7 @@ def _slower(stage: Stage, factor: float) -> Stage:
 SMALL: Mapping[str, Callable[[np.random.Generator], Cell]] = {
     SHOP: lambda rng: shop(rng, *JOBS),
     TOAST: lambda rng: toasts(rng, *TOASTS),
-    FMS: lambda rng: manufactured(rng, *PARTS),
+    FMS: lambda rng: manufacturing(rng, *PARTS),
 }
 BILGE_ULUSOY, MORE_JOBS = "Bilge and Ulusoy, two vehicles", "drawn, 10 to 20 jobs"
 THESIS_TOASTS, DRAWN_TOASTS, ORDERS = (
@@ -103,20 +103,20 @@ THESIS_TOASTS, DRAWN_TOASTS, ORDERS = (
 )
 
 
-def unseen() -> tuple[Unseen, ...]:
+def larger_cells() -> tuple[LargerCell, ...]:
     """The larger cells, which do not depend on the study's seed."""
     printed = [instance.printed for instance in board() if instance.family == PRINTED]
     return (
-        *(Unseen(SHOP, BILGE_ULUSOY, number, value) for number, value in enumerate(printed)),
-        *(Unseen(SHOP, MORE_JOBS, number) for number in range(12)),
-        *(Unseen(TOAST, THESIS_TOASTS, number) for number in range(15)),
-        *(Unseen(TOAST, DRAWN_TOASTS, number) for number in range(20)),
-        *(Unseen(FMS, ORDERS, number) for number in range(10)),
+        *(LargerCell(SHOP, BILGE_ULUSOY, number, value) for number, value in enumerate(printed)),
+        *(LargerCell(SHOP, MORE_JOBS, number) for number in range(12)),
+        *(LargerCell(TOAST, THESIS_TOASTS, number) for number in range(15)),
+        *(LargerCell(TOAST, DRAWN_TOASTS, number) for number in range(20)),
+        *(LargerCell(FMS, ORDERS, number) for number in range(10)),
     )
 
 
 @lru_cache(maxsize=256)
-def unseen_cell(cell: Unseen) -> Cell:
+def larger_cell(cell: LargerCell) -> Cell:
     """The cell that is meant, the same every time."""
     rng = np.random.default_rng([2026, [*GROUPS].index(cell.group), cell.number])
     return GROUPS[cell.group](cell.number, rng)

@@ -39,13 +39,13 @@ class Changed:
     words: str
 
 
-def still(task: Task, layout: Layout) -> Task:
+def with_fixed_obstacles(task: Task, layout: Layout) -> Task:
     """The task with its obstacles fixed where they were laid out."""
     stand = zip(task.obstacles, layout.obstacles, strict=True)
-    return _with(task, obstacles=tuple(o.model_copy(update={"position_m": p, "area": (0.0, 0.0)}) for o, p in stand))
+    return task.changed(obstacles=tuple(o.model_copy(update={"position_m": p, "area": (0.0, 0.0)}) for o, p in stand))
 
 
-def surveyed(scene: Scene, task: Task, layout: Layout, seed: int, order: Order) -> tuple[Prepared, str, int]:
+def survey_of_scene(scene: Scene, task: Task, layout: Layout, seed: int, order: Order) -> tuple[Prepared, str, int]:
     """The survey of a changed scene, the change in words, and the number of earlier draws that could not be surveyed.
 
     task, layout, seed: those of the scene that is changed. Raises BadInput if no draw can be surveyed.
@@ -60,11 +60,6 @@ def surveyed(scene: Scene, task: Task, layout: Layout, seed: int, order: Order) 
     raise BadInput(f"{scene.kind}, scene {scene.number}: none of {MAX_DRAWS} draws can be surveyed; the last: {last}")
 
 
-def _with(task: Task, **changed: object) -> Task:
-    """A copy of a task, checked again."""
-    return task.changed(**changed)
-
-
 def _seen(task: Task, place: tuple[float, float]) -> bool:
     """Whether a point (x, y) [m] lies in a grid that the camera looks at."""
     return any(in_grid(station.grid, place) for station in task.stations if station.grid is not None)
@@ -77,11 +72,11 @@ def _shift(rng: np.random.Generator) -> tuple[float, float, float]:
 
 
 def _cubes_moved(task: Task, layout: Layout, seed: int, rng: np.random.Generator) -> Changed:
-    obstacles, which = [*still(task, layout).obstacles], int(rng.integers(len(task.obstacles)))
+    obstacles, which = [*with_fixed_obstacles(task, layout).obstacles], int(rng.integers(len(task.obstacles)))
     moved, (dx, dy, far) = obstacles[which], _shift(rng)
     x, y = moved.position_m
     obstacles[which] = moved.model_copy(update={"position_m": (x + dx, y + dy)})
-    return Changed(_with(task, obstacles=tuple(obstacles)), seed, f"'{moved.name}' moved {100 * far:.1f} cm")
+    return Changed(task.changed(obstacles=tuple(obstacles)), seed, f"'{moved.name}' moved {100 * far:.1f} cm")
 
 
 def _station_moved(task: Task, layout: Layout, seed: int, rng: np.random.Generator) -> Changed:
@@ -91,7 +86,7 @@ def _station_moved(task: Task, layout: Layout, seed: int, rng: np.random.Generat
     x, y, yaw = moved.pose
     stations[which] = moved.model_copy(update={"pose": (x + dx, y + dy, yaw + turn)})
     words = f"'{moved.name}' moved {100 * far:.1f} cm" + (f", turned {np.degrees(turn):.0f} degrees" if turn else "")
-    return Changed(_with(still(task, layout), stations=tuple(stations)), seed, words)
+    return Changed(with_fixed_obstacles(task, layout).changed(stations=tuple(stations)), seed, words)
 
 
 def _cubes_added(task: Task, layout: Layout, seed: int, rng: np.random.Generator) -> Changed:
@@ -99,18 +94,18 @@ def _cubes_added(task: Task, layout: Layout, seed: int, rng: np.random.Generator
     x, y = float(rng.uniform(min(xs), max(xs))), float(rng.uniform(min(ys), max(ys)))
     cubes = SEEN if _seen(task, (x, y)) else int(rng.integers(1, HIGHEST + 1))
     added = Obstacle(name="cubes added", position_m=(x, y), cubes=cubes)
-    obstacles = (*still(task, layout).obstacles, added)
-    return Changed(_with(task, obstacles=obstacles), seed, f"{cubes} cubes added at ({x:.2f}, {y:.2f}) m")
+    obstacles = (*with_fixed_obstacles(task, layout).obstacles, added)
+    return Changed(task.changed(obstacles=obstacles), seed, f"{cubes} cubes added at ({x:.2f}, {y:.2f}) m")
 
 
 def _cubes_taken(task: Task, layout: Layout, seed: int, rng: np.random.Generator) -> Changed:
-    obstacles, which = [*still(task, layout).obstacles], int(rng.integers(len(task.obstacles)))
+    obstacles, which = [*with_fixed_obstacles(task, layout).obstacles], int(rng.integers(len(task.obstacles)))
     lower = obstacles[which]
     seen = _seen(task, lower.position_m)
     taken = lower.cubes if seen else int(rng.integers(1, lower.cubes + 1))
     left = [lower.model_copy(update={"cubes": lower.cubes - taken})] if taken < lower.cubes else []
     obstacles[which : which + 1] = left
-    return Changed(_with(task, obstacles=tuple(obstacles)), seed, f"{taken} cubes of '{lower.name}' taken away")
+    return Changed(task.changed(obstacles=tuple(obstacles)), seed, f"{taken} cubes of '{lower.name}' taken away")
 
 
 def _another_seed(task: Task, layout: Layout, seed: int, rng: np.random.Generator) -> Changed:

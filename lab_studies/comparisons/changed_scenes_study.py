@@ -14,8 +14,16 @@ from lab.studies.runner import Job
 from lab.tasks.task_file import load
 from lab.teaching.lesson_plan import Lesson
 from lab.toolbox.policy import Policy
-from lab_studies.comparisons.changed_scenes import KINDS, Scene, surveyed
-from lab_studies.comparisons.skills_taught import Known, distinct, fails, key_of, spent, taught, works
+from lab_studies.comparisons.changed_scenes import KINDS, Scene, survey_of_scene
+from lab_studies.comparisons.skills_taught import (
+    Known,
+    distinct_problems,
+    is_failing,
+    lesson_cost,
+    policy_key,
+    reaches_goals,
+    taught_skills,
+)
 
 TASK, TOASTS = "toast", 3
 WAYS = ("the same", "used", "adapted", "refused", "learned")  # what becomes of a skill in a changed scene
@@ -74,7 +82,7 @@ def changed_scenes(job: Job, reading: Mapping[str, Any]) -> Findings:
     """The results of changed scenes, equally many of each kind; the reading has no effect."""
     kinds = [*KINDS]
     scenes = [Scene(kinds[number % len(kinds)], number // len(kinds), job.seed) for number in range(job.sessions)]
-    outcomes = job.each(tried, scenes)
+    outcomes = job.each(scene_outcome, scenes)
     rows = [
         result
         for kind in (None, *KINDS)
@@ -87,31 +95,31 @@ def changed_scenes(job: Job, reading: Mapping[str, Any]) -> Findings:
 
 
 @lru_cache(maxsize=1)
-def learned_here() -> tuple[Prepared, Known, Known]:
+def original_scene() -> tuple[Prepared, Known, Known]:
     """The original scene, the policies that a run learns in it, and those of each problem learned from scratch.
 
     Both by (sub-task, signature), and the same in each process.
     """
     task = load(TASK)
     prepared = prepare(task, task.order(TOASTS), 0)
-    problems = distinct(prepared)
-    lessons = [skill.lesson for skill in taught(prepared, {}, problems)]
-    anew = {key_of(problem): _from_nothing(prepared, problem) for problem in problems}
+    problems = distinct_problems(prepared)
+    lessons = [skill.lesson for skill in taught_skills(prepared, {}, problems)]
+    anew = {policy_key(problem): _from_scratch(prepared, problem) for problem in problems}
     return prepared, {(skill.policy.subtask, skill.policy.signature): skill.policy for skill in lessons}, anew
 
 
-def tried(scene: Scene) -> Outcome:
+def scene_outcome(scene: Scene) -> Outcome:
     """The outcome of one changed scene, with the policies learned before and from scratch."""
-    base, known, learned = learned_here()
-    prepared, words, refused = surveyed(scene, base.task, base.layout, base.seed, base.order)
-    problems = distinct(prepared)
-    here = taught(prepared, known, problems)
-    anew = [learned.get(key_of(problem)) or _from_nothing(prepared, problem) for problem in problems]
-    ways = [_way(skill.lesson) for skill in here]
+    base, known, learned = original_scene()
+    prepared, words, refused = survey_of_scene(scene, base.task, base.layout, base.seed, base.order)
+    problems = distinct_problems(prepared)
+    here = taught_skills(prepared, known, problems)
+    anew = [learned.get(policy_key(problem)) or _from_scratch(prepared, problem) for problem in problems]
+    ways = [_fate(skill.lesson) for skill in here]
     tallies = {}
     for way in WAYS:
         own = [n for n, met in enumerate(ways) if met == way]
-        costs = [spent(here[n].lesson) for n in own]
+        costs = [lesson_cost(here[n].lesson) for n in own]
         tallies[way] = Tally(
             len(own),
             sum(episodes for episodes, _ in costs),
@@ -120,7 +128,7 @@ def tried(scene: Scene) -> Outcome:
             (sum(len(anew[n].curve) for n in own), sum(anew[n].helped_steps for n in own)),
         )
     lessons = [skill.lesson for skill in here]
-    failing = [fails(prepared, problem, lesson.policy) for problem, lesson in zip(problems, lessons, strict=True)]
+    failing = [is_failing(prepared, problem, lesson.policy) for problem, lesson in zip(problems, lessons, strict=True)]
     return Outcome(
         words,
         refused,
@@ -135,18 +143,18 @@ def tried(scene: Scene) -> Outcome:
             for problem, lesson, policy in zip(problems, lessons, anew, strict=True)
         ),
         unsolved=(
-            sum(not works(problem, lesson.policy) for problem, lesson in zip(problems, lessons, strict=True)),
-            sum(not works(problem, policy) for problem, policy in zip(problems, anew, strict=True)),
+            sum(not reaches_goals(problem, lesson.policy) for problem, lesson in zip(problems, lessons, strict=True)),
+            sum(not reaches_goals(problem, policy) for problem, policy in zip(problems, anew, strict=True)),
         ),
     )
 
 
-def _from_nothing(prepared: Prepared, problem: Problem) -> Policy:
+def _from_scratch(prepared: Prepared, problem: Problem) -> Policy:
     """The policy that is learned for a problem from scratch."""
-    return taught(prepared, {}, [problem])[0].lesson.policy
+    return taught_skills(prepared, {}, [problem])[0].lesson.policy
 
 
-def _way(lesson: Lesson) -> str:
+def _fate(lesson: Lesson) -> str:
     if lesson.source == "reused":
         return "the same" if lesson.fitness is None else "used"
     if lesson.source == "adapted":
@@ -155,7 +163,7 @@ def _way(lesson: Lesson) -> str:
 
 
 def _any_works(known: Known, problem: Problem) -> bool:
-    return any(works(problem, policy) for (subtask, _), policy in known.items() if subtask == problem.subtask)
+    return any(reaches_goals(problem, policy) for (subtask, _), policy in known.items() if subtask == problem.subtask)
 
 
 def _moves(problem: Problem, policy: Policy) -> int:

@@ -63,7 +63,7 @@ class Setting:
 
 
 @dataclass(frozen=True)
-class Ran:
+class RunOutcome:
     """The outcome of a run: one of CAME, and why; rows: its faults, see `verdict`. Times in seconds.
 
     asked: the requests to the person who attended the run; did: what the person did. Both are empty for runs without one.
@@ -91,7 +91,7 @@ def faults(job: Job, reading: Mapping[str, Any]) -> Findings:
     runs = measured(job, settings)
     rows = [*rows_of("task", {name: [r for s, r in runs.items() if s.task == name] for name in names})]
     kinds = [*FAULTS, "none"]
-    rows += rows_of("fault", {kind: [r for r in runs.values() if kind in struck(r)] for kind in kinds})
+    rows += rows_of("fault", {kind: [r for r in runs.values() if kind in kinds_struck(r)] for kind in kinds})
     rows += rows_of("", {"all": [*runs.values()]})
     wrong = [f"{s.task}, seed {s.seed}: {r.why}" for s, r in runs.items() if r.came == "wrong"]
     words = ABOUT.format(runs=len(runs), tasks=", ".join(names), longest=LONGEST, comes=COMES_AFTER_S)
@@ -99,19 +99,19 @@ def faults(job: Job, reading: Mapping[str, Any]) -> Findings:
     return Findings(rows, in_short([*runs.values()]), figures, (words, COLUMNS, *(f"Wrong: {why}." for why in wrong)))
 
 
-def struck(ran: Ran) -> list[str]:
+def kinds_struck(ran: RunOutcome) -> list[str]:
     """The kinds of the faults that struck, or ["none"]."""
     return [str(fault["what"]) for fault in ran.rows] or ["none"]
 
 
-def measured(job: Job, settings: Sequence[Setting]) -> dict[Setting, Ran]:
+def measured(job: Job, settings: Sequence[Setting]) -> dict[Setting, RunOutcome]:
     """The outcome of every run; the job's folder keeps them."""
-    kept = job.kept_as(lambda entry: (record_of(Setting, entry["setting"]), record_of(Ran, entry["ran"])))
-    done: dict[Setting, Ran] = {setting: ran for setting, ran in kept.items() if setting in settings}
+    kept = job.kept_as(lambda entry: (record_of(Setting, entry["setting"]), record_of(RunOutcome, entry["ran"])))
+    done: dict[Setting, RunOutcome] = {setting: ran for setting, ran in kept.items() if setting in settings}
     left = [setting for setting in settings if setting not in done]
     left.sort(key=lambda setting: (setting.task, setting.seed))
     job.progress(len(done), len(settings))
-    for setting, ran in job.computed(carried_out, left):
+    for setting, ran in job.computed(run_outcome, left):
         done[setting] = ran
         job.keep({"setting": asdict(setting), "ran": asdict(ran)})
         job.progress(len(done), len(settings))
@@ -166,18 +166,18 @@ def _ready(name: str) -> _Ready:
     return _Ready(prepared, taught, teacher, tuple(order.sequence), order.cost, folder)
 
 
-def carried_out(setting: Setting) -> Ran:
+def run_outcome(setting: Setting) -> RunOutcome:
     """The outcome of one run with its random faults, repeated with a person if it stops."""
-    alone = _carried_out(setting, None)
+    alone = _single_run(setting, None)
     if alone.came != "stopped":
         return alone
     person = Attendant()
-    ran = _carried_out(setting, person)
+    ran = _single_run(setting, person)
     came = "attended" if ran.came == "delivered" else ran.came
     return replace(ran, came=came, asked=person.asked, did=person.did, wall_s=alone.wall_s + ran.wall_s)
 
 
-def _carried_out(setting: Setting, person: Attendant | None) -> Ran:
+def _single_run(setting: Setting, person: Attendant | None) -> RunOutcome:
     """The outcome of one run, attended by a person, or by nobody (None)."""
     from lab.production.composer import Conditions, carry_out
     from lab.production.faults.injector import draw
@@ -187,7 +187,9 @@ def _carried_out(setting: Setting, person: Attendant | None) -> Ran:
     prepared, planned_s = ready.prepared, ready.planned_s
     drawn = draw(prepared.task, prepared.order, setting.seed, planned_s)
 
-    ran = Ran("wrong", "", "", [], [], [fault.what for fault in drawn], 0, len(prepared.order), 0.0, planned_s, 0.0)
+    ran = RunOutcome(
+        "wrong", "", "", [], [], [fault.what for fault in drawn], 0, len(prepared.order), 0.0, planned_s, 0.0
+    )
     try:
         conditions = Conditions(faults=drawn, viewer=_Clock(LONGEST * planned_s))
         if person is not None:
@@ -219,7 +221,7 @@ def _carried_out(setting: Setting, person: Attendant | None) -> Ran:
     )
 
 
-def rows_of(by: str, groups: Mapping[str, Sequence[Ran]]) -> list[Row]:
+def rows_of(by: str, groups: Mapping[str, Sequence[RunOutcome]]) -> list[Row]:
     """For each group, the shares of outcomes of its runs [%], and the share of its faults that were noticed."""
     rows: list[Row] = []
     for name, runs in groups.items():
@@ -241,7 +243,7 @@ def rows_of(by: str, groups: Mapping[str, Sequence[Ran]]) -> list[Row]:
     return rows
 
 
-def in_short(runs: Sequence[Ran]) -> Row:
+def in_short(runs: Sequence[RunOutcome]) -> Row:
     """The numbers of runs by outcome."""
     came = Counter(ran.came for ran in runs)
     says: Row = {"runs": len(runs), **{name: came[name] for name in CAME}}

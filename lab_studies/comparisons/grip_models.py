@@ -80,7 +80,7 @@ def primitive(name: str) -> "Trimesh":
     return cast("Trimesh", made[name]())
 
 
-def written(model: Model, folder: Path) -> PartFields:
+def part_of_model(model: Model, folder: Path) -> PartFields:
     """The fields of a part of the model, which stands as it comes to rest in physics; its file is written to `folder`."""
     if model.file is None:
         name = f"{model.name}.stl"
@@ -97,7 +97,7 @@ def written(model: Model, folder: Path) -> PartFields:
         "friction": FRICTION,
     }
     first = PartFields.model_validate({**fields, "scale": _fitting(folder / name, model.scale)})
-    stands = at_rest(first.model_copy(update={"stands": _stable(first, folder)}), folder)
+    stands = rest_pose(first.model_copy(update={"stands": _stable(first, folder)}), folder)
     return first.model_copy(update={"stands": stands})
 
 
@@ -125,7 +125,7 @@ def _stable(part: PartFields, folder: Path) -> tuple[float, float]:
     return roll_and_pitch(poses[int(np.argmax(chances))][:3, :3])
 
 
-def at_rest(part: PartFields, folder: Path) -> tuple[float, float]:
+def rest_pose(part: PartFields, folder: Path) -> tuple[float, float]:
     """The roll and pitch [rad] at which a part comes to rest after it is set down on a plane as its field `stands` says."""
     shape = shape_of(part, folder)
     with World() as world:

@@ -24,7 +24,7 @@ from lab.tasks.part_fields import PartFields
 from lab.tasks.robot_fields import RobotSettings
 from lab.tasks.task import Task, part_name
 from lab.tasks.task_file import load
-from lab_studies.comparisons.grip_models import MODELS, written
+from lab_studies.comparisons.grip_models import MODELS, part_of_model
 
 CARRY_M, OVER_M = 0.5, 0.15  # how far a part is carried, and how high it is lifted
 NEAR_M, ROLLED_M = 0.015, 0.030  # the largest distance from its place at the end; for what rolls
@@ -92,24 +92,24 @@ class Outcome:
     grip: Grip | None
 
 
-def tried(setting: Setting) -> Outcome:
+def model_outcome(setting: Setting) -> Outcome:
     """The outcome of a model in all its poses; without poses if its grip is rejected."""
     model = next(known for known in MODELS if known.name == setting.model)
     rng = np.random.default_rng([setting.seed, MODELS.index(model)])
     with TemporaryDirectory(prefix="lab-grips-") as name:
         folder = Path(name)
-        part = written(model, folder)
-        edges, widths = measured(part, folder)
+        part = part_of_model(model, folder)
+        edges, widths = edges_and_widths(part, folder)
         try:
             tasks = [_task(part, folder, rng) for _ in range(setting.poses)]
             grip = kinds_of(tasks[0], arm_of(ARM).gripper)[part.name].grip
         except BadInput as error:
             return Outcome(str(error), (), (), edges, widths, None)
-        trials = [carried(task, model.rolls) for task in tasks]
+        trials = [carrying_trial(task, model.rolls) for task in tasks]
         return Outcome("", tuple(why for why, _ in trials), tuple(off for _, off in trials), edges, widths, grip)
 
 
-def measured(part: PartFields, folder: Path) -> tuple[tuple[float, ...], tuple[float, ...]]:
+def edges_and_widths(part: PartFields, folder: Path) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """A part's extents as it stands (3,), and its widths (HEADINGS,) over half a turn [m]."""
     shape = shape_of(part, folder)
     yaws = np.arange(HEADINGS) * pi / HEADINGS
@@ -119,7 +119,7 @@ def measured(part: PartFields, folder: Path) -> tuple[tuple[float, ...], tuple[f
 
 def _task(part: PartFields, folder: Path, rng: np.random.Generator) -> Task:
     """The task of carrying a part between two random places with random yaws, both within the arm's reach."""
-    begin, end = drawn(rng)
+    begin, end = random_places(rng)
     write_whole(folder / "grips.toml", _text(part, begin, end).encode())
     return load(str(folder / "grips.toml"))
 
@@ -129,7 +129,7 @@ def _text(part: PartFields, begin: Place, end: Place) -> str:
     return TASK.format(**fields, arm=ARM.model, begin=begin, end=end)
 
 
-def drawn(rng: np.random.Generator) -> tuple[Place, Place]:
+def random_places(rng: np.random.Generator) -> tuple[Place, Place]:
     """Two random places CARRY_M apart, 0.5 to 1.05 m from the arm's axis and ahead of it."""
     while True:
         x, y = float(rng.uniform(0.35, 0.9)), float(rng.uniform(-0.6, 0.6))
@@ -139,7 +139,7 @@ def drawn(rng: np.random.Generator) -> tuple[Place, Place]:
             return (x, y, yaw), (*there, yaw + turn)
 
 
-def carried(task: Task, rolls: bool) -> tuple[str, float]:
+def carrying_trial(task: Task, rolls: bool) -> tuple[str, float]:
     """Carry the part of a task; return why that failed, or "", and its distance [m] from its place at the end."""
     with World() as world:
         kind = task.parts[0].name

@@ -12,7 +12,16 @@ from lab.studies.findings import Findings, Row, row, share_row
 from lab.studies.runner import Job
 from lab.view.canvas import BLUE, GREY, INK, PALE_GREY, RED, picture_bytes
 from lab_studies.comparisons.grip_models import FITTED_M, FRICTION, GRASPABLE_M, MASS_KG, MODELS
-from lab_studies.comparisons.grip_trials import ARM, CARRY_M, HEADINGS, NEAR_M, ROLLED_M, Outcome, Setting, tried
+from lab_studies.comparisons.grip_trials import (
+    ARM,
+    CARRY_M,
+    HEADINGS,
+    NEAR_M,
+    ROLLED_M,
+    Outcome,
+    Setting,
+    model_outcome,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -35,7 +44,7 @@ POSES = (
 def grips(job: Job, reading: Mapping[str, Any]) -> Findings:
     """The results of some poses of each model; the reading has no effect."""
     settings = [Setting(model.name, job.sessions, job.seed) for model in MODELS]
-    outcomes = {setting.model: outcome for setting, outcome in job.each(tried, settings).items()}
+    outcomes = {setting.model: outcome for setting, outcome in job.each(model_outcome, settings).items()}
     rows = [result for name, outcome in outcomes.items() for result in rows_of(name, outcome)]
     arrived = [not why for outcome in outcomes.values() for why in outcome.failures]
     if arrived:

@@ -12,7 +12,7 @@ import numpy as np
 
 from lab.learning.settings import LearnerSettings
 from lab.mdp import TabularMDP
-from lab_studies.comparisons.learning_speed_session import MOVES, Measured, Missing, Session, session_of, shared_out
+from lab_studies.comparisons.learning_speed_session import MOVES, Measured, Missing, Session, batch_sizes, session_of
 
 LANES = 500  # sessions side by side; the tables of more do not stay in the cache
 FEWEST_LANES = 64  # fewer lanes are not halved again
@@ -35,7 +35,7 @@ def _measure_jax(job: Session, sessions: int, seed: int) -> Measured:
     except ImportError as error:
         raise Missing(f"jax cannot be imported: {error}") from None
     rng = np.random.default_rng(seed)
-    streams = [rng.integers(0, 2**64, lanes, np.uint64) for lanes in shared_out(sessions, LANES)]
+    streams = [rng.integers(0, 2**64, lanes, np.uint64) for lanes in batch_sizes(sessions, LANES)]
     sizes = {len(stream): stream for stream in streams}
     programs = {lanes: jax.jit(_jax_program(job, lanes)).lower(stream).compile() for lanes, stream in sizes.items()}
     began = perf_counter()

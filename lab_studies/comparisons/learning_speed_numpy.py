@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from lab.learning.settings import LearnerSettings
 from lab.mdp import FloatArray, TabularMDP
-from lab_studies.comparisons.learning_speed_session import MOVES, Measured, Session, session_of, shared_out
+from lab_studies.comparisons.learning_speed_session import MOVES, Measured, Session, batch_sizes, session_of
 
 LANES = 2000  # sessions side by side, which share the cost of a call
 BLOCK = 64  # moves after which finished sessions are removed
@@ -21,7 +21,7 @@ def numpy_lock_step(mdp: TabularMDP, settings: LearnerSettings, sessions: int, s
     """The measurement of sessions side by side in numpy arrays, one move of each at a time."""
     session, rng = session_of(mdp, settings, sessions), np.random.default_rng(seed)
     began = perf_counter()
-    batches = [_batch(session, lanes, rng) for lanes in shared_out(sessions, LANES)]
+    batches = [_batch(session, lanes, rng) for lanes in batch_sizes(sessions, LANES)]
     seconds = perf_counter() - began
     return Measured(sum(moves for moves, _ in batches), seconds, 100.0 * sum(won for _, won in batches) / sessions)
 

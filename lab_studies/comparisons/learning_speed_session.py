@@ -83,6 +83,6 @@ def session_of(mdp: TabularMDP, settings: LearnerSettings, sessions: int) -> Ses
     )
 
 
-def shared_out(sessions: int, most: int) -> list[int]:
+def batch_sizes(sessions: int, most: int) -> list[int]:
     """The sizes of the batches of so many sessions, at most `most` in each."""
     return [min(most, sessions - first) for first in range(0, sessions, most)]

@@ -63,7 +63,7 @@ Asks = Callable[[int | None], bool]  # (state) -> whether to ask in it; None: an
 Tally = dict[tuple[str, float], tuple[list[float], list[float]]]  # (rule, share) -> (shares solved, questions)
 
 
-def learned(mdp: TabularMDP, place: Any, rng: np.random.Generator) -> Taught:
+def learned_policy(mdp: TabularMDP, place: Any, rng: np.random.Generator) -> Taught:
     """A policy and an ensemble, which learned the same problem with different random numbers."""
     tables, seen = [], list[int]()
     learner = place.learner.__class__(**(vars(place.learner) | {"episodes": LEARNED}))
@@ -75,7 +75,7 @@ def learned(mdp: TabularMDP, place: Any, rng: np.random.Generator) -> Taught:
     return Taught(np.array(tables), seen)
 
 
-def walked(
+def walked_episode(
     mdp: TabularMDP, place: Any, asks: Asks, policy: Any, rng: np.random.Generator
 ) -> tuple[bool, int, list[Step]]:
     """An episode: whether it reached the goal, its questions, and its steps, each with whether the policy was right."""
@@ -96,17 +96,17 @@ def walked(
     return False, questions, steps
 
 
-def one_policy(where: Place, seed: int) -> Tally:
+def policy_tally(where: Place, seed: int) -> Tally:
     """The tally of every rule with one policy."""
     place = problem(where.layout)
     mdp, rng = place.mdp, np.random.default_rng(seed)
-    taught = learned(mdp, place, rng)
+    taught = learned_policy(mdp, place, rng)
 
     def policy(state: int) -> int:
         return int(taught.tables[0, state].argmax())
 
     def episodes(asks: Asks, count: int) -> list[tuple[bool, int, list[Step]]]:
-        return [walked(mdp, place, asks, policy, rng) for _ in range(count)]
+        return [walked_episode(mdp, place, asks, policy, rng) for _ in range(count)]
 
     labelled = [steps for _, _, steps in episodes(lambda state: False, LABELLED)]
     tally: Tally = {}
@@ -143,11 +143,11 @@ def _watched(taught: Taught, rule: str, threshold: float) -> Watched:
     return watch(several if rule == "ensemble" else several[0], rule, threshold=threshold, seen=taught.seen)
 
 
-def policies_of(where: Place, policies: int, seed: int) -> Tally:
+def layout_tally(where: Place, policies: int, seed: int) -> Tally:
     """The tally of `policies` policies in a layout."""
     tally: Tally = {}
     for own in seeds_of(where, policies, seed):
-        for key, (solved, questions) in one_policy(where, int(own)).items():
+        for key, (solved, questions) in policy_tally(where, int(own)).items():
             both = tally.setdefault(key, ([], []))
             both[0].extend(solved)
             both[1].extend(questions)
@@ -157,7 +157,7 @@ def policies_of(where: Place, policies: int, seed: int) -> Tally:
 def mentor(job: Job, reading: Mapping[str, Any]) -> Findings:
     """The results of every layout; a session is a policy, and the reading has no effect."""
     places = [Place(layout) for layout in LAYOUTS]
-    tallies = job.each(partial(policies_of, policies=job.sessions, seed=job.seed), places)
+    tallies = job.each(partial(layout_tally, policies=job.sessions, seed=job.seed), places)
     rows = [row for place in places for row in rows_of(place.layout, tallies[place])]
     says: Row = {}
     for layout in LAYOUTS:
@@ -177,14 +177,14 @@ def rows_of(layout: str, tally: Tally) -> list[Row]:
     for (rule, share), (solved, questions) in tally.items():
         named: Row = {"problem": layout, "rule": rule, "share": share}
         rows.append(mean_row(named, "solved_percent", 100.0 * np.array(solved)))
-        rows.append(mean_row(named, "questions", questions) if rule != NEVER else _none(named))
+        rows.append(mean_row(named, "questions", questions) if rule != NEVER else _no_questions(named))
         if rule in (*FIXED, THRESHOLD):
             by_chance = np.interp(np.mean(questions), [q for q, _ in line], [s for _, s in line])
             rows.append(mean_row(named, "gain_percent", 100.0 * (np.array(solved) - by_chance)))
     return rows
 
 
-def _none(named: Row) -> Row:
+def _no_questions(named: Row) -> Row:
     return {**named, "measure": "questions", "value": 0.0, "ci95": None, "thesis": None, "within": None}
 
 

@@ -137,7 +137,7 @@ def world() -> PhysicsEnvironment:
 
 
 @cache
-def span_of(places: int = 20) -> float:
+def median_span(places: int = 20) -> float:
     """The median span of the teacher's values on its own paths from `places` random starts."""
     place, known, draw = world(), world().values(1.0), stream(0)
     spans: list[float] = []
@@ -154,7 +154,7 @@ def span_of(places: int = 20) -> float:
 def mountain_car(job: Job, reading: Mapping[str, Any]) -> Findings:
     """The results of every rule with both students; the reading has no effect."""
     settings = [Setting(student, rule) for student in STUDENTS for rule in RULES]
-    outcomes = job.each(partial(taught, sessions=job.sessions, seed=job.seed), settings)
+    outcomes = job.each(partial(setting_outcome, sessions=job.sessions, seed=job.seed), settings)
     rows = [result for setting, outcome in outcomes.items() for result in rows_of(setting, outcome, outcomes)]
     pictures = {
         f"Mountain Car: steps of an episode, {student}": curves(
@@ -165,29 +165,31 @@ def mountain_car(job: Job, reading: Mapping[str, Any]) -> Findings:
     return Findings(rows, in_short(outcomes), pictures, (MEASURES, STARTS, DIFFERS))
 
 
-def student_of(name: str) -> LearnerSettings:
+def student_settings(name: str) -> LearnerSettings:
     """A student's settings."""
     return replace(fitting(world().physics), episodes=EPISODES, start_value=STUDENTS[name])
 
 
-def taught(setting: Setting, *, sessions: int, seed: int) -> Outcome:
+def setting_outcome(setting: Setting, *, sessions: int, seed: int) -> Outcome:
     """The outcome of `sessions` sessions of a setting."""
-    place, learner = world(), student_of(setting.student)
+    place, learner = world(), student_settings(setting.student)
     seeds = seeds_of(replace(setting, rule=""), sessions, seed)  # every rule has the same seeds
     if setting.rule in TEACHERS:
-        return _told(setting, learner, seeds)
-    gate = replace(GATE, gate="never" if setting.rule == NOBODY else setting.rule.removesuffix(" gate"), psi=span_of())
+        return _readable_outcome(setting, learner, seeds)
+    gate = replace(
+        GATE, gate="never" if setting.rule == NOBODY else setting.rule.removesuffix(" gate"), psi=median_span()
+    )
     advice = None if setting.rule == NOBODY else Advice.of(advice_chances(place.values(1.0), EXPERT_TAU))
     batch = run_sessions(place, learner, gate, advice, seeds, keep_tables=True)
     return Outcome(batch.steps.astype(np.int64), batch.helped_steps, _solved(batch.q, learner))
 
 
-def _told(setting: Setting, learner: LearnerSettings, seeds: NDArray[np.uint64]) -> Outcome:
+def _readable_outcome(setting: Setting, learner: LearnerSettings, seeds: NDArray[np.uint64]) -> Outcome:
     """The outcome of a rule that sees what the student is about to do, in readable sessions."""
     known = world().values(1.0).tolist()
     steps, helped, tables = [], [], []
     for seed in seeds.tolist():
-        teacher = Teacher(known, TEACHERS[setting.rule], span_of())
+        teacher = Teacher(known, TEACHERS[setting.rule], median_span())
         session = Session(world(), learner, GATE, teacher, stream(seed)).run()
         if session.interrupted:
             raise KeyboardInterrupt
@@ -226,7 +228,7 @@ def rows_of(setting: Setting, of: Outcome, outcomes: Mapping[Setting, Outcome]) 
 
 def in_short(outcomes: Mapping[Setting, Outcome]) -> Row:
     """The area under the learning curve, its beginning, and the episodes to solve, by student and rule."""
-    says: Row = {"span": round(span_of(), 2)}
+    says: Row = {"span": round(median_span(), 2)}
     for setting, of in outcomes.items():
         which = f"{setting.student}, {setting.rule}"
         says[f"{which}: mean steps"] = round(float(of.steps.mean()), 1)

@@ -69,7 +69,7 @@ class Setting:
 
 
 @dataclass(frozen=True)
-class Reacted:
+class SettingOutcome:
     """The makespans in each episode [s], by policy, and the best rule.
 
     decision_s: the time of a rolling decision [s], None without any; proven: the number of proven optima in hindsight.
@@ -84,7 +84,7 @@ class Reacted:
 def reacting(job: Job, reading: Mapping[str, Any]) -> Findings:
     """The results of every cell with every trouble; the reading has no effect."""
     settings = [Setting(cell, order, trouble) for cell, order in WORKS for trouble in TROUBLES]
-    outcomes = job.each(partial(reacted, episodes=job.sessions, seed=job.seed), settings)
+    outcomes = job.each(partial(setting_outcome, episodes=job.sessions, seed=job.seed), settings)
     rows = [line for setting in settings for line in rows_of(setting, outcomes[setting])]
     figures = {f"{cell}, {order}": _picture(rows, cell) for cell, order in WORKS}
     alike = [(result["table"], result["trouble"]) for result in those(rows, measure="makespan_s", method=ROLLING)]
@@ -100,7 +100,7 @@ def reacting(job: Job, reading: Mapping[str, Any]) -> Findings:
     return Findings(rows, says, figures, notes)
 
 
-def reacted(setting: Setting, episodes: int, seed: int) -> Reacted:
+def setting_outcome(setting: Setting, episodes: int, seed: int) -> SettingOutcome:
     """The makespans of all policies in the same episodes of a setting."""
     file = load_cell(setting.cell)
     cell, chance = file.cell(order_from_word(file, setting.order)), TROUBLES[setting.trouble]
@@ -117,7 +117,7 @@ def reacted(setting: Setting, episodes: int, seed: int) -> Reacted:
         costs[ROLLING] = replicate(cell, policy, chance, episodes, seed)
         decision_s = (perf_counter() - began_s) / episodes / len(planned)
     costs[HINDSIGHT], proven = _hindsight(cell, chance, episodes, seed)
-    return Reacted(costs, rule, decision_s, proven)
+    return SettingOutcome(costs, rule, decision_s, proven)
 
 
 def _hindsight(cell: Cell, chance: Chance, episodes: int, seed: int) -> tuple[Floats, int]:
@@ -126,7 +126,7 @@ def _hindsight(cell: Cell, chance: Chance, episodes: int, seed: int) -> tuple[Fl
     return np.array([hindsight.cost for hindsight in hindsights]), sum(hindsight.proven for hindsight in hindsights)
 
 
-def rows_of(setting: Setting, outcome: Reacted) -> list[Row]:
+def rows_of(setting: Setting, outcome: SettingOutcome) -> list[Row]:
     """The mean makespan of each policy, what it saves compared with the list, and how far it is above hindsight."""
     rows: list[Row] = []
     least = float(outcome.costs[HINDSIGHT].mean())

@@ -15,7 +15,15 @@ from lab.studies.findings import Findings, Row, row, those, varying_row
 from lab.studies.runner import Job
 from lab.tasks.task_file import load
 from lab_studies.comparisons.reuse_figures import by_place, by_task
-from lab_studies.comparisons.skills_taught import Known, Taught, distinct, fails, spent, taught, works
+from lab_studies.comparisons.skills_taught import (
+    Known,
+    TaughtSkill,
+    distinct_problems,
+    is_failing,
+    lesson_cost,
+    reaches_goals,
+    taught_skills,
+)
 
 TASKS = ("toast", "two-toasters", "breakfast", "sorting", "fms-arm")
 OTHER_ARM = "toast-panda"  # taught after the first task only
@@ -102,7 +110,7 @@ def reuse(job: Job, reading: Mapping[str, Any]) -> Findings:
     orders = orders_of(TASKS, job.sessions, job.seed)
     pairs = [(TASKS[0], other) for other in (*TASKS[1:], OTHER_ARM)]
     alone = [(task,) for task in (*TASKS, OTHER_ARM)]
-    places = job.each(tried, [Life(order, job.seed) for order in (*orders, *pairs, *alone)])
+    places = job.each(places_of_life, [Life(order, job.seed) for order in (*orders, *pairs, *alone)])
     anew = {task: places[Life((task,), job.seed)][0] for (task,) in alone}
     lives = [places[Life(order, job.seed)] for order in orders]
     after = {other: places[Life((first, other), job.seed)][1] for first, other in pairs}
@@ -123,20 +131,20 @@ def orders_of(tasks: Sequence[str], count: int, seed: int) -> list[tuple[str, ..
     return [*orders]
 
 
-def tried(life: Life) -> tuple[Place, ...]:
+def places_of_life(life: Life) -> tuple[Place, ...]:
     """The results of each task of a life, in its order."""
-    return _lived(life)[0]
+    return _life(life)[0]
 
 
 @lru_cache(maxsize=_LIVES)
-def _lived(life: Life) -> tuple[tuple[Place, ...], Known]:
+def _life(life: Life) -> tuple[tuple[Place, ...], Known]:
     """The results of each task of a life, and the policies then in the toolbox; lives that begin alike share that begin."""
     if not life.order:
         return (), {}
-    before, known = _lived(Life(life.order[:-1], life.seed))
+    before, known = _life(Life(life.order[:-1], life.seed))
     prepared = _prepared(life.order[-1], life.seed)
-    problems = distinct(prepared)
-    skills = taught(prepared, known, problems, life.seed)
+    problems = distinct_problems(prepared)
+    skills = taught_skills(prepared, known, problems, life.seed)
     place = tuple(outcome_of(prepared, problem, skill) for problem, skill in zip(problems, skills, strict=True))
     policies = [skill.lesson.policy for skill in skills]
     learned = {(policy.subtask, policy.signature): policy for policy in policies}
@@ -149,9 +157,9 @@ def _prepared(name: str, seed: int) -> Prepared:
     return prepare(task, task.order(), seed)
 
 
-def outcome_of(prepared: Prepared, problem: Problem, skill: Taught) -> Outcome:
+def outcome_of(prepared: Prepared, problem: Problem, skill: TaughtSkill) -> Outcome:
     """The result of a lesson; a policy of an earlier task is tried in physics."""
-    lesson, (episodes, helped_steps) = skill.lesson, spent(skill.lesson)
+    lesson, (episodes, helped_steps) = skill.lesson, lesson_cost(skill.lesson)
     outcome = Outcome(
         prepared.task.name,
         problem.subtask,
@@ -162,9 +170,9 @@ def outcome_of(prepared: Prepared, problem: Problem, skill: Taught) -> Outcome:
         0 if lesson.result is None else int(lesson.result.visits.sum()),
         skill.wall_s,
         skill.cpu_s,
-        unsolved=not works(problem, lesson.policy),
+        unsolved=not reaches_goals(problem, lesson.policy),
     )
-    return replace(outcome, failing=outcome.carried and fails(prepared, problem, lesson.policy))
+    return replace(outcome, failing=outcome.carried and is_failing(prepared, problem, lesson.policy))
 
 
 # ---- rows ----------------------------------------------------------------------------------------------------------

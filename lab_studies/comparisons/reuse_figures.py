@@ -15,7 +15,7 @@ FATES = {
     "taken_percent": (BLUE, None, "taken from an earlier task"),
     "adapted_percent": (SKY, None, "adapted from an earlier task"),
     "own_percent": (PALE_GREY, "xxx", "taken or adapted within the task"),
-    "learned_percent": (ORANGE, "///", "learned from nothing"),
+    "learned_percent": (ORANGE, "///", "learned from scratch"),
 }
 # colour and marker of each task, by name
 TASKS = ((BLUE, "o"), (ORANGE, "s"), (GREEN, "^"), (PURPLE, "D"), (YELLOW, "v"), (RED, "P"), (SKY, "X"))

@@ -18,7 +18,7 @@ from lab.learning.simulated_advice import Advice, TableAdvisor, advice_chances
 from lab.studies.charts import bars
 from lab.studies.findings import Findings, Row, share_row, those, varying_row
 from lab.studies.runner import Job, seeds_of
-from lab_studies.thesis.chapter_9 import known
+from lab_studies.thesis.chapter_9 import advisor_note
 from lab_studies.thesis.chapter_9_sessions import (
     AdviceSetting,
     gate_of,
@@ -85,7 +85,7 @@ def advisors(job: Job, reading: Mapping[str, Any]) -> Findings:
     together = {(panel, way): PanelSetting(panel, way, lesson) for panel in PANELS for way in (*DECISIONS, IN_TURN)}
     settings = [*together.values(), *alone.values(), nobody]
     outcomes = job.each(
-        partial(tried, sessions=min(job.sessions, MOST), seed=job.seed),
+        partial(panel_outcome, sessions=min(job.sessions, MOST), seed=job.seed),
         sorted(settings, key=lambda setting: -len(setting.members)),  # those that take longest first
     )
     cells = {(panel, way): ("", outcomes[setting]) for (panel, way), setting in together.items()}
@@ -100,14 +100,14 @@ def advisors(job: Job, reading: Mapping[str, Any]) -> Findings:
         ),
         "Helped steps of a session": _picture(rows, "HS_steps", "helped steps"),
     }
-    return Findings(rows, in_short(rows), pictures, (MEASURES, WAYS_NOTE, known(reading), LIMITS))
+    return Findings(rows, in_short(rows), pictures, (MEASURES, WAYS_NOTE, advisor_note(reading), LIMITS))
 
 
 def _merit(outcome: PanelOutcome) -> tuple[float, float]:
     return float(outcome.success.mean()), -float(outcome.helped_steps.mean())
 
 
-def tried(setting: PanelSetting, *, sessions: int, seed: int) -> PanelOutcome:
+def panel_outcome(setting: PanelSetting, *, sessions: int, seed: int) -> PanelOutcome:
     """The outcome of `sessions` sessions of a setting."""
     seeds = seeds_of(replace(setting, way=None), sessions, seed)  # every way of a panel has the same seeds
     runs = [one_session(setting, int(own)) for own in seeds]
@@ -176,12 +176,12 @@ def rows_of(panel: Sequence[str], way: str, who: str, outcome: PanelOutcome) -> 
         varying_row(named, "readmitted", outcome.readmitted),
         varying_row(named, "disagreed_steps", outcome.disagreed),
     ]
-    for name in names_in(panel):
+    for name in member_names(panel):
         rows.append(share_row(named | {"advisor": name}, "ever_dropped_percent", outcome.dropped.get(name, never) > 0))
     return rows
 
 
-def names_in(panel: Sequence[str]) -> list[str]:
+def member_names(panel: Sequence[str]) -> list[str]:
     """The names of the members in the panel, such as "wrong" and "wrong 2"."""
     return [
         name if not panel[:n].count(name) else f"{name} {panel[:n].count(name) + 1}" for n, name in enumerate(panel)

@@ -18,8 +18,8 @@ from lab_studies.comparisons.srl_time_sessions import (
     Instance,
     MethodOutcome,
     MethodSetting,
-    single,
-    tried,
+    method_outcome,
+    single_sequence_methods,
 )
 
 CASES = ("I", "II", "III")
@@ -59,10 +59,10 @@ LIMITS = (
 
 def srl_time_study(job: Job, reading: Mapping[str, Any]) -> Findings:
     """The results of every method with few and many toasts, and with orders of the FMS; the reading has no effect."""
-    works = works_of()
+    works = instances()
     settings = [setting for work in works for setting in settings_of(work)]
     longest_first = sorted(settings, key=lambda setting: -(setting.work.cell.parts * (setting.episodes or 0)))
-    outcomes = job.each(partial(tried, sessions=job.sessions, seed=job.seed), longest_first)
+    outcomes = job.each(partial(method_outcome, sessions=job.sessions, seed=job.seed), longest_first)
     rows = [result for setting in settings for result in rows_of(setting, outcomes[setting])]
     pictures = {
         "Sessions that find the optimum, by their length (bands: 95 % intervals)": by_episodes(rows, "SP_percent"),
@@ -73,7 +73,7 @@ def srl_time_study(job: Job, reading: Mapping[str, Any]) -> Findings:
     return Findings(rows, agreement(rows) | in_short(rows), pictures, (MEASURES, METHODS, WALLS, LIMITS))
 
 
-def works_of() -> list[Instance]:
+def instances() -> list[Instance]:
     """All instances."""
     toasts = [Instance(case, number) for number, case in product((*FEW, *MANY), CASES)]
     return toasts + [Instance(order=order, interval_s=mean_s) for order, mean_s in product(ORDERS, MEANS_S)]
@@ -92,7 +92,7 @@ def settings_of(work: Instance) -> list[MethodSetting]:
                 for episodes in lengths
                 if method != "srl" or (work.toasts or 0) < READABLE_FROM or episodes <= LONGEST_READABLE
             ]
-    return settings + [MethodSetting(work, method) for method in single(work)]
+    return settings + [MethodSetting(work, method) for method in single_sequence_methods(work)]
 
 
 def _factors(work: Instance, method: str) -> tuple[str | None, ...]:

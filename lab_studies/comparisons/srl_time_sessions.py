@@ -79,13 +79,13 @@ class MethodOutcome:
     wall_s: Floats
 
 
-def single(work: Instance) -> tuple[str, ...]:
+def single_sequence_methods(work: Instance) -> tuple[str, ...]:
     """The methods with one sequence for an instance: constructive ones, and those that prove the optimum within seconds."""
     proving = ("exact", "cp-sat") if work.size == "few" else ("exact",)
     return ("fifo", *usable(work.cell), *proving)
 
 
-def tried(setting: MethodSetting, *, sessions: int, seed: int) -> MethodOutcome:
+def method_outcome(setting: MethodSetting, *, sessions: int, seed: int) -> MethodOutcome:
     """The outcome of `sessions` sessions of a setting, or of as many as its cap allows."""
     count, search = sessions_for(setting, sessions), _search(setting)
     seeds = seeds_of(setting, count, seed)
@@ -98,11 +98,11 @@ def tried(setting: MethodSetting, *, sessions: int, seed: int) -> MethodOutcome:
         began = time.perf_counter()
         sessions_done = run_sessions(cell, setting.method, search, count, int(seeds[0]))
         wall_s = (time.perf_counter() - began) / count
-        return _tried(best, sessions_done.best_cost, sessions_done.final_cost, np.full(count, wall_s))
-    runs = [_timed(setting, search, int(own)) for own in seeds]
+        return _outcome(best, sessions_done.best_cost, sessions_done.final_cost, np.full(count, wall_s))
+    runs = [_timed_session(setting, search, int(own)) for own in seeds]
     costs = np.array([result.cost for result, _ in runs])
     finals = np.array([result.final_cost if isinstance(result, LearnedSequence) else np.nan for result, _ in runs])
-    return _tried(best, costs, finals, np.array([wall_s for _, wall_s in runs]))
+    return _outcome(best, costs, finals, np.array([wall_s for _, wall_s in runs]))
 
 
 def sessions_for(setting: MethodSetting, sessions: int) -> int:
@@ -120,7 +120,7 @@ def _is_compiled(setting: MethodSetting) -> bool:
     return setting.method == "random" or keys_of(setting.work.cell, given.values, given.state) is not None
 
 
-def _timed(setting: MethodSetting, search: Search, seed: int) -> tuple[SequenceResult, float]:
+def _timed_session(setting: MethodSetting, search: Search, seed: int) -> tuple[SequenceResult, float]:
     unbounded: Callable[..., SequenceResult] = partial(srl_time, bounded=False)
     method = unbounded if setting.method == UNBOUNDED else SEQUENCERS[setting.method]
     cell, rng = setting.work.cell, np.random.default_rng(seed)
@@ -129,7 +129,7 @@ def _timed(setting: MethodSetting, search: Search, seed: int) -> tuple[SequenceR
     return method(cell, search, rng), time.perf_counter() - began
 
 
-def _tried(best: Optimum, costs: Floats, finals: Floats, wall_s: Floats) -> MethodOutcome:
+def _outcome(best: Optimum, costs: Floats, finals: Floats, wall_s: Floats) -> MethodOutcome:
     return MethodOutcome(costs / best.bound_s - 1.0, finals / best.bound_s - 1.0, wall_s)
 
 

@@ -12,12 +12,20 @@ from lab.sequencing.search import SAME, gap
 from lab.studies.findings import Findings, Row, row
 from lab.studies.runner import Job
 from lab_studies.comparisons.schedule_checker import faults
-from lab_studies.comparisons.transport_entries import CYCLES_SHOWN, CYCLIC, KEPT, Entry, Found, carried_out, methods_for
+from lab_studies.comparisons.transport_entries import (
+    CYCLES_SHOWN,
+    CYCLIC,
+    KEPT,
+    Entry,
+    EntryResult,
+    entry_result,
+    methods_for,
+)
 from lab_studies.comparisons.transport_figures import by_seconds, profile
-from lab_studies.comparisons.transport_instances import Instance, board, cell_file, own
+from lab_studies.comparisons.transport_instances import Instance, board, cell_file, own_instances
 
 SECONDS = 10.0
-Board = Mapping[Entry, Found]
+Board = Mapping[Entry, EntryResult]
 MEASURES = (
     "Costs are makespans (for a cyclic order, the period) in the instance's unit of time. Best: the lowest cost that anything on "
     "this board found or that is published. Gap: above the best. Bound: the highest that anything on this board proved; an "
@@ -50,20 +58,20 @@ def transport(job: Job, reading: Mapping[str, Any]) -> Findings:
     unknown method and for instances that cannot be read, WorkFailed if "verify" finds a wrong schedule.
     """
     seconds = float(reading.get("seconds", SECONDS))
-    instances = own(reading["instances"]) if "instances" in reading else board()
+    instances = own_instances(reading["instances"]) if "instances" in reading else board()
     entries = entries_of(instances, reading.get("methods", ()), seconds, job.seed)
     results = measured(job, entries)
     notes = [MEASURES, TIMES.format(seconds=seconds), LEARNERS, CHECKED.format(shown=CYCLES_SHOWN)]
     says: Row = {}
     if reading.get("verify"):
-        says["schedules that the checker found right"] = verified(results)
+        says["schedules that the checker found right"] = verification(results)
     rows = [line for instance, of in by_instance(results).items() for line in rows_of(instance, of)]
-    rows = [*in_all(results), *rows]
+    rows = [*family_rows(results), *rows]
     orders = {entry: result for entry, result in results.items() if entry.method != CYCLIC}
     figures = {
         "How many instances a method solves within a gap": profile(gaps_of(orders)),
         "The mean gap, second by second": by_seconds(
-            orders, {instance: least(instance, of) for instance, of in by_instance(orders).items()}
+            orders, {instance: least_cost(instance, of) for instance, of in by_instance(orders).items()}
         ),
     }
     refused = {(e.method, f.refused) for e, f in results.items() if f.cost is None}
@@ -85,14 +93,16 @@ def entries_of(instances: Sequence[Instance], methods: Sequence[str], seconds: f
     ]
 
 
-def measured(job: Job, entries: Sequence[Entry]) -> dict[Entry, Found]:
+def measured(job: Job, entries: Sequence[Entry]) -> dict[Entry, EntryResult]:
     """The result of every entry; the job's folder keeps them."""
     names = {_key(entry): entry for entry in entries}
-    done: dict[Entry, Found] = job.kept_as(lambda line: (names[line["entry"]], Found.of_json(line["found"])))
+    done: dict[Entry, EntryResult] = job.kept_as(
+        lambda line: (names[line["entry"]], EntryResult.of_json(line["found"]))
+    )
     left = [entry for entry in entries if entry not in done]
     job.progress(len(done), len(entries))
     for entry, result in job.computed(
-        carried_out, left, most=1
+        entry_result, left, most=1
     ):  # entries take seconds: a kill loses one in each process
         done[entry] = result
         job.keep({"entry": _key(entry), "found": asdict(result)})
@@ -104,7 +114,7 @@ def _key(entry: Entry) -> str:
     return json.dumps(asdict(entry), sort_keys=True)
 
 
-def verified(results: Board) -> str:
+def verification(results: Board) -> str:
     """The number of schedules that the checker finds right, such as "12 of 12". Raises WorkFailed if any is wrong."""
     wrong, right = list[str](), 0
     for entry, result in results.items():
@@ -121,7 +131,7 @@ def verified(results: Board) -> str:
     return f"{right} of {right}"
 
 
-def faults_of(entry: Entry, result: Found) -> list[str]:
+def faults_of(entry: Entry, result: EntryResult) -> list[str]:
     """The faults that the checker finds in a kept schedule and in its claimed cost."""
     plain = cell_file(entry.instance).model_dump()
     if entry.method == CYCLIC:
@@ -145,7 +155,7 @@ def faults_of(entry: Entry, result: Found) -> list[str]:
 # ---- rows --------------------------------------------------------------------------------------------------------------
 
 
-def by_instance(results: Board) -> dict[Instance, dict[str, Found]]:
+def by_instance(results: Board) -> dict[Instance, dict[str, EntryResult]]:
     """The results by instance and method."""
     return {
         instance: {entry.method: results[entry] for entry in of}
@@ -153,19 +163,19 @@ def by_instance(results: Board) -> dict[Instance, dict[str, Found]]:
     }
 
 
-def least(instance: Instance, of: Mapping[str, Found]) -> float:
+def least_cost(instance: Instance, of: Mapping[str, EntryResult]) -> float:
     """The least known cost of an instance, inf if none is known."""
     return min([result.cost for result in of.values() if result.cost is not None] + [instance.printed or inf])
 
 
-def highest(of: Mapping[str, Found]) -> tuple[float, str]:
+def highest_bound(of: Mapping[str, EntryResult]) -> tuple[float, str]:
     """The highest bound and the method that proved it; 0 and "" without one."""
     return max(((result.bound, result.bound_by) for result in of.values()), key=lambda pair: pair[0], default=(0.0, ""))
 
 
-def rows_of(instance: Instance, of: Mapping[str, Found]) -> list[Row]:
+def rows_of(instance: Instance, of: Mapping[str, EntryResult]) -> list[Row]:
     """The rows of each method on an instance: its cost, its gap to the best known, and what is proven."""
-    best, (bound, by) = least(instance, of), highest(of)
+    best, (bound, by) = least_cost(instance, of), highest_bound(of)
     rows: list[Row] = []
     for method, result in of.items():
         if result.cost is None:
@@ -193,11 +203,11 @@ def gaps_of(results: Board) -> dict[str, list[float]]:
     for instance, of in by_instance(results).items():
         for method, result in of.items():
             if result.cost is not None:
-                gaps.setdefault(method, []).append(100.0 * gap(result.cost, least(instance, of)))
+                gaps.setdefault(method, []).append(100.0 * gap(result.cost, least_cost(instance, of)))
     return gaps
 
 
-def in_all(results: Board) -> list[Row]:
+def family_rows(results: Board) -> list[Row]:
     """The rows of each method and family: its mean and worst gap, and how often it found the best known and proved one."""
     rows: list[Row] = []
     families = dict.fromkeys(entry.instance.family for entry in results)
@@ -227,7 +237,7 @@ def in_short(results: Board) -> Row:
     """The number of instances, of proven optima, and of costs as published or better."""
     boards = by_instance(results)
     told: Row = {"instances": len(boards), "entries": len(results)}
-    proven = [instance for instance, of in boards.items() if least(instance, of) <= highest(of)[0] + SAME]
+    proven = [instance for instance, of in boards.items() if least_cost(instance, of) <= highest_bound(of)[0] + SAME]
     told["optima proven here"] = len(proven)
     mine = {
         instance: min((f.cost for f in of.values() if f.cost is not None), default=inf)

@@ -40,7 +40,7 @@ class Entry:
 
 
 @dataclass(frozen=True)
-class Found:
+class EntryResult:
     """The result of an entry, in the instance's unit of time. trace: (seconds, cost) of each improvement.
 
     refused: why the method does not take the cell or found nothing, else "". schedule: rows with the fields KEPT of an order
@@ -59,7 +59,7 @@ class Found:
     parts: int = field(default=0)
 
     @classmethod
-    def of_json(cls, kept: Mapping[str, Any]) -> "Found":
+    def of_json(cls, kept: Mapping[str, Any]) -> "EntryResult":
         """The result that was kept as JSON. Raises ValueError for anything else."""
         return record_of(cls, kept)
 
@@ -69,7 +69,7 @@ def methods_for(instance: Instance) -> tuple[str, ...]:
     return (CYCLIC,) if instance.is_cyclic else tuple(name for name in SEQUENCERS if name != "earliest-due")
 
 
-def carried_out(entry: Entry) -> Found:
+def entry_result(entry: Entry) -> EntryResult:
     """The result of one entry; if its method does not take the cell, `refused` says why."""
     try:
         cell = cell_of(entry.instance)
@@ -79,7 +79,7 @@ def carried_out(entry: Entry) -> Found:
             return _proven(entry, cell, prove)
         return _by_episodes(entry, cell)
     except (BadInput, WorkFailed) as error:
-        return Found(refused=str(error))
+        return EntryResult(refused=str(error))
 
 
 class _Over(Exception):
@@ -109,7 +109,7 @@ class _Watch:
             raise _Over
 
 
-def _by_episodes(entry: Entry, cell: Cell) -> Found:
+def _by_episodes(entry: Entry, cell: Cell) -> EntryResult:
     """The result of ever longer sessions until the time is over; compiling, in a first episode, does not count."""
     find_sequence(cell, entry.method, Search(1), entry.seed)
     watch, episodes, session = _Watch(entry.seconds), FIRST, 1
@@ -126,31 +126,33 @@ def _by_episodes(entry: Entry, cell: Cell) -> Found:
                 break
     except _Over:
         pass
-    return _measured(cell, watch.best, Found(found_by=entry.method, trace=tuple(watch.trace), wall_s=watch.past_s))
+    return _measured(
+        cell, watch.best, EntryResult(found_by=entry.method, trace=tuple(watch.trace), wall_s=watch.past_s)
+    )
 
 
-def _proven(entry: Entry, cell: Cell, prove: "Callable[[Entry, Cell], Proof]") -> Found:
+def _proven(entry: Entry, cell: Cell, prove: "Callable[[Entry, Cell], Proof]") -> EntryResult:
     began_s = perf_counter()
     sequence, found_by, bound, bound_by = prove(entry, cell)
     wall_s = perf_counter() - began_s
-    result = Found(found_by=found_by, bound=bound, bound_by=bound_by, wall_s=wall_s)
+    result = EntryResult(found_by=found_by, bound=bound, bound_by=bound_by, wall_s=wall_s)
     done = _measured(cell, sequence, result)
     return replace(done, trace=() if done.cost is None else ((wall_s, done.cost),))
 
 
-def _measured(cell: Cell, sequence: tuple[int, ...], result: Found) -> Found:
+def _measured(cell: Cell, sequence: tuple[int, ...], result: EntryResult) -> EntryResult:
     """The result with the cost of the sequence and its schedule."""
     if not sequence:
         return replace(result, refused=result.refused or "no order was found in its time")
     return replace(_with_schedule(cell, simulate(cell, sequence), result), cost=follow(cell, sequence).end_s)
 
 
-def _with_schedule(cell: Cell, schedule: Schedule, result: Found) -> Found:
+def _with_schedule(cell: Cell, schedule: Schedule, result: EntryResult) -> EntryResult:
     rows = tuple(tuple(row[name] for name in KEPT) for row in rows_of(schedule, cell, "planned"))
     return replace(result, schedule=rows, ends_s=schedule.makespan_s, parts=cell.parts)
 
 
-def _cyclic(entry: Entry, cell: Cell) -> Found:
+def _cyclic(entry: Entry, cell: Cell) -> EntryResult:
     from lab.sequencing.cyclic.cycle import best_cycle
     from lab.sequencing.cyclic.unrolled import of_parts, unrolled
 
@@ -159,7 +161,7 @@ def _cyclic(entry: Entry, cell: Cell) -> Found:
     cycle = best_cycle(cell, mix, entry.seconds, entry.seed)
     wall_s = perf_counter() - began_s
     shown = unrolled(cycle, of_parts(cell, mix, CYCLES_SHOWN))
-    result = Found(cycle.period_s, CYCLIC, cycle.bound_s, CYCLIC, ((wall_s, cycle.period_s),), wall_s)
+    result = EntryResult(cycle.period_s, CYCLIC, cycle.bound_s, CYCLIC, ((wall_s, cycle.period_s),), wall_s)
     return _with_schedule(shown.cell, shown.schedule, result)
 
 

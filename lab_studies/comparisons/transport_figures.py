@@ -12,7 +12,7 @@ from lab.view.canvas import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, RED, SKY, pi
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from lab_studies.comparisons.transport_entries import Entry, Found
+    from lab_studies.comparisons.transport_entries import Entry, EntryResult
     from lab_studies.comparisons.transport_instances import Instance
 
 COLOURS = (BLUE, RED, GREEN, ORANGE, PURPLE, SKY, INK, GREY)
@@ -39,7 +39,7 @@ def profile(gaps: Mapping[str, Sequence[float]]) -> bytes:
     return picture_bytes(draw, 7.0, 4.2)
 
 
-def by_seconds(results: "Mapping[Entry, Found]", least: "Mapping[Instance, float]") -> bytes:
+def by_seconds(results: "Mapping[Entry, EntryResult]", least: "Mapping[Instance, float]") -> bytes:
     """A picture of the mean gap of each method's best order so far, by the seconds since it began."""
     ends = [entry.seconds for entry in results]
     seconds = np.geomspace(0.01, max(ends, default=1.0), POINTS)

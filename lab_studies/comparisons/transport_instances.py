@@ -52,7 +52,7 @@ def board() -> tuple[Instance, ...]:
         )
 
 
-def own(paths: Sequence[Path]) -> tuple[Instance, ...]:
+def own_instances(paths: Sequence[Path]) -> tuple[Instance, ...]:
     """An instance for each file, also those in folders. Raises BadInput for a missing or unreadable one."""
     instances = list[Instance]()
     for path in paths:

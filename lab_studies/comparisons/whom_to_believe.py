@@ -47,7 +47,7 @@ class Setting:
     decide: str = "trust-weighted"
 
 
-class Told(NamedTuple):
+class SessionResults(NamedTuple):
     """The results of N sessions: points (N,), answers (N,), and the panel's final trusts (N, members)."""
 
     points: FloatArray
@@ -55,7 +55,7 @@ class Told(NamedTuple):
     trusts: FloatArray
 
 
-def settings() -> list[Setting]:
+def all_settings() -> list[Setting]:
     """All settings; those with 0 members have nobody to ask."""
     every = [Setting(name, LIMITED, "never", 0) for name in PROBLEMS]
     every += [Setting(name, LIMITED, gate, 1) for name in PROBLEMS for gate in GATES]
@@ -63,7 +63,7 @@ def settings() -> list[Setting]:
     return every + [Setting(name, RANKED, gate, len(RELIABILITIES)) for name in PROBLEMS for gate in GATES]
 
 
-def reliable(values: FloatArray, share: float) -> FloatArray:
+def reliable_chances(values: FloatArray, share: float) -> FloatArray:
     """The chances (S, A) of the answers of an advisor that is right in `share` of the cases; right ones are equally likely."""
     best = values >= values.max(axis=1, keepdims=True) - BEST_IN_A_STATE
     count, actions = best.sum(axis=1, keepdims=True), values.shape[1]
@@ -72,11 +72,11 @@ def reliable(values: FloatArray, share: float) -> FloatArray:
     return mixed
 
 
-def sessions_of(setting: Setting, sessions: int, seed: int) -> Told:
+def sessions_of(setting: Setting, sessions: int, seed: int) -> SessionResults:
     """The results of `sessions` sessions of a setting."""
     seeds = seeds_of(Setting(setting.problem, LIMITED, "never", 0), sessions, seed)  # all settings have the same seeds
     runs = [_session(setting, int(own)) for own in seeds]
-    return Told(*(np.array([outcome[n] for outcome in runs]) for n in range(3)))
+    return SessionResults(*(np.array([outcome[n] for outcome in runs]) for n in range(3)))
 
 
 def _session(setting: Setting, seed: int) -> tuple[float, float, list[float]]:
@@ -86,7 +86,9 @@ def _session(setting: Setting, seed: int) -> tuple[float, float, list[float]]:
     streams = rng.spawn(setting.members + 2)
     ranked = setting.kind == RANKED
     chances = [
-        reliable(place.values, RELIABILITIES[n]) if ranked else advice_chances(place.values, SKILL_TAUS["limited"])
+        reliable_chances(place.values, RELIABILITIES[n])
+        if ranked
+        else advice_chances(place.values, SKILL_TAUS["limited"])
         for n in range(setting.members)
     ]
     members = [TableAdvisor(Advice.of(table), uniforms(own)) for table, own in zip(chances, streams, strict=False)]
@@ -109,7 +111,7 @@ def _session(setting: Setting, seed: int) -> tuple[float, float, list[float]]:
 
 def whom_to_believe(job: Job, reading: Mapping[str, Any]) -> Findings:
     """The results of every setting; the reading has no effect."""
-    outcomes = job.each(partial(sessions_of, sessions=job.sessions, seed=job.seed), settings())
+    outcomes = job.each(partial(sessions_of, sessions=job.sessions, seed=job.seed), all_settings())
     rows = [result for setting, told in outcomes.items() for result in rows_of(setting, told, outcomes)]
     right = [_row(rows, name, RANKED, "always") for name in PROBLEMS]
     gains = {
@@ -132,7 +134,7 @@ def whom_to_believe(job: Job, reading: Mapping[str, Any]) -> Findings:
     return Findings(rows, says, pictures, (MEASURES,))
 
 
-def rows_of(setting: Setting, told: Told, outcomes: Mapping[Setting, Told]) -> list[Row]:
+def rows_of(setting: Setting, told: SessionResults, outcomes: Mapping[Setting, SessionResults]) -> list[Row]:
     """The measures of a setting."""
     named: Row = {"problem": setting.problem, "advisors": setting.kind, "gate": setting.gate}
     named |= {"members": setting.members, "decide": setting.decide, "answers": float(told.answers.mean())}

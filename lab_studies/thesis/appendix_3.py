@@ -22,9 +22,9 @@ from lab_studies.thesis.appendix_3_makespans import (
     REACTIONS,
     REPLICATIONS,
     SLOW_BY,
-    Made,
     Mix,
-    made,
+    OrderMakespans,
+    order_makespans,
 )
 
 Floats = NDArray[np.float64]
@@ -79,7 +79,7 @@ def appendix_iii(job: Job, reading: Mapping[str, Any]) -> Findings:
     """The results of all orders by all methods; larger orders are drawn with the job's seed, and the reading has no effect."""
     orders = orders_of(job.seed)
     mixes = [Mix(order, mean_s) for parts in reversed(SIZES) for order in orders[parts] for mean_s in MEANS_S]
-    makespans = job.each(partial(made, sessions=job.sessions, seed=job.seed), mixes)
+    makespans = job.each(partial(order_makespans, sessions=job.sessions, seed=job.seed), mixes)
     rows: list[Row] = []
     for group in product(SIZES, LAWS, MEANS_S):
         rows += _rows(group, [makespans[Mix(order, group[2])] for order in orders[group[0]]])
@@ -103,23 +103,23 @@ def orders_of(seed: int) -> dict[int, list[str]]:
     return orders
 
 
-def _rows(group: Group, of: Sequence[Made]) -> list[Row]:
+def _rows(group: Group, of: Sequence[OrderMakespans]) -> list[Row]:
     """The rows of one size, law and mean: makespans, improvements over both FIFOs, gaps."""
     parts, law, mean_s = group
     named: Row = {"table": f"{parts} parts", "parts": parts, "arrivals": law, "interval_s": mean_s}
     rows = []
     for start, method in FIFO.items():
-        rows += _measured({**named, "method": "fifo", "fifo": start}, law, method, of)
+        rows += _makespan_rows({**named, "method": "fifo", "fifo": start}, law, method, of)
     for method in METHODS:
         if (method, law) not in of[0].makespans_s:
             continue
-        rows += _measured({**named, "method": method}, law, method, of)
+        rows += _makespan_rows({**named, "method": method}, law, method, of)
         for start in STARTS:
-            rows += _improvements({**named, "method": method, "fifo": start}, group, of)
+            rows += _improvement_rows({**named, "method": method, "fifo": start}, group, of)
     return rows
 
 
-def _measured(named: Row, law: str, method: str, of: Sequence[Made]) -> list[Row]:
+def _makespan_rows(named: Row, law: str, method: str, of: Sequence[OrderMakespans]) -> list[Row]:
     """The rows of the mean makespan and, with constant arrivals, of the gap to the optimum."""
     rows = [mean_row(named, "makespan_s", [mix.makespans_s[method, law].mean() for mix in of])]
     if law == "constant":
@@ -127,7 +127,7 @@ def _measured(named: Row, law: str, method: str, of: Sequence[Made]) -> list[Row
     return rows
 
 
-def _improvements(named: Row, group: Group, of: Sequence[Made]) -> list[Row]:
+def _improvement_rows(named: Row, group: Group, of: Sequence[OrderMakespans]) -> list[Row]:
     """The rows of IP (III.1) and of the difference to a FIFO's makespan, over the replications that the method has."""
     method, start, law = named["method"], named["fifo"], group[1]
     pairs = [(mix.makespans_s[FIFO[start], law], mix.makespans_s[method, law]) for mix in of]
@@ -151,7 +151,7 @@ def paired_p(differences: Floats) -> float:
     return float(2 * t.sf(abs(differences.mean()) / error, len(differences) - 1))
 
 
-def _example_rows(orders: Mapping[int, Sequence[str]], makespans: Mapping[Mix, Made]) -> list[Row]:
+def _example_rows(orders: Mapping[int, Sequence[str]], makespans: Mapping[Mix, OrderMakespans]) -> list[Row]:
     """The rows of every order of 3 parts, with constant arrivals of the shorter mean (fig. III.4)."""
     methods: list[tuple[str, Row]] = [(method, {"method": "fifo", "fifo": start}) for start, method in FIFO.items()]
     methods += [(method, {"method": method}) for method in ("srl", "srl-time", "exact")]

@@ -41,7 +41,7 @@ class Mix:
 
 
 @dataclass(frozen=True, eq=False)
-class Made:
+class OrderMakespans:
     """The results of all methods with an order. makespans_s: by method and law of arrivals, of each replication (n,) [s].
 
     Replications are the same for all methods; policies that react have fewer of them, and only with exponential arrivals.
@@ -65,7 +65,7 @@ def fms(order: str, mean_s: float) -> Cell:
     return replace(cell, arrivals=Arrivals((mean_s,) * cell.parts, "pick"), due_s=None)
 
 
-def made(mix: Mix, *, sessions: int, seed: int) -> Made:
+def order_makespans(mix: Mix, *, sessions: int, seed: int) -> OrderMakespans:
     """The results of all methods with one order; sessions: the number that the study was asked for."""
     cell = fms(mix.order, mix.mean_s)
     rng = np.random.default_rng([seed, int(mix.mean_s), *map(ord, mix.order)])
@@ -84,7 +84,7 @@ def made(mix: Mix, *, sessions: int, seed: int) -> Made:
         for method, policy in REACTING.items() if law == UNKNOWN else ():
             makespans_s[method, law] = replicate(cell, policy or reacting(cell), chance, few, times_seed)
     gaps = {method: best.gap(float(costs.mean())) for (method, law), costs in makespans_s.items() if law == "constant"}
-    return Made(makespans_s, gaps, best.proven)
+    return OrderMakespans(makespans_s, gaps, best.proven)
 
 
 def times_seeds(seed: int, episodes: int) -> list[int]:

@@ -75,7 +75,7 @@ def best_results(job: Job, changes: Changes, case: str) -> Findings:
     cells = _of_case(_changed(printed(SESSION_LENGTHS), changes), case)
     table = TABLES[case]
     rows, comparisons = _compared(Measured(job, [cell.setting for cell in cells]), cells, table)
-    pictures = figures.lengths(rows, figures.of_case(case, table))
+    pictures = figures.length_pictures(rows, figures.of_case(case, table))
     notes = (SYMBOLS, READ_AS, SHADED, HOW_MANY, _assumptions([*comparisons.values()]), *examples(comparisons))
     return _findings(rows, job, pictures, notes)
 
@@ -83,7 +83,7 @@ def best_results(job: Job, changes: Changes, case: str) -> Findings:
 def table_iv_1(job: Job, changes: Changes) -> Findings:
     """The results of table IV.1 and fig. 7.5, by beta."""
     rows = _decay_rows(Measured(job, _decay_settings(changes)), changes)
-    pictures = {"Figure 7.5: SP and CE by beta": figures.by_beta(rows)}
+    pictures = {"Figure 7.5: SP and CE by beta": figures.beta_picture(rows)}
     return _findings(rows, job, pictures, (SYMBOLS, READ_AS, DECAY, SAYS_7, HOW_MANY))
 
 
@@ -91,7 +91,7 @@ def table_iv_2(job: Job, changes: Changes) -> Findings:
     """The results of table IV.2 and figs. 7.7 and 7.8, by reward factor."""
     cells = _changed([cell for cell in printed(SESSION_LENGTHS) if cell.setting.method == "srl"], changes)
     rows, _ = _compared(Measured(job, [cell.setting for cell in cells]), cells, FACTOR_TABLE)
-    pictures = figures.lengths(rows, {name: figures.COMPARED[name] for name in figures.OF_FACTORS})
+    pictures = figures.length_pictures(rows, {name: figures.COMPARED[name] for name in figures.OF_FACTORS})
     return _findings(rows, job, pictures, (SYMBOLS, READ_AS, FACTORS, SAYS_7, SHADED, HOW_MANY))
 
 
@@ -100,11 +100,11 @@ def chapter_7(job: Job, changes: Changes) -> Findings:
     cells = _changed(printed(SESSION_LENGTHS), changes)
     measured = Measured(job, [*(cell.setting for cell in cells), *_decay_settings(changes)])
     rows = _decay_rows(measured, changes)
-    pictures = figures.alone(job.seed) | {"Figure 7.5: SP and CE by beta": figures.by_beta(rows)}
+    pictures = figures.session_pictures(job.seed) | {"Figure 7.5: SP and CE by beta": figures.beta_picture(rows)}
     for case, table in TABLES.items():
         rows += _compared(measured, _of_case(cells, case), table)[0]
     factors = _compared(measured, [cell for cell in cells if cell.setting.method == "srl"], FACTOR_TABLE)[0]
-    pictures |= figures.lengths([*rows, *factors], figures.COMPARED) | appendix_4.pictures()
+    pictures |= figures.length_pictures([*rows, *factors], figures.COMPARED) | appendix_4.pictures()
     rows += [result for result in factors if result.get("reward_factor") != "B"]  # type B stands in the other tables
     notes = (SYMBOLS, READ_AS, FACTORS, DECAY, SAYS_7, SHADED, HOW_MANY)
     return _findings(rows, job, pictures, notes)

@@ -154,14 +154,14 @@ def sessions_of(setting: SequencingSetting, sessions: int, seed: int) -> Sequenc
         )
         printed = run_sessions(cell, setting.method, search, sessions, int(seeds[0]))
         return SequencingOutcome(printed.best_cost, printed.final_cost, printed.convergence)
-    outcomes = listing.run_sessions(listed(setting, SPREAD if drawn else 0.0), epsilons(setting), seeds)
+    outcomes = listing.run_sessions(listing_input(setting, SPREAD if drawn else 0.0), epsilons(setting), seeds)
     return SequencingOutcome(outcomes.best_s, outcomes.last_s, outcomes.converged)
 
 
-def listed(setting: SequencingSetting, spread: float = 0.0) -> listing.Listed:
+def listing_input(setting: SequencingSetting, spread: float = 0.0) -> listing.ListingInput:
     """The input of the listing for a setting."""
     toasts = robot_cell(setting.case, setting.toasts)
-    return listing.Listed.of(
+    return listing.ListingInput.of(
         toasts, setting.method, setting.reward_factor, READINGS[setting.reading] or LISTING, spread
     )
 

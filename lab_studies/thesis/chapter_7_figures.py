@@ -14,7 +14,14 @@ from lab.studies.charts import PRINTED, Look, bars, curve, legend_below
 from lab.studies.findings import Row, those
 from lab.studies.runner import seeds_of
 from lab.view.canvas import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, RED, picture_bytes
-from lab_studies.thesis.chapter_7_cells import READINGS, SequencingSetting, epsilons, listed, optimum_s, robot_cell
+from lab_studies.thesis.chapter_7_cells import (
+    READINGS,
+    SequencingSetting,
+    epsilons,
+    listing_input,
+    optimum_s,
+    robot_cell,
+)
 from lab_studies.thesis.chapter_7_listing import run_sessions
 
 if TYPE_CHECKING:
@@ -62,7 +69,7 @@ def of_case(case: str, table: str) -> dict[str, Compared]:
     }
 
 
-def lengths(rows: Sequence[Row], wanted: Mapping[str, Compared]) -> dict[str, bytes]:
+def length_pictures(rows: Sequence[Row], wanted: Mapping[str, Compared]) -> dict[str, bytes]:
     """Pictures by session length, by caption: SP, or the mean best time if times are random."""
     return {caption: _by_length(rows, shown) for caption, shown in wanted.items()}
 
@@ -100,7 +107,7 @@ def _beside_print(axes: "Axes", rows: Sequence[Row], by: str, look: Look) -> Non
     axes.plot([row[by] for row in rows], [row["thesis"] for row in rows], color=look[0], **printed)
 
 
-def by_beta(rows: Sequence[Row]) -> bytes:
+def beta_picture(rows: Sequence[Row]) -> bytes:
     """A picture of SP and CE by beta with type A, a line for each case. Source: thesis fig. 7.5."""
     shown = those(rows, table="Table IV.1", reward_factor="A")
 
@@ -126,9 +133,9 @@ def by_beta(rows: Sequence[Row]) -> bytes:
     return picture_bytes(draw, 8.0, 3.6)
 
 
-def alone(seed: int) -> dict[str, bytes]:
+def session_pictures(seed: int) -> dict[str, bytes]:
     """Figures 7.3 and 7.4, of one session, and 7.6, by caption."""
-    times_s, sequence = session(seed)
+    times_s, sequence = shown_session(seed)
     cell = robot_cell(SESSION.case, SESSION.toasts)
     return {
         "Figure 7.3: a session that settles on the optimum": convergence(times_s),
@@ -137,9 +144,9 @@ def alone(seed: int) -> dict[str, bytes]:
     }
 
 
-def session(seed: int) -> tuple[NDArray[np.float64], list[int]]:
+def shown_session(seed: int) -> tuple[NDArray[np.float64], list[int]]:
     """The times (E,) of the first session that settles on the optimum [s], and the toasts that its best episode moves."""
-    sessions = run_sessions(listed(SESSION), epsilons(SESSION), seeds_of(SESSION, TRIED, seed), keep_times=True)
+    sessions = run_sessions(listing_input(SESSION), epsilons(SESSION), seeds_of(SESSION, TRIED, seed), keep_times=True)
     n = int(np.argmin(sessions.last_s))
     return sessions.times_s[n], [toast for toast in sessions.sequences[n].tolist() if toast]
 

@@ -62,7 +62,7 @@ LISTING = Reading()
 
 
 @dataclass(frozen=True, eq=False)
-class Listed:
+class ListingInput:
     """The input of a session: the toast cell and the method as the listing has them."""
 
     toasts: Toasts
@@ -72,7 +72,7 @@ class Listed:
     @classmethod
     def of(
         cls, cell: Cell, method: str, factor: str | None = None, reading: Reading = LISTING, spread: float = 0.0
-    ) -> "Listed":
+    ) -> "ListingInput":
         """The input for a method in the toast cell of ch. 7 with 2 to MOST_TOASTS toasts; factor: SRL's, "A" or "B".
 
         spread: the standard deviation of processing times as a share of their mean. Raises BadInput for other cells,
@@ -114,8 +114,8 @@ def banned_states(toasts: int, reading: Reading = LISTING) -> NDArray[np.bool_]:
 
 
 def run_sessions(
-    listed: Listed, epsilons: Floats, seeds: NDArray[np.uint64], *, keep_times: bool = False
-) -> kernels.Found:
+    listed: ListingInput, epsilons: Floats, seeds: NDArray[np.uint64], *, keep_times: bool = False
+) -> kernels.ListingOutcomes:
     """The results of a session for each seed (N,) with the exploration epsilons (E,); random search always explores.
 
     Raises BadInput without episodes.
@@ -124,19 +124,19 @@ def run_sessions(
         raise BadInput("episodes = 0: allowed are whole numbers from 1")
     sessions, episodes = len(seeds), len(epsilons)
     tried = np.ones(episodes) if listed.rules.method == RANDOM else np.asarray(epsilons, np.float64)
-    outcomes = kernels.Found(
+    outcomes = kernels.ListingOutcomes(
         times_s=np.zeros((sessions if keep_times else 1, episodes)),
         best_s=np.zeros(sessions),
         last_s=np.zeros(sessions),
         converged=np.ones(sessions, np.int64),
         sequences=np.zeros((sessions, LONGEST * listed.count), np.int64),
     )
-    work = work_of(listed.count)
+    work = new_workspace(listed.count)
     kernels.run_sessions(listed.toasts, listed.rules, work, tried, np.asarray(seeds, np.uint64), outcomes)
     return outcomes if keep_times else outcomes._replace(times_s=outcomes.times_s[:0])
 
 
-def work_of(toasts: int) -> Workspace:
+def new_workspace(toasts: int) -> Workspace:
     """The workspace at the begin of a session with so many toasts."""
     states = STATIONS**toasts
     return Workspace(

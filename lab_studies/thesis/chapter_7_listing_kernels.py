@@ -76,7 +76,7 @@ class Workspace(NamedTuple):
     moved: Ints
 
 
-class Found(NamedTuple):
+class ListingOutcomes(NamedTuple):
     """The results of N sessions of E episodes.
 
     times_s (N, E) [s], of one session unless all are kept; best_s and last_s (N,): the best time and that of the last

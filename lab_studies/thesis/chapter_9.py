@@ -6,7 +6,7 @@ from typing import Any
 from lab.studies.findings import Findings, Row, agreement, marked, share_row, those
 from lab.studies.runner import Job
 from lab_studies.thesis import chapter_9_figures as figures
-from lab_studies.thesis.chapter_9_cells import BEST_BETA, TABLES, appendix, by_beta, table
+from lab_studies.thesis.chapter_9_cells import BEST_BETA, TABLES, appendix, beta_rows, table
 from lab_studies.thesis.chapter_9_sessions import LEARNED_SEED
 from lab_studies.thesis.used_to_choose import SAYS
 
@@ -48,7 +48,7 @@ READINGS: dict[str, dict[str, Any]] = {
 def best_scores(job: Job, reading: Reading, name: str) -> Findings:
     """The results of one of the tables 9.2-9.5, with a picture of its scores and ranks."""
     rows = table(job, name, reading)
-    pictures = {f"{name}: scores and ranks": figures.ranked(rows)}
+    pictures = {f"{name}: scores and ranks": figures.ranks_picture(rows)}
     return Findings(rows, agreement(rows), pictures, _notes([TABLES[name][0]], reading))
 
 
@@ -60,14 +60,14 @@ def appendix_v(job: Job, reading: Reading) -> Findings:
 
 def figure_9_4(job: Job, reading: Reading) -> Findings:
     """The results of learning alone with several decay factors; the reading, which is about advisors, has no effect."""
-    rows = by_beta(job)
-    return Findings(rows, agreement(rows), {BY_BETA: figures.by_beta(rows)}, (RECONSTRUCTED, SAYS["world-2"]))
+    rows = beta_rows(job)
+    return Findings(rows, agreement(rows), {BY_BETA: figures.beta_picture(rows)}, (RECONSTRUCTED, SAYS["world-2"]))
 
 
 def chapter_9(job: Job, reading: Reading) -> Findings:
     """The results of Appendix V, of the four tables' ranks, and of the figures; with a folder each cell is measured once."""
-    cells, alone = appendix(job, TABLES.values(), reading), by_beta(job)
-    pictures = {BY_BETA: figures.by_beta(alone)}
+    cells, alone = appendix(job, TABLES.values(), reading), beta_rows(job)
+    pictures = {BY_BETA: figures.beta_picture(alone)}
     ranks: Row = {}
     for name in TABLES:
         best = best_scores(job, reading, name)
@@ -107,12 +107,12 @@ def by_seed(rows: Sequence[Row]) -> Row:
     return said
 
 
-def known(reading: Reading) -> str:
+def advisor_note(reading: Reading) -> str:
     """The note on what advisors know."""
     return EXACT if reading.get("advisor_table") == "exact" else ADVISOR
 
 
 def _notes(places: Iterable[str], reading: Reading) -> tuple[str, ...]:
     worlds = sorted({*places})
-    notes = (SYMBOLS, known(reading), *(SAYS[place] for place in worlds))
+    notes = (SYMBOLS, advisor_note(reading), *(SAYS[place] for place in worlds))
     return (*notes, RECONSTRUCTED) if "world-2" in worlds else notes

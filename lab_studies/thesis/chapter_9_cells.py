@@ -177,7 +177,7 @@ def _tests(named: Row, comparison: Comparison) -> list[Row]:
     return rows + [row({**named, "gate": gate}, "KS_p", p) for gate, p in comparison.normality.items() if p is not None]
 
 
-def by_beta(job: Job) -> list[Row]:
+def beta_rows(job: Job) -> list[Row]:
     """The rows of learning alone with several decay factors: fig. 9.4 and the two values that section 9.9.1 names."""
     settings = [AdviceSetting(place, beta=beta) for place in BEST_BETA for beta in BETAS]
     rows = []

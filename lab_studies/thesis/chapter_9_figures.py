@@ -15,7 +15,14 @@ from lab.studies.findings import Row, mean_row, share_row, those
 from lab.studies.runner import Job
 from lab.view.canvas import BLUE, GREY, INK, ORANGE, RED, picture_bytes
 from lab_studies.thesis.chapter_9_cells import BEST_BETA, TAUS, describe
-from lab_studies.thesis.chapter_9_sessions import AdviceSetting, example, measured, table_of, walk_of_advisor, world
+from lab_studies.thesis.chapter_9_sessions import (
+    AdviceSetting,
+    example_session,
+    measured,
+    table_of,
+    walk_of_advisor,
+    world,
+)
 from lab_studies.thesis.used_to_choose import is_used
 
 if TYPE_CHECKING:
@@ -36,7 +43,7 @@ Series = Mapping[str, Mapping[str, AdviceSetting]]  # of a figure: series -> gro
 
 def figures(job: Job, reading: Mapping[str, Any]) -> tuple[list[Row], dict[str, bytes]]:
     """The rows of figures 9.1, 9.3 and 9.5-9.13, and their pictures by caption."""
-    rows = walks(reading)
+    rows = walk_rows(reading)
     pictures = {
         "Figure 9.1: an advisor's own way by tau": bars(
             [f"{tau:g}" for tau in WALKERS],
@@ -53,9 +60,9 @@ def figures(job: Job, reading: Mapping[str, Any]) -> tuple[list[Row], dict[str, 
         ("Figure 9.3: a session in world I, learning alone", AdviceSetting("world-1"), None),
         ("Figures 9.5 and 9.6: a session with CCRL and an expert", replace(guided, **reading), 0.05),
     ):
-        steps, helped = example(setting, job.seed)
+        steps, helped = example_session(setting, job.seed)
         pictures[caption] = convergence(steps.tolist(), helped.tolist(), OPTIMUM, threshold)
-    for caption, series in compared().items():
+    for caption, series in figure_series().items():
         more, drawn = _compared(job, reading, caption, series)
         rows += more
         pictures |= drawn
@@ -84,7 +91,7 @@ def _compared(job: Job, reading: Mapping[str, Any], caption: str, series: Series
     return rows, pictures
 
 
-def compared() -> dict[str, Series]:
+def figure_series() -> dict[str, Series]:
     """The series of figures 9.7-9.13, by caption."""
     by_skill = dict(zip(ADVISORS, TAUS, strict=True))
     in_world_1 = AdviceSetting("world-1", "limited", "ccrl", 0.01, 0.05, 1)
@@ -120,7 +127,7 @@ def compared() -> dict[str, Series]:
     }
 
 
-def walks(reading: Mapping[str, Any]) -> list[Row]:
+def walk_rows(reading: Mapping[str, Any]) -> list[Row]:
     """The rows of fig. 9.1: how often advisors of several skills take the shortest path themselves, and their mean steps."""
     known = reading.get("advisor_table", "learned")
     place, table = world("world-1"), table_of(AdviceSetting("world-1", advisor_table=known))
@@ -134,7 +141,7 @@ def walks(reading: Mapping[str, Any]) -> list[Row]:
     return rows
 
 
-def by_beta(rows: Sequence[Row]) -> bytes:
+def beta_picture(rows: Sequence[Row]) -> bytes:
     """A picture of the success percentage against beta with intervals, a curve for each world. Source: thesis fig. 9.4."""
 
     def draw(figure: "Figure") -> None:
@@ -150,7 +157,7 @@ def by_beta(rows: Sequence[Row]) -> bytes:
     return picture_bytes(draw, 6, 3.8)
 
 
-def ranked(rows: Sequence[Row]) -> bytes:
+def ranks_picture(rows: Sequence[Row]) -> bytes:
     """A picture of scores by advisor and method, with ranks on the bars, from the rows of one of the tables 9.2-9.5."""
     score_rows = {(row["gate"], row["tau"]): row for row in those(rows, measure="score")}
     groups = [*ADVISORS, "all"]

@@ -118,7 +118,7 @@ def sessions_of(setting: AdviceSetting, sessions: int, seed: int) -> AdviceOutco
     return AdviceOutcome(succeeded(setting, batch.steps), batch.helped_steps, batch.requests)
 
 
-def example(setting: AdviceSetting, seed: int) -> tuple[NDArray[np.int32], BoolArray]:
+def example_session(setting: AdviceSetting, seed: int) -> tuple[NDArray[np.int32], BoolArray]:
     """The steps and guided episodes (E,) of the first successful session of a setting, of EXAMPLES."""
     batch = _learned(setting, seeds_of(setting, EXAMPLES, seed))
     n = int(np.argmax(succeeded(setting, batch.steps)))

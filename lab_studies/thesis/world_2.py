@@ -50,7 +50,7 @@ def reconstruct(seed: int, progress: Progress = lambda done, total: None) -> Gri
     rng = np.random.default_rng(seed)
     full, limited = ([c for c in printed("appendix-v.csv") if is_compared(c, view)] for view in ("full", "limited"))
     layouts: list[tuple[float, GridWorld, FloatArray]] = []
-    for world in _alike(rng, seed):
+    for world in _similar_worlds(rng, seed):
         table = learned_table(world)
         layouts.append((distance(world, table, full), world, table))
         progress(len(layouts), LAYOUTS + VIEWS)
@@ -59,8 +59,8 @@ def reconstruct(seed: int, progress: Progress = lambda done, total: None) -> Gri
     if not layouts:
         raise WorkFailed(f"seed {seed}: none of {MAX_TRIES} layouts is like world II: try another seed")
     _, world, table = min(layouts, key=lambda entry: entry[0])
-    view = best_view(world, rng, lambda view: distance(_with(world, view), table, limited), progress)
-    return _with(world, view)
+    view = best_view(world, rng, lambda view: distance(_with_view(world, view), table, limited), progress)
+    return _with_view(world, view)
 
 
 def reconstruction(job: Job, reading: Mapping[str, Any]) -> Findings:
@@ -94,7 +94,7 @@ def best_view(
     return best
 
 
-def _with(world: GridWorld, view: Ints) -> GridWorld:
+def _with_view(world: GridWorld, view: Ints) -> GridWorld:
     return world.model_copy(update={"view": AdvisorView(lower=_tuple(view[0]), upper=_tuple(view[1]))})
 
 
@@ -104,7 +104,7 @@ def is_compared(cell: PrintedLine, view: str) -> bool:
     return (setting.world, setting.view) == ("world-2", view) and setting.tau in RECONSTRUCTED_BY
 
 
-def _alike(rng: np.random.Generator, seed: int) -> Iterator[GridWorld]:
+def _similar_worlds(rng: np.random.Generator, seed: int) -> Iterator[GridWorld]:
     """Worlds in which learning alone succeeds as in the thesis."""
     for _ in range(MAX_TRIES):
         wall = layout(rng)
@@ -116,7 +116,7 @@ def _alike(rng: np.random.Generator, seed: int) -> Iterator[GridWorld]:
             mdp = grid(wall.shape, wall, _tuple(start), _tuple(goal))
         except NoPath:
             continue
-        if shortest_steps(mdp) == MOVES and learns_alike(mdp):
+        if shortest_steps(mdp) == MOVES and learns_similarly(mdp):
             yield GridWorld(
                 name="world-2",
                 title=f"Like world II of the thesis: a reconstruction, seed {seed}",
@@ -149,7 +149,7 @@ def layout(rng: np.random.Generator) -> BoolArray:
     return wall
 
 
-def learns_alike(mdp: TabularMDP) -> bool:
+def learns_similarly(mdp: TabularMDP) -> bool:
     """Whether learning alone succeeds in 37 % with beta .7, and in no more with another beta."""
     if abs(success_alone(mdp, BETA, QUICK) - PERCENT) > 3 * POINTS:
         return False

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from devtools.commands import Ended
-from devtools.ctrl_c import judged
+from devtools.ctrl_c import fault_of
 
 GOOD = {
     "stopped_by": "Ctrl-C",
@@ -25,7 +25,7 @@ def ended(code: int = 130, **change: Any) -> Ended:
 
 
 def test_an_order_with_its_bound_is_well() -> None:
-    assert judged(ended()) == ""
+    assert fault_of(ended()) == ""
 
 
 @pytest.mark.parametrize(
@@ -42,4 +42,4 @@ def test_an_order_with_its_bound_is_well() -> None:
     ],
 )
 def test_what_is_missing_is_said(told: Ended, why: str) -> None:
-    assert judged(told).startswith(why)
+    assert fault_of(told).startswith(why)

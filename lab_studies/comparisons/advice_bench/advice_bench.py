@@ -23,7 +23,7 @@ from lab_studies.comparisons.advice_bench.sessions import (
     Case,
     Outcome,
     Outcomes,
-    tried,
+    case_outcomes,
 )
 
 MOST_BELOW = -2.0  # the project's target: no interval of the gain reaches below it
@@ -93,7 +93,7 @@ def measured(job: Job, cases: Sequence[Case], rules: tuple[str, ...]) -> dict[Ca
     done: dict[Case, Outcomes] = job.kept_as(read)
     left = [case for case in cases if case not in done]
     job.progress(len(done), len(cases))
-    work = partial(tried, sessions=job.sessions, seed=job.seed, rules=rules)
+    work = partial(case_outcomes, sessions=job.sessions, seed=job.seed, rules=rules)
     for case, outcomes in job.computed(work, left, 1):
         done[case] = outcomes
         entry = {"case": [case.problem, case.advisor], "of": mark}

@@ -92,7 +92,7 @@ class Outcome(NamedTuple):
 Outcomes = dict[tuple[str, str], Outcome]  # by rule and budget
 
 
-def tried(case: Case, sessions: int, seed: int, rules: tuple[str, ...] = tuple(RULES)) -> Outcomes:
+def case_outcomes(case: Case, sessions: int, seed: int, rules: tuple[str, ...] = tuple(RULES)) -> Outcomes:
     """The outcomes of every rule at every budget, with the same seeds for each; for nobody the one of ("nobody", "any")."""
     worlds = min(RANDOM_WORLDS, sessions) if case.problem in SEVERAL else 1
     sessions *= CHANCE_TIMES if problem(case.problem).chances is not None else 1
@@ -102,12 +102,12 @@ def tried(case: Case, sessions: int, seed: int, rules: tuple[str, ...] = tuple(R
     parts_of: dict[tuple[str, str], list[Any]] = {}
     for world, own in enumerate(shares):
         place = problem(case.problem, world)
-        for key, part in _of_place(place, case.advisor, rules, own).items():
+        for key, part in _place_outcomes(place, case.advisor, rules, own).items():
             parts_of.setdefault(key, []).append(part)
     return {key: _joined(parts) for key, parts in parts_of.items()}
 
 
-def _of_place(
+def _place_outcomes(
     place: Benched, advisor: str | None, rules: tuple[str, ...], seeds: np.ndarray
 ) -> dict[tuple[str, str], Any]:
     if advisor is None:

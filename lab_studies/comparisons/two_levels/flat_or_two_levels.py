@@ -16,7 +16,7 @@ from lab.studies.runner import Job
 from lab.view.canvas import BLUE, GREY, INK, ORANGE, RED, SKY, picture_bytes
 from lab_studies.comparisons.two_levels.flat_learner import FlatSettings, learn_flat
 from lab_studies.comparisons.two_levels.kitchen import FlatWorld, Kitchen, Way, flat_world
-from lab_studies.comparisons.two_levels.two_level_learner import LearnedTransfer, TwoLevels, practised
+from lab_studies.comparisons.two_levels.two_level_learner import LearnedTransfer, TwoLevels, learned_stages
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -102,7 +102,7 @@ def _skills(seed: int, session: int) -> dict[Way, tuple[LearnedTransfer, ...]]:
     """All learned sub-tasks of one session, the same for every number of toasts."""
     empty, loaded = KITCHEN.needed(max(TOASTS))
     ways = sorted({*empty, *loaded})
-    return {way: practised(KITCHEN, way, [seed, session, PRACTICE, number]) for number, way in enumerate(ways)}
+    return {way: learned_stages(KITCHEN, way, [seed, session, PRACTICE, number]) for number, way in enumerate(ways)}
 
 
 def _exact(world: FlatWorld, toasts: int) -> list[Row]:

@@ -38,7 +38,7 @@ class BudgetOutcome:
     used: int
 
 
-def practised(kitchen: Kitchen, way: Way, seed: Sequence[int]) -> tuple[LearnedTransfer, ...]:
+def learned_stages(kitchen: Kitchen, way: Way, seed: Sequence[int]) -> tuple[LearnedTransfer, ...]:
     """A sub-task after each number of EPISODES.
 
     Each is the lab's own session with the same seed, so that a longer one begins as a shorter one.
@@ -52,7 +52,7 @@ def practised(kitchen: Kitchen, way: Way, seed: Sequence[int]) -> tuple[LearnedT
     return tuple(skills)
 
 
-def carried_out(
+def steps_in_flat_world(
     world: FlatWorld, cell: Cell, sequence: Sequence[int], moves: Mapping[Way, Sequence[int]], cap: int
 ) -> int:
     """The steps that a sequence of decisions takes in the flat world if each transfer makes its moves.
@@ -74,7 +74,7 @@ def carried_out(
 class TwoLevels:
     """One session: its learned sub-tasks, and the outcome of each budget of steps.
 
-    skills: those of the needed transfers, as `practised` returns them.
+    skills: those of the needed transfers, as `learned_stages` returns them.
     """
 
     def __init__(
@@ -100,7 +100,7 @@ class TwoLevels:
             return BudgetOutcome(None, 0)
         stage, tries, low = fitting[-1], TRIES, self._low_steps[fitting[-1]]
         if count_simulated:  # the policy at the end is one pass more
-            tries = min(TRIES, (budget - low) // one_after_another(self._cell(stage, cap)) - 1)
+            tries = min(TRIES, (budget - low) // serial_makespan(self._cell(stage, cap)) - 1)
         if tries < 1:
             return BudgetOutcome(None, low)
         if (stage, tries) not in self._tried:
@@ -125,11 +125,11 @@ class TwoLevels:
         if learned.cost > cap:
             return BudgetOutcome(None, simulated)
         moves = {way: skill[stage].moves or () for way, skill in self._skills.items()}
-        makespan = carried_out(self._world, cell, learned.sequence, moves, cap)
+        makespan = steps_in_flat_world(self._world, cell, learned.sequence, moves, cap)
         return BudgetOutcome(makespan if makespan <= cap else None, simulated)
 
 
-def one_after_another(cell: Cell) -> int:
+def serial_makespan(cell: Cell) -> int:
     """The makespan if every toast is finished before the next one is begun."""
     run = Run(cell)
     dispatch(run, lambda run, allowed: allowed[0])

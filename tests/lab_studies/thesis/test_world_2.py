@@ -116,7 +116,7 @@ def test_layouts_have_a_hundred_obstacles() -> None:
 def test_which_layouts_are_alike(monkeypatch: pytest.MonkeyPatch, success: dict[float, float], alike: bool) -> None:
     """By their success, 30 % where nothing else is said."""
     monkeypatch.setattr(module, "success_alone", lambda mdp, beta, sessions: success.get(beta, 30.0))
-    assert module.learns_alike(grid((1, 2, 1), np.zeros((1, 2, 1), bool), (0, 0, 0), (0, 1, 0))) is alike
+    assert module.learns_similarly(grid((1, 2, 1), np.zeros((1, 2, 1), bool), (0, 0, 0), (0, 1, 0))) is alike
 
 
 def test_the_nearest_layout_is_taken_and_the_nearest_view(small: None, monkeypatch: pytest.MonkeyPatch) -> None:
