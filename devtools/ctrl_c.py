@@ -18,7 +18,7 @@ LATEST_S = 2.5  # the longest time from the begin of a search to Ctrl-C
 MOST_S = 60.0
 BEGINS = "Find the order"  # the first words of the line that a search prints when it begins
 SHOP, LATE = "larger job shop, 1 vehicle", "larger job shop, due dates"  # kinds of `plain_pairs`
-ON = {"earliest-due": LATE, "srl-time": "toast-case-2"}  # what methods that do not take SHOP order
+ON = {"earliest-due": LATE, "srl-time": "toast-case-2"}  # what is ordered by methods that do not take SHOP
 METHODS = tuple(SEQUENCERS)
 
 

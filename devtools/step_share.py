@@ -78,7 +78,7 @@ def _say(line: str) -> None:
 
 
 def main() -> None:
-    """Prints a line a run, and the medians."""
+    """Print a line for each run, and the medians."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--rounds", type=int, default=5)
     known, rest = parser.parse_known_args()

@@ -192,8 +192,8 @@ def worst_advisor_rows(
 
 def in_short(rows: Sequence[Row], below: Sequence[Row]) -> Row:
     """The targets and what was measured, success alone, the worst advisor against that, and what memory saves."""
-    of = ("world", "view", "gate", "advisor", "memory", "measure")
-    value = {tuple(result[name] for name in of): result["value"] for result in rows}
+    names = ("world", "view", "gate", "advisor", "memory", "measure")
+    value = {tuple(result[name] for name in names): result["value"] for result in rows}
 
     def cell(place: str, gate: str, name: str, memory: bool) -> tuple[float, float]:
         cell = (place, "full", gate, name, memory)

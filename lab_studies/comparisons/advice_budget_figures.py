@@ -95,10 +95,10 @@ def _name_ticks(axes: "Axes") -> None:
 
 
 def _points(rows: Sequence[Row]) -> list[Point]:
-    of: dict[tuple[str, str, bool], dict[str, float]] = {}
+    measures: dict[tuple[str, str, bool], dict[str, float]] = {}
     for row in rows:
-        of.setdefault((row["gate"], row["advisor"], row["memory"]), {})[row["measure"]] = row["value"]
-    return [(*cell, measured["HS_steps"], measured["SP_percent"]) for cell, measured in of.items()]
+        measures.setdefault((row["gate"], row["advisor"], row["memory"]), {})[row["measure"]] = row["value"]
+    return [(*cell, measured["HS_steps"], measured["SP_percent"]) for cell, measured in measures.items()]
 
 
 def _key(label: str, marker: str, colour: str, filled: bool = True) -> Any:

@@ -145,37 +145,37 @@ def joined_costs(costs: Sequence[Cost]) -> Cost:
 
 def rows_of(skill: str, advisor: str, costs_by_pupil: Mapping[Pupil, Cost]) -> list[Row]:
     """The measures of a skill and an advisor, and what the advisor saves compared with nobody."""
-    of, alone = costs_by_pupil[Pupil(skill, advisor)], costs_by_pupil[Pupil(skill, NOBODY)]
+    cost, alone = costs_by_pupil[Pupil(skill, advisor)], costs_by_pupil[Pupil(skill, NOBODY)]
     named: Row = {
         "skill": skill,
         "subtask": scene().problems[skill].subtask,
         "advisor": advisor,
-        "lessons": len(of.moves),
+        "lessons": len(cost.moves),
     }
     rows = [
-        share_row(named, "solved_percent", of.solved),
-        varying_row(named, "episodes_to_solve", of.episodes),
-        varying_row(named, "moves_to_solve", of.moves),
-        varying_row(named, "helped_steps", of.helped),
+        share_row(named, "solved_percent", cost.solved),
+        varying_row(named, "episodes_to_solve", cost.episodes),
+        varying_row(named, "moves_to_solve", cost.moves),
+        varying_row(named, "helped_steps", cost.helped),
     ]
-    return rows if advisor == NOBODY else [*rows, saved_row(named, of, alone)]
+    return rows if advisor == NOBODY else [*rows, saved_row(named, cost, alone)]
 
 
-def saved_row(named: Row, of: Cost, alone: Cost) -> Row:
+def saved_row(named: Row, cost: Cost, alone: Cost) -> Row:
     """The moves that a lesson saves compared with nobody [%], with the interval of the difference of the means."""
     from scipy.stats import ttest_ind
 
-    low, high = ttest_ind(alone.moves, of.moves, equal_var=False).confidence_interval(0.95)
+    low, high = ttest_ind(alone.moves, cost.moves, equal_var=False).confidence_interval(0.95)
     percent = 100.0 / alone.moves.mean()
     ends = None if np.isnan(low) else (low * percent, high * percent)
-    return row(named, "saved_percent", (alone.moves.mean() - of.moves.mean()) * percent, ends)
+    return row(named, "saved_percent", (alone.moves.mean() - cost.moves.mean()) * percent, ends)
 
 
 def in_short(costs: Mapping[str, Mapping[str, Cost]]) -> Row:
     """Means over the skills of a sub-task, and whether every lesson was solved."""
     says: Row = {}
-    for subtask, of in costs.items():
-        for name, cost in of.items():
+    for subtask, by_advisor in costs.items():
+        for name, cost in by_advisor.items():
             says[f"{subtask}, {name}: moves"] = round(float(cost.moves.mean()))
             says[f"{subtask}, {name}: helped"] = round(float(cost.helped.mean()))
             says[f"{subtask}, {name}: solved [%]"] = round(100.0 * float(cost.solved.mean()), 1)
@@ -184,17 +184,20 @@ def in_short(costs: Mapping[str, Mapping[str, Cost]]) -> Row:
 
 def moves_picture(costs: Mapping[str, Mapping[str, Cost]]) -> bytes:
     """Bars of the moves until a lesson is solved, by sub-task and advisor."""
-    lines = {name: [varying_row({}, "moves_to_solve", of[name].moves) for of in costs.values()] for name in ADVISORS}
+    lines = {
+        name: [varying_row({}, "moves_to_solve", by_advisor[name].moves) for by_advisor in costs.values()]
+        for name in ADVISORS
+    }
     named = {("nobody" if name == NOBODY else name): line for name, line in lines.items()}
     return bars(list(costs), named, "moves until it is solved")
 
 
-def solved_picture(of: Mapping[str, Cost]) -> bytes:
+def solved_picture(by_advisor: Mapping[str, Cost]) -> bytes:
     """The share of lessons that are solved after so many moves, a curve for each advisor."""
 
     def draw(figure: "Figure") -> None:
         axes = figure.add_subplot()
-        for name, cost in of.items():
+        for name, cost in by_advisor.items():
             moves = np.sort(np.where(cost.solved, cost.moves, np.inf))
             share = 100.0 * np.arange(1, len(moves) + 1) / len(moves)
             axes.step(moves, share, where="post", color=COLOURS[name], label="nobody" if name == NOBODY else name)

@@ -152,9 +152,9 @@ def carrying_trial(task: Task, rolls: bool) -> tuple[str, float]:
                 world.step()
         except WorkFailed as error:
             return str(error), float("nan")
-        wanted = bench.scene.kind_of[body].held_at(_goal(bench))
-        at = bench.part_pose(body, wanted.yaw)
-        off = hypot(at.x - wanted.x, at.y - wanted.y)
+        goal = bench.scene.kind_of[body].held_at(_goal(bench))
+        at = bench.part_pose(body, goal.yaw)
+        off = hypot(at.x - goal.x, at.y - goal.y)
         if not rolls and bench.upright(body) <= UPRIGHT:
             return "it fell over", off
         return ("" if off <= (ROLLED_M if rolls else NEAR_M) else f"it is {off:.3f} m off its place"), off

@@ -210,39 +210,39 @@ def episodes_to_solve(steps: NDArray[np.int64]) -> int:
     return int(quick[0]) + SOLVED_OF if len(quick) else len(steps)
 
 
-def rows_of(setting: Setting, of: Outcome, outcomes: Mapping[Setting, Outcome]) -> list[Row]:
+def rows_of(setting: Setting, outcome: Outcome, outcomes: Mapping[Setting, Outcome]) -> list[Row]:
     """The measures of a setting, and the steps of an episode that it saves compared with nobody."""
-    named: Row = {"student": setting.student, "rule": setting.rule, "sessions": len(of.steps)}
+    named: Row = {"student": setting.student, "rule": setting.rule, "sessions": len(outcome.steps)}
     rows = [
-        mean_row(named, "mean_steps", of.steps.mean(axis=1)),
-        mean_row(named, "first_100", of.steps[:, :100].mean(axis=1)),
-        mean_row(named, "episodes_to_solve", of.to_solve),
-        share_row(named, "solved_percent", of.solved),
-        row(named, "helped_steps", float(of.helped.mean())),
+        mean_row(named, "mean_steps", outcome.steps.mean(axis=1)),
+        mean_row(named, "first_100", outcome.steps[:, :100].mean(axis=1)),
+        mean_row(named, "episodes_to_solve", outcome.to_solve),
+        share_row(named, "solved_percent", outcome.solved),
+        row(named, "helped_steps", float(outcome.helped.mean())),
     ]
     if setting.rule == NOBODY:
         return rows
     alone = outcomes[replace(setting, rule=NOBODY)]
-    return [*rows, mean_row(named, "saved_steps", alone.steps.mean(axis=1) - of.steps.mean(axis=1))]
+    return [*rows, mean_row(named, "saved_steps", alone.steps.mean(axis=1) - outcome.steps.mean(axis=1))]
 
 
 def in_short(outcomes: Mapping[Setting, Outcome]) -> Row:
     """The area under the learning curve, its beginning, and the episodes to solve, by student and rule."""
     says: Row = {"span": round(median_span(), 2)}
-    for setting, of in outcomes.items():
+    for setting, outcome in outcomes.items():
         which = f"{setting.student}, {setting.rule}"
-        says[f"{which}: mean steps"] = round(float(of.steps.mean()), 1)
-        says[f"{which}: first 100"] = round(float(of.steps[:, :100].mean()), 1)
-        says[f"{which}: episodes to solve"] = round(float(of.to_solve.mean()))
+        says[f"{which}: mean steps"] = round(float(outcome.steps.mean()), 1)
+        says[f"{which}: first 100"] = round(float(outcome.steps[:, :100].mean()), 1)
+        says[f"{which}: episodes to solve"] = round(float(outcome.to_solve.mean()))
     return says
 
 
-def curves(of: Mapping[str, Outcome]) -> bytes:
+def curves(by_rule: Mapping[str, Outcome]) -> bytes:
     """A picture of the mean steps of ten episodes at a time, a curve for each rule."""
 
     def draw(figure: "Figure") -> None:
         axes = figure.add_subplot()
-        for rule, outcome in of.items():
+        for rule, outcome in by_rule.items():
             mean = outcome.steps.mean(axis=0).reshape(-1, 10).mean(axis=1)
             axes.plot(np.arange(len(mean)) * 10 + 5, mean, color=COLOURS[rule], label=rule, linewidth=1.4)
         axes.set(xlabel="episode", ylabel="steps", xlim=(0, EPISODES))

@@ -101,12 +101,12 @@ def _proof(case: str, toasts: int) -> list[Row]:
 def near_rows(case: str, job: Job) -> list[Row]:
     """Rows of the share of srl-time's sessions that come near the optimum, and, if all do, of the seconds until then."""
     cell, seconds = robot_cell(case, MANY), list[float]()
-    wanted = (1.0 + NEAR) * optimum(cell).bound_s
+    near_cost = (1.0 + NEAR) * optimum(cell).bound_s
     for session in range(min(job.sessions, MANY_SESSIONS)):
         reached, began = [inf], time.perf_counter()
 
         def listen(tried: EpisodeSequenced, reached: list[float] = reached, began: float = began) -> None:
-            if tried.best_cost <= wanted:
+            if tried.best_cost <= near_cost:
                 reached[0] = min(reached[0], time.perf_counter() - began)
 
         rng = np.random.default_rng([job.seed, session])

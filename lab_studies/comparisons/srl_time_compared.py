@@ -133,12 +133,14 @@ def in_short(rows: Sequence[Row]) -> Row:
     """The least success of srl-time, and the mean gaps of all methods in the longest sessions, by table."""
     says: Row = {}
     for table, longest in _longest(those(rows, method="srl-time")):
-        of = those(rows, method="srl-time", table=table, measure="SP_percent", episodes=longest)
-        says[f"srl-time, {table}: least SP in {longest} episodes [%]"] = round(min(result["value"] for result in of), 1)
+        longest_rows = those(rows, method="srl-time", table=table, measure="SP_percent", episodes=longest)
+        says[f"srl-time, {table}: least SP in {longest} episodes [%]"] = round(
+            min(result["value"] for result in longest_rows), 1
+        )
     for table, longest in _longest(rows):
         for method in LEARNING:
-            if of := those(rows, method=method, table=table, measure="gap_percent", episodes=longest):
-                mean = float(np.mean([result["value"] for result in of]))
+            if longest_rows := those(rows, method=method, table=table, measure="gap_percent", episodes=longest):
+                mean = float(np.mean([result["value"] for result in longest_rows]))
                 says[f"{method}, {table}: mean gap in {longest} episodes [%]"] = round(mean, 2)
     proofs = [result["value"] for result in those(rows, method="exact", measure="wall_s")]
     return says | {"exact: longest proof [s]": round(max(proofs), 2)}

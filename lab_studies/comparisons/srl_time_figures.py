@@ -33,10 +33,12 @@ PANEL_INCH = 2.9, 2.5
 
 def by_episodes(rows: Sequence[Row], measure: str) -> bytes:
     """A picture of a percentage by session length, a plot for each case and small number of toasts."""
-    of = [row for row in those(rows, measure=measure) if "episodes" in row and "case" in row]
-    counts = sorted({row["toasts"] for row in of if row["toasts"] <= 4})
-    cases = sorted({row["case"] for row in of})
-    panels = {f"{count} toasts, case {case}": those(of, toasts=count, case=case) for count in counts for case in cases}
+    shown = [row for row in those(rows, measure=measure) if "episodes" in row and "case" in row]
+    counts = sorted({row["toasts"] for row in shown if row["toasts"] <= 4})
+    cases = sorted({row["case"] for row in shown})
+    panels = {
+        f"{count} toasts, case {case}": those(shown, toasts=count, case=case) for count in counts for case in cases
+    }
     ylabel = "sessions that find the optimum [%]" if measure == "SP_percent" else "sessions that end optimal [%]"
 
     def draw(axes: "Axes", shown: Sequence[Row]) -> None:
@@ -48,11 +50,11 @@ def by_episodes(rows: Sequence[Row], measure: str) -> bytes:
 
 def of_orders(rows: Sequence[Row]) -> bytes:
     """A picture of the gap by session length for each order and interval of the FMS; horizontal lines: single sequences."""
-    of = [row for row in those(rows, measure="gap_percent") if "order" in row]
-    means = sorted({row["interval_s"] for row in of})
-    orders = list(dict.fromkeys(row["order"] for row in of))
+    gaps = [row for row in those(rows, measure="gap_percent") if "order" in row]
+    means = sorted({row["interval_s"] for row in gaps})
+    orders = list(dict.fromkeys(row["order"] for row in gaps))
     panels = {
-        f"{order}, every {mean:g} s": those(of, order=order, interval_s=mean) for mean in means for order in orders
+        f"{order}, every {mean:g} s": those(gaps, order=order, interval_s=mean) for mean in means for order in orders
     }
 
     def draw(axes: "Axes", shown: Sequence[Row]) -> None:
@@ -68,9 +70,9 @@ def of_orders(rows: Sequence[Row]) -> bytes:
 
 def by_wall_time(rows: Sequence[Row]) -> bytes:
     """A picture of the gap by the seconds of a session for many toasts: a line for each case and method."""
-    of = [row for row in rows if row.get("toasts", 0) > 4]
-    counts = sorted({row["toasts"] for row in of})
-    panels = {f"{count} toasts": those(of, toasts=count) for count in counts}
+    many = [row for row in rows if row.get("toasts", 0) > 4]
+    counts = sorted({row["toasts"] for row in many})
+    panels = {f"{count} toasts": those(many, toasts=count) for count in counts}
 
     def draw(axes: "Axes", shown: Sequence[Row]) -> None:
         looks = LOOKS | {(method, None): look for method, look in SINGLE.items()}
@@ -108,8 +110,8 @@ def _curves(axes: "Axes", rows: Sequence[Row]) -> None:
     """Draw the methods that learn by session length, on a logarithmic axis with the lengths as ticks."""
     tried = [row for row in rows if "episodes" in row]
     for (method, factor), look in LOOKS.items():
-        if of := those(tried, method=method, reward_factor=factor):
-            curve(axes, of, "episodes", look)
+        if own := those(tried, method=method, reward_factor=factor):
+            curve(axes, own, "episodes", look)
     lengths = sorted({row["episodes"] for row in tried})
     axes.set(xscale="log", xlabel="episodes")
     axes.set_xticks(lengths, [f"{length:g}" for length in lengths])

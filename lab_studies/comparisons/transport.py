@@ -65,13 +65,13 @@ def transport(job: Job, reading: Mapping[str, Any]) -> Findings:
     says: Row = {}
     if reading.get("verify"):
         says["schedules that the checker found right"] = verification(results)
-    rows = [line for instance, of in by_instance(results).items() for line in rows_of(instance, of)]
+    rows = [line for instance, by_method in by_instance(results).items() for line in rows_of(instance, by_method)]
     rows = [*family_rows(results), *rows]
     orders = {entry: result for entry, result in results.items() if entry.method != CYCLIC}
     figures = {
         "How many instances a method solves within a gap": profile(gaps_of(orders)),
         "The mean gap, second by second": by_seconds(
-            orders, {instance: least_cost(instance, of) for instance, of in by_instance(orders).items()}
+            orders, {instance: least_cost(instance, by_method) for instance, by_method in by_instance(orders).items()}
         ),
     }
     refused = {(e.method, f.refused) for e, f in results.items() if f.cost is None}
@@ -158,26 +158,28 @@ def faults_of(entry: Entry, result: EntryResult) -> list[str]:
 def by_instance(results: Board) -> dict[Instance, dict[str, EntryResult]]:
     """The results by instance and method."""
     return {
-        instance: {entry.method: results[entry] for entry in of}
-        for instance, of in groupby(results, key=lambda entry: entry.instance)
+        instance: {entry.method: results[entry] for entry in group}
+        for instance, group in groupby(results, key=lambda entry: entry.instance)
     }
 
 
-def least_cost(instance: Instance, of: Mapping[str, EntryResult]) -> float:
+def least_cost(instance: Instance, by_method: Mapping[str, EntryResult]) -> float:
     """The least known cost of an instance, inf if none is known."""
-    return min([result.cost for result in of.values() if result.cost is not None] + [instance.printed or inf])
+    return min([result.cost for result in by_method.values() if result.cost is not None] + [instance.printed or inf])
 
 
-def highest_bound(of: Mapping[str, EntryResult]) -> tuple[float, str]:
+def highest_bound(by_method: Mapping[str, EntryResult]) -> tuple[float, str]:
     """The highest bound and the method that proved it; 0 and "" without one."""
-    return max(((result.bound, result.bound_by) for result in of.values()), key=lambda pair: pair[0], default=(0.0, ""))
+    return max(
+        ((result.bound, result.bound_by) for result in by_method.values()), key=lambda pair: pair[0], default=(0.0, "")
+    )
 
 
-def rows_of(instance: Instance, of: Mapping[str, EntryResult]) -> list[Row]:
+def rows_of(instance: Instance, by_method: Mapping[str, EntryResult]) -> list[Row]:
     """The rows of each method on an instance: its cost, its gap to the best known, and what is proven."""
-    best, (bound, by) = least_cost(instance, of), highest_bound(of)
+    best, (bound, by) = least_cost(instance, by_method), highest_bound(by_method)
     rows: list[Row] = []
-    for method, result in of.items():
+    for method, result in by_method.items():
         if result.cost is None:
             continue
         named: Row = {
@@ -200,10 +202,10 @@ def rows_of(instance: Instance, of: Mapping[str, EntryResult]) -> list[Row]:
 def gaps_of(results: Board) -> dict[str, list[float]]:
     """By method, the gaps [%] to the best known costs of the instances that it solved."""
     gaps = dict[str, list[float]]()
-    for instance, of in by_instance(results).items():
-        for method, result in of.items():
+    for instance, by_method in by_instance(results).items():
+        for method, result in by_method.items():
             if result.cost is not None:
-                gaps.setdefault(method, []).append(100.0 * gap(result.cost, least_cost(instance, of)))
+                gaps.setdefault(method, []).append(100.0 * gap(result.cost, least_cost(instance, by_method)))
     return gaps
 
 
@@ -237,11 +239,15 @@ def in_short(results: Board) -> Row:
     """The number of instances, of proven optima, and of costs as published or better."""
     boards = by_instance(results)
     told: Row = {"instances": len(boards), "entries": len(results)}
-    proven = [instance for instance, of in boards.items() if least_cost(instance, of) <= highest_bound(of)[0] + SAME]
+    proven = [
+        instance
+        for instance, by_method in boards.items()
+        if least_cost(instance, by_method) <= highest_bound(by_method)[0] + SAME
+    ]
     told["optima proven here"] = len(proven)
     mine = {
-        instance: min((f.cost for f in of.values() if f.cost is not None), default=inf)
-        for instance, of in boards.items()
+        instance: min((f.cost for f in by_method.values() if f.cost is not None), default=inf)
+        for instance, by_method in boards.items()
     }
     printed = [instance for instance in boards if instance.printed is not None]
     if printed:

@@ -158,7 +158,9 @@ def _row(rows: Sequence[Row], name: str, kind: str, gate: str, **more: Any) -> R
 def _points_of(gains: Mapping[str, Sequence[Row]], rows: Sequence[Row]) -> dict[str, list[Row]]:
     """The rows of points that belong to rows of gains, and nobody's, as bars begin at 0."""
     shown = {"nobody": [those(rows, problem=name, gate="never", measure="points")[0] for name in PROBLEMS]}
-    for words, of in gains.items():
-        same = ({key: result[key] for key in ("problem", "advisors", "gate", "members", "decide")} for result in of)
+    for words, gain_rows in gains.items():
+        same = (
+            {key: result[key] for key in ("problem", "advisors", "gate", "members", "decide")} for result in gain_rows
+        )
         shown[words] = [those(rows, measure="points", **names)[0] for names in same]
     return shown

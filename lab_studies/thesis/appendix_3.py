@@ -103,34 +103,34 @@ def orders_of(seed: int) -> dict[int, list[str]]:
     return orders
 
 
-def _rows(group: Group, of: Sequence[OrderMakespans]) -> list[Row]:
+def _rows(group: Group, made: Sequence[OrderMakespans]) -> list[Row]:
     """The rows of one size, law and mean: makespans, improvements over both FIFOs, gaps."""
     parts, law, mean_s = group
     named: Row = {"table": f"{parts} parts", "parts": parts, "arrivals": law, "interval_s": mean_s}
     rows = []
     for start, method in FIFO.items():
-        rows += _makespan_rows({**named, "method": "fifo", "fifo": start}, law, method, of)
+        rows += _makespan_rows({**named, "method": "fifo", "fifo": start}, law, method, made)
     for method in METHODS:
-        if (method, law) not in of[0].makespans_s:
+        if (method, law) not in made[0].makespans_s:
             continue
-        rows += _makespan_rows({**named, "method": method}, law, method, of)
+        rows += _makespan_rows({**named, "method": method}, law, method, made)
         for start in STARTS:
-            rows += _improvement_rows({**named, "method": method, "fifo": start}, group, of)
+            rows += _improvement_rows({**named, "method": method, "fifo": start}, group, made)
     return rows
 
 
-def _makespan_rows(named: Row, law: str, method: str, of: Sequence[OrderMakespans]) -> list[Row]:
+def _makespan_rows(named: Row, law: str, method: str, made: Sequence[OrderMakespans]) -> list[Row]:
     """The rows of the mean makespan and, with constant arrivals, of the gap to the optimum."""
-    rows = [mean_row(named, "makespan_s", [mix.makespans_s[method, law].mean() for mix in of])]
+    rows = [mean_row(named, "makespan_s", [mix.makespans_s[method, law].mean() for mix in made])]
     if law == "constant":
-        rows.append(mean_row(named, "gap_percent", [100.0 * mix.gaps[method] for mix in of]))
+        rows.append(mean_row(named, "gap_percent", [100.0 * mix.gaps[method] for mix in made]))
     return rows
 
 
-def _improvement_rows(named: Row, group: Group, of: Sequence[OrderMakespans]) -> list[Row]:
+def _improvement_rows(named: Row, group: Group, made: Sequence[OrderMakespans]) -> list[Row]:
     """The rows of IP (III.1) and of the difference to a FIFO's makespan, over the replications that the method has."""
     method, start, law = named["method"], named["fifo"], group[1]
-    pairs = [(mix.makespans_s[FIFO[start], law], mix.makespans_s[method, law]) for mix in of]
+    pairs = [(mix.makespans_s[FIFO[start], law], mix.makespans_s[method, law]) for mix in made]
     fifo_s, own_s = np.array([(other[: len(own)].mean(), own.mean()) for other, own in pairs]).T
     p = float(f"{paired_p(fifo_s - own_s):.2g}")
     printed = method == "srl" and start == "listing"
@@ -157,9 +157,9 @@ def _example_rows(orders: Mapping[int, Sequence[str]], makespans: Mapping[Mix, O
     methods += [(method, {"method": method}) for method in ("srl", "srl-time", "exact")]
     rows = []
     for order in orders.get(3, ()):
-        of = makespans[Mix(order, MEANS_S[0])].makespans_s
+        makespans_s = makespans[Mix(order, MEANS_S[0])].makespans_s
         named: Row = {"table": "Figure III.4", "order": order, "arrivals": "constant", "interval_s": MEANS_S[0]}
-        rows += [row(named | own, "makespan_s", float(of[name, "constant"][0])) for name, own in methods]
+        rows += [row(named | own, "makespan_s", float(makespans_s[name, "constant"][0])) for name, own in methods]
     return rows
 
 
@@ -167,8 +167,8 @@ def _in_short(rows: Sequence[Row]) -> Row:
     """The range of IP over the cells, for SRL with both FIFOs, and for other methods with the FIFO as listed."""
     says: Row = {}
     for method, start in (("srl", "listing"), ("srl", "idle-start"), *((m, "listing") for m in BESIDE)):
-        of = [result["value"] for result in those(rows, method=method, fifo=start, measure="IP_percent")]
-        says[f"IP of {method} over {FIFO_NAMES[start]} [%]"] = f"{min(of):.1f} to {max(of):.1f}"
+        improvements = [result["value"] for result in those(rows, method=method, fifo=start, measure="IP_percent")]
+        says[f"IP of {method} over {FIFO_NAMES[start]} [%]"] = f"{min(improvements):.1f} to {max(improvements):.1f}"
     return says
 
 
@@ -214,8 +214,8 @@ def _differences(rows: Sequence[Row]) -> bytes:
     groups = [*product(LAWS, MEANS_S)]
     lines = {}
     for start, name in FIFO_NAMES.items():
-        of = those(rows, parts=5, method="srl", fifo=start, measure="difference_s")
-        lines[f"over {name}"] = [those(of, arrivals=law, interval_s=mean)[0] for law, mean in groups]
+        differences = those(rows, parts=5, method="srl", fifo=start, measure="difference_s")
+        lines[f"over {name}"] = [those(differences, arrivals=law, interval_s=mean)[0] for law, mean in groups]
     return bars([f"{law}\n{mean:g} s" for law, mean in groups], lines, "makespan difference [s]")
 
 

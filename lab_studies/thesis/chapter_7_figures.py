@@ -69,9 +69,9 @@ def of_case(case: str, table: str) -> dict[str, Compared]:
     }
 
 
-def length_pictures(rows: Sequence[Row], wanted: Mapping[str, Compared]) -> dict[str, bytes]:
+def length_pictures(rows: Sequence[Row], shown_by_caption: Mapping[str, Compared]) -> dict[str, bytes]:
     """Pictures by session length, by caption: SP, or the mean best time if times are random."""
-    return {caption: _by_length(rows, shown) for caption, shown in wanted.items()}
+    return {caption: _by_length(rows, shown) for caption, shown in shown_by_caption.items()}
 
 
 def _by_length(rows: Sequence[Row], shown: Compared) -> bytes:

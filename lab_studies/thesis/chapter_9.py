@@ -72,8 +72,8 @@ def chapter_9(job: Job, reading: Reading) -> Findings:
     for name in TABLES:
         best = best_scores(job, reading, name)
         pictures |= best.figures
-        as_printed, of, by_chance, pairs = (best.summary[key] for key in RANKED)
-        ranks[f"{name} ranks"] = f"{as_printed} of {of} as printed ({by_chance} by chance)"
+        as_printed, count, by_chance, pairs = (best.summary[key] for key in RANKED)
+        ranks[f"{name} ranks"] = f"{as_printed} of {count} as printed ({by_chance} by chance)"
         ranks[f"{name} pairs in the printed order"] = pairs
     more, drawn = figures.figures(job, reading)
     rows = marked([*cells, *alone, *more])

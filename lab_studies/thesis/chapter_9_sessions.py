@@ -95,21 +95,21 @@ def measured(job: Job, settings: Sequence[AdviceSetting]) -> dict[AdviceSetting,
 
     Raises WorkFailed if the folder cannot be written or the cluster cannot be reached.
     """
-    wanted = list(dict.fromkeys(settings))
-    keys = {setting.key(job.sessions, job.seed): setting for setting in wanted}
+    distinct = list(dict.fromkeys(settings))
+    keys = {setting.key(job.sessions, job.seed): setting for setting in distinct}
 
     def read(entry: Any) -> tuple[AdviceSetting, AdviceOutcome] | None:
         outcome = AdviceOutcome.from_json(entry)
         return (keys[entry["key"]], outcome) if len(outcome.success) == job.sessions else None
 
     done: dict[AdviceSetting, AdviceOutcome] = job.kept_as(read)
-    left = [setting for setting in wanted if setting not in done]
-    job.progress(len(done), len(wanted))
+    left = [setting for setting in distinct if setting not in done]
+    job.progress(len(done), len(distinct))
     for setting, outcome in job.computed(partial(sessions_of, sessions=job.sessions, seed=job.seed), left):
         done[setting] = outcome
         job.keep({"key": setting.key(job.sessions, job.seed), "setting": asdict(setting), **outcome.to_json()})
-        job.progress(len(done), len(wanted))
-    return {setting: done[setting] for setting in wanted}
+        job.progress(len(done), len(distinct))
+    return {setting: done[setting] for setting in distinct}
 
 
 def sessions_of(setting: AdviceSetting, sessions: int, seed: int) -> AdviceOutcome:

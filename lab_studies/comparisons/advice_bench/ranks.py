@@ -45,8 +45,10 @@ def ranks(scores: Mapping[str, Mapping[Cell, float]], problems: Sequence[str], o
     p = float(friedmanchisquare(*by_problem.T).pvalue) if n > 1 and k > 2 else None
     ordered = sorted(zip(rules, mean.tolist(), strict=True), key=lambda pair: pair[1])
     means = {
-        rule: np.array([np.mean([of[cell] for cell in cells if cell[0] == name]) for name in dict.fromkeys(problems)])
-        for rule, of in scores.items()
+        rule: np.array(
+            [np.mean([scores_of_rule[cell] for cell in cells if cell[0] == name]) for name in dict.fromkeys(problems)]
+        )
+        for rule, scores_of_rule in scores.items()
     }
     others = [rule for rule in rules if rule != ours] if ours in means else []
     single = {rule: float(wilcoxon(means[ours], means[rule], alternative="greater").pvalue) for rule in others}

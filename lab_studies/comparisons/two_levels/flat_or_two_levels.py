@@ -162,9 +162,9 @@ def _named(method: Method, toasts: int, budget: int | None) -> Row:
 
 def rows_of(named: Row, makespans: NDArray[np.int64], best: int) -> list[Row]:
     """The rows of the makespan and the gap over the finished sessions, if any, and of the share of these."""
-    there = makespans[makespans >= 0]
+    finished = makespans[makespans >= 0]
     rows = []
-    for measure, values in (("makespan_steps", there), ("gap_percent", 100.0 * (there / best - 1.0))):
+    for measure, values in (("makespan_steps", finished), ("gap_percent", 100.0 * (finished / best - 1.0))):
         if len(values):
             rows.append(mean_row(named, measure, values) if len(values) > 1 else row(named, measure, values[0]))
     return [*rows, share_row(named, "finished_percent", makespans >= 0)]
@@ -176,9 +176,9 @@ def _in_short(rows: Sequence[Row], toasts: int, exact: Sequence[Row]) -> Row:
     says = ("optimum, flat", "optimum, two levels", "states of the flat problem", "sub-tasks")
     told: Row = {f"{table}: {what}": int(result["value"]) for what, result in zip(says, exact, strict=True)}
     for method, setting in METHODS:
-        of = those(rows, method=method, setting=setting)
-        sure = {result["budget"] for result in those(of, measure="finished_percent", value=100.0)}
-        near = [result["budget"] for result in those(of, measure="gap_percent") if result["value"] <= NEAR_PERCENT]
+        own = those(rows, method=method, setting=setting)
+        sure = {result["budget"] for result in those(own, measure="finished_percent", value=100.0)}
+        near = [result["budget"] for result in those(own, measure="gap_percent") if result["value"] <= NEAR_PERCENT]
         steps = min((budget for budget in near if budget in sure), default=None)
         told[f"{table}: steps to within {NEAR_PERCENT:g} %, {method}, {setting}"] = steps
     return told

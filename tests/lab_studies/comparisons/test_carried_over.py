@@ -38,7 +38,7 @@ SOONEST = CarriedPolicy({"delay": -1.0})
 def short(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(study, "SETTINGS", CarriedLearning(8, 6, 4))
     monkeypatch.setattr(study, "REPEATS", 1)
-    monkeypatch.setattr(study, "unseen", lambda: (EX11, TWENTY))
+    monkeypatch.setattr(study, "larger_cells", lambda: (EX11, TWENTY))
 
 
 def test_a_larger_cell_is_surveyed() -> None:

@@ -103,7 +103,7 @@ def changed(record: dict[str, Any], column: int, value: object) -> dict[str, Any
     [
         (5, 1.0, r"^1 schedule of 1 found wrong: tiny\.jsp, fifo: "),  # it begins later
         (2, "elsewhere", r"^1 schedule of 1 found wrong: tiny\.jsp, fifo: "),
-        (0, "nobody", r"^1 schedule of 1 found wrong: tiny\.jsp, fifo: a row that cannot be: "),
+        (0, "nobody", r"^1 schedule of 1 found wrong: tiny\.jsp, fifo: an impossible row: "),
     ],
 )
 def test_a_schedule_that_was_tampered_with_is_found(

@@ -91,7 +91,7 @@ def test_what_was_found_can_be_written_and_read(small: None, tmp_path: Path) -> 
 
 def test_no_tries(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "MAX_TRIES", 0)
-    with pytest.raises(WorkFailed, match=r"^seed 5: no layout like world II among 0: try another seed$"):
+    with pytest.raises(WorkFailed, match=r"^seed 5: none of 0 layouts is like world II: try another seed$"):
         reconstruct(5)
 
 
