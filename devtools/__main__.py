@@ -12,7 +12,7 @@ import typer
 from rich.console import Console
 from rich.progress import Progress
 
-from devtools.audit_violations import PART as AUDITS
+from devtools.audits import PART as AUDITS
 from devtools.ctrl_c import PART as CTRL_C
 from devtools.drawn_physics import PART as PHYSICS
 from devtools.kills import PART as KILLS
@@ -22,7 +22,7 @@ from devtools.page_attacks import PART as REQUESTS
 from devtools.parts import Part
 from devtools.proofs import PART as PROOFS
 from devtools.resources import PART as RESOURCES
-from devtools.scoreboard import line, show, written
+from devtools.scoreboard import outcome_line, read_outcomes, show
 from devtools.sizes import PART as SIZES
 
 PARTS: dict[str, Part] = {
@@ -44,15 +44,15 @@ def main(
         list[str] | None, typer.Argument(help=f"which: {', '.join(PARTS)}; all of them if none is named")
     ] = None,
     count: Annotated[
-        int | None, typer.Option(min=1, help="attempts of each part; else as many as a long run makes")
+        int | None, typer.Option(min=1, help="attempts of each part; by default as many as a long run makes")
     ] = None,
     seed: Annotated[int, typer.Option(min=0)] = 0,
     workers: Annotated[int, typer.Option(min=1)] = 2,
-    out: Annotated[Path, typer.Option(help="what was tried, a file a part; gone on with if it is there")] = Path(
+    out: Annotated[Path, typer.Option(help="folder of the outcomes; attempts that it holds are not repeated")] = Path(
         "devtools-out"
     ),
 ) -> None:
-    """Tries to break the lab and prints what held."""
+    """Try to break the lab, and print what held."""
     console = Console(width=160)
     unknown = [name for name in parts or () if name not in PARTS]
     if unknown:
@@ -65,25 +65,25 @@ def main(
 
 
 def attempts(name: str, part: Part, count: int | None, seed: int, workers: int, out: Path, console: Console) -> None:
-    """Makes the attempts of a part that its file does not hold yet."""
+    """Make the attempts of a part that its file does not hold yet."""
     room = out / f"{name}-{seed}"
     room.mkdir(parents=True, exist_ok=True)
-    there_are = part.prepare(room, seed)
-    most = part.count if part.count is not None else there_are
-    assert most is not None, f"{name} says neither a count nor how many attempts there are"
-    wanted = range(min(count or most, there_are or count or most))
+    available = part.prepare(room, seed)
+    most = part.count if part.count is not None else available
+    assert most is not None, f"part {name} has no count, and its prepare returns none"
+    numbers = range(min(count or most, available or count or most))
     file = out / f"{name}.jsonl"
-    todo = [number for number in wanted if number not in written(file)]
+    todo = [number for number in numbers if number not in read_outcomes(file)]
     with (
         Progress(console=console) as progress,
         ThreadPoolExecutor(workers) as pool,
         file.open("a", encoding="utf-8") as lines,
     ):
-        bar = progress.add_task(name, total=len(wanted), completed=len(wanted) - len(todo))
+        bar = progress.add_task(name, total=len(numbers), completed=len(numbers) - len(todo))
         running = {pool.submit(part.attempt, number, seed, room): number for number in todo}
         try:
             for ended in as_completed(running):
-                lines.write(line(running[ended], ended.result()))
+                lines.write(outcome_line(running[ended], ended.result()))
                 lines.flush()
                 progress.advance(bar)
         except BaseException:

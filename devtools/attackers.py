@@ -1,7 +1,7 @@
 """Attacks on the live page's server, as a process of its own: `python -m devtools.attackers KIND PORT SECONDS SEED SERVER [UID]`.
 
-It reads the token from stdin, becomes the user UID before it begins, and prints as one JSON document how often it tried, and
-`inside`: what should not have been let in. SERVER is the lesson's process.
+It reads the token from stdin, becomes the user UID before it begins, and prints one JSON document: how often it tried, and
+`inside`, the requests that should not have been let in. SERVER is the lesson's process.
 """
 
 import json
@@ -22,7 +22,7 @@ AT_ONCE = 400  # connections that an attacker holds
 
 
 class Attack:
-    """One attacker: the page's port, and the token, for attacks with it and for checking that nobody gets in without it."""
+    """One attacker. token: for attacks with it, and to check that nobody gets in without it; server: the lesson's process."""
 
     def __init__(self, port: int, token: str, seconds: float, seed: int, server: int) -> None:
         self.port, self.token, self.server = port, token, server
@@ -44,25 +44,25 @@ class Attack:
         except OSError:
             return None
 
-    def say(self, one: socket.socket, words: bytes) -> bool:
-        """Whether the words could be sent."""
+    def say(self, connection: socket.socket, words: bytes) -> bool:
+        """Send some bytes; return whether that was possible."""
         try:
-            one.sendall(words)
+            connection.sendall(words)
         except OSError:
             return False
         return True
 
     def asked(self, words: bytes, wait_s: float = ANSWER_S) -> bytes:
-        """The beginning of what the server answers, empty if it ends the connection."""
-        one = self.connect()
-        if one is None:
+        """The beginning of the server's answer, b"" if it ends the connection, b"no answer" after `wait_s`."""
+        connection = self.connect()
+        if connection is None:
             return b""
-        with one:
-            if not self.say(one, words):
+        with connection:
+            if not self.say(connection, words):
                 return b""
-            one.settimeout(wait_s)
+            connection.settimeout(wait_s)
             try:
-                return one.recv(1 << 16)
+                return connection.recv(1 << 16)
             except TimeoutError:
                 return b"no answer"
             except OSError:
@@ -73,7 +73,7 @@ class Attack:
 
 
 def matrix(attack: Attack) -> None:
-    """Every combination of method, path, token, host and origin; only requests of the server's own page may get in."""
+    """Send requests with every combination of `cases`; only those of the server's own page may get in."""
     for method, path, token, host, origin in cases(attack):
         shown = f"{path}?token={token}" if token is not None else path
         words = f"{method} {shown} HTTP/1.1\r\n" + (f"Host: {host}\r\n" if host else "")
@@ -93,7 +93,7 @@ def matrix(attack: Attack) -> None:
 
 
 def cases(attack: Attack) -> Iterator[tuple[str, str, str | None, str, str | None]]:
-    """Method, path, token, host, origin of a websocket (None: no websocket)."""
+    """The cases of `matrix`: method, path, token, host, and the origin of a websocket (None: no websocket)."""
     right, here = attack.token, f"{HOST}:{attack.port}"
     hosts = (
         here,
@@ -119,14 +119,14 @@ def cases(attack: Attack) -> Iterator[tuple[str, str, str | None, str, str | Non
 
 
 def flood(attack: Attack, words: bytes = b"", again: bytes = b"") -> None:
-    """As many connections as possible, each of which sends something, and a little more from time to time."""
+    """Hold as many connections as possible, each of which sends `words`, and `again` from time to time."""
     held: list[tuple[socket.socket, Iterator[bytes]]] = []
     while attack.goes_on:
-        one = socket.socket()
-        one.setblocking(False)
-        one.connect_ex((HOST, attack.port))
+        opened = socket.socket()
+        opened.setblocking(False)
+        opened.connect_ex((HOST, attack.port))
         attack.tries += 1
-        held.append((one, chain([words], repeat(again))))
+        held.append((opened, chain([words], repeat(again))))
         other, says = held[attack.chance.randrange(len(held))]
         if words and select([], [other], [], 0)[1] and not attack.say(other, next(says)):
             held = [pair for pair in held if pair[0] is not other]
@@ -136,38 +136,38 @@ def flood(attack: Attack, words: bytes = b"", again: bytes = b"") -> None:
 
 
 def half(attack: Attack) -> None:
-    """Half a request, and nothing more."""
+    """Send half a request on each connection, and nothing more."""
     flood(attack, b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nX: ")
 
 
 def slowly(attack: Attack) -> None:
-    """A request that never ends, a byte at a time, on many connections."""
+    """Send a request that never ends, a byte at a time, on each connection."""
     flood(attack, b"GET / HTTP/1.1\r\n", b"X")
 
 
 def unread(attack: Attack) -> None:
-    """Thousands of requests on a connection whose answers nobody reads."""
+    """Send thousands of requests on each connection, and read no answer."""
     flood(attack, b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n" * 1000)
 
 
 def large(attack: Attack) -> None:
-    """Heads and bodies without end."""
+    """Send heads and bodies without end."""
     begun = b"POST / HTTP/1.1\r\nHost: 127.0.0.1\r\nTransfer-Encoding: chunked\r\n\r\n"
     while attack.goes_on:
-        one = attack.connect()
-        if one is None:
+        connection = attack.connect()
+        if connection is None:
             continue
-        with one:
+        with connection:
             chunked = attack.chance.random() < 0.5
-            attack.say(one, begun if chunked else b"GET / HTTP/1.1\r\nX: ")
+            attack.say(connection, begun if chunked else b"GET / HTTP/1.1\r\nX: ")
             while attack.goes_on and attack.say(
-                one, (b"10000\r\n" + b"x" * 65536 + b"\r\n") if chunked else b"x" * 65536
+                connection, (b"10000\r\n" + b"x" * 65536 + b"\r\n") if chunked else b"x" * 65536
             ):
                 pass
 
 
 def garbage(attack: Attack) -> None:
-    """Other protocols and noise."""
+    """Send other protocols and noise."""
     openings = (
         b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03",
         b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n",
@@ -181,17 +181,17 @@ def garbage(attack: Attack) -> None:
 
 
 def spy(attack: Attack) -> None:
-    """Looks for the token in whatever another user can read of the process and its files (their folder: `home` below)."""
+    """Look for the token in whatever another user can read of the process and its files, which lie in `SPIED`."""
     process = Path(f"/proc/{attack.server}")
     for name in ("cmdline", "environ", "comm", "stat", "maps"):
-        _look(attack, process / name)
+        _search(attack, process / name)
     home = Path(os.environ.get("SPIED", os.devnull))
     for folder, _, files in os.walk(home):
         for name in files:
-            _look(attack, Path(folder, name))
+            _search(attack, Path(folder, name))
 
 
-def _look(attack: Attack, file: Path) -> None:
+def _search(attack: Attack, file: Path) -> None:
     attack.tries += 1
     try:
         if attack.token.encode() in file.read_bytes():
@@ -200,7 +200,7 @@ def _look(attack: Attack, file: Path) -> None:
         return
 
 
-# ---- with the token: a page that is out of order, or a guest who may look
+# ---- with the token: a broken page, or a guest who may only look
 
 
 def _page(attack: Attack) -> Any:
@@ -214,18 +214,18 @@ def _page(attack: Attack) -> Any:
 
 
 def pages(attack: Attack) -> None:
-    """Pages that come and go, more than are allowed."""
+    """Open and close pages, more than are allowed."""
     held: list[Any] = []
     while attack.goes_on:
         held.append(_page(attack))
         if len(held) > 40:
-            for one in filter(None, held[:20]):
-                one.close_socket()
+            for page in filter(None, held[:20]):
+                page.close_socket()
             held = held[20:]
 
 
 def chatter(attack: Attack) -> None:
-    """A page without the seat that says anything at all, also answers and commands."""
+    """Send messages of all kinds, answers and commands among them, from a page without the seat."""
     things: list[Any] = [
         None,
         True,
@@ -269,7 +269,7 @@ def chatter(attack: Attack) -> None:
 
 
 def silent(attack: Attack) -> None:
-    """Pages that read nothing and send pings."""
+    """Open pages that read nothing and send pings."""
     frames = (b"\x89\xfd\0\0\0\0" + bytes(125)) * 100
     ask = f"GET /frames?token={attack.token} HTTP/1.1\r\nHost: {HOST}:{attack.port}\r\nUpgrade: websocket\r\n"
     ask += "Connection: Upgrade\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Version: 13\r\n\r\n"
@@ -292,10 +292,10 @@ ATTACKS: dict[str, tuple[Callable[[Attack], None], str]] = {
 
 
 def main(kind: str, port: str, seconds: str, seed: str, server: str, uid: str = "") -> None:
-    """Attacks, and prints what came of it."""
-    import websockets.sync.client  # noqa: F401  # what another user may not be able to read is loaded before
+    """Attack, and print the number of tries and what got in."""
+    import websockets.sync.client  # noqa: F401  # loaded now, because the other user may not be able to read it
 
-    "".encode("idna")  # and this, too
+    "".encode("idna")  # loads the codec, for the same reason
     token = sys.stdin.read().strip()
     if uid:
         os.setgroups([])

@@ -1,8 +1,7 @@
-"""The lab's command as run by the harness: its exit code, its output, its time and memory."""
+"""Runs of the lab's command in the harness: exit code, output, time and memory."""
 
 import os
 import re
-import resource
 import signal
 import subprocess
 import sys
@@ -30,11 +29,11 @@ class Ended:
     stderr: str
     seconds: float
     peak_bytes: int
-    late: bool = False  # it was killed, as it took too long
+    late: bool = False  # it took too long, and was killed
     cpu_s: float = 0.0
 
     def fault(self, codes: Sequence[int] = CODES) -> str:
-        """What is wrong with how it ended: a traceback, an unknown code, lines too long; empty if nothing is."""
+        """What is wrong with how the command ended, such as a traceback or an unknown exit code; "" if nothing is."""
         if self.late:
             return f"no end within {self.seconds:.0f} s"
         for printed in (self.stderr, self.stdout):
@@ -43,24 +42,24 @@ class Ended:
         if self.code not in codes:
             return f"exit {self.code}, allowed {', '.join(map(str, codes))}: {self.stderr.strip()[-200:]}"
         if self.code in (1, 2) and not self.stderr.strip():
-            return f"exit {self.code} without a word"
-        said = [line for line in re.split(r"[\r\n]", self.stderr) if line.startswith(ERROR)]
-        longest = max(map(len, said), default=0)
+            return f"exit {self.code} without a message"
+        errors = [line for line in re.split(r"[\r\n]", self.stderr) if line.startswith(ERROR)]
+        longest = max(map(len, errors), default=0)
         return f"an error of {longest} characters" if longest > LINE_CHARACTERS else ""
 
 
 def module(name: str) -> tuple[str, ...]:
-    """The command that runs a module of this package as a process of its own, in an `environment` that finds it."""
+    """The command that runs a module of this package in a process of its own, with an `environment`."""
     return (sys.executable, "-m", f"devtools.{name}")
 
 
 def search_path() -> str:
-    """The PYTHONPATH with which a process in any folder imports this checkout."""
+    """The PYTHONPATH by which a process in any folder imports this checkout."""
     return os.pathsep.join([str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])])
 
 
 def environment(home: Path, **more: str) -> dict[str, str]:
-    """This process's environment with a home and a toolbox of their own under `home`, in which this checkout is imported."""
+    """This process's environment, changed so that a command has its home and toolbox in `home` and imports this checkout."""
     kept = {name: value for name, value in os.environ.items() if not name.startswith(("LAB_", "XDG_"))}
     return {
         **kept,
@@ -82,14 +81,14 @@ def lab(
     before: Callable[[], None] | None = None,
     command: Sequence[str] = LAB,
 ) -> Ended:
-    """Runs `lab ARGUMENTS` to its end in a session of its own; `before` runs in the child, `command` replaces the lab itself."""
-    with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err, tempfile.TemporaryFile() as told:
-        told.write(stdin.encode())
-        told.seek(0)
+    """Run `lab ARGUMENTS` to its end in a session of its own; `before` runs in the child, `command` replaces `lab`."""
+    with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err, tempfile.TemporaryFile() as given:
+        given.write(stdin.encode())
+        given.seek(0)
         begun = time.monotonic()
         child = subprocess.Popen(
             [*command, *map(str, arguments)],
-            cwd=cwd, env=dict(env), stdin=told, stdout=out, stderr=err, start_new_session=True, preexec_fn=before,
+            cwd=cwd, env=dict(env), stdin=given, stdout=out, stderr=err, start_new_session=True, preexec_fn=before,
         )  # fmt: skip
         late: list[bool] = []
 
@@ -115,11 +114,6 @@ def _text(file: IO[bytes]) -> str:
 
 
 def kill_session(leader: int) -> None:
-    """Kills whatever is left of the session that `leader` began."""
+    """Kill whatever is left of the session that `leader` began."""
     with suppress(ProcessLookupError, PermissionError):
         os.killpg(leader, signal.SIGKILL)
-
-
-def limit(kind: int, value: int) -> Callable[[], None]:
-    """For `before`: sets one of `resource`'s limits in the child."""
-    return lambda: resource.setrlimit(kind, (value, value))

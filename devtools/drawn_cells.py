@@ -1,7 +1,7 @@
-"""Random cells with every feature of a task file, laid out and measured as an engineer would do after reading the docs.
+"""Random cells with every feature of a task file, laid out as an engineer would do after reading the documentation.
 
-Stations are placed around the arm, and the sizes that follow from parts (of machines, of the workspace) are computed, until
-all stations are apart and within reach. Nothing else is checked; a cell without such a layout keeps the last one.
+Stations are placed around the arm, and the sizes of machines and workspace are computed from the parts, until all stations
+are apart and within reach. Nothing else is checked; a cell without such a layout keeps the last one.
 """
 
 import json
@@ -28,19 +28,19 @@ from lab.tasks.task import Task
 from lab.tasks.task_file import task_of_text
 
 ARMS = ("up6", "up6", "panda", "iiwa", "xarm6")
-CELL_M = {"up6": 0.12, "panda": 0.08, "iiwa": 0.1, "xarm6": 0.08}  # of the workspace's grid
-FOOT_UP_M = {"xarm6": 0.15}  # its arm is low
-SPEED_M_S, ACCELERATION_M_S2 = (0.15, 0.8), (0.5, 4.0)  # evenly over their logarithms
+CELL_M = {"up6": 0.12, "panda": 0.08, "iiwa": 0.1, "xarm6": 0.08}  # the edge of the workspace's grid cells
+FOOT_UP_M = {"xarm6": 0.15}  # the base of a low arm is raised
+SPEED_M_S, ACCELERATION_M_S2 = (0.15, 0.8), (0.5, 4.0)  # drawn log-uniformly
 PROCESSING_S, MACHINE_HIGH_M = (3.0, 40.0), (0.03, 0.09)
-FINGERS_M = 0.016  # that the fingers open beyond the widest part
-BODY_M = 0.06  # of a machine's body beyond its parts
-EDGE_M, OVER_M = 0.03, 0.015  # of the reach left alone; between what is carried and what stands
+FINGERS_M = 0.016  # how far the fingers open beyond the widest part
+BODY_M = 0.06  # how far a machine's body reaches beyond its parts
+EDGE_M, OVER_M = 0.03, 0.015  # the edge of the reach that is not used; the clearance over what stands
 TURNS, SHARES = (75, 60, 90, 105), (0.45, 0.55, 0.35, 0.65, 0.75)
-TRIES = 24  # layouts, at most
+TRIES = 24  # the most layouts that are tried
 
 
 def drawn_cell(rng: Rng, folder: Path) -> tuple[str, str]:
-    """The text of a task file, for `folder`, where its meshes are written, and its features in words."""
+    """The text of a random task file, and its features in words; its meshes are written to `folder`."""
     arm = str(rng.choice(ARMS))
     opening_m = arm_of(RobotSettings(model=arm, start="in")).gripper.opening_m
     kinds = int(rng.choice([1, 1, 2, 3]))
@@ -57,7 +57,7 @@ def drawn_cell(rng: Rng, folder: Path) -> tuple[str, str]:
 
 
 def _through_machines(rng: Rng, arm: str, parts: list[DrawnPart]) -> DrawnCell:
-    """Parts that come from one storage through machines to another."""
+    """A cell whose parts go from one storage through machines to another."""
     count = sum(part.table["count"] for part in parts)
     machines = [f"machine-{number}" for number in range(1, 1 + int(rng.choice([0, 1, 1, 2])))]
     stations: dict[str, Table] = {"in": {"kind": "storage", "capacity": count}}
@@ -73,16 +73,16 @@ def _through_machines(rng: Rng, arm: str, parts: list[DrawnPart]) -> DrawnCell:
     return DrawnCell(rng, parts, robot, stations, ["in", *machines, "out"])
 
 
-# ---- laid out ---------------------------------------------------------------------------------------------------------
+# ---- layout -----------------------------------------------------------------------------------------------------------
 
 
 def laid_out(cell: DrawnCell, path: Path) -> str:
-    """The file's text, its stations apart and within reach in one of a few layouts; else as the last one has them."""
+    """The file's text with the first layout whose stations are apart and within reach, else with the last one."""
     text = ""
     for poses in layouts(cell):
-        text = written(cell, poses, None)
+        text = cell_text(cell, poses, None)
         try:
-            text = written(cell, poses, places_of(task_of_text(path, text)))
+            text = cell_text(cell, poses, places_of(task_of_text(path, text)))
             if _is_fit(task_of_text(path, text)):
                 break
         except BadInput:
@@ -91,7 +91,7 @@ def laid_out(cell: DrawnCell, path: Path) -> str:
 
 
 def layouts(cell: DrawnCell) -> Iterator[dict[str, list[float]]]:
-    """Where stations may stand: on an arc around the arm, in the order of the route; those of a level tool as its page has it."""
+    """Poses of the stations, a layout at a time: on an arc around the arm in the order of the route; a furnace has one layout."""
     if "furnace" in cell.stations:
         out = float(cell.rng.uniform(0.55, 0.65))
         yield {"in": [out, -0.5, 0.0], "furnace": [0.95, 0.0, 0.0], "out": [out, 0.5, 0.0]}
@@ -117,7 +117,7 @@ def layouts(cell: DrawnCell) -> Iterator[dict[str, list[float]]]:
 
 
 def _along(cell: DrawnCell, name: str) -> tuple[float, str]:
-    """Where on the way a station lies: in the order of the route, buffers just before their machines."""
+    """The position of a station along the route, and its name; a buffer comes just before its machine."""
     for at, own in enumerate(cell.route):
         table = cell.stations[own]
         if name == table.get("buffer"):
@@ -132,7 +132,7 @@ def _arm(cell: DrawnCell) -> Arm:
 
 
 def _is_fit(task: Task) -> bool:
-    """Whether all spots are within reach, there and above; BadInput for a station in another one's place."""
+    """Whether the arm reaches all spots and the points above them. Raises BadInput if stations overlap."""
     check_apart(task, len(task.order()))
     arm, places = arm_of(task.robot, task.folder), places_of(task)
     above = task.workspace.lower_m[2] + task.workspace.cell_m[2] / 2
@@ -145,8 +145,8 @@ def _is_fit(task: Task) -> bool:
     return True
 
 
-def written(cell: DrawnCell, poses: dict[str, list[float]], places: Places | None) -> str:
-    """The file's text with stations at `poses`; what follows from the parts is measured where `places` are known."""
+def cell_text(cell: DrawnCell, poses: dict[str, list[float]], places: Places | None) -> str:
+    """The file's text with stations at `poses`; sizes that follow from the parts are computed if `places` is known."""
     parts = [{**part.table, "routes": cell.routes()} for part in cell.parts]
     parts += [cell.more["pallet"]] if "pallet" in cell.more else []
     stations = [_station(cell, name, poses[name], places) for name in cell.stations]
@@ -157,17 +157,17 @@ def written(cell: DrawnCell, poses: dict[str, list[float]], places: Places | Non
         robot |= {"opening_m": round(widest + FINGERS_M, 4)} if widest + FINGERS_M < most else {}
     more = {name: table for name, table in cell.more.items() if name != "pallet"}
     if "obstacles" in more:
-        more["obstacles"] = [{**one, "position_m": _midway(poses)} for one in more["obstacles"]]
+        more["obstacles"] = [{**obstacle, "position_m": _midway(poses)} for obstacle in more["obstacles"]]
     workspace = _workspace(cell, poses, places)
     tables = {"robot": robot, "parts": parts, "workspace": workspace, "stations": stations, **more}
     return "\n".join(['name = "drawn"', "", *_lines(tables)])
 
 
 def _midway(poses: dict[str, list[float]]) -> list[float]:
-    """Between the two neighbours that are farthest apart, a little farther out than they are [m]."""
+    """The point (x, y) [m] between the two neighbouring stations that are farthest apart, moved outwards a little."""
     at = list(poses.values())
-    one, other = max(pairwise(at), key=lambda pair: hypot(pair[0][0] - pair[1][0], pair[0][1] - pair[1][1]))
-    return [round(0.55 * (a + b), 3) for a, b in zip(one[:2], other[:2], strict=True)]
+    here, there = max(pairwise(at), key=lambda pair: hypot(pair[0][0] - pair[1][0], pair[0][1] - pair[1][1]))
+    return [round(0.55 * (a + b), 3) for a, b in zip(here[:2], there[:2], strict=True)]
 
 
 def _station(cell: DrawnCell, name: str, pose: list[float], places: Places | None) -> Table:
@@ -184,7 +184,7 @@ def _station(cell: DrawnCell, name: str, pose: list[float], places: Places | Non
 
 
 def _fitted(places: Places, name: str, pose: Sequence[float]) -> tuple[float, float]:
-    """Length and width [m] of a body below all spots of a station, and a little more."""
+    """Length and width [m] of a body that lies below all spots of a station and BODY_M beyond."""
     reach = [0.0, 0.0]
     for kind in places.kinds_at(name):
         for spot in places.spots(places.task.station(name), kind.name):
@@ -194,7 +194,7 @@ def _fitted(places: Places, name: str, pose: Sequence[float]) -> tuple[float, fl
 
 
 def _workspace(cell: DrawnCell, poses: dict[str, list[float]], places: Places | None) -> Table:
-    """The grid above all stations, as low as what is carried goes over what stands."""
+    """The workspace's grid above all stations, as low as carried parts clear the stations."""
     if "furnace" in cell.stations:
         return {"lower_m": [0.36, -0.8, 0.34], "cell_m": [0.08] * 3, "shape": [8, 20, 2]}
     edge = CELL_M[str(cell.robot["model"])]
@@ -211,20 +211,20 @@ def _workspace(cell: DrawnCell, poses: dict[str, list[float]], places: Places | 
     return {"lower_m": [*lower, ceil(1000 * (low - edge / 2)) / 1000], "cell_m": [edge] * 3, "shape": [*shape, 3]}
 
 
-# ---- as TOML ----------------------------------------------------------------------------------------------------------
+# ---- TOML -------------------------------------------------------------------------------------------------------------
 
 
 def _lines(tables: Table) -> Iterator[str]:
     for name, table in tables.items():
-        for one in table if isinstance(table, list) else [table]:
+        for entry in table if isinstance(table, list) else [table]:
             yield f"[[{name}]]" if isinstance(table, list) else f"[{name}]"
-            yield from (f"{key} = {_value(value)}" for key, value in one.items())
+            yield from (f"{key} = {_value(value)}" for key, value in entry.items())
             yield ""
 
 
 def _value(value: Any) -> str:
     if isinstance(value, dict):
-        return "{ " + ", ".join(f"{key} = {_value(one)}" for key, one in value.items()) + " }"
+        return "{ " + ", ".join(f"{key} = {_value(inner)}" for key, inner in value.items()) + " }"
     if isinstance(value, list):
-        return f"[{', '.join(_value(one) for one in value)}]"
+        return f"[{', '.join(_value(inner) for inner in value)}]"
     return json.dumps(value)

@@ -1,4 +1,4 @@
-"""The features of drawn cells: each is a function that changes the tables of a task file, and returns whether it applied."""
+"""The features of drawn cells: each function changes the tables of a task file, and returns whether it applied."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -10,9 +10,9 @@ import numpy as np
 
 from devtools.drawn_parts import DrawnPart, Rng, Table
 
-SPARE_WINDOW_S, FORCE_N = (15.0, 90.0), (8.0, 80.0)  # the forces evenly over their logarithms
-LAYER_M = 0.08  # between the stacks of a layer, beyond the part
-LEVEL_HIGH_M = 0.03  # of what a level tool takes, at least
+SPARE_WINDOW_S, FORCE_N = (15.0, 90.0), (8.0, 80.0)  # forces are drawn log-uniformly
+LAYER_M = 0.08  # the gap between the stacks of a layer
+LEVEL_HIGH_M = 0.03  # the least height of a part that a level tool takes
 
 
 @dataclass
@@ -32,7 +32,7 @@ class DrawnCell:
         return [name for name, table in self.stations.items() if table["kind"] == "machine"]
 
     def routes(self) -> list[list[Any]]:
-        """The ways through the stations, one for each choice among machines in parallel."""
+        """The routes through the stations, one for each choice among parallel machines."""
         choices = [self.stations[name].get("parallel", [name]) for name in self.route]
         return [[self._stage(name) for name in way] for way in product(*choices)]
 
@@ -47,7 +47,7 @@ class DrawnCell:
 
 
 def evenly(rng: Rng, ends: tuple[float, float]) -> float:
-    """A number drawn evenly over its logarithm, three digits of it."""
+    """A log-uniform random number with three significant digits."""
     return float(f"{float(np.exp(rng.uniform(*np.log(ends)))):.3g}")
 
 
@@ -66,14 +66,14 @@ def buffers(cell: DrawnCell) -> bool:
 
 
 def capacities(cell: DrawnCell) -> bool:
-    """Machines that work on several parts, each by itself."""
+    """Machines have room for several parts, and process each by itself."""
     for name in cell.machines():
         cell.stations[name]["capacity"] = int(cell.rng.integers(2, 4))
     return bool(cell.machines())
 
 
 def alternatives(cell: DrawnCell) -> bool:
-    """Two machines in parallel: two routes."""
+    """A second machine stands in parallel to the first, which makes two routes."""
     if not cell.machines():
         return False
     first = cell.machines()[0]
@@ -91,7 +91,7 @@ def windows(cell: DrawnCell) -> bool:
 
 
 def cover(cell: DrawnCell) -> bool:
-    """The last machine has a head that covers the side of slices, which stand in its slot."""
+    """The last machine has a head that covers the side of slices; they stand in its slot."""
     if not cell.machines() or len(cell.parts) > 1 or cell.parts[0].form != "box":
         return False
     table, part = cell.stations[cell.machines()[-1]], cell.parts[0]
@@ -104,7 +104,7 @@ def cover(cell: DrawnCell) -> bool:
     for key in ("processing_s", "high_m"):
         del table[key]
     table |= {"process": "glue", "capacity": 1, "body": "applier.urdf", "floor_m": 0.02}
-    grid = [int(one) for one in cell.rng.integers(1, 4, 2)]
+    grid = [int(count) for count in cell.rng.integers(1, 4, 2)]
     cell.more.setdefault("processes", {})["glue"] = {"grid": grid, "dwell_s": 1.0, "speed_m_s": 0.03}
     return True
 
@@ -119,7 +119,7 @@ def service(cell: DrawnCell) -> bool:
     table["service"] = "vacuum"
     process = {"by": "robot", "grid": [2, 2], "dwell_s": 2.0, "speed_m_s": 0.1, "area_m": [0.06, 0.06]}
     cell.more.setdefault("processes", {})["vacuum"] = process | {"off_m": [-0.12, 0.0, table["high_m"] + 0.03]}
-    table["ahead_m"] = 0.2  # its body reaches so much farther towards the arm
+    table["ahead_m"] = 0.2  # how much farther its body reaches towards the arm
     return True
 
 
@@ -137,7 +137,7 @@ def pallets(cell: DrawnCell) -> bool:
     for name in cell.machines():  # an empty pallet is carried from the buffer before a machine to the one after it
         cell.stations[name] |= {"pallet": True}
         cell.stations[name].pop("buffer", None)
-    cell.stations = {name: one for name, one in cell.stations.items() if one["kind"] != "buffer"}
+    cell.stations = {name: table for name, table in cell.stations.items() if table["kind"] != "buffer"}
     route = ["in"]
     for name in cell.route[1:-1]:
         for beside_it in (f"{name}-in", f"{name}-out"):
@@ -167,7 +167,7 @@ def layers(cell: DrawnCell) -> bool:
 
 
 def nests(cell: DrawnCell) -> bool:
-    """A kit: each kind has places of its own where it ends."""
+    """Parts end in a kit, where each kind has its own places."""
     if len(cell.parts) < 2:
         return False
     along, across = (max(part.extents_m[axis] for part in cell.parts) for axis in (0, 1))
@@ -189,20 +189,20 @@ def nests(cell: DrawnCell) -> bool:
 
 
 def obstacle(cell: DrawnCell) -> bool:
-    """A tower between two stations; where it stands is known once they do."""
+    """A tower stands between two stations; its position is computed once theirs are known."""
     cell.more["obstacles"] = [{"name": "tower", "cubes": int(cell.rng.integers(2, 6)), "area": [0.02, 0.02]}]
     return True
 
 
 def methods(cell: DrawnCell) -> bool:
-    """Another way to find the order."""
+    """The file names a sequencing method."""
     method = str(cell.rng.choice(["fifo", "exact", "cp-sat", "srl", "shortest-move"]))
     cell.more["sequencing"] = {"method": method, "episodes": 300}
     return True
 
 
 def level_tool(cell: DrawnCell) -> bool:
-    """The last of all, for it moves everything: a furnace, entered from the side with a level tool, between shelves."""
+    """A furnace between shelves is entered from the side with a level tool; it comes last, as it replaces all stations."""
     if any(part.extents_m[2] < LEVEL_HIGH_M for part in cell.parts):
         return False
     cell.robot = cell.robot | {"model": "iiwa"}
@@ -211,9 +211,9 @@ def level_tool(cell: DrawnCell) -> bool:
     for part in cell.parts:
         part.table.pop("grip", None)
     ends = {name: cell.stations[name] | {"high_m": shelf} for name in ("in", "out")}
-    for one in ends.values():
-        one.pop("places", None)
-        one["capacity"] = cell.count()
+    for table in ends.values():
+        table.pop("places", None)
+        table["capacity"] = cell.count()
     furnace = {"kind": "machine", "capacity": 1, "processing_s": 20.0, "body": "furnace.urdf", "floor_m": 0.12,
                "approach": "side"}  # fmt: skip
     cell.stations = {"in": ends["in"], "furnace": furnace, "out": ends["out"]}

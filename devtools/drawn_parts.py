@@ -10,18 +10,18 @@ import trimesh
 
 KG_M3 = (500.0, 1200.0, 2700.0, 7800.0)  # wood, plastic, aluminium, steel
 MASS_KG, FRICTION = (0.004, 2.0), (0.3, 1.1)
-AREA = (0.004, 0.004, 0.06)  # [m], [m], [rad] off its spot, at most
-NARROW_M = (0.012, 0.05)  # of a part, where fingers close on it
-SPARE_M = 0.014  # of the fingers' opening that no part takes
-GRIP_SHARE = (0.35, 0.7)  # of a part's height, at which a file has the fingers take it
-FLAT_TOPS = ("box", "cylinder", "block", "disc", "nut")  # another one stands on them
-ORIGIN_M = 0.05  # of a mesh file, off the middle of its part, at most
-SIDES = 48  # of what is round
-LYING = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])  # turned by -90 degrees about x
+AREA = (0.004, 0.004, 0.06)  # the largest offsets of a part from its spot: x, y [m], yaw [rad]
+NARROW_M = (0.012, 0.05)  # the width of a part between the fingers
+SPARE_M = 0.014  # the part of the fingers' opening that no part fills
+GRIP_SHARE = (0.35, 0.7)  # the height of a grip as a share of the part's
+FLAT_TOPS = ("box", "cylinder", "block", "disc", "nut")  # other parts can stand on these
+ORIGIN_M = 0.05  # the largest offset of a mesh file's origin from the middle of its part
+SIDES = 48  # of a round mesh
+LYING = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])  # a turn by -90 degrees about x
 
 Table = dict[str, Any]  # of a task file
 Rng = np.random.Generator
-Mesh = Any  # a trimesh.Trimesh, whose makers have no types
+Mesh = Any  # a trimesh.Trimesh, as trimesh's functions have no types
 
 
 @dataclass(frozen=True)
@@ -39,12 +39,12 @@ class DrawnPart:
 
     @property
     def stacks(self) -> bool:
-        """Whether another one stands on it."""
+        """Whether another part can stand on it."""
         return self.form in FLAT_TOPS
 
 
 def drawn_part(rng: Rng, number: int, opening_m: float, folder: Path) -> DrawnPart:
-    """A kind of part that is narrow enough for fingers that open so far; its mesh file is written to `folder`."""
+    """A kind of part narrow enough for fingers that open `opening_m`; its mesh file is written to `folder`."""
     form = str(rng.choice([*SOLIDS, *MESHES] if rng.random() < 0.6 else [*SOLIDS]))
     narrow = float(rng.uniform(NARROW_M[0], min(NARROW_M[1], opening_m - SPARE_M)))
     mesh = (SOLIDS | MESHES)[form](rng, narrow)
@@ -55,7 +55,7 @@ def drawn_part(rng: Rng, number: int, opening_m: float, folder: Path) -> DrawnPa
     elif form == "cylinder":
         table |= {"shape": "cylinder", "size_m": [round(edge, 4) for edge in (x, z)]}
     else:
-        table |= {"shape": "mesh"} | written(mesh, table["name"], rng, folder)
+        table |= {"shape": "mesh"} | mesh_fields(mesh, table["name"], rng, folder)
     kg = float(np.clip(mesh.volume * rng.choice(KG_M3), *MASS_KG))
     table |= {"mass_kg": float(f"{kg:.3g}"), "friction": round(float(rng.uniform(*FRICTION)), 2)}
     if rng.random() < 0.5:
@@ -65,11 +65,11 @@ def drawn_part(rng: Rng, number: int, opening_m: float, folder: Path) -> DrawnPa
     return DrawnPart(table, form, (x, y, z))
 
 
-def written(mesh: Mesh, name: str, rng: Rng, folder: Path) -> Table:
-    """Writes a mesh as STL or OBJ, in metres or millimetres, upright or lying, its origin anywhere near; returns its fields."""
+def mesh_fields(mesh: Mesh, name: str, rng: Rng, folder: Path) -> Table:
+    """The fields of a mesh file, which is written as STL or OBJ, in metres or millimetres, upright or lying."""
     fields: Table = {}
     mesh = mesh.copy()
-    if rng.random() < 0.2:  # drawn lying on its side, it is stood up by the file
+    if rng.random() < 0.2:  # the mesh lies on its side, and the task file stands it up
         mesh.apply_transform(LYING)
         fields["stands"] = [round(np.pi / 2, 6), 0.0]
     mesh.apply_translation(rng.uniform(-ORIGIN_M, ORIGIN_M, 3))
@@ -81,7 +81,7 @@ def written(mesh: Mesh, name: str, rng: Rng, folder: Path) -> Table:
     return {"file": f"{name}.{ending}", **fields}
 
 
-# ---- what they look like: functions of a generator and of the width between the fingers [m] --------------------------
+# ---- meshes, from a generator and the width between the fingers [m] ---------------------------------------------------
 
 
 def box(rng: Rng, narrow: float) -> Mesh:
@@ -126,7 +126,7 @@ def plate(rng: Rng, narrow: float) -> Mesh:
 
 
 def extruded(corners: Sequence[tuple[float, float]], wide: float) -> Mesh:
-    """A prism, wide along y, of an outline in x and z, counterclockwise, all of which is seen from its first corner."""
+    """A prism of width `wide` along y over a counterclockwise outline (x, z) that is star-shaped around its first corner."""
     count = len(corners)
     points = [(x, side, z) for side in (-wide / 2, wide / 2) for x, z in corners]
     fan = [(0, n, n + 1) for n in range(1, count - 1)]

@@ -1,7 +1,7 @@
-"""Commands forked from a process that has the lab loaded already, which is ten times as fast.
+"""Commands forked from a process that has already loaded the lab, which is ten times as fast.
 
 The process, `python -m devtools.forked`, reads requests from stdin, a line of JSON each, and answers each with two lines: the
-child's number, how it ended.
+child's process number, and its exit code.
 """
 
 import ctypes
@@ -20,13 +20,13 @@ from typing import Any
 from devtools.commands import Ended, kill_session, module
 from devtools.works import environment_in
 
-_WARM = (
+_WARM_UP = (
     ("teach", "world-1", "--advisor", "expert", "--episodes", "30", "--out", "lesson", "--json"),
     ("toolbox", "verify", "--json"),
     ("sequence", "toast-case-1", "--toasts", "2", "--gantt", "order.svg", "--json"),
     ("task", "random", "8x8x8", "--out", "world.toml", "--json"),
 )
-_ALSO = (
+_MODULES = (
     "lab.production.run",
     "lab.sim.world",
     "lab.tasks.new_task",
@@ -34,18 +34,18 @@ _ALSO = (
     "lab.cli.new",
     "lab.view.meshcat",
 )
-_HERE = threading.local()
+_LOCAL = threading.local()
 
 
 def forked(library: Path, room: Path) -> Callable[[tuple[str, ...], Path, Mapping[str, str], float], Ended]:
-    """What carries out commands in children of this thread's own process, with the shim loaded."""
+    """A function that carries out commands in children of a process with the lab and the shim loaded, one a thread."""
 
     def carried_out(words: tuple[str, ...], home: Path, env: Mapping[str, str], timeout_s: float) -> Ended:
-        if getattr(_HERE, "server", None) is None:
+        if getattr(_LOCAL, "server", None) is None:
             warm = room / f"warm-{threading.get_ident()}"
             warm.mkdir(exist_ok=True)
             said = environment_in(warm, room) | {"LD_PRELOAD": str(library)}
-            _HERE.server = subprocess.Popen(
+            _LOCAL.server = subprocess.Popen(
                 module("forked"),
                 cwd=warm,
                 env=said,
@@ -54,7 +54,7 @@ def forked(library: Path, room: Path) -> Callable[[tuple[str, ...], Path, Mappin
                 stderr=subprocess.DEVNULL,
                 text=True,
             )
-        return _asked(_HERE.server, words, home, env, timeout_s)
+        return _asked(_LOCAL.server, words, home, env, timeout_s)
 
     return carried_out
 
@@ -66,7 +66,7 @@ def _asked(
     assert server.stdout is not None
     with tempfile.TemporaryDirectory() as folder:
         out, err = Path(folder, "out"), Path(folder, "err")
-        out.touch()  # a command may be killed before it has opened them
+        out.touch()  # a command may be killed before it opens its files
         err.touch()
         begun = time.monotonic()
         request = {"words": words, "cwd": str(home), "env": dict(env), "out": str(out), "err": str(err)}
@@ -91,16 +91,16 @@ def _asked(
 
 
 def serve() -> None:
-    """Loads the lab, carries out some commands, and then the requests, each in a child."""
+    """Load the lab, carry out some commands, and then every request in a child."""
     from importlib import import_module
 
     answers = os.dup(1)
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
     from lab.cli import main
 
-    for words in _WARM:
+    for words in _WARM_UP:
         _run(main, words)
-    for name in _ALSO:
+    for name in _MODULES:
         import_module(name)
     for line in sys.stdin:
         request = json.loads(line)
@@ -114,7 +114,7 @@ def serve() -> None:
 
 
 def _child(main: Callable[[], None], request: dict[str, Any]) -> None:
-    """Becomes the command of a request, and ends with it."""
+    """Carry out the command of a request in this process, and end it."""
     code = 1
     try:
         os.setsid()

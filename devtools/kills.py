@@ -12,7 +12,7 @@ from pathlib import Path
 from devtools.commands import Ended
 from devtools.forked import forked
 from devtools.parts import Outcome, Part
-from devtools.shim import Strike, built
+from devtools.shim import Strike, built_shim
 from devtools.works import (
     LONGEST_S,
     WORKS,
@@ -23,70 +23,72 @@ from devtools.works import (
     by_itself,
     disturbed,
     environment_in,
-    fresh,
+    first_fault,
+    first_leftover,
+    first_loss,
+    first_missing,
+    fresh_home,
     kept_before,
-    leftovers,
-    lost,
     names,
     next_words,
     own_folder,
-    reached,
-    undisturbed,
-    unsound,
+    undisturbed_result,
 )
 
 COUNT = 1000
-LATE = 12  # calls at the end of a command, among which every other kill is
-ALONE = 40  # one in so many is a process of its own; the others are forked from one that has the lab loaded
-COLD = 2 * ALONE  # one in so many finds nothing compiled, and keeps what it compiles in its home
-AT_RANDOM = 0.1  # of the kills are at any time
+LATE = 12  # every second kill is at one of so many last calls of a command
+ALONE = 40  # one command in so many is a process of its own; the others are forked from one that has loaded the lab
+COLD = 2 * ALONE  # one command in so many finds nothing compiled, and keeps what it compiles in its home
+AT_RANDOM = 0.1  # the share of kills at any time
 
 
 def prepare(room: Path, seed: int) -> None:
-    """The shim, and the home that every command begins in."""
-    built(room)
+    """Build the shim, and the home that every command begins in."""
+    built_shim(room)
     base(room)
 
 
 def attempt(number: int, seed: int, room: Path) -> Outcome:
-    """One kill and what comes next."""
+    """Kill one command, and judge what it left and the next command."""
     chance = random.Random(f"{seed} {number}")
     shuffled = list(names())
     random.Random(seed).shuffle(shuffled)
     name = shuffled[number % len(shuffled)]
-    expected = known_as(name, room)
-    home = fresh(room / f"kill-{number}", room, WORKS[name])
-    carried_out = by_itself if number % ALONE == 0 or "workers" in name else forked(built(room), room)
+    expected = expected_result(name, room)
+    home = fresh_home(room / f"kill-{number}", room, WORKS[name])
+    carried_out = by_itself if number % ALONE == 0 or "workers" in name else forked(built_shim(room), room)
     share = chance.random() if chance.random() < AT_RANDOM else None
     longest_s = expected.seconds if carried_out is by_itself else forked_s(name, room)
     at_s = None if share is None else share * longest_s
     strike = None if at_s is not None else drawn(expected.calls, chance)
     caches = home if number % COLD == 0 else room
-    killed = disturbed(home, WORKS[name].words, built(room), strike, caches, at_s or LONGEST_S, carried_out)
+    killed = disturbed(home, WORKS[name].words, built_shim(room), strike, caches, at_s or LONGEST_S, carried_out)
     how = f"after {at_s:.2f} s" if at_s is not None else str(strike)
-    broke = judged(name, expected, home, killed, room, carried_out)
+    broke = fault_of(name, expected, home, killed, room, carried_out)
     if not broke:
         shutil.rmtree(home.parent)
     return Outcome(name, f"{number}, seed {seed}: {name}: {how}", broke, figures={"MB": killed.peak_bytes / 1e6})
 
 
 @cache
-def known_as(name: str, room: Path) -> Undisturbed:
+def expected_result(name: str, room: Path) -> Undisturbed:
     """The result of an undisturbed command, read once."""
-    return undisturbed(name, room)
+    return undisturbed_result(name, room)
 
 
 @cache
 def forked_s(name: str, room: Path) -> float:
     """The time [s] that a forked command takes, measured once."""
-    home = fresh(own_folder(room, "forked"), room, WORKS[name])
-    took_s = disturbed(home, WORKS[name].words, built(room), None, room, LONGEST_S, forked(built(room), room)).seconds
+    home = fresh_home(own_folder(room, "forked"), room, WORKS[name])
+    took_s = disturbed(
+        home, WORKS[name].words, built_shim(room), None, room, LONGEST_S, forked(built_shim(room), room)
+    ).seconds
     shutil.rmtree(home.parent)
     return took_s
 
 
 def drawn(calls: dict[str, int], chance: random.Random) -> Strike | None:
-    """A kill at some call of one kind, early or late; None for a command that makes none."""
+    """A kill at a random call of a random kind; None for a command without such calls."""
     kinds = [letter for letter, many in calls.items() if many]
     if not kinds:
         return None
@@ -96,14 +98,14 @@ def drawn(calls: dict[str, int], chance: random.Random) -> Strike | None:
     return Strike(kind, at, chance.choice(("before", "after", "half") if kind == "w" else ("before", "after")))
 
 
-def judged(
+def fault_of(
     name: str, expected: Undisturbed, home: Path, killed: Ended, room: Path, carried_out: CarriedOut = by_itself
 ) -> str:
-    """What is wrong after a kill, and after the command that comes next; "" if nothing is."""
+    """What is wrong after a kill or after the next command; "" if nothing is."""
     before, changes = kept_before(room), WORKS[name].changes
     if killed.code >= 0 and killed.code != expected.code:
         return f"it was not killed: exit {killed.code}: {killed.stderr[-200:]}"
-    if wrong := lost(before, home, changes) or unsound(home):
+    if wrong := first_loss(before, home, changes) or first_fault(home):
         return f"after the kill: {wrong}"
     age(home)
     words = next_words(name, expected, home)
@@ -111,10 +113,10 @@ def judged(
     said = f"then lab {' '.join(words)}"
     if fault := then.fault((0, expected.code)):
         return f"{said}: {fault}"
-    is_over = words[:2] == ("toolbox", "verify") and WORKS[name].session  # pictures and receipt are not made once more
-    wrong = (
-        lost(before, home, changes) or unsound(home) or leftovers(home) or ("" if is_over else reached(expected, home))
-    )
+    is_over = words[:2] == ("toolbox", "verify") and WORKS[name].session  # pictures and receipt are not made again
+    wrong = first_loss(before, home, changes) or first_fault(home) or first_leftover(home)
+    if not wrong and not is_over:
+        wrong = first_missing(expected, home)
     return f"{said}: {wrong}" if wrong else ""
 
 

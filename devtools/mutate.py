@@ -1,4 +1,4 @@
-"""Damaged files: mutations of bytes, lines, values and trees, alike for the same seed."""
+"""Damaged files: mutations of bytes, lines, values and trees, the same for the same seed."""
 
 import io
 import json
@@ -13,7 +13,7 @@ from hashlib import sha256
 from random import Random
 from typing import Any
 
-MOST_BYTES = 8_000_000  # of what a mutation makes
+MOST_BYTES = 8_000_000  # a mutated file is cut to this size
 NUMBERS = (
     *("nan", "inf", "-inf", "-1", "0", "-0.0", "1e400", "-1e400", "1e308", "1e-320", "9" * 400, str(-(2**63)), "9" * 5000),
     *(str(2**63), "0x10", "1_000", "1e3", "2.5", "", "1.2.3", "NaN", "Infinity", "true", "null", "1000000", "10000000000"),
@@ -35,7 +35,7 @@ Mutation = Callable[[bytes, Random], bytes]
 
 
 def mutated(content: bytes, kind: str, chance: Random) -> tuple[bytes, str]:
-    """One to three mutations of a file's bytes, of those that fit its kind, and what they are called."""
+    """A file's bytes after one to three mutations that fit its kind, and the names of the mutations."""
     names = []
     for _ in range(chance.choice((1, 1, 1, 2, 3))):
         name = chance.choice(FITTING[kind])
@@ -87,14 +87,14 @@ def _insert(content: bytes, chance: Random) -> bytes:
     return content[:at] + chance.choice((*things, chance.randbytes(chance.choice((1, 8, 300))))) + content[at:]
 
 
-def _nothing(content: bytes, chance: Random) -> bytes:
+def _other_content(content: bytes, chance: Random) -> bytes:
     return chance.choice(
         (b"", b"\n", b"\0" * 1000, b"\xef\xbb\xbf" + content, content + content, content[::-1], b"[]", b"{}", b"null")
     )
 
 
 def _overwrite(content: bytes, chance: Random) -> bytes:
-    """A number of 1 to 8 bytes somewhere, as a damaged header has it."""
+    """The content with a number of 1 to 8 bytes somewhere, as in a damaged header."""
     wide = chance.choice((1, 2, 4, 8))
     at = chance.randrange(max(1, len(content) if chance.random() < 0.3 else min(len(content), 200)))
     number = chance.choice(
@@ -126,11 +126,11 @@ def _lines(content: bytes, chance: Random) -> bytes:
 
 
 def _replaced(content: bytes, chance: Random, pattern: re.Pattern[bytes], by: Callable[[bytes], bytes]) -> bytes:
-    found = list(pattern.finditer(content[:200_000]))
-    if not found:
+    matches = list(pattern.finditer(content[:200_000]))
+    if not matches:
         return _flip(content, chance)
-    one = chance.choice(found)
-    return content[: one.start()] + by(one[0]) + content[one.end() :]
+    match = chance.choice(matches)
+    return content[: match.start()] + by(match[0]) + content[match.end() :]
 
 
 def _number(content: bytes, chance: Random) -> bytes:
@@ -169,7 +169,7 @@ def _type(content: bytes, chance: Random) -> bytes:
 
 
 def _tree(held: Any, chance: Random) -> Any:
-    """A JSON value in which one node is another, is gone, has another name, or stands twice."""
+    """The JSON value with one node replaced, deleted, renamed or repeated."""
     places: list[tuple[Any, Any]] = []
     pending = [held]
     while pending and len(places) < 50_000:
@@ -210,7 +210,7 @@ def _json_line(content: bytes, chance: Random) -> bytes:
 
 
 def _sealed(content: bytes, chance: Random) -> bytes:
-    """A record of a toolbox whose hash fits what it holds now."""
+    """A toolbox's record with damaged content, and the hash of that content."""
     try:
         whole = json.loads(content)
         whole["record"] = _tree(whole["record"], chance)
@@ -223,7 +223,7 @@ def _sealed(content: bytes, chance: Random) -> bytes:
 
 
 def _tensors(content: bytes, chance: Random) -> bytes:
-    """A safetensors file with another head, whose length fits."""
+    """A safetensors file with a damaged header of the declared length."""
     try:
         (length,) = struct.unpack_from("<Q", content)
         head = json.loads(content[8 : 8 + length])
@@ -241,7 +241,7 @@ def _tensors(content: bytes, chance: Random) -> bytes:
 
 
 def _numbers(content: bytes, chance: Random) -> bytes:
-    """Floats in the second half of a binary file become others."""
+    """The content with a float in its second half replaced by an odd one."""
     odd = struct.pack("<d", chance.choice((float("nan"), float("inf"), -1e308, -0.0, 1e-320)))
     at = len(content) // 2 + 8 * chance.randrange(max(1, len(content) // 16))
     return content[:at] + odd + content[at + 8 :]
@@ -251,13 +251,13 @@ def _numbers(content: bytes, chance: Random) -> bytes:
 
 
 def _members(content: bytes, chance: Random) -> bytes:
-    """A zip file packed again with one of its files damaged, renamed, doubled, left out, a link, or a bomb."""
+    """The zip file with one of its files damaged, renamed, doubled, left out, or replaced by a link or a bomb."""
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             files = [(entry, archive.read(entry)) for entry in archive.infolist()]
     except Exception:
         return _overwrite(content, chance)
-    warnings.simplefilter("ignore", UserWarning)  # a name that stands twice is meant
+    warnings.simplefilter("ignore", UserWarning)  # a name is doubled on purpose
     written = io.BytesIO()
     at, what = chance.randrange(len(files)) if files else 0, chance.randrange(9)
     with zipfile.ZipFile(written, "w") as archive:
@@ -291,7 +291,7 @@ def _members(content: bytes, chance: Random) -> bytes:
 
 
 def _array_bomb(chance: Random) -> bytes:
-    """A NumPy array whose head says more than there is, or zeros without end."""
+    """A NumPy array whose header declares more than there is, or with very many zeros."""
     shape = chance.choice(((10**9,), (10**5, 10**5), (2**40, 7), (0,), (-1,), (10**8,)))
     head = repr(
         {"descr": chance.choice(("<f8", "|O", "<U1000", "|b1")), "fortran_order": False, "shape": shape}
@@ -301,7 +301,7 @@ def _array_bomb(chance: Random) -> bytes:
 
 
 def _chunks(content: bytes, chance: Random) -> bytes:
-    """A PNG file with a damaged chunk whose check sum fits; also sizes that are too large, and zeros without end in little."""
+    """The PNG file with a damaged chunk and its right checksum, a wrong size, or a chunk that unpacks to 10 MB of zeros."""
     if not content.startswith(b"\x89PNG"):
         return _overwrite(content, chance)
     at, chunks = 8, []
@@ -340,7 +340,7 @@ MUTATIONS: dict[str, Mutation] = {
     "dropped": _drop,
     "doubled": _double,
     "inserted": _insert,
-    "something else": _nothing,
+    "something else": _other_content,
     "overwritten": _overwrite,
     "lines": _lines,
     "number": _number,
@@ -357,7 +357,7 @@ MUTATIONS: dict[str, Mutation] = {
 }
 _BYTES = ("bits", "cut", "dropped", "doubled", "inserted", "something else")
 _WORDS = (*_BYTES, *("lines", "number", "text", "key", "type") * 3)
-FITTING = {  # kind of content -> the mutations of its files, those that lead farther named more often
+FITTING = {  # kind of content -> the mutations of its files; those that readers notice later stand more often
     "text": _WORDS,
     "json": (*_WORDS, *("tree",) * 20),
     "json lines": (*_WORDS, *("line's tree",) * 20),

@@ -1,4 +1,4 @@
-"""Part `mutated-commands`: a damaged file given to a command of the lab that reads it, a process each."""
+"""Part `mutated-commands`: a damaged file is given to a command of the lab that reads it, in a process of its own."""
 
 import shutil
 from pathlib import Path
@@ -20,7 +20,7 @@ ANSWERS = "1\n" * 50 + "quit\n"
 
 
 class Command(NamedTuple):
-    """A command, {file} being the damaged one and {folder} where that lies; the kind of the file, what it is told."""
+    """A command, with {file} for the damaged file and {folder} for its folder; the kind of that file; the command's stdin."""
 
     words: str
     kind: str
@@ -82,11 +82,11 @@ READ_BY = (
 
 
 def attempt(number: int, seed: int, room: Path) -> Outcome:
-    """One command on one damaged file."""
+    """Run one command on one damaged file."""
     command = READ_BY[number % len(READ_BY)]
     kind, chance = KINDS[command.kind], Random(f"{seed} command {number}")
     folder = room / "commands" / str(number)
-    shutil.rmtree(folder, ignore_errors=True)  # what a run that was stopped has left
+    shutil.rmtree(folder, ignore_errors=True)  # a stopped run may have left it
     files = sound_files(folder, room, kind)
     damaged = chance.choice(files)
     content, how = mutated(damaged.read_bytes(), kind.content, chance)

@@ -1,6 +1,6 @@
 """Part `mutations`: damaged files of every kind that the lab reads, given to the lab's own readers.
 
-An attempt is a batch of one kind in a process of its own. Each file must be read, or refused by the lab's own error in one
+An attempt is a batch of one kind in a process of its own. Each file must be read or rejected with the lab's own error in one
 line, within 5 s of CPU time and 1 GB.
 """
 
@@ -12,33 +12,34 @@ from typing import Any
 
 from devtools.commands import environment, lab, module
 from devtools.parts import Outcome, Part
-from devtools.read_files import KINDS, make_sound
+from devtools.read_files import KINDS
+from devtools.sound_files import make_sound
 
 FILES = 100_000
 BATCH_S = 3600.0
-MOST_DEATHS = 20  # of a batch's processes, each of which a file has killed
-MOST_TOLD = 4  # sorts of faults of a batch
+MOST_DEATHS = 20  # the most processes of a batch that files may kill
+MOST_TOLD = 4  # the most kinds of faults that a batch reports
 
 
 def prepare(room: Path, seed: int) -> None:
-    """The sound files that only runs of the lab leave."""
+    """Make the sound files that only runs of the lab leave, once."""
     if not (room / "sound").exists():
         make_sound(room)
         (room / "sound").touch()
 
 
 def attempt(number: int, seed: int, room: Path) -> Outcome:
-    """One batch: of the kinds in turn, each with other files every time."""
+    """Read one batch; the kinds take turns, and no two batches of a kind have the same files."""
     name = [*KINDS][number % len(KINDS)]
     tries = KINDS[name].tries
     return read_batch(room, name, seed, number // len(KINDS) * tries, tries, str(number))
 
 
 def read_batch(room: Path, name: str, seed: int, first: int, tries: int, folder: str) -> Outcome:
-    """What came of so many damaged files of a kind; a process that a file has killed is followed by another."""
+    """The outcome of `tries` damaged files of a kind; where a file kills the process, another one continues."""
     home = room / folder
     home.mkdir(exist_ok=True)
-    found: Counter[str] = Counter()
+    counts: Counter[str] = Counter()
     broke: list[dict[str, str]] = []
     figures = {"s": 0.0, "MB": 0.0}
     at, end = first, first + tries
@@ -52,7 +53,7 @@ def read_batch(room: Path, name: str, seed: int, first: int, tries: int, folder:
             last: dict[str, Any] = json.loads(lines[-1])
             broke += last.pop("broke")
             figures = {"s": max(figures["s"], last.pop("slowest_s")), "MB": max(figures["MB"], last.pop("most_mb"))}
-            found.update(last)
+            counts.update(last)
             break
         if not lines or death == MOST_DEATHS:
             raise RuntimeError(f"{name}: no batch: exit {ended.code}: {ended.stderr[-600:]}")
@@ -60,20 +61,20 @@ def read_batch(room: Path, name: str, seed: int, first: int, tries: int, folder:
         broke.append(
             {"case": f"{name} {killer}", "why": f"the process ended with {ended.code}: {ended.stderr[-200:]!r}"}
         )
-        found.update(tries=killer + 1 - at)
+        counts.update(tries=killer + 1 - at)
         at = killer + 1
         if at == end:
             break
     case = f"{name}, {tries} files from {first}, seed {seed}"
-    shares = {f"{what} %": round(100 * found[what] / tries) for what in ("read", "refused")}
-    return Outcome(name, case, told_of(broke, tries), found["tries"], {**figures, **shares})
+    shares = {f"{what} %": round(100 * counts[what] / tries) for what in ("read", "refused")}
+    return Outcome(name, case, faults_in_words(broke, tries), counts["tries"], {**figures, **shares})
 
 
-def told_of(broke: list[dict[str, str]], tries: int) -> str:
-    """What broke, each sort of fault with how often it came and its first case; empty if nothing did."""
+def faults_in_words(broke: list[dict[str, str]], tries: int) -> str:
+    """The faults in words, each kind with its number and its first case; "" if there are none."""
     sorts: dict[str, list[dict[str, str]]] = {}
-    for one in broke:
-        sorts.setdefault(one["why"].partition(" (")[2] or one["why"][:60], []).append(one)
+    for fault in broke:
+        sorts.setdefault(fault["why"].partition(" (")[2] or fault["why"][:60], []).append(fault)
     told = [f"{len(same)} x {same[0]['case']}: {same[0]['why']}" for same in sorts.values()]
     return f"{len(broke)} of {tries}: {'; '.join(told[:MOST_TOLD])}" if broke else ""
 
@@ -81,7 +82,7 @@ def told_of(broke: list[dict[str, str]], tries: int) -> str:
 ROUNDS = -(-FILES // sum(kind.tries for kind in KINDS.values()))
 PART = Part(
     "damaged files of every kind",
-    "read or refused in a line, under 5 s, under 1 GB",
+    "read, or rejected in a line, under 5 s, under 1 GB",
     ROUNDS * len(KINDS),
     prepare,
     attempt,

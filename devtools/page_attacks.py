@@ -1,6 +1,6 @@
 """Part `requests`: a lesson taught on its page, while another local user attacks that page; the lesson must not notice.
 
-The attacked lesson is held against one that nobody attacked: same steps, same table, same words on stderr.
+The attacked lesson is compared with one that nobody attacked: same steps, same table, same words on stderr.
 """
 
 import json
@@ -24,17 +24,17 @@ from devtools.parts import Outcome, Part
 
 ANOTHER_USER = "65534"
 LESSON = ("teach", "world-1", "--advisor", "web", "--gate", "always", "--episodes", "6", "--json")
-TAUGHT = 60  # questions that are answered, then the learner goes on alone
+TAUGHT = 60  # questions that are answered; then the learner continues alone
 ATTACK_S = 4.0
-ANSWER_S = 20.0  # the longest that a question may take to come, in which the lesson is not called lost
+ANSWER_S = 20.0  # the longest wait for a question, after which the lesson counts as lost
 DESCRIPTORS = (1024, 256)
 
 
 @dataclass(frozen=True)
-class Taught:
-    """A lesson that is over: what it came to, what it said beside, and what it took.
+class LessonResult:
+    """The result of a finished lesson, and the time and memory that it took.
 
-    learned: a hash of the steps of its episodes and of its table; slowest_s: the longest that a question was waited for.
+    learned: a hash of the steps of its episodes and of its table; slowest_s: the longest wait for a question.
     """
 
     code: int
@@ -46,8 +46,8 @@ class Taught:
 
 
 @dataclass(frozen=True)
-class Told:
-    """What an attacker says it did: how often it tried, and what got in."""
+class AttackReport:
+    """An attacker's report: how often it tried, and what got in."""
 
     tries: int
     inside: list[str]
@@ -55,10 +55,10 @@ class Told:
 
 def lesson(
     folder: Path, descriptors: int, attacked: Callable[[int, str, int], Any] = lambda port, token, process: None
-) -> Taught:
-    """Teaches a lesson through its page; `attacked` is called with port, token and process once it has begun, in a thread.
+) -> LessonResult:
+    """Teach a lesson through its page, and return its result; `attacked` runs in a thread once the lesson has begun.
 
-    Raises RuntimeError where the lesson is lost: it ends early, or asks no more.
+    attacked: called with port, token and process. Raises RuntimeError if the lesson ends early or asks no more.
     """
     folder.mkdir(parents=True)
     stderr = (folder / "stderr").open("w+b")
@@ -81,16 +81,16 @@ def lesson(
         for name, table in sorted(load_file(file).items()):
             learned.update(name.encode() + table.tobytes())
     said = re.sub(r"\d{4,}|token=\S+", "", (folder / "stderr").read_text(errors="replace"))
-    return Taught(
+    return LessonResult(
         child.returncode, learned.hexdigest(), said, slowest_s, used.ru_utime + used.ru_stime, used.ru_maxrss / 1024
     )
 
 
 def _address(child: "subprocess.Popen[bytes]", said: Path) -> tuple[int, str]:
-    """Port and token of the page, once the lesson has printed them."""
+    """Port and token of the page, once the lesson has printed them. Raises RuntimeError if it does not."""
     for _ in range(600):
-        if found := re.search(r"127\.0\.0\.1:(\d+)/\?token=(\S+)", said.read_text(errors="replace")):
-            return int(found[1]), found[2]
+        if match := re.search(r"127\.0\.0\.1:(\d+)/\?token=(\S+)", said.read_text(errors="replace")):
+            return int(match[1]), match[2]
         if child.poll() is not None:
             break
         time.sleep(0.1)
@@ -98,7 +98,7 @@ def _address(child: "subprocess.Popen[bytes]", said: Path) -> tuple[int, str]:
 
 
 def _answers(port: int, token: str, begin: Callable[[], Any]) -> float:
-    """Answers TAUGHT questions, the last once the attack is over, and then none; the longest wait for a question [s]."""
+    """Answer TAUGHT questions, the last one after the attack has ended; return the longest wait for a question [s]."""
     from websockets.sync.client import connect
 
     slowest_s, attack = 0.0, None
@@ -127,7 +127,7 @@ def _answers(port: int, token: str, begin: Callable[[], Any]) -> float:
 
 
 def prepare(room: Path, seed: int) -> int:
-    """The lesson that nobody attacks."""
+    """Teach the lesson that nobody attacks, once; return the number of attempts."""
     if not (room / "quiet.json").exists():
         quiet = lesson(room / "quiet", DESCRIPTORS[0])
         assert quiet.code in (0, 1), quiet.stderr
@@ -136,12 +136,12 @@ def prepare(room: Path, seed: int) -> int:
 
 
 def attempt(number: int, seed: int, room: Path) -> Outcome:
-    """One kind of attack during one lesson."""
+    """Attack one lesson in one way."""
     kind = [*ATTACKS][number % len(ATTACKS)]
     descriptors = DESCRIPTORS[number // len(ATTACKS) % len(DESCRIPTORS)]
-    quiet = Taught(**json.loads((room / "quiet.json").read_text()))
+    quiet = LessonResult(**json.loads((room / "quiet.json").read_text()))
     folder = room / f"{number}"
-    told = Told(0, ["the attacker did not begin"])
+    told = AttackReport(0, ["the attacker did not begin"])
 
     def attacked(port: int, token: str, process: int) -> None:
         nonlocal told
@@ -151,7 +151,11 @@ def attempt(number: int, seed: int, room: Path) -> Outcome:
             [*module("attackers"), kind, str(port), str(ATTACK_S), str(seed), str(process), *uid],
             input=token, capture_output=True, text=True, timeout=300, env=env,
         )  # fmt: skip
-        told = Told(**json.loads(attacker.stdout)) if attacker.returncode == 0 else Told(0, [attacker.stderr[-300:]])
+        told = (
+            AttackReport(**json.loads(attacker.stdout))
+            if attacker.returncode == 0
+            else AttackReport(0, [attacker.stderr[-300:]])
+        )
 
     group, case = ATTACKS[kind][1], f"{kind}, {descriptors} descriptors, seed {seed}"
     try:
@@ -163,19 +167,19 @@ def attempt(number: int, seed: int, room: Path) -> Outcome:
         "MB": round(taught.peak_mb),
         "more CPU s": round(taught.cpu_s - quiet.cpu_s, 2),
     }
-    return Outcome(group, case, judged(taught, quiet, told.inside), told.tries, figures)
+    return Outcome(group, case, fault_of(taught, quiet, told.inside), told.tries, figures)
 
 
-def judged(taught: Taught, quiet: Taught, inside: list[str]) -> str:
-    """What is wrong with an attacked lesson beside the quiet one; empty if nothing is."""
+def fault_of(taught: LessonResult, quiet: LessonResult, inside: list[str]) -> str:
+    """What is wrong with an attacked lesson compared with the quiet one; "" if nothing is."""
     if inside:
         return f"{len(inside)} got in, the first: {inside[0]}"
     if taught.code != quiet.code:
         return f"exit {taught.code} instead of {quiet.code}: {taught.stderr[-300:]}"
     if taught.stderr != quiet.stderr:
-        return f"stderr says something else: {taught.stderr[-300:]!r}"
+        return f"stderr differs: {taught.stderr[-300:]!r}"
     if taught.learned != quiet.learned:
-        return "something else was learned"
+        return "the learned table or the steps differ"
     return f"{taught.peak_mb:.0f} MB" if taught.peak_mb > quiet.peak_mb + 300 else ""
 
 

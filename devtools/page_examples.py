@@ -1,18 +1,18 @@
-"""The examples on a page of the documentation: found, and run one after the other. Uses nothing that is not in every Python."""
+"""Runs the examples on a page of the documentation one after the other, with the standard library alone."""
 
 import re
 import subprocess
 import sys
 from pathlib import Path
 
-BLOCK = re.compile(r"^```(python|sh)\n(\S.*?)^```", re.MULTILINE | re.DOTALL)  # one that begins indented is a fragment
-COMMANDS_RUN = ("lessons", "quickstart")  # folders whose commands are run, too
+BLOCK = re.compile(r"^```(python|sh)\n(\S.*?)^```", re.MULTILINE | re.DOTALL)  # indented blocks are fragments, not run
+COMMANDS_RUN = ("lessons", "quickstart")  # the folders of pages whose commands are run, too
 
 
 def run(page: Path) -> None:
-    """Runs a page's Python in this process and, in some folders, its commands in a shell; in the working folder.
+    """Run a page's Python in this process and, for pages of COMMANDS_RUN, its commands in a shell, in the working folder.
 
-    Whatever its Python raises; AssertionError, with what it said, when a command fails.
+    Raises whatever the page's Python raises, and AssertionError with the output of a command that fails.
     """
     names: dict[str, object] = {"__name__": page.stem}
     for kind, block in BLOCK.findall(page.read_text(encoding="utf-8")):

@@ -24,9 +24,10 @@ class Outcome:
 class Part:
     """One way of breaking the lab.
 
-    what: told in the help; target: what should hold; count: how many attempts a long run makes; prepare(room, seed): makes
-    what all attempts start from in an empty folder, once; attempt(number, seed, room): tries once, alike for the same number and
-    seed, in folders of its own under `room`, and leaves nothing running. `count` None: all that `prepare` says there are.
+    what: one line about it; target: what should hold; count: how many attempts a long run makes (None: the number that
+    `prepare` returns); prepare(room, seed): makes what all attempts start from in an empty folder, once; attempt(number, seed,
+    room): makes one attempt, the same for the same number and seed, in folders of its own under `room`, and leaves nothing
+    running.
     """
 
     what: str

@@ -2,8 +2,8 @@
 
     python -m devtools.plain_model SHOP.json [SECONDS [WORKERS]]
 
-It reads `jobs`, for each operation a table from machine to time; `due`, a time for each job, or none; `travel`, a matrix of
-times whose first place is where jobs and vehicles begin and whose others are the machines, or none; `vehicles`.
+It reads `jobs`, for each operation a table from machine to time; `due`, a time for each job, or null; `travel`, a matrix of
+times between the place where jobs and vehicles begin (first) and the machines, or null; `vehicles`, their number.
 """
 
 import json
@@ -14,7 +14,7 @@ from time import perf_counter
 
 from ortools.sat.python import cp_model
 
-Trip = tuple[cp_model.IntVar, cp_model.IntVar, dict[tuple[int, int], cp_model.IntVar]]  # departs, arrives, by which way
+Trip = tuple[cp_model.IntVar, cp_model.IntVar, dict[tuple[int, int], cp_model.IntVar]]  # departure, arrival, its ways
 
 
 def main() -> None:
@@ -71,25 +71,25 @@ def main() -> None:
     solver.parameters.num_workers = int(sys.argv[3]) if len(sys.argv) > 3 else 1
     solver.parameters.max_time_in_seconds = float(sys.argv[2]) if len(sys.argv) > 2 else 60.0
     status = solver.status_name(solver.solve(model))
-    found = {"status": status, "cost": solver.objective_value, "bound": solver.best_objective_bound}
-    sys.stdout.write(json.dumps(found | {"seconds": perf_counter() - began}) + "\n")
+    outcome = {"status": status, "cost": solver.objective_value, "bound": solver.best_objective_bound}
+    sys.stdout.write(json.dumps(outcome | {"seconds": perf_counter() - began}) + "\n")
 
 
 def _add_vehicles(model: cp_model.CpModel, carried: list[Trip], travel: list[list[int]], vehicles: int) -> None:
-    """Each vehicle goes one route through the trips that it makes, and drives empty between them."""
+    """Let each vehicle make its trips one after another, and drive empty between them."""
     arcs, out = list[tuple[int, int, cp_model.IntVar]](), list[cp_model.IntVar]()
-    for one, (depart, arrive, ways) in enumerate(carried, 1):
+    for number, (depart, arrive, ways) in enumerate(carried, 1):
         none = model.new_bool_var("")
         model.add_exactly_one([none, *ways.values()])
         first = model.new_bool_var("")
         for (origin, _), way in ways.items():
             model.add(depart >= travel[0][origin]).only_enforce_if(first, way)
         out.append(first)
-        arcs += [(one, one, none), (0, one, first), (one, 0, model.new_bool_var(""))]
+        arcs += [(number, number, none), (0, number, first), (number, 0, model.new_bool_var(""))]
         for other, (then, _, others) in enumerate(carried, 1):
-            if other != one:
+            if other != number:
                 follows = model.new_bool_var("")
-                arcs.append((one, other, follows))
+                arcs.append((number, other, follows))
                 for ((_, target), way), ((origin, _), next_way) in product(ways.items(), others.items()):
                     model.add(then >= arrive + travel[target][origin]).only_enforce_if(follows, way, next_way)
     model.add_multiple_circuit(arcs)

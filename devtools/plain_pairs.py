@@ -3,7 +3,7 @@
     python -m devtools.plain_pairs [--seed 1] [--each 5] [--rounds 3] [--seconds 60] [--out FOLDER]
 
 Shops are drawn: job shops, with due dates, flexible, and with vehicles. The plain program (`plain_model.py`) is one that
-somebody writes in an hour. Both are new processes on the same machine in turn; what each pays before it searches is counted.
+somebody writes in an hour. Both run in turn in new processes on the same machine; the time before their search counts.
 """
 
 import argparse
@@ -27,7 +27,7 @@ SAME = 1e-6
 
 @dataclass(frozen=True)
 class Kind:
-    """What is drawn. operations: of a job; choices: machines an operation at most; vehicles: None, there is no travel."""
+    """A kind of random shop. operations: of each job; choices: the most machines for an operation; vehicles None: no travel."""
 
     name: str
     jobs: int
@@ -54,8 +54,8 @@ KINDS = (
 )
 
 
-def drawn(kind: Kind, seed: int) -> dict[str, Any]:
-    """A shop as `plain_model.py` reads it."""
+def random_shop(kind: Kind, seed: int) -> dict[str, Any]:
+    """A random shop as `plain_model.py` reads it."""
     rng = np.random.default_rng([KINDS.index(kind), seed])
     jobs = []
     for _ in range(kind.jobs):
@@ -63,8 +63,8 @@ def drawn(kind: Kind, seed: int) -> dict[str, Any]:
         more = [rng.choice(kind.machines, int(rng.integers(1, kind.choices + 1)), replace=False) for _ in first]
         jobs.append(
             [
-                {int(m): int(rng.integers(3, 31)) for m in {one, *others[1:]}}
-                for one, others in zip(first, more, strict=True)
+                {int(m): int(rng.integers(3, 31)) for m in {own_machine, *choices[1:]}}
+                for own_machine, choices in zip(first, more, strict=True)
             ]
         )
     points = rng.integers(0, 12, (kind.machines + 1, 2))
@@ -80,13 +80,13 @@ def drawn(kind: Kind, seed: int) -> dict[str, Any]:
     }
 
 
-def written(shop: dict[str, Any], kind: Kind, folder: Path) -> tuple[list[str], Path]:
-    """The files of a shop: the arguments of `lab sequence`, and the plain program's file."""
+def shop_files(shop: dict[str, Any], kind: Kind, folder: Path) -> tuple[list[str], Path]:
+    """The arguments of `lab sequence` for a shop, and the plain program's file; both files are written to `folder`."""
     plain, jobs = folder / "plain.json", shop["jobs"]
     plain.write_text(json.dumps(shop), encoding="utf-8")
     if kind.due:
         tasks = [(job, times) for job, own in enumerate(jobs) for times in own]
-        numbers = [[n for n, (job, _) in enumerate(tasks) if job == one] for one in range(len(jobs))]
+        numbers = [[n for n, (job, _) in enumerate(tasks) if job == number] for number in range(len(jobs))]
         document = {
             "jobs": [{"tasks": own, "due_date": due} for own, due in zip(numbers, shop["due"], strict=True)],
             "resources": [{"type": "machine"} for _ in range(kind.machines)],
@@ -124,10 +124,10 @@ def written(shop: dict[str, Any], kind: Kind, folder: Path) -> tuple[list[str], 
     return [str(file), "--layout", str(layout), "--robots", str(kind.vehicles)], plain
 
 
-def timed(command: list[str]) -> tuple[float, float, dict[str, Any]]:
+def timed_command(command: list[str]) -> tuple[float, float, dict[str, Any]]:
     """Wall and processor seconds of a new process, and the last line that it prints, as JSON."""
     before, began = os.times(), time.perf_counter()
-    without = ("PYTHONDONTWRITEBYTECODE",)  # users keep what Python compiled
+    without = ("PYTHONDONTWRITEBYTECODE",)  # users keep the bytecode that Python compiles
     keeps = {name: value for name, value in os.environ.items() if name not in without}
     done = subprocess.run(command, capture_output=True, text=True, check=True, env=keeps)
     wall, after = time.perf_counter() - began, os.times()
@@ -160,8 +160,8 @@ def main() -> None:
         for number in range(asked.each):
             folder = room / f"{kind.name.replace(', ', '-').replace(' ', '-')}-{number}"
             folder.mkdir(parents=True, exist_ok=True)
-            shop = drawn(kind, 1000 * asked.seed + number)
-            words, file = written(shop, kind, folder)
+            shop = random_shop(kind, 1000 * asked.seed + number)
+            words, file = shop_files(shop, kind, folder)
             plain = [sys.executable, str(HERE / "plain_model.py"), str(file), f"{asked.seconds}", f"{asked.workers}"]
             ours = [sys.executable, "-c", "from lab.cli import main; main()", "sequence", *words]
             ours += ["--method", asked.method, "--seconds", f"{asked.seconds}", "--json"]
@@ -169,16 +169,16 @@ def main() -> None:
             spent: list[list[float]] = [[], []]
             for _ in range(asked.rounds):
                 for at, command in enumerate((plain, ours)):
-                    wall, cpu, found = timed(command)
+                    wall, cpu, printed = timed_command(command)
                     walls[at].append(wall)
                     spent[at].append(cpu)
                     if at == 0:
                         cost, proven = (
-                            found["cost"] / (len(shop["jobs"]) if kind.due else 1),
-                            found["status"] == "OPTIMAL",
+                            printed["cost"] / (len(shop["jobs"]) if kind.due else 1),
+                            printed["status"] == "OPTIMAL",
                         )
                     else:
-                        lab_cost, lab_proven = found["best_cost"], found["optimum_proven"]
+                        lab_cost, lab_proven = printed["best_cost"], printed["optimum_proven"]
             if proven and (lab_cost < cost - SAME or (lab_proven and abs(lab_cost - cost) > SAME)):
                 wrong += 1
             middle = [statistics.median(each) for each in (*walls, *spent)]

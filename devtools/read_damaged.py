@@ -1,7 +1,7 @@
-"""Damaged files of one kind, read in a process of its own: `python -m devtools.read_damaged ROOM KIND SEED FIRST COUNT TOLD`.
+"""Reads damaged files of one kind in a process of its own: `python -m devtools.read_damaged ROOM KIND SEED FIRST COUNT TOLD`.
 
-A line of JSON about each file that breaks the lab, and at the end one about all of them, is added to the file TOLD; a line with
-the number alone says which file is being read, so that who waits knows it when this process dies.
+Before each file its number is added as a line to the file TOLD, so that the waiting process knows it if this one dies. The
+last line is a JSON document of the whole batch, with every file that broke the lab.
 """
 
 import faulthandler
@@ -22,19 +22,19 @@ from devtools.mutate import mutated
 from devtools.read_files import KINDS, Kind
 
 LINE_CHARACTERS = 300
-MOST_S = 5.0  # CPU time of a file
-HANGS_S = 120.0  # wall time of a file, after which this process ends
+MOST_S = 5.0  # the most CPU time for a file
+HANGS_S = 120.0  # the wall time for a file after which this process ends
 MOST_MB = 1000.0
-ADDRESSES = 6 << 30  # bytes of memory that this process may ask for
+ADDRESSES = 6 << 30  # the limit of this process's address space [bytes]
 
 
 class TooLong(BaseException):
-    """A file took more than twice what it may."""
+    """Raised when a file takes twice the CPU time that it may."""
 
 
 @dataclass
-class Told:
-    """What came of a batch: files tried, read and refused, the longest and the most memory, what broke."""
+class BatchResults:
+    """The results of a batch: files tried, read and rejected, the longest time, the most memory, and the faults."""
 
     tries: int = 0
     read: int = 0
@@ -45,16 +45,16 @@ class Told:
 
 
 def sound_files(folder: Path, room: Path, kind: Kind) -> list[Path]:
-    """The kind's sound files in a folder of their own, those that are to be damaged."""
+    """The sound files of a kind that are to be damaged, in order; all its sound files are written to `folder`."""
     folder.mkdir(parents=True, exist_ok=True)
     kind.made(folder, room)
-    found = sorted(path for path in folder.glob(kind.which) if path.is_file())
-    assert found, f"no file {kind.which}"
-    return found
+    files = sorted(path for path in folder.glob(kind.which) if path.is_file())
+    assert files, f"no file {kind.which}"
+    return files
 
 
 def verdict(kind: Kind, path: Path) -> tuple[str, str]:
-    """ "read" or "refused" and what was said; or "" and what is wrong with how the lab took the file."""
+    """ "read" or "refused" with the lab's error; or "" and what is wrong with how the lab handled the file."""
     from lab.errors import LabError
 
     try:
@@ -74,17 +74,17 @@ def verdict(kind: Kind, path: Path) -> tuple[str, str]:
 
 
 def _where() -> str:
-    """The last line of the lab's own code that an exception came through."""
+    """The last line of the lab's own code that the current exception has passed, as file:line."""
     from lab.files import PACKAGE
 
-    frames = [(Path(one.filename), one.lineno) for one in traceback.extract_tb(sys.exc_info()[2])]
+    frames = [(Path(frame.filename), frame.lineno) for frame in traceback.extract_tb(sys.exc_info()[2])]
     own = [(path.relative_to(PACKAGE), line) for path, line in frames if path.is_relative_to(PACKAGE)]
     return "{}:{}".format(*own[-1]) if own else "outside the lab"
 
 
-def batch(room: Path, name: str, seed: int, numbers: range, say: Any, folder: Path) -> Told:
-    """Damages and reads so many files; `say` is called with the number before each."""
-    kind, told = KINDS[name], Told()
+def batch(room: Path, name: str, seed: int, numbers: range, say: Any, folder: Path) -> BatchResults:
+    """Damage and read the files of these numbers, and return the results; `say` is called with each number first."""
+    kind, told = KINDS[name], BatchResults()
     paths = sound_files(folder, room, kind)
     contents = [path.read_bytes() for path in paths]
     for path in paths[:40]:
@@ -97,7 +97,7 @@ def batch(room: Path, name: str, seed: int, numbers: range, say: Any, folder: Pa
         content, how = mutated(contents[which], kind.content, chance)
         paths[which].write_bytes(content)
         say(number)
-        peak_begins()
+        reset_peak()
         before_mb = peak_mb()
         begun = time.process_time()
         signal.setitimer(signal.ITIMER_PROF, 2 * MOST_S)
@@ -127,19 +127,19 @@ def _too_long(number: int, frame: object) -> None:
     raise TooLong
 
 
-def peak_begins() -> None:
-    """The process's peak of memory counts from here."""
+def reset_peak() -> None:
+    """Reset the process's peak of memory."""
     Path("/proc/self/clear_refs").write_text("5")
 
 
 def peak_mb() -> float:
-    """The process's peak of memory since then."""
+    """The process's peak of memory [MB] since `reset_peak`."""
     lines = Path("/proc/self/status").read_text().splitlines()
     return float(next(line.split()[1] for line in lines if line.startswith("VmHWM"))) / 1000
 
 
 def main(room: str, name: str, seed: str, first: str, count: str, told: str) -> None:
-    """A batch, told line by line."""
+    """Read a batch, and write its lines to the file TOLD."""
     resource.setrlimit(resource.RLIMIT_AS, (ADDRESSES, ADDRESSES))
     folder = Path(tempfile.mkdtemp(prefix="damaged-", dir=room))
     with Path(told).open("a", encoding="utf-8", buffering=1) as lines:
@@ -149,8 +149,8 @@ def main(room: str, name: str, seed: str, first: str, count: str, told: str) -> 
             faulthandler.dump_traceback_later(HANGS_S, exit=True)
 
         try:
-            found = batch(Path(room), name, int(seed), range(int(first), int(first) + int(count)), say, folder)
-            lines.write(json.dumps(asdict(found)) + "\n")
+            told_at_last = batch(Path(room), name, int(seed), range(int(first), int(first) + int(count)), say, folder)
+            lines.write(json.dumps(asdict(told_at_last)) + "\n")
         finally:
             shutil.rmtree(folder, ignore_errors=True)
 

@@ -1,7 +1,7 @@
-"""Part `resources`: commands that write, where something is missing: room, rights, a home, descriptors, memory, a reader.
+"""Part `resources`: commands that write, while something is missing: room, rights, a home, descriptors, memory, a reader.
 
-A command ends with 0 where all was done, else with 1 or 2 and one clear line; 2 only where nothing was written. Nothing that
-was there is lost, what it says it has kept is there, and once nothing is missing any more it comes to what it should.
+A command exits with 0 if all was done, else with 1 or 2 and one clear line, with 2 only if nothing was written. No earlier
+file is lost, all that the command says it kept is there, and once nothing is missing, repeating it gives the full result.
 """
 
 import errno
@@ -19,9 +19,9 @@ from threading import Timer
 
 from devtools.commands import LAB, Ended, lab
 from devtools.forked import forked
-from devtools.kills import ALONE, known_as
+from devtools.kills import ALONE, expected_result
 from devtools.parts import Outcome, Part
-from devtools.shim import KINDS, Strike, built, shimmed
+from devtools.shim import KINDS, Strike, built_shim, shim_environment
 from devtools.works import (
     LONGEST_S,
     WORKS,
@@ -31,15 +31,15 @@ from devtools.works import (
     base,
     by_itself,
     environment_in,
-    fresh,
+    first_fault,
+    first_leftover,
+    first_loss,
+    first_missing,
+    fresh_home,
+    home_state,
     kept_before,
-    leftovers,
-    lost,
     names,
     next_words,
-    reached,
-    state,
-    unsound,
 )
 from lab.toolbox.registry import Toolbox
 
@@ -55,11 +55,11 @@ Make = Callable[["Case"], None]
 
 @dataclass
 class Case:
-    """A command and what it lacks: filled by a fault.
+    """A command and what it lacks, which a function of FAULTS fills in.
 
-    said: what was done to it; before: runs in the child; read_only: folders under the home; room_kb: of a disk that the home is
-    on; loses: a folder that is removed after so many seconds; was_whole: all of it had been written by then; unheard: nobody
-    may hear what it says; must_do: all the same, it does what it should.
+    said: the fault in words; before: runs in the child; read_only: folders under the home; room_kb: the room on the home's own
+    disk; loses: a folder that is removed after so many seconds; was_whole: the session had been written by then; unheard:
+    nobody may see its output; must_do: it must succeed all the same.
     """
 
     name: str
@@ -78,21 +78,21 @@ class Case:
     must_do: bool = False
 
 
-# ---- what is missing
+# ---- faults
 
 
 def disk_full(case: Case) -> None:
-    """No room from some call on."""
+    """The disk is full from a random call on."""
     _refused(case, NEEDS_ROOM, errno.ENOSPC, always=True)
 
 
 def disk_full_once(case: Case) -> None:
-    """No room at one call, and room again at the next."""
+    """The disk is full at one call, and has room again at the next."""
     _refused(case, NEEDS_ROOM + "s", errno.ENOSPC, always=False)
 
 
 def disk_breaks(case: Case) -> None:
-    """An input/output error at one call, of any kind, or from then on."""
+    """A call of any kind ends with an input/output error, once or from then on."""
     kinds = [letter for letter, many in case.expected.calls.items() if many]
     _refused(case, case.chance.choice(kinds), errno.EIO, always=case.chance.random() < 0.5)
 
@@ -108,13 +108,13 @@ def _refused(case: Case, kinds: str, number: int, always: bool) -> None:
 
 
 def small_disk(case: Case) -> None:
-    """The home is on a disk of its own, which is nearly full."""
+    """The home is on a disk of its own that is nearly full."""
     case.room_kb = case.chance.choice((1, 4, 8, 16, 32, 64, 128, 256))
     case.said = f"a disk with {case.room_kb} KB of room"
 
 
 def read_only(case: Case) -> None:
-    """Folders that may not be written."""
+    """Some folders are read-only."""
     case.read_only = case.chance.choice(
         (
             ("toolbox",),
@@ -129,40 +129,40 @@ def read_only(case: Case) -> None:
 
 
 def nothing_writable(case: Case) -> None:
-    """No folder may be written, and nothing need be."""
+    """All folders are read-only, for a command that need not write."""
     folders = (path for path in case.home.rglob("*") if path.is_dir())
     case.read_only = (".", *(path.relative_to(case.home).as_posix() for path in folders))
     case.said, case.must_do = "all folders read-only", True
 
 
 def no_home(case: Case) -> None:
-    """HOME is not set, is not there, is no folder, or may not be written."""
+    """HOME is not set, does not exist, is no folder, or is read-only."""
     home = case.chance.choice(("", "/nonexistent", "/dev/null", "/proc"))
     case.env = {"HOME": home}
     case.said = f"HOME={home}" if home else "no HOME"
 
 
 def few_descriptors(case: Case) -> None:
-    """So many files open at most."""
+    """The number of open files is limited."""
     many = case.chance.choice((64, 64, 32, 16))
     case.before, case.said = _limited(resource.RLIMIT_NOFILE, many), f"{many} descriptors"
 
 
 def little_memory(case: Case) -> None:
-    """So much address space, or data."""
+    """The address space or the data segment is limited."""
     kind, name = case.chance.choice(((resource.RLIMIT_AS, "address space"), (resource.RLIMIT_DATA, "data")))
     size = case.chance.choice((256, 512, 512, 1024, 2048))
     case.before, case.said = _limited(kind, size * MB), f"{size} MB of {name}"
 
 
 def short_files(case: Case) -> None:
-    """No file may grow beyond so much."""
+    """The size of files is limited."""
     size = case.chance.choice((4096, 16384, 65536))
     case.before, case.said = _limited(resource.RLIMIT_FSIZE, size), f"files up to {size} bytes"
 
 
 def nobody_reads(case: Case) -> None:
-    """Stdout, stderr or stdin are closed, full, or read by nobody."""
+    """Stdout, stderr or stdin is closed, full, or read by nobody."""
     what: dict[str, Before] = {
         "stdout closed": lambda: os.close(1),
         "stderr closed": lambda: os.close(2),
@@ -178,7 +178,7 @@ def nobody_reads(case: Case) -> None:
 
 
 def out_removed(case: Case) -> None:
-    """The folder that the session is kept in is removed meanwhile."""
+    """The folder that keeps the session is removed while the command runs."""
     folder, work = "lesson", WORKS[case.name]
     if "--out" not in work.words:
         folder = "toolbox" if case.chance.random() < 0.3 else "toolbox/sessions"
@@ -223,29 +223,29 @@ FAULTS: dict[
 
 
 def prepare(room: Path, seed: int) -> None:
-    """The shim, and the home that every command begins in."""
-    built(room)
+    """Build the shim, and the home that every command begins in."""
+    built_shim(room)
     base(room)
 
 
 def attempt(number: int, seed: int, room: Path) -> Outcome:
-    """One command that lacks something."""
+    """Run one command that lacks something, and judge it."""
     chance = random.Random(f"{seed} {number}")
     kinds = [kind for kind, (_, share, _) in FAULTS.items() for _ in range(share)]
     random.Random(seed).shuffle(kinds)
     kind = kinds[number % len(kinds)]
     make, _, works = FAULTS[kind]
     name = chance.choice(works or [*names()])
-    case = Case(name, room / f"resource-{number}" / "home", known_as(name, room), chance)
-    fresh(case.home.parent, room, WORKS[name])
+    case = Case(name, room / f"resource-{number}" / "home", expected_result(name, room), chance)
+    fresh_home(case.home.parent, room, WORKS[name])
     make(case)
     told = f"{number}, seed {seed}: {name}: {case.said}"
     if case.room_kb and not BARE:
         return Outcome(kind, f"{told}: only root can make one", tries=0)
-    quickly = by_itself if "study" in name else forked(built(room), room)
+    quickly = by_itself if "study" in name else forked(built_shim(room), room)
     with _disk(case, room):
         ended = carried_out(case, room, quickly if case.strike is not None and number % ALONE else None)
-        broke = judged(case, ended, room, quickly)
+        broke = fault_of(case, ended, room, quickly)
     if not broke:
         shutil.rmtree(case.home.parent)
     return Outcome(kind, told, broke, figures={"seconds": ended.seconds})
@@ -253,7 +253,7 @@ def attempt(number: int, seed: int, room: Path) -> Outcome:
 
 @contextmanager
 def _disk(case: Case, room: Path) -> Iterator[None]:
-    """The home that the command begins in, on a small disk of its own where that is wanted."""
+    """Keep the command's home on a small disk of its own if the case asks for one."""
     if not case.room_kb:
         yield
         return
@@ -274,12 +274,12 @@ def _resize(home: Path, size: int) -> None:
 
 
 def carried_out(case: Case, room: Path, quickly: CarriedOut | None) -> Ended:
-    """The command, with what it lacks; afterwards nothing is missing any more."""
+    """Run the command with what it lacks, and return how it ended; afterwards nothing is missing any more."""
     said = environment_in(case.home, room) | (case.env or {})
     if case.env is not None:
         said = {name: value for name, value in said.items() if value and name not in ("MPLCONFIGDIR", "XDG_CACHE_HOME")}
     if case.strike is not None:
-        said |= shimmed(built(room), case.home, case.home.parent / "counts", case.strike)
+        said |= shim_environment(built_shim(room), case.home, case.home.parent / "counts", case.strike)
     if quickly is not None:
         return quickly(WORKS[case.name].words, case.home, said, LONGEST_S)
     folder, after_s = case.loses
@@ -308,7 +308,7 @@ def carried_out(case: Case, room: Path, quickly: CarriedOut | None) -> Ended:
 
 
 def _lose(case: Case, receipts: int) -> None:
-    """Somebody removes the folder; `receipts`: of sessions that were there before the command."""
+    """Remove the case's folder; receipts: the number of sessions with a receipt before the command."""
     case.was_whole = _receipts(case) > receipts
     shutil.rmtree(case.home / case.loses[0], ignore_errors=True)
 
@@ -317,23 +317,28 @@ def _receipts(case: Case) -> int:
     return len([*case.home.glob(f"{_SESSION_OF[case.name]}/receipt.json")])
 
 
-def judged(case: Case, ended: Ended, room: Path, carried_out: CarriedOut = by_itself) -> str:
-    """What is wrong with how it ended, what it left, and what the same command does once nothing is missing; "" if nothing."""
+def fault_of(case: Case, ended: Ended, room: Path, carried_out: CarriedOut = by_itself) -> str:
+    """What is wrong with how a command ended, what it left, or what it does once nothing is missing; "" if nothing is."""
     wrong = ended.fault((0, 1, 2)) or _noise(ended)
     if case.unheard and not ended.late and ended.code in (0, 1, 2) and "Traceback" not in ended.stderr:
-        wrong = _noise(ended)  # it may have nobody to say it to
+        wrong = _noise(ended)  # its error message may be lost
     if case.must_do and ended.code != case.expected.code:
         wrong = f"exit {ended.code}: {ended.stderr[-200:]}"
     if wrong:
         return wrong
     changes = (*WORKS[case.name].changes, *((f"{case.loses[0]}/*",) if case.loses[0] else ()))
-    if wrong := lost(kept_before(room), case.home, changes) or unsound(case.home):
+    if wrong := first_loss(kept_before(room), case.home, changes) or first_fault(case.home):
         return f"exit {ended.code}: {wrong}"
     if case.loses[0] and ended.code == 0 and not case.was_whole and not _receipts(case):
         return "exit 0 without its session"
-    if ended.code == 0 and not case.unheard and not case.loses[0] and (wrong := reached(case.expected, case.home)):
+    if (
+        ended.code == 0
+        and not case.unheard
+        and not case.loses[0]
+        and (wrong := first_missing(case.expected, case.home))
+    ):
         return f"exit 0: {wrong}"
-    if ended.code == 2 and (more := _kept(state(case.home)) - _kept(state(base(room)))):
+    if ended.code == 2 and (more := _kept(home_state(case.home)) - _kept(home_state(base(room)))):
         return f"exit 2, but it has kept {min(more)}: {ended.stderr[-160:]}"
     if not case.loses[0] and (wrong := _said_kept(ended, case.home)):
         return f"exit {ended.code}: {wrong}"
@@ -347,7 +352,7 @@ def _kept(there: dict[str, str]) -> set[str]:
 
 
 def _noise(ended: Ended) -> str:
-    """Words of Python's own."""
+    """What Python itself printed to stderr, such as a warning; "" if nothing."""
     for words in ("Exception ignored", "Error in sys", "Fatal Python error", "Warning:", "lost sys.stderr"):
         if words in ended.stderr:
             return f"stderr says {ended.stderr[ended.stderr.index(words) :][:200]!r}"
@@ -355,7 +360,7 @@ def _noise(ended: Ended) -> str:
 
 
 def _said_kept(ended: Ended, home: Path) -> str:
-    """What a lesson's document says it has kept, and is not there."""
+    """What is missing of all that a lesson's document says was kept; "" if nothing is."""
     try:
         document = json.loads(ended.stdout or "{}")
     except ValueError:
@@ -364,13 +369,13 @@ def _said_kept(ended: Ended, home: Path) -> str:
     name, files = document.get("saved_as"), document.get("files")
     files = files if isinstance(files, dict) else {}
     if name and name not in kept:
-        return f"it says that it kept '{name}', and it is not there"
+        return f"it says that it kept the policy '{name}', which is not there"
     gone = [file for file in (files).values() if isinstance(file, str) and not (home / file).exists()]
     return f"it names the file {gone[0]}, which is not there" if gone else ""
 
 
 def _goes_on(case: Case, room: Path, carried_out: CarriedOut, same: bool) -> str:
-    """What is wrong with the next command, when nothing is missing any more; same: it comes to what it should have."""
+    """What is wrong with the next command once nothing is missing; same: its result must be the undisturbed one."""
     age(case.home)
     words = next_words(case.name, case.expected, case.home)
     then = carried_out(words, case.home, environment_in(case.home, room), LONGEST_S)
@@ -378,9 +383,9 @@ def _goes_on(case: Case, room: Path, carried_out: CarriedOut, same: bool) -> str
     if fault := then.fault((0, case.expected.code)):
         return f"{said}: {fault}"
     is_over = words[:2] == ("toolbox", "verify") and WORKS[case.name].session
-    wrong = unsound(case.home) or leftovers(case.home)
+    wrong = first_fault(case.home) or first_leftover(case.home)
     if same and not wrong and not is_over:
-        wrong = reached(case.expected, case.home)
+        wrong = first_missing(case.expected, case.home)
     return f"{said}: {wrong}" if wrong else ""
 
 

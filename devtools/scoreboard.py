@@ -1,4 +1,4 @@
-"""Outcomes on disk, a line each, and the table they come to."""
+"""Outcomes as lines of a file, and the table that sums them up."""
 
 import json
 from collections.abc import Iterable, Iterator
@@ -11,54 +11,54 @@ from rich.table import Table
 
 from devtools.parts import Outcome, Part
 
-SHOWN = 12  # of what broke, told under the table; all of it is in the files
+SHOWN = 12  # broken attempts that are printed below the table; the files hold all of them
 
 
-def written(file: Path) -> dict[int, Outcome]:
-    """The outcomes in a file, by number; a line that was cut short is not counted."""
-    found = {}
+def read_outcomes(file: Path) -> dict[int, Outcome]:
+    """The outcomes in a file, by number, without a last line that was cut short."""
+    outcomes = {}
     for line in file.read_text(encoding="utf-8").splitlines() if file.exists() else ():
         try:
             row = json.loads(line)
         except json.JSONDecodeError:
             continue
         number = row.pop("number")
-        found[number] = Outcome(**row)
-    return found
+        outcomes[number] = Outcome(**row)
+    return outcomes
 
 
-def line(number: int, outcome: Outcome) -> str:
-    """An outcome as its line in the file."""
+def outcome_line(number: int, outcome: Outcome) -> str:
+    """The line of an outcome in the file."""
     return json.dumps({"number": number, **asdict(outcome)}) + "\n"
 
 
 def rows(outcomes: Iterable[Outcome]) -> Iterator[dict[str, Any]]:
-    """A row for each group: tries, how many held, what broke, the most of each figure."""
+    """A row for each group: its tries, the number and the cases of broken attempts, the largest value of each figure."""
     groups: dict[str, list[Outcome]] = {}
     for outcome in outcomes:
         groups.setdefault(outcome.group, []).append(outcome)
     for group, members in sorted(groups.items()):
-        broken = [one for one in members if one.broke]
+        broken = [member for member in members if member.broke]
         figures: dict[str, float] = {}
-        for one in members:
-            for name, value in (one.figures or {}).items():
+        for member in members:
+            for name, value in (member.figures or {}).items():
                 figures[name] = max(value, figures.get(name, value))
-        tries = sum(one.tries for one in members)
+        tries = sum(member.tries for member in members)
         yield {"group": group, "tries": tries, "broke": len(broken), "most": figures,
-               "broken": [{"case": one.case, "broke": one.broke} for one in broken]}  # fmt: skip
+               "broken": [{"case": member.case, "broke": member.broke} for member in broken]}  # fmt: skip
 
 
 def show(parts: dict[str, Part], folder: Path, console: Console) -> bool:
-    """Prints and writes (`scoreboard.json`) what the folder's outcomes come to; whether all held."""
+    """Print the table of the folder's outcomes, and write it to `scoreboard.json`; return whether all held."""
     table = Table("part", "what", "tries", "broke", "most")
     document, broken = {}, []
     for name, part in parts.items():
-        counted = list(rows(written(folder / f"{name}.jsonl").values()))
+        counted = list(rows(read_outcomes(folder / f"{name}.jsonl").values()))
         document[name] = {"target": part.target, "rows": counted}
         for n, row in enumerate(counted):
             most = ", ".join(f"{figure} {value:.4g}" for figure, value in row["most"].items())
             table.add_row("" if n else name, row["group"], str(row["tries"]), str(row["broke"]), most)
-            broken += [f"{name}: {one['case']}: {one['broke']}" for one in row["broken"]]
+            broken += [f"{name}: {attempt['case']}: {attempt['broke']}" for attempt in row["broken"]]
         if counted:
             total, lost = (sum(row[key] for row in counted) for key in ("tries", "broke"))
             table.add_row(

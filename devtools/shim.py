@@ -1,4 +1,4 @@
-"""The shim under a command (`write_shim.c`): what it writes is counted, and at a chosen call it is killed or refused."""
+"""The shim under a command (`write_shim.c`), which counts its writes, and kills it or refuses a call at a chosen call."""
 
 import shutil
 import struct
@@ -21,7 +21,10 @@ _COUNTS = struct.Struct(f"{len(KINDS) + 1}I")
 
 @dataclass(frozen=True)
 class Strike:
-    """What befalls a command: at which call of which kinds (letters), and what: see `write_shim.c`; always: from then on."""
+    """A disturbance of a command. kinds: letters of KINDS; at: the number of the call among these, from 1.
+
+    what: "before", "after" or "half", when it is killed, or an errno that the call gives; always: also at later calls.
+    """
 
     kinds: str
     at: int
@@ -34,8 +37,8 @@ class Strike:
         return f"{names} {self.at}: {done}"
 
 
-def built(folder: Path) -> Path:
-    """The shim as a library in a folder; RuntimeError, in a line, where it cannot be compiled."""
+def built_shim(folder: Path) -> Path:
+    """The path of the shim's library, which is compiled into a folder once. Raises RuntimeError if that fails."""
     library, compiler = folder / "write_shim.so", shutil.which("gcc") or shutil.which("cc")
     if compiler is None:
         raise RuntimeError(
@@ -52,8 +55,8 @@ def built(folder: Path) -> Path:
     return library
 
 
-def shimmed(library: Path, under: Path, counts: Path, strike: Strike | None = None) -> dict[str, str]:
-    """What the environment of a command says to the shim; `counts`: the file that it counts in, made anew."""
+def shim_environment(library: Path, under: Path, counts: Path, strike: Strike | None = None) -> dict[str, str]:
+    """The environment variables that load and instruct the shim; counts: the file of its counters, which is reset."""
     counts.write_bytes(bytes(_COUNTS.size))
     said = {"LD_PRELOAD": str(library), "LAB_SHIM_UNDER": str(under.resolve()), "LAB_SHIM_COUNTS": str(counts)}
     if strike is not None:
@@ -62,6 +65,6 @@ def shimmed(library: Path, under: Path, counts: Path, strike: Strike | None = No
     return said
 
 
-def counted(counts: Path) -> dict[str, int]:
-    """How many calls of each kind were made, by its letter."""
+def shim_counts(counts: Path) -> dict[str, int]:
+    """The number of calls of each kind, by its letter."""
     return dict(zip(KINDS.values(), _COUNTS.unpack(counts.read_bytes()), strict=False))

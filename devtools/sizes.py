@@ -1,4 +1,4 @@
-"""Part `sizes`: the largest inputs that somebody may come with; each is refused in a line, soon, or real work is done."""
+"""Part `sizes`: the largest inputs that somebody may bring; each is rejected soon in a line, or is real work."""
 
 import json
 import shutil
@@ -21,7 +21,7 @@ TEN_MB = 9_900_000
 
 
 class Size(NamedTuple):
-    """A file, who writes it into a folder, and the command that reads it."""
+    """A file, the function that writes it, and the command that reads it."""
 
     file: str
     write: Callable[[Path], None]
@@ -29,13 +29,13 @@ class Size(NamedTuple):
 
 
 def _policy(path: Path) -> None:
-    """A gigabyte of nothing."""
+    """Write a gigabyte of zeros."""
     with path.open("wb") as file:
         file.truncate(1 << 30)
 
 
 def _sound_head(path: Path) -> None:
-    """What begins as a policy does, with a table of a gigabyte of zeros."""
+    """Write a policy's header, and a table of a gigabyte of zeros."""
     states = (1 << 30) // 32
     head = {
         "__metadata__": {"format": "teaching-lab-policy-1"},
@@ -50,7 +50,7 @@ def _sound_head(path: Path) -> None:
 
 
 def _many(begin: str, piece: Callable[[int], str], count: int, end: str = "") -> Callable[[Path], None]:
-    """A file of as many pieces, and what is before and after them."""
+    """The writer of a file of `count` pieces between a begin and an end."""
 
     def write(path: Path) -> None:
         path.write_text(begin + "".join(map(piece, range(count))) + end, encoding="utf-8")
@@ -95,7 +95,7 @@ def _workspace(shape: str, cell_m: str) -> Callable[[Path], None]:
 
 
 def _cell(path: Path) -> None:
-    """A hundred stations and fifty parts that each go through fourteen of them."""
+    """Write a cell of a hundred stations and fifty parts that each visit fourteen machines."""
     rng = Random(1)
     machines = [f"s{number}" for number in range(98)]
     lines = ['name = "large"', 'kind = "cell"', "parts = 50", "stations = ["]
@@ -108,22 +108,24 @@ def _cell(path: Path) -> None:
     lines += [json.dumps(["in", *machines[14 * way : 14 * way + 14], "out"]) + "," for way in range(7)]
     lines += ["]", "[travel]"]
     stations = ["in", *machines, "out"]
-    for one in stations:
+    for station in stations:
         lines.append(
-            f"{one} = {{ " + ", ".join(f"{other} = {rng.randint(5, 30)}" for other in stations if other != one) + " }"
+            f"{station} = {{ "
+            + ", ".join(f"{target} = {rng.randint(5, 30)}" for target in stations if target != station)
+            + " }"
         )
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
 def _zip_bomb(path: Path) -> None:
-    """A megabyte that unpacks to a gigabyte."""
+    """Write a megabyte that unpacks to a gigabyte."""
     with ZipFile(path, "w", ZIP_DEFLATED) as archive, archive.open("mine.safetensors", "w") as file:
         for _ in range(1 << 10):
             file.write(bytes(1 << 20))
 
 
 def _png_bomb(path: Path) -> None:
-    """A picture of 30,000 x 30,000 white points, three megabytes."""
+    """Write a picture of 30,000 x 30,000 white pixels in three megabytes."""
     side = 30_000
 
     def chunk(name: bytes, content: bytes) -> bytes:
@@ -171,12 +173,12 @@ SIZES = (
 
 
 def prepare(room: Path, seed: int) -> int:
-    """As many attempts as there are sizes."""
+    """The number of attempts, one for each of SIZES."""
     return len(SIZES)
 
 
 def attempt(number: int, seed: int, room: Path) -> Outcome:
-    """One command on one large file."""
+    """Run one command on one large file."""
     size, folder = SIZES[number], room / str(number)
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir()
@@ -197,5 +199,5 @@ def attempt(number: int, seed: int, room: Path) -> Outcome:
 
 
 PART = Part(
-    "the largest inputs", "refused in a line in 5 s, under 1 GB, or real work under 2 GB", None, prepare, attempt
+    "the largest inputs", "rejected in a line in 5 s, under 1 GB, or real work under 2 GB", None, prepare, attempt
 )

@@ -78,7 +78,7 @@ def _say(line: str) -> None:
 
 
 def main() -> None:
-    """Prints a line a run, and the medians."""
+    """Print a line for each run, and the medians."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--rounds", type=int, default=5)
     known, rest = parser.parse_known_args()
@@ -88,12 +88,12 @@ def main() -> None:
         (folder / "clock").mkdir()
         (folder / "clock" / "sitecustomize.py").write_text(CLOCK, encoding="utf-8")
         for number in range(known.rounds):
-            for kind, found in ratios.items():
+            for kind, values in ratios.items():
                 wall_s, steps_s = measured(rest or ["toast"], folder, folder / f"toolbox-{number}")
-                found.append(wall_s / steps_s)
-                _say(f"{kind}  {wall_s:6.2f} s  {steps_s:6.2f} s in steps  {found[-1]:.2f}")
-    for kind, found in ratios.items():
-        _say(f"{kind}: median {statistics.median(found):.2f}, from {min(found):.2f} to {max(found):.2f}")
+                values.append(wall_s / steps_s)
+                _say(f"{kind}  {wall_s:6.2f} s  {steps_s:6.2f} s in steps  {values[-1]:.2f}")
+    for kind, values in ratios.items():
+        _say(f"{kind}: median {statistics.median(values):.2f}, from {min(values):.2f} to {max(values):.2f}")
 
 
 if __name__ == "__main__":

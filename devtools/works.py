@@ -1,4 +1,4 @@
-"""Commands of the lab that write, what they begin from, and what they come to when nobody disturbs them."""
+"""Commands of the lab that write, the home that they begin from, and their results when nothing disturbs them."""
 
 import fnmatch
 import json
@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from devtools.commands import Ended, environment, lab
-from devtools.shim import Strike, built, counted, shimmed
+from devtools.shim import Strike, built_shim, shim_counts, shim_environment
 from lab.advice.entries import read_journal
 from lab.errors import BadInput
 from lab.production.run_journal import RunEnded, read_run
@@ -27,8 +27,8 @@ from lab.toolbox.policy import Policy
 from lab.toolbox.policy_file import decode
 from lab.toolbox.registry import Toolbox
 
-STOPPED = "toolbox/sessions/world-1-1"  # the session in the base that was killed
-AGED_S = 3600  # what a killed command left is so old when the next one comes
+STOPPED = "toolbox/sessions/world-1-1"  # the killed session in the base
+AGED_S = 3600  # the age of all files when a command begins
 REPAIR = ("toolbox", "verify", "--repair")
 LONGEST_S = 300.0
 _LEFT = (".*.tmp", ".run-*")
@@ -40,8 +40,8 @@ Files = dict[str, bytes]
 class Work:
     """A command.
 
-    share: of a thousand kills; changes: patterns of files in the base that it may change; session: it keeps one, by which it
-    goes on ("teach" or "run"); left: files that other commands have left before it.
+    share: how many of a thousand kills it gets; changes: patterns of files in the base that it may change; session: the command
+    that resumes its session, "teach" or "run"; left: files that other commands have left before it.
     """
 
     words: tuple[str, ...]
@@ -86,7 +86,7 @@ WORKS: dict[str, Work] = {
 
 @dataclass(frozen=True)
 class Undisturbed:
-    """What a command comes to: its exit code, what is there then (see `state`), its calls by kind, how long it takes."""
+    """The result of an undisturbed command: its exit code, the `home_state` of its home, its calls by kind, and its time [s]."""
 
     code: int
     state: dict[str, str]
@@ -94,11 +94,11 @@ class Undisturbed:
     seconds: float
 
 
-# ---- what the commands begin from
+# ---- the home that commands begin from
 
 
 def base(room: Path) -> Path:
-    """The home that every command begins in: policies in versions, one removed, an archive, leftovers, a killed session."""
+    """The home that every command begins in: policies with versions, a removed one, an archive and a killed session."""
     home = room / "base"
     if home.exists():
         return home
@@ -111,7 +111,7 @@ def base(room: Path) -> Path:
     box.remove("gone")
     box.save_record("durations", "kept", {"seconds": 12.5})
     (half / "others.zip").write_bytes(pack([policy("doubled", 5.0), policy("other", 6.0), policy("third", 7.0)])[0])
-    ended = disturbed(half, _TEACH, built(room), Strike("w", 300, "after"), room)
+    ended = disturbed(half, _TEACH, built_shim(room), Strike("w", 300, "after"), room)
     assert ended.code < 0, ended.stderr
     assert not read_journal(half / STOPPED, "the base").closed
     age(half)
@@ -120,7 +120,7 @@ def base(room: Path) -> Path:
 
 
 def policy(name: str, value: float) -> Policy:
-    """A small solved policy."""
+    """A small policy of a solved problem."""
     q = np.full((4, 2), value)
     return Policy(
         name, "world", "drawn", q, np.ones((4, 2), np.int64), ("left", "right"), (4,), 0, "0123456789abcdef", {"learner": "q"},
@@ -130,12 +130,12 @@ def policy(name: str, value: float) -> Policy:
 
 
 def own_folder(room: Path, name: str) -> Path:
-    """A new empty folder that no other worker has: several may measure the same command at the same time."""
+    """A new empty folder for this worker alone, as several may measure the same command at the same time."""
     return Path(mkdtemp(prefix=f"{name}-", dir=room))
 
 
-def fresh(folder: Path, room: Path, work: Work) -> Path:
-    """The home in a folder, made anew, that a command begins from."""
+def fresh_home(folder: Path, room: Path, work: Work) -> Path:
+    """The home in a folder that is made anew for a command, a copy of the base."""
     home = folder / "home"
     shutil.rmtree(folder, ignore_errors=True)
     shutil.copytree(base(room), home, symlinks=True)
@@ -146,7 +146,7 @@ def fresh(folder: Path, room: Path, work: Work) -> Path:
 
 
 def by_itself(words: tuple[str, ...], home: Path, env: Mapping[str, str], timeout_s: float) -> Ended:
-    """A command as a process of its own."""
+    """The end of a command in a process of its own."""
     return lab(*words, cwd=home, env=env, timeout_s=timeout_s)
 
 
@@ -162,37 +162,37 @@ def disturbed(
     timeout_s: float = LONGEST_S,
     carried_out: CarriedOut = by_itself,
 ) -> Ended:
-    """A command in a home, under the shim; what it writes is counted in `counts` beside the home."""
-    said = shimmed(library, home, home.parent / f"{home.name}-counts", strike)
+    """The end of a command in a home, under the shim, which counts calls in a file beside the home."""
+    said = shim_environment(library, home, home.parent / f"{home.name}-counts", strike)
     return carried_out(words, home, environment_in(home, caches) | said, timeout_s)
 
 
 def environment_in(home: Path, caches: Path) -> dict[str, str]:
-    """The environment of a command in a home; what can be had again, such as what is compiled, is kept elsewhere."""
+    """The environment of a command in a home; caches, such as compiled code, are kept in `caches`."""
     return environment(home, MPLCONFIGDIR=str(caches / "matplotlib"), XDG_CACHE_HOME=str(caches / "cache"))
 
 
 def age(home: Path) -> None:
-    """Makes everything in a home look an hour old."""
+    """Make everything in a home look an hour old."""
     then = time.time() - AGED_S
     for path in (home, *home.rglob("*")):
         os.utime(path, (then, then), follow_symlinks=False)
 
 
-# ---- what they come to
+# ---- results
 
 
-def undisturbed(name: str, room: Path) -> Undisturbed:
-    """What a command comes to by itself, measured once; of its files those that come out the same each time."""
+def undisturbed_result(name: str, room: Path) -> Undisturbed:
+    """The result of an undisturbed command, measured once; its state has what two runs have in common."""
     file = room / f"{re.sub('[^a-z0-9]+', '-', name)}.json"
     if not file.exists():
         states, code, calls, took_s = list[dict[str, str]](), 0, dict[str, int](), 0.0
         for turn in ("to compile what it needs", "first", "second"):
-            home = fresh(own_folder(room, f"{file.stem}-{turn.split()[0]}"), room, WORKS[name])
-            ended = disturbed(home, WORKS[name].words, built(room), None, room)
+            home = fresh_home(own_folder(room, f"{file.stem}-{turn.split()[0]}"), room, WORKS[name])
+            ended = disturbed(home, WORKS[name].words, built_shim(room), None, room)
             assert not ended.fault((0, 1)), f"{name}: {ended.fault((0, 1))}"
-            code, calls, took_s = ended.code, counted(home.parent / "home-counts"), ended.seconds
-            states.append(state(home))
+            code, calls, took_s = ended.code, shim_counts(home.parent / "home-counts"), ended.seconds
+            states.append(home_state(home))
             shutil.rmtree(home.parent)
         _, *states = states
         common = {what: value for what, value in states[0].items() if states[1].get(what) == value}
@@ -203,9 +203,9 @@ def undisturbed(name: str, room: Path) -> Undisturbed:
     return Undisturbed(**json.loads(file.read_text()))
 
 
-def state(home: Path) -> dict[str, str]:
-    """What is in a home, by a name that is the same in any home and whatever the time."""
-    found: Counter[str] = Counter()
+def home_state(home: Path) -> dict[str, str]:
+    """The number of each file in a home, by a name that depends neither on the home nor on the time."""
+    counts: Counter[str] = Counter()
     for path in sorted(home.rglob("*")):
         inside = path.relative_to(home).as_posix()
         if (
@@ -219,19 +219,19 @@ def state(home: Path) -> dict[str, str]:
             folder = inside.rpartition("/")[0]
             try:
                 held = decode(path.read_bytes(), inside)
-                found[f"{folder}: policy {held.name}: {_fingerprint(held)}"] += 1
+                counts[f"{folder}: policy {held.name}: {_fingerprint(held)}"] += 1
             except BadInput:
-                found[f"{inside}: damaged"] += 1
+                counts[f"{inside}: damaged"] += 1
         elif inside.startswith("toolbox/sessions/") or path.name == "events.jsonl":
-            found[f"session's {path.name}: {_digest(content)}"] += 1
+            counts[f"session's {path.name}: {_digest(content)}"] += 1
         else:
             content = _timeless(content) if path.suffix == ".json" else content
-            found[f"{inside}: {_digest(content)}"] += 1
-    return {what: str(many) for what, many in found.items()}
+            counts[f"{inside}: {_digest(content)}"] += 1
+    return {what: str(many) for what, many in counts.items()}
 
 
 def _fingerprint(held: Policy) -> str:
-    """A policy without the time at which it was made."""
+    """A hash of a policy without its time of creation."""
     facts = asdict(replace(held, created="", parent=held.parent.rpartition("@")[0]))
     tables = b"".join(np.ascontiguousarray(facts.pop(name)).tobytes() for name in ("q", "visits", "ends"))
     return _digest(tables + json.dumps(facts, sort_keys=True).encode())
@@ -253,17 +253,17 @@ def _digest(content: bytes) -> str:
     return sha256(content).hexdigest()[:16]
 
 
-def reached(expected: Undisturbed, home: Path) -> str:
-    """What an undisturbed command leaves and is not there; "" where nothing is missing."""
-    there = state(home)
+def first_missing(expected: Undisturbed, home: Path) -> str:
+    """What an undisturbed command leaves and is missing in a home; "" if nothing is."""
+    there = home_state(home)
     missing = [what for what in expected.state if what not in there]
     return f"not as undisturbed: {len(missing)} missing: {missing[0]}" if missing else ""
 
 
 def next_words(name: str, expected: Undisturbed, home: Path) -> tuple[str, ...]:
-    """What a person types after a command was killed: nothing more to do but repair, go on with it, or the same again."""
+    """The command that a person types after a kill: a repair if all was done, --resume, or the same again."""
     work = WORKS[name]
-    if not reached(expected, home):
+    if not first_missing(expected, home):
         return REPAIR
     if work.session == "run":
         try:
@@ -289,7 +289,7 @@ def _sessions(work: Work, home: Path) -> list[Path]:
     return sorted(set(home.glob("toolbox/sessions/*")) - {home / STOPPED})
 
 
-# ---- what may not have happened
+# ---- losses
 
 
 def kept_before(room: Path) -> Files:
@@ -298,8 +298,8 @@ def kept_before(room: Path) -> Files:
     return {path.relative_to(home).as_posix(): path.read_bytes() for path in home.rglob("*") if path.is_file()}
 
 
-def lost(before: Files, home: Path, changes: tuple[str, ...]) -> str:
-    """What was in the base and is not any more as it was; a log may have grown. "" if nothing."""
+def first_loss(before: Files, home: Path, changes: tuple[str, ...]) -> str:
+    """The first file of the base that is missing or changed, apart from `changes` and logs that grew; "" if none is."""
     for name, content in before.items():
         if any(fnmatch.fnmatch(name, pattern) for pattern in changes):
             continue
@@ -312,17 +312,17 @@ def lost(before: Files, home: Path, changes: tuple[str, ...]) -> str:
     return ""
 
 
-def unsound(home: Path) -> str:
-    """What `toolbox verify` finds; "" if all is sound."""
+def first_fault(home: Path) -> str:
+    """The first fault that `toolbox verify` finds; "" if all is sound."""
     wrong = [reason for _, ok, reason in Toolbox(home / "toolbox").verify() if not ok]
     return f"toolbox verify: {wrong[0]}" if wrong else ""
 
 
-def leftovers(home: Path) -> str:
-    """What commands should have taken away: drafts, and folders of sessions without a session; "" for nothing."""
-    found = [path for pattern in _LEFT for path in home.rglob(pattern)]
-    found += [folder for folder in home.glob("toolbox/sessions/*") if not _is_session(folder)]
-    return f"left over: {found[0].relative_to(home)}" if found else ""
+def first_leftover(home: Path) -> str:
+    """The first draft, or session folder without a session, that commands should have removed; "" if there is none."""
+    remains = [path for pattern in _LEFT for path in home.rglob(pattern)]
+    remains += [folder for folder in home.glob("toolbox/sessions/*") if not _is_session(folder)]
+    return f"left over: {remains[0].relative_to(home)}" if remains else ""
 
 
 def _is_session(folder: Path) -> bool:

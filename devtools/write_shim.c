@@ -1,9 +1,10 @@
-// What a command writes under a folder, counted by kind; at a chosen call it dies, or is refused with an error. LD_PRELOAD.
+// Counts the calls by which a command writes under a folder, by kind; at a chosen call it kills the command, or refuses the
+// call with an error. Loaded by LD_PRELOAD.
 //
-// LAB_SHIM_UNDER: the folder. LAB_SHIM_COUNTS: a file of 8 numbers of 4 bytes, shared by all processes of the command, in the
-// order of `enum kind`. LAB_SHIM_KINDS: letters of the kinds that are meant, as in LETTERS; LAB_SHIM_AT: at which call of
-// these, from 1, 0: at none. LAB_SHIM_DO: "before" or "after" the call, or "half" of a write, everything of the process group
-// is killed; a number: that errno is given. LAB_SHIM_ALWAYS: from then on, not once.
+// LAB_SHIM_UNDER: the folder. LAB_SHIM_COUNTS: a file of 9 numbers of 4 bytes, shared by all processes of the command, in the
+// order of `enum kind`, the last one for the chosen kinds together. LAB_SHIM_KINDS: letters of the chosen kinds, as in LETTERS;
+// LAB_SHIM_AT: the chosen call among these, from 1; 0: none. LAB_SHIM_DO: "before" or "after" the call, or after "half" of a
+// write, the whole process group is killed; a number: the call gives that errno. LAB_SHIM_ALWAYS: also at all later calls.
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <errno.h>
@@ -29,11 +30,11 @@ enum { PASS, BEFORE, AFTER, HALF, REFUSE };
 
 static char under[PATH_MAX];
 static size_t under_length;
-static atomic_uint *counts; // a number a kind, then how many of the kinds that are meant
+static atomic_uint *counts; // a number a kind, then the number of all chosen kinds
 static unsigned meant, at, always;
 static int deed = PASS, refusal;
 
-// Reads the environment, when a process begins, and again where one is forked for a command of its own.
+// Reads the environment when a process begins, and again in a process that is forked for a command of its own.
 __attribute__((constructor)) void write_shim_begin(void) {
     counts = NULL;
     meant = at = always = 0;
@@ -84,7 +85,7 @@ static int is_under(int folder, const char *path) {
     if (path[0] == '/') return starts_under(path);
     if (folder != AT_FDCWD) return file_is_under(folder);
     char here[PATH_MAX];
-    return getcwd(here, sizeof here) && starts_under(here); // "../x" counts as what it begins from
+    return getcwd(here, sizeof here) && starts_under(here); // "../x" counts as under the working folder
 }
 
 static _Noreturn void die(void) {
@@ -92,7 +93,7 @@ static _Noreturn void die(void) {
     for (;;) pause();
 }
 
-// Counts a call, and says what is to become of it; dies where that comes before it.
+// Counts a call, and returns what is to become of it; kills the process group if that comes before the call.
 static int counted(enum kind kind, int counts_here) {
     if (!counts || !counts_here) return PASS;
     int before = errno;

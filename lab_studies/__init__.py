@@ -1,4 +1,4 @@
-"""What was measured with the lab: the thesis's tables and figures again (`thesis`), and comparisons of our own (`comparisons`).
+"""Studies made with the lab: the thesis's tables and figures measured again (`thesis`), and our own `comparisons`.
 
 The lab never imports this package. It comes in as any plug-in does, by the entry point "teaching_lab.studies", and is the
 largest example of how to build on the lab. A study is a function of a job and a reading (changes to all settings) that
@@ -30,8 +30,8 @@ class _In:
 
     def __call__(self, job: "Job", reading: Mapping[str, Any]) -> "Findings":
         function = getattr(import_module(f"{__name__}.{self.module}"), self.function)
-        found: Findings = function(job, reading, *self.given)
-        return found
+        findings: Findings = function(job, reading, *self.given)
+        return findings
 
 
 STUDIES: dict[str, Study] = {

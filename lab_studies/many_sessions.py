@@ -1,4 +1,4 @@
-"""Many sessions, for studies: each with uniform numbers of its own, whoever runs it, and in whatever company."""
+"""Many sessions for studies: each has its own random numbers, whatever runs it, and with however many others."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -26,17 +26,17 @@ from lab.sequencing.simulate.cell_arrays import Floats, Ints, cell_arrays, most_
 METHODS: Mapping[str, type[SessionLearner]] = MappingProxyType(
     {kind.name: kind for kind in (Srl, MonteCarloAverage, SessionLearner)}
 )
-CHUNK = 2**20  # episodes at once: what their costs take is 8 MiB
-MOST_ROWS = 2**22  # a table that may need more rows grows as it is filled, session by session
+CHUNK = 2**20  # episodes at once, whose costs take 8 MiB
+MOST_ROWS = 2**22  # sessions with a larger table are run one by one, with a table that grows
 
 
 class Sessions(NamedTuple):
-    """What N sessions of E episodes came to, in the order of their numbers.
+    """The results of N sessions of E episodes, in the order of their numbers.
 
-    best_cost (N,): the best episode's, inf where all ended in deadlocks; sequences (N, L): its decisions, then zeros.
-    final_cost (N,): the greedy policy's at the end, with the cell's own times; NaN for random search, which has none.
-    convergence (N,): the first episode from which on the cost stays the same to the end (eq. 7.1). costs (N, E), of no
-    sessions unless asked for.
+    best_cost (N,): of the best episode, inf if all ended in deadlocks; sequences (N, L): its decisions, then zeros.
+    final_cost (N,): of the final greedy policy with the cell's own times; NaN for random search, which has none.
+    convergence (N,): the first episode from which the cost stays the same to the end (eq. 7.1). costs (N, E): empty unless
+    asked for.
     """
 
     best_cost: Floats
@@ -49,11 +49,10 @@ class Sessions(NamedTuple):
 def run_sessions(
     cell: Cell, method: str, search: Search, sessions: int, seed: int, *, keep_costs: bool = False
 ) -> Sessions:
-    """So many sessions of a seed by a method of METHODS; nobody is told of their episodes.
+    """The results of so many sessions of a seed by a method of METHODS; `search.on_episode` is not called.
 
-    Session n has the same random numbers however many there are. With chance, every episode of every session meets times
-    of its own.
-    Raises BadInput for an unknown method, fewer than 1 session, and as `learn` does.
+    Session n has the same random numbers however many there are. With chance, every episode of every session has its own
+    times. Raises BadInput for an unknown method, for fewer than 1 session, and as `learn` does.
     """
     if method not in METHODS:
         raise unknown("method", method, METHODS, "sessions")
@@ -62,11 +61,11 @@ def run_sessions(
     search.check(cell)
     seeds = session_seeds(seed, sessions)
     size = max(1, CHUNK // search.episodes)
-    found = []
+    chunks = []
     for n in range(0, sessions, size):
         chunk = _chunk(cell, METHODS[method], search, seeds[n : n + size])
-        found.append(chunk if keep_costs else chunk._replace(costs=chunk.costs[:0]))
-    return Sessions(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
+        chunks.append(chunk if keep_costs else chunk._replace(costs=chunk.costs[:0]))
+    return Sessions(*(np.concatenate(parts) for parts in zip(*chunks, strict=True)))
 
 
 def evaluate(
@@ -76,10 +75,10 @@ def evaluate(
     chance: Chance = NO_CHANCE,
     objective: str = MAKESPAN,
 ) -> Floats:
-    """The costs (N, M) of N sequences in M episodes; an episode's seed means the same times as in `chance.Episode`.
+    """The costs (N, M) of N sequences in M episodes; an episode's seed gives the same times as in `chance.Episode`.
 
-    A sequence that leaves something undone costs as much as a deadlock.
-    Raises BadInput for an objective that the cell cannot be judged by, and for a sequence that it cannot carry out.
+    An incomplete sequence costs as much as a deadlock. Raises BadInput for an objective that the cell does not have, and for
+    a sequence that it cannot carry out.
     """
     check_objective(objective, cell)
     lengths = np.array([len(sequence) for sequence in sequences], np.int64)
@@ -87,10 +86,10 @@ def evaluate(
     for row, sequence in zip(rows, sequences, strict=True):
         row[: len(sequence)] = sequence
     costs = np.zeros((len(sequences), len(seeds)))
-    there = cell_arrays(cell, objective, chance)
-    kernels.follow_all(there, run_arrays(cell), rows, lengths, np.array(seeds, np.uint64), costs)
+    arrays = cell_arrays(cell, objective, chance)
+    kernels.follow_all(arrays, run_arrays(cell), rows, lengths, np.array(seeds, np.uint64), costs)
     for sequence in (sequences[n] for n in np.flatnonzero(np.isnan(costs).any(axis=1)).tolist()):
-        raise BadInput(f"sequence {list(sequence)}: it has a decision that may not be taken there")
+        raise BadInput(f"sequence {list(sequence)}: it has a decision that is not allowed where it stands")
     return costs
 
 
@@ -100,35 +99,37 @@ def session_seeds(seed: int, sessions: int) -> NDArray[np.uint64]:
 
 
 def _chunk(cell: Cell, kind: type[SessionLearner], search: Search, seeds: NDArray[np.uint64]) -> Sessions:
-    """Some sessions, with all their costs."""
+    """The results of some sessions, with all their costs."""
     keys, moves = kind.keys(cell, search.settings), most_moves(cell)
     if keys is None or min(keys.size, search.episodes * moves) > MOST_ROWS:
-        found = SessionOutcomes.room(len(seeds), search.episodes, moves)
+        outcomes = SessionOutcomes.room(len(seeds), search.episodes, moves)
         for n, seed in enumerate(seeds.tolist()):
             learned = learn(cell, replace(search, on_episode=None), seed, kind)
-            found.costs[n], found.ends[n] = learned.log.costs, (learned.log.best_cost, learned.final_cost)
-            found.sequences[n, : len(learned.log.best)] = learned.log.best
+            outcomes.costs[n], outcomes.ends[n] = learned.log.costs, (learned.log.best_cost, learned.final_cost)
+            outcomes.sequences[n, : len(learned.log.best)] = learned.log.best
     else:
-        found = _together(cell, kind(search), search, keys, seeds)
+        outcomes = _together(cell, kind(search), search, keys, seeds)
     if kind is SessionLearner:
-        found.ends[:, 1] = np.nan
-    return Sessions(found.ends[:, 0], found.ends[:, 1], _convergence(found.costs), found.sequences, found.costs)
+        outcomes.ends[:, 1] = np.nan
+    return Sessions(
+        outcomes.ends[:, 0], outcomes.ends[:, 1], _convergence(outcomes.costs), outcomes.sequences, outcomes.costs
+    )
 
 
 def _together(
     cell: Cell, learner: SessionLearner, search: Search, keys: Keys, seeds: NDArray[np.uint64]
 ) -> SessionOutcomes:
-    """Sessions in one compiled call."""
+    """The outcomes of sessions in one compiled call."""
     moves, epsilons = most_moves(cell), [learner.epsilon(episode) for episode in range(1, search.episodes + 1)]
-    found = SessionOutcomes.room(len(seeds), search.episodes, moves)
+    outcomes = SessionOutcomes.room(len(seeds), search.episodes, moves)
     work = session_arrays(cell, value_table(keys.size, search.episodes * moves, learner.first))
-    session_kernels.advance(learner.learning(cell, keys), work, seeds, np.array(epsilons), 1, found)
-    learner.check(float(found.costs.min()))
-    return found
+    session_kernels.advance(learner.learning(cell, keys), work, seeds, np.array(epsilons), 1, outcomes)
+    learner.check(float(outcomes.costs.min()))
+    return outcomes
 
 
 def _convergence(costs: Floats) -> Ints:
-    """By session, the first episode of the equal ones at the end. Source: thesis eq. 7.1 and its listing."""
+    """The first episode (N,) of each session's last episodes of equal cost. Source: thesis eq. 7.1 and its listing."""
     changes = costs[:, 1:] != costs[:, :-1]
     episode = np.arange(2, costs.shape[1] + 1)
     return np.asarray(np.max(np.where(changes, episode, 1), axis=1, initial=1), np.int64)

@@ -40,7 +40,7 @@ class Advising:
     @classmethod
     def of(
         cls,
-        names: "Sequence[str | Advisor | Ask]",
+        names: "Sequence[str | Advisor | Ask | type[Advisor]]",
         people: Mapping[str, Ask] | None = None,
         asked: str = PanelSettings.asked,
         decide: str = PanelSettings.decide,

@@ -66,7 +66,7 @@ class AdvisorName:
     itself: "Advisor | Ask | type[Advisor] | None" = None
 
     @classmethod
-    def made(cls, advisor: "Advisor | Ask") -> "AdvisorName":
+    def made(cls, advisor: "Advisor | Ask | type[Advisor]") -> "AdvisorName":
         """The name of an advisor object or class, or of a function of a request. Raises BadInput for anything else."""
         text = getattr(advisor, "__name__", type(advisor).__name__)
         is_class = isinstance(advisor, type)
@@ -256,9 +256,11 @@ def make_advisor(name: AdvisorName, level: Level) -> "Advisor | None":
     """
     if name.itself is None:
         return ADVISORS[name.row].make(name, level)
-    if type(name.itself).__module__.partition(".")[0] == "lab" and hasattr(name.itself, "advise"):
-        return name.itself  # one of the lab's own, such as a table of advice
-    return AddedAdvisor(name, name.itself, level.rng)
+    thing: Any = name.itself
+    if type(thing).__module__.partition(".")[0] == "lab" and hasattr(thing, "advise"):
+        advisor: Advisor = thing  # one of the lab's own, such as a table of advice
+        return advisor
+    return AddedAdvisor(name, thing, level.rng)
 
 
 def recorded_fault(record: "Read", what: str, signature: str) -> BadInput:

@@ -104,7 +104,7 @@ def checked(given: Mapping[str, Any], known: type, where: str) -> dict[str, Any]
 # ---- advisors and toolboxes -----------------------------------------------------------------------------------------
 
 
-OneAdvisor = str | Advisor | Ask
+OneAdvisor = str | Advisor | Ask | type[Advisor]
 Advisors = OneAdvisor | Sequence[OneAdvisor] | None
 ToolboxOrPlace = Toolbox | Path | str | None
 

@@ -161,7 +161,7 @@ class Compared:
     """
 
     problem: Teachable
-    advisors: Sequence[str | Advisor | Ask] = ("expert",)
+    advisors: Sequence[str | Advisor | Ask | type[Advisor]] = ("expert",)
     values: Mapping[str, Sequence[Any]] = field(default_factory=dict)
     task: str | None = None
     sight: str | None = None
@@ -188,7 +188,7 @@ class ComparedSetting:
     """One combination: an advisor, and a value for each of the compared settings."""
 
     of: Compared
-    advisor: str | Advisor | Ask
+    advisor: str | Advisor | Ask | type[Advisor]
     values: tuple[tuple[str, Any], ...]
 
     @property

@@ -1,4 +1,4 @@
-"""Pictures of what advice costs: success against helped steps, a panel a world."""
+"""Pictures of the cost of advice: success against helped steps, a panel for each world."""
 
 from collections.abc import Mapping, Sequence
 from itertools import cycle
@@ -22,8 +22,8 @@ YLABEL = "sessions that end optimal [%]"
 Point = tuple[str, str, bool, float, float]  # gate, advisor, memory, helped steps, success [%]
 
 
-def of_gates(rows: Sequence[Row]) -> bytes:
-    """Every gate and advisor: hollow without memory, filled with it; lines across: nobody to ask."""
+def gates_picture(rows: Sequence[Row]) -> bytes:
+    """A picture of every gate and advisor: hollow marks without memory, filled ones with it; horizontal lines: nobody."""
 
     def draw(axes: "Axes", place: str, points: Sequence[Point]) -> None:
         for gate, name, memory, helped, success in points:
@@ -38,8 +38,8 @@ def of_gates(rows: Sequence[Row]) -> bytes:
     return _panels(rows, draw, _gate_keys())
 
 
-def of_ccrl(rows: Sequence[Row], targets: Mapping[str, tuple[float, float]]) -> bytes:
-    """CCRL alone: an arrow for each advisor from without memory to with it; stars: the project's targets in world I."""
+def ccrl_picture(rows: Sequence[Row], targets: Mapping[str, tuple[float, float]]) -> bytes:
+    """A picture of CCRL: an arrow for each advisor from no memory to memory; stars: the project's targets in world I."""
 
     def draw(axes: "Axes", place: str, points: Sequence[Point]) -> None:
         at = {(name, memory): (hs, sp) for gate, name, memory, hs, sp in points}
@@ -59,12 +59,12 @@ def of_ccrl(rows: Sequence[Row], targets: Mapping[str, tuple[float, float]]) -> 
                 }
                 axes.annotate(name, targets[name][::-1], color=INK, **offset)
 
-    shown = [one for one in rows if one["gate"] in ("ccrl", "never")]
+    shown = [row for row in rows if row["gate"] in ("ccrl", "never")]
     return _panels(shown, draw, _ccrl_keys())
 
 
 def _panels(rows: Sequence[Row], draw: Any, keys: Sequence[Any]) -> bytes:
-    """A panel for each world, with a line across for nobody, without and with memory."""
+    """A picture with a panel for each world, and in it horizontal lines for nobody, without and with memory."""
     by_world = {place: _points(those(rows, world=place)) for place in ("world-1", "world-2")}
 
     def whole(figure: "Figure") -> None:
@@ -95,10 +95,10 @@ def _name_ticks(axes: "Axes") -> None:
 
 
 def _points(rows: Sequence[Row]) -> list[Point]:
-    of: dict[tuple[str, str, bool], dict[str, float]] = {}
-    for one in rows:
-        of.setdefault((one["gate"], one["advisor"], one["memory"]), {})[one["measure"]] = one["value"]
-    return [(*cell, measured["HS_steps"], measured["SP_percent"]) for cell, measured in of.items()]
+    measures: dict[tuple[str, str, bool], dict[str, float]] = {}
+    for row in rows:
+        measures.setdefault((row["gate"], row["advisor"], row["memory"]), {})[row["measure"]] = row["value"]
+    return [(*cell, measured["HS_steps"], measured["SP_percent"]) for cell, measured in measures.items()]
 
 
 def _key(label: str, marker: str, colour: str, filled: bool = True) -> Any:

@@ -31,19 +31,18 @@ TASK, TOASTS, SCENE_SEED = "toast", 3, 0
 NOBODY = "none"
 ADVISORS = (NOBODY, *SKILL_TAUS, "wrong")
 COLOURS = dict(zip(ADVISORS, (INK, BLUE, GREEN, SKY, ORANGE, RED), strict=True))
-MOST = 40  # lessons a skill and advisor
-LOOKED = 10  # with several starts, whose ways take longer to look at, the table is looked at in every tenth episode
+MOST = 40  # the most lessons for a skill and an advisor
+LOOKED = 10  # with several starts, whose paths take longer to check, the table is checked every tenth episode
 
 MEASURES = (
-    "A lesson is what lab run gives: sessions one after the other, with the task file's learner and gate. It is solved when the "
-    "greedy way from every start is a shortest one. Episodes and moves: those of the learner until then, walks with advice "
-    f"counted (looked at after each episode, after every {LOOKED}th where episodes begin in several places). Helped: advised "
-    "steps until then. Saved: by how much fewer moves it takes than with nobody, of the means, with the interval of the "
-    "difference (Welch)."
+    "A lesson is that of lab run: sessions one after the other, with the task file's learner and gate. It is solved when the "
+    "greedy path from every start is a shortest one. Episodes and moves: the learner's until then, advised ones included "
+    f"(checked after each episode, after every {LOOKED}th where episodes begin in several places). Helped: advised steps until "
+    "then. Saved: how many fewer moves it takes than without advice, by the means, with the interval of the difference (Welch)."
 )
 SCENE = (
-    f"Task {TASK}, {TOASTS} toasts, the scene of seed {SCENE_SEED}; at most {MOST} lessons a skill and advisor. A simulated "
-    "advisor knows the optimal values, which nobody does in a kitchen; wrong: takes the worst action for the best."
+    f"Task {TASK}, {TOASTS} toasts, the scene of seed {SCENE_SEED}; at most {MOST} lessons for a skill and an advisor. A "
+    "simulated advisor knows the optimal values, which nobody does in a kitchen; 'wrong' takes the worst action for the best."
 )
 
 
@@ -57,7 +56,7 @@ class Pupil:
 
 @dataclass(frozen=True, eq=False)
 class Cost:
-    """The cost of N lessons until they were solved, (N,) each; a lesson that was never solved counts with its whole cost."""
+    """The cost of N lessons until they were solved, (N,) each; an unsolved lesson counts with its whole cost."""
 
     solved: NDArray[np.bool_]
     episodes: NDArray[np.int64]
@@ -67,7 +66,7 @@ class Cost:
 
 @dataclass
 class Watch:
-    """Listens to a lesson until its table is as good as can be."""
+    """A listener that counts the cost of a lesson until its greedy paths are shortest."""
 
     mdp: TabularMDP
     fewest: FloatArray
@@ -78,11 +77,11 @@ class Watch:
 
     @classmethod
     def over(cls, mdp: TabularMDP) -> "Watch":
-        """Of a problem, from every place in which an episode may begin."""
+        """A watch on lessons of a problem, from every state in which an episode may begin."""
         return cls(mdp, fewest_moves(mdp))
 
     def hear(self, event: Event) -> None:
-        """Counts an episode, and looks at what was learned by it."""
+        """Count an episode, and check the table after it."""
         if isinstance(event, SessionBegan):
             self.session, self.before = event.session, self.moves
         if self.solved or not isinstance(event, LessonEvent) or not isinstance(event.event, EpisodeEnded):
@@ -97,23 +96,23 @@ class Watch:
 
 
 def advice_worth(job: Job, reading: Mapping[str, Any]) -> Findings:
-    """Every skill of the toast task with every advisor, and nobody."""
+    """The results of every skill of the toast task with every advisor and nobody; the reading has no effect."""
     skills = list(scene().problems)
     pupils = [Pupil(skill, advisor) for skill in skills for advisor in ADVISORS]
-    found = job.each(partial(taught, lessons=min(job.sessions, MOST), seed=job.seed), pupils)
+    costs_by_pupil = job.each(partial(lessons_cost, lessons=min(job.sessions, MOST), seed=job.seed), pupils)
     subtasks = dict.fromkeys(problem.subtask for problem in scene().problems.values())
     costs: dict[str, dict[str, Cost]] = {}
     rows: list[Row] = []
     for skill in skills:
-        rows += [one for advisor in ADVISORS for one in rows_of(skill, advisor, found)]
+        rows += [result for advisor in ADVISORS for result in rows_of(skill, advisor, costs_by_pupil)]
     for subtask in subtasks:
         of = [skill for skill in skills if scene().problems[skill].subtask == subtask]
-        costs[subtask] = {name: joined([found[Pupil(skill, name)] for skill in of]) for name in ADVISORS}
+        costs[subtask] = {name: joined_costs([costs_by_pupil[Pupil(skill, name)] for skill in of]) for name in ADVISORS}
     pictures = {
-        f"{subtask}: lessons that are solved after so many moves": solved_after(of) for subtask, of in costs.items()
+        f"{subtask}: lessons that are solved after so many moves": solved_picture(of) for subtask, of in costs.items()
     }
     return Findings(
-        rows, in_short(costs), {"Moves until a lesson is solved": moves_of(costs)} | pictures, (MEASURES, SCENE)
+        rows, in_short(costs), {"Moves until a lesson is solved": moves_picture(costs)} | pictures, (MEASURES, SCENE)
     )
 
 
@@ -124,7 +123,7 @@ def scene() -> Prepared:
     return prepare(task, task.order(TOASTS), SCENE_SEED)
 
 
-def taught(pupil: Pupil, *, lessons: int, seed: int) -> Cost:
+def lessons_cost(pupil: Pupil, *, lessons: int, seed: int) -> Cost:
     """The cost of `lessons` lessons of a skill with an advisor."""
     problem = scene().problems[pupil.skill]
     how, advising = scene().task.subtask(problem.subtask), Advising.of([pupil.advisor])
@@ -134,68 +133,71 @@ def taught(pupil: Pupil, *, lessons: int, seed: int) -> Cost:
         watch = Watch.over(problem.mdp)
         Sessions(plan, advising, int(own), Journal(), watch.hear).run()
         watches.append(watch)
-    columns = zip(*((one.solved, one.episodes, one.moves, one.helped) for one in watches), strict=True)
+    columns = zip(*((watch.solved, watch.episodes, watch.moves, watch.helped) for watch in watches), strict=True)
     solved, episodes, moves, helped = (np.array(column) for column in columns)
     return Cost(solved, episodes, moves, helped)
 
 
-def joined(costs: Sequence[Cost]) -> Cost:
+def joined_costs(costs: Sequence[Cost]) -> Cost:
     """The costs of several skills' lessons, joined."""
-    return Cost(*(np.concatenate([getattr(one, name) for one in costs]) for name in Cost.__dataclass_fields__))
+    return Cost(*(np.concatenate([getattr(cost, name) for cost in costs]) for name in Cost.__dataclass_fields__))
 
 
-def rows_of(skill: str, advisor: str, found: Mapping[Pupil, Cost]) -> list[Row]:
-    """The measures of a skill and an advisor, and what it saves over nobody."""
-    of, alone = found[Pupil(skill, advisor)], found[Pupil(skill, NOBODY)]
+def rows_of(skill: str, advisor: str, costs_by_pupil: Mapping[Pupil, Cost]) -> list[Row]:
+    """The measures of a skill and an advisor, and what the advisor saves compared with nobody."""
+    cost, alone = costs_by_pupil[Pupil(skill, advisor)], costs_by_pupil[Pupil(skill, NOBODY)]
     named: Row = {
         "skill": skill,
         "subtask": scene().problems[skill].subtask,
         "advisor": advisor,
-        "lessons": len(of.moves),
+        "lessons": len(cost.moves),
     }
     rows = [
-        share_row(named, "solved_percent", of.solved),
-        varying_row(named, "episodes_to_solve", of.episodes),
-        varying_row(named, "moves_to_solve", of.moves),
-        varying_row(named, "helped_steps", of.helped),
+        share_row(named, "solved_percent", cost.solved),
+        varying_row(named, "episodes_to_solve", cost.episodes),
+        varying_row(named, "moves_to_solve", cost.moves),
+        varying_row(named, "helped_steps", cost.helped),
     ]
-    return rows if advisor == NOBODY else [*rows, saved_row(named, of, alone)]
+    return rows if advisor == NOBODY else [*rows, saved_row(named, cost, alone)]
 
 
-def saved_row(named: Row, of: Cost, alone: Cost) -> Row:
+def saved_row(named: Row, cost: Cost, alone: Cost) -> Row:
     """The moves that a lesson saves compared with nobody [%], with the interval of the difference of the means."""
     from scipy.stats import ttest_ind
 
-    low, high = ttest_ind(alone.moves, of.moves, equal_var=False).confidence_interval(0.95)
+    low, high = ttest_ind(alone.moves, cost.moves, equal_var=False).confidence_interval(0.95)
     percent = 100.0 / alone.moves.mean()
     ends = None if np.isnan(low) else (low * percent, high * percent)
-    return row(named, "saved_percent", (alone.moves.mean() - of.moves.mean()) * percent, ends)
+    return row(named, "saved_percent", (alone.moves.mean() - cost.moves.mean()) * percent, ends)
 
 
 def in_short(costs: Mapping[str, Mapping[str, Cost]]) -> Row:
     """Means over the skills of a sub-task, and whether every lesson was solved."""
     says: Row = {}
-    for subtask, of in costs.items():
-        for name, cost in of.items():
+    for subtask, by_advisor in costs.items():
+        for name, cost in by_advisor.items():
             says[f"{subtask}, {name}: moves"] = round(float(cost.moves.mean()))
             says[f"{subtask}, {name}: helped"] = round(float(cost.helped.mean()))
             says[f"{subtask}, {name}: solved [%]"] = round(100.0 * float(cost.solved.mean()), 1)
     return says
 
 
-def moves_of(costs: Mapping[str, Mapping[str, Cost]]) -> bytes:
+def moves_picture(costs: Mapping[str, Mapping[str, Cost]]) -> bytes:
     """Bars of the moves until a lesson is solved, by sub-task and advisor."""
-    lines = {name: [varying_row({}, "moves_to_solve", of[name].moves) for of in costs.values()] for name in ADVISORS}
+    lines = {
+        name: [varying_row({}, "moves_to_solve", by_advisor[name].moves) for by_advisor in costs.values()]
+        for name in ADVISORS
+    }
     named = {("nobody" if name == NOBODY else name): line for name, line in lines.items()}
     return bars(list(costs), named, "moves until it is solved")
 
 
-def solved_after(of: Mapping[str, Cost]) -> bytes:
+def solved_picture(by_advisor: Mapping[str, Cost]) -> bytes:
     """The share of lessons that are solved after so many moves, a curve for each advisor."""
 
     def draw(figure: "Figure") -> None:
         axes = figure.add_subplot()
-        for name, cost in of.items():
+        for name, cost in by_advisor.items():
             moves = np.sort(np.where(cost.solved, cost.moves, np.inf))
             share = 100.0 * np.arange(1, len(moves) + 1) / len(moves)
             axes.step(moves, share, where="post", color=COLOURS[name], label="nobody" if name == NOBODY else name)

@@ -15,22 +15,22 @@ from lab.sim.frames import Quaternion, Vector
 from lab.sim.scene.scene import MARKER, TABLE, pallet_of
 from lab.skills.skill import UPRIGHT
 
-COMES_AFTER_S = 20.0  # from the stop to when all is put right
-MOST_CALLS = 6  # in one run; then the person leaves, and it ends as one that nobody attends
-STRANGE = "strange box"  # what a box is called that a fault puts on the table
-AT_STATION_M, NEAR_M = 0.10, 0.02  # a part so near to a spot stands at its station, so near to a machine in it
-MOVED_M = 0.005  # what is fixed was moved if it is farther than this from where it stood
-RING_M, RINGS = 0.06, 8  # where a part is put that cannot stand where it began
+COMES_AFTER_S = 20.0  # the time from a stop until all is put right
+MOST_CALLS = 6  # in one run; then the person leaves, and the run ends as one that nobody attends
+STRANGE = "strange box"  # the name of a box that a fault puts on the table
+AT_STATION_M, NEAR_M = 0.10, 0.02  # a part so near to a spot stands at its station; so near to a machine, in it
+MOVED_M = 0.005  # a fixed body that is farther from its place was moved
+RING_M, RINGS = 0.06, 8  # rings of places for a part that cannot stand where it began
 IN_THE_WAY = re.compile(r"something new|no path|approached|no room|enclosed|in the way|presses on|strange box")
 
-NO_ROOM = re.compile(r"presses on|too near to")  # then the part that is named stands where the arm cannot come to it
+NO_ROOM = re.compile(r"presses on|too near to")  # said of a part that stands where the arm cannot take it
 
 
 @dataclass
 class Attendant(Controls):
     """Controls with a person who knows only the run's messages and what is visible.
 
-    asked: what the run said at each of its stops. did: what was done about it, in words.
+    asked: what the run said at each stop. did: what the person did about it, in words.
     """
 
     attended: bool = True
@@ -40,9 +40,9 @@ class Attendant(Controls):
     _stood: dict[str, tuple[Vector, Quaternion]] = field(default_factory=dict, repr=False)
 
     def on_floor(self, floor: Floor) -> None:
-        """Record the places of fixed bodies on the attended floor, from its conditions."""
+        """Record the places of the fixed bodies of a floor."""
         task = floor.scene.task
-        fixed = [one.name for one in task.stations] + [one.name for one in task.obstacles]
+        fixed = [thing.name for thing in task.stations] + [thing.name for thing in task.obstacles]
         for body in [body for name in fixed for body in (name, f"{name}{MARKER}") if body in floor.world.names()]:
             (x, y, z), (i, j, k, w) = floor.world.pose(body)
             self._stood[body] = (float(x), float(y), float(z)), (float(i), float(j), float(k), float(w))
@@ -51,7 +51,7 @@ class Attendant(Controls):
         """Return at once, because only the run's simulated time counts."""
 
     def before_step(self, floor: Floor) -> bool:
-        """Put right what is asked for, once its time has come; whether anything in the scene was changed."""
+        """Put right what the run asks for, once the person has come; return whether anything in the scene was changed."""
         held = self.held
         if held is None or held.kind is not StopKind.PROTECTIVE:
             return False
@@ -68,7 +68,7 @@ class Attendant(Controls):
         return bool(done)
 
     def _put_right(self, floor: Floor, why: str) -> Iterator[str]:
-        """Do what is asked for; what was done, in words."""
+        """Do what the run asks for, and yield what was done, in words."""
         yield from self._clear(floor, why)
         yield from self._put_back(floor, why)
         for station, machine in floor.machines.items():
@@ -82,7 +82,7 @@ class Attendant(Controls):
                 yield f"stood {name} up"
 
     def _clear(self, floor: Floor, why: str) -> Iterator[str]:
-        """Take away boxes that are said to be in the way, and strange parts at a station that is named."""
+        """Take away strange boxes if something is in the way, and parts not of the order at a named station."""
         world, own = floor.world, {body for name in parts_of(floor) for body in (name, pallet_of(name))}
         boxes = [body for body in world.names() if body.startswith(STRANGE) and not body.endswith(MARKER)]
         boxes = boxes if IN_THE_WAY.search(why) else []
@@ -90,13 +90,13 @@ class Attendant(Controls):
         for number, body in enumerate(dict.fromkeys([*boxes, *parts])):
             if world.pose(body)[0][2] < 0:
                 continue
-            for one in (body, f"{body}{MARKER}"):
-                if one in world.names():
-                    world.put(one, (*out_of_sight(number), 1.5 * GROUND_M))
+            for name in (body, f"{body}{MARKER}"):
+                if name in world.names():
+                    world.put(name, (*out_of_sight(number), 1.5 * GROUND_M))
             yield f"took {body} away"
 
     def _put_back(self, floor: Floor, why: str) -> Iterator[str]:
-        """Put obstacles and stations that are named where they were, with what stands in these."""
+        """Put named obstacles and stations back to their places, with the parts in the stations."""
         world = floor.world
         for body, (at, _) in self._stood.items():
             off = np.asarray(at) - np.asarray(world.pose(body)[0])
@@ -104,25 +104,27 @@ class Attendant(Controls):
             if body.endswith(MARKER) or not named or float(np.abs(off).max()) < MOVED_M:
                 continue
             near = [name for name in parts_of(floor) if floor.world.nearest(name, body, NEAR_M) < NEAR_M]
-            for one in (part for name in near for part in stack_of(floor, name) if body in floor.machines):
-                where, how = world.pose(one)
-                world.put(one, tuple(np.asarray(where) + off), how)
-            for one in (body, f"{body}{MARKER}"):
-                if one in self._stood:
-                    world.put(one, *self._stood[one])
+            for moved in (part for name in near for part in stack_of(floor, name) if body in floor.machines):
+                where, how = world.pose(moved)
+                world.put(moved, tuple(np.asarray(where) + off), how)
+            for moved in (body, f"{body}{MARKER}"):
+                if moved in self._stood:
+                    world.put(moved, *self._stood[moved])
             yield f"put '{body}' back"
 
 
 def _at_named(floor: Floor, body: str, why: str) -> bool:
-    """Whether a body stands at a station that is named in what the run said."""
+    """Whether a body stands at a station that the run has named."""
     x, y, _ = floor.world.pose(body)[0]
     named = [station.name for station in floor.scene.task.stations if f"'{station.name}'" in why]
     return any(distance(floor, station, (float(x), float(y))) < AT_STATION_M for station in named)
 
 
 def _stand_up(floor: Floor, number: int) -> bool:
-    """Stand the part of an order up that has fallen, is gone or too far away: where it began, or else beside where it is, clear
-    of all else and within reach; whether there was room."""
+    """Stand up a part of an order that has fallen, is gone or too far away; return whether there was room.
+
+    It is put where it began or, if it cannot stand there, beside where it is, clear of all else and within reach.
+    """
     scene, name = floor.scene, parts_of(floor)[number]
     (x, y, z), yaw, pallet = floor.world.pose(name)[0], yaw_of(floor, name), pallet_of(name)
     before = floor.world.pose(name)
@@ -155,7 +157,7 @@ def _on_spot(floor: Floor, name: str) -> bool:
 
 
 def _is_astray(floor: Floor, name: str) -> bool:
-    """Whether a part lies, or is nowhere that the arm reaches."""
+    """Whether a part has fallen, or is out of the arm's reach."""
     gone = floor.world.pose(name)[0][2] < 0
     reached = not gone and floor.scene.robot.arm.inverse(floor.bench.part_pose(name)) is not None
     return floor.bench.held != name and (not reached or floor.bench.upright(name) < UPRIGHT)

@@ -12,17 +12,17 @@ from lab.tasks.task_file import load_cell
 from lab_studies.comparisons.transport_instances import board, cell_of
 from lab_studies.thesis.chapter_7_cells import robot_cell
 
-PRINTED = "Bilge and Ulusoy, two robots"  # of the board's families
+PRINTED = "Bilge and Ulusoy, two robots"  # a family of the board
 CASES = ("I", "II", "III")
 SHOP, TOAST, FMS = "job shops with two vehicles", "toast cells", "manufacturing cells"
-JOBS, TOASTS, PARTS = (3, 5), (3, 8), (3, 8)  # of the small ones, least and most
+JOBS, TOASTS, PARTS = (3, 5), (3, 8), (3, 8)  # the least and the most in small cells
 
 
 @dataclass(frozen=True)
-class Unseen:
-    """A larger cell: its family, the group that it is reported with, its number there.
+class LargerCell:
+    """A larger cell: its family, the group that it is reported in, and its number there.
 
-    printed: the best value that others print; None: it has to be found.
+    printed: the best published value; None: it has to be computed.
     """
 
     family: str
@@ -32,7 +32,7 @@ class Unseen:
 
 
 def shop(rng: np.random.Generator, least: int, most: int) -> Cell:
-    """A drawn job shop in the manner of Bilge and Ulusoy: four machines, two vehicles, ways one way longer than the other."""
+    """A random job shop like Bilge and Ulusoy's: four machines, two vehicles, travel times that depend on the direction."""
     machines, jobs = 4, int(rng.integers(least, most + 1))
     at = rng.uniform(0.0, 1.0, (machines + 1, 2))
     ways = np.abs(at[:, None] - at[None]).sum(axis=-1) * rng.uniform(0.7, 1.3, (machines + 1, machines + 1))
@@ -43,14 +43,14 @@ def shop(rng: np.random.Generator, least: int, most: int) -> Cell:
     products = []
     for job in range(1, jobs + 1):
         visited = rng.permutation(machines)[: rng.integers(2, machines + 1)]
-        stages = [Stage(names[one], processing_s=float(rng.integers(6, 21))) for one in visited]
+        stages = [Stage(names[machine], processing_s=float(rng.integers(6, 21))) for machine in visited]
         products.append(Product(f"job {job}", ((Stage("LU"), *stages),)))
     robots = tuple(Robot(f"vehicle {number}", "LU") for number in (1, 2))
-    return Cell(stations, tuple(products), tuple(one.name for one in products), times, times, robots)
+    return Cell(stations, tuple(products), tuple(product.name for product in products), times, times, robots)
 
 
 def toasts(rng: np.random.Generator, least: int, most: int) -> Cell:
-    """A case of the thesis's toast cell with other times: each machine up to twice as slow or fast, all moves a little."""
+    """A random case of the thesis's toast cell: each machine up to twice as slow or fast, all moves a little slower or faster."""
     cell = robot_cell(CASES[rng.integers(len(CASES))], int(rng.integers(least, most + 1)))
     factor = rng.uniform(0.7, 1.4)
     return replace(
@@ -63,18 +63,18 @@ def toasts(rng: np.random.Generator, least: int, most: int) -> Cell:
     )
 
 
-def manufactured(rng: np.random.Generator, least: int, most: int) -> Cell:
-    """The manufacturing cell of App. III with a drawn order, other processing times, and parts that come sooner or later."""
+def manufacturing(rng: np.random.Generator, least: int, most: int) -> Cell:
+    """The manufacturing cell of App. III with a random order, random processing times and another interval of arrivals."""
     cell = _fms(rng, int(rng.integers(least, most + 1)))
     factors = dict(zip(("rook", "sign"), rng.uniform(0.6, 1.5, 2), strict=True))
     products = tuple(
         replace(
-            one,
+            product,
             routes=tuple(
-                tuple(s.each(partial(_slower, factor=factors[one.name])) for s in route) for route in one.routes
+                tuple(s.each(partial(_slower, factor=factors[product.name])) for s in route) for route in product.routes
             ),
         )
-        for one in cell.products
+        for product in cell.products
     )
     assert cell.arrivals is not None  # App. III has them
     interval_s = (round(200.0 * rng.uniform(0.3, 1.5), 1),) * cell.parts
@@ -83,7 +83,7 @@ def manufactured(rng: np.random.Generator, least: int, most: int) -> Cell:
 
 def _fms(rng: np.random.Generator, parts: int) -> Cell:
     order = tuple(str(name) for name in rng.choice(["rook", "sign"], parts))
-    return replace(load_cell("fms").cell(order), due_s=None)  # the makespan alone is asked for
+    return replace(load_cell("fms").cell(order), due_s=None)  # only the makespan counts
 
 
 def _slower(stage: Stage, factor: float) -> Stage:
@@ -93,7 +93,7 @@ def _slower(stage: Stage, factor: float) -> Stage:
 SMALL: Mapping[str, Callable[[np.random.Generator], Cell]] = {
     SHOP: lambda rng: shop(rng, *JOBS),
     TOAST: lambda rng: toasts(rng, *TOASTS),
-    FMS: lambda rng: manufactured(rng, *PARTS),
+    FMS: lambda rng: manufacturing(rng, *PARTS),
 }
 BILGE_ULUSOY, MORE_JOBS = "Bilge and Ulusoy, two vehicles", "drawn, 10 to 20 jobs"
 THESIS_TOASTS, DRAWN_TOASTS, ORDERS = (
@@ -103,27 +103,27 @@ THESIS_TOASTS, DRAWN_TOASTS, ORDERS = (
 )
 
 
-def unseen() -> tuple[Unseen, ...]:
-    """The larger cells, the same ones whatever the study's seed."""
-    printed = [one.printed for one in board() if one.family == PRINTED]
+def larger_cells() -> tuple[LargerCell, ...]:
+    """The larger cells, which do not depend on the study's seed."""
+    printed = [instance.printed for instance in board() if instance.family == PRINTED]
     return (
-        *(Unseen(SHOP, BILGE_ULUSOY, number, value) for number, value in enumerate(printed)),
-        *(Unseen(SHOP, MORE_JOBS, number) for number in range(12)),
-        *(Unseen(TOAST, THESIS_TOASTS, number) for number in range(15)),
-        *(Unseen(TOAST, DRAWN_TOASTS, number) for number in range(20)),
-        *(Unseen(FMS, ORDERS, number) for number in range(10)),
+        *(LargerCell(SHOP, BILGE_ULUSOY, number, value) for number, value in enumerate(printed)),
+        *(LargerCell(SHOP, MORE_JOBS, number) for number in range(12)),
+        *(LargerCell(TOAST, THESIS_TOASTS, number) for number in range(15)),
+        *(LargerCell(TOAST, DRAWN_TOASTS, number) for number in range(20)),
+        *(LargerCell(FMS, ORDERS, number) for number in range(10)),
     )
 
 
 @lru_cache(maxsize=256)
-def unseen_cell(one: Unseen) -> Cell:
-    """The cell."""
-    rng = np.random.default_rng([2026, [*GROUPS].index(one.group), one.number])
-    return GROUPS[one.group](one.number, rng)
+def larger_cell(cell: LargerCell) -> Cell:
+    """The cell that is meant, the same every time."""
+    rng = np.random.default_rng([2026, [*GROUPS].index(cell.group), cell.number])
+    return GROUPS[cell.group](cell.number, rng)
 
 
 GROUPS: Mapping[str, Callable[[int, np.random.Generator], Cell]] = {
-    BILGE_ULUSOY: lambda number, rng: cell_of([one for one in board() if one.family == PRINTED][number]),
+    BILGE_ULUSOY: lambda number, rng: cell_of([instance for instance in board() if instance.family == PRINTED][number]),
     MORE_JOBS: lambda number, rng: shop(rng, 10, 20),
     THESIS_TOASTS: lambda number, rng: robot_cell(CASES[number // 5], 20 + 10 * (number % 5)),
     DRAWN_TOASTS: lambda number, rng: toasts(rng, 20, 60),
@@ -132,7 +132,7 @@ GROUPS: Mapping[str, Callable[[int, np.random.Generator], Cell]] = {
 
 
 def small_cells(family: str, count: int, seed: int) -> list[Cell]:
-    """`count` drawn small cells of a family; for an unknown family, of all families in turn."""
+    """`count` random small cells of a family; for an unknown family, of all families in turn."""
     drawn = [SMALL[family]] if family in SMALL else [*SMALL.values()]
     rng = np.random.default_rng([seed, 2, [*SMALL].index(family) if family in SMALL else len(SMALL)])
     return [drawn[number % len(drawn)](rng) for number in range(count)]

@@ -1,4 +1,4 @@
-"""Learning of a carried-over policy: weights of features with which greedy runs of small cells cost less than the rules'."""
+"""Learns a carried-over policy: feature weights by which greedy runs of small cells cost less than those of the rules."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -16,12 +16,15 @@ from lab.sequencing.simulate.cell_arrays import Floats
 from lab.sequencing.simulate.run import Run
 from lab_studies.comparisons.evolution import Evolution
 
-WORST = 3.0  # times the best rule's cost: more than that, as a deadlock costs, is not worse
+WORST = 3.0  # times the best rule's cost; a run that costs more, such as a deadlock, counts as this
 
 
 @dataclass(frozen=True)
 class CarriedLearning:
-    """How long it learns: generations of so many candidates, each tried on so many of the cells, drawn; step: the first."""
+    """How policies are learned.
+
+    population: candidates of a generation; batch: random cells that they are tested on; step: the first step size.
+    """
 
     generations: int = 200
     population: int = 32
@@ -34,7 +37,7 @@ class CarriedLearning:
                 raise BadInput(f"{name} = {getattr(self, name)}: allowed are whole numbers from {least}")
 
 
-OnGeneration = Callable[[int, float], None]  # its number from 1, the mean cost of its candidates over the best rule's
+OnGeneration = Callable[[int, float], None]  # (number from 1, mean of the candidates' costs over the best rule's)
 
 
 def learn_policy(
@@ -45,11 +48,12 @@ def learn_policy(
     learned_on: str = "",
     heard: OnGeneration = lambda number, mean: None,
 ) -> CarriedPolicy:
-    """A policy for cells like these, which are small: costs of greedy runs, over the best rule's, are all that it learns from.
+    """A policy for cells like these small ones, learned only from the costs of greedy runs over the best rule's.
 
-    It begins with what `nearest_ready` does. The weights are the mean of those in the last quarter of the generations;
-    one without which no run of these cells costs more is 0. The same seed gives the same policy. Raises BadInput for an
-    objective that a cell has no data for. Source: CMA-ES, Hansen 2016; Moriarty et al. 1999, policies by evolution.
+    Learning begins with the rule `nearest_ready`. The weights are the mean over the last quarter of the generations; a weight
+    that makes no difference in any of the cells is 0. The same seed gives the same policy. heard: called after each
+    generation. Raises BadInput without cells, and for an objective that a cell has no data for. Source: CMA-ES, Hansen
+    2016; policies by evolution, Moriarty et al. 1999.
     """
     settings = settings or CarriedLearning()
     if not cells:
@@ -82,14 +86,14 @@ class _School:
         self._scales = [_best_rule(cell, objective) for cell in cells]
 
     def costs(self, candidates: Floats, chosen: Sequence[int] | np.ndarray) -> Floats:
-        """The mean cost over the best rule's (N,) of candidates (N, F) in the chosen cells."""
+        """The mean ratio (N,) of the costs of candidates (N, F) to the best rule's in the chosen cells."""
         total = np.zeros(len(candidates))
         for number in chosen:
             total += np.minimum(WORST, self._deciders[number].costs(candidates) / self._scales[number])
         return total / len(chosen)
 
     def without_idle(self, weights: Floats) -> Floats:
-        """The weights, with those set to 0, one after the other, that make no difference in any cell."""
+        """The weights after setting to 0, one after another, those that make no difference in any cell."""
         costs = self._each(weights)
         for number in np.argsort(np.abs(weights)):
             without = weights.copy()
@@ -99,12 +103,12 @@ class _School:
         return weights
 
     def _each(self, weights: Floats) -> Floats:
-        """The cost in each cell of the weights' runs."""
+        """The costs (cells,) of the runs by these weights."""
         return np.array([decider.costs(weights[None])[0] for decider in self._deciders])
 
 
 def _best_rule(cell: Cell, objective: str) -> float:
-    """The cost of the best rule; where that is 0, or none comes to its end, a move's work."""
+    """The cost of the best rule, at least 1, as it is divided by."""
     costs = []
     for rule in usable(cell).values():
         run = Run(cell)

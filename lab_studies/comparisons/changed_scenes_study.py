@@ -14,28 +14,36 @@ from lab.studies.runner import Job
 from lab.tasks.task_file import load
 from lab.teaching.lesson_plan import Lesson
 from lab.toolbox.policy import Policy
-from lab_studies.comparisons.changed_scenes import KINDS, Scene, surveyed
-from lab_studies.comparisons.skills_taught import Known, distinct, fails, key_of, spent, taught, works
+from lab_studies.comparisons.changed_scenes import KINDS, Scene, survey_of_scene
+from lab_studies.comparisons.skills_taught import (
+    Known,
+    distinct_problems,
+    is_failing,
+    lesson_cost,
+    policy_key,
+    reaches_goals,
+    taught_skills,
+)
 
 TASK, TOASTS = "toast", 3
 WAYS = ("the same", "used", "adapted", "refused", "learned")  # what becomes of a skill in a changed scene
 
 ABOUT = (
-    f"{{}} changed scenes of the task '{TASK}', as many of each kind; seed 0 is what the skills were learned in, all with the "
-    "advisor 'expert'. In each scene all skills are found, adapted or learned, and for comparison all are learned from nothing. "
-    "A problem that several skills share counts once. {} scenes could not be surveyed (something overlaps, or nothing leads "
-    "to it) and were drawn again."
+    f"{{}} changed scenes of the task '{TASK}', equally many of each kind; the skills were learned in the scene of seed 0, all "
+    "with the advisor 'expert'. In each scene all skills are reused, fine-tuned or learned, and for comparison all are learned "
+    "from scratch. A problem that several skills share counts once. {} scenes could not be surveyed (bodies overlap, or no path "
+    "leads to one) and were drawn again."
 )
 COLUMNS = (
-    "The same: exactly the problem that it was learned in. Used: another problem, in which its ways are free and as short as "
-    "any. Adapted: learned on from it. Refused: learned from nothing, though there was a policy with its states and moves. "
-    "Learned: there was none. saved_percent: of the episodes that learning from nothing took for the same skills."
+    "The same: exactly the problem that the policy was learned in. Used: another problem, in which its paths are free and "
+    "shortest. Adapted: fine-tuned from it. Refused: learned from scratch, though there was a policy with the same states and "
+    "moves. Learned: there was none. saved_percent: of the episodes that learning from scratch took for the same skills."
 )
 CHECKS = (
-    "Checks, none of which the verdict has seen: accepted_failing: policies used as they are that miss the goal from a start "
-    "step by step, or that fail when they are carried out in physics (all are, grasps before they are used, too); "
-    "refused_working: skills whose policies were refused although one of the toolbox leads from all starts to the goal; "
-    "longer: skills whose way is longer than the one learned from nothing; success: skills that reach their goals."
+    "Checks that play no part in the verdict: accepted_failing: policies used as they are that miss the goal from a start "
+    "step by step, or fail when they are carried out in physics (all are; grasps also before they are used); "
+    "refused_working: skills whose policies were rejected although one of the toolbox leads from all starts to the goal; "
+    "longer: skills whose path is longer than the one learned from scratch; success: skills that reach their goals."
 )
 
 
@@ -43,7 +51,7 @@ CHECKS = (
 class Tally:
     """The results of a scene's skills with the same source; wall_s: time [s] for finding or learning them.
 
-    anew: episodes and helped steps from nothing.
+    anew: episodes and helped steps from scratch.
     """
 
     skills: int
@@ -55,9 +63,9 @@ class Tally:
 
 @dataclass(frozen=True)
 class Outcome:
-    """The results of one changed scene, by `WAYS`; the counts of skills are those of the checks.
+    """The results of one changed scene, by `WAYS`, and the numbers of skills by check (see CHECKS).
 
-    unsolved: skills without a way to the goal, found or learned here, and learned from nothing.
+    unsolved: skills without a path to the goal, as found or learned here, and as learned from scratch.
     """
 
     words: str
@@ -74,42 +82,44 @@ def changed_scenes(job: Job, reading: Mapping[str, Any]) -> Findings:
     """The results of changed scenes, equally many of each kind; the reading has no effect."""
     kinds = [*KINDS]
     scenes = [Scene(kinds[number % len(kinds)], number // len(kinds), job.seed) for number in range(job.sessions)]
-    found = job.each(tried, scenes)
+    outcomes = job.each(scene_outcome, scenes)
     rows = [
-        one for kind in (None, *KINDS) for one in rows_of(kind, [found[s] for s in scenes if kind in (None, s.kind)])
+        result
+        for kind in (None, *KINDS)
+        for result in rows_of(kind, [outcomes[s] for s in scenes if kind in (None, s.kind)])
     ]
-    rows += [one for order, scene in enumerate(scenes, 1) for one in rows_of_scene(order, scene, found[scene])]
-    drawn_again = sum(one.refused_draws for one in found.values())
+    rows += [result for order, scene in enumerate(scenes, 1) for result in rows_of_scene(order, scene, outcomes[scene])]
+    drawn_again = sum(outcome.refused_draws for outcome in outcomes.values())
     notes = (ABOUT.format(len(scenes), drawn_again), COLUMNS, CHECKS)
     return Findings(rows, in_short(rows), {"What becomes of a skill": _picture(rows)}, notes)
 
 
 @lru_cache(maxsize=1)
-def learned_here() -> tuple[Prepared, Known, Known]:
+def original_scene() -> tuple[Prepared, Known, Known]:
     """The original scene, the policies that a run learns in it, and those of each problem learned from scratch.
 
     Both by (sub-task, signature), and the same in each process.
     """
     task = load(TASK)
     prepared = prepare(task, task.order(TOASTS), 0)
-    problems = distinct(prepared)
-    lessons = [one.lesson for one in taught(prepared, {}, problems)]
-    anew = {key_of(problem): _from_nothing(prepared, problem) for problem in problems}
-    return prepared, {(one.policy.subtask, one.policy.signature): one.policy for one in lessons}, anew
+    problems = distinct_problems(prepared)
+    lessons = [skill.lesson for skill in taught_skills(prepared, {}, problems)]
+    anew = {policy_key(problem): _from_scratch(prepared, problem) for problem in problems}
+    return prepared, {(skill.policy.subtask, skill.policy.signature): skill.policy for skill in lessons}, anew
 
 
-def tried(scene: Scene) -> Outcome:
+def scene_outcome(scene: Scene) -> Outcome:
     """The outcome of one changed scene, with the policies learned before and from scratch."""
-    base, known, learned = learned_here()
-    prepared, words, refused = surveyed(scene, base.task, base.layout, base.seed, base.order)
-    problems = distinct(prepared)
-    here = taught(prepared, known, problems)
-    anew = [learned.get(key_of(problem)) or _from_nothing(prepared, problem) for problem in problems]
-    ways = [_way(one.lesson) for one in here]
+    base, known, learned = original_scene()
+    prepared, words, refused = survey_of_scene(scene, base.task, base.layout, base.seed, base.order)
+    problems = distinct_problems(prepared)
+    here = taught_skills(prepared, known, problems)
+    anew = [learned.get(policy_key(problem)) or _from_scratch(prepared, problem) for problem in problems]
+    ways = [_fate(skill.lesson) for skill in here]
     tallies = {}
     for way in WAYS:
-        own = [n for n, one in enumerate(ways) if one == way]
-        costs = [spent(here[n].lesson) for n in own]
+        own = [n for n, met in enumerate(ways) if met == way]
+        costs = [lesson_cost(here[n].lesson) for n in own]
         tallies[way] = Tally(
             len(own),
             sum(episodes for episodes, _ in costs),
@@ -117,8 +127,8 @@ def tried(scene: Scene) -> Outcome:
             sum(here[n].wall_s for n in own),
             (sum(len(anew[n].curve) for n in own), sum(anew[n].helped_steps for n in own)),
         )
-    lessons = [one.lesson for one in here]
-    failing = [fails(prepared, problem, lesson.policy) for problem, lesson in zip(problems, lessons, strict=True)]
+    lessons = [skill.lesson for skill in here]
+    failing = [is_failing(prepared, problem, lesson.policy) for problem, lesson in zip(problems, lessons, strict=True)]
     return Outcome(
         words,
         refused,
@@ -133,18 +143,18 @@ def tried(scene: Scene) -> Outcome:
             for problem, lesson, policy in zip(problems, lessons, anew, strict=True)
         ),
         unsolved=(
-            sum(not works(problem, one.policy) for problem, one in zip(problems, lessons, strict=True)),
-            sum(not works(problem, policy) for problem, policy in zip(problems, anew, strict=True)),
+            sum(not reaches_goals(problem, lesson.policy) for problem, lesson in zip(problems, lessons, strict=True)),
+            sum(not reaches_goals(problem, policy) for problem, policy in zip(problems, anew, strict=True)),
         ),
     )
 
 
-def _from_nothing(prepared: Prepared, problem: Problem) -> Policy:
+def _from_scratch(prepared: Prepared, problem: Problem) -> Policy:
     """The policy that is learned for a problem from scratch."""
-    return taught(prepared, {}, [problem])[0].lesson.policy
+    return taught_skills(prepared, {}, [problem])[0].lesson.policy
 
 
-def _way(lesson: Lesson) -> str:
+def _fate(lesson: Lesson) -> str:
     if lesson.source == "reused":
         return "the same" if lesson.fitness is None else "used"
     if lesson.source == "adapted":
@@ -153,16 +163,16 @@ def _way(lesson: Lesson) -> str:
 
 
 def _any_works(known: Known, problem: Problem) -> bool:
-    return any(works(problem, policy) for (subtask, _), policy in known.items() if subtask == problem.subtask)
+    return any(reaches_goals(problem, policy) for (subtask, _), policy in known.items() if subtask == problem.subtask)
 
 
 def _moves(problem: Problem, policy: Policy) -> int:
-    """Moves of the greedy way from the problem's start."""
+    """The moves of the greedy path from the problem's start."""
     return len(greedy_path(policy.q, problem.mdp, problem.mdp.n_states)[1])
 
 
 def rows_of(kind: str | None, outcomes: Sequence[Outcome]) -> list[Row]:
-    """The measures of the scenes of one kind, None: of all."""
+    """The measures of the scenes of one kind; None: of all kinds."""
     if not outcomes:
         return []
     named: Row = {"kind": kind or "all", "scenes": len(outcomes)}
@@ -170,31 +180,26 @@ def rows_of(kind: str | None, outcomes: Sequence[Outcome]) -> list[Row]:
     rows = [_share(named | {"source": way}, "skills_percent", _sum(outcomes, way), skills) for way in WAYS]
     for measure, ways in (("saved", WAYS), ("saved_in_changed_problems", WAYS[1:])):
         for number, what in enumerate(("episodes", "helped_steps")):
-            spent = [sum(getattr(one.tallies[way], what) for way in ways) for one in outcomes]
-            anew = [sum(one.tallies[way].anew[number] for way in ways) for one in outcomes]
+            spent = [sum(getattr(outcome.tallies[way], what) for way in ways) for outcome in outcomes]
+            anew = [sum(outcome.tallies[way].anew[number] for way in ways) for outcome in outcomes]
             shares = [100.0 * (1 - now / then) for now, then in zip(spent, anew, strict=True) if then]
             rows += _mean(named, f"{measure}_{what}_percent", shares)
     rows += [
-        _share(
-            named, "accepted_failing_percent", sum(one.accepted_failing for one in outcomes), _sum(outcomes, "used")
-        ),
-        _share(
-            named, "adapted_failing_percent", sum(one.adapted_failing for one in outcomes), _sum(outcomes, "adapted")
-        ),
-        _share(
-            named, "refused_working_percent", sum(one.refused_working for one in outcomes), _sum(outcomes, "refused")
-        ),
-        _share(named, "longer_percent", sum(one.longer for one in outcomes), skills),
-        _share(named, "success_percent", skills - sum(one.unsolved[0] for one in outcomes), skills),
+        _share(named, f"{what}_percent", sum(getattr(outcome, what) for outcome in outcomes), _sum(outcomes, way))
+        for what, way in (("accepted_failing", "used"), ("adapted_failing", "adapted"), ("refused_working", "refused"))
+    ]
+    return [
+        *rows,
+        _share(named, "longer_percent", sum(outcome.longer for outcome in outcomes), skills),
+        _share(named, "success_percent", skills - sum(outcome.unsolved[0] for outcome in outcomes), skills),
         _share(
             named | {"source": "all anew"}, "success_percent", skills - sum(o.unsolved[1] for o in outcomes), skills
         ),
     ]
-    return rows
 
 
 def rows_of_scene(order: int, scene: Scene, outcome: Outcome) -> list[Row]:
-    """What came of one scene, a row for each way that a skill took in it."""
+    """The results of one scene, a row for each of WAYS that a skill took in it."""
     return [
         row(
             {
@@ -218,11 +223,11 @@ def rows_of_scene(order: int, scene: Scene, outcome: Outcome) -> list[Row]:
 
 
 def _sum(outcomes: Sequence[Outcome], way: str) -> int:
-    return sum(one.tallies[way].skills for one in outcomes)
+    return sum(outcome.tallies[way].skills for outcome in outcomes)
 
 
 def _share(named: Row, measure: str, count: int, of: int) -> Row:
-    """So many of all, in percent; of none, 0 without an interval."""
+    """`count` of `of` in percent, with an interval; 0 without one if there are none."""
     return (
         share_row(named | {"of": of}, measure, [True] * count + [False] * (of - count))
         if of
@@ -239,14 +244,14 @@ def _mean(named: Row, measure: str, values: Sequence[float]) -> list[Row]:
 def in_short(rows: Sequence[Row]) -> Row:
     """The figures over all scenes."""
     says = {}
-    for one in those(rows, kind="all"):
-        name = " ".join(filter(None, (one.get("source", ""), one["measure"])))
-        says[name] = round(one["value"], 2)
+    for result in those(rows, kind="all"):
+        name = " ".join(filter(None, (result.get("source", ""), result["measure"])))
+        says[name] = round(result["value"], 2)
     return says
 
 
 def _picture(rows: Sequence[Row]) -> bytes:
-    """Bars by kind, a bar for each way."""
+    """A picture with bars by kind, a bar for each of WAYS."""
     kinds = [kind for kind in KINDS if those(rows, kind=kind, measure="skills_percent")]
     lines = {way: [those(rows, kind=kind, source=way, measure="skills_percent")[0] for kind in kinds] for way in WAYS}
     return bars(kinds, lines, "skills [%]")

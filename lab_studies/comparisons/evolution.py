@@ -6,14 +6,14 @@ import numpy as np
 
 from lab.sequencing.simulate.cell_arrays import Floats
 
-LONGEST = 10.0  # of the mean: where only the direction of weights matters, they would grow for ever
+LONGEST = 10.0  # the mean is scaled to this length, as weights of which only the direction matters would grow for ever
 
 
 class Evolution:
-    """A search under way over N weights whose length does not matter. mean (N,): where it stands.
+    """A search over N weights whose length does not matter. mean (N,): the mean of its distribution.
 
-    Candidates are drawn by the symmetric root of the covariance, which is one; the eigenvectors that it is made of are not: each
-    linear algebra library has its own signs. So one seed learns the same on every machine, as far as costs can be told apart.
+    Candidates are drawn with the symmetric root of the covariance, which is unique; eigenvectors are not, as each library of
+    linear algebra has its own signs. So a seed learns the same on every machine, as far as costs can be told apart.
     Source: Hansen 2016, The CMA evolution strategy: a tutorial, with its default settings.
     """
 
@@ -31,14 +31,11 @@ class Evolution:
         self._damping = 1.0 + 2.0 * max(0.0, sqrt((mass - 1.0) / (n + 1.0)) - 1.0) + self._step_rate
         self._usual = sqrt(n) * (1.0 - 1.0 / (4.0 * n) + 1.0 / (21.0 * n * n))
         self._spread, self._path, self._step_path = np.eye(n), np.zeros(n), np.zeros(n)
-        self._root, self._inverse = (
-            np.eye(n),
-            np.eye(n),
-        )  # of the covariance: its symmetric root, and the inverse of that
+        self._root, self._inverse = np.eye(n), np.eye(n)  # the symmetric root of the covariance, and its inverse
         self._moves, self._generation = np.zeros((population, n)), 0
 
     def ask(self) -> Floats:
-        """The candidates (population, N) of a generation."""
+        """New candidates (population, N)."""
         lengths, axes = np.linalg.eigh(self._spread)
         lengths = np.sqrt(np.maximum(lengths, 1e-20))
         self._root, self._inverse = (axes * lengths) @ axes.T, (axes / lengths) @ axes.T
@@ -46,7 +43,7 @@ class Evolution:
         return np.asarray(self.mean + self._step * self._moves)
 
     def tell(self, costs: Floats) -> None:
-        """What they cost (population,): the distribution moves."""
+        """Move the distribution by the costs (population,) of the last candidates."""
         best = np.argsort(costs, kind="stable")[: len(self._shares)]
         move = self._shares @ self._moves[best]
         self._generation += 1

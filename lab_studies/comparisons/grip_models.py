@@ -1,4 +1,4 @@
-"""Twenty parts from elsewhere: models that pybullet_data ships, and trimesh's primitives, as parts of a task."""
+"""Twenty parts that others made, as parts of a task: models that pybullet_data ships, and trimesh's primitives."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -21,11 +21,8 @@ if TYPE_CHECKING:
     from trimesh import Trimesh
 
 MASS_KG, FRICTION = 0.1, 0.8
-GRASPABLE_M, FITTED_M = (
-    0.036,
-    0.03,
-)  # the middle one of three extents: up to this it keeps its size; else it is scaled to that
-SETTLE_STEPS = 480  # of physics, until a part that was dropped is at rest
+GRASPABLE_M, FITTED_M = 0.036, 0.03  # a model whose middle extent is above the first is scaled to the second
+SETTLE_STEPS = 480  # of physics, until a dropped part is at rest
 TABLE_RGBA = (0.8, 0.8, 0.8, 1.0)
 
 Array = NDArray[np.float64]
@@ -33,9 +30,9 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Model:
-    """One model: a file of pybullet_data, or a primitive of trimesh by its name; scale: its own URDF's, or to metres.
+    """One model: a file of pybullet_data, or a primitive of trimesh by its name; scale: that of its own URDF, or to metres.
 
-    hull: its surface is not closed. rolls: it may roll a little once it is let go, and has no upright.
+    hull: its surface is not closed, and its convex hull is used. rolls: it has no upright pose, and may roll when released.
     """
 
     name: str
@@ -70,7 +67,7 @@ MODELS = (
 
 
 def primitive(name: str) -> "Trimesh":
-    """A primitive of trimesh, given by its name with its sizes."""
+    """The primitive of trimesh with this name."""
     from trimesh import creation
 
     made: dict[str, Callable[[], Any]] = {
@@ -83,8 +80,8 @@ def primitive(name: str) -> "Trimesh":
     return cast("Trimesh", made[name]())
 
 
-def written(model: Model, folder: Path) -> PartFields:
-    """The model's file in `folder`, and the fields of a part of it that stands as it comes to rest in physics."""
+def part_of_model(model: Model, folder: Path) -> PartFields:
+    """The fields of a part of the model, which stands as it comes to rest in physics; its file is written to `folder`."""
     if model.file is None:
         name = f"{model.name}.stl"
         primitive(model.name).export(folder / name)
@@ -100,19 +97,19 @@ def written(model: Model, folder: Path) -> PartFields:
         "friction": FRICTION,
     }
     first = PartFields.model_validate({**fields, "scale": _fitting(folder / name, model.scale)})
-    stands = at_rest(first.model_copy(update={"stands": _stable(first, folder)}), folder)
+    stands = rest_pose(first.model_copy(update={"stands": _stable(first, folder)}), folder)
     return first.model_copy(update={"stands": stands})
 
 
 def _models() -> Path:
-    found = find_spec("pybullet_data")  # its folder is enough: it is not imported
-    if found is None or not found.submodule_search_locations:
-        raise WorkFailed("PyBullet's models are not there: install pybullet again")
-    return Path(found.submodule_search_locations[0])
+    package = find_spec("pybullet_data")  # only its folder is used
+    if package is None or not package.submodule_search_locations:
+        raise WorkFailed("pybullet_data, the folder of PyBullet's models, is missing: install pybullet again")
+    return Path(package.submodule_search_locations[0])
 
 
 def _fitting(path: Path, own: float) -> float:
-    """The model's own scale where that is of graspable size, else one of two digits that is."""
+    """The model's own scale if that gives a graspable size, else one with two digits that does."""
     import trimesh
 
     middle = sorted(trimesh.load_mesh(path).extents)[1]
@@ -120,7 +117,7 @@ def _fitting(path: Path, own: float) -> float:
 
 
 def _stable(part: PartFields, folder: Path) -> tuple[float, float]:
-    """Roll and pitch [rad] of the most likely way to lie on a plane."""
+    """Roll and pitch [rad] of the most likely stable pose on a plane."""
     import trimesh
 
     hull = trimesh.Trimesh(shape_of(part, folder).hull).convex_hull
@@ -128,8 +125,8 @@ def _stable(part: PartFields, folder: Path) -> tuple[float, float]:
     return roll_and_pitch(poses[int(np.argmax(chances))][:3, :3])
 
 
-def at_rest(part: PartFields, folder: Path) -> tuple[float, float]:
-    """The roll and pitch [rad] at which a part comes to rest when it is set down on a plane as it `stands`."""
+def rest_pose(part: PartFields, folder: Path) -> tuple[float, float]:
+    """The roll and pitch [rad] at which a part comes to rest after it is set down on a plane as its field `stands` says."""
     shape = shape_of(part, folder)
     with World() as world:
         world.box("floor", (1, 1, 0.02), (0, 0, -0.01), TABLE_RGBA)
@@ -142,6 +139,6 @@ def at_rest(part: PartFields, folder: Path) -> tuple[float, float]:
 
 
 def roll_and_pitch(turn: Array) -> tuple[float, float]:
-    """Of a turn (3, 3) by roll, pitch, then yaw, its roll and pitch [rad]."""
+    """The roll and pitch [rad] of a rotation matrix (3, 3) by roll, then pitch, then yaw."""
     roll, pitch = atan2(turn[2, 1], turn[2, 2]), -asin(float(np.clip(turn[2, 0], -1, 1)))
     return round(roll, 6) + 0.0, round(pitch, 6) + 0.0

@@ -24,13 +24,13 @@ from lab.tasks.part_fields import PartFields
 from lab.tasks.robot_fields import RobotSettings
 from lab.tasks.task import Task, part_name
 from lab.tasks.task_file import load
-from lab_studies.comparisons.grip_models import MODELS, written
+from lab_studies.comparisons.grip_models import MODELS, part_of_model
 
-CARRY_M, OVER_M = 0.5, 0.15  # how far a part is carried, and how high above where it is held
-NEAR_M, ROLLED_M = 0.015, 0.030  # off its place at the most; of what rolls
-REST_STEPS = 240  # of physics after the fingers opened
-SLOW = 0.6  # of the speed, near a part: as skills have it
-HEADINGS = 72  # of the widths that a picture shows, over half a turn
+CARRY_M, OVER_M = 0.5, 0.15  # how far a part is carried, and how high it is lifted
+NEAR_M, ROLLED_M = 0.015, 0.030  # the largest distance from its place at the end; for what rolls
+REST_STEPS = 240  # of physics after the fingers have opened
+SLOW = 0.6  # the share of the speed near a part, as in skills
+HEADINGS = 72  # the headings over half a turn at which a width is measured
 
 ARM = RobotSettings(model="up6", start="to")
 TASK = """
@@ -69,7 +69,7 @@ Place = tuple[float, float, float]  # x, y [m], yaw [rad]
 
 @dataclass(frozen=True)
 class Setting:
-    """A number of poses of a model, given by its name, drawn from a seed."""
+    """A model by its name, the number of its random poses, and their seed."""
 
     model: str
     poses: int
@@ -80,8 +80,8 @@ class Setting:
 class Outcome:
     """The results of a model's poses.
 
-    refused: why it is not graspable, in the words that a task file's user reads. failures: of each pose, "" where it worked.
-    edges_m: its extents as it stands. widths_m: across HEADINGS headings over half a turn, of the whole part.
+    refused: the error of its task if it is not graspable, else "". failures: why each pose failed, "" if it did not.
+    edges_m: the extents of the model as it stands. widths_m: its widths at HEADINGS headings over half a turn.
     """
 
     refused: str
@@ -92,25 +92,25 @@ class Outcome:
     grip: Grip | None
 
 
-def tried(setting: Setting) -> Outcome:
+def model_outcome(setting: Setting) -> Outcome:
     """The outcome of a model in all its poses; without poses if its grip is rejected."""
-    model = next(one for one in MODELS if one.name == setting.model)
+    model = next(known for known in MODELS if known.name == setting.model)
     rng = np.random.default_rng([setting.seed, MODELS.index(model)])
     with TemporaryDirectory(prefix="lab-grips-") as name:
         folder = Path(name)
-        part = written(model, folder)
-        edges, widths = measured(part, folder)
+        part = part_of_model(model, folder)
+        edges, widths = edges_and_widths(part, folder)
         try:
             tasks = [_task(part, folder, rng) for _ in range(setting.poses)]
             grip = kinds_of(tasks[0], arm_of(ARM).gripper)[part.name].grip
         except BadInput as error:
             return Outcome(str(error), (), (), edges, widths, None)
-        found = [carried(task, model.rolls) for task in tasks]
-        return Outcome("", tuple(why for why, _ in found), tuple(off for _, off in found), edges, widths, grip)
+        trials = [carrying_trial(task, model.rolls) for task in tasks]
+        return Outcome("", tuple(why for why, _ in trials), tuple(off for _, off in trials), edges, widths, grip)
 
 
-def measured(part: PartFields, folder: Path) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """A part's extents as it stands (3,), and its widths across HEADINGS headings [m]."""
+def edges_and_widths(part: PartFields, folder: Path) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """A part's extents as it stands (3,), and its widths (HEADINGS,) over half a turn [m]."""
     shape = shape_of(part, folder)
     yaws = np.arange(HEADINGS) * pi / HEADINGS
     across = shape.hull[:, :2] @ np.stack([-np.sin(yaws), np.cos(yaws)])
@@ -118,8 +118,8 @@ def measured(part: PartFields, folder: Path) -> tuple[tuple[float, ...], tuple[f
 
 
 def _task(part: PartFields, folder: Path, rng: np.random.Generator) -> Task:
-    """The task of carrying it from one drawn place to another, both within the arm's reach, turned anyhow."""
-    begin, end = drawn(rng)
+    """The task of carrying a part between two random places with random yaws, both within the arm's reach."""
+    begin, end = random_places(rng)
     write_whole(folder / "grips.toml", _text(part, begin, end).encode())
     return load(str(folder / "grips.toml"))
 
@@ -129,18 +129,18 @@ def _text(part: PartFields, begin: Place, end: Place) -> str:
     return TASK.format(**fields, arm=ARM.model, begin=begin, end=end)
 
 
-def drawn(rng: np.random.Generator) -> tuple[Place, Place]:
-    """Two places CARRY_M apart, x, y [m] and yaw [rad] each, 0.5 to 1.05 m from the arm's axis and ahead of it."""
+def random_places(rng: np.random.Generator) -> tuple[Place, Place]:
+    """Two random places CARRY_M apart, 0.5 to 1.05 m from the arm's axis and ahead of it."""
     while True:
         x, y = float(rng.uniform(0.35, 0.9)), float(rng.uniform(-0.6, 0.6))
-        way, yaw, turn = (float(one) for one in rng.uniform([-pi, -pi, -pi / 2], [pi, pi, pi / 2]))
+        way, yaw, turn = (float(number) for number in rng.uniform([-pi, -pi, -pi / 2], [pi, pi, pi / 2]))
         there = x + CARRY_M * cos(way), y + CARRY_M * sin(way)
         if all(0.5 < hypot(*at) < 1.05 and at[0] > 0.3 for at in ((x, y), there)):
             return (x, y, yaw), (*there, yaw + turn)
 
 
-def carried(task: Task, rolls: bool) -> tuple[str, float]:
-    """Take the part, carry it, set it down: "" or why that failed, and how far off its place it is at the end [m]."""
+def carrying_trial(task: Task, rolls: bool) -> tuple[str, float]:
+    """Carry the part of a task; return why that failed, or "", and its distance [m] from its place at the end."""
     with World() as world:
         kind = task.parts[0].name
         bench = Bench(Scene(world, task, (kind,), Layout((), (NOT_OFF,))))
@@ -152,9 +152,9 @@ def carried(task: Task, rolls: bool) -> tuple[str, float]:
                 world.step()
         except WorkFailed as error:
             return str(error), float("nan")
-        wanted = bench.scene.kind_of[body].held_at(_goal(bench))
-        at = bench.part_pose(body, wanted.yaw)
-        off = hypot(at.x - wanted.x, at.y - wanted.y)
+        goal = bench.scene.kind_of[body].held_at(_goal(bench))
+        at = bench.part_pose(body, goal.yaw)
+        off = hypot(at.x - goal.x, at.y - goal.y)
         if not rolls and bench.upright(body) <= UPRIGHT:
             return "it fell over", off
         return ("" if off <= (ROLLED_M if rolls else NEAR_M) else f"it is {off:.3f} m off its place"), off
@@ -174,12 +174,12 @@ def _motion(bench: Bench, body: str) -> Iterator[None]:
     yield from robot.follow([ToolPose(goal.x, goal.y, high, goal.yaw)], slow=SLOW)
     bench.held = body
     if not bench.holds(body):
-        raise WorkFailed("it is not in the gripper when that has risen")
+        raise WorkFailed("it is not in the gripper after lifting")
     spot = _goal(bench)
     above = bench.scene.kind_of[body].held_at(spot)
     yield from robot.follow([ToolPose(above.x, above.y, high, above.yaw)])
     if not bench.holds(body):
-        raise WorkFailed("it was lost on the way")
+        raise WorkFailed("the gripper lost it on the way")
     let = release_pose(bench, body, spot)
     yield from robot.follow([let], slow=SLOW)
     yield from let_go(bench, [ToolPose(let.x, let.y, high, let.yaw)])

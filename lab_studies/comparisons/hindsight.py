@@ -9,7 +9,7 @@ from lab.sequencing.cell.stations import Begins, Product, Stage
 from lab.sequencing.methods.cp_sat import cp_sat
 from lab.sequencing.methods.exact import optimum
 
-SECONDS = 10.0  # of CP-SAT for an episode; small cells take less
+SECONDS = 10.0  # CP-SAT's for an episode; small cells need less
 
 
 @dataclass(frozen=True)
@@ -21,23 +21,23 @@ class Hindsight:
 
 
 def in_hindsight(cell: Cell, times: Episode, max_expanded: int = 20_000) -> Hindsight:
-    """The shortest makespan of a cell in this episode: of one robot by states (`optimum`), else by CP-SAT, within SECONDS.
+    """The shortest makespan of a cell in an episode, or a bound: by A* for one robot (`optimum`), else by CP-SAT.
 
-    That robots break down is left out, so that it is then a bound. WorkFailed where there is none.
+    Breakdowns of robots are left out, so that the makespan is then a bound. Raises WorkFailed if there is none.
     """
     known, whole = known_cell(cell, times), not times.chance.robot_breaks_every_s
     if cell.serial:
-        found = optimum(known, max_expanded)
-        return Hindsight(found.bound_s, found.proven and whole)
+        proof = optimum(known, max_expanded)
+        return Hindsight(proof.bound_s, proof.proven and whole)
     best = cp_sat(known, time_limit_s=SECONDS)
-    rounding_s = 2.0 * known.possible_moves * best.rounded_s  # of which times it is a bound
+    rounding_s = 2.0 * known.possible_moves * best.rounded_s  # the bound is one of rounded times
     return Hindsight(max(0.0, best.bound - rounding_s), best.status == "optimal" and whole)
 
 
 def known_cell(cell: Cell, times: Episode) -> Cell:
-    """The cell of an episode: each part a product of its own, which takes as long as it does there.
+    """The cell of an episode: each part is a product of its own with its times, and arrives when it does in the episode.
 
-    Where parts arrive after one another it is as the episode has it, too. WorkFailed for a cell whose parts are under way.
+    Raises WorkFailed for a cell whose parts are already under way.
     """
     if cell.begin_at != cell.starts:
         raise WorkFailed("hindsight: some parts are under way")
@@ -55,7 +55,7 @@ def known_cell(cell: Cell, times: Episode) -> Cell:
 
 
 def _as_drawn(cell: Cell, times: Episode, part: int) -> Product:
-    product = next(one for one in cell.products if one.name == cell.order[part - 1])
+    product = next(known for known in cell.products if known.name == cell.order[part - 1])
     number = cell.positions[cell.starts[part - 1]].product
     working = {station.name for station in cell.stations if station.kind == "machine"}
     # The positions in which work begins stand in the order of the routes and their stages.

@@ -20,17 +20,17 @@ from lab_studies.thesis.chapter_9_sessions import learned_table, world
 SESSIONS = 500
 ABOUT = (
     "{} sessions of 200 episodes in world I, one process on one core, median of five runs; compile time is not counted. "
-    "The kernel walks many sessions side by side, so a few of them leave it half empty; 'c scalar' does one after the other, "
-    "'c lanes' one in each SIMD lane of the processor, in single precision. Rivals run at most 500 sessions, the tutorial "
-    "loop 5: their figure is a rate."
+    "The kernel runs many sessions side by side, so that a few of them leave it half empty; 'c scalar' runs one after the "
+    "other, 'c lanes' one in each SIMD lane of the processor, in single precision. Rivals run at most 500 sessions, the "
+    "tutorial loop 5, as their figure is a rate."
 )
-FEW = {"gymnasium tutorial loop": 5}  # sessions of a rival so slow that its rate shows with few
+FEW = {"gymnasium tutorial loop": 5}  # the sessions of a rival so slow that few show its rate
 REPEATS = 5
 GATES = (GateSettings("ccrl", omega=1), GateSettings("ia"), GateSettings("combined", omega=1))
 
 
 def speed(job: Job, reading: Mapping[str, Any]) -> Findings:
-    """Million environment steps a second in world I, median of five runs; the reading changes nothing here."""
+    """The speeds in world I [million environment steps per second], median of five runs; the reading has no effect."""
     place = world("world-1")
     mdp, learner = place.mdp(), place.learner
     advice = Advice.of(advice_chances(learned_table(place), 0.1))
@@ -43,7 +43,7 @@ def speed(job: Job, reading: Mapping[str, Any]) -> Findings:
         return Measured(moves, time.perf_counter() - began)
 
     def against(name: str) -> Row | str:
-        """The row of a rival, or why there is none."""
+        """The row of a rival, or the reason why there is none."""
         sessions = min(FEW.get(name, SESSIONS), job.sessions)
         try:
             return _row(name, lambda: RIVALS[name](mdp, learner, sessions, job.seed))
@@ -51,11 +51,11 @@ def speed(job: Job, reading: Mapping[str, Any]) -> Findings:
             return f"{name}: not measured: {error}"
 
     rows = [_row("kernel", partial(learned, GateSettings("never"))), _row("kernel gated", partial(learned, *GATES))]
-    found = job.in_turn([partial(against, name) for name in RIVALS])
-    rivals = [one for one in found if not isinstance(one, str)]
-    fastest = max((one["value"] for one in rivals), default=inf)
+    measured = job.in_turn([partial(against, name) for name in RIVALS])
+    rivals = [result for result in measured if not isinstance(result, str)]
+    fastest = max((row["value"] for row in rivals), default=inf)
     lanes = those(rivals, name=C_LANES)
-    missing = [one for one in found if isinstance(one, str)]
+    missing = [result for result in measured if isinstance(result, str)]
     summary = agreement(rows + rivals) | {
         "kernel to the fastest rival": round(rows[0]["value"] / fastest, 2) if rivals else None,
         "kernel to C lanes": round(rows[0]["value"] / lanes[0]["value"], 2) if lanes else None,
@@ -65,5 +65,5 @@ def speed(job: Job, reading: Mapping[str, Any]) -> Findings:
 
 def _row(name: str, run: Callable[[], Measured]) -> Row:
     run()  # compiles
-    rates = [found.moves / found.seconds / 1e6 for found in (run() for _ in range(REPEATS))]
+    rates = [measured.moves / measured.seconds / 1e6 for measured in (run() for _ in range(REPEATS))]
     return median_row({"name": name, "world": "world-1"}, "speed_million steps per s", rates)

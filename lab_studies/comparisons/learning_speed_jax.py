@@ -12,14 +12,14 @@ import numpy as np
 
 from lab.learning.settings import LearnerSettings
 from lab.mdp import TabularMDP
-from lab_studies.comparisons.learning_speed_session import MOVES, Measured, Missing, Session, session_of, shared_out
+from lab_studies.comparisons.learning_speed_session import MOVES, Measured, Missing, Session, batch_sizes, session_of
 
-LANES = 500  # the tables of more do not stay in the cache
-FEWEST_LANES = 64  # fewer are not worth a program of their own
+LANES = 500  # sessions side by side; the tables of more do not stay in the cache
+FEWEST_LANES = 64  # fewer lanes are not halved again
 
 
 def jax_lock_step(mdp: TabularMDP, settings: LearnerSettings, sessions: int, seed: int) -> Measured:
-    """All sessions side by side in one compiled jax program, in a process of its own, so that it has one thread."""
+    """The measurement of sessions side by side in a compiled jax program, in a process of its own with one thread."""
     job = session_of(mdp, settings, sessions)
     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
         try:
@@ -35,7 +35,7 @@ def _measure_jax(job: Session, sessions: int, seed: int) -> Measured:
     except ImportError as error:
         raise Missing(f"jax cannot be imported: {error}") from None
     rng = np.random.default_rng(seed)
-    streams = [rng.integers(0, 2**64, lanes, np.uint64) for lanes in shared_out(sessions, LANES)]
+    streams = [rng.integers(0, 2**64, lanes, np.uint64) for lanes in batch_sizes(sessions, LANES)]
     sizes = {len(stream): stream for stream in streams}
     programs = {lanes: jax.jit(_jax_program(job, lanes)).lower(stream).compile() for lanes, stream in sizes.items()}
     began = perf_counter()
@@ -46,7 +46,7 @@ def _measure_jax(job: Session, sessions: int, seed: int) -> Measured:
 
 
 def _jax_program(job: Session, lanes: int) -> Callable[[Any], tuple[Any, Any]]:
-    """(streams of random numbers) -> (moves, won sessions); half of the lanes are dropped when half are over."""
+    """The program (streams of random numbers) -> (moves, won sessions); lanes are halved when half of them are over."""
     import jax.numpy as jnp  # type: ignore[import-not-found, unused-ignore]
     from jax import lax  # type: ignore[import-not-found, unused-ignore]
 
@@ -68,7 +68,7 @@ def _jax_program(job: Session, lanes: int) -> Callable[[Any], tuple[Any, Any]]:
 
 
 def _jax_step(job: Session) -> Callable[[Any], Any]:
-    """One move of each lane; where an episode is over, its end instead: then one scatter does for both."""
+    """The step of all lanes: a move, or the end of an episode that is over, so that one scatter serves both."""
     import jax.numpy as jnp  # type: ignore[import-not-found, unused-ignore]
 
     known: dict[str, Any] = {"mode": "promise_in_bounds"}
@@ -105,7 +105,7 @@ def _jax_step(job: Session) -> Callable[[Any], Any]:
 
 
 def _mixed(z: Any) -> Any:
-    """The scrambling of splitmix64; z uint64."""
+    """The output function of splitmix64 of z, uint64."""
     z = (z ^ (z >> 30)) * np.uint64(0xBF58476D1CE4E5B9)
     z = (z ^ (z >> 27)) * np.uint64(0x94D049BB133111EB)
     return z ^ (z >> 31)

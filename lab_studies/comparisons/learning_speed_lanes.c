@@ -1,8 +1,8 @@
 /* The rival "c lanes": as learning_speed_rival.c, with a session in each SIMD lane: sixteen with AVX-512, eight with AVX2.
 
-   GROUPS vectors of lanes walk in turn, so that the loads of one hide behind the arithmetic of the other. A lane whose
-   session is over takes the next one. Values are single precision, as exact as success percentages can tell. States are
-   numbered so that those from `live` on end an episode: whether one does is a comparison, not a load. */
+   GROUPS vectors of lanes move in turn, so that the loads of one overlap with the arithmetic of the other. A lane whose
+   session is over takes the next one. Values are single precision, which is enough for success percentages. States are
+   numbered so that those from `live` on end an episode, which is checked by a comparison instead of a load. */
 
 #include <immintrin.h>
 #include <stdint.h>
@@ -88,7 +88,7 @@ typedef union {
     float each[LANES];
 } Reals;
 
-/* Some sessions side by side; base: where each one's table begins, old: the value of the state that it is in. */
+/* Some sessions side by side; base: the begin of each one's table, old: the value of its state. */
 typedef struct {
     Wholes base, state, made;
     Reals old, sharpness;
@@ -106,7 +106,7 @@ static inline reals uniform(wholes s[4])
     return TO_REALS(RIGHT(sum, 8)) * ALL(0x1p-24f);
 }
 
-/* 2**x for x <= 0, off by less than 3e-7 of it; no less than 2**-126. */
+/* 2**x for x <= 0 with a relative error below 3e-7, at least 2**-126. */
 static inline reals power_of_two(reals x)
 {
     const reals rounder = ALL(0x1.8p23f); /* adding it leaves the nearest whole number in the lowest bits */
@@ -123,7 +123,7 @@ typedef struct {
     reals loss, gamma, alpha;
 } Rules;
 
-/* One move of each lane, its learning included; the lanes whose episode is over, as bits. */
+/* Makes one move of each lane, and learns from it; returns the lanes whose episode is over, as bits. */
 static inline uint32_t walk(Group *g, const Rules *rules, float *value)
 {
     wholes near[MOVES];
@@ -148,7 +148,7 @@ static inline uint32_t walk(Group *g, const Rules *rules, float *value)
     }
     const reals learned = g->old.all + rules->alpha * (rules->loss + rules->gamma * onward - g->old.all);
     SCATTER(value, ADD(g->state.all, g->base.all), learned);
-    g->old.all = SELECT(EQUAL(entered, g->state.all), learned, onward); /* where a move stays, what was learned is its value */
+    g->old.all = SELECT(EQUAL(entered, g->state.all), learned, onward); /* a move that stays meets the learned value */
     g->state.all = entered, g->made.all = ADD(g->made.all, ALL_WHOLE(1));
     const mask ends = MORE_WHOLE(entered, ALL_WHOLE(rules->live - 1));
     return BITS(EITHER(ends, MORE_WHOLE(g->made.all, ALL_WHOLE(rules->max_moves - 1))));
@@ -191,7 +191,7 @@ int64_t learn(int64_t states, const int32_t *near, int64_t live, const float *ar
                 moves += goes * *made;
                 if (++g->episode[lane] == episodes) {
                     over += goes, *won += goes && goal[*state] && *made == optimal;
-                    g->going &= ~((uint32_t)(begun >= sessions) << lane); /* without a session the lane walks on unseen */
+                    g->going &= ~((uint32_t)(begun >= sessions) << lane); /* a lane without a session walks on, uncounted */
                     begun += begun < sessions;
                     memset(table, 0, sizeof *table * (size_t)states);
                     g->episode[lane] = 0;

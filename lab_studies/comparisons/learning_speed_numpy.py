@@ -9,26 +9,26 @@ from numpy.typing import NDArray
 
 from lab.learning.settings import LearnerSettings
 from lab.mdp import FloatArray, TabularMDP
-from lab_studies.comparisons.learning_speed_session import MOVES, Measured, Session, session_of, shared_out
+from lab_studies.comparisons.learning_speed_session import MOVES, Measured, Session, batch_sizes, session_of
 
-LANES = 2000  # sessions side by side: more of them share the price of a call
-BLOCK = 64  # moves after which sessions that are over leave
+LANES = 2000  # sessions side by side, which share the cost of a call
+BLOCK = 64  # moves after which finished sessions are removed
 
 Index = NDArray[np.intp]
 
 
 def numpy_lock_step(mdp: TabularMDP, settings: LearnerSettings, sessions: int, seed: int) -> Measured:
-    """All sessions side by side in numpy arrays, one move of each at a time; a session is reset as its episode ends."""
+    """The measurement of sessions side by side in numpy arrays, one move of each at a time."""
     session, rng = session_of(mdp, settings, sessions), np.random.default_rng(seed)
     began = perf_counter()
-    batches = [_batch(session, lanes, rng) for lanes in shared_out(sessions, LANES)]
+    batches = [_batch(session, lanes, rng) for lanes in batch_sizes(sessions, LANES)]
     seconds = perf_counter() - began
     return Measured(sum(moves for moves, _ in batches), seconds, 100.0 * sum(won for _, won in batches) / sessions)
 
 
 @dataclass(eq=False)
 class _Lanes:
-    """Sessions under way, (n,) each: where their rows of the table begin, their state, episode, and when that began."""
+    """Sessions under way, (n,) each: the begin of their table, their state, their episode, and the move that it began at."""
 
     base: Index
     state: Index
@@ -37,12 +37,12 @@ class _Lanes:
     sharpness: FloatArray
 
     def those(self, going: NDArray[np.bool_]) -> "_Lanes":
-        """The sessions that go on."""
+        """The sessions that are chosen."""
         return _Lanes(*(column[going] for column in vars(self).values()))
 
 
 class _Move:
-    """One move of all lanes, in arrays that are made once for a block."""
+    """A move of all lanes, with arrays that are made once for a block."""
 
     def __init__(self, session: Session, lanes: _Lanes, table: FloatArray) -> None:
         n = len(lanes.state)
@@ -56,7 +56,7 @@ class _Move:
         self._beyond, self._action = np.empty((MOVES - 1, n), np.bool_), np.empty(n, np.int8)
 
     def __call__(self, mark: FloatArray) -> Index:
-        """What each lane enters, as a place in the table (n,), by a uniform number each, which is used up."""
+        """The place in the table that each lane enters (n,), by a uniform number each; `mark` is overwritten."""
         lanes, near, value, weight = self._lanes, self._near, self._value, self._weight
         np.take(self._neighbours, lanes.state, axis=1, out=near, mode="clip")
         np.add(near, lanes.base, out=near)
@@ -91,11 +91,11 @@ class _Move:
 
 
 def _batch(session: Session, n: int, rng: np.random.Generator) -> tuple[int, int]:
-    """The moves and the won sessions of n lanes. A session that is over walks on unseen until the end of the block."""
+    """The moves and the won sessions of n lanes. A finished session walks on, uncounted, until the end of the block."""
     sharpness = np.pad(session.sharpness, (0, BLOCK), "edge")
     table, zeros = np.zeros(n * session.states), np.zeros(n, np.intp)
     lanes = _Lanes(np.arange(n) * session.states, zeros + session.start, zeros, zeros.copy(), zeros + sharpness[0])
-    now = oldest = moves = won = 0  # oldest: no episode under way began before
+    now = oldest = moves = won = 0  # oldest: the earliest begin of an episode under way
     while len(lanes.state):
         move = _Move(session, lanes, table)
         for mark in rng.random((BLOCK, len(lanes.state))):

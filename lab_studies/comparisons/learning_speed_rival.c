@@ -1,10 +1,10 @@
 /* The rival "c scalar": whole sessions one after another, compiled by learning_speed_rivals.py and called through ctypes.
-   One session walks at a time; the compiler may put its eight exponentials side by side. */
+   The compiler may compute the eight exponentials of a move side by side. */
 
 #include <stdint.h>
 #include <string.h>
 
-enum { MOVES = 6, PADDED = 8 }; /* the last move stands thrice in a row of `near`, so that a loop over it has no rest */
+enum { MOVES = 6, PADDED = 8 }; /* a row of `near` repeats the last move twice, so that vectors of eight fit it */
 
 /* xoshiro256+ by Blackman and Vigna, 53 bits of it as a number in [0, 1). */
 static inline double uniform(uint64_t s[4])
@@ -15,7 +15,7 @@ static inline double uniform(uint64_t s[4])
     return (double)(sum >> 11) * 0x1p-53;
 }
 
-/* exp(x) for x <= 0, off by less than 1e-13; no less than exp(-700). Without branches, unlike the library's. */
+/* exp(x) for x <= 0 with an error below 1e-13, at least exp(-700). It has no branches, unlike the library's. */
 static inline double exp_of(double x)
 {
     const double rounder = 0x1.8p52; /* adding it leaves the nearest whole number in the lowest bits */

@@ -1,8 +1,8 @@
-"""The rivals of the speed benchmark: the same session in other technologies, each written to be as fast as we can.
+"""The rivals of the speed benchmark: the same session in other technologies, each written as fast as we can.
 
-All learn as the thesis's listing does (App. VII), alone: a value for each state, zero at first; at s the softmax over
-loss + gamma V(s') of the six neighbours, temperature n**-beta in episode n; then V(s) += alpha (loss + gamma V(s') -
-V(s)), and a terminal state gets its own value when it is entered. Each runs on one core; compiling is not counted.
+All learn alone as in the thesis's listing (App. VII): states have values, zero at first; a move is drawn at s by the softmax
+over loss + gamma V(s') of the six neighbours with temperature n**-beta in episode n; then V(s) += alpha (loss + gamma V(s')
+- V(s)), and a terminal state gets its own value when it is entered. Each runs on one core; compiling is not counted.
 """
 
 import ctypes
@@ -27,11 +27,11 @@ if TYPE_CHECKING:
 
 SCALAR_SOURCE, LANES_SOURCE = "learning_speed_rival.c", "learning_speed_lanes.c"
 C_FLAGS = ("-O3", "-march=native", "-shared", "-fPIC")
-C_LANES, MOST_LANES = "c lanes", 32  # sessions side by side there: two vectors of sixteen
+C_LANES, MOST_LANES = "c lanes", 32  # its sessions side by side: two vectors of sixteen
 
 
 def gymnasium_loop(mdp: TabularMDP, settings: LearnerSettings, sessions: int, seed: int) -> Measured:
-    """The loop of the tutorials: a Gymnasium environment without wrappers, a numpy table, one session after another."""
+    """The measurement of the tutorials' loop: a Gymnasium environment without wrappers, a numpy table, a session at a time."""
     job, rng = session_of(mdp, settings, sessions), np.random.default_rng(seed)
     env = _gymnasium_world(job)
     began = perf_counter()
@@ -49,7 +49,7 @@ def _gymnasium_world(job: Session) -> "Env[int, int]":
     arrival: list[float] = job.arrival.tolist()
 
     class World(Env[int, int]):
-        """The problem, a state being an observation."""
+        """The problem as an environment whose observations are its states."""
 
         observation_space: Any = Discrete(job.states)
         action_space: Any = Discrete(MOVES)
@@ -91,7 +91,7 @@ def _tutorial_session(env: "Env[int, int]", job: Session, rng: np.random.Generat
 
 
 def c_scalar(mdp: TabularMDP, settings: LearnerSettings, sessions: int, seed: int) -> Measured:
-    """One session after another in C (learning_speed_rival.c), compiled for this very processor."""
+    """The measurement of one session after another in C (learning_speed_rival.c), compiled for this processor."""
     job, rng = session_of(mdp, settings, sessions), np.random.default_rng(seed)
     learn = _compiled(SCALAR_SOURCE, np.uint16, np.float64, np.uint64)
     near = np.pad(job.successor, ((0, 0), (0, 2)), "edge").astype(np.uint16)
@@ -106,7 +106,7 @@ def c_scalar(mdp: TabularMDP, settings: LearnerSettings, sessions: int, seed: in
 
 
 def c_lanes(mdp: TabularMDP, settings: LearnerSettings, sessions: int, seed: int) -> Measured:
-    """A session in each SIMD lane in C (learning_speed_lanes.c), compiled for this very processor."""
+    """The measurement of a session in each SIMD lane in C (learning_speed_lanes.c), compiled for this processor."""
     job, rng = session_of(mdp, settings, sessions), np.random.default_rng(seed)
     learn = _compiled(LANES_SOURCE, np.int32, np.float32, np.uint32)
     order = np.argsort(job.terminal, kind="stable")  # states that end an episode come last
@@ -128,24 +128,24 @@ def c_lanes(mdp: TabularMDP, settings: LearnerSettings, sessions: int, seed: int
 
 
 def _compiled(source: str, near: type, real: type, seed: type) -> Any:
-    """The function `learn` of a C file beside this one; the types of its neighbours, its reals and its seeds."""
+    """The function `learn` of a C file in this folder. near, real, seed: the types of its neighbours, reals and seeds."""
     compiler = which("cc")
     if compiler is None:
         raise Missing("no C compiler: `cc` is not on the path")
     learn = _library(source, compiler, C_FLAGS).learn
     array: Any = np.ctypeslib.ndpointer
-    whole, one = ctypes.c_int64, ctypes.c_float if real is np.float32 else ctypes.c_double
-    live = [whole] if source == LANES_SOURCE else []
-    rules = (whole, one, one, one, whole, array(real), whole, whole)
-    learned = (whole, array(seed), array(real), ctypes.POINTER(whole))
-    learn.argtypes = (whole, array(near), *live, array(real), array(np.uint8), *rules, *learned)
-    learn.restype = whole
+    whole_type, real_type = ctypes.c_int64, ctypes.c_float if real is np.float32 else ctypes.c_double
+    live = [whole_type] if source == LANES_SOURCE else []
+    rules = (whole_type, real_type, real_type, real_type, whole_type, array(real), whole_type, whole_type)
+    learned = (whole_type, array(seed), array(real), ctypes.POINTER(whole_type))
+    learn.argtypes = (whole_type, array(near), *live, array(real), array(np.uint8), *rules, *learned)
+    learn.restype = whole_type
     return learn
 
 
 @cache
 def _library(source: str, compiler: str, flags: tuple[str, ...]) -> ctypes.CDLL:
-    """A C file compiled, once in a process."""
+    """The library of a C file, compiled once in a process. Raises Missing if it cannot be compiled or loaded."""
     with TemporaryDirectory() as folder:
         library = Path(folder, "rival.so")
         command = [compiler, *flags, str(Path(__file__).with_name(source)), "-o", str(library)]
@@ -159,7 +159,7 @@ def _library(source: str, compiler: str, flags: tuple[str, ...]) -> ctypes.CDLL:
 
 
 def _reason(stderr: str) -> str:
-    """The first line of a compiler that says why; else its first."""
+    """The first line of a compiler's output with an error, else its first line."""
     lines = stderr.strip().splitlines() or ["no reason"]
     return next((line for line in lines if "error" in line), lines[0])
 

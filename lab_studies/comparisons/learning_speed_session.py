@@ -1,4 +1,4 @@
-"""What rivals of the speed benchmark learn: one kind of session as plain arrays and numbers, and what it came to."""
+"""The session that rivals of the speed benchmark learn, as plain arrays and numbers, and its measured results."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -16,12 +16,12 @@ MOST_STATES = 2**16
 
 
 class Missing(LabError):
-    """The rival cannot run on this computer; the message says why."""
+    """Raised when a rival cannot run on this computer; the message says why."""
 
 
 @dataclass(frozen=True)
 class Measured:
-    """All moves of the sessions, the seconds that learning them took, and the sessions that ended on a shortest way."""
+    """The moves of all sessions, the seconds that they took, and the share of sessions that ended on a shortest path [%]."""
 
     moves: int
     seconds: float
@@ -49,14 +49,17 @@ class Session:
 
     @property
     def states(self) -> int:
+        """The number of states."""
         return len(self.successor)
 
     @property
     def episodes(self) -> int:
+        """The number of episodes."""
         return len(self.sharpness)
 
 
 def session_of(mdp: TabularMDP, settings: LearnerSettings, sessions: int) -> Session:
+    """The session of a problem and settings. Raises BadInput for a problem that rivals do not learn, and for no sessions."""
     if mdp.n_actions != MOVES or mdp.n_states > MOST_STATES or mdp.starts:
         raise BadInput(
             f"a problem of {mdp.n_states} states, {mdp.n_actions} actions and {len(mdp.starts) or 1} starts: rivals learn "
@@ -80,6 +83,6 @@ def session_of(mdp: TabularMDP, settings: LearnerSettings, sessions: int) -> Ses
     )
 
 
-def shared_out(sessions: int, most: int) -> list[int]:
-    """So many sessions shared out, at most so many at once."""
+def batch_sizes(sessions: int, most: int) -> list[int]:
+    """The sizes of the batches of so many sessions, at most `most` in each."""
     return [min(most, sessions - first) for first in range(0, sessions, most)]

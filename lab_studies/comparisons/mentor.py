@@ -1,4 +1,4 @@
-"""When somebody else's policy should ask: rules of doubt beside asking by chance and asking always, at equal questions."""
+"""When somebody else's policy should ask: rules of doubt compared with asking at random, at equal numbers of questions."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -23,9 +23,9 @@ if TYPE_CHECKING:
 
 LAYOUTS = ("far-door", "lava", "crossing")
 TABLES = 5  # of an ensemble; the first one is the policy
-LEARNED = 200  # episodes: enough to know a way from the start, and less beside it
-LABELLED, TRIED = 5, 20  # episodes to calibrate with, and to be judged by
-SLIP = 0.15  # the chance that a move is another one: so it comes to where it was not
+LEARNED = 200  # episodes, enough to know a path from the start, but less about other states
+LABELLED, TRIED = 5, 20  # episodes for calibrating and for judging a rule
+SLIP = 0.15  # the chance of a random move, which leads the policy to states that it does not know
 SHARES = (0.02, 0.05, 0.1, 0.2, 0.4)
 FIXED = {
     "margin": 0.9,
@@ -33,15 +33,15 @@ FIXED = {
     "ensemble": 0.5,
     VISITS: 0.5,
     CIRCLES: 0.5,
-}  # thresholds by eye, without calibration
+}  # thresholds chosen by eye, without calibration
 CHANCE, ALWAYS, NEVER, THRESHOLD = "chance", "always", "never", "fixed threshold"
 RULES = (*FIXED, CHANCE)
 MEASURES = (
-    "A policy learned in {learned} episodes walks where a move goes wrong with chance {slip:g}; a step that it is asked about is "
-    "made as an expert says. share: of the steps that a rule was calibrated to ask about, by {labelled} episodes that nobody "
-    "helped in; chance asks that share at random; fixed threshold: visits with 0.5, not calibrated. solved_percent: episodes "
-    "that reach the goal; questions: of an episode. Rules are held against each other at equal questions: gain_percent is "
-    "the percentage above what asking by chance solves with as many questions (in between, by a straight line)."
+    "A policy learned in {learned} episodes moves where a move is random with probability {slip:g}; in a step in which it asks, "
+    "it makes the expert's move. share: the share of steps that a rule was calibrated to ask in, with {labelled} episodes "
+    "without help; chance asks that share at random; fixed threshold: visits with 0.5, not calibrated. solved_percent: episodes "
+    "that reach the goal; questions: the questions of an episode. Rules are compared at equal numbers of questions: "
+    "gain_percent is the percentage above what asking at random solves with as many questions (interpolated linearly)."
 )
 
 
@@ -53,32 +53,32 @@ class Place:
 
 
 class Taught(NamedTuple):
-    """A policy and its ensemble: tables (TABLES, S, A), the states that the first one has met."""
+    """A policy and its ensemble: tables (TABLES, S, A), and the states that the first one has met."""
 
     tables: FloatArray
     seen: list[int]
 
 
-Asks = Callable[[int | None], bool]  # whether to ask in a state; None: an episode begins
-Tally = dict[tuple[str, float], tuple[list[float], list[float]]]  # by rule and share: solved shares, questions
+Asks = Callable[[int | None], bool]  # (state) -> whether to ask in it; None: an episode begins
+Tally = dict[tuple[str, float], tuple[list[float], list[float]]]  # (rule, share) -> (shares solved, questions)
 
 
-def learned(mdp: TabularMDP, place: Any, rng: np.random.Generator) -> Taught:
-    """A policy, and others that learned the same with other chances."""
+def learned_policy(mdp: TabularMDP, place: Any, rng: np.random.Generator) -> Taught:
+    """A policy and an ensemble, which learned the same problem with different random numbers."""
     tables, seen = [], list[int]()
     learner = place.learner.__class__(**(vars(place.learner) | {"episodes": LEARNED}))
     for number, own in enumerate(rng.spawn(TABLES)):
-        one = Session(mdp, learner, GateSettings("never"), None, own).run()
-        tables.append(one.q)
+        session = Session(mdp, learner, GateSettings("never"), None, own).run()
+        tables.append(session.q)
         if number == 0:
-            seen = np.repeat(np.arange(mdp.n_states), one.visits.sum(axis=1)).tolist()
+            seen = np.repeat(np.arange(mdp.n_states), session.visits.sum(axis=1)).tolist()
     return Taught(np.array(tables), seen)
 
 
-def walked(
+def walked_episode(
     mdp: TabularMDP, place: Any, asks: Asks, policy: Any, rng: np.random.Generator
 ) -> tuple[bool, int, list[Step]]:
-    """An episode: whether it reached the goal, how often was asked, and each step with whether the policy was right."""
+    """An episode: whether it reached the goal, its questions, and its steps, each with whether the policy was right."""
     environment, best = TableEnvironment(mdp), place.values
     state, questions, steps = mdp.start, 0, list[Step]()
     asks(None)
@@ -96,26 +96,26 @@ def walked(
     return False, questions, steps
 
 
-def one_policy(where: Place, seed: int) -> Tally:
-    """Every rule with one policy."""
+def policy_tally(where: Place, seed: int) -> Tally:
+    """The tally of every rule with one policy."""
     place = problem(where.layout)
     mdp, rng = place.mdp, np.random.default_rng(seed)
-    taught = learned(mdp, place, rng)
+    taught = learned_policy(mdp, place, rng)
 
     def policy(state: int) -> int:
         return int(taught.tables[0, state].argmax())
 
     def episodes(asks: Asks, count: int) -> list[tuple[bool, int, list[Step]]]:
-        return [walked(mdp, place, asks, policy, rng) for _ in range(count)]
+        return [walked_episode(mdp, place, asks, policy, rng) for _ in range(count)]
 
     labelled = [steps for _, _, steps in episodes(lambda state: False, LABELLED)]
-    found: Tally = {}
+    tally: Tally = {}
 
     def judged(rule: str, share: float, asks: Any) -> None:
         tried = episodes(asks, TRIED)
-        solved, questions = found.setdefault((rule, share), ([], []))
-        solved.append(float(np.mean([one[0] for one in tried])))
-        questions.append(float(np.mean([one[1] for one in tried])))
+        solved, questions = tally.setdefault((rule, share), ([], []))
+        solved.append(float(np.mean([episode[0] for episode in tried])))
+        questions.append(float(np.mean([episode[1] for episode in tried])))
 
     judged(NEVER, 0.0, lambda state: False)
     judged(ALWAYS, 1.0, lambda state: True)
@@ -125,7 +125,7 @@ def one_policy(where: Place, seed: int) -> Tally:
         for rule, threshold in FIXED.items():
             watched = _watched(taught, rule, threshold).calibrate(labelled, share=share)
             judged(rule, share, _asks(watched))
-    return found
+    return tally
 
 
 def _asks(watched: Watched) -> Asks:
@@ -143,26 +143,26 @@ def _watched(taught: Taught, rule: str, threshold: float) -> Watched:
     return watch(several if rule == "ensemble" else several[0], rule, threshold=threshold, seen=taught.seen)
 
 
-def policies_of(where: Place, policies: int, seed: int) -> Tally:
-    """So many policies in a layout."""
-    found: Tally = {}
+def layout_tally(where: Place, policies: int, seed: int) -> Tally:
+    """The tally of `policies` policies in a layout."""
+    tally: Tally = {}
     for own in seeds_of(where, policies, seed):
-        for key, (solved, questions) in one_policy(where, int(own)).items():
-            both = found.setdefault(key, ([], []))
+        for key, (solved, questions) in policy_tally(where, int(own)).items():
+            both = tally.setdefault(key, ([], []))
             both[0].extend(solved)
             both[1].extend(questions)
-    return found
+    return tally
 
 
 def mentor(job: Job, reading: Mapping[str, Any]) -> Findings:
-    """Every layout; a session is a policy. Nothing is read."""
+    """The results of every layout; a session is a policy, and the reading has no effect."""
     places = [Place(layout) for layout in LAYOUTS]
-    found = job.each(partial(policies_of, policies=job.sessions, seed=job.seed), places)
-    rows = [one for place in places for one in rows_of(place.layout, found[place])]
+    tallies = job.each(partial(layout_tally, policies=job.sessions, seed=job.seed), places)
+    rows = [row for place in places for row in rows_of(place.layout, tallies[place])]
     says: Row = {}
     for layout in LAYOUTS:
         for rule in FIXED:
-            gains = [one["value"] for one in those(rows, problem=layout, rule=rule, measure="gain_percent")]
+            gains = [row["value"] for row in those(rows, problem=layout, rule=rule, measure="gain_percent")]
             says[f"{layout}: {rule} over chance at equal questions [points of success]"] = round(
                 float(np.mean(gains)), 1
             )
@@ -177,25 +177,25 @@ def rows_of(layout: str, tally: Tally) -> list[Row]:
     for (rule, share), (solved, questions) in tally.items():
         named: Row = {"problem": layout, "rule": rule, "share": share}
         rows.append(mean_row(named, "solved_percent", 100.0 * np.array(solved)))
-        rows.append(mean_row(named, "questions", questions) if rule != NEVER else _none(named))
+        rows.append(mean_row(named, "questions", questions) if rule != NEVER else _no_questions(named))
         if rule in (*FIXED, THRESHOLD):
             by_chance = np.interp(np.mean(questions), [q for q, _ in line], [s for _, s in line])
             rows.append(mean_row(named, "gain_percent", 100.0 * (np.array(solved) - by_chance)))
     return rows
 
 
-def _none(named: Row) -> Row:
+def _no_questions(named: Row) -> Row:
     return {**named, "measure": "questions", "value": 0.0, "ci95": None, "thesis": None, "within": None}
 
 
 def _picture(rows: Sequence[Row]) -> bytes:
-    """Success against questions, a line a rule."""
+    """A picture of success against questions, a line for each rule."""
     looks = dict(zip((*RULES, THRESHOLD), (BLUE, GREEN, ORANGE, SKY, RED, GREY, PURPLE), strict=True))
 
     def draw(figure: "Figure") -> None:
         axes = figure.add_subplot()
         for rule, colour in looks.items():
-            shares = [one["share"] for one in those(rows, rule=rule, measure="questions")]
+            shares = [row["share"] for row in those(rows, rule=rule, measure="questions")]
             at = [
                 (_value(rows, rule, share, "questions"), _value(rows, rule, share, "solved_percent"))
                 for share in shares

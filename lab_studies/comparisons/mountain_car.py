@@ -1,4 +1,4 @@
-"""When a teacher should speak, in Mountain Car: Torrey and Taylor's rules at equal budgets, beside nobody and our gates.
+"""When a teacher should speak, in Mountain Car: Torrey and Taylor's rules compared with our gates and nobody, at equal budgets.
 
 Source: Torrey and Taylor, Teaching on a budget: agents advising agents in reinforcement learning, AAMAS 2013.
 """
@@ -29,37 +29,35 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 EPISODES, BUDGET = 300, 1000
-SOLVED_MEAN, SOLVED_OF = 110.0, 100  # steps, over so many episodes in a row: what Gymnasium calls solved
-STUDENTS = {"hopeful": 0.0, "sober": SOBER}  # what they think of every move at first
+SOLVED_MEAN, SOLVED_OF = 110.0, 100  # mean steps, over so many episodes in a row, at which Gymnasium calls it solved
+STUDENTS = {"hopeful": 0.0, "sober": SOBER}  # student -> initial value of every move
 NOBODY, EXPERT_TAU = "nobody", 0.01
 GATE = GateSettings("always", window=5, first_episode=10, omega=30, spare_best=True, budget=BUDGET)
 
 Values = Sequence[float]
-Speaks = Callable[
-    [Values, int, int | None, float], bool
-]  # teacher's values, the student's own move, the last one here, span
+Speaks = Callable[[Values, int, int | None, float], bool]
 
 
-# what a teacher goes by: its values here, the move that the student announces, the one that it made here last, the span
+# A rule: (the teacher's values, the move that the student announces, its last move here, the span) -> whether to speak
 
 
 def _early(values: Values, own: int, last: int | None, span: float) -> bool:
-    """At every step, until the budget is spent."""
+    """The teacher speaks at every step, until the budget is spent."""
     return True
 
 
 def _importance(values: Values, own: int, last: int | None, span: float) -> bool:
-    """Where the teacher's values of the moves lie apart by the span or more."""
+    """It speaks where the range of its values is at least the span."""
     return max(values) - min(values) >= span
 
 
 def _correcting(values: Values, own: int, last: int | None, span: float) -> bool:
-    """Where that is so and the student announces another move than the teacher's."""
+    """It speaks where `_importance` does and the student announces a worse move."""
     return _importance(values, own, last, span) and values[own] < max(values)
 
 
 def _predictive(values: Values, own: int, last: int | None, span: float) -> bool:
-    """As correcting, of the move that the student is expected to make: the one that it made here last."""
+    """It speaks where `_importance` does and the student's last move here, which it expects again, was worse or unknown."""
     return _importance(values, own, last, span) and (last is None or values[last] < max(values))
 
 
@@ -73,27 +71,28 @@ GATES = ("ccrl", "ia", "importance gate")  # the student asks; compiled
 RULES = (NOBODY, *TEACHERS, *GATES)
 COLOURS = dict(zip(RULES, (INK, SKY, ORANGE, RED, GREEN, BLUE, "#7b5aa6", "#8a6d3b"), strict=True))
 MEASURES = (
-    f"Each session has {EPISODES} episodes of at most 200 steps from drawn starts; all settings have the same seeds. mean_steps: "
-    "of all episodes, a failed one as 201 (the area under the learning curve); first_100: of the first hundred. "
-    f"episodes_to_solve: after how many the mean of the last {SOLVED_OF} is at most {SOLVED_MEAN:g} for the first time, "
-    f"{EPISODES} where it never is. solved_percent: sessions whose greedy policy in the end needs at most {SOLVED_MEAN:g} steps "
-    f"in the mean from 200 starts. helped_steps: what was advised, at most {BUDGET}. saved_steps: an episode, over nobody."
+    f"Each session has {EPISODES} episodes of at most 200 steps from random starts; all settings have the same seeds. "
+    "mean_steps: the mean over all episodes, of which a failed one counts as 201 (the area under the learning curve); first_100: "
+    f"over the first hundred. episodes_to_solve: the episodes after which the mean of the last {SOLVED_OF} is first at most "
+    f"{SOLVED_MEAN:g}, {EPISODES} if it never is. solved_percent: sessions whose final greedy policy needs at most "
+    f"{SOLVED_MEAN:g} steps in the mean from 200 starts. helped_steps: advised steps, at most {BUDGET}. saved_steps: the steps "
+    "of an episode that are saved compared with nobody."
 )
 STARTS = (
-    "The hopeful student begins with zeros, better than any true value here, and so looks for itself into whatever nobody has "
-    f"shown it; the sober one with {SOBER:g}, about what an episode costs from the middle of a way, and keeps to what works."
+    "The hopeful student has optimistic initial values of 0, better than any true value here, and explores all that nobody has "
+    f"shown it; the sober one has pessimistic ones of {SOBER:g}, about the cost of half an episode, and exploits what works."
 )
 DIFFERS = (
-    "What differs from Torrey and Taylor: no figure of theirs stands beside ours, for none was at hand but their abstract's, "
-    "that the same amount of advice has other effects at other moments. Their student's move is foretold by a classifier, ours "
-    "by what it did last in the same cell (a cell where it never was counts as a mistake); their threshold is tuned, ours is "
-    "the median of the teacher's spans on its own ways. The teacher is the best of eight sessions alone."
+    "Differences to Torrey and Taylor: none of their figures stands beside ours, as only their abstract was at hand, which says "
+    "that the same amount of advice has different effects at different moments. They predict the student's move with a "
+    "classifier, we by its last move in the same cell (an unvisited cell counts as a mistake); their threshold is tuned, ours "
+    "is the median of the teacher's spans on its own paths. The teacher is the best of eight sessions alone."
 )
 
 
 @dataclass(frozen=True)
 class Setting:
-    """Which student learns, and by which rule it is advised."""
+    """A student, and the rule by which it is advised."""
 
     student: str
     rule: str
@@ -101,7 +100,7 @@ class Setting:
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What N sessions came to: steps (N, E), helped (N,), solved (N,)."""
+    """The results of N sessions of E episodes: steps (N, E), helped steps (N,), solved (N,)."""
 
     steps: NDArray[np.int64]
     helped: NDArray[np.int64]
@@ -109,13 +108,13 @@ class Outcome:
 
     @property
     def to_solve(self) -> NDArray[np.int64]:
-        """The episodes after which the last hundred were quick enough, (N,)."""
-        return np.array([episodes_to_solve(one) for one in self.steps])
+        """The episodes (N,) after which the problem counts as solved."""
+        return np.array([episodes_to_solve(episodes) for episodes in self.steps])
 
 
 @dataclass
 class Teacher:
-    """An advisor that knows its values (S, A) and speaks by a rule; what the student did last in a cell, it has seen."""
+    """An advisor with values `known` (S, A) that speaks by a rule; seen: the student's last move in each state."""
 
     known: list[list[float]]
     speaks: Speaks
@@ -123,7 +122,7 @@ class Teacher:
     seen: dict[int, int] = field(default_factory=dict)
 
     def advise(self, request: AdviceRequest) -> int | None:
-        """The best move by its values, or nothing."""
+        """The best move by its values, or None if it is silent."""
         values = self.known[request.state]
         speaks = self.speaks(values, request.own, self.seen.get(request.state), self.span)
         best = values.index(max(values))
@@ -133,13 +132,13 @@ class Teacher:
 
 @cache
 def world() -> PhysicsEnvironment:
-    """The car, with what the teacher knows of it."""
+    """The environment, whose `values` the teacher knows."""
     return PhysicsEnvironment(PHYSICS["MountainCar-v0"])
 
 
 @cache
-def span_of(places: int = 20) -> float:
-    """The median span of the teacher's values where it comes by itself, from so many drawn starts."""
+def median_span(places: int = 20) -> float:
+    """The median span of the teacher's values on its own paths from `places` random starts."""
     place, known, draw = world(), world().values(1.0), stream(0)
     spans: list[float] = []
     for _ in range(places):
@@ -153,46 +152,50 @@ def span_of(places: int = 20) -> float:
 
 
 def mountain_car(job: Job, reading: Mapping[str, Any]) -> Findings:
-    """Every rule, for both students."""
+    """The results of every rule with both students; the reading has no effect."""
     settings = [Setting(student, rule) for student in STUDENTS for rule in RULES]
-    found = job.each(partial(taught, sessions=job.sessions, seed=job.seed), settings)
-    rows = [one for setting, outcome in found.items() for one in rows_of(setting, outcome, found)]
+    outcomes = job.each(partial(setting_outcome, sessions=job.sessions, seed=job.seed), settings)
+    rows = [result for setting, outcome in outcomes.items() for result in rows_of(setting, outcome, outcomes)]
     pictures = {
-        f"Mountain Car: steps of an episode, {student}": curves({rule: found[Setting(student, rule)] for rule in RULES})
+        f"Mountain Car: steps of an episode, {student}": curves(
+            {rule: outcomes[Setting(student, rule)] for rule in RULES}
+        )
         for student in STUDENTS
     }
-    return Findings(rows, in_short(found), pictures, (MEASURES, STARTS, DIFFERS))
+    return Findings(rows, in_short(outcomes), pictures, (MEASURES, STARTS, DIFFERS))
 
 
-def student_of(name: str) -> LearnerSettings:
+def student_settings(name: str) -> LearnerSettings:
     """A student's settings."""
     return replace(fitting(world().physics), episodes=EPISODES, start_value=STUDENTS[name])
 
 
-def taught(setting: Setting, *, sessions: int, seed: int) -> Outcome:
-    """So many sessions of a setting."""
-    place, learner = world(), student_of(setting.student)
-    seeds = seeds_of(replace(setting, rule=""), sessions, seed)  # every rule meets the same chances
+def setting_outcome(setting: Setting, *, sessions: int, seed: int) -> Outcome:
+    """The outcome of `sessions` sessions of a setting."""
+    place, learner = world(), student_settings(setting.student)
+    seeds = seeds_of(replace(setting, rule=""), sessions, seed)  # every rule has the same seeds
     if setting.rule in TEACHERS:
-        return _told(setting, learner, seeds)
-    gate = replace(GATE, gate="never" if setting.rule == NOBODY else setting.rule.removesuffix(" gate"), psi=span_of())
+        return _readable_outcome(setting, learner, seeds)
+    gate = replace(
+        GATE, gate="never" if setting.rule == NOBODY else setting.rule.removesuffix(" gate"), psi=median_span()
+    )
     advice = None if setting.rule == NOBODY else Advice.of(advice_chances(place.values(1.0), EXPERT_TAU))
     batch = run_sessions(place, learner, gate, advice, seeds, keep_tables=True)
     return Outcome(batch.steps.astype(np.int64), batch.helped_steps, _solved(batch.q, learner))
 
 
-def _told(setting: Setting, learner: LearnerSettings, seeds: NDArray[np.uint64]) -> Outcome:
-    """The sessions of a rule that looks at what the student is about to do: in the readable session."""
+def _readable_outcome(setting: Setting, learner: LearnerSettings, seeds: NDArray[np.uint64]) -> Outcome:
+    """The outcome of a rule that sees what the student is about to do, in readable sessions."""
     known = world().values(1.0).tolist()
     steps, helped, tables = [], [], []
     for seed in seeds.tolist():
-        teacher = Teacher(known, TEACHERS[setting.rule], span_of())
-        one = Session(world(), learner, GATE, teacher, stream(seed)).run()
-        if one.interrupted:
+        teacher = Teacher(known, TEACHERS[setting.rule], median_span())
+        session = Session(world(), learner, GATE, teacher, stream(seed)).run()
+        if session.interrupted:
             raise KeyboardInterrupt
-        steps.append(one.steps)
-        helped.append(one.helped_steps)
-        tables.append(one.q)
+        steps.append(session.steps)
+        helped.append(session.helped_steps)
+        tables.append(session.q)
     return Outcome(np.array(steps), np.array(helped), _solved(tables, learner))
 
 
@@ -201,45 +204,45 @@ def _solved(tables: Sequence[FloatArray] | FloatArray, learner: LearnerSettings)
 
 
 def episodes_to_solve(steps: NDArray[np.int64]) -> int:
-    """After how many episodes the mean of the last SOLVED_OF is at most SOLVED_MEAN; all of them where it never is."""
+    """The episodes after which the mean of the last SOLVED_OF is at most SOLVED_MEAN; all episodes if it never is."""
     sums = np.concatenate([[0], np.cumsum(steps)])
     quick = np.flatnonzero(sums[SOLVED_OF:] - sums[:-SOLVED_OF] <= SOLVED_MEAN * SOLVED_OF)
     return int(quick[0]) + SOLVED_OF if len(quick) else len(steps)
 
 
-def rows_of(setting: Setting, of: Outcome, found: Mapping[Setting, Outcome]) -> list[Row]:
-    """The measures of a setting, and how many steps an episode it saves over nobody."""
-    named: Row = {"student": setting.student, "rule": setting.rule, "sessions": len(of.steps)}
+def rows_of(setting: Setting, outcome: Outcome, outcomes: Mapping[Setting, Outcome]) -> list[Row]:
+    """The measures of a setting, and the steps of an episode that it saves compared with nobody."""
+    named: Row = {"student": setting.student, "rule": setting.rule, "sessions": len(outcome.steps)}
     rows = [
-        mean_row(named, "mean_steps", of.steps.mean(axis=1)),
-        mean_row(named, "first_100", of.steps[:, :100].mean(axis=1)),
-        mean_row(named, "episodes_to_solve", of.to_solve),
-        share_row(named, "solved_percent", of.solved),
-        row(named, "helped_steps", float(of.helped.mean())),
+        mean_row(named, "mean_steps", outcome.steps.mean(axis=1)),
+        mean_row(named, "first_100", outcome.steps[:, :100].mean(axis=1)),
+        mean_row(named, "episodes_to_solve", outcome.to_solve),
+        share_row(named, "solved_percent", outcome.solved),
+        row(named, "helped_steps", float(outcome.helped.mean())),
     ]
     if setting.rule == NOBODY:
         return rows
-    alone = found[replace(setting, rule=NOBODY)]
-    return [*rows, mean_row(named, "saved_steps", alone.steps.mean(axis=1) - of.steps.mean(axis=1))]
+    alone = outcomes[replace(setting, rule=NOBODY)]
+    return [*rows, mean_row(named, "saved_steps", alone.steps.mean(axis=1) - outcome.steps.mean(axis=1))]
 
 
-def in_short(found: Mapping[Setting, Outcome]) -> Row:
-    """The area under the curve, its beginning, and when it is solved, by student and rule."""
-    says: Row = {"span": round(span_of(), 2)}
-    for setting, of in found.items():
+def in_short(outcomes: Mapping[Setting, Outcome]) -> Row:
+    """The area under the learning curve, its beginning, and the episodes to solve, by student and rule."""
+    says: Row = {"span": round(median_span(), 2)}
+    for setting, outcome in outcomes.items():
         which = f"{setting.student}, {setting.rule}"
-        says[f"{which}: mean steps"] = round(float(of.steps.mean()), 1)
-        says[f"{which}: first 100"] = round(float(of.steps[:, :100].mean()), 1)
-        says[f"{which}: episodes to solve"] = round(float(of.to_solve.mean()))
+        says[f"{which}: mean steps"] = round(float(outcome.steps.mean()), 1)
+        says[f"{which}: first 100"] = round(float(outcome.steps[:, :100].mean()), 1)
+        says[f"{which}: episodes to solve"] = round(float(outcome.to_solve.mean()))
     return says
 
 
-def curves(of: Mapping[str, Outcome]) -> bytes:
-    """The mean steps of each episode, ten averaged, a curve for each rule."""
+def curves(by_rule: Mapping[str, Outcome]) -> bytes:
+    """A picture of the mean steps of ten episodes at a time, a curve for each rule."""
 
     def draw(figure: "Figure") -> None:
         axes = figure.add_subplot()
-        for rule, outcome in of.items():
+        for rule, outcome in by_rule.items():
             mean = outcome.steps.mean(axis=0).reshape(-1, 10).mean(axis=1)
             axes.plot(np.arange(len(mean)) * 10 + 5, mean, color=COLOURS[rule], label=rule, linewidth=1.4)
         axes.set(xlabel="episode", ylabel="steps", xlim=(0, EPISODES))

@@ -1,4 +1,4 @@
-"""Times that nobody knows: a list kept as it is, policies that react, and the best order in hindsight, in the same episodes."""
+"""Random times: a fixed list, policies that react, and the best order in hindsight, compared in the same episodes."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -38,30 +38,30 @@ TROUBLES = {
 }
 LIST, RULE, ANEW, ROLLING, HINDSIGHT = "the list as it is", "best rule", "planned anew", "rolling", "best in hindsight"
 ABOUT = (
-    "Makespans in {episodes} drawn episodes, the same ones for all; intervals are of the mean, 95 %. The list is "
-    "the proven optimum by the mean times, kept whatever comes. Best rule: of all dispatching rules, asked at "
-    "every decision, the one with the least mean here. Planned anew: by mean times, by rollout, at every decision; "
-    "with several robots whenever something happens, beginning with the list. Rolling, of one robot: "
-    "each decision is tried in {futures} futures drawn from what can be known, by the list and by every rule "
-    "after it. Best in hindsight: the optimum with the drawn times known (where it was not proven, a bound), "
-    "which no policy can reach; where robots break down a bound, as if none did."
+    "Makespans in {episodes} random episodes, the same ones for all; intervals are 95 % intervals of the mean. The list is "
+    "the proven optimum by the mean times, which is never changed. Best rule: of all dispatching rules, asked at "
+    "every decision, the one with the least mean here. Planned anew: by rollout with mean times, at every decision; "
+    "with several robots at every event, beginning with the list. Rolling, for one robot: "
+    "each decision is tried in {futures} futures drawn from what can be known, followed by the list and by every rule. "
+    "Best in hindsight: the optimum with all times known (a bound if it was not proven), "
+    "which no policy can beat; if robots break down, a bound without breakdowns."
 )
 KINDS = (
-    "Times 10 % off: processing times are normal, their standard deviation a tenth of the mean (thesis 7.6). "
-    "Breakdowns: besides, a machine works 300 s between two of them on average, and is repaired for 60 s. Late "
-    "parts: besides, each comes 60 s late on average. Where the FMS's parts arrive after one another, lateness is "
-    "not drawn. Robots break down: besides, a robot is in order for 300 s on average, at work or not, and then stops "
+    "Times 10 % off: processing times are normal with a standard deviation of a tenth of the mean (thesis 7.6). "
+    "Breakdowns: in addition, a machine works for 300 s between two of them on average, and is repaired for 60 s. Late "
+    "parts: in addition, each part comes 60 s late on average; parts of the FMS, which arrive one after another, are never "
+    "late. Robots break down: in addition, a robot is in order for 300 s on average, at work or not, and then stops "
     "where it is, with what it holds, for 60 s."
 )
 LIMITS = (
-    "Rolling decisions are for one robot: their futures are compiled for decisions that follow one another in time, and "
-    "leave out that the robot breaks down, which delays all of them. Machines break down while they work only."
+    "Rolling decisions are for one robot: their futures are compiled for decisions that follow one another in time, and have "
+    "no breakdowns of the robot, which delay all decisions alike. Machines break down only while they work."
 )
 
 
 @dataclass(frozen=True)
 class Setting:
-    """A cell with an order, and what troubles it."""
+    """A cell with an order, and a trouble of TROUBLES."""
 
     cell: str
     order: str
@@ -69,9 +69,11 @@ class Setting:
 
 
 @dataclass(frozen=True)
-class Reacted:
-    """The costs in each episode [s], by policy; how long a rolling decision took [s], None: there is none, and how many
-    hindsights are proven."""
+class SettingOutcome:
+    """The makespans in each episode [s], by policy, and the best rule.
+
+    decision_s: the time of a rolling decision [s], None without any; proven: the number of proven optima in hindsight.
+    """
 
     costs: Mapping[str, Floats]
     rule: str
@@ -80,26 +82,26 @@ class Reacted:
 
 
 def reacting(job: Job, reading: Mapping[str, Any]) -> Findings:
-    """Every cell with every trouble; the reading changes nothing here."""
+    """The results of every cell with every trouble; the reading has no effect."""
     settings = [Setting(cell, order, trouble) for cell, order in WORKS for trouble in TROUBLES]
-    found = job.each(partial(reacted, episodes=job.sessions, seed=job.seed), settings)
-    rows = [line for setting in settings for line in rows_of(setting, found[setting])]
+    outcomes = job.each(partial(setting_outcome, episodes=job.sessions, seed=job.seed), settings)
+    rows = [line for setting in settings for line in rows_of(setting, outcomes[setting])]
     figures = {f"{cell}, {order}": _picture(rows, cell) for cell, order in WORKS}
-    alike = [(one["table"], one["trouble"]) for one in those(rows, measure="makespan_s", method=ROLLING)]
-    alike = [one for one in alike if one[1] != ROBOTS]  # there hindsight is a bound
+    alike = [(result["table"], result["trouble"]) for result in those(rows, measure="makespan_s", method=ROLLING)]
+    alike = [pair for pair in alike if pair[1] != ROBOTS]  # hindsight is only a bound there
     says: Row = {}
     for name in (LIST, RULE, ANEW, ROLLING) if alike else ():
         over = those(rows, measure="over hindsight_percent", method=name)
-        mean = np.mean([one["value"] for one in over if (one["table"], one["trouble"]) in alike])
+        mean = np.mean([result["value"] for result in over if (result["table"], result["trouble"]) in alike])
         says[f"{name}: mean over hindsight, one robot that never breaks down [%]"] = round(float(mean), 2)
-    took_s = [one.decision_s for one in found.values() if one.decision_s is not None]
+    took_s = [outcome.decision_s for outcome in outcomes.values() if outcome.decision_s is not None]
     says["milliseconds a rolling decision"] = round(1e3 * float(np.mean(took_s)), 1) if took_s else None
     notes = (ABOUT.format(episodes=job.sessions, futures=FUTURES), KINDS, LIMITS)
     return Findings(rows, says, figures, notes)
 
 
-def reacted(setting: Setting, episodes: int, seed: int) -> Reacted:
-    """One setting: all policies in the same episodes."""
+def setting_outcome(setting: Setting, episodes: int, seed: int) -> SettingOutcome:
+    """The makespans of all policies in the same episodes of a setting."""
     file = load_cell(setting.cell)
     cell, chance = file.cell(order_from_word(file, setting.order)), TROUBLES[setting.trouble]
     planned = optimum(cell).sequence if cell.serial else cp_sat(cell).sequence
@@ -115,32 +117,32 @@ def reacted(setting: Setting, episodes: int, seed: int) -> Reacted:
         costs[ROLLING] = replicate(cell, policy, chance, episodes, seed)
         decision_s = (perf_counter() - began_s) / episodes / len(planned)
     costs[HINDSIGHT], proven = _hindsight(cell, chance, episodes, seed)
-    return Reacted(costs, rule, decision_s, proven)
+    return SettingOutcome(costs, rule, decision_s, proven)
 
 
 def _hindsight(cell: Cell, chance: Chance, episodes: int, seed: int) -> tuple[Floats, int]:
     rng = np.random.default_rng(seed)  # the episodes of `replicate`
-    found = [in_hindsight(cell, Episode(cell, chance, drawn_seed(rng))) for _ in range(episodes)]
-    return np.array([one.cost for one in found]), sum(one.proven for one in found)
+    hindsights = [in_hindsight(cell, Episode(cell, chance, drawn_seed(rng))) for _ in range(episodes)]
+    return np.array([hindsight.cost for hindsight in hindsights]), sum(hindsight.proven for hindsight in hindsights)
 
 
-def rows_of(setting: Setting, found: Reacted) -> list[Row]:
-    """The mean of each policy, what it saves over the list, and how far it is from hindsight."""
+def rows_of(setting: Setting, outcome: SettingOutcome) -> list[Row]:
+    """The mean makespan of each policy, what it saves compared with the list, and how far it is above hindsight."""
     rows: list[Row] = []
-    least = float(found.costs[HINDSIGHT].mean())
-    for name, costs in found.costs.items():
+    least = float(outcome.costs[HINDSIGHT].mean())
+    for name, costs in outcome.costs.items():
         named: Row = {"table": setting.cell, "order": setting.order, "trouble": setting.trouble, "method": name}
         if name == RULE:
-            named["rule"] = found.rule
+            named["rule"] = outcome.rule
         rows.append(mean_row(named, "makespan_s", costs))
         if name not in (LIST, HINDSIGHT):
-            rows.append(mean_row(named, "saved over the list_s", found.costs[LIST] - costs))
+            rows.append(mean_row(named, "saved over the list_s", outcome.costs[LIST] - costs))
         rows.append(row(named, "over hindsight_percent", 100.0 * (float(costs.mean()) / least - 1.0)))
     return rows
 
 
 def _picture(rows: list[Row], cell: str) -> bytes:
-    """Bars of the mean makespans, trouble by trouble."""
+    """A picture with bars of the mean makespans, by trouble."""
     lines = {
         name: [those(rows, table=cell, trouble=trouble, method=name, measure="makespan_s")[0] for trouble in TROUBLES]
         for name in (LIST, RULE, ANEW, ROLLING, HINDSIGHT)

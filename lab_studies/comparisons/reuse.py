@@ -1,4 +1,4 @@
-"""The curriculum: tasks taught one after another into one toolbox, in several orders, beside each learned from nothing."""
+"""The curriculum: tasks taught one after another into one toolbox, in several orders, compared with each from scratch."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -15,42 +15,53 @@ from lab.studies.findings import Findings, Row, row, those, varying_row
 from lab.studies.runner import Job
 from lab.tasks.task_file import load
 from lab_studies.comparisons.reuse_figures import by_place, by_task
-from lab_studies.comparisons.skills_taught import Known, Taught, distinct, fails, spent, taught, works
+from lab_studies.comparisons.skills_taught import (
+    Known,
+    TaughtSkill,
+    distinct_problems,
+    is_failing,
+    lesson_cost,
+    reaches_goals,
+    taught_skills,
+)
 
 TASKS = ("toast", "two-toasters", "breakfast", "sorting", "fms-arm")
-OTHER_ARM = "toast-panda"  # taught after the first task alone
+OTHER_ARM = "toast-panda"  # taught after the first task only
 SOURCES = ("reused", "adapted", "learned")
 FATES = ("taken", "adapted", "own", "learned")
 COSTS = ("episodes", "helped_steps", "moves", "wall_s", "cpu_s")
 LATER = "later"  # all places of an order but the first
 GROWTH = "more_saved_a_place_percent"
-CARRIED, NOT_CARRIED = 50.0, 10.0  # [%] of its skills: from which on a sub-task carries over, up to which it does not
-_LIVES = 12  # that a process remembers: their policies fill up to 100 MB each
+CARRIED, NOT_CARRIED = (
+    50.0,
+    10.0,
+)  # the shares [%] of its skills from which a sub-task carries over, and up to which not
+_LIVES = 12  # lives that a process remembers; their policies fill up to 100 MB each
 
 ABOUT = (
-    "{orders} of the tasks {tasks}: the order that they ship in, then drawn ones. Each task's skills are found, adapted or "
-    "learned as `lab run` does, with the advisor 'expert', into the toolbox that the tasks before it left; the first task of "
-    "an order finds an empty one. For comparison each task is learned from nothing, which shares skills within the task, too: "
-    "what is saved is saved by earlier tasks. A problem that several skills share counts once. A table fits only where there are "
-    "the same states and moves: ways between stations carry over where the workspaces have the same grid. "
-    "Intervals are over the orders: they say nothing of other tasks or scenes."
+    "{orders} of the tasks {tasks}: the order that they ship in, then random ones. Each task's skills are reused, fine-tuned or "
+    "learned as in `lab run`, with the advisor 'expert', in the toolbox of the tasks before it; the first task of an order has "
+    "an empty one. For comparison each task is learned from scratch, where skills are also shared within the task, so that only "
+    "earlier tasks save anything. A problem that several skills share counts once. A table fits only a problem with the same "
+    "states and moves, so that paths between stations carry over only between workspaces with the same grid. "
+    "Intervals are over the orders and say nothing about other tasks or scenes."
 )
 COLUMNS = (
-    "Taken: the policy of an earlier task is used as it is. Adapted: learned on from it. Own: taken or adapted within the "
-    "task. Learned: from nothing. from_earlier: how many skills are taken or adapted from earlier tasks. saved_percent: of "
-    "the episodes that the same skills take from nothing. Place 'later': all places but the first. after: the toolbox holds "
-    f"that task's skills alone. {GROWTH}: how much more a task saves for each place that it comes later, "
-    "from the second on; a task is only held against itself. wall_s is as the clock has it, cpu_s the processor's share of it."
+    "Taken: the policy of an earlier task is used as it is. Adapted: it is fine-tuned. Own: taken or adapted within the "
+    "task. Learned: from scratch. from_earlier: the skills that are taken or adapted from earlier tasks. saved_percent: of "
+    "the episodes that the same skills take from scratch. Place 'later': all places but the first. after: the toolbox holds "
+    f"only that task's skills. {GROWTH}: how much more a task saves for each place that it comes later, from the second "
+    "on; a task is only compared with itself. wall_s is time by the clock, cpu_s time of the processor."
 )
 CHECKS = (
-    "Checks, none of which the verdict has seen: taken_failing_percent: policies of earlier tasks that are used or adapted and "
-    "then miss a goal step by step, or fail in physics; unsolved_percent: skills without a way to the goal from each start."
+    "Checks that play no part in the verdict: taken_failing_percent: policies of earlier tasks that are used or adapted and "
+    "then miss a goal step by step, or fail in physics; unsolved_percent: skills without a path to the goal from each start."
 )
 
 
 @dataclass(frozen=True)
 class Life:
-    """Tasks that are taught one after another, in scenes that the seed lays out."""
+    """Tasks taught one after another, in scenes that the seed lays out."""
 
     order: tuple[str, ...]
     seed: int
@@ -58,9 +69,9 @@ class Life:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of one skill; from_task: whose policy was taken or adapted, "" where it was learned from nothing.
+    """The result of one skill; from_task: the task whose policy was taken or adapted, "" if it was learned from scratch.
 
-    failing: it came from an earlier task, and fails in physics; unsolved: it does not reach the goal from each start.
+    failing: its policy is of an earlier task and fails in physics; unsolved: it does not reach the goal from each start.
     """
 
     task: str
@@ -77,12 +88,12 @@ class Outcome:
 
     @property
     def carried(self) -> bool:
-        """Whether an earlier task left what it was made of."""
+        """Whether its policy was taken or adapted from an earlier task."""
         return self.from_task not in ("", self.task)
 
     @property
     def fate(self) -> str:
-        """Its kind of FATES."""
+        """One of FATES."""
         if not self.from_task:
             return "learned"
         if not self.carried:
@@ -91,18 +102,18 @@ class Outcome:
 
 
 Place = tuple[Outcome, ...]  # the skills of one task, in the order in which they are taught
-Beside = tuple[Sequence[Outcome], Sequence[Outcome]]  # skills, and the same skills from nothing
+Beside = tuple[Sequence[Outcome], Sequence[Outcome]]  # skills, and the same skills from scratch
 
 
 def reuse(job: Job, reading: Mapping[str, Any]) -> Findings:
-    """As many orders of TASKS as there are sessions; the reading changes nothing here. BadInput for more than there are."""
+    """The results of `job.sessions` orders of TASKS; the reading has no effect. Raises BadInput for more than there are."""
     orders = orders_of(TASKS, job.sessions, job.seed)
     pairs = [(TASKS[0], other) for other in (*TASKS[1:], OTHER_ARM)]
     alone = [(task,) for task in (*TASKS, OTHER_ARM)]
-    found = job.each(tried, [Life(order, job.seed) for order in (*orders, *pairs, *alone)])
-    anew = {task: found[Life((task,), job.seed)][0] for (task,) in alone}
-    lives = [found[Life(order, job.seed)] for order in orders]
-    after = {other: found[Life((first, other), job.seed)][1] for first, other in pairs}
+    places = job.each(places_of_life, [Life(order, job.seed) for order in (*orders, *pairs, *alone)])
+    anew = {task: places[Life((task,), job.seed)][0] for (task,) in alone}
+    lives = [places[Life(order, job.seed)] for order in orders]
+    after = {other: places[Life((first, other), job.seed)][1] for first, other in pairs}
     rows = [*rows_of(lives, anew), *rows_after(after, anew), *rows_of_lives(lives, anew)]
     figures = {"Saved, by place in the order": by_place(rows), "What becomes of the skills of a task": by_task(rows)}
     words = f"{len(orders)} orders" if len(orders) > 1 else "1 order"
@@ -111,31 +122,31 @@ def reuse(job: Job, reading: Mapping[str, Any]) -> Findings:
 
 
 def orders_of(tasks: Sequence[str], count: int, seed: int) -> list[tuple[str, ...]]:
-    """So many orders of the tasks, none twice: the one given, then drawn ones; BadInput when there are not so many."""
+    """`count` different orders of the tasks: the given one, then random ones. Raises BadInput if there are fewer."""
     if not 1 <= count <= factorial(len(tasks)):
         raise BadInput(f"{count} orders (--sessions) of {len(tasks)} tasks: allowed are 1 to {factorial(len(tasks))}")
-    rng, found = np.random.default_rng([seed, len(tasks)]), {tuple(tasks): None}
-    while len(found) < count:
-        found[tuple(tasks[at] for at in rng.permutation(len(tasks)))] = None
-    return [*found]
+    rng, orders = np.random.default_rng([seed, len(tasks)]), {tuple(tasks): None}
+    while len(orders) < count:
+        orders[tuple(tasks[at] for at in rng.permutation(len(tasks)))] = None
+    return [*orders]
 
 
-def tried(life: Life) -> tuple[Place, ...]:
-    """What came of each task of a life, one after the other."""
-    return _lived(life)[0]
+def places_of_life(life: Life) -> tuple[Place, ...]:
+    """The results of each task of a life, in its order."""
+    return _life(life)[0]
 
 
 @lru_cache(maxsize=_LIVES)
-def _lived(life: Life) -> tuple[tuple[Place, ...], Known]:
-    """What came of each task, and what the toolbox then holds; lives that begin alike share their beginning."""
+def _life(life: Life) -> tuple[tuple[Place, ...], Known]:
+    """The results of each task of a life, and the policies then in the toolbox; lives that begin alike share that begin."""
     if not life.order:
         return (), {}
-    before, known = _lived(Life(life.order[:-1], life.seed))
+    before, known = _life(Life(life.order[:-1], life.seed))
     prepared = _prepared(life.order[-1], life.seed)
-    problems = distinct(prepared)
-    lessons = taught(prepared, known, problems, life.seed)
-    place = tuple(outcome_of(prepared, problem, one) for problem, one in zip(problems, lessons, strict=True))
-    policies = [one.lesson.policy for one in lessons]
+    problems = distinct_problems(prepared)
+    skills = taught_skills(prepared, known, problems, life.seed)
+    place = tuple(outcome_of(prepared, problem, skill) for problem, skill in zip(problems, skills, strict=True))
+    policies = [skill.lesson.policy for skill in skills]
     learned = {(policy.subtask, policy.signature): policy for policy in policies}
     return (*before, place), {**known, **learned}
 
@@ -146,10 +157,10 @@ def _prepared(name: str, seed: int) -> Prepared:
     return prepare(task, task.order(), seed)
 
 
-def outcome_of(prepared: Prepared, problem: Problem, one: Taught) -> Outcome:
-    """What is counted of a lesson; a policy of an earlier task is tried in physics."""
-    lesson, (episodes, helped_steps) = one.lesson, spent(one.lesson)
-    found = Outcome(
+def outcome_of(prepared: Prepared, problem: Problem, skill: TaughtSkill) -> Outcome:
+    """The result of a lesson; a policy of an earlier task is tried in physics."""
+    lesson, (episodes, helped_steps) = skill.lesson, lesson_cost(skill.lesson)
+    outcome = Outcome(
         prepared.task.name,
         problem.subtask,
         lesson.source if lesson.source in SOURCES else "learned",
@@ -157,18 +168,18 @@ def outcome_of(prepared: Prepared, problem: Problem, one: Taught) -> Outcome:
         episodes,
         helped_steps,
         0 if lesson.result is None else int(lesson.result.visits.sum()),
-        one.wall_s,
-        one.cpu_s,
-        unsolved=not works(problem, lesson.policy),
+        skill.wall_s,
+        skill.cpu_s,
+        unsolved=not reaches_goals(problem, lesson.policy),
     )
-    return replace(found, failing=found.carried and fails(prepared, problem, lesson.policy))
+    return replace(outcome, failing=outcome.carried and is_failing(prepared, problem, lesson.policy))
 
 
 # ---- rows ----------------------------------------------------------------------------------------------------------
 
 
 def rows_of(lives: Sequence[Sequence[Place]], anew: Mapping[str, Place]) -> list[Row]:
-    """The measures of each place, of all later ones, and there of each sub-task and task; a value an order."""
+    """The measures of each place, and of all later ones together, by sub-task, and by task."""
 
     def at(places: slice, **wanted: str) -> list[Beside]:
         return [_beside(life[places], anew, wanted) for life in lives]
@@ -177,7 +188,7 @@ def rows_of(lives: Sequence[Sequence[Place]], anew: Mapping[str, Place]) -> list
     for place in range(1, len(lives[0])):
         rows += measures({"place": place + 1}, at(slice(place, place + 1)))
     rows += measures({"place": LATER}, at(later)) + _growth(lives, anew)
-    for subtask in dict.fromkeys(one.subtask for place in anew.values() for one in place):
+    for subtask in dict.fromkeys(outcome.subtask for place in anew.values() for outcome in place):
         rows += measures({"place": LATER, "subtask": subtask}, at(later, subtask=subtask))
     for task in anew:
         rows += measures({"place": LATER, "task": task}, at(later, task=task))
@@ -185,7 +196,7 @@ def rows_of(lives: Sequence[Sequence[Place]], anew: Mapping[str, Place]) -> list
 
 
 def _growth(lives: Sequence[Sequence[Place]], anew: Mapping[str, Place]) -> list[Row]:
-    """By least squares, how much more of its episodes a task saves the later it comes; nothing where none comes at two places."""
+    """The row of GROWTH by least squares; no row if no task comes at two places."""
     at: dict[str, list[tuple[float, float]]] = {}
     for life in lives:
         for place, skills in enumerate(life[1:], 2):
@@ -198,15 +209,17 @@ def _growth(lives: Sequence[Sequence[Place]], anew: Mapping[str, Place]) -> list
 
 
 def rows_after(after: Mapping[str, Place], anew: Mapping[str, Place]) -> list[Row]:
-    """The measures of each task that finds the skills of the first one alone."""
+    """The measures of each task whose toolbox holds only the skills of the first one."""
     first = TASKS[0]
     return [
-        one for task, place in after.items() for one in measures({"after": first, "task": task}, [(place, anew[task])])
+        result
+        for task, place in after.items()
+        for result in measures({"after": first, "task": task}, [(place, anew[task])])
     ]
 
 
 def rows_of_lives(lives: Sequence[Sequence[Place]], anew: Mapping[str, Place]) -> list[Row]:
-    """What came of each task in each order, a row for all its skills and for each source."""
+    """The results of each task in each order, a row for all its skills and for each source."""
     rows = []
     for order, life in enumerate(lives, 1):
         for place, skills in enumerate(life, 1):
@@ -214,7 +227,7 @@ def rows_of_lives(lives: Sequence[Sequence[Place]], anew: Mapping[str, Place]) -
             for source in ("all", *SOURCES):
                 own = [pair for pair in pairs if source in ("all", pair[0].source)]
                 named: Row = {"order": order, "place": place, "task": skills[0].task, "source": source}
-                rows += [_row_of(named, [one for one, _ in own], [other for _, other in own])] if own else []
+                rows += [_row_of(named, [outcome for outcome, _ in own], [other for _, other in own])] if own else []
     return rows
 
 
@@ -223,39 +236,41 @@ def _row_of(named: Row, now: Sequence[Outcome], anew: Sequence[Outcome]) -> Row:
     spent_now = {what: round(_sum(now, what), 3) for what in COSTS}
     spent_anew = {f"{what}_anew": round(_sum(anew, what), 3) for what in COSTS}
     saved = None if not then else 100.0 * (1 - _sum(now, "episodes") / then)
-    carried = sum(one.carried for one in now)
+    carried = sum(outcome.carried for outcome in now)
     return row(
         {**named, "from_earlier": carried, **spent_now, "saved_percent": saved, **spent_anew}, "skills", len(now)
     )
 
 
 def _beside(places: Iterable[Place], anew: Mapping[str, Place], wanted: Mapping[str, str]) -> Beside:
-    """The skills of some places that have what is wanted, and the same ones from nothing."""
+    """The skills of some places with the wanted attributes, and the same skills from scratch."""
     pairs = [pair for place in places for pair in zip(place, anew[place[0].task], strict=True)]
     pairs = [pair for pair in pairs if all(getattr(pair[0], name) == value for name, value in wanted.items())]
-    return [one for one, _ in pairs], [other for _, other in pairs]
+    return [outcome for outcome, _ in pairs], [other for _, other in pairs]
 
 
 def measures(named: Row, orders: Sequence[Beside]) -> list[Row]:
-    """What became of skills and what that saved, in percent, with an interval over the orders where it varies."""
-    orders = [one for one in orders if one[0]]
+    """The shares of FATES and the savings [%], with an interval over the orders if they vary."""
+    orders = [order for order in orders if order[0]]
     rows = []
     for fate in FATES:
-        rows += _mean(named, f"{fate}_percent", [_share([one.fate == fate for one in now]) for now, _ in orders])
+        rows += _mean(
+            named, f"{fate}_percent", [_share([outcome.fate == fate for outcome in now]) for now, _ in orders]
+        )
     for what in COSTS:
         costs = [(_sum(now, what), _sum(anew, what)) for now, anew in orders]
         rows += _mean(named, f"saved_{what}_percent", [100.0 * (1 - now / then) for now, then in costs if then])
-    failing = [[one.failing for one in now if one.carried] for now, _ in orders]
-    rows += _mean(named, "taken_failing_percent", [_share(found) for found in failing if found])
-    return rows + _mean(named, "unsolved_percent", [_share([one.unsolved for one in now]) for now, _ in orders])
+    failing = [[outcome.failing for outcome in now if outcome.carried] for now, _ in orders]
+    rows += _mean(named, "taken_failing_percent", [_share(flags) for flags in failing if flags])
+    return rows + _mean(named, "unsolved_percent", [_share([outcome.unsolved for outcome in now]) for now, _ in orders])
 
 
-def _share(found: Sequence[bool]) -> float:
-    return 100.0 * sum(found) / len(found)
+def _share(flags: Sequence[bool]) -> float:
+    return 100.0 * sum(flags) / len(flags)
 
 
 def _sum(outcomes: Iterable[Outcome], what: str) -> float:
-    total: float = sum(getattr(one, what) for one in outcomes)
+    total: float = sum(getattr(outcome, what) for outcome in outcomes)
     return total
 
 
@@ -263,17 +278,25 @@ def _mean(named: Row, measure: str, values: Sequence[float]) -> list[Row]:
     return [varying_row(named, measure, values)] if values else []
 
 
-# ---- in words ------------------------------------------------------------------------------------------------------
+# ---- summary -------------------------------------------------------------------------------------------------------
 
 
 def in_short(rows: Sequence[Row], orders: int) -> Row:
     """Whether a lab that has lived longer learns less, and what carries over, in words and numbers."""
-    whole = [one for one in rows if one.get("place") is not None and not (one.get("subtask") or one.get("task"))]
-    later = {one["measure"]: one for one in those(whole, place=LATER)}
-    saved = [one for one in rows if one["measure"] == "saved_episodes_percent"]
-    places = [f"{ordinal(one['place'])} {percent(one)}" for one in saved if isinstance(one.get("place"), int)]
-    tasks = [f"{one['task']} {percent(one)}" for one in saved if one.get("place") == LATER and one.get("task")]
-    after = [f"{one['task']} {percent(one)}" for one in saved if one.get("after")]
+    whole = [
+        result
+        for result in rows
+        if result.get("place") is not None and not (result.get("subtask") or result.get("task"))
+    ]
+    later = {result["measure"]: result for result in those(whole, place=LATER)}
+    saved = [result for result in rows if result["measure"] == "saved_episodes_percent"]
+    places = [
+        f"{ordinal(result['place'])} {percent(result)}" for result in saved if isinstance(result.get("place"), int)
+    ]
+    tasks = [
+        f"{result['task']} {percent(result)}" for result in saved if result.get("place") == LATER and result.get("task")
+    ]
+    after = [f"{result['task']} {percent(result)}" for result in saved if result.get("after")]
     shares = _carried(rows)
     says: Row = {
         "orders": orders,
@@ -297,12 +320,12 @@ def _named(shares: Mapping[str, float], wanted: Callable[[float], bool]) -> str:
 
 def _answer(later: Mapping[str, Row]) -> str:
     """The verdict over all tasks that are not the first of their order, from their measures."""
-    found = later.get("saved_episodes_percent")
-    if found is None:
-        return "one task alone has nothing to take over"
-    ends = found["ci95"] or [found["value"]] * 2
+    saved = later.get("saved_episodes_percent")
+    if saved is None:
+        return "a single task has nothing to take over"
+    ends = saved["ci95"] or [saved["value"]] * 2
     verdict = "yes" if ends[0] > 0 else "no" if ends[1] <= 0 else "not shown"
-    said = f"{verdict}: later tasks of an order save {percent(found)} of the episodes that they take from nothing"
+    said = f"{verdict}: later tasks of an order save {percent(saved)} of the episodes that they take from scratch"
     growth = later.get(GROWTH)
     if growth is None:
         return said
@@ -311,21 +334,21 @@ def _answer(later: Mapping[str, Row]) -> str:
 
 
 def _carried(rows: Sequence[Row]) -> dict[str, float]:
-    """By sub-task, how many of its skills are taken or adapted from earlier tasks [%]; the most first."""
-    later = [one for one in rows if one.get("place") == LATER and one.get("subtask")]
+    """By sub-task, the share of its skills taken or adapted from earlier tasks [%], largest first."""
+    later = [result for result in rows if result.get("place") == LATER and result.get("subtask")]
     shares: dict[str, float] = {}
-    for one in later:
-        if one["measure"] in ("taken_percent", "adapted_percent"):
-            shares[one["subtask"]] = shares.get(one["subtask"], 0.0) + one["value"]
+    for result in later:
+        if result["measure"] in ("taken_percent", "adapted_percent"):
+            shares[result["subtask"]] = shares.get(result["subtask"], 0.0) + result["value"]
     return dict(sorted(shares.items(), key=lambda pair: -pair[1]))
 
 
-def percent(one: Row) -> str:
+def percent(result: Row) -> str:
     """A measure and its interval, such as "31 % (20 to 42)"."""
-    ends = "" if one["ci95"] is None else f" ({one['ci95'][0]:.0f} to {one['ci95'][1]:.0f})"
-    return f"{one['value']:.0f} %{ends}"
+    ends = "" if result["ci95"] is None else f" ({result['ci95'][0]:.0f} to {result['ci95'][1]:.0f})"
+    return f"{result['value']:.0f} %{ends}"
 
 
 def ordinal(number: int) -> str:
-    """Such as "2nd"; for numbers up to 20."""
+    """The ordinal of a number up to 20, such as "2nd"."""
     return f"{number}{dict(enumerate(('st', 'nd', 'rd'), 1)).get(number, 'th')}"

@@ -1,4 +1,4 @@
-"""A policy that averages over drawn futures: at every decision each that may be taken is tried in all of them."""
+"""A policy that averages over random futures: at every decision it tries each allowed one in all futures."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -20,19 +20,19 @@ from lab.sequencing.simulate.run import branch
 from lab_studies.comparisons.rolling_kernels import mean_cost
 
 FUTURES = 100  # drawn at every decision
-TRIES = 30  # to draw a time that is not over yet
+TRIES = 30  # draws for a time that has not passed yet
 
 
 def rolling(
     planned: Sequence[int], chance: Chance, seed: int, objective: str = MAKESPAN, futures: int = FUTURES
 ) -> Policy:
-    """A policy that begins with a planned list of decisions, and departs from it where another one is better on average.
+    """A policy that begins with a planned list of decisions, and departs from it where another decision is better on average.
 
-    So many futures are drawn anew at every decision, from what can be known: what goes on is not over yet. In each of them each
-    decision that may be taken is followed by the rest of the list, and by what each dispatching rule makes of the rest; the
-    least mean is taken, of equal ones what the list has. All decisions meet the same futures. Raises BadInput for fewer than 1
-    future, and when it is run in a cell with several robots or servers: its futures are compiled for one robot, whose decisions
-    follow one another in time. That one robot breaks down delays whatever it does, so futures leave it out.
+    At every decision futures are drawn from what can be known: what goes on has not ended yet. In each future each allowed
+    decision is followed by the rest of the list, and by each dispatching rule; the decision with the least mean is taken, of
+    equal ones that of the list. All decisions meet the same futures. Raises BadInput for fewer than 1 future, and when it is
+    run in a cell with several robots, servers or batches: its futures are compiled for one robot, whose decisions follow one
+    another in time. They have no breakdowns of the robot, which delay all decisions alike.
     Source: rollout with several heuristics, Bertsekas, Tsitsiklis and Wu 1997; Monte Carlo policy improvement, Tesauro and
     Galperin 1997.
     """
@@ -42,20 +42,16 @@ def rolling(
     def policy(cell: Cell) -> Choose:
         check_objective(objective, cell)
         if not cell.serial:
-            raise BadInput(
-                "rolling decisions are for cells in which one robot does all the work: several are planned anew by rollout"
-            )
+            raise BadInput("rolling decisions are for cells with one robot: with several, plan anew by rollout")
         if cell.batches:
-            raise BadInput(
-                "rolling decisions are for cells without batches: an order says what they are, before it begins"
-            )
+            raise BadInput("rolling decisions are for cells without batches, which an order defines before it begins")
         return _Rolling(cell, planned, chance, (seed, futures), objective).choose
 
     return policy
 
 
 class _Rolling:
-    """An episode of the policy: what is left of the list, and room for runs."""
+    """An episode of the policy: the rest of the list, and arrays for runs."""
 
     def __init__(
         self, cell: Cell, planned: Sequence[int], chance: Chance, drawn: tuple[int, int], objective: str
@@ -69,19 +65,19 @@ class _Rolling:
     def choose(self, seen: Observed, allowed: tuple[int, ...]) -> int:
         """The decision with the least mean cost."""
         self._decisions += 1
-        first = next((one for one in self._left if one in allowed), allowed[0])
+        first = next((decision for decision in self._left if decision in allowed), allowed[0])
         chosen = first
         if len(allowed) > 1:
             seeds = np.array([self._seed_of(future) for future in range(self.futures)], np.uint64)
-            ready_s = np.array([self._ready_s(seen, int(one)) for one in seeds])
-            _put(self._now, seen, self._arrays.rooms)
-            others = [one for one in allowed if one != first]
-            chosen = min([first, *others], key=lambda one: self._mean_cost(seen, one, ready_s, seeds))
+            ready_s = np.array([self._ready_s(seen, int(seed)) for seed in seeds])
+            _copy_run(self._now, seen, self._arrays.rooms)
+            others = [decision for decision in allowed if decision != first]
+            chosen = min([first, *others], key=lambda decision: self._mean_cost(seen, decision, ready_s, seeds))
         self._left = self._without(chosen)
         return chosen
 
     def _mean_cost(self, seen: Observed, decision: int, ready_s: Floats, seeds: NDArray[np.uint64]) -> float:
-        """The least mean of all the ways to carry on after a decision."""
+        """The least mean cost over the ways to continue after a decision."""
         index, way = part_of(decision, self.cell.parts) - 1, seen.option(decision)
         place = seen.locations[index]
         option = int(self._arrays.first_option[place]) + self.cell.positions[place].options.index(way)
@@ -96,19 +92,19 @@ class _Rolling:
         )
 
     def _without(self, decision: int) -> list[int]:
-        """The rest of the list without a decision: its own entry, or the next one of its part."""
+        """The rest of the list without a decision, or without the next one of its part if it is not in the list."""
         parts = self.cell.parts
-        own = [n for n, one in enumerate(self._left) if part_of(one, parts) == part_of(decision, parts)]
+        own = [n for n, entry in enumerate(self._left) if part_of(entry, parts) == part_of(decision, parts)]
         same = [n for n in own if self._left[n] == decision]
         used = next(iter([*same, *own]), len(self._left))
-        return [one for n, one in enumerate(self._left) if n != used]
+        return [entry for n, entry in enumerate(self._left) if n != used]
 
     def _order(self, tail: Sequence[int]) -> OrderArrays:
-        """A list of priorities: the tail, and after it moves that its parts did not need."""
+        """A list of priorities: the tail, then spare moves of every part."""
         parts = self.cell.parts
         spare = [part for _ in range(max(moves_each(self.cell))) for part in range(parts)]
-        own = np.array([part_of(one, parts) - 1 for one in tail] + spare, np.int64)
-        choices = np.array([choice_of(one, parts) for one in tail] + [0] * len(spare), np.int64)
+        own = np.array([part_of(decision, parts) - 1 for decision in tail] + spare, np.int64)
+        choices = np.array([choice_of(decision, parts) for decision in tail] + [0] * len(spare), np.int64)
         size = len(own)
         left_s = np.zeros(len(self.cell.positions))
         return OrderArrays(own, choices, np.zeros(size, np.bool_), np.zeros(size, np.int64), left_s)
@@ -117,7 +113,7 @@ class _Rolling:
         return int(mixed((self.seed * 1_000_003 + self._decisions * 10_007 + future) & MASK))
 
     def _ready_s(self, seen: Observed, seed: int) -> list[float]:
-        """When each part may be picked in a future: what goes on now is drawn again, until it is not over yet."""
+        """The times (P,) from which parts may be picked in a future; a time under way is drawn until it has not passed."""
         ready_s = list(seen.ready_s)
         for index, ready in enumerate(seen.ready):
             place = seen.locations[index]
@@ -133,8 +129,8 @@ class _Rolling:
         return ready_s
 
 
-def _put(now: RunArrays, seen: Observed, rooms: Ints) -> None:
-    """A run into arrays."""
+def _copy_run(now: RunArrays, seen: Observed, rooms: Ints) -> None:
+    """Copy a run into arrays."""
     now.locations[:] = seen.locations
     now.finished_s[:] = [end_s or 0.0 for end_s in seen.finished_s]
     now.room[:] = rooms

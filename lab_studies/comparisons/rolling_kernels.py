@@ -1,4 +1,4 @@
-"""Drawn futures compiled: what a decision comes to in each of them, a list of priorities carrying on."""
+"""Compiled random futures: the cost of a decision in each of them, continued by a list of priorities."""
 
 from typing import Any
 
@@ -21,10 +21,10 @@ def _as_it_is(run: Any, now: Any) -> None:
 
 @without_refcounts
 def mean_cost(cell: Any, run: Any, now: Any, order: Any, way: Any, ready_s: Any, seeds: Any) -> float:
-    """The mean cost over K futures of a way, (part from 0, option), and of the list after it.
+    """The mean cost over K futures of a decision `way`, (part from 0, option), and of the list `order` after it.
 
-    now: the run as it is, but for ready_s (K, P), when parts may be picked in each future; seeds (K,): of the times that nothing
-    has begun to take yet.
+    now: the present state of the run, without ready_s (K, P), the times from which parts may be picked in each future; seeds
+    (K,): of the times that have not begun yet. run: room for a run.
     """
     total = 0.0
     for k in range(len(seeds)):

@@ -1,7 +1,7 @@
-"""Whether a schedule keeps to its cell, from first principles: plain data in, faults in words out, nothing of the simulators.
+"""Checks a schedule against its cell from first principles: plain data in, faults in words out, without the simulators.
 
-cell: what a cell file says, as TOML's values (`tomllib.load`, `CellFile.model_dump`). rows: what `--schedule` writes as JSON.
-Not looked at: whether a buffer for when the machine ahead is full (buffers = "busy") was used only then.
+cell: the values of a cell file (`tomllib.load`, `CellFile.model_dump`). rows: what `--schedule` writes as JSON. It is not
+checked that a buffer for when the machine ahead is full (buffers = "busy") was used only then.
 """
 
 from collections.abc import Mapping, Sequence
@@ -18,47 +18,50 @@ Rooms = list[tuple[str, float, float]]  # station, from, to [s]
 
 
 def faults(cell: Row, rows: Sequence[Row], makespan_s: float) -> list[str]:
-    """What is wrong with a schedule that claims this makespan [s], a line each; none: it is right."""
-    robots = {one.get("name") or "robot": one for one in cell.get("robots") or [cell.get("robot")] if one}
+    """The faults of a schedule that claims this makespan [s], in words; an empty list if there are none."""
+    robots = {robot.get("name") or "robot": robot for robot in cell.get("robots") or [cell.get("robot")] if robot}
     order = cell.get("order") or [cell["products"][0]["name"]] * cell["parts"]
     parts, arrivals = [f"{name} {n}" for n, name in enumerate(order, 1)], cell.get("arrivals") or {}
     for row in rows:
         known = row["part"] in (*parts, None) and (row["robot"] in robots or row["operation"] in ("process", "blocked"))
         if not (known and 0 <= row["start_s"] <= row["end_s"] < NEVER):
-            return [f"a row that cannot be: {row}"]
-    found, taken, end_s, came_s = list[str](), Rooms(), 0.0, 0.0
+            return [f"an impossible row: {row}"]
+    errors, taken, end_s, came_s = list[str](), Rooms(), 0.0, 0.0
     rows = [row for row in rows if row["operation"] != "service" or row["end_s"] > row["start_s"] + EPS]
     rows.sort(key=lambda row: (row["start_s"], row["end_s"]))
     for part, name, free_s in zip(parts, order, cell.get("release_s") or [0.0] * len(order), strict=True):
         came_s += arrivals.get("interval_s", 0.0)  # the parts come in their order
         own = [row for row in rows if row["part"] == part and row["operation"] not in ("wait", "blocked")]
-        routes = next(one["routes"] for one in cell["products"] if one["name"] == name)
+        routes = next(product["routes"] for product in cell["products"] if product["name"] == name)
         tried = [_way(cell, robots, route, own, max(free_s, came_s)) for route in routes]
         wrong, rooms, done_s, first_s = min(tried, key=lambda way: len(way[0]))
-        found, taken, end_s = found + [f"{part}: {one}" for one in wrong], taken + rooms, max(end_s, done_s)
+        errors += [f"{part}: {words}" for words in wrong]
+        taken, end_s = taken + rooms, max(end_s, done_s)
         came_s = first_s if arrivals.get("after") == "pick" else came_s
-    for one in cell["stations"]:
-        work = [row for row in rows if row["operation"] == "process" and row["station"] == one["name"]]
-        found += _crowd(one, [(a, b) for at, a, b in taken if at == one["name"]]) + _overload(one, work)
+    for station in cell["stations"]:
+        work = [row for row in rows if row["operation"] == "process" and row["station"] == station["name"]]
+        errors += _crowd(station, [(a, b) for at, a, b in taken if at == station["name"]]) + _overload(station, work)
     for name, robot in robots.items():
-        found += _trips(cell, robot, [row for row in rows if row["robot"] == name])
+        errors += _trips(cell, robot, [row for row in rows if row["robot"] == name])
     if cell.get("track"):
-        found += _collisions(cell, robots, [row for row in rows if row["operation"] in ("empty", "carry", "pallet")])
-    return found + ([] if abs(end_s - makespan_s) <= EPS else [f"the makespan is {end_s:g}, not {makespan_s:g}"])
+        errors += _collisions(cell, robots, [row for row in rows if row["operation"] in ("empty", "carry", "pallet")])
+    return errors + ([] if abs(end_s - makespan_s) <= EPS else [f"the makespan is {end_s:g}, not {makespan_s:g}"])
 
 
-Spans = list[tuple[int, float, float]]  # a stretch of the track, from when until when a robot is on it [s]
-MOST_CHOICES = 256  # of when robots set out
+Spans = list[
+    tuple[int, float, float]
+]  # a stretch of the track, and the times from and until which a robot is on it [s]
+MOST_CHOICES = 256  # combinations of the times at which robots set out
 
 
 def _ways(cell: Row) -> dict[str, dict[str, list[tuple[int, float, float]]]]:
-    """The shortest way on the track between any two stations: its stretches, from when until when one is on each [s]."""
+    """The shortest way on the track between any two stations: its stretches with the times from and until [s]."""
     stretches = [
         (n, a, b, seconds)
-        for n, one in enumerate(cell["track"]["stretches"])
-        for a, b, seconds in (one, [*one[1::-1], one[2]])
+        for n, stretch in enumerate(cell["track"]["stretches"])
+        for a, b, seconds in (stretch, [*stretch[1::-1], stretch[2]])
     ]
-    ways: dict[str, Any] = {one["name"]: {one["name"]: []} for one in cell["stations"]}
+    ways: dict[str, Any] = {station["name"]: {station["name"]: []} for station in cell["stations"]}
     for _ in cell["stations"]:
         for own in ways.values():
             for n, a, b, seconds in stretches:
@@ -69,14 +72,14 @@ def _ways(cell: Row) -> dict[str, dict[str, list[tuple[int, float, float]]]]:
 
 
 def _collisions(cell: Row, robots: Row, rows: Sequence[Row]) -> list[str]:
-    """Two robots on one stretch at a time, whenever they set out: all drive without stopping from then on.
+    """The faults where two robots are on one stretch at a time, whenever they set out; all drive without stopping.
 
-    With a part a robot sets out as it has picked, or when a stretch that it needs is free, at the latest so that it comes there
-    just in time: rows do not say when.
+    A robot with a part sets out after the pick or when a stretch is free, at the latest so that it arrives in time: rows do
+    not say when.
     """
     ways, chosen = _ways(cell), [Spans()]
     worst = list[str]()
-    for row in sorted(rows, key=lambda one: one["end_s"]):
+    for row in sorted(rows, key=lambda row: row["end_s"]):
         way, speed = ways[row["station"]][row["target"]], float(robots[row["robot"]].get("speed") or 1.0)
         way = [(n, since / speed, until / speed) for n, since, until in way]
         first_s, late_s = row["start_s"], row["end_s"] - (way[-1][2] if way else 0.0)
@@ -92,10 +95,10 @@ def _collisions(cell: Row, robots: Row, rows: Sequence[Row]) -> list[str]:
 
 
 def _met(held: Spans, more: Spans) -> list[str]:
-    """Where spans of one robot are those of others."""
+    """The faults where new spans overlap held ones on the same stretch."""
     pairs = [(n, min(end, until)) for n, begin, end in more for m, since, until in held
              if n == m and max(begin, since) < min(end, until) - EPS]  # fmt: skip
-    return [f"two on stretch {n} of the track at {until_s:g}" for n, until_s in pairs]
+    return [f"two robots on stretch {n} of the track at {until_s:g}" for n, until_s in pairs]
 
 
 def _travel_s(cell: Row, robot: Row, ends: Sequence[str], tables: Sequence[str] = ("travel",)) -> float:
@@ -109,8 +112,9 @@ def _travel_s(cell: Row, robot: Row, ends: Sequence[str], tables: Sequence[str] 
 def _way(
     cell: Row, robots: Row, route: Any, rows: Sequence[Row], free_s: float
 ) -> tuple[list[str], Rooms, float, float]:
-    """A part on a route: what does not fit, the rooms it takes, when it is finished, and when it was first taken [s]."""
-    wrong, rooms, left, stations = list[str](), Rooms(), [*rows], {one["name"]: one for one in cell["stations"]}
+    """The faults of a part on a route, the room that it takes, and the times of its end and its first pick [s]."""
+    stations = {station["name"]: station for station in cell["stations"]}
+    wrong, rooms, left = list[str](), Rooms(), [*rows]
 
     def within(what: str, least_s: float, at_s: float, most_s: float = NEVER) -> None:
         wrong.extend([f"{what}: {at_s:g}, not {least_s:g} to {most_s:g}"] * (not least_s - EPS <= at_s <= most_s + EPS))
@@ -123,11 +127,11 @@ def _way(
         left.remove(row) if fits else None
         return row["start_s"], row["end_s"]
 
-    stages: list[Row] = [{"station": one} if isinstance(one, str) else one for one in route]
+    stages: list[Row] = [{"station": entry} if isinstance(entry, str) else entry for entry in route]
     at, since_s, ready_s, first_s, most_s, service_s = stages[0]["station"], NEVER, free_s, NEVER, NEVER, 0.0
-    pallet: list[tuple[str, float]] = []  # where the part's own one stands, and since when, if it waits for it
-    for one in stages[1:]:
-        stage = _taken(one, left)
+    pallet: list[tuple[str, float]] = []  # the station of the part's waiting pallet, and since when it is there
+    for entry in stages[1:]:
+        stage = _taken(entry, left)
         place, own_s, buffer = stations[stage["station"]], stage.get("processing_s"), stage.get("buffer")
         through = [buffer] if any(row["operation"] == "carry" and row["target"] == buffer for row in left) else []
         for target in [*through, place["name"]] if robots and at != place["name"] else []:
@@ -136,7 +140,7 @@ def _way(
             served_s = take("service", at) if service_s > EPS else (ready_s, pick_s)
             within(f"service in '{at}'", service_s, min(served_s[1], pick_s) - max(served_s[0], ready_s))
             rooms, since_s, ready_s, kept = [*rooms, (at, since_s, pick_s)], came_s, came_s, (at, since_s)
-            for before, stood_s in pallet:  # it goes ahead of the part, from the station before to the one after
+            for before, stood_s in pallet:  # the pallet goes ahead, from the station before to the one after
                 left_s, since_s = take("pallet", before, target)
                 within("pallet picked", kept[1], left_s, pick_s)
                 within("pallet dropped", left_s, since_s, pick_s)
@@ -149,7 +153,7 @@ def _way(
             within(f"begun in '{place['name']}'", ready_s, begin_s, ready_s + latest_s)
             work_s = (place.get("processing_s") or 0.0) if own_s is None else own_s
             within(f"worked on in '{place['name']}'", work_s, end_s - begin_s, work_s)
-            limits = [one["at_most_s"] for one in (stage, place) if one.get("at_most_s") is not None]
+            limits = [limited["at_most_s"] for limited in (stage, place) if limited.get("at_most_s") is not None]
             ready_s, most_s, first_s = end_s, [*limits, NEVER][0], min(first_s, begin_s)
             service_s = stage.get("service_s") or 0.0
     rooms += [(at, since_s, ready_s)] if stations[at]["kind"] == "machine" else []
@@ -157,8 +161,10 @@ def _way(
 
 
 def _taken(stage: Row, rows: Sequence[Row]) -> Row:
-    """Which of a stage and its alternatives a part took, by what is left of its rows: where it is worked on, or goes to, next."""
-    ways = [{"station": one} if isinstance(one, str) else one for one in (stage, *stage.get("alternatives", ()))]
+    """The one of a stage and its alternatives that a part took, by the next station in the rest of its rows."""
+    ways = [
+        {"station": entry} if isinstance(entry, str) else entry for entry in (stage, *stage.get("alternatives", ()))
+    ]
     done = sorted(rows, key=lambda row: (row["start_s"], row["end_s"]))
     names = [row["target"] for row in done if row["operation"] in ("carry", "process")]
     places = [name for name in names if name in {way["station"] for way in ways}]
@@ -166,30 +172,30 @@ def _taken(stage: Row, rows: Sequence[Row]) -> Row:
 
 
 def _crowd(station: Row, spans: Sequence[tuple[float, float]]) -> list[str]:
-    """Whether there are ever more parts in a station than it has room for."""
+    """The fault of a station that ever holds more parts than it has room for."""
     most = max((sum(a <= begin < b - EPS for a, b in spans) for begin, _ in spans), default=0)
     return [f"'{station['name']}' holds {most}"] * (station["capacity"] != "unlimited" and most > station["capacity"])
 
 
 def _overload(station: Row, work: Sequence[Row]) -> list[str]:
-    """Whether more servers are at work than a machine has, setups counted: the fewest chains that cover all its work."""
+    """The fault of a machine that needs more servers than it has, setups included: the fewest chains that cover its work."""
     follows, setups = np.zeros((len(work), len(work)), dtype=bool), station.get("setup_s") or {}
-    for (i, one), (j, then) in combinations(enumerate(work), 2):
-        setup_s = setups.get(one["product"], {}).get(then["product"], 0.0)
-        follows[i, j] = one["end_s"] + setup_s <= then["start_s"] + EPS
+    for (i, first), (j, then) in combinations(enumerate(work), 2):
+        setup_s = setups.get(first["product"], {}).get(then["product"], 0.0)
+        follows[i, j] = first["end_s"] + setup_s <= then["start_s"] + EPS
     chains = len(work) - int((maximum_bipartite_matching(csr_array(follows)) >= 0).sum()) if work else 0
     return [f"'{station['name']}' needs {chains} servers"] if chains > (station.get("servers") or NEVER) else []
 
 
 def _trips(cell: Row, robot: Row, rows: Sequence[Row]) -> list[str]:
-    """Where a robot would have to be at two places, drive too fast, leave its service, or work where it does not serve."""
-    at, free_s, found, serves, busy = robot["start"], 0.0, list[str](), robot.get("serves"), None
+    """The faults where a robot is at two places, drives too fast, leaves its service, or works where it does not serve."""
+    at, free_s, errors, serves, busy = robot["start"], 0.0, list[str](), robot.get("serves"), None
     for row in rows:
         ends, carries = (row["station"], row["target"]), row["operation"] in ("carry", "pallet")
         short = row["operation"] == "empty" and row["end_s"] - row["start_s"] + EPS < _travel_s(cell, robot, ends)
         wrong = {"late": row["start_s"] + EPS < free_s + _travel_s(cell, robot, (at, ends[0])), "short": short}
         wrong["barred"] = serves is not None and carries and not {*ends} <= {*serves}
         wrong["gone from its service"] = busy is not None and (busy != row["part"] or not carries)
-        found += [f"robot {word}: {row}" for word, is_so in wrong.items() if is_so]
+        errors += [f"robot {word}: {row}" for word, is_so in wrong.items() if is_so]
         at, free_s, busy = row["target"], row["end_s"], row["part"] if row["operation"] == "service" else None
-    return found
+    return errors

@@ -1,4 +1,4 @@
-"""How fast the sequencers are: episodes a second, seconds to the optimum and to a proof, all in one run on one core."""
+"""The speed of the sequencers: episodes per second, seconds to the optimum and to a proof, in one run on one core."""
 
 import time
 from collections.abc import Callable, Mapping
@@ -22,43 +22,43 @@ from lab_studies.thesis.chapter_7_cells import robot_cell
 
 CASES = ("I", "II", "III")
 EPISODES, TOASTS = 400, 4  # of the sessions whose rate is measured
-READABLE_SESSIONS = 3  # its rate shows with few
+READABLE_SESSIONS = 3  # few sessions show the rate of readable ones
 PROVEN = (30, 100)  # toasts
 MANY, MANY_EPISODES, MANY_SESSIONS = 30, 1000, 10
-NEAR = 0.01  # above the optimum, as a fraction
+NEAR = 0.01  # the gap to the optimum, as a fraction, that counts as near
 CP_SAT_LIMIT_S = 60.0
 REPEATS = 5
 RATE, SECONDS = "speed_thousand episodes per s", "wall_s"
 ABOUT = (
-    f"One process on one core, median of {REPEATS} runs, lowest and highest beside it; compiling is not counted. Rates: SRL of "
-    f"type B and random search, {{}} sessions of {EPISODES} episodes, {TOASTS} toasts in case I; 'readable' is the same session "
-    f"in plain Python, {READABLE_SESSIONS} of them. exact: seconds to the proof."
+    f"One process on one core, the median of {REPEATS} runs with the lowest and the highest; compiling is not counted. Rates: "
+    f"SRL of type B and random search, {{}} sessions of {EPISODES} episodes, {TOASTS} toasts in case I; 'readable' is the same "
+    f"session in plain Python, {READABLE_SESSIONS} of them. exact: seconds to the proof."
 )
 ABOUT_MANY = (
-    f"{MANY} toasts: srl-time's seconds until its best sequence is within {NEAR:.0%} of the optimum, median of the sessions "
+    f"{MANY} toasts: the seconds of srl-time until its best sequence is within {NEAR:.0%} of the optimum, median of the sessions "
     f"({MANY_SESSIONS} at most; the interval is the fastest and the slowest). CP-SAT: the gap of its best sequence after "
-    "{:g} s with one thread, building the model not counted; it begins with the sequence of first come, first served."
+    "{:g} s with one thread, without building the model; it begins with the sequence of first come, first served."
 )
 
 
 def sequencing_speed(job: Job, reading: Mapping[str, Any]) -> Findings:
-    """Rates, seconds and their ratios; the reading changes nothing here."""
+    """Rates, seconds and their ratios; the reading has no effect."""
     steps: list[Callable[[], list[Row]]] = [
         *(partial(_rate, name, run) for name, run in _rated(job).items()),
         *(partial(_proof, case, toasts) for toasts in PROVEN for case in CASES),
         *(partial(near_rows, case, job) for case in CASES),
         *(partial(solved_rows, case, job.seed) for case in CASES),
     ]
-    found = job.in_turn(steps)
-    rates, learned, solved = found[:3], found[-2 * len(CASES) : -len(CASES)], found[-len(CASES) :]
+    measured = job.in_turn(steps)
+    rates, learned, solved = measured[:3], measured[-2 * len(CASES) : -len(CASES)], measured[-len(CASES) :]
     notes = (ABOUT.format(job.sessions), ABOUT_MANY.format(CP_SAT_LIMIT_S))
-    rows = list(chain(*found))
+    rows = list(chain(*measured))
     summary = ratios(*(list(chain(*some)) for some in (rates, learned, solved)))
     return Findings(rows, summary | agreement(rows), {}, notes)
 
 
 def _rated(job: Job) -> dict[str, Callable[[], int]]:
-    """What is timed, by name; each returns how many episodes it was."""
+    """The functions that are timed, by name; each returns the number of its episodes."""
     cell, search = robot_cell("I", TOASTS), Search(EPISODES, settings=SrlSettings(beta=0.5, factor="B"))
 
     def compiled(method: str) -> int:
@@ -88,7 +88,7 @@ def _rate(name: str, run: Callable[[], int]) -> list[Row]:
 
 
 def _proof(case: str, toasts: int) -> list[Row]:
-    """Seconds to the proof; of a search that gives up, to that, under another name."""
+    """The row of the seconds to the proof, or, under another name, to the end of a search without one."""
     cell, seconds, proven = robot_cell(case, toasts), list[float](), True
     for _ in range(REPEATS):
         began = time.perf_counter()
@@ -99,48 +99,48 @@ def _proof(case: str, toasts: int) -> list[Row]:
 
 
 def near_rows(case: str, job: Job) -> list[Row]:
-    """The share of srl-time's sessions that came near enough, and where all did, their seconds until then."""
-    cell, found = robot_cell(case, MANY), list[float]()
-    wanted = (1.0 + NEAR) * optimum(cell).bound_s
+    """Rows of the share of srl-time's sessions that come near the optimum, and, if all do, of the seconds until then."""
+    cell, seconds = robot_cell(case, MANY), list[float]()
+    near_cost = (1.0 + NEAR) * optimum(cell).bound_s
     for session in range(min(job.sessions, MANY_SESSIONS)):
         reached, began = [inf], time.perf_counter()
 
         def listen(tried: EpisodeSequenced, reached: list[float] = reached, began: float = began) -> None:
-            if tried.best_cost <= wanted:
+            if tried.best_cost <= near_cost:
                 reached[0] = min(reached[0], time.perf_counter() - began)
 
         rng = np.random.default_rng([job.seed, session])
         SEQUENCERS["srl-time"](cell, Search(MANY_EPISODES, on_episode=listen), rng)
-        found.append(reached[0])
-    return rows_of_near(case, found)
+        seconds.append(reached[0])
+    return rows_of_near(case, seconds)
 
 
 def rows_of_near(case: str, seconds: list[float]) -> list[Row]:
-    """Of the seconds of each session, inf where it never came near."""
+    """The rows of the sessions' seconds until they came near, inf for one that never did."""
     named: Row = {"name": "srl-time, near the optimum", "case": case, "toasts": MANY}
     near = row(named, "near_percent", 100.0 * sum(map(isfinite, seconds)) / len(seconds))
     return [near, median_row(named, SECONDS, seconds)] if near["value"] == 100.0 else [near]
 
 
 def solved_rows(case: str, seed: int) -> list[Row]:
-    """CP-SAT's gap after its limit."""
+    """The rows of CP-SAT's gap after its time limit, and of its seconds."""
     cell = robot_cell(case, MANY)
-    best, found = optimum(cell), cp_sat(cell, time_limit_s=CP_SAT_LIMIT_S, seed=seed)
+    best, solved = optimum(cell), cp_sat(cell, time_limit_s=CP_SAT_LIMIT_S, seed=seed)
     named: Row = {"name": "cp-sat", "case": case, "toasts": MANY, "limit_s": CP_SAT_LIMIT_S}
-    gap = max(0.0, 100.0 * best.gap(found.cost))
-    return [row(named, "gap_percent", gap), row(named, SECONDS, found.wall_s)]
+    gap = max(0.0, 100.0 * best.gap(solved.cost))
+    return [row(named, "gap_percent", gap), row(named, SECONDS, solved.wall_s)]
 
 
 def ratios(rates: list[Row], learned: list[Row], solved: list[Row]) -> Row:
-    """How many times as fast; CP-SAT's seconds are at least those of its limit where its sequence was not near yet."""
-    fast, random, slow = (one["value"] for one in rates)
+    """The ratios of speeds; CP-SAT needs at least its time limit where its sequence was not near the optimum by then."""
+    fast, random, slow = (result["value"] for result in rates)
     says: Row = {
         "compiled to readable SRL": round(fast / slow, 1),
         "random search to SRL, both compiled": round(random / fast, 2),
     }
-    for one in those(learned, measure=SECONDS):
-        other = {own["measure"]: own["value"] for own in those(solved, case=one["case"])}
+    for result in those(learned, measure=SECONDS):
+        other = {own["measure"]: own["value"] for own in those(solved, case=result["case"])}
         far = other.get("gap_percent", 0.0) > 100.0 * NEAR
-        ratio = round(other[SECONDS] / one["value"]) if far else None
-        says[f"CP-SAT's seconds to srl-time's, case {one['case']}, at least"] = ratio
+        ratio = round(other[SECONDS] / result["value"]) if far else None
+        says[f"CP-SAT's seconds to srl-time's, case {result['case']}, at least"] = ratio
     return says

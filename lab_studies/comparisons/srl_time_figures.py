@@ -20,7 +20,7 @@ LOOKS: dict[tuple[str, str | None], Look] = {  # by method and reward factor
     ("random", None): (GREY, "v", "random search"),
     ("ga", None): (PURPLE, "X", "genetic"),
 }
-SINGLE: dict[str, Look] = {  # one sequence, no episodes
+SINGLE: dict[str, Look] = {  # methods with one sequence and no episodes
     "fifo": (INK, "P", "FIFO"),
     "nearest-ready": (SKY, "<", "nearest-ready"),
     "shortest-move": (SKY, ">", "shortest-move"),
@@ -32,11 +32,13 @@ PANEL_INCH = 2.9, 2.5
 
 
 def by_episodes(rows: Sequence[Row], measure: str) -> bytes:
-    """A percentage by session length, a plot for each case and number of few toasts."""
-    of = [one for one in those(rows, measure=measure) if "episodes" in one and "case" in one]
-    counts = sorted({one["toasts"] for one in of if one["toasts"] <= 4})
-    cases = sorted({one["case"] for one in of})
-    panels = {f"{count} toasts, case {case}": those(of, toasts=count, case=case) for count in counts for case in cases}
+    """A picture of a percentage by session length, a plot for each case and small number of toasts."""
+    shown = [row for row in those(rows, measure=measure) if "episodes" in row and "case" in row]
+    counts = sorted({row["toasts"] for row in shown if row["toasts"] <= 4})
+    cases = sorted({row["case"] for row in shown})
+    panels = {
+        f"{count} toasts, case {case}": those(shown, toasts=count, case=case) for count in counts for case in cases
+    }
     ylabel = "sessions that find the optimum [%]" if measure == "SP_percent" else "sessions that end optimal [%]"
 
     def draw(axes: "Axes", shown: Sequence[Row]) -> None:
@@ -47,18 +49,18 @@ def by_episodes(rows: Sequence[Row], measure: str) -> bytes:
 
 
 def of_orders(rows: Sequence[Row]) -> bytes:
-    """The gap by session length for each order and interval of the FMS; methods with one sequence as lines across."""
-    of = [one for one in those(rows, measure="gap_percent") if "order" in one]
-    means = sorted({one["interval_s"] for one in of})
-    orders = list(dict.fromkeys(one["order"] for one in of))
+    """A picture of the gap by session length for each order and interval of the FMS; horizontal lines: single sequences."""
+    gaps = [row for row in those(rows, measure="gap_percent") if "order" in row]
+    means = sorted({row["interval_s"] for row in gaps})
+    orders = list(dict.fromkeys(row["order"] for row in gaps))
     panels = {
-        f"{order}, every {mean:g} s": those(of, order=order, interval_s=mean) for mean in means for order in orders
+        f"{order}, every {mean:g} s": those(gaps, order=order, interval_s=mean) for mean in means for order in orders
     }
 
     def draw(axes: "Axes", shown: Sequence[Row]) -> None:
         _curves(axes, shown)
         fifo = those(shown, method="fifo")[0]["value"]
-        rule = min(one["value"] for one in shown if "episodes" not in one and one["method"] not in ("fifo", "exact"))
+        rule = min(row["value"] for row in shown if "episodes" not in row and row["method"] not in ("fifo", "exact"))
         axes.axhline(fifo, color=INK, linestyle="--", linewidth=1.0, label="FIFO")
         axes.axhline(rule, color=SKY, linestyle=":", linewidth=1.6, label="best dispatching rule")
         axes.set_ylim(bottom=-0.04 * axes.get_ylim()[1])
@@ -67,18 +69,18 @@ def of_orders(rows: Sequence[Row]) -> bytes:
 
 
 def by_wall_time(rows: Sequence[Row]) -> bytes:
-    """The gap by the seconds of a session for many toasts: a line for each case and method, a mark for one sequence."""
-    of = [one for one in rows if one.get("toasts", 0) > 4]
-    counts = sorted({one["toasts"] for one in of})
-    panels = {f"{count} toasts": those(of, toasts=count) for count in counts}
+    """A picture of the gap by the seconds of a session for many toasts: a line for each case and method."""
+    many = [row for row in rows if row.get("toasts", 0) > 4]
+    counts = sorted({row["toasts"] for row in many})
+    panels = {f"{count} toasts": those(many, toasts=count) for count in counts}
 
     def draw(axes: "Axes", shown: Sequence[Row]) -> None:
         looks = LOOKS | {(method, None): look for method, look in SINGLE.items()}
         for look, (colour, marker, name) in looks.items():
             size = 9 if marker == "*" else 5
-            for case in sorted({one["case"] for one in shown}):
+            for case in sorted({row["case"] for row in shown}):
                 mine = those(shown, case=case, method=look[0], reward_factor=look[1])
-                walls, gaps = ([one["value"] for one in those(mine, measure=m)] for m in ("wall_s", "gap_percent"))
+                walls, gaps = ([row["value"] for row in those(mine, measure=m)] for m in ("wall_s", "gap_percent"))
                 if walls:
                     axes.plot(walls, gaps, color=colour, marker=marker, markersize=size, linewidth=0.9, label=name)
         axes.set(xscale="log", xlabel="seconds of a session")
@@ -88,7 +90,7 @@ def by_wall_time(rows: Sequence[Row]) -> bytes:
 
 
 def _grid(panels: Mapping[str, Sequence[Row]], columns: int, draw: Any, ylabel: str, tall: float = 1.0) -> bytes:
-    """A plot for each of the panels, title -> rows, row by row, and one legend below."""
+    """A picture with a plot for each of the panels, title -> rows, and one legend below."""
     lines = -(-len(panels) // columns)
 
     def whole(figure: "Figure") -> None:
@@ -105,12 +107,12 @@ def _grid(panels: Mapping[str, Sequence[Row]], columns: int, draw: Any, ylabel: 
 
 
 def _curves(axes: "Axes", rows: Sequence[Row]) -> None:
-    """The methods that learn by session length: the lengths themselves are the ticks of a logarithmic axis."""
-    tried = [one for one in rows if "episodes" in one]
+    """Draw the methods that learn by session length, on a logarithmic axis with the lengths as ticks."""
+    tried = [row for row in rows if "episodes" in row]
     for (method, factor), look in LOOKS.items():
-        if of := those(tried, method=method, reward_factor=factor):
-            curve(axes, of, "episodes", look)
-    lengths = sorted({one["episodes"] for one in tried})
+        if own := those(tried, method=method, reward_factor=factor):
+            curve(axes, own, "episodes", look)
+    lengths = sorted({row["episodes"] for row in tried})
     axes.set(xscale="log", xlabel="episodes")
     axes.set_xticks(lengths, [f"{length:g}" for length in lengths])
     axes.set_xticks([], minor=True)

@@ -1,4 +1,4 @@
-"""How fast sessions on tiles are in Mountain Car: compiled, readable, and through Gymnasium's own loop."""
+"""The speed of sessions on tiles in Mountain Car: compiled, readable, and through Gymnasium's own loop."""
 
 import time
 from collections.abc import Callable, Mapping
@@ -24,15 +24,15 @@ from lab.studies.runner import Job
 NAME, EPISODES, READABLE_EPISODES, REPEATS = "MountainCar-v0", 500, 60, 5
 NOBODY = GateSettings("never")
 ABOUT = (
-    "Steps of MountainCar-v0 a second, one process on one core, median of five runs; compile time is not counted. The learner is "
-    f"SARSA(lambda) with replacing traces on eight tilings: {EPISODES} episodes a session in the kernel, "
-    f"{READABLE_EPISODES} in the readable one, on the lab's own physics and on Gymnasium's. 'gymnasium alone' learns nothing: "
-    "it moves by chance."
+    "Steps of MountainCar-v0 per second, one process on one core, median of five runs; compile time is not counted. The learner "
+    f"is SARSA(lambda) with replacing traces on eight tilings: {EPISODES} episodes in a session of the kernel, "
+    f"{READABLE_EPISODES} in a readable one, on the lab's own physics and on Gymnasium's. 'gymnasium alone' learns nothing and "
+    "moves at random."
 )
 
 
 def tiles_speed(job: Job, reading: Mapping[str, Any]) -> Findings:
-    """Thousand steps a second, median of five runs; the reading changes nothing here."""
+    """The speeds [thousand steps per second], median of five runs; the reading has no effect."""
     car = PhysicsEnvironment(PHYSICS[NAME])
     learner = replace(fitting(car.physics), episodes=EPISODES)
     short = replace(learner, episodes=READABLE_EPISODES)
@@ -57,16 +57,16 @@ def tiles_speed(job: Job, reading: Mapping[str, Any]) -> Findings:
         "kernel": compiled,
         "session": lambda: readable(car),
         "session through gymnasium": lambda: readable(theirs),
-        "gymnasium alone": lambda: _by_chance(job.seed),
+        "gymnasium alone": lambda: _random_steps(job.seed),
     }
     rows = job.in_turn([lambda name=name, run=run: _row(name, run) for name, run in runs.items()])  # type: ignore[misc]
-    rates = {one["name"]: one["value"] for one in rows}
+    rates = {row["name"]: row["value"] for row in rows}
     summary: Row = {f"kernel to {name}": round(rates["kernel"] / rates[name], 1) for name in rates if name != "kernel"}
     return Findings(rows, summary, {}, (ABOUT,))
 
 
-def _by_chance(seed: int) -> tuple[int, float]:
-    """The steps of READABLE_EPISODES episodes, and the time at their end [s]."""
+def _random_steps(seed: int) -> tuple[int, float]:
+    """The number of steps of READABLE_EPISODES episodes with random moves in Gymnasium's environment, and their end [s]."""
     env, made, draw = gymnasium.make(NAME), 0, stream(seed)
     for episode in range(READABLE_EPISODES):
         env.reset(seed=seed + episode)

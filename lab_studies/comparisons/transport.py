@@ -1,4 +1,4 @@
-"""Orders of work on the instances that the field measures itself with: every method beside the best known and the printed."""
+"""Orders of work on the field's benchmark instances: every method compared with the best known and the published values."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -12,103 +12,115 @@ from lab.sequencing.search import SAME, gap
 from lab.studies.findings import Findings, Row, row
 from lab.studies.runner import Job
 from lab_studies.comparisons.schedule_checker import faults
-from lab_studies.comparisons.transport_entries import CYCLES_SHOWN, CYCLIC, KEPT, Entry, Found, carried_out, methods_for
+from lab_studies.comparisons.transport_entries import (
+    CYCLES_SHOWN,
+    CYCLIC,
+    KEPT,
+    Entry,
+    EntryResult,
+    entry_result,
+    methods_for,
+)
 from lab_studies.comparisons.transport_figures import by_seconds, profile
-from lab_studies.comparisons.transport_instances import Instance, board, cell_file, own
+from lab_studies.comparisons.transport_instances import Instance, board, cell_file, own_instances
 
 SECONDS = 10.0
-Board = Mapping[Entry, Found]
+Board = Mapping[Entry, EntryResult]
 MEASURES = (
-    "Costs are makespans (of a cyclic order: the period) in the instance's unit of time. Best: the least that anything on this "
-    "board found, or that is printed. Gap: above the best. Bound: the highest that anything on this board proved; an order "
-    "that reaches it is an optimum, proven; without a proof, a printed figure or a prover beside it, the best may be far from "
-    "that. Seconds: when a method found the last of its improvements. One seed each. JobShopLab's vehicles set out for a job "
-    "only when the operation before has begun; here they may set out earlier, so that its PPO's schedules are allowed here, "
-    "and those here not always there."
+    "Costs are makespans (for a cyclic order, the period) in the instance's unit of time. Best: the lowest cost that anything on "
+    "this board found or that is published. Gap: above the best. Bound: the highest that anything on this board proved; an "
+    "order that reaches it is a proven optimum. Without a proof, a published value or a proving method the best may be far from "
+    "optimal. Seconds: the time of a method's last improvement. One seed each. JobShopLab's vehicles set out for a job only when "
+    "the operation before has begun; here they may set out earlier, so that its PPO's schedules are allowed here, but those "
+    "from here not always there."
 )
 TIMES = (
-    "Each method has {seconds:g} s an instance, by the clock of this machine, other entries of the study beside it: with more "
-    "time, or alone, each finds more. Methods that try sequences begin again with ever longer sessions until the time is over; "
-    "compiling does not count, building CP-SAT's model does not either. Rules have one sequence. CP-SAT has six threads."
+    "Each method has {seconds:g} s for an instance, by the clock, while other entries of the study run: with more time, or "
+    "alone, each finds more. Methods that try sequences start ever longer sessions until the time is over; neither compiling "
+    "nor building CP-SAT's model counts. Rules have one sequence. CP-SAT has six threads."
 )
 LEARNERS = (
-    "srl and mc learn from the costs of whole sequences alone; srl-time is given a lower bound of the whole cell besides, and "
-    "takes cells with one robot only. srl-improved learns from sequences that a short annealing has improved, so that much of "
-    "what it finds is that search's. anneal, ga and random search learn nothing; exact, cp-sat and portfolio know the "
-    "cell's model."
+    "srl and mc learn from the costs of whole sequences alone; srl-time also has a lower bound of the whole cell, and takes only "
+    "cells with one robot. srl-improved learns from sequences that a short annealing has improved, to which it owes much of its "
+    "result. anneal, ga and random search learn nothing; exact, cp-sat and portfolio know the cell's model."
 )
 CHECKED = (
-    "--verify holds each kept schedule against its instance with a checker that shares no code with the simulators or the "
+    "--verify checks each kept schedule against its instance with a checker that shares no code with the simulators or the "
     "methods (lab_studies/comparisons/schedule_checker.py): every operation in its turn, on its machine, long enough, no "
-    "machine, place or robot in two places at once, and the end as it is claimed. Of the cyclic order it is shown {shown} parts."
+    "machine, place or robot used twice at a time, and the claimed end. Of a cyclic order it checks {shown} parts."
 )
 
 
 def transport(job: Job, reading: Mapping[str, Any]) -> Findings:
-    """Every method on every instance; reading: "seconds" a method, "methods", "instances" of one's own instead, "verify".
+    """The results of every method on every instance.
 
-    Raises BadInput for an unknown method and for instances that cannot be read, WorkFailed where a schedule is found wrong.
+    reading: "seconds" for each method, "methods", the user's "instances" in place of all, and "verify". Raises BadInput for an
+    unknown method and for instances that cannot be read, WorkFailed if "verify" finds a wrong schedule.
     """
     seconds = float(reading.get("seconds", SECONDS))
-    instances = own(reading["instances"]) if "instances" in reading else board()
+    instances = own_instances(reading["instances"]) if "instances" in reading else board()
     entries = entries_of(instances, reading.get("methods", ()), seconds, job.seed)
-    found = measured(job, entries)
+    results = measured(job, entries)
     notes = [MEASURES, TIMES.format(seconds=seconds), LEARNERS, CHECKED.format(shown=CYCLES_SHOWN)]
     says: Row = {}
     if reading.get("verify"):
-        says["schedules that the checker found right"] = verified(found)
-    rows = [line for one, of in by_instance(found).items() for line in rows_of(one, of)]
-    rows = [*in_all(found), *rows]
-    orders = {entry: one for entry, one in found.items() if entry.method != CYCLIC}
+        says["schedules that the checker found right"] = verification(results)
+    rows = [line for instance, by_method in by_instance(results).items() for line in rows_of(instance, by_method)]
+    rows = [*family_rows(results), *rows]
+    orders = {entry: result for entry, result in results.items() if entry.method != CYCLIC}
     figures = {
         "How many instances a method solves within a gap": profile(gaps_of(orders)),
         "The mean gap, second by second": by_seconds(
-            orders, {one: least(one, of) for one, of in by_instance(orders).items()}
+            orders, {instance: least_cost(instance, by_method) for instance, by_method in by_instance(orders).items()}
         ),
     }
-    refused = {(e.method, f.refused) for e, f in found.items() if f.cost is None}
+    refused = {(e.method, f.refused) for e, f in results.items() if f.cost is None}
     notes += [f"Left out: {method}: {why}." for method, why in sorted(refused)[:12]]
-    return Findings(rows, in_short(found) | says, figures, tuple(notes))
+    return Findings(rows, in_short(results) | says, figures, tuple(notes))
 
 
 def entries_of(instances: Sequence[Instance], methods: Sequence[str], seconds: float, seed: int) -> list[Entry]:
-    """Every method that is asked for (none: all) on every instance that it may be tried on."""
-    known = dict.fromkeys(method for one in instances for method in methods_for(one))
+    """The entries of the methods that are asked for (none: all) on every instance that they may be tried on."""
+    known = dict.fromkeys(method for instance in instances for method in methods_for(instance))
     for name in methods:
         if name not in known:
             raise unknown("method", name, known, "--methods")
     return [
-        Entry(one, method, seconds, seed)
-        for one in instances
-        for method in methods_for(one)
+        Entry(instance, method, seconds, seed)
+        for instance in instances
+        for method in methods_for(instance)
         if not methods or method in methods
     ]
 
 
-def measured(job: Job, entries: Sequence[Entry]) -> dict[Entry, Found]:
-    """What came of every entry; those that the job's folder holds are read, the others are measured and kept there."""
-    names = {_key(one): one for one in entries}
-    done: dict[Entry, Found] = job.kept_as(lambda line: (names[line["entry"]], Found.of_json(line["found"])))
-    left = [one for one in entries if one not in done]
+def measured(job: Job, entries: Sequence[Entry]) -> dict[Entry, EntryResult]:
+    """The result of every entry; the job's folder keeps them."""
+    names = {_key(entry): entry for entry in entries}
+    done: dict[Entry, EntryResult] = job.kept_as(
+        lambda line: (names[line["entry"]], EntryResult.of_json(line["found"]))
+    )
+    left = [entry for entry in entries if entry not in done]
     job.progress(len(done), len(entries))
-    for entry, found in job.computed(carried_out, left, most=1):  # seconds each: a kill loses one a process
-        done[entry] = found
-        job.keep({"entry": _key(entry), "found": asdict(found)})
+    for entry, result in job.computed(
+        entry_result, left, most=1
+    ):  # entries take seconds: a kill loses one in each process
+        done[entry] = result
+        job.keep({"entry": _key(entry), "found": asdict(result)})
         job.progress(len(done), len(entries))
-    return {one: done[one] for one in entries}
+    return {entry: done[entry] for entry in entries}
 
 
 def _key(entry: Entry) -> str:
     return json.dumps(asdict(entry), sort_keys=True)
 
 
-def verified(found: Board) -> str:
-    """How many kept schedules the checker holds right, of how many; WorkFailed names the first that are not."""
+def verification(results: Board) -> str:
+    """The number of schedules that the checker finds right, such as "12 of 12". Raises WorkFailed if any is wrong."""
     wrong, right = list[str](), 0
-    for entry, one in found.items():
-        if one.cost is None:
+    for entry, result in results.items():
+        if result.cost is None:
             continue
-        said = faults_of(entry, one)
+        said = faults_of(entry, result)
         right += not said
         wrong += [f"{entry.instance.name}, {entry.method}: {said[0]}"] if said else []
     if wrong:
@@ -119,54 +131,56 @@ def verified(found: Board) -> str:
     return f"{right} of {right}"
 
 
-def faults_of(entry: Entry, found: Found) -> list[str]:
-    """What the checker finds wrong with a kept schedule, and with the cost that is claimed for it."""
+def faults_of(entry: Entry, result: EntryResult) -> list[str]:
+    """The faults that the checker finds in a kept schedule and in its claimed cost."""
     plain = cell_file(entry.instance).model_dump()
     if entry.method == CYCLIC:
-        names = list(dict.fromkeys(plain["order"] or [one["name"] for one in plain["products"]]))
-        plain |= {"parts": None, "order": [names[n % len(names)] for n in range(found.parts)]}
-    elif abs(found.ends_s - (found.cost or 0.0)) > SAME:
-        return [f"it ends at {found.ends_s:g}, not at {found.cost:g}"]
+        names = list(dict.fromkeys(plain["order"] or [product["name"] for product in plain["products"]]))
+        plain |= {"parts": None, "order": [names[n % len(names)] for n in range(result.parts)]}
+    elif abs(result.ends_s - (result.cost or 0.0)) > SAME:
+        return [f"it ends at {result.ends_s:g}, not at {result.cost:g}"]
     try:
         return faults(
             plain,
             [
-                dict.fromkeys(("product", "resource", "when")) | dict(zip(KEPT, one, strict=True))
-                for one in found.schedule
+                dict.fromkeys(("product", "resource", "when")) | dict(zip(KEPT, values, strict=True))
+                for values in result.schedule
             ],
-            found.ends_s,
+            result.ends_s,
         )
     except (KeyError, TypeError, ValueError, StopIteration) as error:
         return [f"it cannot be read: {type(error).__name__}: {error}"]
 
 
-# ---- what is told of it ------------------------------------------------------------------------------------------------
+# ---- rows --------------------------------------------------------------------------------------------------------------
 
 
-def by_instance(found: Board) -> dict[Instance, dict[str, Found]]:
-    """What each method found, instance by instance."""
+def by_instance(results: Board) -> dict[Instance, dict[str, EntryResult]]:
+    """The results by instance and method."""
     return {
-        one: {entry.method: found[entry] for entry in of}
-        for one, of in groupby(found, key=lambda entry: entry.instance)
+        instance: {entry.method: results[entry] for entry in group}
+        for instance, group in groupby(results, key=lambda entry: entry.instance)
     }
 
 
-def least(instance: Instance, of: Mapping[str, Found]) -> float:
-    """The least cost that is known of an instance; infinite where nothing is."""
-    return min([one.cost for one in of.values() if one.cost is not None] + [instance.printed or inf])
+def least_cost(instance: Instance, by_method: Mapping[str, EntryResult]) -> float:
+    """The least known cost of an instance, inf if none is known."""
+    return min([result.cost for result in by_method.values() if result.cost is not None] + [instance.printed or inf])
 
 
-def highest(of: Mapping[str, Found]) -> tuple[float, str]:
-    """The highest bound, and whose it is; 0 by nobody."""
-    return max(((one.bound, one.bound_by) for one in of.values()), key=lambda one: one[0], default=(0.0, ""))
+def highest_bound(by_method: Mapping[str, EntryResult]) -> tuple[float, str]:
+    """The highest bound and the method that proved it; 0 and "" without one."""
+    return max(
+        ((result.bound, result.bound_by) for result in by_method.values()), key=lambda pair: pair[0], default=(0.0, "")
+    )
 
 
-def rows_of(instance: Instance, of: Mapping[str, Found]) -> list[Row]:
-    """A line a method: what it found, how far that is from the best known, and what is proven."""
-    best, (bound, by) = least(instance, of), highest(of)
+def rows_of(instance: Instance, by_method: Mapping[str, EntryResult]) -> list[Row]:
+    """The rows of each method on an instance: its cost, its gap to the best known, and what is proven."""
+    best, (bound, by) = least_cost(instance, by_method), highest_bound(by_method)
     rows: list[Row] = []
-    for method, one in of.items():
-        if one.cost is None:
+    for method, result in by_method.items():
+        if result.cost is None:
             continue
         named: Row = {
             "table": instance.family,
@@ -175,35 +189,37 @@ def rows_of(instance: Instance, of: Mapping[str, Found]) -> list[Row]:
             "printed": instance.printed,
             "printed as": instance.printed_is or None,
             "bound": bound,
-            "proven": one.cost <= bound + SAME,
-            "proven by": by if one.cost <= bound + SAME else None,
+            "proven": result.cost <= bound + SAME,
+            "proven by": by if result.cost <= bound + SAME else None,
             "method": method,
-            "found_by": one.found_by if one.found_by != method else None,
-            "seconds": round(one.trace[-1][0] if one.trace else one.wall_s, 3),
+            "found_by": result.found_by if result.found_by != method else None,
+            "seconds": round(result.trace[-1][0] if result.trace else result.wall_s, 3),
         }
-        rows += [row(named, "cost", one.cost), row(named, "gap_percent", 100.0 * gap(one.cost, best))]
+        rows += [row(named, "cost", result.cost), row(named, "gap_percent", 100.0 * gap(result.cost, best))]
     return rows
 
 
-def gaps_of(found: Board) -> dict[str, list[float]]:
-    """By method, the gaps [%] to the best known of the instances that it took."""
+def gaps_of(results: Board) -> dict[str, list[float]]:
+    """By method, the gaps [%] to the best known costs of the instances that it solved."""
     gaps = dict[str, list[float]]()
-    for instance, of in by_instance(found).items():
-        for method, one in of.items():
-            if one.cost is not None:
-                gaps.setdefault(method, []).append(100.0 * gap(one.cost, least(instance, of)))
+    for instance, by_method in by_instance(results).items():
+        for method, result in by_method.items():
+            if result.cost is not None:
+                gaps.setdefault(method, []).append(100.0 * gap(result.cost, least_cost(instance, by_method)))
     return gaps
 
 
-def in_all(found: Board) -> list[Row]:
-    """A line a method and family: its mean and worst gap, how often it found the best known, and how often it proved one."""
+def family_rows(results: Board) -> list[Row]:
+    """The rows of each method and family: its mean and worst gap, and how often it found the best known and proved one."""
     rows: list[Row] = []
-    families = dict.fromkeys(one.instance.family for one in found)
+    families = dict.fromkeys(entry.instance.family for entry in results)
     for family in families:
-        part = {entry: one for entry, one in found.items() if entry.instance.family == family}
+        part = {entry: result for entry, result in results.items() if entry.instance.family == family}
         proofs = {
             method: sum(
-                one.cost is not None and one.cost <= one.bound + SAME for e, one in part.items() if e.method == method
+                result.cost is not None and result.cost <= result.bound + SAME
+                for e, result in part.items()
+                if e.method == method
             )
             for method in dict.fromkeys(entry.method for entry in part)
         }
@@ -211,7 +227,7 @@ def in_all(found: Board) -> list[Row]:
             named: Row = {
                 "table": f"All of {family}",
                 "method": method,
-                "best known found": f"{sum(one <= 100 * SAME for one in gaps)} of {len(gaps)}",
+                "best known found": f"{sum(gap_percent <= 100 * SAME for gap_percent in gaps)} of {len(gaps)}",
                 "proven alone": f"{proofs[method]} of {len(gaps)}",
             }
             rows.append(row(named, "mean gap_percent", sum(gaps) / len(gaps)))
@@ -219,16 +235,23 @@ def in_all(found: Board) -> list[Row]:
     return rows
 
 
-def in_short(found: Board) -> Row:
-    """How many instances there are, how many optima are proven, and how the best compare with what is printed."""
-    boards = by_instance(found)
-    told: Row = {"instances": len(boards), "entries": len(found)}
-    proven = [one for one, of in boards.items() if least(one, of) <= highest(of)[0] + SAME]
+def in_short(results: Board) -> Row:
+    """The number of instances, of proven optima, and of costs as published or better."""
+    boards = by_instance(results)
+    told: Row = {"instances": len(boards), "entries": len(results)}
+    proven = [
+        instance
+        for instance, by_method in boards.items()
+        if least_cost(instance, by_method) <= highest_bound(by_method)[0] + SAME
+    ]
     told["optima proven here"] = len(proven)
-    mine = {one: min((f.cost for f in of.values() if f.cost is not None), default=inf) for one, of in boards.items()}
-    printed = [one for one in boards if one.printed is not None]
+    mine = {
+        instance: min((f.cost for f in by_method.values() if f.cost is not None), default=inf)
+        for instance, by_method in boards.items()
+    }
+    printed = [instance for instance in boards if instance.printed is not None]
     if printed:
-        equal = sum(abs(mine[one] - (one.printed or 0.0)) <= SAME for one in printed)
-        better = [one.name for one in printed if mine[one] < (one.printed or 0.0) - SAME]
+        equal = sum(abs(mine[instance] - (instance.printed or 0.0)) <= SAME for instance in printed)
+        better = [instance.name for instance in printed if mine[instance] < (instance.printed or 0.0) - SAME]
         told |= {"with a printed figure": len(printed), "as printed": equal, "better than printed": len(better)}
     return told

@@ -1,4 +1,4 @@
-"""One entry of the board: a method on an instance for so many seconds, what it finds when, and its schedule as plain rows."""
+"""One entry of the board: a method on an instance for some seconds, its improvements by time, and its schedule as plain rows."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
@@ -17,21 +17,21 @@ from lab.studies.runner import record_of
 from lab_studies.comparisons.transport_instances import Instance, cell_of
 
 CYCLIC = "cyclic"
-FIRST, GROWS, SHARE = (
-    50,
+FIRST = 50  # episodes of the first session
+GROWS, SHARE = (
     10.0,
     0.9,
-)  # episodes of a first session, how much longer the next may be, of the time that is left
-CP_SAT_WORKERS = 6  # threads that look in different ways, also on two cores
-CYCLES_SHOWN = 12  # parts of a cyclic order that the checker is shown
-KEPT = ("part", "operation", "station", "target", "robot", "start_s", "end_s")  # of a schedule's rows
+)  # a session may be so many times longer than the one before, and take this share of the time left
+CP_SAT_WORKERS = 6  # threads with different searches, also on two cores
+CYCLES_SHOWN = 12  # parts of a cyclic order in its schedule
+KEPT = ("part", "operation", "station", "target", "robot", "start_s", "end_s")  # the fields of a schedule's rows
 
-Proof = tuple[tuple[int, ...], str, float, str]  # a sequence, by whom; a bound, by whom
+Proof = tuple[tuple[int, ...], str, float, str]  # a sequence and who found it; a bound and who proved it
 
 
 @dataclass(frozen=True)
 class Entry:
-    """What is measured: a method on an instance, for so long [s], with a seed."""
+    """A method on an instance, its time [s], and its seed."""
 
     instance: Instance
     method: str
@@ -40,11 +40,11 @@ class Entry:
 
 
 @dataclass(frozen=True)
-class Found:
-    """What came of it, in the instance's unit of time. trace: (seconds, cost), each better than the one before.
+class EntryResult:
+    """The result of an entry, in the instance's unit of time. trace: (seconds, cost) of each improvement.
 
-    refused: why the method takes no such cell, or found nothing. schedule: rows by KEPT of an order that ends at `ends_s`; a
-    cyclic order's cost is its period, and its schedule that of CYCLES_SHOWN parts.
+    refused: why the method does not take the cell or found nothing, else "". schedule: rows with the fields KEPT of an order
+    that ends at `ends_s`; a cyclic order's cost is its period, and its schedule has CYCLES_SHOWN parts.
     """
 
     cost: float | None = None
@@ -59,9 +59,9 @@ class Found:
     parts: int = field(default=0)
 
     @classmethod
-    def of_json(cls, found: Mapping[str, Any]) -> "Found":
-        """As it was kept. Raises ValueError for what is something else."""
-        return record_of(cls, found)
+    def of_json(cls, kept: Mapping[str, Any]) -> "EntryResult":
+        """The result that was kept as JSON. Raises ValueError for anything else."""
+        return record_of(cls, kept)
 
 
 def methods_for(instance: Instance) -> tuple[str, ...]:
@@ -69,8 +69,8 @@ def methods_for(instance: Instance) -> tuple[str, ...]:
     return (CYCLIC,) if instance.is_cyclic else tuple(name for name in SEQUENCERS if name != "earliest-due")
 
 
-def carried_out(entry: Entry) -> Found:
-    """One entry; what a method does not take is told in `refused`."""
+def entry_result(entry: Entry) -> EntryResult:
+    """The result of one entry; if its method does not take the cell, `refused` says why."""
     try:
         cell = cell_of(entry.instance)
         if entry.method == CYCLIC:
@@ -79,16 +79,16 @@ def carried_out(entry: Entry) -> Found:
             return _proven(entry, cell, prove)
         return _by_episodes(entry, cell)
     except (BadInput, WorkFailed) as error:
-        return Found(refused=str(error))
+        return EntryResult(refused=str(error))
 
 
 class _Over(Exception):
-    """The time is over."""
+    """Raised when the time is over."""
 
 
 @dataclass
 class _Watch:
-    """Hears every episode; raises _Over after so many seconds."""
+    """A listener that records improvements, and raises _Over after so many seconds."""
 
     seconds: float
     began_s: float = field(default_factory=perf_counter)
@@ -109,16 +109,16 @@ class _Watch:
             raise _Over
 
 
-def _by_episodes(entry: Entry, cell: Cell) -> Found:
-    """Sessions that grow until the time is over; compiling, in a first one of one episode, does not count."""
+def _by_episodes(entry: Entry, cell: Cell) -> EntryResult:
+    """The result of ever longer sessions until the time is over; compiling, in a first episode, does not count."""
     find_sequence(cell, entry.method, Search(1), entry.seed)
     watch, episodes, session = _Watch(entry.seconds), FIRST, 1
     try:
         while True:
             began_s = watch.past_s
             search = Search(episodes, on_episode=watch.hear)
-            found = find_sequence(cell, entry.method, search, entry.seed, session)
-            if len(found.episode_costs) < episodes:
+            sequenced = find_sequence(cell, entry.method, search, entry.seed, session)
+            if len(sequenced.episode_costs) < episodes:
                 break  # a rule has one sequence
             left, took_s = entry.seconds - watch.past_s, max(watch.past_s - began_s, 1e-6)
             episodes, session = int(episodes * min(GROWS, SHARE * left / took_s)), session + 1
@@ -126,31 +126,33 @@ def _by_episodes(entry: Entry, cell: Cell) -> Found:
                 break
     except _Over:
         pass
-    return _measured(cell, watch.best, Found(found_by=entry.method, trace=tuple(watch.trace), wall_s=watch.past_s))
+    return _measured(
+        cell, watch.best, EntryResult(found_by=entry.method, trace=tuple(watch.trace), wall_s=watch.past_s)
+    )
 
 
-def _proven(entry: Entry, cell: Cell, prove: "Callable[[Entry, Cell], Proof]") -> Found:
+def _proven(entry: Entry, cell: Cell, prove: "Callable[[Entry, Cell], Proof]") -> EntryResult:
     began_s = perf_counter()
     sequence, found_by, bound, bound_by = prove(entry, cell)
     wall_s = perf_counter() - began_s
-    found = Found(found_by=found_by, bound=bound, bound_by=bound_by, wall_s=wall_s)
-    done = _measured(cell, sequence, found)
+    result = EntryResult(found_by=found_by, bound=bound, bound_by=bound_by, wall_s=wall_s)
+    done = _measured(cell, sequence, result)
     return replace(done, trace=() if done.cost is None else ((wall_s, done.cost),))
 
 
-def _measured(cell: Cell, sequence: tuple[int, ...], found: Found) -> Found:
-    """With the cost of the sequence, and its schedule as rows."""
+def _measured(cell: Cell, sequence: tuple[int, ...], result: EntryResult) -> EntryResult:
+    """The result with the cost of the sequence and its schedule."""
     if not sequence:
-        return replace(found, refused=found.refused or "no order was found in its time")
-    return replace(_with_schedule(cell, simulate(cell, sequence), found), cost=follow(cell, sequence).end_s)
+        return replace(result, refused=result.refused or "no order was found in its time")
+    return replace(_with_schedule(cell, simulate(cell, sequence), result), cost=follow(cell, sequence).end_s)
 
 
-def _with_schedule(cell: Cell, schedule: Schedule, found: Found) -> Found:
-    rows = tuple(tuple(one[name] for name in KEPT) for one in rows_of(schedule, cell, "planned"))
-    return replace(found, schedule=rows, ends_s=schedule.makespan_s, parts=cell.parts)
+def _with_schedule(cell: Cell, schedule: Schedule, result: EntryResult) -> EntryResult:
+    rows = tuple(tuple(row[name] for name in KEPT) for row in rows_of(schedule, cell, "planned"))
+    return replace(result, schedule=rows, ends_s=schedule.makespan_s, parts=cell.parts)
 
 
-def _cyclic(entry: Entry, cell: Cell) -> Found:
+def _cyclic(entry: Entry, cell: Cell) -> EntryResult:
     from lab.sequencing.cyclic.cycle import best_cycle
     from lab.sequencing.cyclic.unrolled import of_parts, unrolled
 
@@ -159,8 +161,8 @@ def _cyclic(entry: Entry, cell: Cell) -> Found:
     cycle = best_cycle(cell, mix, entry.seconds, entry.seed)
     wall_s = perf_counter() - began_s
     shown = unrolled(cycle, of_parts(cell, mix, CYCLES_SHOWN))
-    found = Found(cycle.period_s, CYCLIC, cycle.bound_s, CYCLIC, ((wall_s, cycle.period_s),), wall_s)
-    return _with_schedule(shown.cell, shown.schedule, found)
+    result = EntryResult(cycle.period_s, CYCLIC, cycle.bound_s, CYCLIC, ((wall_s, cycle.period_s),), wall_s)
+    return _with_schedule(shown.cell, shown.schedule, result)
 
 
 def _exact(entry: Entry, cell: Cell) -> Proof:
@@ -179,15 +181,15 @@ def _exact(entry: Entry, cell: Cell) -> Proof:
 def _cp_sat(entry: Entry, cell: Cell) -> Proof:
     from lab.sequencing.methods.cp_sat import cp_sat
 
-    found = cp_sat(cell, MAKESPAN, entry.seconds, entry.seed, None, CP_SAT_WORKERS)
-    return found.sequence, "CP-SAT", found.bound, "CP-SAT"
+    solved = cp_sat(cell, MAKESPAN, entry.seconds, entry.seed, None, CP_SAT_WORKERS)
+    return solved.sequence, "CP-SAT", solved.bound, "CP-SAT"
 
 
 def _portfolio(entry: Entry, cell: Cell) -> Proof:
     from lab.sequencing.methods.portfolio import best_known
 
-    found = best_known(cell, MAKESPAN, entry.seconds, entry.seed, CP_SAT_WORKERS)
-    return found.sequence, found.found_by, found.bound, found.bound_by
+    solved = best_known(cell, MAKESPAN, entry.seconds, entry.seed, CP_SAT_WORKERS)
+    return solved.sequence, solved.found_by, solved.bound, solved.bound_by
 
 
 PROVERS: dict[str, Callable[[Entry, Cell], Proof]] = {"exact": _exact, "cp-sat": _cp_sat, "portfolio": _portfolio}

@@ -1,4 +1,4 @@
-"""Two pictures of the board: how many instances each method solves within a gap, and how its mean gap falls with time."""
+"""Two pictures of the board: the share of instances that each method solves within a gap, and its mean gap over time."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -12,7 +12,7 @@ from lab.view.canvas import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, RED, SKY, pi
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from lab_studies.comparisons.transport_entries import Entry, Found
+    from lab_studies.comparisons.transport_entries import Entry, EntryResult
     from lab_studies.comparisons.transport_instances import Instance
 
 COLOURS = (BLUE, RED, GREEN, ORANGE, PURPLE, SKY, INK, GREY)
@@ -22,7 +22,7 @@ NOTHING = 100.0  # percent: the gap of a method that has found nothing yet
 
 
 def profile(gaps: Mapping[str, Sequence[float]]) -> bytes:
-    """The share of instances [%] within a gap, a line a method; the higher and the further left, the better."""
+    """A picture of the share of instances [%] within a gap, a line for each method; higher and further left is better."""
 
     def draw(figure: "Figure") -> None:
         axes = figure.add_subplot()
@@ -39,14 +39,14 @@ def profile(gaps: Mapping[str, Sequence[float]]) -> bytes:
     return picture_bytes(draw, 7.0, 4.2)
 
 
-def by_seconds(found: "Mapping[Entry, Found]", least: "Mapping[Instance, float]") -> bytes:
-    """The mean gap of each method's best order so far, by the seconds since it began."""
-    ends = [entry.seconds for entry in found]
+def by_seconds(results: "Mapping[Entry, EntryResult]", least: "Mapping[Instance, float]") -> bytes:
+    """A picture of the mean gap of each method's best order so far, by the seconds since it began."""
+    ends = [entry.seconds for entry in results]
     seconds = np.geomspace(0.01, max(ends, default=1.0), POINTS)
     lines = dict[str, list[np.ndarray]]()
-    for entry, one in found.items():
-        if one.cost is not None:
-            lines.setdefault(entry.method, []).append(_gaps_at(seconds, one.trace, least[entry.instance]))
+    for entry, result in results.items():
+        if result.cost is not None:
+            lines.setdefault(entry.method, []).append(_gaps_at(seconds, result.trace, least[entry.instance]))
 
     def draw(figure: "Figure") -> None:
         axes = figure.add_subplot()
@@ -63,7 +63,7 @@ def by_seconds(found: "Mapping[Entry, Found]", least: "Mapping[Instance, float]"
 
 
 def _gaps_at(seconds: np.ndarray, trace: Sequence[tuple[float, float]], least: float) -> np.ndarray:
-    """The gap of what was found by then [%]."""
+    """The gap [%] of the best order that was found by each of the times, (n,)."""
     gaps = np.full(len(seconds), NOTHING)
     for at_s, value in trace:
         gaps[seconds >= at_s] = min(NOTHING, 100.0 * gap(value, least))
@@ -71,9 +71,9 @@ def _gaps_at(seconds: np.ndarray, trace: Sequence[tuple[float, float]], least: f
 
 
 def _ranked(gaps: Mapping[str, Sequence[float]]) -> list[tuple[int, tuple[str, Sequence[float]]]]:
-    """The methods, least mean gap first, each with the number of its look, which is the same in both pictures."""
+    """The methods with their gaps, least mean first, each with the number of its look, the same in both pictures."""
     looks = {method: number for number, method in enumerate(sorted(gaps))}
-    ranked = sorted(gaps.items(), key=lambda one: float(np.mean(one[1])))
+    ranked = sorted(gaps.items(), key=lambda pair: float(np.mean(pair[1])))
     return [(looks[method], (method, values)) for method, values in ranked]
 
 

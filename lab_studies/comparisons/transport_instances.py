@@ -1,4 +1,4 @@
-"""The board's instances: those that come with the lab, each a row of board.csv, and files of one's own."""
+"""The board's instances: those that come with the lab, each a row of board.csv, and the user's own files."""
 
 import csv
 from collections.abc import Sequence
@@ -18,10 +18,10 @@ OWN = "your own"
 
 @dataclass(frozen=True)
 class Instance:
-    """An instance: its family and name, the file that holds it, and what is asked for beside it.
+    """An instance: its family, its name, the file that holds it, and the options with which it is read.
 
-    file: in `instances`, a cell that comes with the lab, or a path; case: which of a file's instances, of a cell the order.
-    printed: what others print, in the file's unit of time, and what that is: "optimum", "best known", "PPO".
+    file: a file in `instances`, a cell that comes with the lab, or a path; case: one of the file's instances, or the order of a
+    cell. printed: the published cost, in the file's unit of time; printed_is: "optimum", "best known" or "PPO".
     """
 
     family: str
@@ -35,7 +35,7 @@ class Instance:
 
     @property
     def is_cyclic(self) -> bool:
-        """Whether the shortest period is asked for, of an order that repeats for ever."""
+        """Whether the cost is the period of an order that repeats for ever."""
         return self.family.endswith("cyclic")
 
 
@@ -44,30 +44,30 @@ def board() -> tuple[Instance, ...]:
     with (FOLDER / "board.csv").open(encoding="utf-8", newline="") as file:
         return tuple(
             Instance(
-                **{name: one[name] for name in ("family", "name", "file", "layout", "case", "printed_is")},
-                robots=int(one["robots"]) if one["robots"] else None,
-                printed=float(one["printed"]) if one["printed"] else None,
+                **{name: line[name] for name in ("family", "name", "file", "layout", "case", "printed_is")},
+                robots=int(line["robots"]) if line["robots"] else None,
+                printed=float(line["printed"]) if line["printed"] else None,
             )
-            for one in csv.DictReader(file)
+            for line in csv.DictReader(file)
         )
 
 
-def own(paths: Sequence[Path]) -> tuple[Instance, ...]:
-    """An instance of each file, and of each file in a folder; BadInput for what is not there or cannot be read."""
-    found = list[Instance]()
+def own_instances(paths: Sequence[Path]) -> tuple[Instance, ...]:
+    """An instance for each file, also those in folders. Raises BadInput for a missing or unreadable one."""
+    instances = list[Instance]()
     for path in paths:
         if not path.exists():
             raise BadInput(f"instance '{path}' (--instances): there is no such file or folder")
-        files = [path] if path.is_file() else sorted(one for one in path.iterdir() if one.is_file())
-        found += [Instance(OWN, one.name, str(one)) for one in files]
-    for one in found:
-        cell_file(one)
-    return tuple(found)
+        files = [path] if path.is_file() else sorted(inside for inside in path.iterdir() if inside.is_file())
+        instances += [Instance(OWN, file.name, str(file)) for file in files]
+    for instance in instances:
+        cell_file(instance)
+    return tuple(instances)
 
 
 @lru_cache(maxsize=256)
 def cell_file(instance: Instance) -> CellFile:
-    """The cell file that an instance is, its order in it. BadInput as its reader."""
+    """The cell file of an instance, with its order. Raises BadInput as its reader does."""
     shipped = FOLDER / instance.file
     path = shipped if shipped.is_file() else Path(instance.file)
     if path.is_file() and is_instance(path):
@@ -80,5 +80,5 @@ def cell_file(instance: Instance) -> CellFile:
 
 
 def cell_of(instance: Instance) -> Cell:
-    """The cell of an instance. BadInput as `cell_file`."""
-    return replace(cell_file(instance).cell(), due_s=None)  # the makespan alone is asked for
+    """The cell of an instance. Raises BadInput as `cell_file` does."""
+    return replace(cell_file(instance).cell(), due_s=None)  # only the makespan counts

@@ -1,4 +1,4 @@
-"""Whom to believe: advisors of known reliability ranked by a panel, and limited advisors together beside one and nobody."""
+"""Whom to believe: advisors of known reliability ranked by a panel, and three limited advisors compared with one and nobody."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -22,23 +22,23 @@ from lab.studies.runner import Job, seeds_of
 from lab_studies.comparisons.advice_bench.problems import problem
 
 PROBLEMS = ("world-1", "world-2", "insert", "transfer")
-RELIABILITIES = (0.0, 0.1, 0.25, 0.5, 0.75, 0.9, 1.0)  # CLUE's full panel
+RELIABILITIES = (0.0, 0.1, 0.25, 0.5, 0.75, 0.9, 1.0)  # those of CLUE's full panel
 RANKED, LIMITED = "ranked", "limited"
 EARNED = "earned-trust"
 GATES = ("always", "ccrl", EARNED)
 BEST_IN_A_STATE = 1e-9  # values that differ by less are equally good
 MEASURES = (
-    "Ranked: seven advisors whose answers are right (among the best actions) in 0 to 100 % of the cases, else wrong, all asked "
-    "about each question; ranking_right_percent: sessions in which the panel's trust has all seven in their order at "
-    "the end. In CLUE's setting every step is asked about: gate always. It is a session of many steps here, a decision of one "
-    "step there. Limited: one advisor of tau 0.3, or three as a panel; points as in AdviceBench: 100 the best policy, 0 "
-    "failure, means over all episodes; gain_points: over nobody, both with the same seeds, with a 95 % interval."
+    "Ranked: seven advisors whose answers are right (among the best actions) in 0 to 100 % of the cases, else wrong; all answer "
+    "each question. ranking_right_percent: sessions in which the panel's final trust ranks all seven rightly. In CLUE's setting "
+    "every step is asked about, as with the gate always; a session has many steps here, but one decision there. Limited: one "
+    "advisor of tau 0.3, or three as a panel; points as in AdviceBench: 100 is the best policy, 0 failure, means over all "
+    "episodes; gain_points: points above nobody's with the same seeds, with a 95 % interval."
 )
 
 
 @dataclass(frozen=True)
 class Setting:
-    """Who is asked in a problem, and when: kind RANKED or LIMITED, so many members, how a panel decides."""
+    """The advisors in a problem, and when they are asked: kind RANKED or LIMITED, their number, how a panel decides."""
 
     problem: str
     kind: str
@@ -47,49 +47,51 @@ class Setting:
     decide: str = "trust-weighted"
 
 
-class Told(NamedTuple):
-    """What N sessions came to: points (N,), answers (N,), the panel's trusts (N, members)."""
+class SessionResults(NamedTuple):
+    """The results of N sessions: points (N,), answers (N,), and the panel's final trusts (N, members)."""
 
     points: FloatArray
     answers: FloatArray
     trusts: FloatArray
 
 
-def settings() -> list[Setting]:
-    """All that is run; none asked: nobody."""
-    found = [Setting(name, LIMITED, "never", 0) for name in PROBLEMS]
-    found += [Setting(name, LIMITED, gate, 1) for name in PROBLEMS for gate in GATES]
-    found += [Setting(name, LIMITED, gate, 3, decide) for name in PROBLEMS for gate in GATES for decide in DECISIONS]
-    return found + [Setting(name, RANKED, gate, len(RELIABILITIES)) for name in PROBLEMS for gate in GATES]
+def all_settings() -> list[Setting]:
+    """All settings; those with 0 members have nobody to ask."""
+    every = [Setting(name, LIMITED, "never", 0) for name in PROBLEMS]
+    every += [Setting(name, LIMITED, gate, 1) for name in PROBLEMS for gate in GATES]
+    every += [Setting(name, LIMITED, gate, 3, decide) for name in PROBLEMS for gate in GATES for decide in DECISIONS]
+    return every + [Setting(name, RANKED, gate, len(RELIABILITIES)) for name in PROBLEMS for gate in GATES]
 
 
-def reliable(values: FloatArray, share: float) -> FloatArray:
-    """The chances (S, A) of an advisor that is right in a share of the cases, each right or wrong action alike."""
+def reliable_chances(values: FloatArray, share: float) -> FloatArray:
+    """The chances (S, A) of the answers of an advisor that is right in `share` of the cases; right ones are equally likely."""
     best = values >= values.max(axis=1, keepdims=True) - BEST_IN_A_STATE
     count, actions = best.sum(axis=1, keepdims=True), values.shape[1]
     chances = np.where(best, share / count, (1.0 - share) / np.maximum(actions - count, 1))
-    found: FloatArray = np.where(count == actions, 1.0 / actions, chances)
-    return found
+    mixed: FloatArray = np.where(count == actions, 1.0 / actions, chances)
+    return mixed
 
 
-def sessions_of(setting: Setting, sessions: int, seed: int) -> Told:
-    """So many sessions of a setting."""
-    seeds = seeds_of(Setting(setting.problem, LIMITED, "never", 0), sessions, seed)  # each with the same chances
-    runs = [_one(setting, int(own)) for own in seeds]
-    return Told(*(np.array([one[n] for one in runs]) for n in range(3)))
+def sessions_of(setting: Setting, sessions: int, seed: int) -> SessionResults:
+    """The results of `sessions` sessions of a setting."""
+    seeds = seeds_of(Setting(setting.problem, LIMITED, "never", 0), sessions, seed)  # all settings have the same seeds
+    runs = [_session(setting, int(own)) for own in seeds]
+    return SessionResults(*(np.array([outcome[n] for outcome in runs]) for n in range(3)))
 
 
-def _one(setting: Setting, seed: int) -> tuple[float, float, list[float]]:
-    """Points, answers and trusts of a session."""
+def _session(setting: Setting, seed: int) -> tuple[float, float, list[float]]:
+    """The points, answers and trusts of a session."""
     place = problem(setting.problem)
     rng = np.random.default_rng(seed)
     streams = rng.spawn(setting.members + 2)
     ranked = setting.kind == RANKED
     chances = [
-        reliable(place.values, RELIABILITIES[n]) if ranked else advice_chances(place.values, SKILL_TAUS["limited"])
+        reliable_chances(place.values, RELIABILITIES[n])
+        if ranked
+        else advice_chances(place.values, SKILL_TAUS["limited"])
         for n in range(setting.members)
     ]
-    members = [TableAdvisor(Advice.of(one), uniforms(own)) for one, own in zip(chances, streams, strict=False)]
+    members = [TableAdvisor(Advice.of(table), uniforms(own)) for table, own in zip(chances, streams, strict=False)]
     advisor: Advisor | None = members[0] if members else None
     panel = None
     if len(members) > 1:
@@ -101,16 +103,16 @@ def _one(setting: Setting, seed: int) -> tuple[float, float, list[float]]:
             tell=lambda event: None,
         )
     gate = GateSettings(setting.gate, first_episode=10, spare_best=True)
-    one = Session(place.mdp, place.learner, gate, advisor, streams[-1]).run()
+    session = Session(place.mdp, place.learner, gate, advisor, streams[-1]).run()
     most = place.learner.max_steps + 1
-    points = float((100.0 * (most - one.steps) / (most - place.par)).mean())
-    return points, one.helped_steps, [] if panel is None else [member.trust for member in panel.standing()]
+    points = float((100.0 * (most - session.steps) / (most - place.par)).mean())
+    return points, session.helped_steps, [] if panel is None else [member.trust for member in panel.standing()]
 
 
 def whom_to_believe(job: Job, reading: Mapping[str, Any]) -> Findings:
-    """Every setting; nothing is read."""
-    found = job.each(partial(sessions_of, sessions=job.sessions, seed=job.seed), settings())
-    rows = [one for setting, told in found.items() for one in rows_of(setting, told, found)]
+    """The results of every setting; the reading has no effect."""
+    outcomes = job.each(partial(sessions_of, sessions=job.sessions, seed=job.seed), all_settings())
+    rows = [result for setting, told in outcomes.items() for result in rows_of(setting, told, outcomes)]
     right = [_row(rows, name, RANKED, "always") for name in PROBLEMS]
     gains = {
         f"{gate}, {'one' if members == 1 else 'three'}": [
@@ -120,21 +122,23 @@ def whom_to_believe(job: Job, reading: Mapping[str, Any]) -> Findings:
         for members in (1, 3)
     }
     says: Row = {
-        "ranking of seven right, asked always [%]": ", ".join(f"{one['problem']} {one['value']:.0f}" for one in right),
+        "ranking of seven right, asked always [%]": ", ".join(
+            f"{result['problem']} {result['value']:.0f}" for result in right
+        ),
         "three limited over nobody, gate earned-trust [points]": ", ".join(
-            f"{one['problem']} {one['value']:+.1f} ({one['ci95'][0]:+.1f} to {one['ci95'][1]:+.1f})"
-            for one in gains[f"{EARNED}, three"]
+            f"{result['problem']} {result['value']:+.1f} ({result['ci95'][0]:+.1f} to {result['ci95'][1]:+.1f})"
+            for result in gains[f"{EARNED}, three"]
         ),
     }
-    pictures = {"Points of limited advisors": bars(PROBLEMS, _lifted(gains, rows), "points", label="")}
+    pictures = {"Points of limited advisors": bars(PROBLEMS, _points_of(gains, rows), "points", label="")}
     return Findings(rows, says, pictures, (MEASURES,))
 
 
-def rows_of(setting: Setting, told: Told, found: Mapping[Setting, Told]) -> list[Row]:
+def rows_of(setting: Setting, told: SessionResults, outcomes: Mapping[Setting, SessionResults]) -> list[Row]:
     """The measures of a setting."""
     named: Row = {"problem": setting.problem, "advisors": setting.kind, "gate": setting.gate}
     named |= {"members": setting.members, "decide": setting.decide, "answers": float(told.answers.mean())}
-    nobody = found[Setting(setting.problem, LIMITED, "never", 0)]
+    nobody = outcomes[Setting(setting.problem, LIMITED, "never", 0)]
     rows = [mean_row(named, "points", told.points)]
     if setting.members:
         mean, *ends = interval(told.points - nobody.points)
@@ -151,10 +155,12 @@ def _row(rows: Sequence[Row], name: str, kind: str, gate: str, **more: Any) -> R
     return those(rows, problem=name, advisors=kind, gate=gate, measure=measure, **more)[0]
 
 
-def _lifted(gains: Mapping[str, Sequence[Row]], rows: Sequence[Row]) -> dict[str, list[Row]]:
-    """Points in place of gains, with nobody's beside them: bars begin at 0."""
+def _points_of(gains: Mapping[str, Sequence[Row]], rows: Sequence[Row]) -> dict[str, list[Row]]:
+    """The rows of points that belong to rows of gains, and nobody's, as bars begin at 0."""
     shown = {"nobody": [those(rows, problem=name, gate="never", measure="points")[0] for name in PROBLEMS]}
-    for words, of in gains.items():
-        same = ({key: one[key] for key in ("problem", "advisors", "gate", "members", "decide")} for one in of)
-        shown[words] = [those(rows, measure="points", **one)[0] for one in same]
+    for words, gain_rows in gains.items():
+        same = (
+            {key: result[key] for key in ("problem", "advisors", "gate", "members", "decide")} for result in gain_rows
+        )
+        shown[words] = [those(rows, measure="points", **names)[0] for names in same]
     return shown

@@ -1,4 +1,4 @@
-"""First in, first out in the flexible manufacturing system (thesis App. III), as the listing of App. VIII does it."""
+"""First in, first out in the flexible manufacturing system (thesis App. III), as in the listing of App. VIII."""
 
 from math import inf
 from typing import NamedTuple
@@ -8,28 +8,28 @@ from lab.sequencing.cell.routes import choice_of, part_of
 from lab.sequencing.methods.fifo import something_comes
 from lab.sequencing.simulate.execution import WAIT, Observed, Policy
 
-MACHINES = ("mill", "lathe-1", "lathe-2")  # of tasks that become possible together those of the mill go first
+MACHINES = ("mill", "lathe-1", "lathe-2")  # in the order of tasks that become possible together
 MILL = 0
-FETCH, LOAD, PALLET, UNLOAD, SHIP = range(5)  # and of one machine's, in this order
-BY_EVENTS = (FETCH, UNLOAD)  # what an arrival, or the end of a process, makes possible; all else follows moves
+FETCH, LOAD, PALLET, UNLOAD, SHIP = range(5)  # in the order of tasks of one machine
+BY_EVENTS = (FETCH, UNLOAD)  # tasks that an arrival or the end of a process makes possible; moves make the others so
 STARTS = ("listing", "idle-start")
 
 
 def queued_fifo(start: str) -> Policy:
-    """The policy of a robot with a queue of tasks, for the task `fms`; `start`, one of STARTS: when an idle robot begins.
+    """The policy of a robot with a queue of tasks, for the task `fms`; start: one of STARTS, when an idle robot begins.
 
-    After each move, arrival and end of a process every task that is possible by then joins the queue; the head is
-    served. Fetch: the part has come, and the in-buffer of its machine is free; lathes take turns, whether the other one
-    is free or not. Load: the machine is free; a lathe's out-buffer, too. Pallet: the out-buffer is free. Unload: the
-    machine has finished, and the pallet is there. Ship: the part is on its pallet.
-    A robot that finds the queue empty after a move is idle. By "listing" it then sleeps until no process goes on and no
-    part is on its way, whatever joins the queue; by "idle-start" only until something does.
+    After each move, arrival and end of a process every possible task joins the queue, and its head is served. Tasks are
+    possible as follows. Fetch: the part has come, and the in-buffer of its machine is free; lathes take turns, even if only
+    the other one is free. Load: the machine is free, and so is a lathe's out-buffer. Pallet: the out-buffer is free. Unload:
+    the machine has finished, and the pallet is there. Ship: the part is on its pallet.
+    A robot that finds the queue empty after a move is idle. With "listing" it then sleeps until no process goes on and no
+    part is on its way, even if tasks join the queue; with "idle-start" only until one does.
     """
     return lambda cell: _Fifo(cell, sleeps=start == "listing")
 
 
 class _Task(NamedTuple):
-    """What the robot may be asked to do: in the order of the listing, the machine that it is for and what it is."""
+    """A task of the robot, sorted by machine and kind as in the listing."""
 
     machine: int
     kind: int
@@ -43,7 +43,7 @@ class _Fifo:
     def __init__(self, cell: Cell, *, sleeps: bool) -> None:
         self._cell, self._sleeps = cell, sleeps
         self._queue: list[_Task] = []
-        self._possible: set[_Task] = set()  # when it last looked, were it not for what has to finish or to come first
+        self._possible: set[_Task] = set()  # the tasks possible at the last decision, apart from events to wait for
         self._looked_s = 0.0
         self._idle = self._fetched = True
 
@@ -61,7 +61,7 @@ class _Fifo:
         return head.decision
 
     def _task(self, seen: Observed, decision: int) -> _Task:
-        """The task that an allowed decision is; stations are named after their machines."""
+        """The task of an allowed decision; the stations' names begin with those of their machines."""
         cell, option, part = self._cell, seen.option(decision), part_of(decision, self._cell.parts) - 1
         assert option is not None
         fetch = seen.locations[part] == cell.starts[part]
@@ -78,7 +78,7 @@ class _Fifo:
         return _Task(machine, kind, decision, part)
 
     def _is_possible(self, seen: Observed, task: _Task) -> bool:
-        """Whether the listing does it, apart from what has to finish or to come first."""
+        """Whether the listing allows a task, apart from events to wait for."""
         cell = self._cell
         if task.kind == LOAD and task.machine != MILL:
             return seen.occupied[cell.index(f"{MACHINES[task.machine]}-out")] == 0
@@ -89,9 +89,9 @@ class _Fifo:
         return True
 
     def _joins_s(self, seen: Observed, task: _Task) -> float:
-        """When it joins the queue: with the event that made it possible; inf: only now, after the robot's move.
+        """The time at which a task joins the queue: that of the event that made it possible; inf: only now, after the move.
 
-        An event during the move finds all as it was before; only a part that was fetched is on its way.
+        An event during the move meets the state before it; only a fetched part has already left.
         """
         event_s = seen.ready_s[task.part]
         before = task in self._possible or (task.kind == FETCH and self._fetched)

@@ -1,4 +1,4 @@
-"""Appendix III, order by order: what each method's makespans are in the flexible manufacturing system."""
+"""Appendix III, order by order: the makespans of each method in the flexible manufacturing system."""
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -23,11 +23,11 @@ from lab_studies.thesis.chapter_7_cells import beta_of
 Floats = NDArray[np.float64]
 
 EPISODES, REPLICATIONS, SPREAD = 200, 50, 0.1  # App. III
-LEARNED_BY = 10  # of the sessions asked for, one in so many is learned for each order,
-SLOW_BY = 250  # and one in so many by what is not compiled
-REACTIONS = {3: 6, 5: 2, 8: 1}  # replications of a policy that reacts, for 500 sessions: it takes its time
+LEARNED_BY = 10  # one in so many of the requested sessions is learned for each order,
+SLOW_BY = 250  # and one in so many with methods that are not compiled
+REACTIONS = {3: 6, 5: 2, 8: 1}  # parts -> replications of slow policies that react, for ASKED sessions
 ASKED = 500
-UNKNOWN = "exponential"  # the law of arrivals by which there is something to react to
+UNKNOWN = "exponential"  # the law of arrivals with which policies react
 REACTING: dict[str, Policy | None] = {"reacting": None, "rollout": replan()}  # None: made for each cell
 FIFO = {start: f"fifo {start}" for start in STARTS}
 
@@ -41,12 +41,12 @@ class Mix:
 
 
 @dataclass(frozen=True, eq=False)
-class Made:
-    """What the methods make of an order. makespans_s: by method and law of arrivals, of each replication (n,) [s].
+class OrderMakespans:
+    """The results of all methods with an order. makespans_s: by method and law of arrivals, of each replication (n,) [s].
 
-    Replications are the same ones for all methods; of policies that react there are fewer, and by exponential arrivals only.
-    By constant arrivals there is one. Methods that learn: the mean over their sessions. gaps: by method, constant arrivals,
-    how much longer than the proven optimum (where not `proven`, than the bound), as a fraction.
+    Replications are the same for all methods; policies that react have fewer of them, and only with exponential arrivals.
+    With constant arrivals there is one. Methods that learn have the mean over their sessions. gaps: by method with constant
+    arrivals, above the proven optimum (above the bound if not `proven`), as a fraction.
     """
 
     makespans_s: dict[tuple[str, str], Floats]
@@ -56,7 +56,7 @@ class Made:
 
 @lru_cache(maxsize=64)
 def fms(order: str, mean_s: float) -> Cell:
-    """The system with an order to make, parts arriving one at a time, after the pick of the one before."""
+    """The system's cell with an order; each part arrives an interval after the pick of the one before."""
     from lab.tasks.cell_file import order_from_word
     from lab.tasks.task_file import load_cell
 
@@ -65,41 +65,41 @@ def fms(order: str, mean_s: float) -> Cell:
     return replace(cell, arrivals=Arrivals((mean_s,) * cell.parts, "pick"), due_s=None)
 
 
-def made(mix: Mix, *, sessions: int, seed: int) -> Made:
-    """All methods with one order; `sessions` are those that the study was asked for."""
+def order_makespans(mix: Mix, *, sessions: int, seed: int) -> OrderMakespans:
+    """The results of all methods with one order; sessions: the number that the study was asked for."""
     cell = fms(mix.order, mix.mean_s)
     rng = np.random.default_rng([seed, int(mix.mean_s), *map(ord, mix.order)])
     times_seed = drawn_seed(rng)
     best = optimum(cell)
     lists, greedy_s = _lists(cell, sessions, rng)
     lists["exact"] = [best.sequence]
-    found: dict[tuple[str, str], Floats] = {("srl greedy", "constant"): greedy_s}
+    makespans_s: dict[tuple[str, str], Floats] = {("srl greedy", "constant"): greedy_s}
     for law in LAWS:
         chance, count = Chance("constant", law, SPREAD), 1 if law == "constant" else REPLICATIONS
         for method, sequences in lists.items():
-            found[method, law] = evaluate(cell, sequences, times_seeds(times_seed, count), chance).mean(axis=0)
+            makespans_s[method, law] = evaluate(cell, sequences, times_seeds(times_seed, count), chance).mean(axis=0)
         for start, method in FIFO.items():
-            found[method, law] = replicate(cell, queued_fifo(start), chance, count, times_seed)
+            makespans_s[method, law] = replicate(cell, queued_fifo(start), chance, count, times_seed)
         few = min(count, max(1, REACTIONS.get(cell.parts, 1) * sessions // ASKED))
         for method, policy in REACTING.items() if law == UNKNOWN else ():
-            found[method, law] = replicate(cell, policy or reacting(cell), chance, few, times_seed)
-    gaps = {method: best.gap(float(costs.mean())) for (method, law), costs in found.items() if law == "constant"}
-    return Made(found, gaps, best.proven)
+            makespans_s[method, law] = replicate(cell, policy or reacting(cell), chance, few, times_seed)
+    gaps = {method: best.gap(float(costs.mean())) for (method, law), costs in makespans_s.items() if law == "constant"}
+    return OrderMakespans(makespans_s, gaps, best.proven)
 
 
 def times_seeds(seed: int, episodes: int) -> list[int]:
-    """The seeds of the times that `execution.replicate` meets, so that lists can be evaluated in the same."""
+    """The seeds of the episodes of `execution.replicate`, in which lists are evaluated, too."""
     rng = np.random.default_rng(seed)
     return [drawn_seed(rng) for _ in range(episodes)]
 
 
 def settings(parts: int) -> SrlSettings:
-    """Those of App. III and its listing: values per next state of the stations, type B."""
+    """The settings of App. III and its listing: values per next state of the stations, type B."""
     return SrlSettings(beta=beta_of(parts), factor="B", values="states", state="stations")
 
 
 def _lists(cell: Cell, sessions: int, rng: np.random.Generator) -> tuple[dict[str, list[tuple[int, ...]]], Floats]:
-    """By method the best sequence of each session, learned with constant arrivals; SRL's greedy makespan at the end (1,)."""
+    """The best sequence of each session, by method, learned with constant arrivals; SRL's final greedy makespan (1,) [s]."""
     listed, seed = Search(EPISODES, settings=settings(cell.parts)), drawn_seed(rng)
     pairs = replace(listed, settings=replace(listed.settings, values="pairs"))
     lists, greedy_s = {}, np.zeros(1)

@@ -1,4 +1,4 @@
-"""The branch and bound of thesis App. IV, kept whole: what was tried, in which order, and why it was not gone on with."""
+"""The branch and bound of thesis App. IV with its whole tree: the nodes in order, and why the search ended at each."""
 
 import heapq
 from dataclasses import dataclass
@@ -13,11 +13,11 @@ MAX_NODES = 20_000
 
 @dataclass(frozen=True)
 class Node:
-    """A state that was reached: the decisions that lead there, its time [s], and why the search ended there.
+    """A state that was reached: the decisions that lead to it, its time [s], and why the search ended there.
 
-    end: "" it was branched; "finished"; "dominated", the same state was reached no later by other decisions; "bound",
-    what is finished already takes no longer; "deadlock", nothing can move. Alike parts count as one: in each state the
-    first that came is moved.
+    end: "" if it was branched; "finished"; "dominated": the same state was reached no later by other decisions; "bound": the
+    incumbent takes no longer; "deadlock": nothing can move. Alike parts count as one: in each state the first that came is
+    moved.
     """
 
     decisions: tuple[int, ...]
@@ -27,14 +27,14 @@ class Node:
 
 @dataclass(frozen=True)
 class SearchTree:
-    """All nodes, each after the one that it branches off, and the decisions of an optimal sequence."""
+    """All nodes, each after its parent, and the decisions of an optimal sequence."""
 
     nodes: tuple[Node, ...]
     optimal: tuple[int, ...]
 
 
 def branch_and_bound(cell: Cell, most: int = MAX_NODES) -> SearchTree:
-    """The whole search tree of a small cell, its nodes opened in the order of their times; nothing is estimated ahead.
+    """The whole search tree of a small cell, whose nodes are branched in the order of their times, without an estimate.
 
     Raises BadInput for a tree of more than `most` nodes. Source: thesis App. IV, figs. IV.2 and IV.3.
     """
@@ -48,7 +48,7 @@ def branch_and_bound(cell: Cell, most: int = MAX_NODES) -> SearchTree:
 
 
 class _Tree:
-    """The nodes so far, by number."""
+    """The nodes so far, by number, and the incumbent."""
 
     def __init__(self, cell: Cell, most: int) -> None:
         self.decisions: list[tuple[int, ...]] = []
@@ -63,7 +63,7 @@ class _Tree:
         self._add(self._cell.start(named=True), ())
 
     def open(self, number: int, now: int) -> None:
-        """Branch a node, unless something that was reached meanwhile makes that needless."""
+        """Branch a node, unless it is dominated or reaches the bound by now."""
         state = self._states.pop(number)
         if self._reached[self._cell.key(state)][1] != number:
             self.ends[number] = "dominated"

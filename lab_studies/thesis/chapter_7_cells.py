@@ -46,10 +46,9 @@ READINGS: Mapping[str, Reading | None] = {  # None: the lab's own SRL, which is 
 
 @dataclass(frozen=True)
 class SequencingSetting:
-    """One cell of a table: so many episodes of a method with so many toasts. reading: see READINGS.
+    """One cell of a table: a method, its toasts and its episodes. reading: one of READINGS.
 
-    reward_factor is that of SRL, beta that of SRL and Monte Carlo; the others have none. Raises BadInput for an unknown
-    reading.
+    reward_factor is of SRL, beta of SRL and Monte Carlo; other methods have none. Raises BadInput for an unknown reading.
     """
 
     case: str
@@ -68,9 +67,9 @@ class SequencingSetting:
 
 @dataclass(frozen=True, eq=False)
 class SequencingOutcome:
-    """What N sessions came to, (N,) each: the best time [s], that of the last episode, the episode of convergence.
+    """The results of N sessions, (N,) each: the best time [s], that of the last episode, the episode of convergence.
 
-    With the reading AS_PRINTED the last time is that of the greedy policy after the last episode.
+    With the reading AS_PRINTED the last time is that of the final greedy policy.
     """
 
     best_s: Floats
@@ -80,7 +79,7 @@ class SequencingOutcome:
 
 @dataclass(frozen=True)
 class PrintedFigure:
-    """One printed figure."""
+    """One printed value."""
 
     setting: SequencingSetting
     measure: str
@@ -89,7 +88,7 @@ class PrintedFigure:
 
 @cache
 def printed(file: str) -> tuple[PrintedFigure, ...]:
-    """The figures of a printed table, in its order."""
+    """The values of a printed table, in its order."""
     read = _decay_cells if file == DECAY_FACTORS else _length_cells
     return tuple(cell for line in printed_lines(file) for cell in read(line))
 
@@ -109,21 +108,23 @@ def _length_cells(line: dict[str, str]) -> list[PrintedFigure]:
 
 
 def beta_of(parts: int) -> float:
-    """How fast exploration ends where the thesis does not compare that. Source: section 7.6, App. III."""
+    """The beta where the thesis does not compare several. Source: section 7.6, App. III."""
     return 1.0 if parts == 3 else 0.5
 
 
 def _decay_cells(line: dict[str, str]) -> list[PrintedFigure]:
-    """The thesis does not say which reward factor these have: type A comes out, type B does not."""
+    """The values of a line of table IV.1, with reward factor A, which the thesis does not name but its values show."""
     setting = SequencingSetting(line["case"], 3, "srl", DECAY_EPISODES, reward_factor="A", beta=float(line["beta"]))
     return [PrintedFigure(setting, measure, float(line[measure])) for measure in ("SP_percent", "CE_episode")]
 
 
 @cache
 def optimum_s(case: str, toasts: int) -> float:
-    """The shortest makespan as printed [s]."""
+    """The printed shortest makespan [s]."""
     lines = printed_lines("optimal-makespans.csv")
-    return next(float(one["optimum_seconds"]) for one in lines if (one["case"], one["toasts"]) == (case, str(toasts)))
+    return next(
+        float(line["optimum_seconds"]) for line in lines if (line["case"], line["toasts"]) == (case, str(toasts))
+    )
 
 
 @lru_cache(maxsize=16)
@@ -136,13 +137,13 @@ def robot_cell(case: str, toasts: int) -> Cell:
 
 
 def epsilons(setting: SequencingSetting) -> Floats:
-    """Of each episode (E,); eq. 5.1. Random search has none: 1."""
+    """The exploration probability of each episode (E,), eq. 5.1; 1 without a beta, as in random search."""
     numbers = np.arange(1, setting.episodes + 1, dtype=np.float64)
     return np.asarray(numbers ** -(setting.beta or 0.0))
 
 
 def sessions_of(setting: SequencingSetting, sessions: int, seed: int) -> SequencingOutcome:
-    """So many sessions of one setting."""
+    """The results of `sessions` sessions of one setting."""
     reading, seeds = READINGS[setting.reading], seeds_of(setting, sessions, seed)
     cell, drawn = robot_cell(setting.case, setting.toasts), setting.environment == "stochastic"
     if reading is None:
@@ -153,20 +154,20 @@ def sessions_of(setting: SequencingSetting, sessions: int, seed: int) -> Sequenc
         )
         printed = run_sessions(cell, setting.method, search, sessions, int(seeds[0]))
         return SequencingOutcome(printed.best_cost, printed.final_cost, printed.convergence)
-    found = listing.run_sessions(listed(setting, SPREAD if drawn else 0.0), epsilons(setting), seeds)
-    return SequencingOutcome(found.best_s, found.last_s, found.converged)
+    outcomes = listing.run_sessions(listing_input(setting, SPREAD if drawn else 0.0), epsilons(setting), seeds)
+    return SequencingOutcome(outcomes.best_s, outcomes.last_s, outcomes.converged)
 
 
-def listed(setting: SequencingSetting, spread: float = 0.0) -> listing.Listed:
-    """What the listing is told of a setting."""
+def listing_input(setting: SequencingSetting, spread: float = 0.0) -> listing.ListingInput:
+    """The input of the listing for a setting."""
     toasts = robot_cell(setting.case, setting.toasts)
-    return listing.Listed.of(
+    return listing.ListingInput.of(
         toasts, setting.method, setting.reward_factor, READINGS[setting.reading] or LISTING, spread
     )
 
 
 class Measured:
-    """The outcomes of all settings that are asked for, computed at once where the job says."""
+    """The outcomes of all settings that are asked for, computed together as the job says."""
 
     def __init__(self, job: Job, settings: Iterable[SequencingSetting]) -> None:
         self.sessions = job.sessions
@@ -174,44 +175,46 @@ class Measured:
         self.outcomes = job.each(work, list(dict.fromkeys(settings)))
 
     def succeeds(self, setting: SequencingSetting, times_s: Floats) -> NDArray[np.bool_]:
-        """Which times are the optimum's."""
+        """Whether times (N,) are those of the optimum, (N,) bool."""
         return np.asarray(times_s <= optimum_s(setting.case, setting.toasts) + SAME)
 
     def row(self, table: str, setting: SequencingSetting, measure: str, thesis: float | None, **more: Any) -> Row:
-        """One row of a study; `more` stands after the settings. Source: section 7.6 (SP, CE, BR)."""
+        """One row of a study; more: further fields after the settings. Source: section 7.6 (SP, CE, BR)."""
         named, outcome = {"table": table, **describe(setting), **more}, self.outcomes[setting]
         theirs = printed_sessions(table, setting.toasts)
         if measure in ("BR_s", "CE_episode"):
-            found = mean_row(named, measure, outcome.best_s if measure == "BR_s" else outcome.converged, thesis, theirs)
+            result = mean_row(
+                named, measure, outcome.best_s if measure == "BR_s" else outcome.converged, thesis, theirs
+            )
         else:
             times_s = outcome.last_s if measure == "final_percent" else outcome.best_s
-            found = share_row(named, measure, self.succeeds(setting, times_s), thesis, theirs)
-        return found if thesis is None else found | {"used": is_used_7(table, setting.reward_factor, setting.toasts)}
+            result = share_row(named, measure, self.succeeds(setting, times_s), thesis, theirs)
+        return result if thesis is None else result | {"used": is_used_7(table, setting.reward_factor, setting.toasts)}
 
     def replicated(self, setting: SequencingSetting) -> Floats:
-        """SP [%] of each of ten replications, or BR [s] where times are left to chance."""
+        """The SP [%] of each of ten replications, or the BR [s] if times are random."""
         values = self.outcomes[setting].best_s
         if setting.environment == "deterministic":
             values = np.where(self.succeeds(setting, values), 100.0, 0.0)
         return part_means(values, REPLICATIONS)
 
     def compared(self, settings: Sequence[SequencingSetting]) -> Comparison:
-        """Several methods, or reward factors, at one session length (Appendix II)."""
+        """The comparison of several methods or reward factors at one session length (Appendix II)."""
         groups = {short_name(setting): self.replicated(setting) for setting in settings}
         return compare(groups, lowest_is_best=settings[0].environment == "stochastic")
 
 
 def printed_sessions(table: str, toasts: int) -> int:
-    """How many sessions the thesis ran for each cell of a table."""
+    """The number of sessions that the thesis ran for each cell of a table."""
     return DECAY_SESSIONS if table == DECAY_TABLE else PRINTED_SESSIONS[toasts]
 
 
 def describe(setting: SequencingSetting) -> Row:
-    """A setting under the names that rows use, only what applies to it."""
+    """The fields of a setting that apply to it, as in rows."""
     names = ("environment", "case", "toasts", "method", "reward_factor", "beta", "episodes", "reading")
     return {name: getattr(setting, name) for name in names if getattr(setting, name) is not None}
 
 
 def short_name(setting: SequencingSetting) -> str:
-    """ "srl B", "mc" or "random"."""
+    """The short name of a setting's method, such as "srl B" or "mc"."""
     return " ".join(part for part in (setting.method, setting.reward_factor) if part)

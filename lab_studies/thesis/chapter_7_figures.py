@@ -1,4 +1,4 @@
-"""Figures 7.3 to 7.12 of the thesis as SVG: what was measured as lines with intervals, what is printed as open markers."""
+"""Figures 7.3 to 7.12 of the thesis as SVG: measured values are lines with intervals, printed ones open markers."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -14,7 +14,14 @@ from lab.studies.charts import PRINTED, Look, bars, curve, legend_below
 from lab.studies.findings import Row, those
 from lab.studies.runner import seeds_of
 from lab.view.canvas import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, RED, picture_bytes
-from lab_studies.thesis.chapter_7_cells import READINGS, SequencingSetting, epsilons, listed, optimum_s, robot_cell
+from lab_studies.thesis.chapter_7_cells import (
+    READINGS,
+    SequencingSetting,
+    epsilons,
+    listing_input,
+    optimum_s,
+    robot_cell,
+)
 from lab_studies.thesis.chapter_7_listing import run_sessions
 
 if TYPE_CHECKING:
@@ -33,7 +40,7 @@ SIZE_INCH = 7.0, 4.0
 
 
 class Compared(NamedTuple):
-    """What one picture by session length shows."""
+    """The case, toasts, environment and methods that one picture by session length shows."""
 
     case: str
     toasts: int
@@ -53,7 +60,7 @@ OF_FACTORS = tuple(caption for caption, shown in COMPARED.items() if shown.names
 
 
 def of_case(case: str, table: str) -> dict[str, Compared]:
-    """The four pictures of one of the tables 7.4-7.6, by caption."""
+    """What the four pictures of one of the tables 7.4-7.6 show, by caption."""
     words = {"deterministic": "", "stochastic": ", times drawn"}
     return {
         f"{table}: {toasts} toasts, case {case}{word}": Compared(case, toasts, environment)
@@ -62,9 +69,9 @@ def of_case(case: str, table: str) -> dict[str, Compared]:
     }
 
 
-def lengths(rows: Sequence[Row], wanted: Mapping[str, Compared]) -> dict[str, bytes]:
-    """A picture by session length for each caption: SP, or the mean best time where times are drawn."""
-    return {caption: _by_length(rows, shown) for caption, shown in wanted.items()}
+def length_pictures(rows: Sequence[Row], shown_by_caption: Mapping[str, Compared]) -> dict[str, bytes]:
+    """Pictures by session length, by caption: SP, or the mean best time if times are random."""
+    return {caption: _by_length(rows, shown) for caption, shown in shown_by_caption.items()}
 
 
 def _by_length(rows: Sequence[Row], shown: Compared) -> bytes:
@@ -72,12 +79,12 @@ def _by_length(rows: Sequence[Row], shown: Compared) -> bytes:
         axes = figure.add_subplot()
         for name, colour, marker in zip(shown.names, COLOURS, "os^", strict=False):
             of = {
-                one["episodes"]: one
-                for one in those(rows, case=shown.case, toasts=shown.toasts, environment=shown.environment)
-                if one["thesis"] is not None
-                and _method(one) == name
-                and one["measure"] in ("SP_percent", "BR_s")
-                and one["table"] != "Table IV.1"
+                row["episodes"]: row
+                for row in those(rows, case=shown.case, toasts=shown.toasts, environment=shown.environment)
+                if row["thesis"] is not None
+                and _method(row) == name
+                and row["measure"] in ("SP_percent", "BR_s")
+                and row["table"] != "Table IV.1"
             }
             _beside_print(axes, [of[episodes] for episodes in sorted(of)], "episodes", (colour, marker, NAMES[name]))
         title = f"{shown.toasts} toasts, case {shown.case}"
@@ -94,14 +101,14 @@ def _by_length(rows: Sequence[Row], shown: Compared) -> bytes:
 
 
 def _beside_print(axes: "Axes", rows: Sequence[Row], by: str, look: Look) -> None:
-    """The values of rows against one of their settings, and what is printed as open markers on a dotted line."""
+    """Draw the values of rows against one of their settings, and the printed ones as open markers on a dotted line."""
     curve(axes, rows, by, look)
     printed = PRINTED | {"marker": look[1], "linestyle": ":", "linewidth": 0.9, "markeredgecolor": look[0]}
-    axes.plot([one[by] for one in rows], [one["thesis"] for one in rows], color=look[0], **printed)
+    axes.plot([row[by] for row in rows], [row["thesis"] for row in rows], color=look[0], **printed)
 
 
-def by_beta(rows: Sequence[Row]) -> bytes:
-    """SP and CE by beta with type A, a line for each case. Source: thesis fig. 7.5."""
+def beta_picture(rows: Sequence[Row]) -> bytes:
+    """A picture of SP and CE by beta with type A, a line for each case. Source: thesis fig. 7.5."""
     shown = those(rows, table="Table IV.1", reward_factor="A")
 
     def draw(figure: "Figure") -> None:
@@ -126,9 +133,9 @@ def by_beta(rows: Sequence[Row]) -> bytes:
     return picture_bytes(draw, 8.0, 3.6)
 
 
-def alone(seed: int) -> dict[str, bytes]:
-    """Figures 7.3 and 7.4, of one session, and 7.6."""
-    times_s, sequence = session(seed)
+def session_pictures(seed: int) -> dict[str, bytes]:
+    """Figures 7.3 and 7.4, of one session, and 7.6, by caption."""
+    times_s, sequence = shown_session(seed)
     cell = robot_cell(SESSION.case, SESSION.toasts)
     return {
         "Figure 7.3: a session that settles on the optimum": convergence(times_s),
@@ -137,14 +144,15 @@ def alone(seed: int) -> dict[str, bytes]:
     }
 
 
-def session(seed: int) -> tuple[NDArray[np.float64], list[int]]:
+def shown_session(seed: int) -> tuple[NDArray[np.float64], list[int]]:
     """The times (E,) of the first session that settles on the optimum [s], and the toasts that its best episode moves."""
-    found = run_sessions(listed(SESSION), epsilons(SESSION), seeds_of(SESSION, TRIED, seed), keep_times=True)
-    n = int(np.argmin(found.last_s))
-    return found.times_s[n], [toast for toast in found.sequences[n].tolist() if toast]
+    sessions = run_sessions(listing_input(SESSION), epsilons(SESSION), seeds_of(SESSION, TRIED, seed), keep_times=True)
+    n = int(np.argmin(sessions.last_s))
+    return sessions.times_s[n], [toast for toast in sessions.sequences[n].tolist() if toast]
 
 
 def convergence(times_s: NDArray[np.float64]) -> bytes:
+    """A picture of the times (E,) of a session's episodes [s]. Source: thesis fig. 7.3."""
     best_s = optimum_s(SESSION.case, SESSION.toasts)
     changes = np.flatnonzero(times_s[1:] != times_s[:-1])
     settles = int(changes[-1]) + 2 if len(changes) else 1
@@ -167,16 +175,18 @@ def convergence(times_s: NDArray[np.float64]) -> bytes:
 
 
 def _places(cell: Cell, sequence: Sequence[int]) -> bytes:
-    """The station of each toast over time; sloping where the robot carries it."""
+    """A picture of the station of each toast over time; its line slopes while the robot carries it."""
     schedule = simulate(cell, sequence)
 
     def draw(figure: "Figure") -> None:
         axes = figure.add_subplot()
         for part, colour in zip(range(1, cell.parts + 1), COLOURS, strict=False):
             own = [activity for activity in schedule.parts if activity.part == part]
-            times = [time for one in own for time in (one.start_s, one.end_s)]
-            places = [cell.index(name) for one in own for name in (one.origin, one.target)]
-            lifted = np.array(places) + 0.09 * (part - (cell.parts + 1) / 2)  # or equal lines hide each other
+            times = [time for activity in own for time in (activity.start_s, activity.end_s)]
+            places = [cell.index(name) for activity in own for name in (activity.origin, activity.target)]
+            lifted = np.array(places) + 0.09 * (
+                part - (cell.parts + 1) / 2
+            )  # so that equal lines do not hide each other
             axes.plot(times, lifted, color=colour, linewidth=2.2, label=f"toast {part}", solid_capstyle="butt")
         names = [f"{number}  {name.replace('_', ' ')}" for number, name in enumerate(cell.names, 1)]
         axes.set_yticks(range(len(names)), names)
@@ -190,7 +200,7 @@ def _places(cell: Cell, sequence: Sequence[int]) -> bytes:
 
 
 def _exploration() -> bytes:
-    """Eq. 5.1 for the betas that the thesis compares."""
+    """A picture of eq. 5.1 for the betas that the thesis compares."""
 
     def draw(figure: "Figure") -> None:
         axes = figure.add_subplot()
@@ -205,8 +215,8 @@ def _exploration() -> bytes:
 
 
 def readings(rows: Sequence[Row]) -> dict[str, bytes]:
-    """How far each reading is from the printed SP: bars by method, a picture for each number of toasts."""
-    off = {(one["reading"], one["toasts"], _method(one)): one for one in those(rows, measure="off_points")}
+    """Pictures of the distance of each reading from the printed SP, bars by method, one for each number of toasts."""
+    off = {(row["reading"], row["toasts"], _method(row)): row for row in those(rows, measure="off_points")}
     groups = [fill(name, 14) for name in READINGS]
     return {
         f"Distance from the printed SP by reading, {toasts} toasts, case I": bars(
@@ -218,5 +228,5 @@ def readings(rows: Sequence[Row]) -> dict[str, bytes]:
     }
 
 
-def _method(one: Row) -> str:
-    return " ".join(filter(None, (one["method"], one.get("reward_factor"))))
+def _method(row: Row) -> str:
+    return " ".join(filter(None, (row["method"], row.get("reward_factor"))))

@@ -1,9 +1,9 @@
-"""The sequencing experiments of chapter 7 as the listings of App. VI do them, compiled, for any number of toasts.
+"""The sequencing experiments of chapter 7 as in the listings of App. VI, compiled, for any number of toasts.
 
-They differ from fig. 5.1, and that makes the printed figures. Values are kept per next state, and a next state is what
-is chosen, but only its toast counts: it may be a state to which that toast cannot go now (a phantom). A toast in a
+They differ from fig. 5.1, which explains the printed values. Values are kept per next state, and a next state is
+chosen, but only its toast counts: it may be a state to which that toast cannot go now (a phantom). A toast in a
 buffer may be chosen while the machine ahead is busy, and stays (a null move). `Reading` changes these one by one.
-What is compiled stands in `chapter_7_listing_kernels`.
+The compiled functions are in `chapter_7_listing_kernels`.
 """
 
 from dataclasses import dataclass
@@ -33,20 +33,20 @@ from lab_studies.thesis.chapter_7_listing_kernels import (
 
 KINDS = ("storage", "buffer", "machine", "buffer", "machine", "storage")
 MOST_TOASTS = 6
-# a [s] and b of eq. 5.3: the listing's for three toasts; for more, what comes nearest to table IV.2.
+# a [s] and b of eq. 5.3: the listing's for three toasts; for more, the values that come nearest to table IV.2
 FACTOR_A, FACTOR_A_MORE = (5.0, 0.8), (10.0, 0.95)
-BANNED_TOO = {3: ((APPLIER, PLATE, PLATE), (BUTTER_BUFFER, APPLIER, BUTTER_BUFFER))}  # beside those that rules ban
-LONGEST = 5  # moves that bring one toast through all buffers and machines
+BANNED_TOO = {3: ((APPLIER, PLATE, PLATE), (BUTTER_BUFFER, APPLIER, BUTTER_BUFFER))}  # in addition to those of rules
+LONGEST = 5  # moves of one toast through all buffers and machines
 
 
 @dataclass(frozen=True)
 class Reading:
-    """What the listings do and the text does not say; the other value of each is what one would expect.
+    """What the listings do and the text does not say; the other value of each field is what a reader would expect.
 
-    phantoms: the next states of a toast are one and two stations on, wherever it can go; else that where it goes.
-    null_moves: a toast in front of a busy machine may be chosen. last_of_ties: of the best values the last is taken,
-    else any. averages: Monte Carlo averages over the session; the listing forgets, and keeps what the last episode gave.
-    frees_by_place: any arrival at the butter buffer or the applier frees the toaster; else that of its own toast.
+    phantoms: the next states of a toast are one and two stations ahead, wherever it can go; else the one where it goes.
+    null_moves: a toast before a busy machine may be chosen. last_of_ties: the last of equal best values is taken, else a
+    random one. averages: Monte Carlo averages over the session; the listing keeps the value of the last episode.
+    frees_by_place: any arrival at the butter buffer or the applier frees the toaster; else only that of its own toast.
     bans_too: the states of BANNED_TOO, after which no second toast is loaded, are banned.
     """
 
@@ -62,8 +62,8 @@ LISTING = Reading()
 
 
 @dataclass(frozen=True, eq=False)
-class Listed:
-    """What a session does: the toast cell and its method as the listing reads them."""
+class ListingInput:
+    """The input of a session: the toast cell and the method as the listing has them."""
 
     toasts: Toasts
     rules: ListingRules
@@ -72,15 +72,15 @@ class Listed:
     @classmethod
     def of(
         cls, cell: Cell, method: str, factor: str | None = None, reading: Reading = LISTING, spread: float = 0.0
-    ) -> "Listed":
-        """A method in the toast cell of ch. 7, whose parts are toasts, 2 to MOST_TOASTS; factor: "A" or "B", of SRL.
+    ) -> "ListingInput":
+        """The input for a method in the toast cell of ch. 7 with 2 to MOST_TOASTS toasts; factor: SRL's, "A" or "B".
 
         spread: the standard deviation of processing times as a share of their mean. Raises BadInput for other cells,
         and for an unknown method or factor.
         """
         if tuple(station.kind for station in cell.stations) != KINDS:
             raise BadInput(
-                f"cell with the stations {', '.join(cell.names)}: only a toast cell's six can be read as listed"
+                f"cell with the stations {', '.join(cell.names)}: the listing is for the six stations of a toast cell"
             )
         if not 2 <= cell.parts <= MOST_TOASTS:
             raise BadInput(f"{cell.parts} toasts as listed: allowed are 2 to {MOST_TOASTS}")
@@ -96,10 +96,11 @@ class Listed:
 
 
 def banned_states(toasts: int, reading: Reading = LISTING) -> NDArray[np.bool_]:
-    """(6 ** toasts,): the listing's "impossible" states, 75 for three toasts, as rules that hold for any number.
+    """Whether each state is one of the listing's "impossible" ones, (6 ** toasts,) bool, 75 for three toasts.
 
-    Two toasts in one machine; one in the butter buffer with none at the applier or done; one in the toaster's buffer
-    with none in the toaster, at the applier or done; and two more for three toasts. None is printed for four.
+    The rules hold for any number: two toasts in one machine; one in the butter buffer with none at the applier or done; one
+    in the toaster's buffer with none in the toaster, at the applier or done; and two more states for three toasts. None is
+    printed for four.
     """
     banned = np.zeros((STATIONS,) * toasts, dtype=np.bool_)
     for places in product(range(STATIONS), repeat=toasts):
@@ -113,9 +114,9 @@ def banned_states(toasts: int, reading: Reading = LISTING) -> NDArray[np.bool_]:
 
 
 def run_sessions(
-    listed: Listed, epsilons: Floats, seeds: NDArray[np.uint64], *, keep_times: bool = False
-) -> kernels.Found:
-    """A session for each seed (N,), with the exploration epsilons (E,); random search explores anyway.
+    listed: ListingInput, epsilons: Floats, seeds: NDArray[np.uint64], *, keep_times: bool = False
+) -> kernels.ListingOutcomes:
+    """The results of a session for each seed (N,) with the exploration epsilons (E,); random search always explores.
 
     Raises BadInput without episodes.
     """
@@ -123,20 +124,20 @@ def run_sessions(
         raise BadInput("episodes = 0: allowed are whole numbers from 1")
     sessions, episodes = len(seeds), len(epsilons)
     tried = np.ones(episodes) if listed.rules.method == RANDOM else np.asarray(epsilons, np.float64)
-    found = kernels.Found(
+    outcomes = kernels.ListingOutcomes(
         times_s=np.zeros((sessions if keep_times else 1, episodes)),
         best_s=np.zeros(sessions),
         last_s=np.zeros(sessions),
         converged=np.ones(sessions, np.int64),
         sequences=np.zeros((sessions, LONGEST * listed.count), np.int64),
     )
-    work = work_of(listed.count)
-    kernels.run_sessions(listed.toasts, listed.rules, work, tried, np.asarray(seeds, np.uint64), found)
-    return found if keep_times else found._replace(times_s=found.times_s[:0])
+    work = new_workspace(listed.count)
+    kernels.run_sessions(listed.toasts, listed.rules, work, tried, np.asarray(seeds, np.uint64), outcomes)
+    return outcomes if keep_times else outcomes._replace(times_s=outcomes.times_s[:0])
 
 
-def work_of(toasts: int) -> Workspace:
-    """What a session with so many toasts works on, as it begins."""
+def new_workspace(toasts: int) -> Workspace:
+    """The workspace at the begin of a session with so many toasts."""
     states = STATIONS**toasts
     return Workspace(
         values=np.ones(states),

@@ -1,7 +1,4 @@
-"""Sessions of `chapter_7_listing`, compiled with numba.
-
-Stations and toasts are numbered from 0 here.
-"""
+"""Sessions of `chapter_7_listing`, compiled with numba; stations and toasts are numbered from 0 here."""
 
 from math import cos, inf, log, pi, sqrt
 from typing import Any, NamedTuple
@@ -19,8 +16,8 @@ STATIONS = 6
 METHODS = ("srl", "mc", "random")
 SRL, MONTE_CARLO, RANDOM = range(3)  # in METHODS
 ALPHA, DISCOUNT, GOAL_REWARD = 0.05, 0.9, 1.5
-LATEST_S = 20_000.0  # the listing gives an episode up then
-MOST_MOVES = 10_000_000  # null moves take no time, so time alone would not end every episode; never met
+LATEST_S = 20_000.0  # the time at which the listing gives up an episode
+MOST_MOVES = 10_000_000  # ends an episode of null moves, which take no time; never reached
 _following, _mixed, _fraction = (
     without_refcounts(splitmix.following),
     without_refcounts(splitmix.mixed),
@@ -30,9 +27,10 @@ ROBOT, STATE, SEEN, MOVED = range(4)  # in `whole`: its station, the state's num
 
 
 class Toasts(NamedTuple):
-    """K toasts. travel_s (6, 6), 0 where the cell has no time; processing_s (6,), normal with `spread` times that [s].
+    """The cell with K toasts. travel_s (6, 6) [s], 0 where the cell has no time; processing_s (6,): mean times [s].
 
-    banned (6 ** K,): states that are never chosen. A state is a number of K digits, toast 0's station the lowest one.
+    spread: the standard deviation of normal processing times as a share of the mean. banned (6 ** K,): states that are never
+    chosen. A state is a number of K digits to base 6, of which toast 0's station is the lowest.
     """
 
     travel_s: Floats
@@ -42,7 +40,7 @@ class Toasts(NamedTuple):
 
 
 class ListingRules(NamedTuple):
-    """How a session learns: a method's index, type A of the reward factor with a and b, or type B; see `Reading`."""
+    """How a session learns: the method's index, the reward factor's type with a and b, and the fields of `Reading`."""
 
     method: int
     type_a: bool
@@ -56,11 +54,11 @@ class ListingRules(NamedTuple):
 
 
 class Workspace(NamedTuple):
-    """What a session works on.
+    """The arrays of a session.
 
     values, counts (of all visits), visits (of the episode's) and seen (the states of the episode) (6 ** K,); place and
     ready_s (K,) of the toasts, busy (6,) of the stations; toast and following (2 K,) of the options; clock (1,) [s];
-    whole (4,); stream (1,) of uniform numbers; moved (5 K,): the toasts moved in the episode, from 1, then zeros.
+    whole (4,); stream (1,) of random numbers; moved (5 K,): the toasts moved in the episode, from 1, then zeros.
     """
 
     values: Floats
@@ -78,12 +76,12 @@ class Workspace(NamedTuple):
     moved: Ints
 
 
-class Found(NamedTuple):
-    """What N sessions of E episodes came to.
+class ListingOutcomes(NamedTuple):
+    """The results of N sessions of E episodes.
 
-    times_s (N, E), of one session alone unless all are kept [s]; best_s and last_s (N,): the best time and that of the
-    last episode [s]; converged (N,): the first episode from which on the time stays the same; sequences (N, 5 K): the
-    toasts moved in the best episode, from 1, then zeros.
+    times_s (N, E) [s], of one session unless all are kept; best_s and last_s (N,): the best time and that of the last
+    episode [s]; converged (N,): the first episode from which the time stays the same; sequences (N, 5 K): the toasts
+    moved in the best episode, from 1, then zeros.
     """
 
     times_s: Floats
@@ -102,7 +100,7 @@ def _uniform(work: Any) -> float:
 
 @without_refcounts
 def processing_s(toasts: Any, work: Any, machine: int) -> float:
-    """Not cut off at 0 s, as in the listing. Source: Box and Muller 1958."""
+    """A random processing time [s], which may be negative, as in the listing. Source: Box and Muller 1958."""
     mean_s = toasts.processing_s[machine]
     if toasts.spread == 0.0:
         return float(mean_s)
@@ -112,7 +110,7 @@ def processing_s(toasts: Any, work: Any, machine: int) -> float:
 
 @without_refcounts
 def _target(work: Any, origin: int) -> int:
-    """Where a toast that is picked up at a station goes: to the machine ahead when it is free, else to its buffer."""
+    """The station to which a toast goes from another one: the machine ahead if it is free, else its buffer."""
     if origin == APPLIER:
         return DONE
     machine = TOASTER if origin < TOASTER else APPLIER
@@ -121,6 +119,7 @@ def _target(work: Any, origin: int) -> int:
 
 @without_refcounts
 def reset(work: Any) -> None:
+    """Prepare the workspace for an episode."""
     for toast in range(len(work.place)):
         work.place[toast], work.ready_s[toast] = PLATE, 0.0
     for n in range(work.whole[SEEN]):
@@ -131,7 +130,7 @@ def reset(work: Any) -> None:
 
 @without_refcounts
 def carry(toasts: Any, rules: Any, work: Any, toast: int) -> None:
-    """The robot goes to a toast, waits until it is processed, and takes it on, or leaves it where it is: a null move."""
+    """Let the robot go to a toast, wait for its processing, and carry it ahead, or leave it there in a null move."""
     origin = work.place[toast]
     target = _target(work, origin)
     reach_s = work.clock[0] + toasts.travel_s[work.whole[ROBOT], origin]
@@ -161,7 +160,7 @@ def _visit(work: Any) -> None:
 
 @without_refcounts
 def list_options(toasts: Any, rules: Any, work: Any) -> int:
-    """How many next states may be chosen: by toast, the nearer station first."""
+    """The number of next states that may be chosen; they are listed by toast, the nearer station first."""
     count, state, weight = 0, work.whole[STATE], 1
     for toast in range(len(work.place)):
         digit, weight = weight, weight * STATIONS
@@ -182,7 +181,7 @@ def list_options(toasts: Any, rules: Any, work: Any) -> int:
 
 @without_refcounts
 def _choose(rules: Any, work: Any, count: int, epsilon: float) -> int:
-    """The toast of one of the options."""
+    """The toast of the chosen option, random with probability epsilon."""
     if _uniform(work) <= epsilon:
         return int(work.toast[int(_uniform(work) * count)])
     best, ties, chosen = -inf, 0, 0
@@ -204,7 +203,7 @@ def _choose(rules: Any, work: Any, count: int, epsilon: float) -> int:
 
 @without_refcounts
 def _episode(toasts: Any, rules: Any, work: Any, epsilon: float) -> float:
-    """One episode with the step update of SRL; its time [s], LATEST_S when it does not end."""
+    """Carry out an episode with the step update of SRL; return its time [s], LATEST_S if it does not end."""
     reset(work)
     goal, toast = len(toasts.banned) - 1, 0  # the first move is always that of the first toast
     for _ in range(MOST_MOVES):
@@ -227,7 +226,7 @@ def _episode(toasts: Any, rules: Any, work: Any, epsilon: float) -> float:
 
 @without_refcounts
 def learn(rules: Any, work: Any, time_s: float, best_s: float) -> None:
-    """What the time of an episode does to the values of the states visited, the start left out, once for each visit."""
+    """Update the values of the visited states, without the start, by the time of an episode, once for each visit."""
     gain = 1.0 / time_s
     factor = 1.0 / (time_s - best_s + rules.a) + rules.b if rules.type_a else gain
     for n in range(work.whole[SEEN]):
@@ -245,19 +244,19 @@ def learn(rules: Any, work: Any, time_s: float, best_s: float) -> None:
 
 
 @without_refcounts
-def run_sessions(toasts: Any, rules: Any, work: Any, epsilons: Any, seeds: Any, found: Any) -> None:
-    """A session for each seed (N,), with exploration epsilons (E,); what they come to is written to `found`."""
+def run_sessions(toasts: Any, rules: Any, work: Any, epsilons: Any, seeds: Any, outcomes: Any) -> None:
+    """Run a session for each seed (N,) with exploration epsilons (E,), and write their results to `outcomes`."""
     for n in range(len(seeds)):
-        row, best_s = n % len(found.times_s), inf
+        row, best_s = n % len(outcomes.times_s), inf
         work.values[:], work.counts[:], work.stream[0] = 1.0, 0, seeds[n]
         for episode in range(len(epsilons)):
             time_s = _episode(toasts, rules, work, epsilons[episode])
             if time_s < best_s:
                 best_s = time_s
                 for m in range(len(work.moved)):
-                    found.sequences[n, m] = work.moved[m]
-            if episode > 0 and time_s != found.times_s[row, episode - 1]:
-                found.converged[n] = episode + 1
-            found.times_s[row, episode] = time_s
+                    outcomes.sequences[n, m] = work.moved[m]
+            if episode > 0 and time_s != outcomes.times_s[row, episode - 1]:
+                outcomes.converged[n] = episode + 1
+            outcomes.times_s[row, episode] = time_s
             learn(rules, work, time_s, best_s)
-        found.best_s[n], found.last_s[n] = best_s, found.times_s[row, len(epsilons) - 1]
+        outcomes.best_s[n], outcomes.last_s[n] = best_s, outcomes.times_s[row, len(epsilons) - 1]

@@ -1,4 +1,4 @@
-"""The studies of chapter 9: which cells and pictures belong together, and what is to be said about them."""
+"""The studies of chapter 9: their cells, pictures and notes."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
@@ -6,7 +6,7 @@ from typing import Any
 from lab.studies.findings import Findings, Row, agreement, marked, share_row, those
 from lab.studies.runner import Job
 from lab_studies.thesis import chapter_9_figures as figures
-from lab_studies.thesis.chapter_9_cells import BEST_BETA, TABLES, appendix, by_beta, table
+from lab_studies.thesis.chapter_9_cells import BEST_BETA, TABLES, appendix, beta_rows, table
 from lab_studies.thesis.chapter_9_sessions import LEARNED_SEED
 from lab_studies.thesis.used_to_choose import SAYS
 
@@ -15,22 +15,22 @@ RANKED = ("ranks as printed", "ranks", "ranks as printed by chance", "pairs in t
 AGREEMENT = "Each value is the share of Appendix V's cells of world I that agree with the printed ones under a reading."
 BY_BETA = "Figure 9.4 (bands: 95 % intervals)"
 SYMBOLS = (
-    "SP: sessions whose last episode takes the shortest way; HS: steps of a session in which advice was followed; AR: episodes "
+    "SP: sessions whose last episode takes the shortest path; HS: steps of a session in which advice was followed; AR: episodes "
     "in which advice was asked for; score: eq. 9.4, success against effort. β: how fast the learner's softmax cools; τ: the "
-    "advisor's temperature, .01 an expert, 1 a novice; Λ: the improvement below which CCRL asks; Ω: the misleads that it "
-    "tolerates; Ψ: the width of values below which IA asks."
+    "advisor's temperature, .01 for an expert, 1 for a novice; Λ: the improvement below which CCRL asks; Ω: the misleads that "
+    "it tolerates; Ψ: the range of values below which IA asks."
 )
 RECONSTRUCTED = (
-    "World II of the thesis is not printed but as a picture; the one here, tasks/world-2.toml, is reconstructed from the figures "
-    "that it is compared with: by what learning alone does there, by success and by helped steps of experts and novices (lab "
-    "task reconstruct). Differences there say little about the methods."
+    "The thesis prints world II only as a picture; the one here, tasks/world-2.toml, is reconstructed from the values that it is "
+    "compared with: from success without advice, and from success and helped steps with experts and novices (lab study run "
+    "world-2). Differences there say little about the methods."
 )
 EXACT = "Advisors know the exact optimal values; without --advisor-table exact they know a learned table."
 ADVISOR = (
-    "In full view all agreement with chapter 9 hangs on one table that the thesis loads and does not print: what its "
-    "advisors know. Here it is learned by an autonomous session of 1000 episodes that begin anywhere (beta .7, seed "
-    f"{LEARNED_SEED}, chosen among 36 seeds by how near world I comes to the printed figures, one choice for all cells); "
-    "--advisor-table exact takes the exact optimal values. The study 'readings' compares these and other readings."
+    "In full view all agreement with chapter 9 depends on one table that the thesis loads but does not print: what its "
+    "advisors know. Here it is learned by a session without advice of 1000 episodes that begin anywhere (beta .7, seed "
+    f"{LEARNED_SEED}, chosen among 36 seeds as the one with which world I comes nearest to the printed values, one choice for "
+    "all cells); --advisor-table exact takes the exact optimal values. The study 'readings' compares these and other readings."
 )
 
 
@@ -46,34 +46,34 @@ READINGS: dict[str, dict[str, Any]] = {
 
 
 def best_scores(job: Job, reading: Reading, name: str) -> Findings:
-    """One of the tables 9.2-9.5, with a picture of its scores and ranks."""
+    """The results of one of the tables 9.2-9.5, with a picture of its scores and ranks."""
     rows = table(job, name, reading)
-    pictures = {f"{name}: scores and ranks": figures.ranked(rows)}
+    pictures = {f"{name}: scores and ranks": figures.ranks_picture(rows)}
     return Findings(rows, agreement(rows), pictures, _notes([TABLES[name][0]], reading))
 
 
 def appendix_v(job: Job, reading: Reading) -> Findings:
-    """All cells of Appendix V."""
+    """The results of all cells of Appendix V."""
     rows = appendix(job, TABLES.values(), reading)
     return Findings(rows, agreement(rows), {}, _notes(BEST_BETA, reading))
 
 
 def figure_9_4(job: Job, reading: Reading) -> Findings:
-    """Learning alone with several decay factors; the reading, which is about advisors, changes nothing here."""
-    rows = by_beta(job)
-    return Findings(rows, agreement(rows), {BY_BETA: figures.by_beta(rows)}, (RECONSTRUCTED, SAYS["world-2"]))
+    """The results of learning alone with several decay factors; the reading, which is about advisors, has no effect."""
+    rows = beta_rows(job)
+    return Findings(rows, agreement(rows), {BY_BETA: figures.beta_picture(rows)}, (RECONSTRUCTED, SAYS["world-2"]))
 
 
 def chapter_9(job: Job, reading: Reading) -> Findings:
-    """All of it: Appendix V, the four tables' ranks, and the figures; with a folder, cells that several need are run once."""
-    cells, alone = appendix(job, TABLES.values(), reading), by_beta(job)
-    pictures = {BY_BETA: figures.by_beta(alone)}
+    """The results of Appendix V, of the four tables' ranks, and of the figures; with a folder each cell is measured once."""
+    cells, alone = appendix(job, TABLES.values(), reading), beta_rows(job)
+    pictures = {BY_BETA: figures.beta_picture(alone)}
     ranks: Row = {}
     for name in TABLES:
         best = best_scores(job, reading, name)
         pictures |= best.figures
-        as_printed, of, by_chance, pairs = (best.summary[key] for key in RANKED)
-        ranks[f"{name} ranks"] = f"{as_printed} of {of} as printed ({by_chance} by chance)"
+        as_printed, count, by_chance, pairs = (best.summary[key] for key in RANKED)
+        ranks[f"{name} ranks"] = f"{as_printed} of {count} as printed ({by_chance} by chance)"
         ranks[f"{name} pairs in the printed order"] = pairs
     more, drawn = figures.figures(job, reading)
     rows = marked([*cells, *alone, *more])
@@ -81,13 +81,13 @@ def chapter_9(job: Job, reading: Reading) -> Findings:
 
 
 def readings(job: Job, reading: Reading) -> Findings:
-    """Appendix V's world I under several readings of what the thesis leaves open."""
+    """The agreement of Appendix V's world I under several readings of what the thesis leaves open."""
     rows: list[Row] = []
     for name, changes in READINGS.items():
         cells = appendix(job, [TABLES["table-9.2"], TABLES["table-9.3"]], changes)
         for view in ("full", "limited"):
             for measure in ("SP_percent", "HS_steps", "score"):
-                agree = [one["within"] for one in those(cells, view=view, measure=measure)]
+                agree = [row["within"] for row in those(cells, view=view, measure=measure)]
                 named = {"reading": name, "world": "world-1", "view": view}
                 rows.append(share_row(named, f"{measure.split('_')[0]}_agreement_percent", agree))
     summary = {"readings": len(READINGS)} | agreement(rows) | by_seed(rows)
@@ -95,24 +95,24 @@ def readings(job: Job, reading: Reading) -> Findings:
 
 
 def by_seed(rows: Sequence[Row]) -> Row:
-    """What the choice of the advisor's table is worth: agreement with the chosen seed beside the range of the others."""
+    """The agreement with the chosen seed of the advisor's table, and the range with the others, by view and measure."""
     said: Row = {}
-    for one in those(rows, reading=CHOSEN):
-        same = {name: one[name] for name in ("view", "measure")}
+    for row in those(rows, reading=CHOSEN):
+        same = {name: row[name] for name in ("view", "measure")}
         others = [other["value"] for other in those(rows, **same) if other["reading"].startswith(OTHER_SEED)]
         if others:
-            name = f"{one['measure'].removesuffix('_agreement_percent')} agreement in {one['view']} view"
-            chosen, low, high = one["value"], min(others), max(others)
+            name = f"{row['measure'].removesuffix('_agreement_percent')} agreement in {row['view']} view"
+            chosen, low, high = row["value"], min(others), max(others)
             said[name] = f"{chosen:.0f} % with the chosen table, {low:.0f} to {high:.0f} % with {len(others)} others"
     return said
 
 
-def known(reading: Reading) -> str:
-    """The remark on what advisors know, and where that comes from."""
+def advisor_note(reading: Reading) -> str:
+    """The note on what advisors know."""
     return EXACT if reading.get("advisor_table") == "exact" else ADVISOR
 
 
 def _notes(places: Iterable[str], reading: Reading) -> tuple[str, ...]:
     worlds = sorted({*places})
-    notes = (SYMBOLS, known(reading), *(SAYS[place] for place in worlds))
+    notes = (SYMBOLS, advisor_note(reading), *(SAYS[place] for place in worlds))
     return (*notes, RECONSTRUCTED) if "world-2" in worlds else notes

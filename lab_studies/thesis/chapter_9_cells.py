@@ -1,4 +1,4 @@
-"""Chapter 9 again: tables 9.2-9.5 and Appendix V cell by cell, the sweep of beta, and the figures."""
+"""Chapter 9 again: tables 9.2-9.5 and Appendix V cell by cell, and the sweep of beta."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
@@ -35,7 +35,7 @@ REPLICATIONS, PRINTED_SESSIONS = 5, 500  # section 9.8: five of 100 sessions eac
 
 @dataclass(frozen=True)
 class PrintedLine:
-    """One printed line: a setting, or (average) the mean over the four advisors of one combination of parameters."""
+    """One printed line: of a setting, or (average) the mean over the four advisors with the same parameters."""
 
     setting: AdviceSetting
     average: bool
@@ -74,7 +74,7 @@ def _is_at(cell: PrintedLine, place: str, view: View) -> bool:
 
 
 class Grid:
-    """All printed combinations of one world and view, measured; `reading`: changes to all settings."""
+    """All printed combinations of one world and view, measured. reading: changes to all settings."""
 
     def __init__(self, job: Job, place: str, view: View, reading: Mapping[str, Any]):
         self.reading = reading
@@ -89,22 +89,22 @@ class Grid:
         return replace(setting, **self.reading)
 
     def settings_of(self, cell: PrintedLine) -> list[AdviceSetting]:
-        """The settings of a cell, those of its four advisors where it is their mean."""
+        """The setting of a cell, or those of its four advisors if it is their mean."""
         taus = TAUS if cell.average else [cell.setting.tau]
         return [self._asked(replace(cell.setting, tau=tau)) for tau in taus]
 
     def of(self, cell: PrintedLine) -> list[AdviceOutcome]:
-        """The outcome of a cell, or those of its four advisors (some of which the scan of the thesis does not show)."""
+        """The outcome of a cell, or those of its four advisors (the scan of the thesis does not show all of them)."""
         return [self.outcomes[setting] for setting in self.settings_of(cell)]
 
     def scores(self, cell: PrintedLine) -> FloatArray:
-        """The score of each of five replications, averaged over the cell's advisors; eq. 9.4."""
+        """The scores (5,) of the replications, averaged over the cell's advisors; eq. 9.4."""
         scores = [_replicated_scores(outcome, self.sp_range, self.hs_range) for outcome in self.of(cell)]
         means: FloatArray = np.mean(scores, axis=0)
         return means
 
     def rows(self, cell: PrintedLine) -> list[Row]:
-        """SP, HS and score of a cell beside the printed ones; for CCRL its requests, which are not printed."""
+        """The rows of SP, HS and score of a cell with the printed values; for CCRL also its requests, which are not printed."""
         outcomes, setting = self.of(cell), self._asked(cell.setting)
         named = describe(setting, ALL_ADVISORS if cell.average else setting.tau)
         if len(outcomes) == 1:
@@ -118,7 +118,7 @@ class Grid:
             mean_row(named, "HS_steps", helped, cell.hs, PRINTED_SESSIONS),
             mean_row(named, "score", self.scores(cell), cell.score, REPLICATIONS * PRINTED_SESSIONS / len(helped)),
         ]
-        rows = [one | {"used": is_used(setting.world, named["tau"])} for one in rows]
+        rows = [result | {"used": is_used(setting.world, named["tau"])} for result in rows]
         if setting.gate == "ccrl":
             asked = np.mean([outcome.requests for outcome in outcomes], axis=0)
             rows.append(mean_row(named, "AR_requests", asked))
@@ -131,7 +131,7 @@ def _replicated_scores(outcome: AdviceOutcome, sp_range: Range, hs_range: Range)
 
 
 def describe(setting: AdviceSetting, tau: float | str | None = None) -> Row:
-    """A setting under the names that rows use, only what applies to it; `tau` is its own unless said otherwise."""
+    """The fields of a setting that apply to it, as in rows; tau: in place of its own."""
     own = {"tau": setting.tau if tau is None else tau, "beta": learner_of(setting).beta}
     names = ("world", "view", "gate", "tau", "lambda_threshold", "omega", "psi", "beta")
     named = {name: own.get(name, getattr(setting, name)) for name in names}
@@ -141,50 +141,52 @@ def describe(setting: AdviceSetting, tau: float | str | None = None) -> Row:
 
 
 def appendix(job: Job, places: Iterable[tuple[str, View]], reading: Mapping[str, Any]) -> list[Row]:
-    """Every line of Appendix V for these worlds and views."""
+    """The rows of every line of Appendix V for these worlds and views."""
     grids = (Grid(job, place, view, reading) for place, view in places)
-    return marked(one for grid in grids for cell in grid.cells for one in grid.rows(cell))
+    return marked(result for grid in grids for cell in grid.cells for result in grid.rows(cell))
 
 
 def table(job: Job, name: str, reading: Mapping[str, Any]) -> list[Row]:
-    """One of the tables 9.2-9.5: the printed best combinations, with our ranks of the methods for each advisor."""
+    """The rows of one of the tables 9.2-9.5: the printed best combinations, with our ranks of the methods by advisor."""
     place, view = TABLES[name]
     grid = Grid(job, place, view, reading)
     rows: list[Row] = []
     tests: list[Row] = []
     for tau in (*TAUS, None):
         chosen = [cell for cell in grid.best if cell.setting.tau == tau]
-        found = compare({cell.setting.gate: grid.scores(cell) for cell in chosen})
+        comparison = compare({cell.setting.gate: grid.scores(cell) for cell in chosen})
         for cell in chosen:
-            ranked = {"rank": found.ranks[cell.setting.gate], "thesis_rank": cell.rank}
-            rows += [{**one, **ranked} for one in grid.rows(cell)]
+            ranked = {"rank": comparison.ranks[cell.setting.gate], "thesis_rank": cell.rank}
+            rows += [{**result, **ranked} for result in grid.rows(cell)]
         about = {
             "table": "comparison of scores",
             "world": place,
             "view": view,
             "tau": ALL_ADVISORS if tau is None else tau,
         }
-        tests += _tests(about, found)
+        tests += _tests(about, comparison)
     return marked(rows) + tests
 
 
-def _tests(named: Row, found: Comparison) -> list[Row]:
-    """The tests behind the ranks: their p values (Appendix II)."""
-    rows = [row(named, "ANOVA_p", found.p), row(named, "Levene_p", found.levene)]
-    rows += [row({**named, "gate": f"{one} - {other}"}, "Tukey_p", p) for (one, other), p in found.tukey.items()]
-    return rows + [row({**named, "gate": gate}, "KS_p", p) for gate, p in found.normality.items() if p is not None]
+def _tests(named: Row, comparison: Comparison) -> list[Row]:
+    """The rows of the p values behind the ranks (Appendix II)."""
+    rows = [row(named, "ANOVA_p", comparison.p), row(named, "Levene_p", comparison.levene)]
+    rows += [
+        row({**named, "gate": f"{first} - {second}"}, "Tukey_p", p) for (first, second), p in comparison.tukey.items()
+    ]
+    return rows + [row({**named, "gate": gate}, "KS_p", p) for gate, p in comparison.normality.items() if p is not None]
 
 
-def by_beta(job: Job) -> list[Row]:
-    """Learning alone with several decay factors: fig. 9.4 and the two figures that section 9.9.1 names."""
+def beta_rows(job: Job) -> list[Row]:
+    """The rows of learning alone with several decay factors: fig. 9.4 and the two values that section 9.9.1 names."""
     settings = [AdviceSetting(place, beta=beta) for place in BEST_BETA for beta in BETAS]
     rows = []
     for setting, outcome in measured(job, settings).items():
         best, percent = BEST_BETA[setting.world]
         named = {"table": "Figure 9.4", **describe(setting)}
         if setting.beta == best:
-            one = share_row(named, "SP_percent", outcome.success, percent, PRINTED_SESSIONS)
-            rows.append(one | {"used": is_used(setting.world, None)})
+            result = share_row(named, "SP_percent", outcome.success, percent, PRINTED_SESSIONS)
+            rows.append(result | {"used": is_used(setting.world, None)})
         else:
             rows.append(share_row(named, "SP_percent", outcome.success))
     return marked(rows)

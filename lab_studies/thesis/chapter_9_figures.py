@@ -15,7 +15,14 @@ from lab.studies.findings import Row, mean_row, share_row, those
 from lab.studies.runner import Job
 from lab.view.canvas import BLUE, GREY, INK, ORANGE, RED, picture_bytes
 from lab_studies.thesis.chapter_9_cells import BEST_BETA, TAUS, describe
-from lab_studies.thesis.chapter_9_sessions import AdviceSetting, example, measured, table_of, walk_of_advisor, world
+from lab_studies.thesis.chapter_9_sessions import (
+    AdviceSetting,
+    example_session,
+    measured,
+    table_of,
+    walk_of_advisor,
+    world,
+)
 from lab_studies.thesis.used_to_choose import is_used
 
 if TYPE_CHECKING:
@@ -24,19 +31,19 @@ if TYPE_CHECKING:
 
 ADVISORS = tuple(f"{name} ({tau:g})" for name, tau in SKILL_TAUS.items())
 METHODS = {"ccrl": "CCRL", "ia": "IA", "combined": "combined"}
-NEVER_REJECTS = 1_000_000  # Omega: nobody misleads so often
+NEVER_REJECTS = 1_000_000  # an Omega that no advisor reaches
 OPTIMUM = 13  # steps in world I
-WALKERS = (0.01, 0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 1.0)  # of fig. 9.1: tau
-PRINTED_WALKS = {0.01: (100.0, 13.0), 1.0: (None, 178.0)}  # share of shortest ways [%], mean steps
-LOWEST_RATE = -2.0  # improvement rates below are drawn as a mark at the edge
+WALKERS = (0.01, 0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 1.0)  # the taus of fig. 9.1
+PRINTED_WALKS = {0.01: (100.0, 13.0), 1.0: (None, 178.0)}  # tau -> share of shortest paths [%], mean steps
+LOWEST_RATE = -2.0  # lower improvement rates are drawn as a mark at the edge
 WINDOW = 5  # K of the improvement rate
 
 Series = Mapping[str, Mapping[str, AdviceSetting]]  # of a figure: series -> group -> setting
 
 
 def figures(job: Job, reading: Mapping[str, Any]) -> tuple[list[Row], dict[str, bytes]]:
-    """Figures 9.1, 9.3 and 9.5-9.13: their cells and pictures."""
-    rows = walks(reading)
+    """The rows of figures 9.1, 9.3 and 9.5-9.13, and their pictures by caption."""
+    rows = walk_rows(reading)
     pictures = {
         "Figure 9.1: an advisor's own way by tau": bars(
             [f"{tau:g}" for tau in WALKERS],
@@ -53,9 +60,9 @@ def figures(job: Job, reading: Mapping[str, Any]) -> tuple[list[Row], dict[str, 
         ("Figure 9.3: a session in world I, learning alone", AdviceSetting("world-1"), None),
         ("Figures 9.5 and 9.6: a session with CCRL and an expert", replace(guided, **reading), 0.05),
     ):
-        steps, helped = example(setting, job.seed)
+        steps, helped = example_session(setting, job.seed)
         pictures[caption] = convergence(steps.tolist(), helped.tolist(), OPTIMUM, threshold)
-    for caption, series in compared().items():
+    for caption, series in figure_series().items():
         more, drawn = _compared(job, reading, caption, series)
         rows += more
         pictures |= drawn
@@ -63,7 +70,7 @@ def figures(job: Job, reading: Mapping[str, Any]) -> tuple[list[Row], dict[str, 
 
 
 def _compared(job: Job, reading: Mapping[str, Any], caption: str, series: Series) -> tuple[list[Row], dict[str, bytes]]:
-    """Success and helped steps of one of the figures 9.7-9.13."""
+    """The rows of success and helped steps of one of the figures 9.7-9.13, and their pictures."""
     asked = {name: [replace(setting, **reading) for setting in line.values()] for name, line in series.items()}
     outcomes = measured(job, [setting for line in asked.values() for setting in line])
     groups = list(next(iter(series.values())))
@@ -79,15 +86,15 @@ def _compared(job: Job, reading: Mapping[str, Any], caption: str, series: Series
             ]
             for name, line in asked.items()
         }
-        rows += [one for line in lines.values() for one in line]
+        rows += [row for line in lines.values() for row in line]
         pictures[f"{caption}: {what}"] = bars(groups, lines, what, xlabel=xlabel)
     return rows, pictures
 
 
-def compared() -> dict[str, Series]:
-    """What figures 9.7-9.13 compare, by caption."""
+def figure_series() -> dict[str, Series]:
+    """The series of figures 9.7-9.13, by caption."""
     by_skill = dict(zip(ADVISORS, TAUS, strict=True))
-    one = AdviceSetting("world-1", "limited", "ccrl", 0.01, 0.05, 1)
+    in_world_1 = AdviceSetting("world-1", "limited", "ccrl", 0.01, 0.05, 1)
     two = AdviceSetting("world-2", "limited", "ccrl", 0.01, 0.05, 7)
     introspecting = AdviceSetting("world-2", "limited", "ia", 0.01, psi=1.0)
 
@@ -104,11 +111,11 @@ def compared() -> dict[str, Series]:
             "Omega 7": by_threshold(two),
         },
         "Figures 9.8 and 9.9: CCRL without and with the assessment of advice, world I, limited view": {
-            "never rejects": skills(replace(one, omega=NEVER_REJECTS)),
-            "Omega 1": skills(one),
+            "never rejects": skills(replace(in_world_1, omega=NEVER_REJECTS)),
+            "Omega 1": skills(in_world_1),
         },
         "Figure 9.10: CCRL by Omega, world I, limited view": {
-            f"Omega {omega}": skills(replace(one, omega=omega)) for omega in (1, 3, 5, 7)
+            f"Omega {omega}": skills(replace(in_world_1, omega=omega)) for omega in (1, 3, 5, 7)
         },
         "Figure 9.11: IA by Psi, expert, world II, limited view": {
             "IA": {f"{psi:g}": replace(introspecting, psi=psi) for psi in (0.1, 0.3, 0.7, 1.0, 1.3)}
@@ -120,8 +127,8 @@ def compared() -> dict[str, Series]:
     }
 
 
-def walks(reading: Mapping[str, Any]) -> list[Row]:
-    """Figure 9.1: how often advisors of several skills take the shortest way themselves, and in how many steps they arrive."""
+def walk_rows(reading: Mapping[str, Any]) -> list[Row]:
+    """The rows of fig. 9.1: how often advisors of several skills take the shortest path themselves, and their mean steps."""
     known = reading.get("advisor_table", "learned")
     place, table = world("world-1"), table_of(AdviceSetting("world-1", advisor_table=known))
     rows = []
@@ -130,12 +137,12 @@ def walks(reading: Mapping[str, Any]) -> list[Row]:
         named = {"table": "Figure 9.1", "world": "world-1", "advisor": "alone", "tau": tau, "advisor_table": known}
         share, mean = PRINTED_WALKS.get(tau, (None, None))
         more = [share_row(named, "SP_percent", steps == OPTIMUM, share), mean_row(named, "mean_steps", steps, mean)]
-        rows += [one if one["thesis"] is None else one | {"used": is_used("world-1", tau)} for one in more]
+        rows += [row if row["thesis"] is None else row | {"used": is_used("world-1", tau)} for row in more]
     return rows
 
 
-def by_beta(rows: Sequence[Row]) -> bytes:
-    """Success percentage against beta with intervals, one curve a world. Source: thesis fig. 9.4."""
+def beta_picture(rows: Sequence[Row]) -> bytes:
+    """A picture of the success percentage against beta with intervals, a curve for each world. Source: thesis fig. 9.4."""
 
     def draw(figure: "Figure") -> None:
         axes = figure.add_subplot()
@@ -143,25 +150,25 @@ def by_beta(rows: Sequence[Row]) -> bytes:
             curve(axes, those(rows, world=place), "beta", (*look, place))
             axes.plot(*best, label="printed", zorder=3, **PRINTED)
         axes.set(xlabel="β (softmax temperature $n^{-β}$ in episode n)", ylabel="sessions that end optimal [%]")
-        axes.set_ylim(0, 1.08 * max(20.0, *(one["ci95"][1] for one in rows)))
+        axes.set_ylim(0, 1.08 * max(20.0, *(row["ci95"][1] for row in rows)))
         axes.grid()
         legend_below(figure)
 
     return picture_bytes(draw, 6, 3.8)
 
 
-def ranked(rows: Sequence[Row]) -> bytes:
-    """Scores by advisor and method, the rank of each on its bar, from the rows of one of the tables 9.2-9.5."""
-    found = {(one["gate"], one["tau"]): one for one in those(rows, measure="score")}
+def ranks_picture(rows: Sequence[Row]) -> bytes:
+    """A picture of scores by advisor and method, with ranks on the bars, from the rows of one of the tables 9.2-9.5."""
+    score_rows = {(row["gate"], row["tau"]): row for row in those(rows, measure="score")}
     groups = [*ADVISORS, "all"]
-    lines = {name: [found[gate, tau] for tau in (*TAUS, "all")] for gate, name in METHODS.items()}
+    lines = {name: [score_rows[gate, tau] for tau in (*TAUS, "all")] for gate, name in METHODS.items()}
     return bars(groups, lines, "score", xlabel="advisor, number on a bar: rank among the methods", label="rank")
 
 
 def convergence(steps: Sequence[int], guided: Sequence[bool], optimum: int, threshold: float | None = None) -> bytes:
-    """Steps of each episode (n,) of one session, guided ones marked, above the improvement rate before each episode.
+    """A picture of the steps (n,) of a session's episodes, with guided ones marked, above the improvement rate before each.
 
-    optimum: fewest possible steps; threshold: Lambda, below which the learner asks. Raises BadInput without episodes,
+    optimum: the fewest possible steps; threshold: Lambda, below which the learner asks. Raises BadInput without episodes,
     and for lengths that differ. Source: thesis figs. 9.3, 9.5, 9.6; eq. 6.1.
     """
     if not len(steps) or len(steps) != len(guided):
@@ -177,7 +184,7 @@ def convergence(steps: Sequence[int], guided: Sequence[bool], optimum: int, thre
 
 
 def draw_steps(axes: "Axes", steps: NDArray[np.int64], guided: NDArray[np.bool_], optimum: int) -> None:
-    """The steps of each episode (n,)."""
+    """Draw the steps of each episode (n,)."""
     from matplotlib.ticker import MaxNLocator
 
     episodes = np.arange(1, len(steps) + 1)
@@ -193,8 +200,10 @@ def draw_steps(axes: "Axes", steps: NDArray[np.int64], guided: NDArray[np.bool_]
 
 
 def draw_rate(axes: "Axes", steps: Sequence[int], window: int, threshold: float | None) -> None:
-    """The improvement rate that the learner knows before each episode; it exists from episode 2K + 1 on."""
-    known = [(n + 1, found.rate) for n in range(len(steps)) if (found := improvement(steps[:n], window)) is not None]
+    """Draw the improvement rate that the learner knows before each episode; it exists from episode 2K + 1."""
+    known = [
+        (n + 1, improved.rate) for n in range(len(steps)) if (improved := improvement(steps[:n], window)) is not None
+    ]
     if known:
         axes.plot(*zip(*known, strict=True), color=INK, linewidth=0.9)
         cut = [(episode, LOWEST_RATE) for episode, rate in known if rate < LOWEST_RATE]

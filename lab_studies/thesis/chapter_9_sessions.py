@@ -1,4 +1,4 @@
-"""The sessions of chapter 9: who advises in which world, when the learner asks, and what that comes to."""
+"""The sessions of chapter 9: who advises in which world, when the learner asks, and their results."""
 
 import json
 from collections.abc import Sequence
@@ -18,9 +18,9 @@ from lab.tasks.grid_world import AdvisorView, GridWorld
 if TYPE_CHECKING:
     from lab.learning.batch import Batch
 
-FORMAT = 1  # of what is stored; another one is computed anew
+FORMAT = 1  # of stored results; those of another format are computed again
 LEARNED_EPISODES, LEARNED_BETA, LEARNED_SEED = 1000, 0.7, 14
-EXAMPLES = 100  # sessions, of which the first that succeeds is shown
+EXAMPLES = 100  # sessions, of which the first successful one is shown
 
 Count = NDArray[np.int64]
 
@@ -29,10 +29,10 @@ Count = NDArray[np.int64]
 class AdviceSetting:
     """One cell of a table: a world, who advises there, and when the learner asks.
 
-    tau None: nobody advises. lambda_threshold, omega and psi are those of the gates that have them. advisor_table:
-    "exact" optimal values, or "learned" (see `learned_table`). beta and learner None: the world's own. judge_unhelped:
-    see GateSettings. success: the "last" episode took the shortest way, or "any" did. table_seed: another learned table.
-    memory: advice is remembered, see GateSettings; wrong: the advisor takes the worst action for the best.
+    tau None: nobody advises. lambda_threshold, omega, psi: of the gates that have them. advisor_table: "exact" optimal
+    values, or "learned" (see `learned_table`). beta and learner None: the world's own. judge_unhelped, memory: see
+    GateSettings. success: the "last" episode took the shortest path, or "any" did. table_seed: another learned table.
+    wrong: the advisor takes the worst action for the best.
     """
 
     world: str
@@ -57,10 +57,10 @@ class AdviceSetting:
                 object.__setattr__(self, name, float(getattr(self, name)))
 
     def key(self, sessions: int, seed: int) -> str:
-        """What names this setting's results among all that are stored."""
+        """The key of this setting's results among all stored ones."""
         place = world(self.world).model_dump(mode="json")
         for name in ("spare_best", "fading", "consistency"):
-            del place["gate"][name]  # no result depends on it: see `gate_of`
+            del place["gate"][name]  # no result depends on it, see `gate_of`
         for name, off in (("tilings", 1), ("start_value", 0.0)):
             if place["learner"][name] == off:
                 del place["learner"][name]
@@ -71,14 +71,14 @@ class AdviceSetting:
 
 @dataclass(frozen=True, eq=False)
 class AdviceOutcome:
-    """What N sessions came to, one number each (N,): whether they succeeded (see `AdviceSetting`), and the advice in them."""
+    """The results of N sessions, (N,) each: whether they succeeded (see `AdviceSetting`), helped steps and requests."""
 
     success: BoolArray
     helped_steps: Count
     requests: Count
 
     def to_json(self) -> dict[str, list[int]]:
-        """Plain lists."""
+        """The result as lists."""
         return {name: np.asarray(value, np.int64).tolist() for name, value in vars(self).items()}
 
     @classmethod
@@ -89,41 +89,40 @@ class AdviceOutcome:
 
 
 def measured(job: Job, settings: Sequence[AdviceSetting]) -> dict[AdviceSetting, AdviceOutcome]:
-    """The outcome of every setting; those that the job's folder holds are read, the others computed and kept there.
+    """The outcome of every setting; the job's folder keeps them, also after Ctrl-C.
 
-    Raises WorkFailed when the folder cannot be written or the cluster cannot be reached. After Ctrl-C all that is
-    finished is kept.
+    Raises WorkFailed if the folder cannot be written or the cluster cannot be reached.
     """
-    wanted = list(dict.fromkeys(settings))
-    keys = {setting.key(job.sessions, job.seed): setting for setting in wanted}
+    distinct = list(dict.fromkeys(settings))
+    keys = {setting.key(job.sessions, job.seed): setting for setting in distinct}
 
     done: dict[AdviceSetting, AdviceOutcome] = job.kept_as(
         lambda entry: (keys[entry["key"]], AdviceOutcome.from_json(entry))
     )
-    left = [setting for setting in wanted if setting not in done]
-    job.progress(len(done), len(wanted))
+    left = [setting for setting in distinct if setting not in done]
+    job.progress(len(done), len(distinct))
     for setting, outcome in job.computed(partial(sessions_of, sessions=job.sessions, seed=job.seed), left):
         done[setting] = outcome
         job.keep({"key": setting.key(job.sessions, job.seed), "setting": asdict(setting), **outcome.to_json()})
-        job.progress(len(done), len(wanted))
-    return {setting: done[setting] for setting in wanted}
+        job.progress(len(done), len(distinct))
+    return {setting: done[setting] for setting in distinct}
 
 
 def sessions_of(setting: AdviceSetting, sessions: int, seed: int) -> AdviceOutcome:
-    """Learns so many sessions of one setting."""
+    """The outcome of `sessions` sessions of one setting."""
     batch = _learned(setting, seeds_of(setting, sessions, seed))
     return AdviceOutcome(succeeded(setting, batch.steps), batch.helped_steps, batch.requests)
 
 
-def example(setting: AdviceSetting, seed: int) -> tuple[NDArray[np.int32], BoolArray]:
-    """Steps and guided episodes (E,) of the first session of a setting that succeeds, of EXAMPLES."""
+def example_session(setting: AdviceSetting, seed: int) -> tuple[NDArray[np.int32], BoolArray]:
+    """The steps and guided episodes (E,) of the first successful session of a setting, of EXAMPLES."""
     batch = _learned(setting, seeds_of(setting, EXAMPLES, seed))
     n = int(np.argmax(succeeded(setting, batch.steps)))
     return batch.steps[n], batch.guided[n]
 
 
 def succeeded(setting: AdviceSetting, steps: NDArray[np.integer[Any]]) -> BoolArray:
-    """Whether each session took the shortest way, (N,) bool, by the steps of its episodes (N, E)."""
+    """Whether each session took the shortest path, (N,) bool, by the steps of its episodes (N, E)."""
     shown = steps[:, -1] if setting.success == "last" else steps.min(axis=1)
     return np.asarray(shown == shortest_steps(problem(setting.world)) + world(setting.world).learner.count_start)
 
@@ -144,7 +143,7 @@ def problem(name: str) -> TabularMDP:
 
 @lru_cache(maxsize=128)
 def known_values(name: str, seed: int | None) -> FloatArray:
-    """What an advisor in the world of that name knows, (S, A): the table learned with a seed, or None: the exact values."""
+    """What an advisor knows in the world of that name, (S, A): the table learned with a seed, for None the exact values."""
     return (
         optimal_values(problem(name), world(name).learner.discount)
         if seed is None
@@ -153,19 +152,20 @@ def known_values(name: str, seed: int | None) -> FloatArray:
 
 
 def limited_view(place: GridWorld) -> BoolArray:
-    """The states (S,) bool in which an advisor with a limited view sees the robot; without a view the middle half of each axis.
+    """Whether an advisor with a limited view sees the robot in each state, (S,) bool.
 
-    That is 6 x 6 x 6 of 10 x 10 x 10 cells; the views of the thesis's worlds have 5 x 7 x 6 and 5 x 5 x 7.
+    A world without a view has the middle half of each axis, 6 x 6 x 6 of 10 x 10 x 10 cells; the views of the thesis's worlds
+    have 5 x 7 x 6 and 5 x 5 x 7.
     """
     middle = AdvisorView(lower=tuple(n // 4 for n in place.shape), upper=tuple(n - n // 4 - 1 for n in place.shape))
     return place.model_copy(update={"view": place.view or middle}).region()
 
 
 def learned_table(place: GridWorld, seed: int = LEARNED_SEED) -> FloatArray:
-    """The advisor's table as the thesis may have had it: learned alone, in 1000 episodes that begin in any free cell.
+    """The advisor's table (S, A) float64, learned alone in 1000 episodes that begin in any free cell.
 
-    (S, A) float64. The thesis loads a table and does not say where it came from; this recipe came nearest to its
-    figures among those that the study `readings` compares.
+    The thesis loads a table without naming its source; of the recipes that the study `readings` compares, this one comes
+    nearest to the printed values.
     """
     from lab.learning.batch import run_sessions
 
@@ -178,7 +178,7 @@ def learned_table(place: GridWorld, seed: int = LEARNED_SEED) -> FloatArray:
 
 
 def walk_of_advisor(place: GridWorld, table: FloatArray, tau: float, walks: int = 1000) -> NDArray[np.int32]:
-    """The steps (walks,) of an advisor who walks by own advice alone; max_steps + 1 where it does not arrive (fig. 9.1)."""
+    """The steps (walks,) of an advisor that follows its own advice; max_steps + 1 if it does not arrive (fig. 9.1)."""
     from lab.learning.batch import run_sessions
     from lab.learning.simulated_advice import Advice, advice_chances
 
@@ -195,12 +195,12 @@ def table_of(setting: AdviceSetting) -> FloatArray:
 
 
 def learner_of(setting: AdviceSetting) -> LearnerSettings:
-    """The world's learner with what the setting says."""
+    """The world's learner, changed by the setting."""
     return replace(world(setting.world).learner, **_given(setting, "beta", "learner"))
 
 
 def gate_of(setting: AdviceSetting, gate: GateSettings) -> GateSettings:
-    """The world's gate with what the setting says, and its misleads as printed."""
+    """The world's gate, changed by the setting, with misleads judged as in the thesis."""
     names = ("gate", "lambda_threshold", "omega", "psi", "judge_unhelped", "memory")
     return replace(gate, **{"spare_best": False} | _given(setting, *names))
 

@@ -1,4 +1,4 @@
-"""The tree of a branch-and-bound search: which sequences were tried, and why most were not (thesis figs. IV.2, IV.3)."""
+"""Pictures of the tree of a branch-and-bound search, with the reason why each branch ended (thesis figs. IV.2, IV.3)."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -20,10 +20,10 @@ CUT_INK = "#777777"
 
 @dataclass(frozen=True)
 class Branch:
-    """A node as it is drawn. parent: its index among the nodes, which comes before its own; None: the root.
+    """A node as it is drawn. parent: the index of its parent, smaller than its own; None: the root.
 
-    move: what leads here; when: at what time that is; says: more, for pointing at it. end: "" when the search went on
-    from here, else why it did not (see LOOKS). optimal: on the way to the optimum.
+    move: the move that leads here; when: its time; says: the tooltip. end: "" if the search continued from here, else why it
+    ended (see LOOKS). optimal: whether the node is on the way to the optimum.
     """
 
     parent: int | None
@@ -36,7 +36,7 @@ class Branch:
 
 @dataclass(frozen=True)
 class Look:
-    """How a node is drawn: the legend's words, the box's colour, its rim and the text on it."""
+    """How a node is drawn: the words of the legend, and the colours of its box, its rim and its text."""
 
     says: str
     face: str
@@ -44,7 +44,7 @@ class Look:
     ink: str = INK
 
 
-LOOKS: dict[str, Look] = {  # why the search ended at a node -> how it is drawn
+LOOKS: dict[str, Look] = {  # why the search ended at a node -> its look
     "optimal": Look("on the way to the optimum", BLUE, BLUE, "white"),
     "": Look("branched", "white", GREY),
     "finished": Look("finished, no sooner", PALE_GREEN, GREEN),
@@ -56,21 +56,21 @@ LOOKS: dict[str, Look] = {  # why the search ended at a node -> how it is drawn
 
 @dataclass(frozen=True)
 class Scale:
-    """Sizes [inch]: from leaf to leaf, a box's height, between columns; the font [points] and its characters' width."""
+    """Sizes [inch]: distance of leaves, height of boxes, gap of columns, font [points], width of a character."""
 
     row: float
     box: float
     gap: float
     font: float
     character: float
-    between: str  # what stands between move and time on a box
+    between: str  # the text between move and time on a box
 
     def words(self, branch: Branch) -> str:
-        """What is written on a box."""
+        """The text on a box."""
         return f"{branch.move}{self.between}{branch.when}"
 
     def width(self, branches: Sequence[Branch]) -> float:
-        """The width of all boxes: as wide as the longest line on them."""
+        """The width of all boxes, that of the longest line on them."""
         longest = max(len(line) for branch in branches for line in self.words(branch).split("\n"))
         return longest * self.character + 0.08
 
@@ -80,10 +80,10 @@ FEW_LEAVES = 40
 
 
 def branch_picture(branches: Sequence[Branch], *, title: str = "", near: bool = False) -> bytes:
-    """A tree as SVG bytes, from the root at the left, one column a move; the way to the optimum bold, cuts pale.
+    """A tree as SVG bytes, from the root at the left, a column for each move; the way to the optimum is bold, cuts are pale.
 
-    near: only the way to the optimum and what branches off it, as fig. IV.3. Raises BadInput for no nodes, more than
-    MAX_NODES of them, and a parent that does not come before its child. Source: thesis figs. IV.2, IV.3.
+    near: only the way to the optimum and the nodes that branch off it, as in fig. IV.3. Raises BadInput for no nodes, for more
+    than MAX_NODES, and for a parent that does not come before its child. Source: thesis figs. IV.2, IV.3.
     """
     draw, size_inch = _drawing(branches, title, near)
     return picture_bytes(draw, *size_inch)
@@ -92,7 +92,7 @@ def branch_picture(branches: Sequence[Branch], *, title: str = "", near: bool = 
 def _drawing(
     branches: Sequence[Branch], title: str, near: bool
 ) -> tuple[Callable[["Figure"], None], tuple[float, float]]:
-    """What draws the tree on a figure, and the figure's width and height [inch]."""
+    """The function that draws the tree on a figure, and the figure's width and height [inch]."""
     columns, rows = layout(branches)
     if near:
         branches = _near(branches)
@@ -125,18 +125,19 @@ def _drawing(
 
 
 def branches_of(cell: Cell, nodes: Iterable[tuple[Sequence[int], str]], optimal: Sequence[int]) -> list[Branch]:
-    """The nodes of a search as they are drawn, from the decisions that lead to each and why the search ended there.
+    """The nodes of a search as they are drawn.
 
-    nodes: each after its parent, the root, with no decisions, first; optimal: the decisions of the optimum. Raises
-    BadInput for a node before its parent and for a decision that may not be taken.
+    nodes: the decisions that lead to each, and why the search ended there; each comes after its parent, and the root, without
+    decisions, is the first. optimal: the decisions of the optimum. Raises BadInput for a node before its parent, and for a
+    decision that is not allowed.
     """
-    found: list[Branch] = []
+    nodes_drawn: list[Branch] = []
     index: dict[tuple[int, ...], int] = {}
     for decisions, end in nodes:
         taken = tuple(decisions)
         if taken and taken[:-1] not in index:
             raise BadInput(f"search tree: node {list(taken)} comes before its parent {list(taken[:-1])}")
-        index[taken] = len(found)
+        index[taken] = len(nodes_drawn)
         run = Run(cell)
         move = [run.move(decision) for decision in taken][-1:]
         name = f"{cell.part_name(move[0].part)} \N{RIGHTWARDS ARROW} {move[0].target}" if move else "start"
@@ -146,30 +147,32 @@ def branches_of(cell: Cell, nodes: Iterable[tuple[Sequence[int], str]], optimal:
         parts = ", ".join(f"{cell.part_name(part)} at {place}" for part, place in enumerate(places, 1))
         says = f"after {list(taken)}, {seconds(run.now_s)}: {parts}"
         on_way = taken == tuple(optimal[: len(taken)])
-        found.append(Branch(index.get(taken[:-1]) if taken else None, name, seconds(run.now_s), says, end, on_way))
-    return found
+        nodes_drawn.append(
+            Branch(index.get(taken[:-1]) if taken else None, name, seconds(run.now_s), says, end, on_way)
+        )
+    return nodes_drawn
 
 
 def _near(branches: Sequence[Branch]) -> list[Branch]:
-    """The nodes on the way to the optimum and their children, with how many nodes below them are left out."""
+    """The nodes on the way to the optimum and their children, with the number of nodes below that are left out."""
     below = [0] * len(branches)
     for index in reversed(range(1, len(branches))):
         below[branches[index].parent or 0] += 1 + below[index]
     new: dict[int, int] = {}
-    found: list[Branch] = []
+    nodes_near: list[Branch] = []
     for index, branch in enumerate(branches):
         if branch.parent is None or branch.optimal or branches[branch.parent].optimal:
             hidden = 0 if branch.optimal or branch.parent is None else below[index]
             parent = None if branch.parent is None else new[branch.parent]
-            new[index] = len(found)
-            found.append(
+            new[index] = len(nodes_near)
+            nodes_near.append(
                 replace(branch, parent=parent, when=branch.when + f" (+{counted(hidden, 'node')})" * (hidden > 0))
             )
-    return found
+    return nodes_near
 
 
 def layout(branches: Sequence[Branch]) -> tuple[list[int], list[float]]:
-    """Column (number of moves) and row of each node: leaves one below the other, others amid their children."""
+    """The column (number of moves) and the row of each node: leaves follow one another, others are amid their children."""
     children: list[list[int]] = [[] for _ in branches]
     columns: list[int] = []
     for index, branch in enumerate(branches):
@@ -180,7 +183,7 @@ def layout(branches: Sequence[Branch]) -> tuple[list[int], list[float]]:
             children[branch.parent].append(index)
         else:
             raise BadInput(
-                f"search tree: node {index} has parent {branch.parent}; allowed: none for 0, else one before it"
+                f"search tree: node {index} has parent {branch.parent}; allowed are None for node 0, else an earlier node"
             )
     if not branches:
         raise BadInput("search tree: there are no nodes")
@@ -194,7 +197,7 @@ def layout(branches: Sequence[Branch]) -> tuple[list[int], list[float]]:
 
 
 def _leaves(children: Sequence[Sequence[int]]) -> Iterator[int]:
-    """The nodes without children, in the order in which a walk through the tree meets them."""
+    """The nodes without children, in depth-first order."""
     waiting = [0]
     while waiting:
         index = waiting.pop()
@@ -206,7 +209,7 @@ def _leaves(children: Sequence[Sequence[int]]) -> Iterator[int]:
 def _draw_edges(
     axes: "Axes", branches: Sequence[Branch], places: Sequence[tuple[float, float]], wide: float, gap: float
 ) -> None:
-    """Curves from each box's right side to its children; those to the optimum are bold."""
+    """Draw curves from each box's right side to its children; those to the optimum are bold."""
     from matplotlib.collections import PathCollection
     from matplotlib.path import Path as Curve
 
@@ -234,7 +237,7 @@ def _draw_node(axes: "Axes", branch: Branch, place: tuple[float, float], wide: f
 
 
 def _draw_head(axes: "Axes", branches: Sequence[Branch], title: str, width_inch: float) -> None:
-    """The title, and below it what the colours mean and how many nodes there are of each."""
+    """Draw the title, and below it the legend of colours with their numbers of nodes."""
     from matplotlib.patches import Patch
 
     axes.text(EDGE_INCH, 0.26, title, fontsize=10, parse_math=False)

@@ -1,8 +1,8 @@
-"""World II of chapter 9 looked for again: the thesis prints only a picture of it and what was learned there.
+"""The reconstruction of world II of chapter 9, of which the thesis prints only a picture and what was learned there.
 
-Known are its size, 100 obstacle cells in blocks and walls, a shortest way of 15 moves ("16 steps"), and that learning
-alone is best with beta .7 and then ends optimal in 37 % of the sessions. Many layouts are like that. The one is taken
-whose success and helped steps in full view come nearest to the printed ones, and then the limited view whose do.
+Known are its size, 100 obstacle cells in blocks and walls, a shortest path of 15 moves ("16 steps"), and that learning
+alone is best with beta .7 and then ends optimal in 37 % of the sessions. Of many such layouts the one is taken whose
+success and helped steps in full view come nearest to the printed ones, and then the nearest limited view.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -34,11 +34,11 @@ Cells are [x, y, z], counted from 0.
 """
 SIDE, OBSTACLES, MOVES = 10, 100, 15
 BETA, PERCENT = BEST_BETA["world-2"]
-POINTS = 2.0  # how near its success is near enough
+POINTS = 2.0  # the largest distance of its success from the printed one
 OTHER_BETAS = (0.5, 0.6, 0.8, 0.9, 1.1, 1.3)
-QUICK, SURE = 60, 500  # sessions for a first look, and for the decision
-LAYOUTS, VIEWS = 16, 100  # how many of each are drawn and compared
-COMPARED = 100  # sessions for a printed cell while layouts and views are compared
+QUICK, SURE = 60, 500  # sessions for a first test, and for the decision
+LAYOUTS, VIEWS = 16, 100  # the numbers of layouts and views that are compared
+COMPARED = 100  # sessions for a printed cell in these comparisons
 MAX_TRIES = 20_000
 LEARNER = LearnerSettings("afterstate", beta=BETA, count_start=True)
 
@@ -46,25 +46,25 @@ Ints = NDArray[np.int_]
 
 
 def reconstruct(seed: int, progress: Progress = lambda done, total: None) -> GridWorld:
-    """A world like world II, the same for the same seed; takes minutes. WorkFailed when none is found."""
+    """A world like world II, the same for the same seed, after minutes. Raises WorkFailed if none is found."""
     rng = np.random.default_rng(seed)
     full, limited = ([c for c in printed("appendix-v.csv") if is_compared(c, view)] for view in ("full", "limited"))
-    found: list[tuple[float, GridWorld, FloatArray]] = []
-    for world in _alike(rng, seed):
+    layouts: list[tuple[float, GridWorld, FloatArray]] = []
+    for world in _similar_worlds(rng, seed):
         table = learned_table(world)
-        found.append((distance(world, table, full), world, table))
-        progress(len(found), LAYOUTS + VIEWS)
-        if len(found) == LAYOUTS:
+        layouts.append((distance(world, table, full), world, table))
+        progress(len(layouts), LAYOUTS + VIEWS)
+        if len(layouts) == LAYOUTS:
             break
-    if not found:
-        raise WorkFailed(f"seed {seed}: no layout like world II among {MAX_TRIES}: try another seed")
-    _, world, table = min(found, key=lambda entry: entry[0])
-    view = best_view(world, rng, lambda view: distance(_with(world, view), table, limited), progress)
-    return _with(world, view)
+    if not layouts:
+        raise WorkFailed(f"seed {seed}: none of {MAX_TRIES} layouts is like world II: try another seed")
+    _, world, table = min(layouts, key=lambda entry: entry[0])
+    view = best_view(world, rng, lambda view: distance(_with_view(world, view), table, limited), progress)
+    return _with_view(world, view)
 
 
 def reconstruction(job: Job, reading: Mapping[str, Any]) -> Findings:
-    """A world like world II as a task file, and what is known of the printed one measured on it. WorkFailed: none is found."""
+    """A world like world II as a task file, and its known features measured. Raises WorkFailed if none is found."""
     world = reconstruct(job.seed, job.progress)
     measured = {"obstacles": len(world.obstacles), "shortest_steps": shortest_steps(world.check())}
     rows = [row({"world": world.name}, measure, value) for measure, value in measured.items()]
@@ -75,7 +75,7 @@ def reconstruction(job: Job, reading: Mapping[str, Any]) -> Findings:
 def best_view(
     world: GridWorld, rng: np.random.Generator, distance: Callable[[Ints], float], progress: Progress
 ) -> Ints:
-    """The best of some views drawn at random, its faces then moved by a cell as long as that helps; (2, 3), corners."""
+    """The corners (2, 3) of the best of some random views, whose faces are then moved by a cell as long as that helps."""
     best, nearest = np.array([[0, 0, 0], [SIDE - 1] * 3]), np.inf
     for tried in range(1, VIEWS + 1):
         view = np.sort(rng.integers(0, SIDE, (2, 3)), axis=0)
@@ -94,18 +94,18 @@ def best_view(
     return best
 
 
-def _with(world: GridWorld, view: Ints) -> GridWorld:
+def _with_view(world: GridWorld, view: Ints) -> GridWorld:
     return world.model_copy(update={"view": AdvisorView(lower=_tuple(view[0]), upper=_tuple(view[1]))})
 
 
 def is_compared(cell: PrintedLine, view: str) -> bool:
-    """The printed lines that layouts and views are compared by: experts and novices of world II."""
+    """Whether layouts and views are compared by a printed line: those of experts and novices of world II."""
     setting = cell.setting
     return (setting.world, setting.view) == ("world-2", view) and setting.tau in RECONSTRUCTED_BY
 
 
-def _alike(rng: np.random.Generator, seed: int) -> Iterator[GridWorld]:
-    """Worlds whose learner does alone what the thesis says."""
+def _similar_worlds(rng: np.random.Generator, seed: int) -> Iterator[GridWorld]:
+    """Worlds in which learning alone succeeds as in the thesis."""
     for _ in range(MAX_TRIES):
         wall = layout(rng)
         free = np.argwhere(~wall)
@@ -116,7 +116,7 @@ def _alike(rng: np.random.Generator, seed: int) -> Iterator[GridWorld]:
             mdp = grid(wall.shape, wall, _tuple(start), _tuple(goal))
         except NoPath:
             continue
-        if shortest_steps(mdp) == MOVES and learns_alike(mdp):
+        if shortest_steps(mdp) == MOVES and learns_similarly(mdp):
             yield GridWorld(
                 name="world-2",
                 title=f"Like world II of the thesis: a reconstruction, seed {seed}",
@@ -149,8 +149,8 @@ def layout(rng: np.random.Generator) -> BoolArray:
     return wall
 
 
-def learns_alike(mdp: TabularMDP) -> bool:
-    """Whether learning alone succeeds in 37 % with beta .7, and in no more with any other."""
+def learns_similarly(mdp: TabularMDP) -> bool:
+    """Whether learning alone succeeds in 37 % with beta .7, and in no more with another beta."""
     if abs(success_alone(mdp, BETA, QUICK) - PERCENT) > 3 * POINTS:
         return False
     at_best = success_alone(mdp, BETA, SURE)
@@ -158,6 +158,7 @@ def learns_alike(mdp: TabularMDP) -> bool:
 
 
 def success_alone(mdp: TabularMDP, beta: float, sessions: int) -> float:
+    """The success of learning alone [%]."""
     from lab.learning.batch import run_sessions
 
     seeds = np.arange(sessions, dtype=np.uint64)
@@ -166,7 +167,7 @@ def success_alone(mdp: TabularMDP, beta: float, sessions: int) -> float:
 
 
 def distance(world: GridWorld, table: FloatArray, cells: Sequence[PrintedLine]) -> float:
-    """How far success and helped steps are from the printed ones; 1: on average just what counts as agreeing."""
+    """The distance of success and helped steps from the printed ones; 1 is the mean distance that still counts as agreeing."""
     from lab.learning.batch import run_sessions
     from lab.learning.simulated_advice import Advice, advice_chances
 

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -143,7 +144,8 @@ def test_an_added_advisor_answers_with_an_allowed_action(answer: object) -> None
             return answer
 
     mdp = board()
-    for thing in (Odd, Odd(), lambda request: answer):
+    things: list[Any] = [Odd, Odd(), lambda request: answer]
+    for thing in things:
         name = AdvisorName.made(thing)
         advisor = TableLevel(mdp, 0.99, np.random.default_rng(0)).advisor(name)
         assert advisor is not None

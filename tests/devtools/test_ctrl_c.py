@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from devtools.commands import Ended
-from devtools.ctrl_c import judged
+from devtools.ctrl_c import fault_of
 
 GOOD = {
     "stopped_by": "Ctrl-C",
@@ -25,14 +25,14 @@ def ended(code: int = 130, **change: Any) -> Ended:
 
 
 def test_an_order_with_its_bound_is_well() -> None:
-    assert judged(ended()) == ""
+    assert fault_of(ended()) == ""
 
 
 @pytest.mark.parametrize(
     ("told", "why"),
     [
         (ended(0), "exit 0, allowed 130"),
-        (ended(best_sequence=[], best_moves=[]), "its order is empty"),
+        (ended(best_sequence=[], best_moves=[]), "the order is empty"),
         (ended(bound_cost=0.0, optimum_proven=False), "bound 0.0, best 14.0"),
         (ended(bound_cost=12.0), "proven: True, bound 12.0, best 14.0"),
         (ended(error="stopped by Ctrl-C"), "no order: stopped by Ctrl-C"),
@@ -42,4 +42,4 @@ def test_an_order_with_its_bound_is_well() -> None:
     ],
 )
 def test_what_is_missing_is_said(told: Ended, why: str) -> None:
-    assert judged(told).startswith(why)
+    assert fault_of(told).startswith(why)

@@ -12,7 +12,7 @@ from devtools.commands import Ended
 from devtools.drawn_cells import drawn_cell
 from devtools.drawn_features import FEATURES
 from devtools.drawn_parts import MESHES, SOLIDS
-from devtools.drawn_physics import FORCE_N, MASS_KG, MOVED_M, SHIPPED, SPEED_M_S, TASKS, attempt, drawn, judged
+from devtools.drawn_physics import FORCE_N, MASS_KG, MOVED_M, SHIPPED, SPEED_M_S, TASKS, attempt, varied_task, verdict
 from lab.tasks.robot_fields import MODELS
 from lab.tasks.task_file import find, task_of_text
 
@@ -25,7 +25,7 @@ NOT_HELD = "lab: robot.grip_force_n = 1: slice of 2 kg, friction 0.1, would slip
 @pytest.mark.parametrize("seed", range(4))
 def test_what_is_drawn_is_in_the_task(name: str, seed: int) -> None:
     text = find(name).read_text(encoding="utf-8")
-    own, other = tomllib.loads(text), tomllib.loads(drawn(text, np.random.default_rng(seed)))
+    own, other = tomllib.loads(text), tomllib.loads(varied_task(text, np.random.default_rng(seed)))
     assert SPEED_M_S[0] <= other["robot"]["speed_m_s"] <= SPEED_M_S[1]
     assert other["robot"].get("grip_force_n", FORCE_N[0]) <= FORCE_N[1]
     assert all(MASS_KG[0] <= part["mass_kg"] <= MASS_KG[1] for part in other["parts"])
@@ -86,4 +86,4 @@ def ended(code: int, stderr: str = "", **document: object) -> Ended:
     ],
 )  # fmt: skip
 def test_what_a_drawn_run_counts_as(ran: Ended, check: Ended, counts: tuple[str, str]) -> None:
-    assert judged(ran, lambda: check) == counts
+    assert verdict(ran, lambda: check) == counts

@@ -14,22 +14,22 @@ import pytest
 
 from devtools import kills, works
 from devtools.commands import Ended
-from devtools.kills import drawn, judged
+from devtools.kills import drawn, fault_of
 from devtools.resources import Case
-from devtools.resources import judged as judged_without
-from devtools.shim import KINDS, Strike, built, counted, shimmed
+from devtools.resources import fault_of as judged_without
+from devtools.shim import KINDS, Strike, built_shim, shim_counts, shim_environment
 from devtools.works import (
     WORKS,
     Undisturbed,
     age,
+    first_fault,
+    first_leftover,
+    first_loss,
+    first_missing,
+    home_state,
     kept_before,
-    leftovers,
-    lost,
     policy,
-    reached,
-    state,
-    undisturbed,
-    unsound,
+    undisturbed_result,
 )
 from lab.toolbox.registry import Toolbox
 
@@ -50,19 +50,19 @@ pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="the shim mu
 
 @pytest.fixture(scope="module")
 def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return built(tmp_path_factory.mktemp("shim"))
+    return built_shim(tmp_path_factory.mktemp("shim"))
 
 
 def written(library: Path, folder: Path, strike: Strike | None) -> tuple[int, str, dict[str, int]]:
     """How the writer ends under the shim, what it says, and how many calls of each kind were counted."""
     home = folder / "home"
     home.mkdir()
-    said = shimmed(library, home, folder / "counts", strike)
+    said = shim_environment(library, home, folder / "counts", strike)
     ran = subprocess.run(
         [sys.executable, "-c", WRITER], cwd=home, env={**os.environ, **said}, capture_output=True, text=True,
         start_new_session=True,
     )  # fmt: skip
-    return ran.returncode, ran.stderr, counted(folder / "counts")
+    return ran.returncode, ran.stderr, shim_counts(folder / "counts")
 
 
 def test_what_is_written_is_counted_by_kind(library: Path, tmp_path: Path) -> None:
@@ -126,22 +126,29 @@ def room(tmp_path: Path) -> Path:
 
 def test_what_is_wrong_after_a_kill(room: Path) -> None:
     home, before, changes = room / "home", kept_before(room), WORKS["toolbox remove"].changes
-    expected = Undisturbed(0, state(home), {}, 1.0)
-    assert (lost(before, home, changes), unsound(home), leftovers(home), reached(expected, home)) == ("", "", "", "")
-    assert reached(expected, room / "base").startswith("not as undisturbed: 1 missing: toolbox/trash: policy doubled")
+    expected = Undisturbed(0, home_state(home), {}, 1.0)
+    assert (
+        first_loss(before, home, changes),
+        first_fault(home),
+        first_leftover(home),
+        first_missing(expected, home),
+    ) == ("", "", "", "")
+    assert first_missing(expected, room / "base").startswith(
+        "not as undisturbed: 1 missing: toolbox/trash: policy doubled"
+    )
     (home / "toolbox" / ".doubled.safetensors.0123abcd.tmp").touch()
-    assert leftovers(home) == "left over: toolbox/.doubled.safetensors.0123abcd.tmp"
+    assert first_leftover(home) == "left over: toolbox/.doubled.safetensors.0123abcd.tmp"
     (home / "toolbox" / "log" / "doubled.jsonl").write_text("shorter")
-    assert lost(before, home, changes) == "changed: toolbox/log/doubled.jsonl"
+    assert first_loss(before, home, changes) == "changed: toolbox/log/doubled.jsonl"
     (home / "toolbox" / "bystander.safetensors").write_bytes(b"damaged")
-    assert "bystander" in unsound(home)
+    assert "bystander" in first_fault(home)
     (home / "toolbox" / "bystander.safetensors").unlink()
-    assert lost(before, home, changes) == "lost: toolbox/bystander.safetensors"
+    assert first_loss(before, home, changes) == "lost: toolbox/bystander.safetensors"
 
 
 def test_a_killed_command_is_done_again(room: Path) -> None:
     home = room / "home"
-    expected = Undisturbed(0, state(home), {}, 1.0)
+    expected = Undisturbed(0, home_state(home), {}, 1.0)
     killed, again = Ended(-9, "", "", 0.1, 0), Ended(0, "{}", "", 0.1, 0)
     words: list[tuple[str, ...]] = []
 
@@ -149,11 +156,11 @@ def test_a_killed_command_is_done_again(room: Path) -> None:
         words.append(wanted)
         return again
 
-    assert judged("toolbox remove", expected, home, killed, room, carried_out) == ""
+    assert fault_of("toolbox remove", expected, home, killed, room, carried_out) == ""
     assert words == [("toolbox", "verify", "--repair")]
     shutil.rmtree(home)
     shutil.copytree(room / "base", home)
-    assert "then lab toolbox remove doubled --json: not as undisturbed" in judged(
+    assert "then lab toolbox remove doubled --json: not as undisturbed" in fault_of(
         "toolbox remove", expected, home, killed, room, carried_out
     )
 
@@ -166,16 +173,16 @@ def test_two_workers_measure_a_command_in_homes_of_their_own(room: Path, monkeyp
         together.wait()
         (home / "measured").mkdir()
         together.wait()
-        shimmed(room / "write_shim.so", home, home.parent / f"{home.name}-counts")  # nothing is counted
+        shim_environment(room / "write_shim.so", home, home.parent / f"{home.name}-counts")  # nothing is counted
         return Ended(0, "", "", 1.5, 0)
 
     for module in (kills, works):
         monkeypatch.setattr(module, "disturbed", disturbed)
-        monkeypatch.setattr(module, "built", lambda _: room / "write_shim.so")
+        monkeypatch.setattr(module, "built_shim", lambda _: room / "write_shim.so")
     with ThreadPoolExecutor(2) as pool:
         forked = [pool.submit(kills.forked_s, "toolbox remove", room) for _ in range(2)]
         assert [one.result() for one in forked] == [1.5, 1.5]
-        alone = [pool.submit(undisturbed, "toolbox remove", room) for _ in range(2)]
+        alone = [pool.submit(undisturbed_result, "toolbox remove", room) for _ in range(2)]
         assert [one.result().seconds for one in alone] == [1.5, 1.5]
     assert sorted(path.name for path in room.iterdir()) == ["base", "home", "toolbox-remove.json"]
 
@@ -184,12 +191,12 @@ def test_two_workers_measure_a_command_in_homes_of_their_own(room: Path, monkeyp
     ("ended", "said"),
     [
         (Ended(0, "{}", "", 0.1, 0), ""),
-        (Ended(1, "{}", "", 0.1, 0), "exit 1 without a word"),
+        (Ended(1, "{}", "", 0.1, 0), "exit 1 without a"),
         (Ended(1, "{}", "lab: no room\n", 0.1, 0), ""),
         (Ended(2, "{}", "lab: no room\n", 0.1, 0), "exit 2, but it has kept toolbox/trash"),
         (
             Ended(1, '{"saved_as": "more"}', "lab: no room\n", 0.1, 0),
-            "it says that it kept 'more', and it is not there",
+            "'more', which is not there",
         ),
         (Ended(1, "{}", "Traceback (most recent call last):\nKeyError", 0.1, 0), "traceback: KeyError"),
         (Ended(0, "{}", "Exception ignored in: <_io>", 0.1, 0), "stderr says 'Exception ignored"),
@@ -200,7 +207,7 @@ def test_what_is_wrong_with_a_command_that_lacks_something(room: Path, ended: En
     import random
 
     home = room / "home"
-    expected = Undisturbed(0, state(home), {}, 1.0)
+    expected = Undisturbed(0, home_state(home), {}, 1.0)
     case = Case("toolbox remove", home, expected, random.Random(0))
     age(home)
     wrong = judged_without(case, ended, room, lambda *_: Ended(0, "{}", "", 0.1, 0))

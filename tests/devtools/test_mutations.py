@@ -8,7 +8,7 @@ from zipfile import ZipFile
 import pytest
 
 from devtools.mutate import FITTING, MUTATIONS, mutated
-from devtools.mutations import told_of
+from devtools.mutations import faults_in_words
 from devtools.read_damaged import batch, verdict
 from devtools.read_files import KINDS, Kind
 from lab.errors import BadInput
@@ -86,10 +86,10 @@ def test_how_a_file_was_taken(read: Callable[[Path], object], result: str, said:
 def test_faults_of_a_sort_are_told_once() -> None:
     broke = [{"case": f"world {n}", "why": f"KeyError: '{n}' (tasks/record.py:7)"} for n in range(3)]
     broke.append({"case": "world 9", "why": "ValueError: x (tasks/record.py:8)"})
-    told = told_of(broke, 100)
+    told = faults_in_words(broke, 100)
     assert told.startswith("4 of 100: 3 x world 0: KeyError: '0'")
     assert "1 x world 9: ValueError" in told
-    assert told_of([], 100) == ""
+    assert faults_in_words([], 100) == ""
 
 
 def test_there_is_a_kind_for_every_sort_of_file_that_a_command_is_given() -> None:

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from devtools.page_attacks import Taught, judged
+from devtools.page_attacks import LessonResult, fault_of
 
-QUIET = Taught(0, "as the quiet one", "page: http://", 0.01, 1.0, 100.0)
+QUIET = LessonResult(0, "as the quiet one", "page: http://", 0.01, 1.0, 100.0)
 
 
 def test_a_lesson_does_not_notice_requests_without_a_right(tmp_path: Path, root: Path) -> None:
@@ -40,11 +40,11 @@ def test_a_lesson_does_not_notice_requests_without_a_right(tmp_path: Path, root:
         (QUIET, [], ""),
         (QUIET, ["GET / token None: 200"], "got in, the first: GET / token None: 200"),
         (replace(QUIET, code=1, stderr="Too many open files"), [], "exit 1 instead of 0: Too many open files"),
-        (replace(QUIET, stderr="Exception in callback"), [], "stderr says something else"),
-        (replace(QUIET, learned="another table"), [], "something else was learned"),
+        (replace(QUIET, stderr="Exception in callback"), [], "stderr"),
+        (replace(QUIET, learned="another table"), [], "table or the steps"),
         (replace(QUIET, peak_mb=1000.0), [], "1000 MB"),
     ],
 )
-def test_what_is_wrong_with_an_attacked_lesson(taught: Taught, inside: list[str], said: str) -> None:
-    assert said in judged(taught, QUIET, inside)
-    assert bool(said) == bool(judged(taught, QUIET, inside))
+def test_what_is_wrong_with_an_attacked_lesson(taught: LessonResult, inside: list[str], said: str) -> None:
+    assert said in fault_of(taught, QUIET, inside)
+    assert bool(said) == bool(fault_of(taught, QUIET, inside))

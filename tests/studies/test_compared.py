@@ -131,7 +131,8 @@ class Entangled(Patient):
 
 def helped(advisor: Any, seed: int = 0) -> list[float]:
     setting = one(Compared(WORLD, (advisor,), {"gate": ["always"], **SHORT}))
-    return sessions_of(setting, 4, seed).helped_steps.tolist()
+    steps: list[float] = sessions_of(setting, 4, seed).helped_steps.tolist()
+    return steps
 
 
 @pytest.mark.parametrize("advisor", [Patient(), Patient])

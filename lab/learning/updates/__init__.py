@@ -59,7 +59,8 @@ def update_of(settings: LearnerSettings, mdp: TabularMDP, q: FloatArray, draw: D
         return make(values, settings, mdp)
     given = {"rng": np.random.default_rng(int(draw() * 2**53))} if takes_generator(make) else {}
     learner = make(values, settings, mdp, **given)
-    shape = np.shape(getattr(learner, "q", None))
+    table: Any = getattr(learner, "q", None)
+    shape = np.shape(table)
     if shape != q.shape:
         raise BadInput(f"learner '{name}': its `q` has the shape {shape}: wanted {q.shape}, states by actions")
     return learner

@@ -23,43 +23,45 @@ from lab_studies.comparisons.advice_bench.sessions import (
     Case,
     Outcome,
     Outcomes,
-    tried,
+    case_outcomes,
 )
 
-MOST_BELOW = -2.0  # points below nobody that an interval may reach: the project's own target
-LEVEL = 0.9  # of nobody's last points: where a learner has recovered
+MOST_BELOW = -2.0  # the project's target: no interval of the gain reaches below it
+LEVEL = 0.9  # a learner has recovered at this share of nobody's last points
 MEASURES = (
-    "Points: the mean over all episodes (the area under the learning curve), 100 as the best policy walks on average, 0 an "
-    "episode that fails; in between by its steps. gain_points: less those of nobody's sessions with the same seeds, with the "
-    "95 % interval of the paired differences; below 0 is harm. last: points of the last tenth of the episodes. answers: what the "
-    "advisor said in a session. later: episodes until the mean curve reaches nine tenths of nobody's last points, less "
-    "nobody's own; empty: it never does. Budget: answers of a session. Where moves are left to chance (lake) there are four "
-    "times as many sessions."
+    "Points: the mean over all episodes (the area under the learning curve); 100 is the best policy's mean, 0 an episode that "
+    "fails, and steps count in between. gain_points: points minus those of nobody's sessions with the same seeds, with the "
+    "95 % interval of the paired differences; below 0 is harm. last: points of the last tenth of the episodes. answers: the "
+    "advisor's answers in a session. later: episodes until the mean curve reaches nine tenths of nobody's last points, minus "
+    "nobody's own; empty if it never does. Budget: answers of a session. Where moves are random (lake) there are four times as "
+    "many sessions."
 )
 RULES_NOTE = (
-    "always is early advising where there is a budget. importance (teacher's), correcting and predictive: the advisor speaks "
-    "only in the half of the states where most is at stake, there only against what the learner would do (which it "
-    "announces), or did when last there (Torrey and Taylor 2013; their prediction is a classifier). importance (learner's): "
+    "always with a budget is early advising. importance (teacher's): the advisor speaks only in the half of the states where "
+    "most is at stake; correcting: there only against the move that the learner announces; predictive: there only against the "
+    "learner's last move in the state (Torrey and Taylor 2013, who predict with a classifier). importance (learner's): "
     "Clouse's and Amir's. uncertainty: RCMP with five tables. novelty: advice novelty. reliability: CLUE with one advisor. two "
-    "levels: ADMIRAL's successor, with one. shaping: policy shaping with a fixed consistency. fading: confidence decay. Those "
-    "that the literature gives for deep learners are their idea in a table."
+    "levels: ADMIRAL's successor, with one. shaping: policy shaping with a fixed consistency. fading: confidence decay. Rules "
+    "that the literature gives for deep learners are carried over to tables."
 )
 CHOSEN = (
     "Chosen on the problems that are not held out: the constants of 'earned-trust' (with seed 0, so that its figures there "
     "flatter it), the rivals' settings (the best mean gain of three to six values each, with seed 7), and the learner's "
-    "settings, so that nobody learns best. Held out, nothing was chosen on them: " + ", ".join(HELD_OUT) + "."
+    "settings (the best for learning without advice). Nothing was chosen on the problems held out: "
+    + ", ".join(HELD_OUT)
+    + "."
 )
 RANKED = (
-    "Ranks: of the points in each cell (problem, advisor, budget), ties shared, averaged within each problem, then over "
-    "problems; the critical difference is Nemenyi's at 5 %, with problems as blocks. Points above others': Wilcoxon's signed "
-    "ranks of the problems' means, Holm's correction."
+    "Ranks: the ranks of the points in each cell (problem, advisor, budget), ties shared, averaged within each problem, then "
+    "over problems; the critical difference is Nemenyi's at 5 %, with problems as blocks. Whether points are above others': "
+    "Wilcoxon's signed ranks of the problems' means with Holm's correction."
 )
 
 
 def advice_bench(job: Job, reading: Mapping[str, Any]) -> Findings:
-    """The bench; reading: "problem", "methods" (rules) and "advisors", lists of names, in place of all.
+    """The results of the bench; reading: lists "problem", "methods" (rules) and "advisors" of names, which replace all.
 
-    Raises BadInput for a problem that cannot be a table, an unknown rule or advisor.
+    Raises BadInput for a problem that cannot be a table, and for an unknown rule or advisor.
     """
     rules = tuple(reading.get("methods", RULES))
     for name in rules:
@@ -73,8 +75,8 @@ def advice_bench(job: Job, reading: Mapping[str, Any]) -> Findings:
             if advisor not in ADVISORS:
                 advice_of(advisor, place)
     cases = [Case(name, advisor) for name in problems for advisor in (None, *advisors)]
-    found = measured(job, cases, rules)
-    rows = [one for name in problems for one in rows_of(name, found, advisors, rules)]
+    outcomes = measured(job, cases, rules)
+    rows = [result for name in problems for result in rows_of(name, outcomes, advisors, rules)]
     says, pictures = in_short(rows, problems, rules)
     return Findings(rows, says, pictures, (MEASURES, RULES_NOTE, CHOSEN, RANKED))
 
@@ -85,24 +87,24 @@ def measured(job: Job, cases: Sequence[Case], rules: tuple[str, ...]) -> dict[Ca
 
     def read(entry: Any) -> tuple[Case, Outcomes] | None:
         case = Case(*entry["case"])
-        found = {(str(rule), str(budget)): Outcome.from_json(lists) for (rule, budget), lists in entry["found"]}
-        return (case, found) if entry["of"] == mark and case in cases else None
+        outcomes = {(str(rule), str(budget)): Outcome.from_json(lists) for (rule, budget), lists in entry["found"]}
+        return (case, outcomes) if entry["of"] == mark and case in cases else None
 
     done: dict[Case, Outcomes] = job.kept_as(read)
     left = [case for case in cases if case not in done]
     job.progress(len(done), len(cases))
-    work = partial(tried, sessions=job.sessions, seed=job.seed, rules=rules)
-    for case, found in job.computed(work, left, 1):
-        done[case] = found
+    work = partial(case_outcomes, sessions=job.sessions, seed=job.seed, rules=rules)
+    for case, outcomes in job.computed(work, left, 1):
+        done[case] = outcomes
         entry = {"case": [case.problem, case.advisor], "of": mark}
-        job.keep(entry | {"found": [[list(key), one.to_json()] for key, one in found.items()]})
+        job.keep(entry | {"found": [[list(key), outcome.to_json()] for key, outcome in outcomes.items()]})
         job.progress(len(done), len(cases))
     return done
 
 
-def rows_of(name: str, found: Mapping[Case, Outcomes], advisors: Sequence[str], rules: Sequence[str]) -> list[Row]:
+def rows_of(name: str, outcomes: Mapping[Case, Outcomes], advisors: Sequence[str], rules: Sequence[str]) -> list[Row]:
     """One row for nobody, and one for each advisor, budget and rule in a problem."""
-    nobody = found[Case(name, None)][NOBODY, "any"]
+    nobody = outcomes[Case(name, None)][NOBODY, "any"]
     group = {"held_out": name in HELD_OUT}
     alone = {
         "problem": name,
@@ -116,48 +118,48 @@ def rows_of(name: str, found: Mapping[Case, Outcomes], advisors: Sequence[str], 
     for advisor in advisors:
         for budget in BUDGETS:
             for rule in rules:
-                one = found[Case(name, advisor)][rule, budget]
+                outcome = outcomes[Case(name, advisor)][rule, budget]
                 named = {"problem": name, "advisor": advisor, "budget": budget, "rule": rule, **group}
-                mean, *ends = interval(one.points - nobody.points)
-                rows.append(row(named | _shown(one, nobody, name), "gain_points", mean, ends))
+                mean, *ends = interval(outcome.points - nobody.points)
+                rows.append(row(named | _shown(outcome, nobody, name), "gain_points", mean, ends))
     return rows
 
 
-def _shown(one: Outcome, nobody: Outcome, name: str) -> Row:
+def _shown(outcome: Outcome, nobody: Outcome, name: str) -> Row:
     """The measures that are shown beside the gain."""
-    later = _recovered(one, nobody, name), _recovered(nobody, nobody, name)
+    later = _recovered(outcome, nobody, name), _recovered(nobody, nobody, name)
     return {
-        "points": round(float(one.points.mean()), 2),
-        "last": round(float(one.last.mean()), 2),
-        "answers": round(float(one.answers.mean()), 1),
+        "points": round(float(outcome.points.mean()), 2),
+        "last": round(float(outcome.last.mean()), 2),
+        "answers": round(float(outcome.answers.mean()), 1),
         "later": None if None in later else round(later[0] - later[1]),  # type: ignore[operator]
     }
 
 
-def _recovered(one: Outcome, nobody: Outcome, name: str) -> float | None:
-    """The episode from which on the mean curve stays at nine tenths of nobody's last points, None: it does not."""
-    enough = one.curve >= LEVEL * nobody.last.mean()
+def _recovered(outcome: Outcome, nobody: Outcome, name: str) -> float | None:
+    """The episode from which the mean curve stays above nine tenths of nobody's last points; None if it does not."""
+    enough = outcome.curve >= LEVEL * nobody.last.mean()
     below = np.flatnonzero(~enough)
     first = 0 if len(below) == 0 else int(below[-1]) + 1
     return None if first == BINS else first * problem(name).learner.episodes / BINS
 
 
 def in_short(rows: Sequence[Row], problems: Sequence[str], rules: Sequence[str]) -> tuple[Row, dict[str, bytes]]:
-    """The ranks and the harm on the problems used for development and on those held out; with pictures."""
-    advised = [one for one in rows if one["rule"] != NOBODY]
-    alone = {one["problem"]: one["points"] for one in rows if one["rule"] == NOBODY}
+    """The ranks and the harm, and their pictures, on the problems used for development and on those held out."""
+    advised = [result for result in rows if result["rule"] != NOBODY]
+    alone = {result["problem"]: result["points"] for result in rows if result["rule"] == NOBODY}
     scores: dict[str, dict[Cell, float]] = {rule: {} for rule in rules}
     scores[NOBODY] = {}
-    for one in advised:
-        cell = one["problem"], one["advisor"], one["budget"]
-        scores[one["rule"]][cell], scores[NOBODY][cell] = one["points"], alone[one["problem"]]
-    says: Row = {"rules": len(rules), "advisors": len({one["advisor"] for one in advised})}
+    for result in advised:
+        cell = result["problem"], result["advisor"], result["budget"]
+        scores[result["rule"]][cell], scores[NOBODY][cell] = result["points"], alone[result["problem"]]
+    says: Row = {"rules": len(rules), "advisors": len({result["advisor"] for result in advised})}
     pictures: dict[str, bytes] = {}
     groups = {"": [name for name in problems if name not in HELD_OUT], "held out: ": [*filter(HELD_OUT.get, problems)]}
     for words, those in groups.items():
         if not those:
             continue
-        here = [one for one in advised if one["problem"] in those]
+        here = [result for result in advised if result["problem"] in those]
         ranked = ranks(scores, those, OURS)
         says |= _ranked(words, ranked) | _harm(words, here, rules)
         where = "held-out problems" if words else "problems"
@@ -183,13 +185,13 @@ def _ranked(words: str, ranked: Ranks) -> Row:
 
 
 def _harm(words: str, rows: Sequence[Row], rules: Sequence[str]) -> Row:
-    """In how many cells each rule's interval reaches below the target, and the worst of them."""
+    """The number of cells in which each rule's interval reaches below the target, and the worst cell."""
     says: Row = {}
     for rule in rules:
-        own = [one for one in rows if one["rule"] == rule]
-        below = sum(one["ci95"][0] < MOST_BELOW for one in own)
-        surely = sum(one["ci95"][1] < MOST_BELOW for one in own)
-        worst = min(own, key=lambda one: one["ci95"][0])
+        own = [result for result in rows if result["rule"] == rule]
+        below = sum(result["ci95"][0] < MOST_BELOW for result in own)
+        surely = sum(result["ci95"][1] < MOST_BELOW for result in own)
+        worst = min(own, key=lambda result: result["ci95"][0])
         place = f"{worst['problem']}, {worst['advisor']}, budget {worst['budget']}"
         says[f"{words}harm by {rule}"] = (
             f"{below} of {len(own)} intervals reach below {MOST_BELOW:g}, {surely} lie there whole; "

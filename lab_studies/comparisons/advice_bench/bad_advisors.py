@@ -14,62 +14,62 @@ from lab.mdp import BoolArray, FloatArray
 from lab_studies.comparisons.advice_bench.problems import Benched
 
 EXPERT = SKILL_TAUS["expert"]
-WRONG_THERE, SILENT = 0.25, 0.75  # shares of the states
-DRIFTS = 50  # steps in which an expert becomes contrary
+WRONG_THERE, SILENT = 0.25, 0.75  # the shares of states with wrong and without answers
+DRIFTS = 50  # the steps in which an expert becomes contrary
 Made = Callable[[Benched], Advice]
 
 
 def _skill(tau: float) -> Made:
-    return lambda of: Advice.of(advice_chances(of.values, tau))
+    return lambda benched: Advice.of(advice_chances(benched.values, tau))
 
 
-def contrary(of: Benched) -> Advice:
-    """Takes the worst action for the best."""
-    return Advice.of(advice_chances(-of.values, EXPERT))
+def contrary(benched: Benched) -> Advice:
+    """An advisor that takes the worst action for the best."""
+    return Advice.of(advice_chances(-benched.values, EXPERT))
 
 
-def wrong_there(of: Benched) -> Advice:
-    """An expert that is contrary in a quarter of the states, drawn once and for all."""
-    there = _drawn(of, WRONG_THERE)
-    return Advice.of(advice_chances(np.where(there[:, None], -of.values, of.values), EXPERT))
+def wrong_there(benched: Benched) -> Advice:
+    """An expert that is contrary in a quarter of the states, which are drawn once."""
+    wrong = _drawn(benched, WRONG_THERE)
+    return Advice.of(advice_chances(np.where(wrong[:, None], -benched.values, benched.values), EXPERT))
 
 
-def late(of: Benched) -> Advice:
-    """An expert whose answer is for the previous question."""
-    return replace(Advice.of(advice_chances(of.values, EXPERT)), late=True)
+def late(benched: Benched) -> Advice:
+    """An expert that answers the previous question."""
+    return replace(Advice.of(advice_chances(benched.values, EXPERT)), late=True)
 
 
-def stuck(of: Benched) -> Advice:
-    """Gives everywhere the action that is best at the start."""
-    always = int(of.values[of.mdp.start].argmax())
-    return Advice.of(np.tile(np.eye(of.mdp.n_actions)[always], (of.mdp.n_states, 1)))
+def stuck(benched: Benched) -> Advice:
+    """An advisor that always gives the action that is best at the start."""
+    always = int(benched.values[benched.mdp.start].argmax())
+    return Advice.of(np.tile(np.eye(benched.mdp.n_actions)[always], (benched.mdp.n_states, 1)))
 
 
-def drifting(of: Benched) -> Advice:
-    """An expert at first; the chance of a contrary answer grows to 1 over the session."""
-    good, bad = advice_chances(of.values, EXPERT), advice_chances(-of.values, EXPERT)
-    rows = np.minimum(np.arange(of.learner.episodes) * DRIFTS // of.learner.episodes, DRIFTS - 1)
+def drifting(benched: Benched) -> Advice:
+    """An expert whose chance of a contrary answer grows from 0 to 1 over the session."""
+    good, bad = advice_chances(benched.values, EXPERT), advice_chances(-benched.values, EXPERT)
+    rows = np.minimum(np.arange(benched.learner.episodes) * DRIFTS // benched.learner.episodes, DRIFTS - 1)
     shares = np.linspace(0.0, 1.0, DRIFTS)[rows]
     return Advice.of((1.0 - shares)[:, None, None] * good + shares[:, None, None] * bad)
 
 
-def long_winded(of: Benched) -> Advice:
-    """Half of its answers are the best action, the others any action without failure: it arrives, but by detours."""
-    best = advice_chances(of.values, EXPERT)
-    mdp = of.mdp
+def long_winded(benched: Benched) -> Advice:
+    """An advisor that gives the best action in half of its answers, else any action without failure: it makes detours."""
+    best = advice_chances(benched.values, EXPERT)
+    mdp = benched.mdp
     safe = (~(mdp.terminal & ~mdp.goal)[mdp.successor]).astype(np.float64)
     safe[safe.sum(axis=1) == 0.0] = 1.0
     return Advice.of(0.5 * best + 0.5 * safe / safe.sum(axis=1, keepdims=True))
 
 
-def silent(of: Benched) -> Advice:
-    """An expert that says nothing in three quarters of the states, drawn once and for all."""
-    return Advice.of(advice_chances(of.values, EXPERT), ~_drawn(of, SILENT))
+def silent(benched: Benched) -> Advice:
+    """An expert that is silent in three quarters of the states, which are drawn once."""
+    return Advice.of(advice_chances(benched.values, EXPERT), ~_drawn(benched, SILENT))
 
 
-def _drawn(of: Benched, share: float) -> BoolArray:
-    rng = np.random.default_rng(crc32(f"{of.name} {of.mdp.signature}".encode()))
-    return rng.random(of.mdp.n_states) < share
+def _drawn(benched: Benched, share: float) -> BoolArray:
+    rng = np.random.default_rng(crc32(f"{benched.name} {benched.mdp.signature}".encode()))
+    return rng.random(benched.mdp.n_states) < share
 
 
 ADVISORS: Mapping[str, Made] = {
@@ -84,21 +84,25 @@ ADVISORS: Mapping[str, Made] = {
 }
 
 
-def advice_of(name: str, of: Benched) -> Advice:
-    """The advice of an advisor of the bench, or of any other whose answer to a question is constant, such as a recorded one.
+def advice_of(name: str, benched: Benched) -> Advice:
+    """The advice of an advisor of the bench, or of another one that always answers a question alike, such as a recorded one.
 
     Raises BadInput for an unknown advisor, and for a record of another problem.
     """
     if name in ADVISORS:
-        return ADVISORS[name](of)
-    level = TableLevel(of.mdp, of.learner.discount, np.random.default_rng(0), episodes=of.learner.episodes)
+        return ADVISORS[name](benched)
+    level = TableLevel(
+        benched.mdp, benched.learner.discount, np.random.default_rng(0), episodes=benched.learner.episodes
+    )
     advisor = level.advisor(AdvisorName.of(name, "--advisors"))
     if isinstance(advisor, TableAdvisor):
         return advisor.advice
-    says = np.zeros(of.mdp.successor.shape)
-    q = [[0.0] * of.mdp.n_actions] * of.mdp.n_states
-    for state in np.flatnonzero(~of.mdp.terminal).tolist():
-        request = AdviceRequest(episode=1, step=1, state=state, own=0, allowed=range(of.mdp.n_actions), mdp=of.mdp, q=q)
+    says = np.zeros(benched.mdp.successor.shape)
+    q = [[0.0] * benched.mdp.n_actions] * benched.mdp.n_states
+    for state in np.flatnonzero(~benched.mdp.terminal).tolist():
+        request = AdviceRequest(
+            episode=1, step=1, state=state, own=0, allowed=range(benched.mdp.n_actions), mdp=benched.mdp, q=q
+        )
         action = None if advisor is None else advisor.advise(request)
         if action is not None:
             says[state, action] = 1.0
@@ -107,9 +111,9 @@ def advice_of(name: str, of: Benched) -> Advice:
     return Advice.of(says, heard)
 
 
-def importance(of: Benched, share: float = 0.5) -> BoolArray:
-    """Whether a state is important (S,) bool: of the half with the widest range of values (Torrey and Taylor 2013)."""
-    live = ~of.mdp.terminal
-    width: FloatArray = of.values.max(axis=1) - of.values.min(axis=1)
+def importance(benched: Benched, share: float = 0.5) -> BoolArray:
+    """Whether each state is among the half with the widest range of values, (S,) bool (Torrey and Taylor 2013)."""
+    live = ~benched.mdp.terminal
+    width: FloatArray = benched.values.max(axis=1) - benched.values.min(axis=1)
     wide: BoolArray = width >= np.quantile(width[live], 1.0 - share)
     return wide & live

@@ -17,7 +17,7 @@ LARGEST = 40.0  # points, where the colours of the gains end
 
 
 def distances(ranked: Ranks) -> bytes:
-    """Mean ranks, best first, each with a bar of the critical difference; ranks within it do not differ significantly."""
+    """A picture of the mean ranks, best first, with the critical difference as bars; ranks within one do not differ."""
     rules = list(ranked.mean)
 
     def draw(figure: "Figure") -> None:
@@ -36,9 +36,9 @@ def distances(ranked: Ranks) -> bytes:
 
 
 def gains(rows: Sequence[Row], rules: Sequence[str]) -> bytes:
-    """A map for each budget: rules by advisors, the mean gain over nobody as colour and number."""
-    advisors = list(dict.fromkeys(one["advisor"] for one in rows))
-    shown = [rule for rule in rules if any(one["rule"] == rule for one in rows)]
+    """A map of rules by advisors for each budget, with the mean gain over nobody as colour and number."""
+    advisors = list(dict.fromkeys(row["advisor"] for row in rows))
+    shown = [rule for rule in rules if any(row["rule"] == rule for row in rows)]
 
     def draw(figure: "Figure") -> None:
         both = figure.subplots(1, len(BUDGETS), sharey=True)
@@ -57,24 +57,24 @@ def gains(rows: Sequence[Row], rules: Sequence[str]) -> bytes:
 
 
 def _mean(rows: Sequence[Row], budget: str, rule: str, advisor: str) -> float:
-    those = [one["value"] for one in rows if (one["budget"], one["rule"], one["advisor"]) == (budget, rule, advisor)]
+    those = [row["value"] for row in rows if (row["budget"], row["rule"], row["advisor"]) == (budget, rule, advisor)]
     return float(np.mean(those))
 
 
 def worst_cells(rows: Sequence[Row], rules: Sequence[str], target: float) -> bytes:
-    """For each rule the cell with the lowest end of its interval, and the target."""
+    """A picture of each rule's cell with the lowest end of its interval, and of the target."""
     lowest = {}
     for rule in rules:
-        own = [one for one in rows if one["rule"] == rule]
+        own = [row for row in rows if row["rule"] == rule]
         if own:
-            lowest[rule] = min(own, key=lambda one: one["ci95"][0])
+            lowest[rule] = min(own, key=lambda row: row["ci95"][0])
 
     def draw(figure: "Figure") -> None:
         axes = figure.add_subplot()
-        for line, (rule, one) in enumerate(lowest.items()):
+        for line, (rule, row) in enumerate(lowest.items()):
             colour = ORANGE if rule == OURS else BLUE
-            axes.hlines(line, *one["ci95"], color=colour, linewidth=1.6)
-            axes.plot(one["value"], line, "o", color=colour, markersize=4)
+            axes.hlines(line, *row["ci95"], color=colour, linewidth=1.6)
+            axes.plot(row["value"], line, "o", color=colour, markersize=4)
         axes.axvline(target, color=RED, linewidth=1.0, linestyle="--", label=f"target {target:g}")
         axes.axvline(0.0, color=GREY, linewidth=0.8)
         axes.set_yticks(range(len(lowest)), lowest)
@@ -86,14 +86,14 @@ def worst_cells(rows: Sequence[Row], rules: Sequence[str], target: float) -> byt
 
 
 def answers_and_gain(rows: Sequence[Row], rules: Sequence[str]) -> bytes:
-    """The answers that each rule uses and its gain, by budget, as means over all cells."""
+    """A picture of each rule's answers and gain, as means over all cells, by budget."""
 
     def draw(figure: "Figure") -> None:
         axes = figure.add_subplot()
         for budget, marker in zip(BUDGETS, "ox", strict=True):
             for rule in rules:
-                own = [one for one in rows if (one["rule"], one["budget"]) == (rule, budget)]
-                at = max(1.0, float(np.mean([one["answers"] for one in own]))), np.mean([one["value"] for one in own])
+                own = [row for row in rows if (row["rule"], row["budget"]) == (rule, budget)]
+                at = max(1.0, float(np.mean([row["answers"] for row in own]))), np.mean([row["value"] for row in own])
                 axes.plot(*at, marker, color=ORANGE if rule == OURS else BLUE, markersize=5)
                 if budget == "any" or rule == OURS:
                     axes.annotate(rule, at, xytext=(4, 2), textcoords="offset points", fontsize=6.5)

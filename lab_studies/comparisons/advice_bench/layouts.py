@@ -19,13 +19,11 @@ LAVA_ROWS = ("S..~...", "...~...", "...~...", "...~...", ".......", "...~...", "
 WON, LOST = "won", "lost"
 ENDS = {"G": WON, "~": LOST}
 
-Leads = Callable[
-    [Any, int], Any
-]  # from a state, whatever can be in a dictionary, to another; WON and LOST end an episode
+Leads = Callable[[Any, int], Any]  # (hashable state, action) -> the next state; WON and LOST end an episode
 
 
 class At(NamedTuple):
-    """The state of a MiniGrid agent: row, column, heading (of AHEAD), whether it has the key and the door is open."""
+    """The state of a MiniGrid agent: row, column, heading (an index of AHEAD), whether it has the key, and the door is open."""
 
     row: int
     column: int
@@ -35,33 +33,33 @@ class At(NamedTuple):
 
 
 def explored(start: Any, actions: Sequence[str], leads: Leads) -> TabularMDP:
-    """The states that can be reached from one, by number in the order found, as a decision problem with the lab's rewards."""
+    """The decision problem of all states that can be reached from `start`, numbered as they are met, with the lab's rewards."""
     rewards, queue = Rewards(), [start]
-    found: dict[Any, int] = {start: 0}
+    numbers: dict[Any, int] = {start: 0}
     rows: list[list[int]] = []
     for state in queue:
         ends = state in (WON, LOST)
         row = []
         for action in range(len(actions)):
             entered = state if ends else leads(state, action)
-            if entered not in found:
-                found[entered] = len(found)
+            if entered not in numbers:
+                numbers[entered] = len(numbers)
                 queue.append(entered)
-            row.append(found[entered])
+            row.append(numbers[entered])
         rows.append(row)
     successor = np.array(rows, np.int32)
-    goal, lost = (np.array([state == end for state in found]) for end in (WON, LOST))
+    goal, lost = (np.array([state == end for state in numbers]) for end in (WON, LOST))
     reward = np.where(goal[successor], rewards.goal, np.where(lost[successor], rewards.collision, rewards.step))
     reward[goal | lost] = 0.0
     return TabularMDP(successor, reward, goal | lost, goal, 0, tuple(actions))
 
 
 def minigrid(rows: Sequence[str]) -> TabularMDP:
-    """A layout with walls around: S start (facing right), G goal, # wall, ~ lava, k key, D locked door.
+    """The problem of a layout: S start (facing right), G goal, # wall, ~ lava, k key, D locked door; walls surround it.
 
-    Actions turn left and right and go forward, with a door also pick up and toggle; one that does nothing stays. Lava ends
-    the episode. A key in the way blocks it until it is picked up; the door opens by toggling it from the front with the key.
-    Source: Chevalier-Boisvert et al. 2023, its rules; rewards are the lab's, as MiniGrid's depend on the time.
+    Actions turn left and right and go forward, with a door also pick up and toggle; one without effect stays. Lava ends the
+    episode. A key blocks its cell until it is picked up; toggling from the front with the key opens the door. Source: the
+    rules of Chevalier-Boisvert et al. 2023; rewards are the lab's, as MiniGrid's depend on the time.
     """
     cells = {(r, c): mark for r, row in enumerate(rows) for c, mark in enumerate(row)}
     (start,) = (cell for cell, mark in cells.items() if mark == "S")
@@ -89,22 +87,22 @@ TOASTS, TOASTING, BUTTERING, SLOTS = 3, 4, 2, 2  # times in steps of 10 s
 BREAD, IN_TOASTER, TOASTED, IN_APPLIER, BUTTERED, DONE = range(6)
 
 
-Toasts = tuple[tuple[int, int], ...]  # of each toast its stage, and how long it still stays there
+Toasts = tuple[tuple[int, int], ...]  # the stage of each toast, and the steps that it still stays there
 
 
 def toast_order() -> TabularMDP:
-    """In which order the robot moves three toasts: a step is 10 s, a move takes one, and the least steps are the makespan.
+    """The problem of the order in which the robot moves three toasts. A step is 10 s, and the fewest steps are the makespan.
 
     Each toast is bread, in the toaster (two slots, 40 s), toasted, under the butter applier (one, 20 s), buttered, done. An
-    action moves one toast on, or waits; a move that cannot be made is a wait. All else about the cell is left out.
+    action moves one toast to its next stage, or waits; a move that cannot be made is a wait. The model has no more.
     """
 
     def leads(toasts: Toasts, action: int) -> Toasts | str:
         moved = None
         if action < TOASTS:
             stage, _ = toasts[action]
-            room = sum(one[0] in (IN_TOASTER, TOASTED) for one in toasts) < SLOTS
-            free = all(one[0] not in (IN_APPLIER, BUTTERED) for one in toasts)
+            room = sum(toast[0] in (IN_TOASTER, TOASTED) for toast in toasts) < SLOTS
+            free = all(toast[0] not in (IN_APPLIER, BUTTERED) for toast in toasts)
             if stage == BREAD and room:
                 moved = (IN_TOASTER, TOASTING)
             elif stage == TOASTED and free:

@@ -16,14 +16,14 @@ from lab.teaching.subjects import subject_from
 from lab_studies.comparisons.advice_bench import layouts
 
 RANDOM_WORLDS = 100
-OTHERS = 1000  # the number of the first of the random worlds that are held out
-WALKS = 480  # of the best policy, to know what it comes to
+OTHERS = 1000  # the number of the first random world that is held out
+WALKS = 480  # walks of the best policy, of which `par` is the mean
 COMMON = LearnerSettings(learner="q", alpha=0.95, beta=1.0, episodes=200, max_steps=200)
 
 
 @dataclass(frozen=True, eq=False)
 class Benched:
-    """A problem: its table, the moves left to chance if there are any, the learner, and the best values (S, A)."""
+    """A problem: its table, the random moves if there are any, the learner, and the optimal values (S, A)."""
 
     name: str
     mdp: TabularMDP
@@ -38,7 +38,7 @@ class Benched:
 
     @cached_property
     def par(self) -> float:
-        """The mean steps of the best policy, an episode that it does not finish as the step limit + 1."""
+        """The mean steps of the best policy; an unfinished episode counts as the step limit + 1."""
         best = Advice.of(advice_chances(self.values, 1e-6))
         learner = replace(self.learner, episodes=1)
         seeds = np.arange(WALKS, dtype=np.uint64)
@@ -51,7 +51,7 @@ def _table(mdp: TabularMDP, **changes: Any) -> Benched:
 
 
 def _named(name: str, task: str | None = None, **changes: Any) -> Benched:
-    """Whatever `lab teach` takes by name; a problem of Gymnasium must bring its model along."""
+    """The problem that `lab teach` has by a name. Raises BadInput for an environment of Gymnasium without a model."""
     subject = subject_from(name, task)
     problem = subject.prepare(0)
     learner = replace(COMMON, max_steps=subject.settings.learner.max_steps, **changes)
@@ -98,7 +98,7 @@ PROBLEMS: Mapping[str, Callable[[], Benched]] = {
 }
 
 
-# on these nothing was chosen: neither a constant of a rule nor a learner's setting
+# nothing was chosen on these, neither a constant of a rule nor a learner's setting
 HELD_OUT: Mapping[str, Callable[[], Benched]] = {
     "other-worlds": lambda: _named(f"random:10x10x10:0.06:{OTHERS}", learner="afterstate"),
     "place": lambda: _named("place", "toast"),
@@ -112,7 +112,7 @@ SEVERAL = {"random-worlds": 0, "other-worlds": OTHERS}  # the number of the firs
 
 @lru_cache(maxsize=256)
 def problem(name: str, world: int = 0) -> Benched:
-    """The problem of that name, or one of the user's own; world: which of the random ones. BadInput for what is none."""
+    """The problem of a name, or one of the user's own; world: the number of a random one. Raises BadInput for an unknown name."""
     if name in SEVERAL:
         made = _named(f"random:10x10x10:0.06:{SEVERAL[name] + world}", learner="afterstate")
     else:

@@ -1,4 +1,4 @@
-"""Mean ranks of rules over problems, and how far two must lie apart to differ (Friedman's test with Nemenyi's distance)."""
+"""Mean ranks of rules over problems, and the distance from which two differ (Friedman's test, Nemenyi's critical difference)."""
 
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
@@ -11,10 +11,11 @@ Cell = tuple[str, str, str]  # problem, advisor, budget
 
 
 class Ranks(NamedTuple):
-    """Mean ranks by rule, best first; critical: two that lie less apart are not told apart; p: that all are alike,
-    None for one problem or two rules.
+    """Mean ranks by rule, best first.
 
-    beaten: of one rule, the p that it scores no more than each other (Wilcoxon's signed ranks over problems, Holm's correction).
+    critical: two ranks that differ by less are not told apart. p: of the hypothesis that all rules are alike, None for one
+    problem or two rules. beaten: by rule, the p of the hypothesis that our rule scores no more than it (Wilcoxon's signed
+    ranks over problems, Holm's correction).
     """
 
     mean: dict[str, float]
@@ -24,9 +25,9 @@ class Ranks(NamedTuple):
 
 
 def ranks(scores: Mapping[str, Mapping[Cell, float]], problems: Sequence[str], ours: str) -> Ranks:
-    """Ranks in each cell, 1 the highest score, ties shared; means over a problem's cells, then over problems.
+    """Mean ranks: 1 is the highest score in a cell, ties share; means are over a problem's cells, then over problems.
 
-    The blocks of the test are the problems: cells of one problem are not independent. Source: Demsar, JMLR 7 (2006).
+    The blocks of the test are the problems, as cells of one problem are not independent. Source: Demsar, JMLR 7 (2006).
     """
     from scipy.stats import friedmanchisquare, rankdata, studentized_range, wilcoxon
 
@@ -42,10 +43,12 @@ def ranks(scores: Mapping[str, Mapping[Cell, float]], problems: Sequence[str], o
     mean, (n, k) = by_problem.mean(axis=0), by_problem.shape
     critical = float(studentized_range.ppf(0.95, k, np.inf) / np.sqrt(2.0) * np.sqrt(k * (k + 1) / (6.0 * n)))
     p = float(friedmanchisquare(*by_problem.T).pvalue) if n > 1 and k > 2 else None
-    ordered = sorted(zip(rules, mean.tolist(), strict=True), key=lambda one: one[1])
+    ordered = sorted(zip(rules, mean.tolist(), strict=True), key=lambda pair: pair[1])
     means = {
-        rule: np.array([np.mean([of[cell] for cell in cells if cell[0] == name]) for name in dict.fromkeys(problems)])
-        for rule, of in scores.items()
+        rule: np.array(
+            [np.mean([scores_of_rule[cell] for cell in cells if cell[0] == name]) for name in dict.fromkeys(problems)]
+        )
+        for rule, scores_of_rule in scores.items()
     }
     others = [rule for rule in rules if rule != ours] if ours in means else []
     single = {rule: float(wilcoxon(means[ours], means[rule], alternative="greater").pvalue) for rule in others}
@@ -53,9 +56,9 @@ def ranks(scores: Mapping[str, Mapping[Cell, float]], problems: Sequence[str], o
 
 
 def holm(single: Mapping[str, float]) -> dict[str, float]:
-    """Single p values corrected for their number (Holm 1979)."""
-    found, least = {}, 0.0
-    for number, (name, p) in enumerate(sorted(single.items(), key=lambda one: one[1])):
+    """The p values corrected for their number (Holm 1979)."""
+    corrected, least = {}, 0.0
+    for number, (name, p) in enumerate(sorted(single.items(), key=lambda pair: pair[1])):
         least = max(least, min(1.0, p * (len(single) - number)))
-        found[name] = least
-    return found
+        corrected[name] = least
+    return corrected

@@ -15,8 +15,8 @@ from lab_studies.comparisons.advice_bench.bad_advisors import advice_of, importa
 from lab_studies.comparisons.advice_bench.problems import RANDOM_WORLDS, SEVERAL, Benched, problem
 
 BUDGETS = {"100": 100, "any": GateSettings.budget}  # answers of a session
-CHANCE_TIMES = 4  # as many sessions where moves are left to chance: their points vary more
-LAST = 0.1  # the share of the episodes that shows what was learned
+CHANCE_TIMES = 4  # times as many sessions where moves are random, as their points vary more
+LAST = 0.1  # the share of the episodes, at the end, that shows what was learned
 BINS = 40  # of a learning curve
 NOBODY, OURS = "nobody", "earned-trust"
 
@@ -25,7 +25,7 @@ class Rule(NamedTuple):
     """A rule of when to ask: the gate with its settings, and the states in which the advisor itself gives no answer."""
 
     gate: GateSettings
-    important: bool = False  # it speaks only where most is at stake
+    important: bool = False  # the advisor speaks only where most is at stake
     speaks: int = 0
 
 
@@ -35,7 +35,7 @@ def _gate(gate: str, **settings: Any) -> GateSettings:
 
 EARLY: Any = {"first_episode": 1}
 CCRL: Any = {"first_episode": 10, "lambda_threshold": 0.2, "omega": 3}
-# settings: of a few values each, those with the highest mean gain over the problems that are not held out, with another seed
+# each setting is, of a few values, the one with the highest mean gain over the problems not held out, with another seed
 RULES: Mapping[str, Rule] = {
     "always": Rule(_gate("always")),
     "random": Rule(_gate("random", rate=0.02, **EARLY)),
@@ -60,7 +60,7 @@ RULES: Mapping[str, Rule] = {
 
 @dataclass(frozen=True)
 class Case:
-    """An advisor in a problem; None: nobody."""
+    """An advisor in a problem; None: nobody advises."""
 
     problem: str
     advisor: str | None
@@ -76,39 +76,39 @@ class Outcome(NamedTuple):
 
     def to_json(self) -> list[list[float]]:
         """Plain lists."""
-        return [one.tolist() for one in self]
+        return [values.tolist() for values in self]
 
     @classmethod
     def from_json(cls, lists: Any) -> "Outcome":
         """What `to_json` wrote. Raises TypeError or ValueError for anything else."""
-        return cls(*(np.array(one, np.float64) for one in lists))
+        return cls(*(np.array(values, np.float64) for values in lists))
 
 
 Outcomes = dict[tuple[str, str], Outcome]  # by rule and budget
 
 
-def tried(case: Case, sessions: int, seed: int, rules: tuple[str, ...] = tuple(RULES)) -> Outcomes:
-    """Every rule at every budget, the same chances for each; of nobody one outcome, ("nobody", "any")."""
+def case_outcomes(case: Case, sessions: int, seed: int, rules: tuple[str, ...] = tuple(RULES)) -> Outcomes:
+    """The outcomes of every rule at every budget, with the same seeds for each; for nobody the one of ("nobody", "any")."""
     worlds = min(RANDOM_WORLDS, sessions) if case.problem in SEVERAL else 1
     sessions *= CHANCE_TIMES if problem(case.problem).chances is not None else 1
     rng = np.random.default_rng([seed, crc32(case.problem.encode())])
     seeds = rng.integers(2**64, size=sessions, dtype=np.uint64)
     shares = np.array_split(seeds, worlds)
-    found: dict[tuple[str, str], list[Any]] = {}
+    parts_of: dict[tuple[str, str], list[Any]] = {}
     for world, own in enumerate(shares):
         place = problem(case.problem, world)
-        for key, part in _of_place(place, case.advisor, rules, own).items():
-            found.setdefault(key, []).append(part)
-    return {key: _joined(parts) for key, parts in found.items()}
+        for key, part in _place_outcomes(place, case.advisor, rules, own).items():
+            parts_of.setdefault(key, []).append(part)
+    return {key: _joined(parts) for key, parts in parts_of.items()}
 
 
-def _of_place(
+def _place_outcomes(
     place: Benched, advisor: str | None, rules: tuple[str, ...], seeds: np.ndarray
 ) -> dict[tuple[str, str], Any]:
     if advisor is None:
         return {(NOBODY, "any"): _points(place, GateSettings("never"), None, seeds)}
     advice = advice_of(advisor, place)
-    found = {}
+    outcomes = {}
     for name in rules:
         rule = RULES[name]
         spoken = advice
@@ -116,8 +116,8 @@ def _of_place(
             region = advice.region & importance(place)
             spoken = replace(advice, region=region, speaks=rule.speaks)
         for budget, most in BUDGETS.items():
-            found[name, budget] = _points(place, replace(rule.gate, budget=most), spoken, seeds)
-    return found
+            outcomes[name, budget] = _points(place, replace(rule.gate, budget=most), spoken, seeds)
+    return outcomes
 
 
 def _points(place: Benched, gate: GateSettings, advice: Advice | None, seeds: np.ndarray) -> Any:
@@ -128,8 +128,8 @@ def _points(place: Benched, gate: GateSettings, advice: Advice | None, seeds: np
 
 
 def _joined(parts: list[Any]) -> Outcome:
-    points, answers = np.concatenate([one[0] for one in parts]), np.concatenate([one[1] for one in parts])
+    points, answers = np.concatenate([part[0] for part in parts]), np.concatenate([part[1] for part in parts])
     last = max(1, round(LAST * points.shape[1]))
     curve = np.array([part.mean() for part in np.array_split(points.mean(axis=0), BINS)])
-    found = points.mean(axis=1), points[:, -last:].mean(axis=1), answers.astype(np.float64), curve
-    return Outcome(*(np.round(one, 2) for one in found))  # to a hundredth of a point: so they are kept
+    values = points.mean(axis=1), points[:, -last:].mean(axis=1), answers.astype(np.float64), curve
+    return Outcome(*(np.round(array, 2) for array in values))  # kept to a hundredth of a point

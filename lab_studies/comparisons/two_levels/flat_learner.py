@@ -1,4 +1,4 @@
-"""Q-learning of the whole task as one flat problem, compiled with numba, with the makespan known after so many steps."""
+"""Q-learning of the whole task as one flat problem, compiled with numba, and the makespan known after a budget of steps."""
 
 from typing import NamedTuple
 
@@ -13,11 +13,11 @@ Count = NDArray[np.int64]
 
 
 class FlatSettings(NamedTuple):
-    """How the flat problem is learned: Q-learning with alpha 1, exact where nothing is left to chance; values begin at 0.
+    """How the flat problem is learned: by Q-learning with alpha 1, as nothing is random; values begin at 0.
 
-    cost: of each step. goal: reward at the end. In episode n a random action has the probability epsilon * n ** -beta,
-    but at least `least`. After an episode its steps are learned from once more, from the last to the first, and it is
-    broken off after `longest` steps.
+    cost: of each step. goal: the reward at the end. In episode n a random action has the probability epsilon * n ** -beta,
+    but at least `least`. After an episode its steps are learned from again, from the last to the first; an episode is cut
+    off after `longest` steps.
     """
 
     cost: float
@@ -38,10 +38,10 @@ class _Problem(NamedTuple):
 def learn_flat(
     world: FlatWorld, settings: FlatSettings, budgets: tuple[int, ...], cap: int, rng: np.random.Generator
 ) -> Count:
-    """The makespan known after so many steps of learning, (budgets,), -1 where none is of `cap` steps or fewer.
+    """The makespans (budgets,) known after each budget of learning steps, -1 if none is at most `cap`; budgets ascend.
 
-    It is that of the greedy policy or of the best episode until then, whichever is shorter: nothing is left to chance,
-    so that an episode can be repeated. Budgets ascend.
+    A makespan is that of the greedy policy or of the best episode so far, whichever is shorter: nothing is random, so that
+    an episode can be repeated.
     """
     problem = _Problem(world.mdp.successor, world.mdp.terminal, world.mdp.start)
     return np.asarray(_session(problem, settings, np.array(budgets, np.int64), cap, rng))
@@ -68,15 +68,15 @@ def _session(problem: _Problem, settings: FlatSettings, budgets: Count, cap: int
                 for step in range(length - 1, -1, -1):
                     _learn(problem, settings, q, episode[step, 0], episode[step, 1])
                 state, length, number = problem.start, 0, number + 1
-        found = min(best, _greedy_steps(problem, q, cap))
-        if found <= cap:
-            makespans[stop] = found
+        shortest = min(best, _greedy_steps(problem, q, cap))
+        if shortest <= cap:
+            makespans[stop] = shortest
     return makespans
 
 
 @compiled
 def _choose(q: FloatArray, state: int, epsilon: float, rng: np.random.Generator) -> int:
-    """The best action, equally good ones drawn between, or with probability epsilon any one."""
+    """The best action, a random one of equally good ones, or with probability epsilon any action."""
     actions = q.shape[1]
     if epsilon > 0.0 and rng.random() < epsilon:
         return int(rng.random() * actions)
@@ -95,7 +95,7 @@ def _choose(q: FloatArray, state: int, epsilon: float, rng: np.random.Generator)
 
 @compiled
 def _learn(problem: _Problem, settings: FlatSettings, q: FloatArray, state: int, action: int) -> None:
-    """Q(s,a) = r + gamma max Q(s',.): the rule of `lab.learning.updates.QLearning` with alpha 1."""
+    """Update Q(s,a) = r + gamma max Q(s',.), the rule of `lab.learning.updates.QLearning` with alpha 1."""
     entered = problem.successor[state, action]
     value = settings.goal
     if not problem.terminal[entered]:
@@ -108,7 +108,7 @@ def _learn(problem: _Problem, settings: FlatSettings, q: FloatArray, state: int,
 
 @compiled
 def _greedy_steps(problem: _Problem, q: FloatArray, cap: int) -> int:
-    """Steps of the greedy policy to the end (ties: the lowest index); cap + 1 when it takes more."""
+    """The steps of the greedy policy to the end (ties: the lowest index); cap + 1 if it takes more."""
     state = problem.start
     for steps in range(cap + 1):
         if problem.terminal[state]:

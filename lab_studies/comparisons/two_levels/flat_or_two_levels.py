@@ -16,7 +16,7 @@ from lab.studies.runner import Job
 from lab.view.canvas import BLUE, GREY, INK, ORANGE, RED, SKY, picture_bytes
 from lab_studies.comparisons.two_levels.flat_learner import FlatSettings, learn_flat
 from lab_studies.comparisons.two_levels.kitchen import FlatWorld, Kitchen, Way, flat_world
-from lab_studies.comparisons.two_levels.two_level_learner import LearnedTransfer, TwoLevels, practised
+from lab_studies.comparisons.two_levels.two_level_learner import LearnedTransfer, TwoLevels, learned_stages
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,16 +28,16 @@ BUDGETS = (
     *(1000, 2000, 3000, 5000, 7000, 10_000, 15_000, 20_000, 30_000, 50_000),
     *(100_000, 300_000, 1_000_000, 3_000_000, 10_000_000),
 )
-LARGEST = {1: 1_000_000, 2: 3_000_000, 3: 10_000_000}  # budgets, by toasts
-CAP = 500  # steps; a longer makespan counts as not finished
-SESSIONS = 20  # at most: the flat learner needs millions of steps in each
-NEAR_PERCENT = 5.0  # above the optimum: what the summary counts as reaching it
+LARGEST = {1: 1_000_000, 2: 3_000_000, 3: 10_000_000}  # toasts -> the largest budget
+CAP = 500  # steps; a longer makespan counts as unfinished
+SESSIONS = 20  # the most, as the flat learner needs millions of steps in each
+NEAR_PERCENT = 5.0  # the gap that the summary counts as reaching the optimum
 FLAT = {
     "optimistic": FlatSettings(cost=1.0, goal=0.0, discount=1.0),
     "goal reward": FlatSettings(cost=0.0, goal=1.0, discount=0.99, epsilon=1.0, beta=0.2, least=0.3),
     "both": FlatSettings(cost=0.02, goal=1.0, discount=0.99, epsilon=1.0, beta=0.3, least=0.1),
 }
-PRACTICE, FLAT_LEARNING, SEQUENCING = 1, 2, 3  # in seeds: nothing shares its chance with anything else
+PRACTICE, FLAT_LEARNING, SEQUENCING = 1, 2, 3  # parts of seeds, so that no two share random numbers
 ALL_STEPS, LOW_STEPS = "all steps", "low level's steps"
 Skills = Sequence[Mapping[Way, tuple[LearnedTransfer, ...]]]  # of each session
 Method = tuple[str, str]  # method and setting of a row
@@ -52,45 +52,45 @@ METHODS: dict[Method, Look] = {
 CAPTION = "Makespan by the steps of learning: one flat problem and two levels (bands: 95 % intervals)"
 ABOUT = (
     f"A kitchen of 5 x 6 cells with the six stations of the toast cell and six obstacles; a step is a move, a pick, a "
-    f"drop or a wait, and each machine takes {KITCHEN.toaster_steps}. Makespans are of what was learned, carried out in "
-    f"the same world without exploring; one above {CAP} steps counts as not finished, and is left out of the means. "
+    f"drop or a wait, and each machine takes {KITCHEN.toaster_steps}. Makespans are those of learned policies in the same "
+    f"world without exploration; one above {CAP} steps counts as unfinished and is left out of the means. "
     f"At most {SESSIONS} sessions."
 )
 ABOUT_FLAT = (
-    "Flat: Q-learning, alpha 1, alike toasts merged, each episode learned from once more backwards, result the better of "
-    "its greedy policy and its best episode. Three settings, of 26 tried with five sessions each: 'optimistic': a step "
+    "Flat: Q-learning, alpha 1, alike toasts merged; each episode is learned from again backwards, and the result is the better "
+    "of its greedy policy and its best episode. Three settings, of 26 tried with five sessions each: 'optimistic': a step "
     "costs 1 and values begin at 0, greedy; 'goal reward': 1 at the end, discount .99, random actions with probability "
-    "n^-.2, at least .3; 'both': the same with .02 a step, n^-.3, at least .1. Running into an obstacle is a wait."
+    "n^-.2, at least .3; 'both': the same with a cost of .02 for a step, n^-.3, at least .1. Running into an obstacle is a wait."
 )
 ABOUT_TWO_LEVELS = (
-    "Two levels: each transfer is a grid sub-task, Q-learning with the thesis's alpha .95 and discount .99, greedy from "
-    "values of 0 (a step costs .1), one of nine learners tried; all get as many episodes as fit, then srl-time orders "
-    "them by the steps that they take. 'all steps' counts the sequencer's simulated steps too, and keeps half of the "
-    "budget for them; 'low level's steps' counts none of them. What it is given beside: which transfers there are, "
-    "episodes that begin at any station, and the machines' times."
+    "Two levels: each transfer is a grid sub-task, learned by Q-learning with the thesis's alpha .95 and discount .99, greedy "
+    "from values of 0 (a step costs .1), one of nine learners tried; all get as many episodes as fit, then srl-time orders "
+    "them by the steps that they take. 'all steps' also counts the sequencer's simulated steps, and keeps half of the "
+    "budget for them; 'low level's steps' counts none of them. Two levels also know the transfers, the machines' times, and "
+    "episodes that begin at any station."
 )
 ABOUT_LOSS = (
-    "In this world the two levels lose nothing by deciding only at drops: the exact optimum of the cell with shortest "
-    "transfers is that of the flat problem (rows of method 'exact'). Times are certain here; where they are not, a flat "
-    "policy could change its mind on the way, which this study does not measure."
+    "In this world two levels lose nothing by deciding only at drops: the exact optimum of the cell with shortest "
+    "transfers is that of the flat problem (rows of method 'exact'). Times are certain here; with random times a flat "
+    "policy could change its decision on the way, which this study does not measure."
 )
 
 
 def flat(job: Job, reading: Mapping[str, Any]) -> Findings:
-    """Makespan against budget for both, 1 to 3 toasts, beside the exact optimum; at most SESSIONS sessions of each."""
+    """The makespans of both by budget, with 1 to 3 toasts, and the exact optimum; at most SESSIONS sessions of each."""
     sessions = min(job.sessions, SESSIONS)
     skills = [_skills(job.seed, session) for session in range(sessions)]
-    found = job.in_turn([partial(_measured, toasts, job.seed, skills) for toasts in TOASTS])
-    rows = [one for some, _ in found for one in some]
+    measured = job.in_turn([partial(_measured, toasts, job.seed, skills) for toasts in TOASTS])
+    rows = [result for results, _ in measured for result in results]
     summary: Row = {"sessions": sessions}
-    for _, says in found:
+    for _, says in measured:
         summary |= says
     notes = (ABOUT, ABOUT_FLAT, ABOUT_TWO_LEVELS, ABOUT_LOSS)
     return Findings(rows, summary | agreement(rows), {CAPTION: _picture(rows)}, notes)
 
 
 def _measured(toasts: int, seed: int, skills: Skills) -> tuple[list[Row], Row]:
-    """All rows with so many toasts, and what they say in short."""
+    """All rows with so many toasts, and their summary."""
     world = flat_world(KITCHEN, toasts)
     exact = _exact(world, toasts)
     asked = _Asked(world, toasts, tuple(b for b in BUDGETS if b <= LARGEST[toasts]), int(exact[0]["value"]), seed)
@@ -99,20 +99,20 @@ def _measured(toasts: int, seed: int, skills: Skills) -> tuple[list[Row], Row]:
 
 
 def _skills(seed: int, session: int) -> dict[Way, tuple[LearnedTransfer, ...]]:
-    """All sub-tasks of one session; they are the same whatever the number of toasts."""
+    """All learned sub-tasks of one session, the same for every number of toasts."""
     empty, loaded = KITCHEN.needed(max(TOASTS))
     ways = sorted({*empty, *loaded})
-    return {way: practised(KITCHEN, way, [seed, session, PRACTICE, number]) for number, way in enumerate(ways)}
+    return {way: learned_stages(KITCHEN, way, [seed, session, PRACTICE, number]) for number, way in enumerate(ways)}
 
 
 def _exact(world: FlatWorld, toasts: int) -> list[Row]:
-    """The optimum of the flat problem, and that of the cell whose transfers are all shortest; how large both are."""
+    """The rows of the optimum of the flat problem, of that of the cell with shortest transfers, and of their sizes."""
     empty, loaded = KITCHEN.needed(toasts)
     ways = {way: shortest_steps(KITCHEN.way(way)) for way in (*empty, *loaded)}
-    found = optimum(KITCHEN.cell(toasts, ways))
+    best = optimum(KITCHEN.cell(toasts, ways))
     figures = {
         ("flat", "makespan_steps"): shortest_steps(world.mdp),
-        ("two levels", "makespan_steps"): found.cost,
+        ("two levels", "makespan_steps"): best.cost,
         ("flat", "problem_states"): world.mdp.n_states,
         ("two levels", "problem_subtasks"): len(ways),
     }
@@ -121,7 +121,7 @@ def _exact(world: FlatWorld, toasts: int) -> list[Row]:
 
 @dataclass(frozen=True, eq=False)
 class _Asked:
-    """What both are asked for: the budgets, and the shortest makespan, that of `exact`."""
+    """What both learn: the problem, the budgets, and the shortest makespan."""
 
     world: FlatWorld
     toasts: int
@@ -147,11 +147,11 @@ def _two_level_rows(asked: _Asked, skills: Skills) -> list[Row]:
     learners = [TwoLevels(KITCHEN, asked.world, asked.toasts, *own) for own in zip(skills, seeds, strict=True)]
     for name in (ALL_STEPS, LOW_STEPS):
         for budget in asked.budgets:
-            found = [learner.outcome(budget, CAP, name == ALL_STEPS) for learner in learners]
+            outcomes = [learner.outcome(budget, CAP, name == ALL_STEPS) for learner in learners]
             named = _named(("two-level", name), asked.toasts, budget)
-            makespans = np.array([-1 if one.makespan is None else one.makespan for one in found])
+            makespans = np.array([-1 if outcome.makespan is None else outcome.makespan for outcome in outcomes])
             rows += rows_of(named, makespans, asked.best)
-            rows.append(row(named, "used_steps", float(np.mean([one.used for one in found]))))
+            rows.append(row(named, "used_steps", float(np.mean([outcome.used for outcome in outcomes]))))
     return rows
 
 
@@ -161,31 +161,31 @@ def _named(method: Method, toasts: int, budget: int | None) -> Row:
 
 
 def rows_of(named: Row, makespans: NDArray[np.int64], best: int) -> list[Row]:
-    """Makespan and its distance from the optimum over the sessions that finished, if any, and the share of these."""
-    there = makespans[makespans >= 0]
+    """The rows of the makespan and the gap over the finished sessions, if any, and of the share of these."""
+    finished = makespans[makespans >= 0]
     rows = []
-    for measure, values in (("makespan_steps", there), ("gap_percent", 100.0 * (there / best - 1.0))):
+    for measure, values in (("makespan_steps", finished), ("gap_percent", 100.0 * (finished / best - 1.0))):
         if len(values):
             rows.append(mean_row(named, measure, values) if len(values) > 1 else row(named, measure, values[0]))
     return [*rows, share_row(named, "finished_percent", makespans >= 0)]
 
 
 def _in_short(rows: Sequence[Row], toasts: int, exact: Sequence[Row]) -> Row:
-    """The optimum, and with which budget all sessions of a method first finish, on average near it."""
+    """The optimum, and the least budget with which all sessions of a method finish, on average near the optimum."""
     table = exact[0]["table"]
     says = ("optimum, flat", "optimum, two levels", "states of the flat problem", "sub-tasks")
-    found: Row = {f"{table}: {what}": int(one["value"]) for what, one in zip(says, exact, strict=True)}
+    told: Row = {f"{table}: {what}": int(result["value"]) for what, result in zip(says, exact, strict=True)}
     for method, setting in METHODS:
-        of = those(rows, method=method, setting=setting)
-        sure = {one["budget"] for one in those(of, measure="finished_percent", value=100.0)}
-        near = [one["budget"] for one in those(of, measure="gap_percent") if one["value"] <= NEAR_PERCENT]
+        own = those(rows, method=method, setting=setting)
+        sure = {result["budget"] for result in those(own, measure="finished_percent", value=100.0)}
+        near = [result["budget"] for result in those(own, measure="gap_percent") if result["value"] <= NEAR_PERCENT]
         steps = min((budget for budget in near if budget in sure), default=None)
-        found[f"{table}: steps to within {NEAR_PERCENT:g} %, {method}, {setting}"] = steps
-    return found
+        told[f"{table}: steps to within {NEAR_PERCENT:g} %, {method}, {setting}"] = steps
+    return told
 
 
 def _picture(rows: Sequence[Row]) -> bytes:
-    """A plot for each number of toasts; hollow marks: not all sessions finished."""
+    """A picture with a plot for each number of toasts; hollow marks: not all sessions finished."""
 
     def draw(figure: "Figure") -> None:
         plots = figure.subplots(1, len(TOASTS), squeeze=False)[0]
@@ -199,20 +199,20 @@ def _picture(rows: Sequence[Row]) -> bytes:
 
 def _draw(axes: "Axes", rows: Sequence[Row]) -> None:
     finished = {
-        (one["method"], one["setting"], one["budget"]): one["value"] == 100.0
-        for one in those(rows, measure="finished_percent")
+        (result["method"], result["setting"], result["budget"]): result["value"] == 100.0
+        for result in those(rows, measure="finished_percent")
     }
     for (method, setting), (colour, marker, name) in METHODS.items():
         line = those(rows, method=method, setting=setting, measure="makespan_steps")
         curve(axes, line, "budget", (colour, marker, name))
-        for one in line:
-            if not finished[method, setting, one["budget"]]:
+        for result in line:
+            if not finished[method, setting, result["budget"]]:
                 look: dict[str, Any] = {"color": colour, "markerfacecolor": "white", "markersize": 4.5, "zorder": 3}
-                axes.plot(one["budget"], one["value"], marker, **look)
+                axes.plot(result["budget"], result["value"], marker, **look)
     best = those(rows, method="exact")[0]["value"]
     axes.axhline(best, color=INK, linestyle="--", linewidth=1.0, label="exact optimum")
     axes.set(xscale="log", xlabel="steps of learning", title=f"{rows[0]['table']}, optimum {best:.0f}")
     asked = [budget for _, _, budget in finished]
-    axes.set_xlim(0.8 * min(asked), 1.25 * max(asked))  # also where nothing finished
+    axes.set_xlim(0.8 * min(asked), 1.25 * max(asked))  # also budgets with which nothing finished
     axes.set_ylim(0.9 * best, None)
     axes.grid()

@@ -33,7 +33,7 @@ ROUTE: Route = (
     Stage(LETTERS["B"], LETTERS["b"]),
     Stage(LETTERS["F"]),
 )
-HANDLING = 2  # steps of a loaded transfer beside its way: the pick and the drop
+HANDLING = 2  # additional steps of a loaded transfer: the pick and the drop
 
 Way = tuple[str, str]  # station names, from and to
 Count = NDArray[np.int64]
@@ -55,8 +55,8 @@ class Kitchen:
     @cached_property
     def places(self) -> dict[str, tuple[int, int]]:
         """The cell (row, column) of each station, by its name."""
-        found = {letter: (r, c) for r, row in enumerate(self.rows) for c, letter in enumerate(row)}
-        return {name: found[letter] for letter, name in LETTERS.items()}
+        cells = {letter: (r, c) for r, row in enumerate(self.rows) for c, letter in enumerate(row)}
+        return {name: cells[letter] for letter, name in LETTERS.items()}
 
     def needed(self, parts: int) -> tuple[tuple[Way, ...], tuple[Way, ...]]:
         """The transfers that some allowed order of so many toasts may contain: empty ones and loaded ones."""
@@ -64,7 +64,7 @@ class Kitchen:
         return moves.empty, moves.loaded
 
     def way(self, way: Way) -> TabularMDP:
-        """The sub-task of one transfer, `lab.mdp.grid`: to run into an obstacle ends the episode."""
+        """The sub-task of one transfer, as `lab.mdp.grid` makes it: running into an obstacle ends the episode."""
         return grid(self.rows_and_columns, self.blocked, self.places[way[0]], self.places[way[1]])
 
     @property
@@ -73,7 +73,7 @@ class Kitchen:
         return len(self.rows), len(self.rows[0])
 
     def cell(self, parts: int, steps: dict[Way, int]) -> Cell:
-        """The high level: a cell whose transfers take so many steps on their way, and HANDLING more when loaded."""
+        """The high level: a cell whose transfers take the given steps, and HANDLING more when loaded."""
         stations = self._stations(parts)
         names = [station.name for station in stations]
         empty = np.full((len(names), len(names)), np.nan)
@@ -94,10 +94,10 @@ class Kitchen:
 
 @dataclass(frozen=True, eq=False)
 class FlatWorld:
-    """The whole task as one problem: its decision problem, and what the robot carries in each state, (S,) int.
+    """The whole task as one decision problem, and what the robot carries in each state.
 
-    mdp: ACTIONS, each for one step, -1 a step; what cannot be done is a wait. carried: 0 nothing, else the number of
-    machines that the toast has behind it, + 1.
+    mdp: has the ACTIONS, each of one step with reward -1; an impossible one is a wait. carried (S,) int: 0 for nothing, else
+    1 + the number of machines that the toast has passed.
     """
 
     mdp: TabularMDP
@@ -105,10 +105,10 @@ class FlatWorld:
 
 
 def flat_world(kitchen: Kitchen, parts: int) -> FlatWorld:
-    """The states that can be reached from the start: all toasts on the plate, the robot at the toaster buffer.
+    """The problem of all states that can be reached from the start: all toasts on the plate, the robot at the toaster buffer.
 
-    A state is the robot's cell, what it carries, how many toasts are on the plate and in each buffer, and for each
-    machine whether it is empty or how many steps it still needs; who is who does not matter.
+    A state is the robot's cell, what it carries, the numbers of toasts on the plate and in each buffer, and for each machine
+    whether it is empty or the steps that it still needs; toasts are alike.
     """
     rules = _Transitions(kitchen, parts)
     start = rules.code(rules.first)
@@ -128,9 +128,9 @@ def flat_world(kitchen: Kitchen, parts: int) -> FlatWorld:
 
 
 class _Transitions:
-    """What an action does, to many states at once: columns robot cell, carried, plate, buffer, machine, buffer, machine.
+    """The effects of actions on many states at once, as columns: robot cell, carried, plate, buffer, machine, buffer, machine.
 
-    A machine: 0 is empty, 1 done, n + 1 needs n more steps.
+    A machine is 0 if it is empty, 1 if it is done, n + 1 if it needs n more steps.
     """
 
     def __init__(self, kitchen: Kitchen, parts: int) -> None:
@@ -152,11 +152,11 @@ class _Transitions:
         return list(np.unravel_index(code, self._sizes))
 
     def done(self, code: Count) -> BoolArray:
-        """Whether nothing is left anywhere but on the finished plate."""
+        """Whether all toasts are on the finished plate."""
         return np.asarray(sum(self.state(code)[1:]) == 0)
 
     def after(self, code: Count, action: int) -> Count:
-        """The state one step later. Of states that are done it does not matter."""
+        """The states one step later; those after a done state have no meaning."""
         cell, carried, plate, *line = self.state(code)
         before = list(line)
         for machine in (1, 3):

@@ -14,7 +14,7 @@ from lab_studies.comparisons.advice_bench.advice_bench import advice_bench
 from lab_studies.comparisons.advice_bench.bad_advisors import ADVISORS, advice_of, importance
 from lab_studies.comparisons.advice_bench.problems import problem
 from lab_studies.comparisons.advice_bench.ranks import holm, ranks
-from lab_studies.comparisons.advice_bench.sessions import RULES, Case, tried
+from lab_studies.comparisons.advice_bench.sessions import RULES, Case, case_outcomes
 
 
 def test_layouts_take_as_many_moves_as_by_hand() -> None:
@@ -85,10 +85,10 @@ def test_ranks_by_hand() -> None:
 
 
 def test_every_rule_runs_and_nobody_is_the_same_whatever_the_advisor() -> None:
-    found = tried(Case("empty", "expert"), 3, 0)
+    found = case_outcomes(Case("empty", "expert"), 3, 0)
     assert {rule for rule, _ in found} == {*RULES}
     assert all(one.points.shape == (3,) and one.answers.max() <= 100 for key, one in found.items() if key[1] == "100")
-    nobody = tried(Case("empty", None), 3, 0)["nobody", "any"]
+    nobody = case_outcomes(Case("empty", None), 3, 0)["nobody", "any"]
     assert found["always", "any"].points == pytest.approx([100.0] * 3, abs=0.5)
     assert found["earned-trust", "any"].points.mean() > nobody.points.mean()
 

@@ -20,11 +20,11 @@ from lab_studies.comparisons.advice_budget import (
     TARGETS,
     VIEWS,
     WORLDS,
-    Asked,
+    BudgetCell,
     difference,
     in_short,
     settings,
-    worst,
+    worst_advisor_rows,
 )
 from lab_studies.thesis.chapter_9_sessions import (
     AdviceOutcome,
@@ -37,7 +37,7 @@ from lab_studies.thesis.chapter_9_sessions import (
 
 ASKED = len(ASKING) * len(ADVISORS)
 CELLS = len(PLACES) * 2 + len(WORLDS) * ASKED + len(PLACES) * len(VIEWS) * ASKED  # nobody; without memory; with it
-FEW = Asked("world-1", "full", "ccrl", "limited", True)
+FEW = BudgetCell("world-1", "full", "ccrl", "limited", True)
 TARGETS_IN_ROWS = {name: list(pair) for name, pair in TARGETS.items()}
 
 
@@ -57,13 +57,13 @@ def found() -> Findings:
 
 
 @pytest.fixture(scope="module")
-def outcomes() -> Mapping[Asked, AdviceOutcome]:
+def outcomes() -> Mapping[BudgetCell, AdviceOutcome]:
     """Sixty of a hundred succeed everywhere but in a few cells."""
     made = dict.fromkeys(settings(), outcome(60, 100, 20))
     made[FEW] = outcome(50, 100, 9)
     made[FEW._replace(memory=False)] = outcome(1, 100, 1000)
-    made[Asked("world-1", "full", "never", NOBODY, True)] = outcome(90, 100)
-    made[Asked("world-2", "limited", "importance", "wrong", True)] = outcome(20, 100, 3)
+    made[BudgetCell("world-1", "full", "never", NOBODY, True)] = outcome(90, 100)
+    made[BudgetCell("world-2", "limited", "importance", "wrong", True)] = outcome(20, 100, 3)
     return made
 
 
@@ -125,7 +125,7 @@ def test_advisors_may_know_a_learned_table(monkeypatch: pytest.MonkeyPatch) -> N
     learned = STUDIES["advice-budget"].run(Job(sessions=2), {"advisor_table": "learned"})
     tables = {one["advisor_table"] for one in learned.rows if "advisor_table" in one}
     assert tables == {"learned"}
-    assert any("learned by an autonomous session" in note for note in learned.notes)
+    assert any("1000 episodes that begin anywhere" in note for note in learned.notes)
 
 
 def test_the_difference_of_two_shares_has_newcombes_interval() -> None:
@@ -136,19 +136,19 @@ def test_the_difference_of_two_shares_has_newcombes_interval() -> None:
     np.testing.assert_allclose(back, [-gap, -high, -low])
 
 
-def test_the_worst_advisor_is_held_against_nobody(outcomes: Mapping[Asked, AdviceOutcome]) -> None:
-    alone, kept = worst(outcomes, "world-1", "full")
+def test_the_worst_advisor_is_held_against_nobody(outcomes: Mapping[BudgetCell, AdviceOutcome]) -> None:
+    alone, kept = worst_advisor_rows(outcomes, "world-1", "full")
     assert (alone["advisor"], kept["advisor"]) == ("limited", "limited")
     assert (alone["against"], kept["against"]) == ("alone", "alone, with memory")
     np.testing.assert_allclose([alone["value"], kept["value"]], [-10.0, -40.0])
     assert kept["ci95"][1] < 0 < alone["ci95"][1]
-    any_gate = worst(outcomes, "world-2", "limited", ASKING)[0]
+    any_gate = worst_advisor_rows(outcomes, "world-2", "limited", ASKING)[0]
     assert (any_gate["gate"], any_gate["advisor"], any_gate["over"]) == ("importance", "wrong", "any gate")
 
 
-def test_targets_are_met_or_missed(outcomes: Mapping[Asked, AdviceOutcome]) -> None:
+def test_targets_are_met_or_missed(outcomes: Mapping[BudgetCell, AdviceOutcome]) -> None:
     rows = [one for cell, made in outcomes.items() for one in advice_budget.rows_of(cell, made, "exact")]
-    below = [one for gates in (("ccrl",), ASKING) for one in worst(outcomes, "world-1", "full", gates)]
+    below = [one for gates in (("ccrl",), ASKING) for one in worst_advisor_rows(outcomes, "world-1", "full", gates)]
     says = in_short(rows, below)
     assert (
         says["limited, target 85 % / 150 steps"]
@@ -156,7 +156,7 @@ def test_targets_are_met_or_missed(outcomes: Mapping[Asked, AdviceOutcome]) -> N
     )
     assert says["world-1: alone"] == "60.0 %"
     assert says["worst_below_alone"] == -10.0
-    assert says["worst_below_alone target"] == "at least -2 points: open: the interval holds it"
+    assert says["worst_below_alone target"] == "at least -2 points: open: the interval contains it"
     assert says["worst_below_alone_with_memory"] == -40.0
     assert says["worst_below_alone_with_memory target"] == "at least -2 points: missed"
     better = dict(outcomes) | {FEW: outcome(85, 100, 149)}
@@ -169,7 +169,7 @@ def test_targets_are_met_or_missed(outcomes: Mapping[Asked, AdviceOutcome]) -> N
     [
         ((-1.9, 5.0), "met, with its interval"),
         ((-9.0, -2.1), "missed"),
-        ((-3.0, 1.0), "open: the interval holds it"),
+        ((-3.0, 1.0), "open: the interval contains it"),
     ],
 )
 def test_a_verdict_needs_its_interval(ends: tuple[float, float], says: str) -> None:
@@ -193,7 +193,7 @@ def test_a_setting_says_whether_advice_is_remembered() -> None:
 
 
 def test_the_random_worlds_share_the_sessions_and_have_a_limited_view() -> None:
-    ones = settings()[Asked(RANDOM, "limited", "always", "expert", True)][:3]
+    ones = settings()[BudgetCell(RANDOM, "limited", "always", "expert", True)][:3]
     joined = advice_budget._joined(ones, 2, 0)
     parts = [sessions_of(one, 2, 0) for one in ones]
     assert joined.success.tolist() == [one for part in parts for one in part.success.tolist()]

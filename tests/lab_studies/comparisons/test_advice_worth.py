@@ -16,11 +16,11 @@ from lab_studies.comparisons.advice_worth import (
     Pupil,
     Watch,
     in_short,
-    joined,
-    moves_of,
+    joined_costs,
+    lessons_cost,
+    moves_picture,
     rows_of,
-    solved_after,
-    taught,
+    solved_picture,
 )
 
 CORRIDOR = grid((1, 4), np.zeros((1, 4), bool), (0, 0), (0, 3))
@@ -50,16 +50,16 @@ def test_what_an_advisor_saves() -> None:
         "saved_percent": pytest.approx(50.0),
     }
     assert len(rows_of("butter at butter_applier", NOBODY, found)) == 4
-    assert joined([TWO, FOUR]).moves.tolist() == [1, 3, 3, 5]
+    assert joined_costs([TWO, FOUR]).moves.tolist() == [1, 3, 3, 5]
     costs = {"butter": dict.fromkeys(("none", "expert", "moderate", "limited", "novice", "wrong"), TWO)}
     assert in_short(costs)["butter, expert: moves"] == 2
-    for picture in (moves_of(costs), solved_after(costs["butter"])):
+    for picture in (moves_picture(costs), solved_picture(costs["butter"])):
         assert picture.startswith(b"<?xml")
 
 
 def test_every_advisor_has_the_same_lessons() -> None:
     alone, again, helped = (
-        taught(Pupil("insert at toaster", name), lessons=2, seed=0) for name in ("none", "none", "expert")
+        lessons_cost(Pupil("insert at toaster", name), lessons=2, seed=0) for name in ("none", "none", "expert")
     )
     assert alone.moves.tolist() == again.moves.tolist()
     assert alone.solved.all()

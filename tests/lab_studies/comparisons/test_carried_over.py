@@ -13,11 +13,11 @@ from lab_studies.comparisons import carried_over as study
 from lab_studies.comparisons.carried_over import (
     ALL,
     CARRIED,
-    Surveyed,
+    Survey,
     carried_over,
     decisions_per_s,
     rows_of,
-    surveyed,
+    survey_record,
 )
 from lab_studies.comparisons.carried_over_families import (
     BILGE_ULUSOY,
@@ -25,12 +25,12 @@ from lab_studies.comparisons.carried_over_families import (
     SMALL,
     THESIS_TOASTS,
     TOAST,
-    Unseen,
-    unseen_cell,
+    LargerCell,
+    larger_cell,
 )
 from lab_studies.comparisons.carried_over_learning import CarriedLearning
 
-EX11, TWENTY = Unseen(SHOP, BILGE_ULUSOY, 0, 96.0), Unseen(TOAST, THESIS_TOASTS, 0)
+EX11, TWENTY = LargerCell(SHOP, BILGE_ULUSOY, 0, 96.0), LargerCell(TOAST, THESIS_TOASTS, 0)
 SOONEST = CarriedPolicy({"delay": -1.0})
 
 
@@ -38,21 +38,21 @@ SOONEST = CarriedPolicy({"delay": -1.0})
 def short(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(study, "SETTINGS", CarriedLearning(8, 6, 4))
     monkeypatch.setattr(study, "REPEATS", 1)
-    monkeypatch.setattr(study, "unseen", lambda: (EX11, TWENTY))
+    monkeypatch.setattr(study, "larger_cells", lambda: (EX11, TWENTY))
 
 
 def test_a_larger_cell_is_surveyed() -> None:
     """EX11's best value is printed; of 20 toasts the optimum is proven."""
-    printed, toasts = Surveyed(**surveyed(EX11)), Surveyed(**surveyed(TWENTY))
+    printed, toasts = Survey(**survey_record(EX11)), Survey(**survey_record(TWENTY))
     assert (printed.best, printed.bound, printed.proven, printed.moves) == (96.0, 96.0, True, 26)
     assert toasts.proven
     assert toasts.rules["nearest-ready"] > toasts.best
-    assert not Surveyed(10.0, 9.0, {}, 1, {}).proven
+    assert not Survey(10.0, 9.0, {}, 1, {}).proven
 
 
 def test_rows_by_hand() -> None:
     """What begins soonest first is nearest-ready: the same gap as the rule, with any family's name on it."""
-    found = Surveyed(**surveyed(TWENTY))
+    found = Survey(**survey_record(TWENTY))
     rows = rows_of(TOAST, THESIS_TOASTS, {TWENTY: found}, {ALL: SOONEST, TOAST: SOONEST})
     gap = 100.0 * (found.rules["nearest-ready"] / found.best - 1.0)
     best = those(rows, best_rule=True, measure="mean gap_percent")
@@ -67,7 +67,7 @@ def test_rows_by_hand() -> None:
 
 def test_a_hundred_thousand_decisions_a_second() -> None:
     """In the largest of the printed cells, with every feature."""
-    decider = Decider(unseen_cell(Unseen(SHOP, BILGE_ULUSOY, 39, 157.0)))
+    decider = Decider(larger_cell(LargerCell(SHOP, BILGE_ULUSOY, 39, 157.0)))
     decisions_per_s([decider], SOONEST)  # compiles
     assert max(decisions_per_s([decider], SOONEST) for _ in range(5)) > 1e5
 

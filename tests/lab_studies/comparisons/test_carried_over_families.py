@@ -14,9 +14,9 @@ from lab_studies.comparisons.carried_over_families import (
     SMALL,
     THESIS_TOASTS,
     TOAST,
+    larger_cell,
+    larger_cells,
     small_cells,
-    unseen,
-    unseen_cell,
 )
 
 LEAST_MOST = {SHOP: (3, 5), TOAST: (3, 8), FMS: (3, 8)}
@@ -41,10 +41,13 @@ def test_of_all_families_in_turn() -> None:
 
 
 def test_the_larger_ones_are_larger() -> None:
-    of = {group: [one for one in unseen() if one.group == group] for group in dict.fromkeys(o.group for o in unseen())}
+    of = {
+        group: [one for one in larger_cells() if one.group == group]
+        for group in dict.fromkeys(o.group for o in larger_cells())
+    }
     assert [len(group) for group in of.values()] == [40, 12, 15, 20, 10]
-    assert [unseen_cell(one).parts for one in of[THESIS_TOASTS]] == [20, 30, 40, 50, 60] * 3
-    assert [unseen_cell(one).parts for one in of[ORDERS]] == [*range(12, 32, 2)]
-    assert all(10 <= unseen_cell(one).parts <= 20 for one in of[MORE_JOBS])
+    assert [larger_cell(one).parts for one in of[THESIS_TOASTS]] == [20, 30, 40, 50, 60] * 3
+    assert [larger_cell(one).parts for one in of[ORDERS]] == [*range(12, 32, 2)]
+    assert all(10 <= larger_cell(one).parts <= 20 for one in of[MORE_JOBS])
     assert [one.printed for one in of[BILGE_ULUSOY]][:3] == [96.0, 100.0, 99.0]
-    assert all(len(unseen_cell(one).robots) == 2 for one in of[BILGE_ULUSOY])
+    assert all(len(larger_cell(one).robots) == 2 for one in of[BILGE_ULUSOY])

@@ -10,7 +10,7 @@ from lab.studies.findings import those
 from lab.studies.runner import Job
 from lab.tasks.task_file import load
 from lab_studies.comparisons import changed_scenes_study as study
-from lab_studies.comparisons.changed_scenes import KINDS, Scene, surveyed
+from lab_studies.comparisons.changed_scenes import KINDS, Scene, survey_of_scene
 from lab_studies.comparisons.changed_scenes_study import (
     WAYS,
     Outcome,
@@ -19,7 +19,7 @@ from lab_studies.comparisons.changed_scenes_study import (
     in_short,
     rows_of,
     rows_of_scene,
-    tried,
+    scene_outcome,
 )
 
 NONE = Tally(0, 0, 0, 0.0, (0, 0))
@@ -84,12 +84,12 @@ def few(monkeypatch: pytest.MonkeyPatch) -> None:
         return prepared
 
     def scene(*given: Any) -> tuple[Prepared, str, int]:
-        prepared, words, refused = surveyed(*given)
+        prepared, words, refused = survey_of_scene(*given)
         return some(prepared), words, refused
 
     monkeypatch.setattr(study, "prepare", lambda *given: some(prepare(*given)))
-    monkeypatch.setattr(study, "surveyed", scene)
-    study.learned_here.cache_clear()
+    monkeypatch.setattr(study, "survey_of_scene", scene)
+    study.original_scene.cache_clear()
 
 
 def test_one_scene_of_few_skills_from_end_to_end(few: None) -> None:
@@ -102,8 +102,8 @@ def test_one_scene_of_few_skills_from_end_to_end(few: None) -> None:
         assert [one["value"] for one in those(found.rows, kind="all", measure=measure)] == [0.0]
     assert {one["value"] for one in those(found.rows, measure="success_percent")} == {100.0}
     assert "changed scenes" in found.notes[0]
-    base, known, learned = study.learned_here()
+    base, known, learned = study.original_scene()
     assert base.layout == prepare(load("toast"), load("toast").order(3), 0).layout
     assert len(known) <= len(learned) == 4
-    assert tried(Scene(next(iter(KINDS)), 0, 0)).words in skills[0]["task"]
-    study.learned_here.cache_clear()
+    assert scene_outcome(Scene(next(iter(KINDS)), 0, 0)).words in skills[0]["task"]
+    study.original_scene.cache_clear()

@@ -17,8 +17,8 @@ from lab.studies import STUDIES
 from lab.studies.findings import those
 from lab.studies.runner import Job
 from lab_studies.comparisons import grips as study
-from lab_studies.comparisons.grip_models import GRASPABLE_M, MODELS, Model, roll_and_pitch, written
-from lab_studies.comparisons.grip_trials import ARM, CARRY_M, OVER_M, Outcome, Setting, drawn, tried
+from lab_studies.comparisons.grip_models import GRASPABLE_M, MODELS, Model, part_of_model, roll_and_pitch
+from lab_studies.comparisons.grip_trials import ARM, CARRY_M, OVER_M, Outcome, Setting, model_outcome, random_places
 from lab_studies.comparisons.grips import grips, in_short, rows_of
 
 GRIP = Grip(0.5, 0.02, 0.0, 0.0, 0.03, np.pi)
@@ -51,7 +51,7 @@ def test_in_short() -> None:
 
 @given(st.integers(0, 2**32))
 def test_a_part_is_carried_half_a_metre_between_places_that_the_arm_reaches(seed: int) -> None:
-    begin, end = drawn(np.random.default_rng(seed))
+    begin, end = random_places(np.random.default_rng(seed))
     assert hypot(end[0] - begin[0], end[1] - begin[1]) == pytest.approx(CARRY_M)
     arm = arm_of(ARM)
     for x, y, yaw in (begin, end):
@@ -76,18 +76,18 @@ def _product(p: np.ndarray, q: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("model", MODELS, ids=lambda model: model.name)
 def test_every_model_is_a_part_of_graspable_size(model: Model, tmp_path: Path) -> None:
-    shape = shape_of(written(model, tmp_path), tmp_path)
+    shape = shape_of(part_of_model(model, tmp_path), tmp_path)
     low, middle, high = sorted(shape.high - shape.low)
     assert 0.004 < low <= middle < 1.5 * GRASPABLE_M
     assert high < 0.12
 
 
 def test_a_prism_arrives_and_a_domino_on_its_side_is_refused_with_its_height() -> None:
-    found = tried(Setting("prism", 1, 0))
+    found = model_outcome(Setting("prism", 1, 0))
     assert (found.refused, found.failures) == ("", ("",))
     assert found.off_m[0] < 0.015
-    assert tried(Setting("prism", 1, 0)) == found, "the same seed, the same result"
-    domino = tried(Setting("domino", 1, 0))
+    assert model_outcome(Setting("prism", 1, 0)) == found, "the same seed, the same result"
+    domino = model_outcome(Setting("domino", 1, 0))
     assert "part 'domino' is 0.0064 m high as it stands, too flat for the fingers" in domino.refused
     assert (domino.failures, domino.grip) == ((), None)
 

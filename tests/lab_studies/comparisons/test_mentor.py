@@ -1,10 +1,10 @@
 """The study of mentors, in small: it learns policies, calibrates and holds rules against chance at equal questions."""
 
-from lab_studies.comparisons.mentor import CHANCE, FIXED, SHARES, Place, policies_of, rows_of
+from lab_studies.comparisons.mentor import CHANCE, FIXED, SHARES, Place, layout_tally, rows_of
 
 
 def test_rules_are_held_against_chance_at_equal_questions() -> None:
-    found = policies_of(Place("lava"), 2, 0)
+    found = layout_tally(Place("lava"), 2, 0)
     assert {rule for rule, _ in found} == {*FIXED, CHANCE, "always", "never", "fixed threshold"}
     assert all(len(solved) == len(questions) == 2 for solved, questions in found.values())
     rows = rows_of("lava", found)

@@ -62,7 +62,7 @@ def test_the_study_has_all_rules_and_says_what_differs(tmp_path: Path, monkeypat
     }
     assert helped["sober", "nobody"] == 0.0
     assert 900.0 < helped["sober", "early"] <= 1000.0  # ten ways of its teacher
-    assert any("differs from Torrey" in note for note in document["notes"])
+    assert any("Torrey and Taylor" in note for note in document["notes"])
 
 
 def test_speeds_are_of_all_ways_to_make_a_step(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -12,18 +12,18 @@ from lab_studies.comparisons.reacting import (
     LIST,
     ROLLING,
     RULE,
-    Reacted,
     Setting,
-    reacted,
+    SettingOutcome,
     reacting,
     rows_of,
+    setting_outcome,
 )
 
 SETTING = Setting("toast-case-1", "TT", "exponential times")
 
 
 def test_nothing_beats_hindsight() -> None:
-    found = reacted(SETTING, 5, 0)
+    found = setting_outcome(SETTING, 5, 0)
     assert found.proven == 5
     for name in (LIST, RULE, ANEW, ROLLING):
         assert (found.costs[name] >= found.costs[HINDSIGHT] - 1e-6).all(), name
@@ -31,7 +31,7 @@ def test_nothing_beats_hindsight() -> None:
 
 def test_rows() -> None:
     costs = {LIST: [110.0, 130.0], RULE: [120.0, 120.0], ANEW: [105.0, 125.0], ROLLING: [100.0, 120.0]}
-    found = Reacted(
+    found = SettingOutcome(
         {**{n: np.array(c) for n, c in costs.items()}, HINDSIGHT: np.array([100.0, 100.0])}, "fifo", 0.01, 2
     )
     rows = rows_of(SETTING, found)
@@ -52,7 +52,7 @@ def test_the_whole(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_several_robots_that_break_down() -> None:
     """Nothing rolls there, hindsight is a bound, and what is planned anew saves over the list."""
-    found = reacted(Setting("two-carriers", "BBB", study.ROBOTS), 3, 0)
+    found = setting_outcome(Setting("two-carriers", "BBB", study.ROBOTS), 3, 0)
     assert (set(found.costs), found.proven, found.decision_s) == ({LIST, RULE, ANEW, HINDSIGHT}, 0, None)
     assert all((costs >= found.costs[HINDSIGHT] - 1e-6).all() for costs in found.costs.values())
     assert found.costs[ANEW].mean() <= found.costs[LIST].mean()

@@ -64,7 +64,7 @@ def test_rows_by_hand() -> None:
     says = in_short(rows, 2)
     assert (
         says["answer"]
-        == "yes: later tasks of an order save 92 % (36 to 148) of the episodes that they take from nothing"
+        == "yes: later tasks of an order save 92 % (36 to 148) of the episodes that they take from scratch"
     )
     assert says["episodes saved by place"] == "2nd 92 % (36 to 148)"
     assert (says["carry over"], says["do not carry over"]) == ("grasp 100 %, transfer 50 %", "none")
@@ -109,7 +109,7 @@ def test_pictures_say_what_they_show() -> None:
     places, tasks = by_place(rows).decode(), by_task(rows).decode()
     assert "<title>order 1: a, b</title>" in places
     assert "<title>order 1: b 96 %</title>" in places
-    assert all(name in tasks for name in ("taken from an earlier task", "learned from nothing", ">a<", ">b<"))
+    assert all(name in tasks for name in ("taken from an earlier task", "learned from scratch", ">a<", ">b<"))
 
 
 @pytest.mark.parametrize(("number", "said"), [(1, "1st"), (2, "2nd"), (3, "3rd"), (4, "4th"), (11, "11th")])
@@ -134,7 +134,7 @@ def few(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
         return first
 
     def forget() -> None:
-        study._lived.cache_clear()
+        study._life.cache_clear()
         study._prepared.cache_clear()
 
     monkeypatch.setattr(study, "prepare", some)
@@ -163,7 +163,7 @@ def test_two_small_tasks_in_both_orders(few: None) -> None:
     assert found.summary["do not carry over"] == "insert 0 %"
     assert (found.summary["taken_failing_percent"], found.summary["unsolved_percent"]) == (0.0, 0.0)
     assert found.summary["episodes saved after toast"].endswith("toast-panda 100 %")
-    study._lived.cache_clear()
+    study._life.cache_clear()
     again = reuse(Job(2), {})
     assert [_but_time(one) for one in again.rows] == [_but_time(one) for one in found.rows]
 

@@ -19,9 +19,9 @@ from lab_studies.comparisons.several_advisors import (
     PanelSetting,
     advisors,
     in_short,
-    names_in,
+    member_names,
+    panel_outcome,
     rows_of,
-    tried,
 )
 from lab_studies.thesis.chapter_9_sessions import AdviceSetting
 
@@ -34,27 +34,28 @@ def counts(*values: int) -> np.ndarray:
 
 
 def test_nobody_and_an_expert_alone() -> None:
-    alone = tried(PanelSetting((), None, EXACT), sessions=3, seed=0)
+    alone = panel_outcome(PanelSetting((), None, EXACT), sessions=3, seed=0)
     assert alone.helped_steps.tolist() == [0, 0, 0]
-    expert = tried(PanelSetting(("expert",), None, EXACT), sessions=3, seed=0)
+    expert = panel_outcome(PanelSetting(("expert",), None, EXACT), sessions=3, seed=0)
     assert (expert.helped_steps > 0).all()
     assert (expert.dropped, expert.disagreed.tolist()) == ({}, [0, 0, 0])
 
 
 def test_two_advisors_disagree_and_one_is_dropped() -> None:
-    found = tried(PanelSetting(PAIR, IN_TURN, EXACT), sessions=2, seed=0)
+    found = panel_outcome(PanelSetting(PAIR, IN_TURN, EXACT), sessions=2, seed=0)
     assert found.disagreed.tolist() == [0, 0]  # one is asked at a time
     assert found.dropped["wrong"].tolist() == [1, 1]
-    together = tried(PanelSetting(PAIR, "majority", EXACT), sessions=2, seed=0)
+    together = panel_outcome(PanelSetting(PAIR, "majority", EXACT), sessions=2, seed=0)
     assert (together.disagreed > 0).all()
     for way in DECISIONS:  # between two there is no majority: the more trusted one decides
-        again = tried(PanelSetting(PAIR, way, EXACT), sessions=2, seed=0)
+        again = panel_outcome(PanelSetting(PAIR, way, EXACT), sessions=2, seed=0)
         assert again.helped_steps.tolist() == together.helped_steps.tolist()
 
 
 def test_chance_depends_on_the_seed_and_the_members() -> None:
     one = [
-        tried(PanelSetting(("novice",), None, EXACT), sessions=2, seed=seed).helped_steps.tolist() for seed in (0, 0, 1)
+        panel_outcome(PanelSetting(("novice",), None, EXACT), sessions=2, seed=seed).helped_steps.tolist()
+        for seed in (0, 0, 1)
     ]
     assert one[0] == one[1] != one[2]
 
@@ -88,7 +89,7 @@ def test_rows_by_hand() -> None:
 
 
 def test_names_in_a_panel() -> None:
-    assert names_in(("wrong", "expert", "wrong", "wrong")) == ["wrong", "expert", "wrong 2", "wrong 3"]
+    assert member_names(("wrong", "expert", "wrong", "wrong")) == ["wrong", "expert", "wrong 2", "wrong 3"]
 
 
 @pytest.fixture(scope="module")

@@ -12,16 +12,16 @@ from lab.sequencing.methods.exact import optimum
 from lab.studies.findings import Findings
 from lab.studies.runner import Job
 from lab_studies.comparisons import srl_time_compared, srl_time_sessions
-from lab_studies.comparisons.srl_time_compared import rows_of, settings_of, srl_time_study, works_of
+from lab_studies.comparisons.srl_time_compared import instances, rows_of, settings_of, srl_time_study
 from lab_studies.comparisons.srl_time_sessions import (
     CAPS,
     UNBOUNDED,
     Instance,
     MethodOutcome,
     MethodSetting,
+    method_outcome,
     sessions_for,
-    single,
-    tried,
+    single_sequence_methods,
 )
 
 THREE = Instance("II", 3)
@@ -30,7 +30,7 @@ RULES = ("shortest-move", "longest-remaining-work", "most-urgent-machine", "near
 
 
 def test_what_is_sequenced() -> None:
-    works = works_of()
+    works = instances()
     assert [work.size for work in works] == ["few"] * 6 + ["many"] * 9 + ["order"] * 8
     assert (THREE.cell.parts, RSR.cell.parts) == (3, 3)
     assert optimum(THREE.cell).cost == 700.0  # printed
@@ -38,8 +38,8 @@ def test_what_is_sequenced() -> None:
 
 
 def test_every_rival_is_asked() -> None:
-    assert sorted(single(THREE)) == sorted(("fifo", *RULES, "exact", "cp-sat"))
-    assert "cp-sat" not in single(RSR)  # it does not prove all of them in seconds
+    assert sorted(single_sequence_methods(THREE)) == sorted(("fifo", *RULES, "exact", "cp-sat"))
+    assert "cp-sat" not in single_sequence_methods(RSR)  # it does not prove all of them in seconds
     asked = {(one.method, one.reward_factor) for one in settings_of(THREE) if one.episodes is not None}
     learners = {("srl", "B"), ("srl-time", None), (UNBOUNDED, None), ("random", None), ("ga", None)}
     assert asked == learners | {("srl", "A"), ("mc", None)}
@@ -75,20 +75,21 @@ def test_what_takes_long_is_tried_less_often(setting: MethodSetting, sessions: i
 def test_what_sessions_come_to(method: str) -> None:
     learns = method in srl_time_sessions.LEARNING
     setting = MethodSetting(THREE, method, 10 if learns else None, "A" if method == "srl" else None)
-    found = tried(setting, sessions=3, seed=1)
+    found = method_outcome(setting, sessions=3, seed=1)
     assert len(found.gap) == len(found.wall_s) == (3 if learns else 1)
     assert (found.gap >= 0).all()
     assert (found.wall_s > 0).all()
     assert np.isfinite(found.final_gap).all() == (method in ("srl", "mc", "srl-time", UNBOUNDED))
     if method in ("exact", "cp-sat"):
         assert found.gap.tolist() == [0.0]
-    again = tried(setting, sessions=3, seed=1)
+    again = method_outcome(setting, sessions=3, seed=1)
     assert again.gap.tolist() == found.gap.tolist()
 
 
 def test_seeds_are_those_of_the_study() -> None:
     gaps = [
-        tried(MethodSetting(Instance("II", 10), "random", 5), sessions=4, seed=seed).gap.tolist() for seed in (0, 1)
+        method_outcome(MethodSetting(Instance("II", 10), "random", 5), sessions=4, seed=seed).gap.tolist()
+        for seed in (0, 1)
     ]
     assert gaps[0] != gaps[1]
     assert len({*gaps[0]}) > 1

@@ -12,9 +12,9 @@ from lab.errors import BadInput, WorkFailed
 from lab.studies import run_study
 from lab.studies.findings import those
 from lab.studies.runner import STORE, Job
-from lab_studies.comparisons.transport import entries_of, faults_of, measured, rows_of, transport, verified
-from lab_studies.comparisons.transport_entries import CYCLIC, PROVERS, Entry, Found, carried_out
-from lab_studies.comparisons.transport_instances import Instance, board, cell_of, own
+from lab_studies.comparisons.transport import entries_of, faults_of, measured, rows_of, transport, verification
+from lab_studies.comparisons.transport_entries import CYCLIC, PROVERS, Entry, EntryResult, entry_result
+from lab_studies.comparisons.transport_instances import Instance, board, cell_of, own_instances
 
 TOAST = next(one for one in board() if one.name == "case I, 3 toasts")
 EX11 = next(one for one in board() if (one.name, one.robots) == ("bu-11", 2))
@@ -27,7 +27,7 @@ TINY = "1 2\n0 3 1 4\n"
 def tiny(tmp_path: Path) -> Instance:
     path = tmp_path / "tiny.jsp"
     path.write_text(TINY, encoding="utf-8")
-    return own([path])[0]
+    return own_instances([path])[0]
 
 
 def test_every_instance_that_comes_with_the_lab_can_be_read() -> None:
@@ -42,7 +42,7 @@ def test_every_instance_that_comes_with_the_lab_can_be_read() -> None:
 @pytest.mark.parametrize("method", ["fifo", "anneal", "exact", "portfolio"])
 def test_an_entry_by_hand(tiny: Instance, method: str) -> None:
     """7 s, which a machine that has one job only cannot be late for."""
-    found = carried_out(Entry(tiny, method, 0.1, 0))
+    found = entry_result(Entry(tiny, method, 0.1, 0))
     if found.refused:
         assert (method, found.cost) == ("exact", None)
         assert found.refused.startswith("neither by states nor by tours: ")
@@ -53,12 +53,12 @@ def test_an_entry_by_hand(tiny: Instance, method: str) -> None:
 
 
 def test_what_a_method_does_not_take_is_told() -> None:
-    found = carried_out(Entry(EX11, "exact", 0.1, 0))
+    found = entry_result(Entry(EX11, "exact", 0.1, 0))
     assert (found.cost, found.refused) == (None, "neither by states nor by tours: it needs one robot")
 
 
 def test_a_cycle_is_measured_by_its_period_and_shown_part_by_part() -> None:
-    found = carried_out(Entry(HOIST, CYCLIC, 60.0, 0))
+    found = entry_result(Entry(HOIST, CYCLIC, 60.0, 0))
     assert found.cost == pytest.approx(521.0)
     assert found.bound == pytest.approx(521.0)
     assert found.ends_s > 12 * 521.0
@@ -67,9 +67,9 @@ def test_a_cycle_is_measured_by_its_period_and_shown_part_by_part() -> None:
 
 def test_a_line_a_method() -> None:
     of = {
-        "fifo": Found(120.0, "fifo", trace=((0.01, 120.0),)),
-        "portfolio": Found(100.0, "CP-SAT", 100.0, "CP-SAT", ((2.0, 100.0),)),
-        "srl": Found(refused="not found"),
+        "fifo": EntryResult(120.0, "fifo", trace=((0.01, 120.0),)),
+        "portfolio": EntryResult(100.0, "CP-SAT", 100.0, "CP-SAT", ((2.0, 100.0),)),
+        "srl": EntryResult(refused="not found"),
     }
     rows = rows_of(replace(EX11, printed=100.0), of)
     assert [one["method"] for one in those(rows, measure="cost")] == ["fifo", "portfolio"]
@@ -86,7 +86,7 @@ def test_what_is_kept_is_not_measured_again(tiny: Instance, tmp_path: Path, monk
     found = measured(job, entries)
     store = tmp_path / "out" / STORE
     store.write_text(store.read_text(encoding="utf-8") + '{"entry": 3}\nno json\n', encoding="utf-8")
-    monkeypatch.setattr("lab_studies.comparisons.transport.carried_out", lambda _: pytest.fail("it is kept"))
+    monkeypatch.setattr("lab_studies.comparisons.transport.entry_result", lambda _: pytest.fail("it is kept"))
     assert measured(job, entries) == found
     assert len(found) == 2
 
@@ -103,7 +103,7 @@ def changed(record: dict[str, Any], column: int, value: object) -> dict[str, Any
     [
         (5, 1.0, r"^1 schedule of 1 found wrong: tiny\.jsp, fifo: "),  # it begins later
         (2, "elsewhere", r"^1 schedule of 1 found wrong: tiny\.jsp, fifo: "),
-        (0, "nobody", r"^1 schedule of 1 found wrong: tiny\.jsp, fifo: a row that cannot be: "),
+        (0, "nobody", r"^1 schedule of 1 found wrong: tiny\.jsp, fifo: an impossible row: "),
     ],
 )
 def test_a_schedule_that_was_tampered_with_is_found(
@@ -121,10 +121,10 @@ def test_a_schedule_that_was_tampered_with_is_found(
 
 def test_a_claim_of_another_cost_is_found(tiny: Instance) -> None:
     entry = Entry(tiny, "fifo", 0.1, 0)
-    found = carried_out(entry)
-    assert verified({entry: found}) == "1 of 1"
+    found = entry_result(entry)
+    assert verification({entry: found}) == "1 of 1"
     with pytest.raises(WorkFailed, match=r"it ends at 7, not at 6$"):
-        verified({entry: replace(found, cost=6.0)})
+        verification({entry: replace(found, cost=6.0)})
 
 
 def test_what_is_told_of_all(tiny: Instance) -> None:

@@ -3,12 +3,19 @@
 import numpy as np
 
 from lab_studies.comparisons import whom_to_believe
-from lab_studies.comparisons.whom_to_believe import RANKED, RELIABILITIES, Setting, reliable, rows_of, sessions_of
+from lab_studies.comparisons.whom_to_believe import (
+    RANKED,
+    RELIABILITIES,
+    Setting,
+    reliable_chances,
+    rows_of,
+    sessions_of,
+)
 
 
 def test_an_advisor_is_right_as_often_as_is_said() -> None:
     values = np.array([[1.0, 1.0, 0.0, 0.5], [0.0, 2.0, 1.0, 1.0], [3.0, 3.0, 3.0, 3.0]])
-    chances = reliable(values, 0.9)
+    chances = reliable_chances(values, 0.9)
     assert np.allclose(chances[0], [0.45, 0.45, 0.05, 0.05])
     assert np.allclose(chances[1], [0.1 / 3, 0.9, 0.1 / 3, 0.1 / 3])
     assert np.allclose(chances[2], 0.25)  # nothing is wrong there

@@ -20,7 +20,7 @@ from lab_studies.many_sessions import evaluate
 from lab_studies.thesis import appendix_3, appendix_3_makespans
 from lab_studies.thesis.appendix_3 import METHODS, appendix_iii, orders_of, paired_p
 from lab_studies.thesis.appendix_3_fifo import STARTS, queued_fifo
-from lab_studies.thesis.appendix_3_makespans import FIFO, Mix, fms, made, times_seeds
+from lab_studies.thesis.appendix_3_makespans import FIFO, Mix, fms, order_makespans, times_seeds
 
 # Makespans [s] by the listing's own code, translated line by line by somebody else: order, arrivals every 100 s as
 # listed and with idle start, every 200 s as listed and with idle start.
@@ -130,11 +130,11 @@ def test_p_is_that_of_the_paired_test() -> None:
 
 
 @pytest.fixture(scope="module")
-def one() -> appendix_3_makespans.Made:
-    return made(Mix("RSR", 100.0), sessions=10, seed=3)
+def one() -> appendix_3_makespans.OrderMakespans:
+    return order_makespans(Mix("RSR", 100.0), sessions=10, seed=3)
 
 
-def test_what_is_made_of_an_order(one: appendix_3_makespans.Made) -> None:
+def test_what_is_made_of_an_order(one: appendix_3_makespans.OrderMakespans) -> None:
     """1205 s is the proven optimum, 1540 s and 1335 s are FIFO's; the sessions are those of the seed."""
     of = one.makespans_s
     assert one.proven
@@ -148,7 +148,7 @@ def test_what_is_made_of_an_order(one: appendix_3_makespans.Made) -> None:
         assert {len(of[method, law]) for method in (*lists, *FIFO.values())} == {replications}
     assert len(of["reacting", "exponential"]) == len(of["rollout", "exponential"]) == 1
     assert not {("srl greedy", "normal"), ("reacting", "normal"), ("rollout", "constant")} & {*of}
-    again = made(Mix("RSR", 100.0), sessions=10, seed=3)
+    again = order_makespans(Mix("RSR", 100.0), sessions=10, seed=3)
     assert {key: costs.tolist() for key, costs in again.makespans_s.items()} == {
         key: costs.tolist() for key, costs in of.items()
     }
@@ -156,7 +156,7 @@ def test_what_is_made_of_an_order(one: appendix_3_makespans.Made) -> None:
 
 def test_more_sessions_react_more_often(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(appendix_3_makespans, "REPLICATIONS", 8)
-    of = made(Mix("RS", 100.0), sessions=3000, seed=0).makespans_s
+    of = order_makespans(Mix("RS", 100.0), sessions=3000, seed=0).makespans_s
     assert len(of["reacting", "exponential"]) == 6  # one for 500 sessions, with a size that the thesis does not have
     assert len(of["srl", "normal"]) == 8
 

@@ -29,7 +29,7 @@ def rows() -> list[Row]:
 
 @pytest.mark.parametrize("seed", [0, 1])
 def test_the_session_shown_settles_on_the_optimum(seed: int) -> None:
-    times_s, sequence = figures.session(seed)
+    times_s, sequence = figures.shown_session(seed)
     assert len(times_s) == figures.SESSION.episodes
     assert times_s.min() == times_s[-1] == 700
     assert simulate(robot_cell("II", 3), sequence).makespan_s == 700
@@ -37,8 +37,8 @@ def test_the_session_shown_settles_on_the_optimum(seed: int) -> None:
 
 
 def test_pictures_of_one_session() -> None:
-    pictures = figures.alone(0)
-    assert pictures == figures.alone(0)
+    pictures = figures.session_pictures(0)
+    assert pictures == figures.session_pictures(0)
     settles, places, exploration = map(words, pictures.values())
     assert "optimum: 700 s" in settles
     assert "printed: from 67 on" in settles
@@ -56,11 +56,11 @@ def test_settles_where_the_time_stops_changing() -> None:
 def test_what_a_picture_by_length_shows(rows: list[Row]) -> None:
     """Only the cells of its case, toasts, environment and methods, each once; the printed ones beside them."""
     wanted = {"a": figures.Compared("II", 3, "deterministic")}
-    (picture,) = figures.lengths(rows, wanted).values()
+    (picture,) = figures.length_pictures(rows, wanted).values()
     own = [one for one in rows if (one["case"], one["environment"]) == ("II", "deterministic")]
     shown = [one for one in own if one.get("reward_factor") != "A"]
     assert len(rows) > len(own) > len(shown) == 6
-    assert figures.lengths(shown, wanted)["a"] == picture
+    assert figures.length_pictures(shown, wanted)["a"] == picture
     assert "3 toasts, case II" in words(picture)
     assert all(name in words(picture) for name in ("SRL, type B", "Monte Carlo", "random search", "printed"))
     assert "sessions that find the optimum [%]" in words(picture)
@@ -73,7 +73,7 @@ def test_drawn_times_are_shown_as_times(rows: list[Row]) -> None:
         *("Table 7.6: 4 toasts, case III", "Table 7.6: 4 toasts, case III, times drawn"),
     ]
     caption = "Table 7.6: 3 toasts, case III, times drawn"
-    (picture,) = figures.lengths(rows, {caption: captions[caption]}).values()
+    (picture,) = figures.length_pictures(rows, {caption: captions[caption]}).values()
     assert "mean best makespan [s]" in words(picture)
 
 

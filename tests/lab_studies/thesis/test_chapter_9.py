@@ -79,7 +79,7 @@ def test_learning_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None
     found = figure_9_4(JOB, {})
     assert (found.summary["cells"], len(found.rows)) == (2, 4)
     assert {"world-1", "world-2", "printed"} <= {*texts(*found.figures.values())}
-    assert "is reconstructed from the figures that it is compared with" in "".join(found.notes)
+    assert "tasks/world-2.toml, is reconstructed" in "".join(found.notes)
     check(found, tmp_path)
 
 
@@ -94,7 +94,7 @@ def test_the_appendix_is_all_worlds_and_views(monkeypatch: pytest.MonkeyPatch) -
     found = appendix_v(JOB, {"advisor_table": "exact"})
     assert asked == [*TABLES.values(), {"advisor_table": "exact"}]
     assert (found.summary["cells"], found.summary["within"]) == (1, 1)
-    assert "is reconstructed from the figures that it is compared with" in "".join(found.notes)
+    assert "tasks/world-2.toml, is reconstructed" in "".join(found.notes)
 
 
 def test_readings_are_compared_by_their_agreement(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -20,7 +20,7 @@ from lab_studies.thesis.chapter_9_cells import (
     Grid,
     PrintedLine,
     appendix,
-    by_beta,
+    beta_rows,
     describe,
     printed,
     table,
@@ -275,7 +275,7 @@ def test_ranks_are_those_of_the_scores(grid: Grid) -> None:
 def test_the_printed_success_stands_at_the_best_beta(monkeypatch: pytest.MonkeyPatch) -> None:
     assert {0.7, 1.3} < {*BETAS}
     monkeypatch.setattr(chapter_9_cells, "BETAS", (0.5, 0.7, 1.3))
-    rows = by_beta(JOB)
+    rows = beta_rows(JOB)
     assert [(one["world"], one["beta"], one["thesis"]) for one in rows] == [
         *(("world-1", 0.5, None), ("world-1", 0.7, None), ("world-1", 1.3, 63.0)),
         *(("world-2", 0.5, None), ("world-2", 0.7, 37.0), ("world-2", 1.3, None)),

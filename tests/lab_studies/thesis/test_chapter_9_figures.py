@@ -14,7 +14,7 @@ from lab.studies.findings import JUDGED, row, those
 from lab.studies.runner import Job
 from lab_studies.thesis import chapter_9_figures as figures
 from lab_studies.thesis.chapter_9_cells import TABLES, appendix
-from lab_studies.thesis.chapter_9_figures import NEVER_REJECTS, by_beta, convergence, walks
+from lab_studies.thesis.chapter_9_figures import NEVER_REJECTS, beta_picture, convergence, walk_rows
 from lab_studies.thesis.chapter_9_sessions import world
 
 JOB = Job(sessions=10)
@@ -25,7 +25,7 @@ GUIDED = [False] * 25 + [True] * 5 + [False] * 30
 def test_cells_of_the_figures() -> None:
     """Each figure varies one or two settings, and where the appendix has the cell, it is the same one."""
     rows, pictures = figures.figures(JOB, {})
-    assert len(pictures) == 3 + 2 * len(figures.compared())
+    assert len(pictures) == 3 + 2 * len(figures.figure_series())
     walked, cells = rows[:16], rows[16:]
     assert [one["tau"] for one in walked if one["measure"] == "SP_percent"] == [0.01, 0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 1]
     assert [one["thesis"] for one in walked if one["thesis"]] == [100.0, 13.0, 178.0]
@@ -64,7 +64,7 @@ def _named(one: dict[str, Any]) -> str:
 
 def test_an_advisor_alone() -> None:
     """Who knows the exact values and is an expert takes the shortest way, in 13 steps; a novice seldom arrives."""
-    rows = walks({"advisor_table": "exact"})
+    rows = walk_rows({"advisor_table": "exact"})
     shares, means = ([one["value"] for one in those(rows, measure=m)] for m in ("SP_percent", "mean_steps"))
     assert shares[0] > 99 > 1 > shares[-1]
     assert means[0] == pytest.approx(13, abs=0.1)
@@ -84,7 +84,7 @@ def test_what_is_written() -> None:
         for beta, value in ((0.5, 20), (1.3, 62))
     ]
     rows.append(row({"world": "world-2", "beta": 0.7}, "SP_percent", 37, (28, 47)))
-    assert {"world-1", "world-2", "printed"} <= {*texts(by_beta(rows))}
+    assert {"world-1", "world-2", "printed"} <= {*texts(beta_picture(rows))}
     written = {*texts(convergence(STEPS, GUIDED, 13, 0.05))}
     assert {"guided episodes", "fewest possible: 13", "asks below Λ = 0.05"} <= written
 

@@ -281,7 +281,7 @@ def test_an_advisor_walks_alone(small: str) -> None:
 
 def test_the_example_is_a_session_that_succeeds(small: str) -> None:
     setting = AdviceSetting(small, beta=0.5)
-    steps, guided = chapter.example(setting, 0)
+    steps, guided = chapter.example_session(setting, 0)
     place = chapter.world(small)
     learner, seeds = replace(place.learner, beta=0.5), seeds_of(setting, 100, 0)
     batch = compiled.run_sessions(place.mdp(), learner, GateSettings("never"), None, seeds)

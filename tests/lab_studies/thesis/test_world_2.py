@@ -91,7 +91,7 @@ def test_what_was_found_can_be_written_and_read(small: None, tmp_path: Path) -> 
 
 def test_no_tries(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "MAX_TRIES", 0)
-    with pytest.raises(WorkFailed, match=r"^seed 5: no layout like world II among 0: try another seed$"):
+    with pytest.raises(WorkFailed, match=r"^seed 5: none of 0 layouts is like world II: try another seed$"):
         reconstruct(5)
 
 
@@ -116,7 +116,7 @@ def test_layouts_have_a_hundred_obstacles() -> None:
 def test_which_layouts_are_alike(monkeypatch: pytest.MonkeyPatch, success: dict[float, float], alike: bool) -> None:
     """By their success, 30 % where nothing else is said."""
     monkeypatch.setattr(module, "success_alone", lambda mdp, beta, sessions: success.get(beta, 30.0))
-    assert module.learns_alike(grid((1, 2, 1), np.zeros((1, 2, 1), bool), (0, 0, 0), (0, 1, 0))) is alike
+    assert module.learns_similarly(grid((1, 2, 1), np.zeros((1, 2, 1), bool), (0, 0, 0), (0, 1, 0))) is alike
 
 
 def test_the_nearest_layout_is_taken_and_the_nearest_view(small: None, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -45,9 +45,9 @@ from lab_studies.comparisons.two_levels.two_level_learner import (
     EPISODES,
     LearnedTransfer,
     TwoLevels,
-    carried_out,
-    one_after_another,
-    practised,
+    learned_stages,
+    serial_makespan,
+    steps_in_flat_world,
 )
 
 UP, DOWN, LEFT, RIGHT = range(4)
@@ -158,15 +158,15 @@ def test_what_the_cell_predicts_is_what_the_world_takes() -> None:
     found = list(sequences(LINE, 2, steps))
     assert len(found) > 10
     for sequence, makespan in found:
-        assert carried_out(world, cell, sequence, moves, CAP) == makespan
+        assert steps_in_flat_world(world, cell, sequence, moves, CAP) == makespan
     assert min(makespan for _, makespan in found) == shortest_steps(world.mdp)
-    assert one_after_another(cell) == dict(found)[1, 1, 1, 2, 2, 2]
+    assert serial_makespan(cell) == dict(found)[1, 1, 1, 2, 2, 2]
 
 
 def test_a_sequence_that_does_not_come_to_its_end() -> None:
     steps, world = shortest(LINE, 1), flat_world(LINE, 1)
     wrong = {way: [WAIT] for way in steps}
-    assert carried_out(world, LINE.cell(1, steps), [1, 1, 1], wrong, 50) == 51
+    assert steps_in_flat_world(world, LINE.cell(1, steps), [1, 1, 1], wrong, 50) == 51
 
 
 @pytest.mark.parametrize("name", FLAT)
@@ -202,11 +202,11 @@ def test_an_episode_that_is_broken_off(line: FlatWorld) -> None:
 def test_practice_goes_on_where_it_stopped() -> None:
     """More episodes take more steps, and the last ones know a shortest way."""
     way = (LETTERS["T"], LETTERS["B"])
-    skills = practised(KITCHEN, way, [0])
+    skills = learned_stages(KITCHEN, way, [0])
     assert len(skills) == len(EPISODES)
     assert all(one.steps < other.steps for one, other in pairwise(skills))
     assert skills[-1].moves == (DOWN,) * 3
-    assert skills == practised(KITCHEN, way, [0])
+    assert skills == learned_stages(KITCHEN, way, [0])
 
 
 @pytest.fixture(scope="module")
