@@ -6,6 +6,7 @@ from itertools import product
 from math import atan, cos, pi, radians, sin, tan
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from lab.sim.arms.kinematics import ToolPose
@@ -170,10 +171,8 @@ def hand_camera(tool: ToolPose) -> Camera:
 @cache
 def seen_corners(shape: PartShape) -> Array:
     """The corners (n, 3) of the hull of a part's visible shapes, relative to the middle of its foot [m]."""
-    from scipy.spatial import ConvexHull
-
     points = np.concatenate([_points(look) for look in shape.looks])
-    corners: Array = points[ConvexHull(points).vertices] + (0.0, 0.0, shape.foot_m)
+    corners: Array = points[scipy.spatial.ConvexHull(points).vertices] + (0.0, 0.0, shape.foot_m)
     return corners
 
 

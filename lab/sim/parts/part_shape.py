@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from lab.errors import BadInput, counted
@@ -69,14 +70,13 @@ class PartShape:
 
         Flat sides are then in contact where they really are; edges are rounded by the margin.
         """
-        from scipy.spatial import ConvexHull, HalfspaceIntersection
-
         corners = self.hull @ urdf_reader.rotation(self.turn)
-        sides = np.unique(ConvexHull(corners).equations.round(9), axis=0)  # (k, 4): normals, and offsets [m]
+        hull = scipy.spatial.ConvexHull(corners)
+        sides = np.unique(hull.equations.round(9), axis=0)  # (k, 4): normals, and offsets [m]
         middle = corners.mean(axis=0)
         margin = min(MARGIN_M, float(np.min(-sides[:, :3] @ middle - sides[:, 3])) / 2)
         sides[:, 3] += margin
-        return np.asarray(HalfspaceIntersection(sides, middle).intersections), margin
+        return np.asarray(scipy.spatial.HalfspaceIntersection(sides, middle).intersections), margin
 
     @property
     def foot_m(self) -> float:
@@ -151,9 +151,8 @@ def _quaternion(turn: Array) -> Quaternion:
     """Of a turn (3, 3), as xyzw; exactly (0, 0, 0, 1) for none, for which scipy is not loaded."""
     if np.array_equal(turn, np.eye(3)):
         return (0.0, 0.0, 0.0, 1.0)
-    from scipy.spatial.transform import Rotation
-
-    x, y, z, w = (float(one) + 0.0 for one in Rotation.from_matrix(turn).as_quat(canonical=True))
+    rotation = scipy.spatial.transform.Rotation.from_matrix(turn)
+    x, y, z, w = (float(one) + 0.0 for one in rotation.as_quat(canonical=True))
     return x, y, z, w
 
 
