@@ -10,13 +10,12 @@ from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
-from lab.advice.entries import read_journal
+from lab.advice.entries import Read, read_journal
 from lab.errors import BadInput, unknown
 from lab.plugins.code_file import from_file
 from lab.plugins.family import Family, first_line, takes, wanted
 
 if TYPE_CHECKING:
-    from lab.advice.entries import Read
     from lab.learning.requests import Advisor, Ask, Request
 
 
@@ -30,7 +29,7 @@ class Level(Protocol):
     def simulated(self, taus: tuple[float, ...], sign: float) -> "Advisor":
         """An advisor that draws from the exact values with tau, or from the first to the last tau; sign -1 inverts the values."""
 
-    def check(self, recorded: "Read") -> None:
+    def check(self, recorded: Read) -> None:
         """Raises BadInput if the record is about another problem."""
 
     def learned(self, name: str) -> "Advisor":
@@ -205,7 +204,7 @@ def make_advisor(name: AdvisorName, level: Level) -> "Advisor | None":
     return name.itself or ADVISORS[name.row].make(name, level)
 
 
-def recorded_fault(record: "Read", what: str, signature: str) -> BadInput:
+def recorded_fault(record: Read, what: str, signature: str) -> BadInput:
     """The error for a record of another problem; what: "problem" or "order"; signature: the one that is needed."""
     recorded = record.session
     return BadInput(

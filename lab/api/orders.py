@@ -5,11 +5,12 @@ from functools import cached_property
 from html import escape
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, TypedDict, Unpack
+from typing import Any, TypedDict, Unpack
 
 from lab.api.options import ToolboxOrPlace, checked, data_frame, toolbox_of
 from lab.api.pictures import Picture
 from lab.errors import BadInput
+from lab.lazy import pandas
 from lab.production.sequencing_job import SequencingOptions, sequence_cell, sequenced_named
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import NO_CHANCE
@@ -18,9 +19,6 @@ from lab.sequencing.simulate.follow import simulate
 from lab.tasks.sequencing import Sequencing
 from lab.teaching.teacher import Teacher
 from lab.view.gantt import gantt
-
-if TYPE_CHECKING:
-    import pandas
 
 
 class OrderOptions(TypedDict, total=False):

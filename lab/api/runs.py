@@ -6,12 +6,13 @@ from functools import cached_property
 from html import escape
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, TypedDict, Unpack
+from typing import Any, TypedDict, Unpack
 
 from lab.api.options import Advisors, ToolboxOrPlace, advising_of, checked, data_frame, several, toolbox_of
 from lab.api.pictures import Page, Picture
 from lab.errors import BadInput
 from lab.files import check_out
+from lab.lazy import pandas
 from lab.production.composer import Conditions
 from lab.production.report import Report
 from lab.production.run import run as run_task
@@ -25,9 +26,6 @@ from lab.tasks.task_file import load
 from lab.teaching.teacher import Teacher
 from lab.view.gantt import gantt
 from lab.workers import Workers
-
-if TYPE_CHECKING:
-    import pandas
 
 
 class TaskOptions(TypedDict, total=False):

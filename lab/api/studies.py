@@ -4,10 +4,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from lab.api.options import Advisors, OneAdvisor, data_frame, several
 from lab.api.pictures import Picture
+from lab.lazy import pandas
 from lab.learning.settings import USUAL
 from lab.studies import checked, study_of
 from lab.studies.compared import Compared, compared
@@ -16,9 +17,6 @@ from lab.studies.report import write_report
 from lab.studies.runner import Job
 from lab.studies.tuning import Tuning, tuned
 from lab.teaching.subjects import Teachable
-
-if TYPE_CHECKING:
-    import pandas
 
 
 @dataclass(frozen=True, eq=False)

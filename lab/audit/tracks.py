@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from lab.errors import BadInput
 from lab.files import read_limited
+from lab.lazy import trimesh
 from lab.sim.frames import Body, Recording, Shape
 from lab.sim.mesh_file import readable
 
@@ -123,8 +124,6 @@ def _bounds(body: Body) -> tuple[Array, Array]:
 def _corners(shape: Shape) -> Array:
     """Points (n, 3) [m] with the same bounds as a shape."""
     if shape.kind == "mesh":
-        import trimesh
-
         path = Path(shape.mesh or "")
         load: Any = trimesh.load
         mesh = load(BytesIO(readable(path)), path.suffix.lower().removeprefix("."), force="mesh")

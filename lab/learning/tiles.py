@@ -15,10 +15,10 @@ from math import prod
 from typing import TypeVar
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from lab.errors import BadInput
+from lab.lazy import scipy
 
 MOST_ROUNDS = 300  # iterations of the least-squares fit of weights to a table
 

@@ -6,9 +6,9 @@ from itertools import product
 from math import atan, cos, pi, radians, sin, tan
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
+from lab.lazy import scipy
 from lab.sim.arms.kinematics import ToolPose
 from lab.sim.frames import Shape
 from lab.sim.mesh_file import vertices

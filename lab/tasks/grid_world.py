@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field, model_validator
 
 from lab.errors import BadInput, counted
+from lab.lazy import scipy
 from lab.mdp import BoolArray, NoPath, TabularMDP, grid, shortest_steps
 from lab.tasks.record import Learned, Name, Record, as_tuple, read_text, walking, write_whole
 

@@ -11,10 +11,10 @@ from functools import cached_property
 from math import atan, atan2, cos, degrees, inf, pi, sin
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from lab.errors import BadInput
+from lab.lazy import scipy
 from lab.sim.arms.fingers import Gripper
 from lab.sim.parts.part_shape import PartShape
 from lab.tasks.part_fields import GripFields

@@ -10,22 +10,18 @@ from functools import cached_property
 from io import BytesIO
 from math import cos, pi, sin
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from lab.errors import BadInput, counted
 from lab.files import assets_folder, is_file, within
+from lab.lazy import scipy, trimesh
 from lab.sim import urdf_reader
 from lab.sim.frames import Quaternion, Shape, ShapeKind, Vector
 from lab.sim.mesh_file import MAX_BYTES, is_binary, readable, text_corners
 from lab.tasks.part_fields import PartFields
-
-if TYPE_CHECKING:
-    from trimesh import Trimesh
-
 
 MOST_TEXT = 40_000  # triangles of an STL in text: PyBullet, which reads none, is handed them one by one
 MOST_HULL = 256  # vertices: more make physics slow and no rounder
@@ -222,10 +218,8 @@ def _look(part: PartFields, folder: Path) -> tuple[Shape, ...]:
     return links[""]
 
 
-def _mesh(part: PartFields, path: Path) -> "Trimesh":
+def _mesh(part: PartFields, path: Path) -> "trimesh.Trimesh":
     """The mesh in metres, closed, its faces outwards; or its hull, where the part asks for that."""
-    import trimesh
-
     where = f"part '{part.name}': file = '{part.file}'"
     try:
         kind = path.suffix.lower().removeprefix(".")
@@ -256,7 +250,7 @@ def _mesh(part: PartFields, path: Path) -> "Trimesh":
     except Exception:  # Qhull's own kind of error
         raise BadInput(f"{where}: it is flat: wanted a solid") from None
     if part.hull:
-        return cast("Trimesh", hull)
+        return cast("trimesh.Trimesh", hull)
     _check_closed(where, mesh)
     if not mesh.is_winding_consistent or mesh.volume <= 0:
         trimesh.repair.fix_normals(mesh, multibody=True)  # type: ignore[no-untyped-call]
@@ -286,7 +280,7 @@ def _check_size(part: PartFields, where: str, longest: float) -> None:
     )
 
 
-def _check_closed(where: str, mesh: "Trimesh") -> None:
+def _check_closed(where: str, mesh: "trimesh.Trimesh") -> None:
     """A mesh with holes encloses nothing: neither mass nor inertia are known."""
     if mesh.is_watertight:
         return
