@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from math import exp, inf, log
 
 import numpy as np
-import scipy
 
 from lab.advice.advisors import SKILL_TAUS
+from lab.lazy import scipy
 from lab.mdp import FloatArray, TabularMDP
 
 PRIOR = 1.0  # pseudo-counts of good and of bad answers: the parameters of the Beta prior
