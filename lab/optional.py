@@ -2,8 +2,10 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from types import ModuleType
 
 from lab.errors import BadInput, out_of_memory
+from lab.lazy import load
 
 EXTRAS = {  # extra in pyproject.toml -> the optional libraries that it installs, by their import names
     "dask": ("distributed",),
@@ -30,6 +32,13 @@ def optional(use: str) -> Iterator[None]:
         extra = next((name for name, libraries in EXTRAS.items() if library in libraries), None)
         command = f"pip install '.[{extra}]' in a checkout of the lab" if extra else f"pip install {library}"
         raise BadInput(f"{use}: the library '{library}' is not installed: {command}") from None
+
+
+def require(use: str, *libraries: ModuleType) -> None:
+    """Loads libraries of `lab.lazy`; raises BadInput as `optional` does."""
+    with optional(use):
+        for library in libraries:
+            load(library)
 
 
 def _missing(error: BaseException | None) -> str | None:

@@ -7,6 +7,7 @@ from itertools import combinations
 from math import hypot, sqrt
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from lab.errors import BadInput
@@ -44,12 +45,10 @@ def interval(values: ArrayLike) -> tuple[float, float, float]:
 
     Raises BadInput for fewer than two values and for values that are not finite.
     """
-    from scipy.stats import t
-
     sample = _sample(values, "interval")
     mean = _mean(sample)
     error = sqrt(np.square(sample - mean).sum() / (len(sample) - 1) / len(sample))
-    half = float(t.isf(TAIL, len(sample) - 1)) * error
+    half = float(scipy.stats.t.isf(TAIL, len(sample) - 1)) * error
     return mean, mean - half, mean + half
 
 
@@ -58,11 +57,9 @@ def proportion_interval(successes: int, n: int) -> tuple[float, float, float]:
 
     Raises BadInput unless 0 <= successes <= n and n >= 1. Source: E. B. Wilson, JASA 22 (1927), 209-212.
     """
-    from scipy.special import ndtri
-
     if not 0 <= successes <= n or n < 1:
         raise BadInput(f"interval of a proportion: {successes} successes of {n}; needed: 0 <= successes <= n, n >= 1")
-    z2 = float(ndtri(TAIL)) ** 2
+    z2 = float(scipy.special.ndtri(TAIL)) ** 2
     share = successes / n
     middle = (share + z2 / (2 * n)) / (1 + z2 / n)
     half = sqrt(z2 * (share * (1 - share) + z2 / (4 * n)) / n) / (1 + z2 / n)
@@ -193,9 +190,7 @@ def within_errors(value: float, thesis: float, errors: tuple[float, float]) -> b
 
     The rounding of the printed figure is not taken into account.
     """
-    from scipy.special import ndtri
-
-    tolerance = -float(ndtri(TAIL)) * hypot(*errors)
+    tolerance = -float(scipy.special.ndtri(TAIL)) * hypot(*errors)
     return bool(abs(value - thesis) <= tolerance + NOISE * max(abs(value), abs(thesis)))
 
 
@@ -214,8 +209,6 @@ def _mean(sample: FloatArray) -> float:
 
 def _anova(samples: Sequence[FloatArray]) -> tuple[float, float, float]:
     """F, p and the mean square within groups; samples (n,) are scaled so that the largest value is about 1."""
-    from scipy.stats import f as f_distribution
-
     sizes, means = np.array([len(sample) for sample in samples]), np.array([_mean(sample) for sample in samples])
     grand = means[0] + np.average(means - means[0], weights=sizes)
     between_df, within_df = len(samples) - 1, int(sizes.sum()) - len(samples)
@@ -223,7 +216,7 @@ def _anova(samples: Sequence[FloatArray]) -> tuple[float, float, float]:
     squares = sum(float(np.square(sample - mean).sum()) for sample, mean in zip(samples, means, strict=True))
     mean_square = max(squares / within_df, NOISE**2)
     f = between / mean_square
-    return f, float(f_distribution.sf(f, between_df, within_df)), mean_square
+    return f, float(scipy.stats.f.sf(f, between_df, within_df)), mean_square
 
 
 def _tukey(samples: Mapping[str, FloatArray], mean_square: float) -> dict[tuple[str, str], float]:
@@ -231,29 +224,24 @@ def _tukey(samples: Mapping[str, FloatArray], mean_square: float) -> dict[tuple[
 
     For thousands of values and nearly equal means scipy warns that its integral converges slowly; its p, 1, is right.
     """
-    from scipy.integrate import IntegrationWarning
-    from scipy.stats import studentized_range
-
     df = sum(map(len, samples.values())) - len(samples)
     p_values = {}
     for first, second in combinations(samples, 2):
         error = sqrt(mean_square / 2 * (1 / len(samples[first]) + 1 / len(samples[second])))
         q = abs(_mean(samples[first]) - _mean(samples[second])) / error
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", IntegrationWarning)
-            p_values[first, second] = float(studentized_range.sf(q, len(samples), df))
+            warnings.simplefilter("ignore", scipy.integrate.IntegrationWarning)
+            p_values[first, second] = float(scipy.stats.studentized_range.sf(q, len(samples), df))
     return p_values
 
 
 def _normality(sample: FloatArray) -> float | None:
     """p of the Kolmogorov-Smirnov test of a sample (n,) against the normal distribution of its mean and deviation."""
-    from scipy.special import kolmogorov, ndtr
-
     deviation = float(np.std(sample, ddof=1))
     if deviation <= NOISE:
         return None
-    expected = ndtr((np.sort(sample) - sample.mean()) / deviation)
+    expected = scipy.special.ndtr((np.sort(sample) - sample.mean()) / deviation)
     n = len(sample)
     steps = np.arange(n + 1) / n
     distance = max(float((steps[1:] - expected).max()), float((expected - steps[:-1]).max()))
-    return float(kolmogorov(sqrt(n) * distance))
+    return float(scipy.special.kolmogorov(sqrt(n) * distance))

@@ -1,11 +1,12 @@
-"""Names that are loaded when they are touched, by a table."""
+"""Names and libraries that are loaded when they are touched, by a table."""
 
 import math
 import sys
 
 import pytest
 
-from lab.lazy import loader
+from lab import lazy
+from lab.lazy import Library, load, loader
 
 
 def test_a_name_is_found_where_the_table_says() -> None:
@@ -25,3 +26,21 @@ def test_a_module_is_loaded_when_one_of_its_names_is_touched(monkeypatch: pytest
 def test_any_other_name_is_none_of_the_module(name: str) -> None:
     with pytest.raises(AttributeError, match=f"module 'mine' has no attribute '{name}'"):
         loader("mine", {"math": ("pi", "floor as down")})(name)
+
+
+def test_a_library_is_loaded_when_one_of_its_names_is_touched(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(lazy, "LIBRARIES", {"xml": ("xml.sax.saxutils",)})
+    for name in [name for name in sys.modules if name.partition(".")[0] == "xml"]:
+        monkeypatch.delitem(sys.modules, name)
+    library = Library("xml")
+    assert "xml" not in sys.modules
+    assert library.sax.saxutils.escape("<") == "&lt;"
+    assert load(library) is sys.modules["xml"]
+    with pytest.raises(AttributeError, match="module 'xml' has no attribute 'dom'"):
+        _ = library.dom
+
+
+def test_a_library_that_is_not_installed_is_missed_when_it_is_touched(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(lazy, "LIBRARIES", {"not_installed": ("not_installed.part",)})
+    with pytest.raises(ModuleNotFoundError, match="No module named 'not_installed'"):
+        _ = Library("not_installed").part

@@ -16,6 +16,7 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 from lab.errors import BadInput
+from lab.lazy import LIBRARIES
 from lab.optional import EXTRAS, optional
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -216,7 +217,8 @@ def test_each_library_that_is_imported_is_a_dependency_or_is_asked_for_as_option
     }
     owners = {module: {canonicalize_name(name) for name in names} for module, names in packages_distributions().items()}
     for path in SOURCES:
-        for library, asked in imported(ast.parse(path.read_text(encoding="utf-8"))):
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        for library, asked in (*imported(tree), *lazily_imported(tree)):
             given = bool(own & owners.get(library, set())) or BROUGHT.get(library) in own
             assert given != asked or library in RIVALS, f"{path.relative_to(ROOT)}: {library}"
 
@@ -234,6 +236,26 @@ def imported(tree: ast.AST, asked: bool = False) -> Iterator[tuple[str, bool]]:
                 yield library, asked
         inside = isinstance(node, ast.With) and any("optional(" in ast.unparse(item) for item in node.items)
         yield from imported(node, asked or inside)
+
+
+def lazily_imported(tree: ast.AST) -> Iterator[tuple[str, bool]]:
+    """Each library of `lab.lazy` that a module uses, and whether it names it in `require` or inside `with optional(...)`."""
+    nodes = list(ast.walk(tree))
+    found = {
+        alias.name
+        for node in nodes
+        if isinstance(node, ast.ImportFrom) and node.module == "lab.lazy"
+        for alias in node.names
+    } & LIBRARIES.keys()
+    asking = [
+        node
+        for node in nodes
+        if (isinstance(node, ast.Call) and ast.unparse(node.func) == "require")
+        or (isinstance(node, ast.With) and any("optional(" in ast.unparse(item) for item in node.items))
+    ]
+    used = {node.id for node in nodes if isinstance(node, ast.Name)}  # and not only in a quoted annotation
+    asked = {node.id for outer in asking for node in ast.walk(outer) if isinstance(node, ast.Name)}
+    yield from ((name, name in asked) for name in sorted(found & used))
 
 
 def test_no_message_and_no_page_installs_the_lab_from_an_index() -> None:

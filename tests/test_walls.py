@@ -13,6 +13,8 @@ from pathlib import Path
 
 import pytest
 
+from lab.lazy import LIBRARIES
+
 ROOT = Path(__file__).resolve().parent.parent
 LAYERS: tuple[tuple[str, ...], ...] = (
     ("lab.errors", "lab.interrupts", "lab.lazy", "lab.operating_system", "lab.version"),
@@ -37,7 +39,7 @@ ALONE: dict[str, set[str]] = (
         "pybullet_data": {"lab.sim.world"},
         "pybullet_utils": {"lab.sim.world"},
         "meshcat": {"lab.view.meshcat"},
-        "cv2": {"lab.vision.opencv"},
+        "cv2": {f"lab.vision.{name}" for name in ("calibration", "lens", "markers", "part_outline", "picture_files")},
         "PIL": {"lab.view.movie"},
         "numba": {"lab.learning.compiled"},  # what is kept of it is kept in one place
         "ortools": {"lab.sequencing.methods.cp_sat_solver"},  # without pandas
@@ -120,6 +122,8 @@ def imports(tree: ast.Module, module: str, is_package: bool, known: frozenset[st
             if node.level:
                 parents = module.split(".")[: len(module.split(".")) - node.level + is_package]
                 base = ".".join([*parents, base] if base else parents)
+            lazily = [alias.name for alias in node.names if base == "lab.lazy" and alias.name in LIBRARIES]
+            found += [Import(library, node.lineno, False) for library in lazily]
             names = [f"{base}.{alias.name}" for alias in node.names]
             targets = [name if name in known else base for name in names]
         else:
@@ -136,7 +140,10 @@ def import_faults(module: str, found: list[Import]) -> Iterator[str]:
     """What is wrong with a module's imports, one line each."""
     for item in found:
         top, place = item.target.partition(".")[0], f"{module}:{item.line} imports {item.target}"
-        if module not in ALONE.get(top, {module}):
+        if module not in {
+            *ALONE.get(top, {module}),
+            "lab.lazy",
+        }:  # the table of libraries is for those that may import them
             yield f"{place}: allowed in {sorted(ALONE[top]) or 'no module'}"
         if top not in PACKAGES or (item.target == "lab" and not within(module, "lab")):
             continue
@@ -265,6 +272,14 @@ def test_a_table_of_what_is_loaded_later_holds_what_is_imported_for_types(module
     assert {(where, row.partition(" ")[0], row.rpartition(" ")[2]) for where, row in rows} == for_types
 
 
+def test_the_table_of_libraries_holds_what_is_imported_for_types() -> None:
+    tree, _ = house()["lab.lazy"]
+    block = next(node for node in tree.body if isinstance(node, ast.If) and _is_type_checking(node))
+    for_types = [alias.name for node in block.body if isinstance(node, ast.Import) for alias in node.names]
+    assert for_types == [module for modules in LIBRARIES.values() for module in modules]
+    assert {name.partition(".")[0] for name in for_types} == {*LIBRARIES}
+
+
 def test_ctrl_c_is_heard_before_anything_is_loaded() -> None:
     assert not [item.target for item in house()["lab.cli"][1] if item.at_load]
 
@@ -296,7 +311,8 @@ def faults(module: str, source: str) -> list[str]:
         ("lab.sim.arms.robot", "import pybullet", "allowed in ['lab.sim.world']"),
         ("lab.sim.arms.robot", "def f():\n    import pybullet as p", "lab.sim.arms.robot:2 imports pybullet"),
         ("lab.view.plots", "from meshcat.geometry import Box", "allowed in ['lab.view.meshcat']"),
-        ("lab.skills.insert", "import cv2.gapi", "allowed in ['lab.vision.opencv']"),
+        ("lab.skills.insert", "import cv2.gapi", "allowed in ['lab.vision.calibration'"),
+        ("lab.skills.insert", "from lab.lazy import cv2, loader", "lab.skills.insert:1 imports cv2: allowed in"),
         ("lab.view.plots", "import websockets", "allowed in no module"),
         (
             "lab.sequencing.methods.exact",
@@ -345,7 +361,7 @@ def test_a_broken_wall_is_seen(module: str, source: str, fault: str) -> None:
     ("module", "source"),
     [
         ("lab.sim.world", "import pybullet"),
-        ("lab.vision.opencv", "import cv2"),
+        ("lab.vision.lens", "from lab.lazy import cv2"),
         ("lab.cli.output", "print('x')\nfrom lab.view import meshcat"),
         ("lab.seat.terminal.prompt", "console.print('x')"),
         ("lab.learning.session", "from lab.learning.gates import GATES\nfrom .settings import GateSettings"),

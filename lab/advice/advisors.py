@@ -13,7 +13,7 @@ from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
-from lab.advice.entries import read_journal
+from lab.advice.entries import Read, read_journal
 from lab.errors import BadInput, unknown
 from lab.plugins.code_file import from_file
 from lab.plugins.family import Family, checked_action, first_line, takes, takes_generator, wanted
@@ -21,7 +21,6 @@ from lab.plugins.family import Family, checked_action, first_line, takes, takes_
 if TYPE_CHECKING:
     import numpy as np
 
-    from lab.advice.entries import Read
     from lab.learning.requests import Advisor, Ask, Request
 
 
@@ -39,7 +38,7 @@ class Level(Protocol):
     def simulated(self, taus: tuple[float, ...], sign: float) -> "Advisor":
         """An advisor that draws from the exact values with tau, or from the first to the last tau; sign -1 inverts the values."""
 
-    def check(self, recorded: "Read") -> None:
+    def check(self, recorded: Read) -> None:
         """Raises BadInput if the record is about another problem."""
 
     def learned(self, name: str) -> "Advisor":
@@ -263,7 +262,7 @@ def make_advisor(name: AdvisorName, level: Level) -> "Advisor | None":
     return AddedAdvisor(name, thing, level.rng)
 
 
-def recorded_fault(record: "Read", what: str, signature: str) -> BadInput:
+def recorded_fault(record: Read, what: str, signature: str) -> BadInput:
     """The error for a record of another problem; what: "problem" or "order"; signature: the one that is needed."""
     recorded = record.session
     return BadInput(

@@ -9,6 +9,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Self
 
+from pydantic import ConfigDict, TypeAdapter, ValidationError
+
 from lab.errors import BadInput, WorkFailed
 from lab.files import json_of
 from lab.operating_system import lock, opened, replace_and_close
@@ -31,8 +33,6 @@ class EntryKinds:
 
     def entry_of(self, line: bytes) -> Any:
         """The entry in a line. Raises ValueError if it holds none."""
-        from pydantic import ValidationError
-
         if len(line) > MAX_LINE_BYTES:
             raise ValueError(f"{len(line)} bytes long, allowed {MAX_LINE_BYTES}")
         record = json_of(line.decode("utf-8"))
@@ -61,8 +61,6 @@ def differing(before: str, now: str) -> str:
 
 @cache
 def _reader(model: Hashable) -> Any:
-    from pydantic import ConfigDict, TypeAdapter
-
     strict = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
     kind: Any = model
     return TypeAdapter(type(kind.__name__, (kind,), {"__pydantic_config__": strict, "__doc__": kind.__doc__}))

@@ -15,6 +15,7 @@ from math import exp, inf, log
 import numpy as np
 
 from lab.advice.advisors import SKILL_TAUS
+from lab.lazy import scipy
 from lab.mdp import FloatArray, TabularMDP
 
 PRIOR = 1.0  # pseudo-counts of good and of bad answers: the parameters of the Beta prior
@@ -116,10 +117,8 @@ def trust_there(overall: float, good: int, bad: int) -> float:
 
 def bounds(good: int, bad: int, level: float = LEVEL) -> tuple[float, float]:
     """(low, high): the credible interval of the share of good advice, from quantiles of the Beta posterior."""
-    from scipy.special import betaincinv
-
     tail = (1.0 - level) / 2.0
-    low, high = (float(betaincinv(PRIOR + good, PRIOR + bad, at)) for at in (tail, 1.0 - tail))
+    low, high = (float(scipy.special.betaincinv(PRIOR + good, PRIOR + bad, at)) for at in (tail, 1.0 - tail))
     return low, high
 
 
@@ -154,8 +153,6 @@ def skill_of(answers: Sequence[Pair], values: FloatArray) -> SkillEstimate | Non
 
     Only states count in which the actions differ in value; None for fewer than FEWEST of them. Source: thesis eq. 9.1.
     """
-    from scipy.optimize import brentq, minimize_scalar
-
     table = values[[state for state, _ in answers]] if answers else values[:0]
     below = table - table.max(axis=1, keepdims=True)
     telling = below.min(axis=1) < -SAME
@@ -169,11 +166,14 @@ def skill_of(answers: Sequence[Pair], values: FloatArray) -> SkillEstimate | Non
         return float(chosen.sum() / tau - np.log(np.exp(below / tau).sum(axis=1)).sum())
 
     ends = log(TAUS[0]), log(TAUS[1])  # one peak: the likelihood is concave in 1/tau
-    inner = float(minimize_scalar(lambda at: -likelihood(at), bounds=ends, method="bounded").x)
+    optimize = scipy.optimize
+    inner = float(optimize.minimize_scalar(lambda at: -likelihood(at), bounds=ends, method="bounded").x)
     best = max((*ends, inner), key=lambda at: likelihood(at) + SAME * (at in ends))
     floor = likelihood(best) - EDGE
     low, high = (
-        end if likelihood(end) >= floor else float(brentq(lambda at: likelihood(at) - floor, *sorted((end, best))))
+        end
+        if likelihood(end) >= floor
+        else float(optimize.brentq(lambda at: likelihood(at) - floor, *sorted((end, best))))
         for end in ends
     )
     word = min(SKILL_TAUS, key=lambda name: abs(log(SKILL_TAUS[name]) - best))

@@ -5,13 +5,14 @@ from functools import cached_property
 from html import escape
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Annotated, Any, Unpack
+from typing import Annotated, Any, Unpack
 
 from annotated_types import Ge, Lt
 
 from lab.api.options import Advisors, Settings, ToolboxOrPlace, advising_of, check_common, data_frame, toolbox_of
 from lab.api.pictures import Picture
 from lab.errors import BadInput, check_value
+from lab.lazy import pandas
 from lab.learning.problem import Problem
 from lab.learning.session_result import SessionResult
 from lab.mdp import FloatArray
@@ -24,9 +25,6 @@ from lab.teaching.teacher import Teacher
 from lab.toolbox.policy import Policy
 from lab.toolbox.registry import Toolbox
 from lab.view.plots import learning_curves
-
-if TYPE_CHECKING:
-    import pandas
 
 
 @dataclass(frozen=True, eq=False)

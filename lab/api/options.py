@@ -3,27 +3,24 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypedDict, get_type_hints
+from typing import Annotated, Any, TypedDict, get_type_hints
 
 from annotated_types import Ge, Le
 
 from lab.advice.advising import Advising
 from lab.errors import check_value, unknown
+from lab.lazy import pandas
 from lab.learning.gates import Gate
 from lab.learning.requests import Advisor, Ask
 from lab.learning.updates import Update
-from lab.optional import optional
+from lab.optional import require
 from lab.toolbox.registry import Toolbox
-
-if TYPE_CHECKING:
-    import pandas
 
 
 def data_frame(rows: Iterable[Mapping[str, Any]]) -> "pandas.DataFrame":
     """The rows as a DataFrame. Raises BadInput if pandas is not installed."""
-    with optional("to_dataframe()"):
-        from pandas import DataFrame
-    return DataFrame.from_records([dict(row) for row in rows])
+    require("to_dataframe()", pandas)
+    return pandas.DataFrame.from_records([dict(row) for row in rows])
 
 
 # ---- settings of learner and gate -----------------------------------------------------------------------------------

@@ -5,13 +5,14 @@ from functools import cached_property
 from html import escape
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Annotated, Any, TypedDict, Unpack
+from typing import Annotated, Any, TypedDict, Unpack
 
 from annotated_types import Ge, Le
 
 from lab.api.options import ToolboxOrPlace, check_common, checked, data_frame, toolbox_of
 from lab.api.pictures import Picture
 from lab.errors import BadInput
+from lab.lazy import pandas
 from lab.production.sequencing_job import SequencingOptions, named_cell, sequence_cell
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import NO_CHANCE
@@ -20,9 +21,6 @@ from lab.sequencing.simulate.follow import simulate
 from lab.tasks.sequencing import Sequencing
 from lab.teaching.teacher import Teacher
 from lab.view.gantt import gantt
-
-if TYPE_CHECKING:
-    import pandas
 
 
 class OrderOptions(TypedDict, total=False):

@@ -6,7 +6,7 @@ from functools import cached_property
 from html import escape
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Annotated, Any, TypedDict, Unpack
+from typing import Annotated, Any, TypedDict, Unpack
 
 from annotated_types import Ge, Le
 
@@ -23,6 +23,7 @@ from lab.api.options import (
 from lab.api.pictures import Page, Picture
 from lab.errors import BadInput
 from lab.files import check_out
+from lab.lazy import pandas
 from lab.production.composer import Conditions
 from lab.production.report import Report
 from lab.production.run import run as run_task
@@ -36,9 +37,6 @@ from lab.tasks.task_file import load
 from lab.teaching.teacher import Teacher
 from lab.view.gantt import gantt
 from lab.workers import Workers
-
-if TYPE_CHECKING:
-    import pandas
 
 
 class TaskOptions(TypedDict, total=False):

@@ -4,11 +4,12 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from lab.api.options import Advisors, OneAdvisor, check_common, data_frame, several
 from lab.api.pictures import Picture
 from lab.errors import BadInput
+from lab.lazy import pandas
 from lab.learning.settings import USUAL
 from lab.studies import checked, study_of
 from lab.studies.compared import Compared, compared
@@ -17,9 +18,6 @@ from lab.studies.report import write_report
 from lab.studies.runner import Job
 from lab.studies.tuning import Tuning, tuned
 from lab.teaching.subjects import Teachable
-
-if TYPE_CHECKING:
-    import pandas
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,10 +9,12 @@ from typing import Any
 from zipfile import BadZipFile, ZipFile
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from lab.errors import BadInput
 from lab.files import read_limited
+from lab.lazy import trimesh
 from lab.sim.frames import Body, Recording, Shape
 from lab.sim.mesh_file import readable
 
@@ -57,10 +59,9 @@ class BodyTracks:
 
     def middle(self, body: int) -> Array:
         """The middle (n, 3) [m] of a body's bounds at each frame."""
-        from scipy.spatial.transform import Rotation
-
         middle = (self.low[body] + self.high[body]) / 2
-        return np.asarray(self.poses[:, body, :3] + Rotation.from_quat(self.poses[:, body, 3:]).apply(middle))
+        turns = scipy.spatial.transform.Rotation.from_quat(self.poses[:, body, 3:])
+        return np.asarray(self.poses[:, body, :3] + turns.apply(middle))
 
     def inside(self, body: int, point: Array) -> Array:
         """Points (n, 3) [m], one per recorded frame, in the coordinate frame of a body that may be turned about the vertical."""
@@ -78,10 +79,9 @@ def on_grid(low: Array, high: Array) -> Array:
 
 def in_frame(poses: Array, others: Array, points: Array) -> Array:
     """Points (m, 3) [m] of a body in the frame of another one (m, n, 3), by the poses (n, 7) of both."""
-    from scipy.spatial.transform import Rotation
-
-    to_other = Rotation.from_quat(others[:, 3:]).inv()
-    turn = (to_other * Rotation.from_quat(poses[:, 3:])).as_matrix()
+    rotation = scipy.spatial.transform.Rotation
+    to_other = rotation.from_quat(others[:, 3:]).inv()
+    turn = (to_other * rotation.from_quat(poses[:, 3:])).as_matrix()
     turned = (points @ turn.transpose(0, 2, 1)).transpose(1, 0, 2)
     return np.asarray(turned + to_other.apply(poses[:, :3] - others[:, :3]))
 
@@ -113,12 +113,10 @@ def tracks_of(recording: Recording) -> BodyTracks:
 
 def _bounds(body: Body) -> tuple[Array, Array]:
     """The lower and the upper corner of a body in its own frame [m]."""
-    from scipy.spatial.transform import Rotation
-
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     for shape in body.shapes:
         corners = _corners(shape)
-        placed = Rotation.from_quat(shape.quaternion).apply(corners) + np.array(shape.position)
+        placed = scipy.spatial.transform.Rotation.from_quat(shape.quaternion).apply(corners) + np.array(shape.position)
         low, high = np.minimum(low, placed.min(axis=0)), np.maximum(high, placed.max(axis=0))
     return low, high
 
@@ -126,8 +124,6 @@ def _bounds(body: Body) -> tuple[Array, Array]:
 def _corners(shape: Shape) -> Array:
     """Points (n, 3) [m] with the same bounds as a shape."""
     if shape.kind == "mesh":
-        import trimesh
-
         path = Path(shape.mesh or "")
         load: Any = trimesh.load
         mesh = load(BytesIO(readable(path)), path.suffix.lower().removeprefix("."), force="mesh")

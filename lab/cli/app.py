@@ -13,6 +13,7 @@ from typer.core import TyperCommand, TyperGroup
 from lab.cli.families import CommandOfFamilies
 from lab.cli.output import begin, end, fail, silence, write
 from lab.errors import LabError, out_of_memory
+from lab.lazy import rich
 from lab.plugins.family import blame
 from lab.version import __version__
 
@@ -35,25 +36,21 @@ class CommandGroup(TyperGroup):
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
         """Print the help of the group."""
-        from rich.console import Console
-        from rich.padding import Padding
-        from rich.panel import Panel
-        from rich.table import Table
-        from rich.text import Text
-
         options = [record for param in self.get_params(ctx) if (record := param.get_help_record(ctx))]
         commands = [(name, command.help or "") for name, command in self.commands.items()]
-        console = Console(highlight=False)
+        console = rich.console.Console(highlight=False)
         usage = self.get_usage(ctx).split(" ", 1)
-        console.print(Padding(Text.assemble((usage[0], "yellow"), f" {usage[1]}"), 1), style="bold")
-        console.print(Padding(Text(self.help or ""), (0, 1, 1, 1)))
+        console.print(
+            rich.padding.Padding(rich.text.Text.assemble((usage[0], "yellow"), f" {usage[1]}"), 1), style="bold"
+        )
+        console.print(rich.padding.Padding(rich.text.Text(self.help or ""), (0, 1, 1, 1)))
         for title, rows in (("Options", options), ("Commands", commands)):
-            table = Table(show_header=False, box=None, expand=True, pad_edge=False)
+            table = rich.table.Table(show_header=False, box=None, expand=True, pad_edge=False)
             table.add_column(style="bold cyan", no_wrap=True)
             table.add_column(ratio=1)
             for name, meaning in rows:
-                table.add_row(name, Text(meaning))
-            console.print(Panel(table, title=title, title_align="left", border_style="dim"))
+                table.add_row(name, rich.text.Text(meaning))
+            console.print(rich.panel.Panel(table, title=title, title_align="left", border_style="dim"))
 
 
 # ---- the table of commands ----------------------------------------------------------------------------------------------

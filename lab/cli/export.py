@@ -3,7 +3,7 @@
 from datetime import datetime
 from math import degrees
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
@@ -12,9 +12,7 @@ from lab.cli.families import offers
 from lab.cli.options import Json
 from lab.cli.output import complain, end, show
 from lab.errors import WorkFailed, counted, unknown
-
-if TYPE_CHECKING:
-    from rich.console import RenderableType
+from lab.lazy import rich
 
 
 def export(
@@ -87,9 +85,7 @@ def _written(texts: dict[str, str], folder: Path) -> list[Path]:
     return [folder / name for name in texts]
 
 
-def _summary(document: dict[str, Any]) -> "RenderableType":
-    from rich.text import Text
-
+def _summary(document: dict[str, Any]) -> "rich.console.RenderableType":
     files = document["files"]
     worst = f"{1000 * document['max_deviation_m']:.2f} mm, {degrees(document['max_deviation_rad']):.2f} degrees"
     rest = f"{1000 * document['deviation_at_rest_m']:.2f} mm, {degrees(document['deviation_at_rest_rad']):.2f} degrees"
@@ -99,4 +95,4 @@ def _summary(document: dict[str, Any]) -> "RenderableType":
         f"read back and played in physics: at most {worst} off the run's tool on {counted(document['motions'], 'path')}, "
         f"{rest} at their ends",
     ]
-    return Text("\n".join(lines))
+    return rich.text.Text("\n".join(lines))

@@ -5,13 +5,11 @@ import os
 import sys
 import warnings
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, NoReturn, TextIO
+from typing import Any, NoReturn, TextIO
 
 from lab.cli import deferred
 from lab.errors import LabError, Notice, WorkFailed, escaped
-
-if TYPE_CHECKING:
-    from rich.console import Console, RenderableType
+from lab.lazy import rich
 
 _FILE_WIDTH = 200  # characters; used when stdout is no terminal, so that lines are not wrapped
 _PLAIN = str.maketrans("▁▂▃▄▅▆▇█·", "_.-:=+*#.")  # replacements for a stdout without Unicode
@@ -91,12 +89,14 @@ def silence(stream: TextIO | None = None) -> None:
     os.dup2(os.open(os.devnull, os.O_WRONLY), (stream or sys.stdout).fileno())
 
 
-def console() -> "Console":
+def console() -> "rich.console.Console":
     """The console of stderr."""
     return deferred.EscapingConsole(stderr=True, highlight=False)
 
 
-def show(document: dict[str, Any], as_json: bool, render: Callable[[dict[str, Any]], "RenderableType"]) -> None:
+def show(
+    document: dict[str, Any], as_json: bool, render: Callable[[dict[str, Any]], "rich.console.RenderableType"]
+) -> None:
     """Print a document as JSON, or as text made by `render`."""
     if as_json:
         write_json(document)

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
@@ -11,10 +11,7 @@ from lab.cli.families import offers
 from lab.cli.options import Json, Seed, ToolboxPlace
 from lab.cli.output import complain, console, end, show
 from lab.errors import BadInput, counted, unknown
-
-if TYPE_CHECKING:
-    from rich.console import RenderableType
-
+from lab.lazy import rich
 
 OutFolder = Annotated[Path, typer.Option("--out", help="The folder for its files.")]
 
@@ -131,11 +128,8 @@ def toolbox_evaluate(
         end(f"in none of {counted(scenes, 'drawn scene')} can '{wanted}' reach its goal", 1)
 
 
-def evaluation_summary(document: Mapping[str, Any]) -> "RenderableType":
+def evaluation_summary(document: Mapping[str, Any]) -> "rich.console.RenderableType":
     """The text of `lab toolbox evaluate`, from its JSON document: the success rate, and a line for each failed scene."""
-    from rich.console import Group
-    from rich.text import Text
-
     scenes = f"{counted(document['scenes'], 'drawn scene')} of {document['task']} from seed {document['seed']}"
     lines = [f"'{document['policy']}' as '{document['skill']}': {document['successes']} of {scenes} succeeded"]
     if document["success_percent"] is not None:
@@ -146,7 +140,9 @@ def evaluation_summary(document: Mapping[str, Any]) -> "RenderableType":
     if document["unsolvable"]:
         lines.append(f"not counted: {counted(document['unsolvable'], 'scene')} in which nobody could reach the goal")
     failed = [row for row in document["rows"] if not row["success"]]
-    return Group(*map(Text, lines), *(Text(f"seed {row['seed']}: {row['reason']}", "red") for row in failed))
+    return rich.console.Group(
+        *map(rich.text.Text, lines), *(rich.text.Text(f"seed {row['seed']}: {row['reason']}", "red") for row in failed)
+    )
 
 
 # ---- list, show, versions, verify, remove -------------------------------------------------------------------------------

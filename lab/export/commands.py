@@ -9,6 +9,7 @@ from itertools import pairwise
 from math import ceil, pi, radians
 
 import numpy as np
+import scipy
 
 from lab.export.program import Action, Array, Motion, Press, Program, ProgramTransfer
 from lab.sim.arms.kinematics import ToolPose
@@ -220,10 +221,8 @@ def _corners(motion: Motion, rows: Array) -> tuple[Array, Array]:
 
 def _apart(rows: Array, shape: Array) -> float:
     """The largest deviation [m] of poses (n, 4) from a path (m, 4), turns included by _TURN_M."""
-    from scipy.spatial import cKDTree
-
     lines = np.vstack([shape[:-1] + share * np.diff(shape, axis=0) for share in (0.0, 0.25, 0.5, 0.75)] + [shape[-1:]])
-    gaps = rows - lines[cKDTree(lines * COUNTED).query(rows * COUNTED)[1]]
+    gaps = rows - lines[scipy.spatial.cKDTree(lines * COUNTED).query(rows * COUNTED)[1]]
     return float(max(np.linalg.norm(gaps[:, :3], axis=1).max(), _TURN_M * np.abs(gaps[:, 3]).max()))
 
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from math import ceil, radians
 
 import numpy as np
+import scipy
 
 from lab.errors import BadInput
 from lab.export.commands import (
@@ -238,9 +239,8 @@ def _at(times: Array, joints: Array, step: int) -> Array:
 
 def _gaps(one: Array, other: Array) -> tuple[Array, Array]:
     """The distances (n,) [m] and angles (n,) [rad] between two rows of poses (n, 7), row by row."""
-    from scipy.spatial.transform import Rotation
-
-    turn = Rotation.from_quat(one[:, 3:]).inv() * Rotation.from_quat(other[:, 3:])
+    rotation = scipy.spatial.transform.Rotation
+    turn = rotation.from_quat(one[:, 3:]).inv() * rotation.from_quat(other[:, 3:])
     return np.linalg.norm(one[:, :3] - other[:, :3], axis=1), np.asarray(turn.magnitude())
 
 
@@ -266,8 +266,6 @@ def apart(seen: Array, way: Array) -> tuple[Array, Array]:
 
 def _flat(poses: Array) -> Array:
     """The coordinates (n, 4) [m] of poses (n, 7): x, y, z, and the unwrapped yaw times YAW_ARM."""
-    from scipy.spatial.transform import Rotation
-
-    across = Rotation.from_quat(poses[:, 3:]).apply([0.0, 1.0, 0.0])
+    across = scipy.spatial.transform.Rotation.from_quat(poses[:, 3:]).apply([0.0, 1.0, 0.0])
     yaw = np.unwrap(np.arctan2(-across[:, 0], across[:, 1]))
     return np.column_stack([poses[:, :3], yaw * YAW_ARM])

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from lab.export.program import Action, ArmRest, Array, Motion, Press, Program, ProgramDocument, ProgramTransfer
@@ -120,12 +121,11 @@ class MotionRecorder:
 
 def tips(links: Array, tip: Array) -> Array:
     """The finger tips' poses (n, 7), x, y, z [m] and quaternion xyzw, for poses (n, 7) of the link in which `tip` (4, 4) is."""
-    from scipy.spatial.transform import Rotation
-
     if not len(links):
         return links
-    turns = Rotation.from_quat(links[:, 3:])
-    return np.hstack([links[:, :3] + turns.apply(tip[:3, 3]), (turns * Rotation.from_matrix(tip[:3, :3])).as_quat()])
+    rotation = scipy.spatial.transform.Rotation
+    turns = rotation.from_quat(links[:, 3:])
+    return np.hstack([links[:, :3] + turns.apply(tip[:3, 3]), (turns * rotation.from_matrix(tip[:3, :3])).as_quat()])
 
 
 def closed_at(actions: Sequence[Action], at_s: Array) -> NDArray[np.bool_]:

@@ -7,6 +7,7 @@ from operator import itemgetter
 from typing import Any, NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from lab.errors import WorkFailed
@@ -124,11 +125,9 @@ class TransitionModel:
     @cached_property
     def _onward(self) -> Any:
         """The probabilities (S * A, S) of continuing in each state, as a scipy.sparse array."""
-        from scipy.sparse import csr_array
-
         goes = ~self._over & ~self.terminal[self._row // self.n_actions]
         size = (self.n_states * self.n_actions, self.n_states)
-        return csr_array((self._chance[goes], (self._row[goes], self._entered[goes])), shape=size)
+        return scipy.sparse.csr_array((self._chance[goes], (self._row[goes], self._entered[goes])), shape=size)
 
     def optimal(self, discount: float) -> FloatArray:
         """The optimal action values (S, A) by value iteration, 0 in terminal states. Raises WorkFailed if they diverge."""

@@ -7,6 +7,7 @@ from typing import Annotated, Any, NamedTuple, get_type_hints
 from annotated_types import DocInfo, Ge, Gt, Le, Lt, doc
 
 from lab.errors import LIMITS, BadInput
+from lab.lazy import pydantic
 
 COMPARE_WINDOWS = ("ccrl", "combined")
 
@@ -14,21 +15,17 @@ COMPARE_WINDOWS = ("ccrl", "combined")
 @cache
 def _checked(kind: type) -> Any:
     """A strict pydantic model with the fields of a settings class."""
-    from pydantic import ConfigDict, create_model
-
     fields: dict[str, Any] = {name: (hint, ...) for name, hint in get_type_hints(kind, include_extras=True).items()}
-    return create_model(kind.__name__, __config__=ConfigDict(strict=True), **fields)
+    return pydantic.create_model(kind.__name__, __config__=pydantic.ConfigDict(strict=True), **fields)
 
 
 def _require_allowed(settings: Any) -> None:
     """Raises BadInput for the first field of a wrong type or outside its range; converts numpy numbers to plain ones."""
-    from pydantic import ValidationError
-
     kind: Any = type(settings)
     model = _checked(kind)
     try:
         vars(settings).update(vars(model.model_validate(vars(settings))))
-    except ValidationError as error:
+    except pydantic.ValidationError as error:
         first = error.errors(include_url=False)[0]
         field = model.model_fields[first["loc"][0]]
         limits = _limits(field.metadata)

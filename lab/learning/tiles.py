@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.errors import BadInput
+from lab.lazy import scipy
 
 MOST_ROUNDS = 300  # iterations of the least-squares fit of weights to a table
 
@@ -123,12 +124,10 @@ class TileCoding:
         """The weights (count, A) whose values fit given ones (S, A) best (least squares); exact for tile-coded values."""
         if (values == values[0, 0]).all():
             return np.full((self.count, values.shape[1]), values[0, 0] / self.tilings)
-        from scipy.sparse import csr_matrix
-        from scipy.sparse.linalg import lsqr
-
         rows = np.arange(0, self.active.size + 1, self.tilings)
         shape = (len(self.active), self.count)
-        matrix = csr_matrix((np.ones(self.active.size), self.active.ravel(), rows), shape=shape)
+        lsqr = scipy.sparse.linalg.lsqr
+        matrix = scipy.sparse.csr_matrix((np.ones(self.active.size), self.active.ravel(), rows), shape=shape)
         return np.stack(
             [lsqr(matrix, column, atol=1e-13, btol=1e-13, iter_lim=MOST_ROUNDS)[0] for column in values.T], axis=1
         )

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from lab.learning.session_events import Event as SessionEvent
 from lab.learning.settings import GateSettings
 from lab.production.cyclic_order import cyclic_order
 from lab.production.order_learning import OrderLearning, bound_shares
-from lab.sequencing import find_sequence
+from lab.sequencing import deferred, find_sequence
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import BUILT_IN, MAKESPAN, cost
 from lab.sequencing.cell.routes import part_of
@@ -45,9 +45,6 @@ from lab.teaching.events import (
     unheard,
 )
 from lab.teaching.lesson_sessions import TellingAdvisor
-
-if TYPE_CHECKING:  # it loads the compiler
-    from lab.sequencing.methods.srl_advised import AdvisedResult
 
 NOBODY = AdvisorName.of("none")
 KeepOrder = Callable[[Cell, str], Journal]  # given the cell and the objective
@@ -174,7 +171,7 @@ def ordered(cell: Cell, settings: Sequencing, advice: OrderAdvice, seed: int, te
         own = cost(follow(cell, repeated.sequence), search.objective)
         orders[CYCLIC] = SequenceResult(repeated.sequence, own, (own,))
     said: dict[str, Any] = {}
-    asked: AdvisedResult | None = None
+    asked: deferred.AdvisedResult | None = None
     if advice.advisor.row != "none" and not orders:
         asked, said = _with_advice(cell, search, advice, seed, known, tell)
     if asked is not None and asked.advised:
@@ -228,7 +225,7 @@ def _cheapest(orders: Mapping[str, SequenceResult]) -> str:
 
 def _with_advice(
     cell: Cell, search: Search, advice: OrderAdvice, seed: int, known: Reference, tell: Tell
-) -> "tuple[AdvisedResult, dict[str, Any]]":
+) -> "tuple[deferred.AdvisedResult, dict[str, Any]]":
     """SRL's order with advice, and its receipt; it begins again each time an answer is taken back."""
     is_person = advice.advisor.row in PEOPLE
     journal = advice.keep(cell, search.objective) if is_person else Journal()
@@ -252,13 +249,11 @@ def _with_advice(
 
 def advised_session(
     cell: Cell, search: Search, advice: OrderAdvice, seeds: tuple[int, int], journal: Journal | None, tell: Tell
-) -> "AdvisedResult":
+) -> "deferred.AdvisedResult":
     """The result of a session of SRL with advice; seeds: the command's, and the session's number.
 
     Raises Again, and as `advised_srl`.
     """
-    from lab.sequencing.methods.srl_advised import advised_srl  # only where it counts: the compiler takes its time
-
     seed, session = seeds
     rng, own = (np.random.default_rng([seed, stream, session]) for stream in (2, 3))
     people, signature = through(journal, advice.people), signature_of(cell, search.objective)
@@ -269,7 +264,7 @@ def advised_session(
     def hear(event: SessionEvent) -> None:
         tell(LessonEvent(ORDER, event, True if journal is None else journal.tell(event)))
 
-    return advised_srl(cell, search, rng, GateSettings(advice.gate, spare_best=True), advisor, hear)
+    return deferred.advised_srl(cell, search, rng, GateSettings(advice.gate, spare_best=True), advisor, hear)
 
 
 @dataclass(frozen=True)

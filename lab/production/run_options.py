@@ -9,6 +9,7 @@ from typing import Annotated, Any, ClassVar
 from annotated_types import Ge, Le
 
 from lab.errors import BadInput
+from lab.production import deferred
 from lab.production.cyclic_order import check_parts, mix_of
 from lab.production.run_journal import RunBegan, RunJournal, read_run
 from lab.sequencing import SEQUENCERS, check_method
@@ -67,10 +68,7 @@ class RunOptions(SessionOptions):
         if self.parts_per_cycle is not None:
             check_parts(self.parts_per_cycle, mix_of(order), self.cyclic)
         if self.order is not None or self.cyclic:
-            from lab.production.durations import untimed  # and with it all of the scene
-            from lab.production.order import check_order  # and with it all that finds one
-
-            check_order(untimed(task, order), self.order, mix_of(order) if self.cyclic else ())
+            deferred.check_order(deferred.untimed(task, order), self.order, mix_of(order) if self.cyclic else ())
         return order
 
     def lessons(self) -> LessonOptions:

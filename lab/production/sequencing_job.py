@@ -15,9 +15,11 @@ from lab.errors import BadInput, unknown
 from lab.interrupts import uninterrupted
 from lab.learning.requests import Ask
 from lab.learning.settings import GateSettings
+from lab.production import deferred
 from lab.production.any_time import CTRL_C, SearchPlan, SearchResults, Session, looked_for
 from lab.production.order import NOBODY, KeepOrder, OrderAdvice, advised_session
 from lab.sequencing import SEQUENCERS, carried_reaction, check_method, find_sequence
+from lab.sequencing import deferred as methods
 from lab.sequencing.cell.cell import EVERY_PLAN, Cell
 from lab.sequencing.cell.chance import NO_CHANCE, Chance
 from lab.sequencing.cell.objectives import (
@@ -141,9 +143,7 @@ def _check_names(wanted: SequencingOptions, settings: Sequencing) -> None:
     if objective not in OBJECTIVES:
         raise unknown("objective", objective, OBJECTIVES, "--objective")
     if wanted.advisor.row != "none" or wanted.gate != SequencingOptions.gate:
-        from lab.sequencing.methods.srl_advised import check_gate  # only where it counts: the compiler takes its time
-
-        check_gate(wanted.gate)
+        methods.check_gate(wanted.gate)
     if wanted.policy is not None:
         if method != "carried":
             raise BadInput(f"--policy {wanted.policy} with --method {method}: only carried decides by one")
@@ -165,18 +165,14 @@ def ordered_cell(file: CellFile, case: str | None, toasts: int | None) -> Cell:
 
 def measured_cell(task: Task, toasts: int | None, wanted: SequencingOptions, teacher: Teacher) -> Cell:
     """The cell of a task, once its skills are learned and their durations measured."""
-    from lab.production.durations import Durations, cell_of
-    from lab.production.taught import teach_all
-    from lab.skills.prepared_scene import prepare
-    from lab.skills.skillset import SkillSet
-
     objective = wanted.objective or task.sequencing.objective
     if objective in WITH_DUE_TIMES:
         raise BadInput(f"objective '{objective}' (--objective) needs due times, and a task has none: use a cell file")
     if wanted.durations is not None:
         order = task.ordered(toasts, wanted.parts)
-        return cell_of(task, Durations.from_json(wanted.durations, SkillSet.of(task, order)), order)
-    return teach_all(prepare(task, task.ordered(toasts, wanted.parts), teacher.seed), teacher).cell
+        skills = deferred.SkillSet.of(task, order)
+        return deferred.cell_of(task, deferred.Durations.from_json(wanted.durations, skills), order)
+    return deferred.teach_all(deferred.prepare(task, task.ordered(toasts, wanted.parts), teacher.seed), teacher).cell
 
 
 def sequence_cell(

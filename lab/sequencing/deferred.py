@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from lab.sequencing.methods.rollout import by_rule, replan
     from lab.sequencing.methods.rules import RULES, dispatched
     from lab.sequencing.methods.srl import srl
+    from lab.sequencing.methods.srl_advised import AdvisedResult, advised_srl, check_gate
     from lab.sequencing.methods.srl_improved import srl_improved
     from lab.sequencing.methods.srl_time import reacting, srl_time
 
@@ -37,6 +38,7 @@ TABLE = {
     "lab.sequencing.methods.rollout": ("by_rule", "replan"),
     "lab.sequencing.methods.rules": ("RULES", "dispatched"),
     "lab.sequencing.methods.srl": ("srl",),
+    "lab.sequencing.methods.srl_advised": ("AdvisedResult", "advised_srl", "check_gate"),
     "lab.sequencing.methods.srl_improved": ("srl_improved",),
     "lab.sequencing.methods.srl_time": ("reacting", "srl_time"),
     "numpy.random": ("default_rng",),

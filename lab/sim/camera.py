@@ -8,6 +8,7 @@ from math import atan, cos, pi, radians, sin, tan
 import numpy as np
 from numpy.typing import NDArray
 
+from lab.lazy import scipy
 from lab.sim.arms.kinematics import ToolPose
 from lab.sim.frames import Shape
 from lab.sim.mesh_file import vertices
@@ -166,10 +167,8 @@ def hand_camera(tool: ToolPose) -> Camera:
 @cache
 def seen_corners(shape: PartShape) -> Array:
     """The corners (n, 3) of the hull of a part's visible shapes, relative to the middle of its foot [m]."""
-    from scipy.spatial import ConvexHull
-
     points = np.concatenate([_points(look) for look in shape.looks])
-    corners: Array = points[ConvexHull(points).vertices] + (0.0, 0.0, shape.foot_m)
+    corners: Array = points[scipy.spatial.ConvexHull(points).vertices] + (0.0, 0.0, shape.foot_m)
     return corners
 
 

@@ -4,16 +4,13 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from math import pi
 from pathlib import Path
-from typing import TYPE_CHECKING
 from xml.etree import ElementTree as Xml
 
 import numpy as np
 
+from lab.lazy import trimesh
 from lab.sim.arms import kinematics as arm
 from lab.sim.frames import Rgba, Vector
-
-if TYPE_CHECKING:
-    from trimesh import Trimesh
 
 
 @dataclass(frozen=True)
@@ -23,7 +20,7 @@ class LinkShape:
     color: Rgba
     size: tuple[float, ...] = ()
     at: Vector = (0.0, 0.0, 0.0)
-    mesh: "Trimesh | None" = None
+    mesh: "trimesh.Trimesh | None" = None
     ghost: bool = False
     hidden: bool = False
 
@@ -60,11 +57,9 @@ class UrdfModel:
     links: list[Link] = field(default_factory=list)
 
 
-def cylinder(radius: float, length: float, at: Vector = (0, 0, 0), along: str = "z") -> "Trimesh":
+def cylinder(radius: float, length: float, at: Vector = (0, 0, 0), along: str = "z") -> "trimesh.Trimesh":
     """A solid cylinder around `at` [m], its axis along x, y or z."""
-    import trimesh
-
-    mesh: Trimesh = trimesh.creation.cylinder(radius=radius, height=length, sections=40)
+    mesh: trimesh.Trimesh = trimesh.creation.cylinder(radius=radius, height=length, sections=40)
     if along != "z":
         turn: Vector = (0, 1, 0) if along == "x" else (1, 0, 0)
         mesh.apply_transform(trimesh.transformations.rotation_matrix(pi / 2, turn))  # type: ignore[no-untyped-call]
@@ -72,26 +67,22 @@ def cylinder(radius: float, length: float, at: Vector = (0, 0, 0), along: str = 
     return mesh
 
 
-def join(*meshes: "Trimesh") -> "Trimesh":
+def join(*meshes: "trimesh.Trimesh") -> "trimesh.Trimesh":
     """Meshes as one, overlaps kept."""
-    import trimesh
-
     joined = trimesh.util.concatenate(list(meshes))
     assert isinstance(joined, trimesh.Trimesh)
     return joined
 
 
-def hull(*meshes: "Trimesh") -> "Trimesh":
+def hull(*meshes: "trimesh.Trimesh") -> "trimesh.Trimesh":
     """The convex hull of meshes."""
-    hull: Trimesh = join(*meshes).convex_hull
+    hull: trimesh.Trimesh = join(*meshes).convex_hull
     return hull
 
 
-def box(size: Vector, at: Vector = (0, 0, 0)) -> "Trimesh":
+def box(size: Vector, at: Vector = (0, 0, 0)) -> "trimesh.Trimesh":
     """A solid box of `size` around `at` [m]."""
-    import trimesh
-
-    mesh: Trimesh = trimesh.creation.box(extents=size)
+    mesh: trimesh.Trimesh = trimesh.creation.box(extents=size)
     mesh.apply_translation(at)
     return mesh
 
@@ -109,7 +100,7 @@ def _geometry(parent: Xml.Element, part: LinkShape, mesh_file: str) -> None:
         Xml.SubElement(shape, "box", size=_numbers(part.size))
 
 
-def _solid(part: LinkShape) -> "Trimesh":
+def _solid(part: LinkShape) -> "trimesh.Trimesh":
     size = part.size
     return part.mesh if part.mesh is not None else box((size[0], size[1], size[2]), part.at)
 
@@ -168,7 +159,7 @@ def urdf(model: UrdfModel) -> tuple[str, dict[str, str]]:
     return '<?xml version="1.0"?>\n' + Xml.tostring(root, encoding="unicode") + "\n", meshes
 
 
-def obj(mesh: "Trimesh") -> str:
+def obj(mesh: "trimesh.Trimesh") -> str:
     """`mesh` as OBJ text with a normal per face, rounded to micrometres so that every machine writes the same file."""
     lines = [f"v {_numbers(vertex)}" for vertex in mesh.vertices]
     normals = {tuple(np.round(normal, 3) + 0.0): None for normal in mesh.face_normals}
@@ -334,14 +325,12 @@ def bread() -> UrdfModel:
     """A slice of bread that stands: solid as a box, seen as a loaf's profile with a crust."""
     width, thick, height = SLICE
 
-    def profile(shrink: float, depth: float) -> "Trimesh":
+    def profile(shrink: float, depth: float) -> "trimesh.Trimesh":
         w, top, bottom = width / 2 - shrink, height / 2 - shrink, -height / 2 + shrink
         side, round_ = top - 0.034, 0.030
         cap = [(w - round_ + round_ * np.cos(t), top - round_ + round_ * np.sin(t)) for t in np.linspace(0, pi / 2, 8)]
         outline = [(w * 0.97, bottom), (w * 0.97, side), *cap]
         outline += [(-x, z) for x, z in outline]
-        import trimesh
-
         return hull(trimesh.Trimesh([(x, y, z) for x, z in outline for y in (-depth / 2, depth / 2)]))
 
     seen = [

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -14,9 +14,7 @@ from lab.sim.scene.blocked_cells import OUT_OF_REACH, Survey, in_the_way
 from lab.skills.skill import Bench, Skill, learned_path, no_path_error
 from lab.skills.surveys import NEAR_SHAPE, NEAR_STEP_M, NEAR_YAW_STEP, NEAR_YAWS, SurveyName, Surveys, near_pose
 from lab.tasks.task import Task
-
-if TYPE_CHECKING:
-    from lab.toolbox.policy import Policy
+from lab.toolbox.policy import Policy
 
 SLOW = 0.6
 SIDEWAYS = {
@@ -73,7 +71,7 @@ class AroundPart(Skill):
         """The approach pose of the station."""
         return self.surveys.approach(self.station)
 
-    def down(self, bench: Bench, policy: "Policy", goal: ToolPose) -> Iterator[None]:
+    def down(self, bench: Bench, policy: Policy, goal: ToolPose) -> Iterator[None]:
         """Move above the part (or in front of it, at a station entered from the side), then along the learned path to `goal`.
 
         Path corners are cut where the straight line is free.

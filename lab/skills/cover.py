@@ -1,7 +1,7 @@
 """Cover: treat a surface cell by cell along the shortest learned path, as with butter, glue or paint, or by vacuuming."""
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -21,9 +21,7 @@ from lab.skills.state_words import plain
 from lab.skills.surveys import Surveys
 from lab.tasks.task import Task
 from lab.tasks.task_fields import Process, Stage
-
-if TYPE_CHECKING:
-    from lab.toolbox.policy import Policy
+from lab.toolbox.policy import Policy
 
 REST = (0.0, 0.0)  # joints of a machine's head while it waits, low and clear of the gripper
 HEAD_BEHIND_M = 0.03  # distance of the head's frame behind the nozzle's plane
@@ -174,7 +172,7 @@ class CoverPart(Cover):
         covered = np.ndenumerate(self.problem.mdp.covered(state))
         return {self._patch(name, row, column): bool(on) for (row, column), on in covered}
 
-    def motion(self, bench: Bench, policy: "Policy") -> Iterator[None]:
+    def motion(self, bench: Bench, policy: Policy) -> Iterator[None]:
         """Move the head along the learned path, dwell on each cell, record where its ray hits the part, and return to rest."""
         mdp, process = self.problem.mdp, self.process
         kind = bench.scene.kind_of.get(
@@ -255,7 +253,7 @@ class CoverPlace(Cover):
         """The approach pose of the station."""
         return self.surveys.approach(self.station)
 
-    def motion(self, bench: Bench, policy: "Policy") -> Iterator[None]:
+    def motion(self, bench: Bench, policy: Policy) -> Iterator[None]:
         """Move down to the first cell, along the learned path with a dwell on each cell, and back up to the approach."""
         robot, mdp, process = bench.scene.robot, self.problem.mdp, self.process
         approach = self.surveys.approach(self.station)

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import replace
 from math import hypot
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from lab.sim.arms.kinematics import ToolPose
 from lab.skills.around_part import SLOW, AroundPart
@@ -12,9 +12,7 @@ from lab.skills.sight import SkillFailed
 from lab.skills.skill import Bench
 from lab.skills.state_words import plain
 from lab.tasks.task import Task
-
-if TYPE_CHECKING:
-    from lab.toolbox.policy import Policy
+from lab.toolbox.policy import Policy
 
 ACTIONS = ("left", "right", "backward", "forward", "down", "up", "turn right", "turn left")  # of the part's axes
 GOAL = (2, 2, 0, 2)
@@ -42,7 +40,7 @@ class Grasp(AroundPart):
         """The open fingers, and the place where they close on the part."""
         return "The open fingers are", f"where they close on {plain(self.kind)}"
 
-    def motion(self, bench: Bench, policy: "Policy") -> Iterator[None]:
+    def motion(self, bench: Bench, policy: Policy) -> Iterator[None]:
         """Open, move above the part, follow the learned path down, close, lift, and check that the part is held."""
         robot, body = bench.scene.robot, bench.scene.body_of(self.part, self.kind)
         if robot.closed:

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import replace
 from math import hypot
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,10 +22,8 @@ from lab.skills.state_words import plain
 from lab.skills.surveys import SurveyName, Surveys
 from lab.tasks.task import Task
 from lab.tasks.task_fields import Obstacle
+from lab.toolbox.policy import Policy
 from lab.vision import Marker, find_markers, locate, see
-
-if TYPE_CHECKING:
-    from lab.toolbox.policy import Policy
 
 ACTIONS = ("left", "right", "backward", "forward")  # -x, +x, -y, +y: as the camera's picture shows them
 CLEARANCE_M = 0.006  # between a carried part and an obstacle
@@ -139,7 +137,7 @@ class Insert(Skill):
         """The part in the fingers, and the machine's slot."""
         return f"{plain(self.kind).capitalize()} in the fingers is", f"the slot of {plain(self.station)}"
 
-    def motion(self, bench: Bench, policy: "Policy") -> Iterator[None]:
+    def motion(self, bench: Bench, policy: Policy) -> Iterator[None]:
         """Follow the learned cells, each checked by the camera, then move above the slot, down, release, and check the part."""
         robot, mdp, body = bench.scene.robot, self.problem.mdp, bench.held
         if body is None:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import scipy
 
 from lab.errors import BadInput, WorkFailed
 from lab.files import write_whole
@@ -167,11 +168,9 @@ def mat_of(task: Task) -> Mat:
 
 def _mat_picture(mat: Mat, camera: Camera, lens: Lens, number: int, rng: np.random.Generator) -> Image:
     """The camera's picture of the mat, flat on the table (number 0) or tilted."""
-    from scipy.spatial.transform import Rotation
-
     turn, shift = camera.turn_and_shift()
     if number:
-        tilt = Rotation.from_rotvec(rng.uniform(-MAT_TILT, MAT_TILT, 3)).as_matrix()
+        tilt = scipy.spatial.transform.Rotation.from_rotvec(rng.uniform(-MAT_TILT, MAT_TILT, 3)).as_matrix()
         middle = np.array([*mat.middle_m, 0.0])
         turn, shift = turn @ tilt, shift + turn @ (middle - tilt @ middle)
     return mat.photographed(lens, turn, shift)

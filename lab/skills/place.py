@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -16,9 +16,7 @@ from lab.skills.sight import SkillFailed
 from lab.skills.skill import Bench
 from lab.skills.state_words import plain
 from lab.tasks.task import Task
-
-if TYPE_CHECKING:
-    from lab.toolbox.policy import Policy
+from lab.toolbox.policy import Policy
 
 ACTIONS = ("left", "right", "backward", "forward", "down", "up")  # of the spot's axes
 GOAL = (2, 2, 0)
@@ -48,7 +46,7 @@ class PlacePart(AroundPart):
         """The part in the fingers, and its place at the station."""
         return f"{plain(self.kind).capitalize()} in the fingers is", f"its place at {plain(self.station)}"
 
-    def motion(self, bench: Bench, policy: "Policy") -> Iterator[None]:
+    def motion(self, bench: Bench, policy: Policy) -> Iterator[None]:
         """Move above the spot, follow the learned path down, release, rise, and check that the part stands."""
         body, spot = bench.held, self.stands_on()
         if body is None:

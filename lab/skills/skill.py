@@ -21,11 +21,11 @@ from lab.skills.sight import Sight, SkillFailed
 from lab.skills.state_words import away_in_words, size_in_words
 from lab.tasks.task import Task
 from lab.tasks.task_fields import Stage
+from lab.toolbox.policy import Policy
 from lab.vision import GridView
 
 if TYPE_CHECKING:
     from lab.skills.surveys import SurveyName, Surveys
-    from lab.toolbox.policy import Policy
 
 LOST_M = 0.03  # [m] largest distance of a held part from its place between the fingers
 UPRIGHT = 0.97  # cosine of the largest tilt of a part that counts as standing
@@ -346,14 +346,14 @@ class Skill:
         """The name of the part in a trial of the skill; "" when it handles none."""
         return self.kind and f"{self.surveys.task.made_as(self.kind).name} 1"
 
-    def motion(self, bench: Bench, policy: "Policy") -> Iterator[None]:
+    def motion(self, bench: Bench, policy: Policy) -> Iterator[None]:
         """Follows the policy: each `next` sets the targets of one physics step of 1/240 s. Raises SkillFailed.
 
         bench: the scene, with `bench.scene.robot` and `bench.scene.world`; policy: `policy.q` is the learned table.
         """
         raise NotImplementedError
 
-    def start(self, bench: Bench, policy: "Policy") -> None:
+    def start(self, bench: Bench, policy: Policy) -> None:
         """Begins to follow `policy` from the bench's current state."""
         self._motion = self.motion(bench, policy)
         self.status, self.reason = Status.RUNNING, ""
@@ -387,7 +387,7 @@ def stand_below(scene: Scene, station: str, below: Sequence[tuple[str, Spot]]) -
             scene.add(name, kind, spot)
 
 
-def learned_path(policy: "Policy", mdp: TabularMDP, start: int) -> list[int]:
+def learned_path(policy: Policy, mdp: TabularMDP, start: int) -> list[int]:
     """The states on the policy's greedy path from `start` to the goal; SkillFailed when it does not reach the goal."""
     if mdp.goal[start]:
         return [start]

@@ -1,7 +1,7 @@
 """Transfer: move the tool through the workspace from one approach to another, with or without a part in the fingers."""
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from lab.errors import BadInput
 from lab.learning.problem import Problem
@@ -12,9 +12,7 @@ from lab.skills.skill import Bench, Skill, learned_path, no_path_error
 from lab.skills.state_words import plain
 from lab.skills.surveys import SurveyName, Surveys, grid_of, way_to
 from lab.tasks.task import Task
-
-if TYPE_CHECKING:
-    from lab.toolbox.policy import Policy
+from lab.toolbox.policy import Policy
 
 ACTIONS = ("left", "right", "backward", "forward", "down", "up")  # -x, +x, -y, +y, -z, +z, as seen from above
 _BLEND_M = 0.10
@@ -91,7 +89,7 @@ class Transfer(Skill):
             f"the end of its path{', where the camera takes over' if camera else f' over {plain(self.target)}'}",
         )
 
-    def motion(self, bench: Bench, policy: "Policy") -> Iterator[None]:
+    def motion(self, bench: Bench, policy: Policy) -> Iterator[None]:
         """Follow the learned path from the tool's pose to the target's approach; its corners are cut where that is free."""
         mdp, robot = self.problem.mdp, bench.scene.robot
         poses = [self.pose(state) for state in learned_path(policy, mdp, mdp.start)]

@@ -4,18 +4,14 @@ Hollow diamonds mark the values that the thesis prints. The same data gives the 
 """
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from lab.errors import BadInput
+from lab.lazy import matplotlib
 from lab.studies.findings import Row
 from lab.view.canvas import BLUE, INK, ORANGE, PALE_GREY, RED, SKY, YELLOW, picture_bytes
-
-if TYPE_CHECKING:
-    from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 Look = tuple[str, str, str]  # of a curve: colour, marker, name
 # of the bars of a series: colour, hatch
@@ -45,7 +41,7 @@ def bars(
     if any(len(line) != len(groups) for line in lines.values()):
         raise BadInput(f"bars: {[*map(len, lines.values())]} rows of the series; needed: {len(groups)} of each")
 
-    def draw(figure: "Figure") -> None:
+    def draw(figure: "matplotlib.figure.Figure") -> None:
         axes = figure.add_subplot()
         for number, (name, line) in enumerate(lines.items()):
             middle = GROUP_WIDTH * ((number + 0.5) / len(lines) - 0.5)
@@ -68,7 +64,7 @@ def bars(
     return picture_bytes(draw, max(5.0, 1.4 + 0.34 * len(groups) * (len(lines) + 1)), 3.8)
 
 
-def curve(axes: "Axes", rows: Sequence[Row], by: str, look: Look) -> None:
+def curve(axes: "matplotlib.axes.Axes", rows: Sequence[Row], by: str, look: Look) -> None:
     """Draws the values of rows over one of their settings, with a band for the intervals."""
     colour, marker, name = look
     x, y = [row[by] for row in rows], [row["value"] for row in rows]
@@ -77,7 +73,9 @@ def curve(axes: "Axes", rows: Sequence[Row], by: str, look: Look) -> None:
     axes.plot(x, y, color=colour, marker=marker, markersize=4.5, linewidth=1.4, label=name, zorder=2.5)
 
 
-def legend_below(figure: "Figure", handles: Mapping[str, "Artist"] | None = None) -> None:
+def legend_below(
+    figure: "matplotlib.figure.Figure", handles: Mapping[str, "matplotlib.artist.Artist"] | None = None
+) -> None:
     """Draws one legend below all plots, in as many columns as fit; handles: by name, None for all artists with labels."""
     if handles is None:
         legends = [axes.get_legend_handles_labels() for axes in figure.axes]
@@ -93,7 +91,7 @@ def _top(row: Row) -> float:
     return max((float(height) for height in heights if height is not None), default=0.0)
 
 
-def _draw_bar(axes: "Axes", x: float, row: Row, series: int, width: float) -> None:
+def _draw_bar(axes: "matplotlib.axes.Axes", x: float, row: Row, series: int, width: float) -> None:
     colour, hatch = SERIES[series]
     axes.bar(x, row["value"], width, color=colour, hatch=hatch, edgecolor="white", linewidth=0.6)
     for line_colour, line_width in (("white", 3.0), (INK, 1.2)):  # a white rim, or it is lost on dark bars
@@ -101,6 +99,6 @@ def _draw_bar(axes: "Axes", x: float, row: Row, series: int, width: float) -> No
     axes.plot(x, np.nan if row["thesis"] is None else row["thesis"], zorder=4, **PRINTED)
 
 
-def _write(axes: "Axes", x: float, row: Row, text: str) -> None:
+def _write(axes: "matplotlib.axes.Axes", x: float, row: Row, text: str) -> None:
     offset: dict[str, Any] = {"xytext": (0, 4), "textcoords": "offset points", "ha": "center"}
     axes.annotate(text, (x, _top(row)), fontsize=8, color=INK, **offset)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
 from hashlib import sha256
 from itertools import product
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from zlib import crc32
 
 import numpy as np
@@ -16,6 +16,7 @@ from lab.advice.advising import Advising
 from lab.advice.advisors import ADVISORS
 from lab.errors import BadInput
 from lab.files import code_key
+from lab.lazy import matplotlib
 from lab.learning.batch import run_sessions
 from lab.learning.environment import Environment, TableEnvironment
 from lab.learning.gates import GATES
@@ -37,11 +38,6 @@ from lab.teaching.lesson import Subject
 from lab.teaching.subjects import Teachable, subject_from
 from lab.version import __version__
 from lab.view.canvas import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, RED, SKY, picture_bytes
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
 
 Result = tuple[Row, "ComparedSessions"]
 COLOURS = (BLUE, ORANGE, GREEN, RED, PURPLE, SKY, GREY)
@@ -72,7 +68,7 @@ def _dots(results: Sequence[Result]) -> bytes:
     """A picture with a line per setting and a column per measure."""
     names = [words(named, [other for other, _ in results]) for named, _ in results]
 
-    def draw(figure: "Figure") -> None:
+    def draw(figure: "matplotlib.figure.Figure") -> None:
         columns = figure.subplots(1, 3, sharey=True)
         measured: list[tuple[str, list[Any]]] = [
             ("solved [%]", [share(found.solved) for _, found in results]),
@@ -100,8 +96,8 @@ def _mean(values: Any) -> tuple[float, float, float]:
 
 
 def _curves(results: Sequence[Result]) -> bytes:
-    def draw(figure: "Figure") -> None:
-        axes: Axes = figure.add_subplot()
+    def draw(figure: "matplotlib.figure.Figure") -> None:
+        axes: matplotlib.axes.Axes = figure.add_subplot()
         for n, (named, measured) in enumerate(results):
             name = words(named, [other for other, _ in results])
             look: dict[str, Any] = {"color": COLOURS[n % len(COLOURS)], "linestyle": DASHES[n // len(COLOURS)]}

@@ -12,6 +12,7 @@ from typing import Any
 
 from lab import files
 from lab.errors import BadInput, WorkFailed
+from lab.lazy import jinja2
 from lab.statistics import PERCENT_POINTS, RELATIVE, allowed
 from lab.studies.findings import JUDGED, Findings, counts, share_within
 from lab.version import __version__
@@ -71,9 +72,7 @@ def write_report(path: Path, title: str, name: str, found: Findings) -> None:
 
     Raises BadInput for a figure that is neither SVG nor PNG, WorkFailed if the file cannot be written.
     """
-    from jinja2 import Environment, StrictUndefined
-
-    page = Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=StrictUndefined)
+    page = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined)
     text = page.from_string(TEMPLATE.read_text(encoding="utf-8")).render(
         title=title,
         name=name,

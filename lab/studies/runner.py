@@ -18,10 +18,12 @@ from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import TypeAdapter
 
 from lab.errors import BadInput, LabError, WorkFailed
 from lab.files import source_hash
-from lab.optional import optional
+from lab.lazy import distributed, joblib, psutil
+from lab.optional import require
 
 STORE = "sessions.jsonl"
 BATCH = 4  # the most items that a worker is given at once
@@ -83,16 +85,14 @@ class Job:
         elif self.workers == 1 or len(items) <= 1:
             yield from ((item, work(item)) for item in items)
         else:
-            from joblib import Parallel, delayed
-
             # joblib replaces a process that has grown too large; no work is lost
             warnings.filterwarnings("ignore", "A worker stopped while some jobs were given", UserWarning)
 
             ending: dict[str, Any] = {"initializer": _end_with_parent, "initargs": (os.getpid(),)}
             # if there are few items, each of them takes long and is given out alone
             batch = min(most, max(1, len(items) // (4 * self.workers)))
-            pool = Parallel(min(self.workers, len(items)), return_as="generator", batch_size=batch, **ending)
-            yield from zip(items, pool(delayed(work)(item) for item in items), strict=True)
+            pool = joblib.Parallel(min(self.workers, len(items)), return_as="generator", batch_size=batch, **ending)
+            yield from zip(items, pool(joblib.delayed(work)(item) for item in items), strict=True)
 
     def kept(self) -> Iterator[Any]:
         """The records that `keep` stored; those of other code, incomplete lines and lines that are no JSON are skipped."""
@@ -143,8 +143,6 @@ class Job:
 
 def record_of(kind: type[Result], record: Any) -> Result:
     """An instance of a dataclass from its JSON values. Raises ValueError if a value does not have its field's type."""
-    from pydantic import TypeAdapter
-
     return TypeAdapter(kind).validate_python(record)
 
 
@@ -171,12 +169,10 @@ def said(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 def _end_with_parent(parent: int) -> None:
     """Starts a thread that ends this process soon after its parent has ended, even by kill -9."""
 
-    from psutil import STATUS_ZOMBIE, NoSuchProcess, Process
-
     def watch() -> None:
-        with suppress(NoSuchProcess):
-            process = Process(parent)
-            while process.is_running() and process.status() != STATUS_ZOMBIE:
+        with suppress(psutil.NoSuchProcess):
+            process = psutil.Process(parent)
+            while process.is_running() and process.status() != psutil.STATUS_ZOMBIE:
                 time.sleep(PARENT_LOOK_S)
         os._exit(1)
 
@@ -185,17 +181,16 @@ def _end_with_parent(parent: int) -> None:
 
 def _on_cluster(work: Callable[[Item], Result], items: list[Item], address: str) -> Iterator[tuple[Item, Result]]:
     """(item, result) pairs from a Dask cluster, each as soon as it is finished."""
-    with optional(f"--dask {address}"):
-        from distributed import Client, as_completed
+    require(f"--dask {address}", distributed)
     try:
-        client = Client(address, timeout="10s")  # type: ignore[no-untyped-call]
+        client = distributed.Client(address, timeout="10s")  # type: ignore[no-untyped-call]
     except (OSError, ValueError, TypeError, RuntimeError) as error:
         raise WorkFailed(f"--dask {address}: no cluster answers there: {error}") from None
     with client:
         if not client.scheduler_info()["workers"]:
             raise WorkFailed(f"--dask {address}: the cluster has no workers")
         tasks = {client.submit(work, item, pure=False): item for item in items}
-        for task in as_completed(tasks):  # type: ignore[no-untyped-call]
+        for task in distributed.as_completed(tasks):  # type: ignore[no-untyped-call]
             try:
                 result = task.result()
             except LabError:

@@ -4,19 +4,20 @@ import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from warnings import simplefilter
 
 import numpy as np
 
 from lab.advice.advising import Advising
 from lab.errors import BadInput, counted, unknown
+from lab.lazy import matplotlib, optuna
 from lab.learning.gates import GATES
 from lab.learning.selection import SELECTIONS
 from lab.learning.settings import RANGES, SETTINGS, USUAL, LearnerSettings, Range, Span
 from lab.learning.updates import UPDATES
 from lab.mdp import FloatArray
-from lab.optional import optional
+from lab.optional import require
 from lab.statistics import interval
 from lab.studies.compared import Compared, ComparedSessions, ComparedSetting, key_of, prepared, sessions_of
 from lab.studies.findings import Findings, Row, mean_row, row, share_row
@@ -24,10 +25,6 @@ from lab.studies.report import write_file
 from lab.studies.runner import Job
 from lab.teaching.subjects import Teachable
 from lab.view.canvas import BLUE, GREY, INK, ORANGE, picture_bytes
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 
 BATCH = 8  # trials per round, whatever the number of workers
 Values = dict[str, Any]
@@ -54,8 +51,8 @@ def search(
     finished ones. Source of the sampler: Bergstra et al., NIPS 24 (2011); of the importances: Watanabe et al.,
     IJCAI 2023. Raises BadInput if Optuna is not installed.
     """
-    optuna = _optuna()
-    kinds = {name: _distribution(optuna, allowed) for name, allowed in ranges.items()}
+    _load_optuna()
+    kinds = {name: _distribution(allowed) for name, allowed in ranges.items()}
     study = optuna.create_study(
         sampler=optuna.samplers.TPESampler(seed=seed, constant_liar=True),
         pruner=optuna.pruners.MedianPruner(n_startup_trials=BATCH),
@@ -85,18 +82,16 @@ def search(
             else:
                 study.tell(trial, costs[trial.number][-1])
             done.append(Trial(trial.number, trial.params, tuple(costs[trial.number]), pruned))
-    return done, _importances(optuna, study)
+    return done, _importances(study)
 
 
-def _optuna() -> Any:
-    with optional("tuning"):
-        import optuna
+def _load_optuna() -> None:
+    require("tuning", optuna)
     simplefilter("ignore", optuna.exceptions.ExperimentalWarning)
     optuna.logging.set_verbosity(optuna.logging.ERROR)
-    return optuna
 
 
-def _distribution(optuna: Any, allowed: Range) -> Any:
+def _distribution(allowed: Range) -> Any:
     if not isinstance(allowed, Span):
         return optuna.distributions.CategoricalDistribution(allowed)
     if isinstance(allowed.low, int) and isinstance(allowed.high, int):
@@ -104,7 +99,7 @@ def _distribution(optuna: Any, allowed: Range) -> Any:
     return optuna.distributions.FloatDistribution(allowed.low, allowed.high, log=allowed.log)
 
 
-def _importances(optuna: Any, study: Any) -> dict[str, float]:
+def _importances(study: Any) -> dict[str, float]:
     ended = study.get_trials(deepcopy=False, states=(optuna.trial.TrialState.COMPLETE,))
     if len({trial.value for trial in ended}) < BATCH:
         return {}
@@ -125,7 +120,7 @@ def figures(trials: Sequence[Trial], importances: Mapping[str, float], gained: F
 
 
 def _gain(gained: FloatArray) -> bytes:
-    def draw(figure: "Figure") -> None:
+    def draw(figure: "matplotlib.figure.Figure") -> None:
         axes = figure.add_subplot()
         axes.hist(gained, bins=30, color=BLUE)
         axes.axvline(0.0, color=INK, linewidth=1.0)
@@ -138,7 +133,7 @@ def _gain(gained: FloatArray) -> bytes:
 
 
 def _importance(importances: Mapping[str, float]) -> bytes:
-    def draw(figure: "Figure") -> None:
+    def draw(figure: "matplotlib.figure.Figure") -> None:
         axes = figure.add_subplot()
         axes.barh(range(len(importances)), [100 * importance for importance in importances.values()], color=BLUE)
         axes.set_yticks(range(len(importances)), list(importances))
@@ -149,7 +144,7 @@ def _importance(importances: Mapping[str, float]) -> bytes:
 
 
 def _history(trials: Sequence[Trial]) -> bytes:
-    def draw(figure: "Figure") -> None:
+    def draw(figure: "matplotlib.figure.Figure") -> None:
         axes = figure.add_subplot()
         for pruned, colour, name in ((True, GREY, "given up early"), (False, BLUE, "tried to the end")):
             shown = [trial for trial in trials if trial.pruned == pruned and trial.costs]

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field, model_validator
 
 from lab.errors import BadInput, counted
+from lab.lazy import scipy
 from lab.mdp import BoolArray, NoPath, TabularMDP, grid, shortest_steps
 from lab.tasks.record import Learned, Name, Record, as_tuple, read_text, walking, write_whole
 
@@ -292,7 +293,6 @@ def random_world(shape: Sequence[int], density: float, seed: int) -> GridWorld:
 
 def _obstacles(shape: Coordinates, count: int, start: Ints, goal: Ints, rng: np.random.Generator) -> BoolArray:
     """A mask of `count` random obstacles that leave a path from start to goal; bool of `shape`."""
-    from scipy.ndimage import label
 
     def scattered(kept: Ints) -> BoolArray:
         """A mask of random obstacles outside the kept cells (n, axes)."""
@@ -303,7 +303,7 @@ def _obstacles(shape: Coordinates, count: int, start: Ints, goal: Ints, rng: np.
 
     for _ in range(_TRIES):
         wall = scattered(np.stack([start, goal]))
-        rooms, _ = label(~wall)
+        rooms, _ = scipy.ndimage.label(~wall)
         if rooms[tuple(start)] == rooms[tuple(goal)]:
             return wall
     return scattered(_staircase(start, goal, rng))

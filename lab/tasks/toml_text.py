@@ -9,14 +9,12 @@ from dataclasses import dataclass, field
 from difflib import get_close_matches
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pydantic import ValidationError
+from pydantic_core import ErrorDetails
 
 from lab.errors import BadInput
-
-if TYPE_CHECKING:
-    from pydantic_core import ErrorDetails
 
 Loc = tuple[str | int, ...]  # the path to a value: keys of tables, and indices in arrays
 Fields = Callable[[Loc], Sequence[str]]
@@ -217,7 +215,7 @@ class _Scan:
         return bisect_right(self._ends, self.at) + 1
 
 
-def finding(error: ValidationError) -> "ErrorDetails":
+def finding(error: ValidationError) -> ErrorDetails:
     """The first finding of a validation; an unknown key comes before all others, which may follow from it."""
     findings = error.errors()
     return next((candidate for candidate in findings if candidate["type"] in _NO_SUCH_KEY), findings[0])

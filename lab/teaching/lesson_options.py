@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar, Self, TypeVar
 
 from annotated_types import Ge, Le
+from pydantic import TypeAdapter, ValidationError
 
 from lab.advice.advising import Advising
 from lab.errors import BadInput
@@ -33,8 +34,6 @@ class SessionOptions:
     @classmethod
     def from_json(cls, record: dict[str, Any], where: str) -> Self:
         """The options that `to_json` wrote. Raises BadInput, which names `where`, for anything else."""
-        from pydantic import TypeAdapter, ValidationError
-
         try:
             return TypeAdapter(cls).validate_python(record)
         except ValidationError as error:

@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 
 from lab.errors import BadInput, WorkFailed
+from lab.lazy import gymnasium, h5py, minari, tensorboard
 from lab.learning.environment import Environment, Step
 from lab.learning.selection import Draw
 from lab.learning.session_events import EpisodeEnded
 from lab.mdp import TabularMDP
-from lab.optional import optional
+from lab.optional import require
 from lab.teaching.events import LessonBegan, LessonEvent, QuestionAnswered, SessionBegan
 
 
@@ -83,17 +84,11 @@ class StepRecord:
         Observations are states; infos say which steps were advised. Raises BadInput if Minari is not installed, if nothing was
         recorded, and if the dataset exists; WorkFailed if it cannot be written.
         """
-        from gymnasium.spaces import Discrete
-
         check_libraries(dataset_id)
-        with optional(f"dataset '{dataset_id}'"):
-            from minari import create_dataset_from_buffers
-            from minari.data_collector import EpisodeBuffer
-            from minari.storage import get_dataset_path
         if self.mdp is None or not self.episodes:
             raise BadInput(f"dataset '{dataset_id}': no episode was recorded")
         buffers = [
-            EpisodeBuffer(
+            minari.data_collector.EpisodeBuffer(
                 id=n,
                 observations=np.array(episode.states, np.int64),
                 actions=np.array(episode.actions, np.int64),
@@ -107,11 +102,11 @@ class StepRecord:
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")  # about authors and links that a session has not
-                create_dataset_from_buffers(
+                minari.create_dataset_from_buffers(
                     dataset_id,
                     buffers,
-                    observation_space=Discrete(self.mdp.n_states),
-                    action_space=Discrete(self.mdp.n_actions),
+                    observation_space=gymnasium.spaces.Discrete(self.mdp.n_states),
+                    action_space=gymnasium.spaces.Discrete(self.mdp.n_actions),
                     algorithm_name="teaching-lab",
                     description=f"A taught session: '{self.name}'; infos: which steps were advised.",
                 )
@@ -119,38 +114,36 @@ class StepRecord:
             raise BadInput(f"dataset '{dataset_id}': {error}") from None
         except OSError as error:
             raise WorkFailed(f"dataset '{dataset_id}' cannot be written: {error}") from error
-        return Path(get_dataset_path(dataset_id))
+        return Path(minari.storage.get_dataset_path(dataset_id))
 
     def to_tensorboard(self, folder: Path) -> Path:
         """The folder, to which steps, return and advised steps of each episode were written for TensorBoard.
 
         Raises BadInput if TensorBoard is not installed, or if the folder cannot be written.
         """
-        with optional(f"folder '{folder}'"):
-            from tensorboard.compat.proto.event_pb2 import Event
-            from tensorboard.compat.proto.summary_pb2 import Summary
-            from tensorboard.summary.writer.event_file_writer import EventFileWriter
+        check_libraries(None, folder)
+        event, summary = tensorboard.compat.proto.event_pb2.Event, tensorboard.compat.proto.summary_pb2.Summary
         try:
-            writer = EventFileWriter(str(folder))
+            writer = tensorboard.summary.writer.event_file_writer.EventFileWriter(str(folder))
         except OSError as error:
             raise BadInput(f"folder '{folder}' cannot be written: {error.strerror or error}") from error
         for n, episode in enumerate(self.episodes, start=1):
             values = {"steps": episode.steps, "return": sum(episode.rewards), "advised steps": sum(episode.advised)}
-            said = [Summary.Value(tag=tag, simple_value=float(value)) for tag, value in values.items()]
-            writer.add_event(Event(wall_time=time.time(), step=n, summary=Summary(value=said)))
+            said = [summary.Value(tag=tag, simple_value=float(value)) for tag, value in values.items()]
+            writer.add_event(event(wall_time=time.time(), step=n, summary=summary(value=said)))
         writer.close()
         return folder
 
 
-def check_libraries(minari: str | None, tensorboard: Path | None = None) -> None:
-    """Raises BadInput if a library for writing these is missing; None: that format is not wanted."""
-    if minari is not None:
-        with optional(f"dataset '{minari}'"):
-            import h5py  # type: ignore[import-untyped]  # noqa: F401  # Minari misses it only with a folder half made
-            import minari as _  # noqa: F401
-    if tensorboard is not None:
-        with optional(f"folder '{tensorboard}'"):
-            from tensorboard.summary.writer import event_file_writer  # noqa: F401
+def check_libraries(dataset_id: str | None, folder: Path | None = None) -> None:
+    """Loads the libraries that write a Minari dataset and a folder for TensorBoard, each None if it is not wanted.
+
+    Raises BadInput if one is missing.
+    """
+    if dataset_id is not None:
+        require(f"dataset '{dataset_id}'", h5py, minari)  # Minari misses h5py only with a folder half made
+    if folder is not None:
+        require(f"folder '{folder}'", tensorboard)
 
 
 def _recorded(inner: Environment, record: StepRecord) -> Environment:

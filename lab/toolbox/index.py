@@ -4,16 +4,13 @@ import json
 import zlib
 from collections.abc import Callable, Iterable, Iterator, Mapping, MutableMapping
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from lab.errors import BadInput
 from lab.files import read_limited, write_whole
 from lab.toolbox import deferred
 from lab.toolbox.folder_place import FilePlace, FileState
 from lab.toolbox.names import SUFFIX, VERSIONS, hash_of
-
-if TYPE_CHECKING:
-    from lab.toolbox.policy import Policy
 
 FILE = "index.json"  # in the place's cache
 FORMAT = "teaching-lab-index-1"
@@ -112,18 +109,18 @@ def _checksum(body: bytes) -> str:
     return f"{zlib.crc32(body):08x}"
 
 
-class KnownPolicies(MutableMapping[Key, "Policy"]):
+class KnownPolicies(MutableMapping[Key, "deferred.Policy"]):
     """Policies by (sub-task, signature), each read when it is first used; one that cannot be read raises KeyError.
 
     rows: of the index, with at least name, solved, created, states, actions and file; load: reads a file.
     """
 
-    def __init__(self, rows: Mapping[Key, Row], load: Callable[[str], "Policy"]) -> None:
+    def __init__(self, rows: Mapping[Key, Row], load: Callable[[str], "deferred.Policy"]) -> None:
         self._rows, self._load = dict(rows), load
-        self._read: dict[Key, Policy] = {}
+        self._read: dict[Key, deferred.Policy] = {}
 
     @classmethod
-    def of(cls, policies: Iterable["Policy"]) -> "KnownPolicies":
+    def of(cls, policies: Iterable["deferred.Policy"]) -> "KnownPolicies":
         """These policies, which are in memory already."""
         known = cls({}, lambda file: NotImplemented)
         known.update({(policy.subtask, policy.signature): policy for policy in policies})
@@ -145,7 +142,7 @@ class KnownPolicies(MutableMapping[Key, "Policy"]):
         rows = {key: row for key, row in self._rows.items() if made.get(" ".join(key)) == str(row["created"])}
         return KnownPolicies(rows, self._load)
 
-    def __getitem__(self, key: Key) -> "Policy":
+    def __getitem__(self, key: Key) -> "deferred.Policy":
         if key not in self._read:
             try:
                 self._read[key] = self._load(self._rows[key]["file"])
@@ -153,7 +150,7 @@ class KnownPolicies(MutableMapping[Key, "Policy"]):
                 raise KeyError(key) from None
         return self._read[key]
 
-    def __setitem__(self, key: Key, policy: "Policy") -> None:
+    def __setitem__(self, key: Key, policy: "deferred.Policy") -> None:
         states, actions = policy.q.shape
         about = {"name": policy.name, "solved": policy.solved, "created": policy.created}
         self._read[key], self._rows[key] = policy, about | {"states": states, "actions": actions}

@@ -14,6 +14,7 @@ from platformdirs import user_cache_dir, user_data_dir
 
 from lab.errors import BadInput, WorkFailed
 from lab.files import write_whole
+from lab.lazy import fsspec
 from lab.optional import optional
 from lab.toolbox.folder_place import MAX_FILE_BYTES, FileState, FolderPlace
 from lab.toolbox.names import hash_of, slug
@@ -58,10 +59,8 @@ class RemotePlace:
     def _connected(self) -> tuple[Any, str]:
         try:
             with optional(f"toolbox {self.address}"):
-                from fsspec.core import url_to_fs
-
                 options = {"use_listings_cache": False, **_OPTIONS.get(self._protocol, {})}
-                fs, root = url_to_fs(self.address, **options)
+                fs, root = fsspec.core.url_to_fs(self.address, **options)
         except BadInput:
             raise
         except Exception as error:

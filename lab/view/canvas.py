@@ -8,14 +8,11 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from lab.errors import BadInput
 from lab.files import write_whole
-
-if TYPE_CHECKING:
-    from matplotlib.artist import Artist
-    from matplotlib.figure import Figure
+from lab.lazy import matplotlib
 
 FORMS = ("png", "svg")
 # Okabe and Ito's palette, which colour-blind people can tell apart, and tints of it.
@@ -54,7 +51,9 @@ def check_picture(path: Path) -> None:
 
 
 @contextmanager
-def picture_file(path: Path, width_inch: float, height_inch: float, *, solved: bool = True) -> Iterator["Figure"]:
+def picture_file(
+    path: Path, width_inch: float, height_inch: float, *, solved: bool = True
+) -> Iterator["matplotlib.figure.Figure"]:
     """A figure in the lab's style, written to `path` (PNG or SVG by its suffix) when the block ends without an error.
 
     solved: whether matplotlib's layout solver runs; figures with many plots set their own margins, in a tenth of the time.
@@ -71,7 +70,7 @@ def picture_file(path: Path, width_inch: float, height_inch: float, *, solved: b
         raise BadInput(f"picture '{path}' cannot be written: {error.strerror}") from error
 
 
-def picture_bytes(draw: Callable[["Figure"], None], width_inch: float, height_inch: float) -> bytes:
+def picture_bytes(draw: Callable[["matplotlib.figure.Figure"], None], width_inch: float, height_inch: float) -> bytes:
     """The SVG bytes of a figure in the lab's style on which `draw` has drawn."""
     drawn = BytesIO()
     with _figure(drawn, "svg", (width_inch, height_inch)) as figure:
@@ -79,7 +78,7 @@ def picture_bytes(draw: Callable[["Figure"], None], width_inch: float, height_in
     return drawn.getvalue()
 
 
-def tip(artist: "Artist", text: str) -> None:
+def tip(artist: "matplotlib.artist.Artist", text: str) -> None:
     """Give an artist a tooltip, which browsers show in SVG pictures; PNG pictures have none."""
     artist.set_gid(_TIP + text.replace('"', "'"))
 
@@ -90,15 +89,13 @@ def seconds(value: float) -> str:
 
 
 @contextmanager
-def _figure(out: BytesIO, form: str, size_inch: tuple[float, float], solved: bool = True) -> Iterator["Figure"]:
+def _figure(
+    out: BytesIO, form: str, size_inch: tuple[float, float], solved: bool = True
+) -> Iterator["matplotlib.figure.Figure"]:
     """A figure whose bytes are in `out` when the block ends without an error; reproducible, without dates or random ids."""
-    import matplotlib.style
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     with matplotlib.style.context(STYLE | SVG_STYLE, after_reset=True):
-        figure = Figure(figsize=size_inch, layout="constrained" if solved else None)
-        FigureCanvasAgg(figure)
+        figure = matplotlib.figure.Figure(figsize=size_inch, layout="constrained" if solved else None)
+        matplotlib.backends.backend_agg.FigureCanvasAgg(figure)
         yield figure
         if form == "png":
             figure.savefig(out, format="png", metadata={"Software": None})

@@ -5,20 +5,16 @@ from functools import cache
 from itertools import product
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from lab.errors import BadInput
+from lab.lazy import matplotlib
 from lab.sequencing.cell.schedule import Schedule
 from lab.sequencing.cyclic.unrolled import Steady
 from lab.view.canvas import GREY, INK, RED, picture_bytes, picture_file, seconds, tip
 from lab.view.gantt_bars import LOOKS, Bar, Chart, CycleChart, mixed
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-    from matplotlib.lines import Line2D
 
 MANY_ROWS = 12  # from this number on, times and names stand on both sides of the chart
 FAR_PIXELS = 100  # closer to the row's name than this, a part's name is not repeated
@@ -61,7 +57,7 @@ def _drawing(
     predicted: Schedule | None,
     ends: list[tuple[float, str, str]] | None = None,
     due_s: Sequence[float] | None = None,
-) -> tuple[Callable[["Figure"], None], tuple[float, float]]:
+) -> tuple[Callable[["matplotlib.figure.Figure"], None], tuple[float, float]]:
     """The function that draws the chart on a figure, and the figure's width and height [inch].
 
     ends: vertical lines, each with its time [s], dashes and name ("" for none); None: one line at the makespan.
@@ -78,7 +74,7 @@ def _drawing(
         strips = [bar for bar in chart.bars(predicted, 0.28, 0.13) if bar.look != "outside"]
         ends.append((predicted.makespan_s, "--", "makespan, predicted (thin strips)"))
 
-    def draw(figure: "Figure") -> None:
+    def draw(figure: "matplotlib.figure.Figure") -> None:
         axes = figure.add_subplot()
         for bar in (*bars, *strips):
             _draw_bar(axes, bar, chart)
@@ -95,21 +91,19 @@ def _drawing(
     return draw, (width_inch, height_inch)
 
 
-def _draw_bar(axes: "Axes", bar: Bar, chart: Chart) -> None:
-    from matplotlib.patches import Rectangle
-
+def _draw_bar(axes: "matplotlib.axes.Axes", bar: Bar, chart: Chart) -> None:
     start_s, end_s, outside = bar.activity.start_s, bar.activity.end_s, bar.look == "outside"
     look: dict[str, Any] = {"facecolor": chart.colour(bar), "hatch": LOOKS[bar.look].hatch, "edgecolor": GREY}
-    patch = Rectangle((start_s, bar.top), end_s - start_s, bar.height, linewidth=0 if outside else 0.4, **look)
+    patch = matplotlib.patches.Rectangle(
+        (start_s, bar.top), end_s - start_s, bar.height, linewidth=0 if outside else 0.4, **look
+    )
     patch.set_in_layout(False)
     tip(patch, chart.tip(bar.activity))
     axes.add_patch(patch)
 
 
-def _dress(axes: "Axes", chart: Chart, last_s: float, width_inch: float) -> None:
+def _dress(axes: "matplotlib.axes.Axes", chart: Chart, last_s: float, width_inch: float) -> None:
     """Draw the rows' names, the bands behind them, and the time axis."""
-    from matplotlib.ticker import MaxNLocator
-
     rows, parts = chart.rows, len({activity.resource for activity in chart.schedule.parts})
     for row in range(1, len(rows), 2):
         axes.axhspan(row - 0.5, row + 0.5, color=BAND, linewidth=0, zorder=0.5)
@@ -119,18 +113,18 @@ def _dress(axes: "Axes", chart: Chart, last_s: float, width_inch: float) -> None
     axes.set(ylim=(len(rows) - 0.5, -0.5), xlim=(0, last_s), xlabel="time [s]")
     axes.tick_params(axis="y", length=0, labelright=len(rows) > MANY_ROWS)
     axes.tick_params(axis="x", top=len(rows) > MANY_ROWS, labeltop=len(rows) > MANY_ROWS)
-    axes.xaxis.set_major_locator(MaxNLocator(nbins=int(1.5 * width_inch), steps=[1, 2, 5, 10]))
+    axes.xaxis.set_major_locator(matplotlib.ticker.MaxNLocator(nbins=int(1.5 * width_inch), steps=[1, 2, 5, 10]))
     axes.grid(axis="x")
     axes.set_title(chart.title())
 
 
-def _draw_end(axes: "Axes", end_s: float, dashes: str, name: str) -> "Line2D":
+def _draw_end(axes: "matplotlib.axes.Axes", end_s: float, dashes: str, name: str) -> "matplotlib.lines.Line2D":
     """A vertical line at a time, such as the makespan, behind the bars."""
     look: dict[str, Any] = {"color": RED, "linestyle": dashes, "linewidth": 1.4, "zorder": 0.9}
     return axes.axvline(end_s, label=f"{name}: {seconds(end_s)}", **look)
 
 
-def _draw_arrivals(axes: "Axes", chart: Chart) -> list["Line2D"]:
+def _draw_arrivals(axes: "matplotlib.axes.Axes", chart: Chart) -> list["matplotlib.lines.Line2D"]:
     """Marks at the arrivals of parts; none for parts that are there from the start."""
     came_s = {activity.resource: activity.start_s for activity in reversed(chart.schedule.parts)}
     late = [(at_s, chart.rows.index(row)) for row, at_s in came_s.items() if at_s > 0]
@@ -138,7 +132,7 @@ def _draw_arrivals(axes: "Axes", chart: Chart) -> list["Line2D"]:
     return axes.plot(*zip(*late, strict=True), label="arrives", **look) if late else []
 
 
-def _draw_limits(axes: "Axes", chart: Chart) -> list["Line2D"]:
+def _draw_limits(axes: "matplotlib.axes.Axes", chart: Chart) -> list["matplotlib.lines.Line2D"]:
     """Marks on the machines' rows at the latest times for fetching a part; none without such a limit."""
     limits, rows = chart.schedule.fetch_by, chart.rows
     until = [(limit.until_s, rows.index(limit.station)) for limit in limits if limit.station in rows]
@@ -146,7 +140,7 @@ def _draw_limits(axes: "Axes", chart: Chart) -> list["Line2D"]:
     return axes.plot(*zip(*until, strict=True), label="to be fetched until then", **look) if until else []
 
 
-def _draw_due(axes: "Axes", chart: Chart, due_s: Sequence[float]) -> list["Line2D"]:
+def _draw_due(axes: "matplotlib.axes.Axes", chart: Chart, due_s: Sequence[float]) -> list["matplotlib.lines.Line2D"]:
     """Marks on the parts' rows at their due dates, in another colour for parts that are late."""
     drawn = []
     for late, colour, label in ((False, INK, "due"), (True, RED, "due, and late")):
@@ -160,12 +154,10 @@ def _draw_due(axes: "Axes", chart: Chart, due_s: Sequence[float]) -> list["Line2
     return drawn
 
 
-def _write(axes: "Axes", bars: Sequence[Bar], chart: Chart) -> None:
+def _write(axes: "matplotlib.axes.Axes", bars: Sequence[Bar], chart: Chart) -> None:
     """Write on each bar the first of its texts that fits, or nothing."""
-    from matplotlib.font_manager import FontProperties
-
     renderer = axes.figure.canvas.get_renderer()  # type: ignore[attr-defined]
-    fonts = {size: FontProperties(size=size) for size in FONT_SIZES}
+    fonts = {size: matplotlib.font_manager.FontProperties(size=size) for size in FONT_SIZES}
 
     @cache
     def extent(text: str, size: float) -> tuple[float, float]:
@@ -185,7 +177,7 @@ def _write(axes: "Axes", bars: Sequence[Bar], chart: Chart) -> None:
                 break
 
 
-def _write_text(axes: "Axes", bar: Bar, text: str, size: float, colour: str) -> None:
+def _write_text(axes: "matplotlib.axes.Axes", bar: Bar, text: str, size: float, colour: str) -> None:
     """Write a text in the middle of its bar; beside the part's bars when it has not begun or is finished."""
     start_s, end_s = bar.activity.start_s, bar.activity.end_s
     at_s, align, points = (start_s + end_s) / 2, "center", 0
@@ -201,17 +193,21 @@ def _write_text(axes: "Axes", bar: Bar, text: str, size: float, colour: str) -> 
         written.set_bbox({"facecolor": colour, "linewidth": 0, "pad": 1})
 
 
-def _legend(figure: "Figure", chart: Chart, lines: Sequence[Any], kinds: set[str], width_inch: float) -> None:
-    from matplotlib.legend_handler import HandlerTuple
-    from matplotlib.patches import Patch
-
+def _legend(
+    figure: "matplotlib.figure.Figure", chart: Chart, lines: Sequence[Any], kinds: set[str], width_inch: float
+) -> None:
     handles: list[Any] = []
     labels: list[str] = []
     for kind, look in LOOKS.items():
         if kind not in kinds:
             continue
         colours = [look.colour] if look.colour else [mixed(own, look.strength) for own in chart.products.values()]
-        handles.append(tuple(Patch(facecolor=own, hatch=look.hatch, edgecolor=GREY, linewidth=0.4) for own in colours))
+        handles.append(
+            tuple(
+                matplotlib.patches.Patch(facecolor=own, hatch=look.hatch, edgecolor=GREY, linewidth=0.4)
+                for own in colours
+            )
+        )
         several = f" ({', '.join(chart.products)})" if kind == "process" and len(chart.products) > 1 else ""
         labels.append(look.says + several)
     columns = max(1, int(width_inch / 2.7))
@@ -220,5 +216,5 @@ def _legend(figure: "Figure", chart: Chart, lines: Sequence[Any], kinds: set[str
         [*labels, *(str(line.get_label()) for line in lines)],
         loc="outside lower left",
         ncols=columns,
-        handler_map={tuple: HandlerTuple(ndivide=None, pad=0)},
+        handler_map={tuple: matplotlib.legend_handler.HandlerTuple(ndivide=None, pad=0)},
     )

@@ -15,17 +15,14 @@ from pathlib import Path
 from secrets import token_urlsafe
 from socket import gethostname
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
 from lab import files
 from lab.errors import BadInput, WorkFailed, unknown
 from lab.sim.frames import Body, Frame, Recording, Viewpoint
+from lab.view import deferred
 from lab.view.keyframes import BodyMotion, KeyframeTrack, motions
 from lab.view.scene_data import Json, Story, describe, pack
-
-if TYPE_CHECKING:  # the server loads starlette and uvicorn, which only a served page needs
-    from lab.view.server import File, Server
-    from lab.view.server_page import ScenePanel
 
 HERE = Path(__file__).parent
 GANTT_SCRIPT = HERE / "gantt.js"
@@ -47,23 +44,21 @@ class LiveView:
     dropped unless there is a panel, and leaving the context never takes longer than about 3 s.
     """
 
-    _panel: "ScenePanel | None" = None
+    _panel: "deferred.ScenePanel | None" = None
 
     def __init__(self, port: int = 0, *, title: str = "Teaching lab, live", replay: Path | None = None) -> None:
         self._wanted, self._title, self._replay = port, title, replay
-        self._server: Server | None = None
+        self._server: deferred.Server | None = None
         self._token = ""
         self._shown: dict[str, tuple[float, ...] | None] = {}
 
     def __enter__(self) -> Self:
-        from lab.view.server import File, Server
-
         self._token = token_urlsafe(16)
         if self._replay is None:
             served = self._files()
         else:
-            served = {"": File(_read(self._replay).encode(), "text/html", f"{RULES}; frame-ancestors 'none'")}
-        self._server = Server(self._wanted, served, self._token, self._panel)
+            served = {"": deferred.File(_read(self._replay).encode(), "text/html", f"{RULES}; frame-ancestors 'none'")}
+        self._server = deferred.Server(self._wanted, served, self._token, self._panel)
         self._server.start()
         return self
 
@@ -72,10 +67,8 @@ class LiveView:
     ) -> None:
         self.close()
 
-    def _files(self) -> "dict[str, File]":
+    def _files(self) -> "dict[str, deferred.File]":
         """The page and the files that it loads, by their addresses, which contain the token."""
-        from lab.view.server import File
-
         brought = () if self._panel is None else self._panel.files
         styles = [HERE / "page.css", *(path for path in brought if path.suffix == ".css")]
         scripts = [viewer_script(), *(path for path in brought if path.suffix == ".js"), HERE / "page.js"]
@@ -87,9 +80,9 @@ class LiveView:
             scripts="\n".join(f'<script src="{path.name}{ask}"></script>' for path in scripts),
             panel="".join(path.read_text(encoding="utf-8") for path in brought if path.suffix == ".html"),
         )
-        served = {"": File(page.encode(), "text/html", SERVED)}
+        served = {"": deferred.File(page.encode(), "text/html", SERVED)}
         for kind, paths in (("text/css", styles), ("text/javascript", scripts)):
-            served |= {path.name: File(path.read_bytes(), kind) for path in paths}
+            served |= {path.name: deferred.File(path.read_bytes(), kind) for path in paths}
         return served
 
     @property
@@ -116,19 +109,15 @@ class LiveView:
 
         Raises BadInput for a mesh that cannot be read and for two bodies of one name.
         """
-        from lab.view.server_page import News
-
         scene = describe(bodies, camera or Viewpoint())
         self._shown = {body.name: None for body in bodies}
-        self._running().send(News(scene=scene))
+        self._running().send(deferred.News(scene=scene))
 
     def update(self, frame: Frame) -> None:
         """Show a frame; everything that moved since the last one is sent as one message.
 
         Returns at once, and does nothing after `close`. Raises BadInput when the frame names a body that is not shown.
         """
-        from lab.view.server_page import News
-
         for name in (*frame.poses, *frame.colors, *frame.visible):
             if name not in self._shown:
                 raise unknown("body", name, self._shown, f"frame at {frame.time_s} s")
@@ -139,7 +128,7 @@ class LiveView:
         self._shown.update(moved)
         colors = {name: tuple(float(part) for part in rgba) for name, rgba in frame.colors.items()}
         visible = {name: bool(shown) for name, shown in frame.visible.items()}
-        self._server.send(News(None, float(frame.time_s), moved, colors, visible))
+        self._server.send(deferred.News(None, float(frame.time_s), moved, colors, visible))
 
     def wait_for_page(self, timeout_s: float) -> bool:
         """Whether a browser has opened the page; waits for one up to `timeout_s` [s]."""
@@ -151,7 +140,7 @@ class LiveView:
             self._server.stop()
             self._server = None
 
-    def _running(self) -> "Server":
+    def _running(self) -> "deferred.Server":
         if self._server is None:
             raise WorkFailed("live view: not running (use it as a context manager: with LiveView() as view)")
         return self._server

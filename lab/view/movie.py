@@ -5,17 +5,16 @@ from collections.abc import Callable, Iterator
 from io import BytesIO
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib import get_data_path  # it ships a font with the letters of many languages
+from PIL import Image, ImageDraw, ImageFont
 
 from lab.errors import BadInput
 from lab.files import nearest, write_whole
 from lab.view.rasterizer import BACKGROUND, Floats, Rasterizer
 from lab.view.replay_file import Moments, Replay, read_replay
-
-if TYPE_CHECKING:
-    from PIL.Image import Image
 
 FORMATS = {".gif": "GIF", ".webp": "WEBP"}
 WIDTH, HEIGHT, STRIP = 560, 350, 34  # pixels: size of the picture, and height of the strip with text below it
@@ -60,10 +59,7 @@ def write_movie(
     return {"file": str(out), "frames": count, "speed": speed} | size
 
 
-def _pictures(replay: Replay, times_s: Floats, speed: float) -> "Iterator[Image]":
-    from matplotlib import get_data_path  # it ships a font with the letters of many languages
-    from PIL import Image, ImageDraw, ImageFont
-
+def _pictures(replay: Replay, times_s: Floats, speed: float) -> Iterator[Image.Image]:
     moments = replay.at(times_s)
     around = _around(replay, moments)
     rasterizer = Rasterizer(replay.bodies, replay.camera, WIDTH, HEIGHT, around)
@@ -117,7 +113,7 @@ def readable(replay: Replay, speed: float) -> list[tuple[float, str]]:
     return kept
 
 
-def _told(pictures: "Iterator[Image]", tell: Callable[[int, int], None], count: int) -> "Iterator[Image]":
+def _told(pictures: Iterator[Image.Image], tell: Callable[[int, int], None], count: int) -> Iterator[Image.Image]:
     for number, picture in enumerate(pictures, 1):
         tell(number, count)
         yield picture
@@ -126,7 +122,7 @@ def _told(pictures: "Iterator[Image]", tell: Callable[[int, int], None], count: 
 class _Film:
     """A lazy sequence of pictures as one image with frames: Pillow would put several images in a list, but seeks in one."""
 
-    def __init__(self, pictures: "Iterator[Image]", count: int) -> None:
+    def __init__(self, pictures: Iterator[Image.Image], count: int) -> None:
         self._pictures, self.n_frames = pictures, count
 
     def seek(self, frame: int) -> None:
@@ -136,10 +132,8 @@ class _Film:
         return getattr(self._picture, name)
 
 
-def _encoded(pictures: "Iterator[Image]", count: int, form: str, samples: "list[Image]") -> bytes:
+def _encoded(pictures: Iterator[Image.Image], count: int, form: str, samples: list[Image.Image]) -> bytes:
     """The pictures as a file in this format; only one is held in memory. samples: pictures from which a GIF's palette is made."""
-    from PIL import Image
-
     buffer = BytesIO()
     durations = [round(1000 / FRAMES_PER_S)] * (count - 1) + [round(1000 * STAYS_S)]
     how: dict[str, Any] = {"save_all": True, "duration": durations, "loop": 0}

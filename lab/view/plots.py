@@ -8,12 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lab.errors import BadInput
+from lab.lazy import matplotlib
 from lab.mdp import FloatArray, TabularMDP, greedy_path
 from lab.view.canvas import BLUE, INK, ORANGE, RED, SKY, check_png, picture_file
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
     from lab.vision import GridView, View
 
 
@@ -166,10 +165,8 @@ def cell_corners(view: "View") -> NDArray[np.float64]:
     return view.pixel(np.stack([x, y, np.zeros_like(x)], axis=-1))
 
 
-def _draw_curve(axes: "Axes", policy: Curve) -> None:
+def _draw_curve(axes: "matplotlib.axes.Axes", policy: Curve) -> None:
     """Draw one policy's small plot, its lines in the order of the legend."""
-    from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator, ScalarFormatter
-
     episodes, steps = np.arange(1, len(policy.curve) + 1), np.asarray(policy.curve)
     guided = np.asarray(policy.guided, dtype=np.bool_)
     axes.plot(episodes, steps, color=BLUE, linewidth=0.9, label="steps")
@@ -180,24 +177,26 @@ def _draw_curve(axes: "Axes", policy: Curve) -> None:
     axes.set(xlabel="episode", ylabel="steps", xlim=(0, 1.02 * max(2, len(episodes))))
     if max(policy.curve, default=0) > 4 * max(1, fewest):
         axes.set_yscale("log")
-        axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-        axes.yaxis.set_major_formatter(ScalarFormatter())
-        axes.yaxis.set_minor_locator(NullLocator())
+        axes.yaxis.set_major_locator(matplotlib.ticker.LogLocator(subs=(1, 2, 5)))
+        axes.yaxis.set_major_formatter(matplotlib.ticker.ScalarFormatter())
+        axes.yaxis.set_minor_locator(matplotlib.ticker.NullLocator())
     else:
         axes.set_ylim(0, 1.15 * max(2, fewest, *policy.curve))
-        axes.yaxis.set_major_locator(MaxNLocator(integer=True))
-    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+        axes.yaxis.set_major_locator(matplotlib.ticker.MaxNLocator(integer=True))
+    axes.xaxis.set_major_locator(matplotlib.ticker.MaxNLocator(integer=True))
     axes.grid()
 
 
-def _draw_places(axes: "Axes", crossings: NDArray[np.float64], walls: NDArray[np.bool_], places: MapMarks) -> None:
+def _draw_places(
+    axes: "matplotlib.axes.Axes", crossings: NDArray[np.float64], walls: NDArray[np.bool_], places: MapMarks
+) -> None:
     """Draw blocked cells, the greedy path, start and goal on a value map."""
-    from matplotlib.collections import PolyCollection
-
     middles = (crossings[:-1, :-1] + crossings[1:, 1:]) / 2
     outlines = [crossings[[i, i, i + 1, i + 1], [j, j + 1, j + 1, j]] for i, j in np.argwhere(walls)]
     if outlines:
-        hatched = PolyCollection(outlines, facecolor="#00000055", edgecolor="white", hatch="xxx", label="blocked")
+        hatched = matplotlib.collections.PolyCollection(
+            outlines, facecolor="#00000055", edgecolor="white", hatch="xxx", label="blocked"
+        )
         axes.add_collection(hatched)
     if len(places.route):
         rows, columns = np.asarray(places.route).T

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from lab.errors import BadInput
@@ -54,8 +55,7 @@ class Replay:
 
     def at(self, times_s: ArrayLike) -> Moments:
         """The poses, visibility and colours of all bodies at each of these times [s]."""
-        from scipy.spatial.transform import Rotation, Slerp
-
+        transform = scipy.spatial.transform
         times, bodies = np.asarray(times_s, dtype=np.float64), len(self.bodies)
         places, quaternions = np.empty((len(times), bodies, 3)), np.empty((len(times), bodies, 4))
         shown, rgba = np.ones((len(times), bodies), dtype=bool), np.full((len(times), bodies, 4), np.nan)
@@ -67,12 +67,12 @@ class Replay:
                     places[:, number, axis] = np.interp(times, keys, values[:, axis])
             if motion["quaternion"] is not None:
                 keys, values = motion["quaternion"]
-                turned = Slerp(keys, Rotation.from_quat(values))(np.clip(times, keys[0], keys[-1]))
+                turned = transform.Slerp(keys, transform.Rotation.from_quat(values))(np.clip(times, keys[0], keys[-1]))
                 quaternions[:, number] = turned.as_quat()
             for kind, steps in ((shown, motion["visible"]), (rgba, motion["colors"])):
                 for since, value in steps:
                     kind[times >= since, number] = value
-        turns = Rotation.from_quat(quaternions.reshape(-1, 4)).as_matrix().reshape(len(times), bodies, 3, 3)
+        turns = transform.Rotation.from_quat(quaternions.reshape(-1, 4)).as_matrix().reshape(len(times), bodies, 3, 3)
         return Moments(places, turns, shown, rgba)
 
 
@@ -129,8 +129,6 @@ class _Reading:
         return positions, normals, faces
 
     def _meshes(self, shapes: Any, geometries: Sequence[Any]) -> list[Mesh]:
-        from scipy.spatial.transform import Rotation
-
         meshes = []
         for shape in shapes:
             number = int(shape["geometry"])
@@ -142,18 +140,17 @@ class _Reading:
             pose, scale = self._row(shape["pose"], 7), np.array(self._row(shape["scale"], 3))
             if scale.min() <= 0.0:
                 raise ValueError(f"a scale of {scale.min()}")
-            turn = Rotation.from_quat(pose[3:]).as_matrix()
+            turn = scipy.spatial.transform.Rotation.from_quat(pose[3:]).as_matrix()
             placed = (positions * scale) @ turn.T + np.array(pose[:3])
             meshes.append(Mesh(placed, (normals / scale) @ turn.T, faces, self._row(shape["rgba"], 4)))
         return meshes
 
     def _motion(self, motion: Any) -> dict[str, Any]:
-        from scipy.spatial.transform import Rotation
-
         start, turns = self._row(motion["start"], 7), self._track(motion["quaternion"], 4)
-        Rotation.from_quat(start[3:])  # ValueError for one of length 0
+        rotation = scipy.spatial.transform.Rotation
+        rotation.from_quat(start[3:])  # ValueError for one of length 0
         if turns is not None:
-            Rotation.from_quat(turns[1])
+            rotation.from_quat(turns[1])
         return {
             "start": start,
             "position": self._track(motion["position"], 3),

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lab.errors import BadInput, unknown
+from lab.lazy import trimesh
 from lab.mdp import FloatArray
 from lab.sequencing.cell.schedule import Activity, Schedule
 from lab.sim.frames import Body, Shape, Vector, Viewpoint, unique_names
@@ -163,8 +164,6 @@ def read_mesh(path: Path, changed_ns: int) -> Json:
     Edges sharper than 34 degrees stay sharp. The file is read again only when it has changed. Raises BadInput when it
     holds no mesh.
     """
-    import trimesh
-
     try:
         mesh: Any = trimesh.load(BytesIO(readable(path)), path.suffix.lower().removeprefix("."), force="mesh")
         assert isinstance(mesh, trimesh.Trimesh)
@@ -191,17 +190,15 @@ def read_mesh(path: Path, changed_ns: int) -> Json:
 
 def corners_of(shape: Shape) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
     """The positions (n, 3) [m], normals (n, 3) and faces (m, 3) of a box, a cylinder or a sphere. BadInput for another shape."""
-    from trimesh import creation, graph
-
     if shape.kind == "box":
-        mesh = creation.box(shape.size)
+        mesh = trimesh.creation.box(shape.size)
     elif shape.kind == "cylinder":
-        mesh = creation.cylinder(shape.size[0], shape.size[1], sections=48)
+        mesh = trimesh.creation.cylinder(shape.size[0], shape.size[1], sections=48)
     elif shape.kind == "sphere":
-        mesh = creation.icosphere(3, shape.size[0])
+        mesh = trimesh.creation.icosphere(3, shape.size[0])
     else:
         raise unknown("shape kind", shape.kind, ("box", "cylinder", "sphere"), "corners_of")
-    shaded = graph.smooth_shade(mesh, angle=CREASE_RAD)
+    shaded = trimesh.graph.smooth_shade(mesh, angle=CREASE_RAD)
     return np.array(shaded.vertices), np.array(shaded.vertex_normals), np.array(shaded.faces)
 
 

@@ -4,16 +4,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import cycle
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lab.errors import BadInput, counted
+from lab.lazy import matplotlib
 from lab.view.canvas import BLUE, GREY, INK, ORANGE, RED, SKY, picture_file, seconds, tip
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 SIZE_INCH = 7.0, 4.0
 FloatArray = NDArray[np.float64]
@@ -44,8 +42,6 @@ def sequence_plot(
     from all means. optimal: the proven optimum, or None.
     Raises BadInput without episodes, and for a path that cannot be written. Source: thesis fig. 7.3.
     """
-    from matplotlib.ticker import MaxNLocator
-
     sessions, beside = _sessions(episode_costs), beside or PlotBeside()
     if not sessions or not all(map(len, sessions)):
         raise BadInput("sequencing plot: there are no episodes")
@@ -66,7 +62,7 @@ def sequence_plot(
             axes.axhline(value, color=ORANGE, linestyle=look, linewidth=1.2, label=label)
         _draw_stuck(axes, stuck)
         axes.set(xlabel="episode", ylabel=ylabel, xlim=(0, 1.02 * max(2, costs.shape[1])))
-        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+        axes.xaxis.set_major_locator(matplotlib.ticker.MaxNLocator(integer=True))
         axes.grid()
         several = f"Sequences tried in {len(sessions)} sessions"
         axes.set_title(beside.title or ("Sequences tried" if len(sessions) == 1 else several))
@@ -79,7 +75,7 @@ def _sessions(costs: Sequence[float] | Sequence[Sequence[float]]) -> list[Sequen
     return [numbers] if numbers else [session for session in costs if not isinstance(session, int | float)]
 
 
-def _draw_session(axes: "Axes", costs: FloatArray, unit: str) -> None:
+def _draw_session(axes: "matplotlib.axes.Axes", costs: FloatArray, unit: str) -> None:
     """Draw the costs (1, n) of one session."""
     (session,) = costs
     episodes = np.arange(1, len(session) + 1)
@@ -93,7 +89,7 @@ def _draw_session(axes: "Axes", costs: FloatArray, unit: str) -> None:
         axes.plot(episodes[bests[0]], best[-1], "o", color=BLUE, label=f"found in episode {bests[0] + 1}")
 
 
-def _draw_sessions(axes: "Axes", costs: FloatArray, unit: str) -> None:
+def _draw_sessions(axes: "matplotlib.axes.Axes", costs: FloatArray, unit: str) -> None:
     """Draw the costs (sessions, episodes) of several sessions."""
     episodes = np.arange(1, costs.shape[1] + 1)
     best = _best_so_far(costs)
@@ -108,7 +104,7 @@ def _draw_sessions(axes: "Axes", costs: FloatArray, unit: str) -> None:
     axes.step(episodes, mean, where="post", color=BLUE, linewidth=2.0, label=label)
 
 
-def _draw_stuck(axes: "Axes", stuck: NDArray[np.bool_]) -> None:
+def _draw_stuck(axes: "matplotlib.axes.Axes", stuck: NDArray[np.bool_]) -> None:
     """Draw a mark at the upper edge for each episode with a deadlock in `stuck` (sessions, episodes)."""
     where = np.flatnonzero(stuck.any(axis=0))
     if len(where):

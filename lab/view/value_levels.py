@@ -6,21 +6,16 @@ Also `Planes`, the layers of a grid as rows and columns, which other views of a 
 from collections.abc import Sequence
 from math import prod
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lab.errors import BadInput
+from lab.lazy import matplotlib
 from lab.mdp import FloatArray, TabularMDP
 from lab.toolbox.policy import GOAL, ON, OUT, Policy
 from lab.view.canvas import GREY, INK, ORANGE, PALE_GREY, RED, check_png, picture_file
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.collections import QuadMesh
-    from matplotlib.colors import ListedColormap
-    from matplotlib.lines import Line2D
 
 
 class Grid(Protocol):
@@ -161,7 +156,9 @@ class Pen(NamedTuple):
     labels: tuple[str, ...]
     scale: tuple[float, float]
 
-    def draw_level(self, axes: "Axes", learned: LearnedValues, level: int) -> "QuadMesh":
+    def draw_level(
+        self, axes: "matplotlib.axes.Axes", learned: LearnedValues, level: int
+    ) -> "matplotlib.collections.QuadMesh":
         """Draw one level's colours and signs; returns the mesh of its colours."""
         values, best, visited, ends = (self.planes.plane(table, level) for table in learned)
         seen = visited & (ends == ON)
@@ -175,13 +172,13 @@ class Pen(NamedTuple):
         self._mark(axes, ends == GOAL, "*", 0.85, ORANGE)
         return tint
 
-    def draw_start(self, axes: "Axes", place: tuple[int, int]) -> None:
+    def draw_start(self, axes: "matplotlib.axes.Axes", place: tuple[int, int]) -> None:
         """Draw a ring around the start cell."""
         at = np.zeros((self.planes.rows, self.planes.columns), bool)
         at[place] = True
         self._mark(axes, at, "o", 0.8, "none", RED)
 
-    def _draw_moves(self, axes: "Axes", best: NDArray[np.int64]) -> None:
+    def _draw_moves(self, axes: "matplotlib.axes.Axes", best: NDArray[np.int64]) -> None:
         """Draw an arrow for moves to a neighbouring cell, and a sign for other moves."""
         signs = _signs(self.labels)
         length: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "scale": 1.0}
@@ -202,7 +199,13 @@ class Pen(NamedTuple):
                 axes.quiver(*tails, np.full(len(rows), 0.6 * x), np.full(len(rows), 0.6 * y), **length, **look)
 
     def _mark(
-        self, axes: "Axes", where: NDArray[np.bool_], marker: str, size: float, face: str, edge: str = INK
+        self,
+        axes: "matplotlib.axes.Axes",
+        where: NDArray[np.bool_],
+        marker: str,
+        size: float,
+        face: str,
+        edge: str = INK,
     ) -> None:
         """Draw a marker in some cells; `size`: as a share of a cell's side."""
         rows, columns = np.nonzero(where)
@@ -211,18 +214,15 @@ class Pen(NamedTuple):
         )
 
 
-def _one_colour(colour: str) -> "ListedColormap":
-    from matplotlib.colors import ListedColormap
-
-    return ListedColormap([colour])
+def _one_colour(colour: str) -> "matplotlib.colors.ListedColormap":
+    return matplotlib.colors.ListedColormap([colour])
 
 
-def _legend(policy: Policy, learned: LearnedValues) -> list["Line2D"]:
+def _legend(policy: Policy, learned: LearnedValues) -> list["matplotlib.lines.Line2D"]:
     """The legend of the signs that are not plain arrows."""
-    from matplotlib.lines import Line2D
 
-    def sign(name: str, marker: str, face: str, edge: str = INK) -> Line2D:
-        return Line2D(
+    def sign(name: str, marker: str, face: str, edge: str = INK) -> matplotlib.lines.Line2D:
+        return matplotlib.lines.Line2D(
             [], [], linestyle="none", marker=marker, color=face, markeredgecolor=edge, markersize=8, label=name
         )
 

@@ -9,6 +9,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from numpy.typing import ArrayLike
 
+from lab.lazy import trimesh
 from lab.mdp import FloatArray
 from lab.sim.frames import IDENTITY, Body, Frame, Quaternion, Recording, Rgba, Shape, Vector, Viewpoint
 from lab.tasks.grid_world import GridWorld
@@ -173,10 +174,8 @@ class WorldBodies:
 
     def _mesh(self, centres: FloatArray) -> Path:
         """A mesh file with all boxes, because thousands of separate bodies would make the page slow."""
-        from trimesh.voxel.ops import multibox
-
         path = Path(self._folder.name) / "obstacles.stl"
-        boxes = multibox(centres / self._box, pitch=1.0)  # type: ignore[no-untyped-call]
+        boxes = trimesh.voxel.ops.multibox(centres / self._box, pitch=1.0)  # type: ignore[no-untyped-call]
         boxes.apply_scale(self._box)
         boxes.export(path)
         return path

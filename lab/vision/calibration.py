@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from lab.errors import BadInput, WorkFailed, counted
 from lab.files import json_of, read_limited, write_whole
+from lab.lazy import cv2
 from lab.vision.lens import TERMS, Lens
-from lab.vision.opencv import cv2
 from lab.vision.picture_files import Image, check_picture
 
 Array = NDArray[np.float64]

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lab.errors import BadInput
-from lab.vision.opencv import cv2
+from lab.lazy import cv2
 from lab.vision.picture_files import Image, check_picture
 
 Array = NDArray[np.float64]

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.errors import BadInput
+from lab.lazy import cv2
 from lab.vision.grid_view import Cell, GridView, Marker, View, plain_view
-from lab.vision.opencv import cv2
 from lab.vision.picture_files import Image, check_picture
 
 Array = NDArray[np.float64]

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from lab.lazy import cv2
 from lab.vision.markers import calmed
-from lab.vision.opencv import cv2
 from lab.vision.picture_files import Image, check_picture
 
 Array = NDArray[np.float64]

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from lab.errors import BadInput
 from lab.files import read_limited
-from lab.vision.opencv import cv2
+from lab.lazy import cv2
 
 Image = NDArray[np.uint8]  # (H, W, 3), RGB
 

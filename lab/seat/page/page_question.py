@@ -4,11 +4,12 @@ from collections.abc import Sequence
 from functools import lru_cache
 from itertools import pairwise
 from math import prod
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lab.lazy import rich
 from lab.learning.requests import AdviceRequest, Request
 from lab.learning.selection import chances
 from lab.learning.updates import Table
@@ -18,10 +19,6 @@ from lab.seat.page.page_console import order_of
 from lab.seat.request_text import choice, leads, outcome
 from lab.sequencing.search import SequenceRequest
 from lab.view.value_levels import GridPlanes
-
-if TYPE_CHECKING:
-    from rich.text import Text
-
 
 Json = dict[str, Any]
 LOWER, HIGHER = 4, 5  # directions along the third axis, after those in the picture: up, down, left, right
@@ -176,13 +173,13 @@ def picture_of(drawing: str) -> list[list[list[str]]]:
     return [_runs(line) for line in safe_ansi(drawing).split("\n", allow_blank=True)]
 
 
-def _runs(line: "Text") -> list[list[str]]:
+def _runs(line: "rich.text.Text") -> list[list[str]]:
     """A line of text as runs of equal style."""
     edges = {0, len(line.plain)} | {edge for span in line.spans for edge in (span.start, span.end)}
     return [[line.plain[start:end], _classes(line, start)] for start, end in pairwise(sorted(edges))]
 
 
-def _classes(line: "Text", at: int) -> str:
+def _classes(line: "rich.text.Text", at: int) -> str:
     classes: dict[str, str] = {}
     for span in line.spans:
         style = span.style

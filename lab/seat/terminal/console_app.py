@@ -4,17 +4,17 @@ import sys
 from contextlib import suppress
 from io import StringIO
 from threading import Thread
-from typing import TYPE_CHECKING
 
 from prompt_toolkit.application import Application
 from prompt_toolkit.buffer import Buffer
 from prompt_toolkit.completion import WordCompleter
 from prompt_toolkit.filters import Condition
 from prompt_toolkit.formatted_text import ANSI
+from prompt_toolkit.input import Input
 from prompt_toolkit.key_binding import KeyBindings, KeyPressEvent
 from prompt_toolkit.layout import BufferControl, FormattedTextControl, HSplit, Layout, Window
 from prompt_toolkit.layout.processors import BeforeInput
-from prompt_toolkit.output import create_output
+from prompt_toolkit.output import Output, create_output
 from rich.text import Text
 
 from lab.errors import printable
@@ -23,13 +23,6 @@ from lab.production.operation.desk import Desk
 from lab.seat.terminal.console_view import plain_lines, view
 from lab.seat.terminal.screen import folded
 from lab.view.progress import EscapingConsole
-
-if TYPE_CHECKING:
-    from prompt_toolkit.application import Application
-    from prompt_toolkit.buffer import Buffer
-    from prompt_toolkit.input import Input
-    from prompt_toolkit.key_binding import KeyBindings
-    from prompt_toolkit.output import Output
 
 STEP_MM, TURN_DEGREES = 10, 15
 ESCAPE_S = 0.025  # after Esc, until it cannot be the beginning of an arrow key's sequence
@@ -63,7 +56,7 @@ LETTER_S = 0.4  # a letter followed by nothing for this time is a key, otherwise
 class OperatorConsole:
     """The console: `run` returns when the operator leaves; the simulation runs in a thread of its own."""
 
-    def __init__(self, desk: Desk, keys: "Input | None" = None, screen: "Output | None" = None) -> None:
+    def __init__(self, desk: Desk, keys: Input | None = None, screen: Output | None = None) -> None:
         self._desk = desk
         self._log: list[tuple[str, str]] = []
         self._answer = 0  # number of log lines in the answer to the last command
@@ -132,8 +125,8 @@ class OperatorConsole:
 
     # ---- the screen and its keys -------------------------------------------------------------------------------------
 
-    def _made(self, keys: "Input | None", screen: "Output | None") -> "Application[None]":
-        def entered(buffer: "Buffer") -> bool:
+    def _made(self, keys: Input | None, screen: Output | None) -> Application[None]:
+        def entered(buffer: Buffer) -> bool:
             self.say(buffer.text.removeprefix(":"))
             return False
 
@@ -151,7 +144,7 @@ class OperatorConsole:
         app.ttimeoutlen = app.timeoutlen = ESCAPE_S
         return app
 
-    def _bindings(self, line: "Buffer") -> "KeyBindings":
+    def _bindings(self, line: Buffer) -> KeyBindings:
         bindings, is_empty = KeyBindings(), Condition(lambda: not line.text)
 
         def bind(key: str, words: str) -> None:

@@ -6,20 +6,15 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from queue import Empty, SimpleQueue
 from threading import Lock, Thread
-from typing import TYPE_CHECKING, Protocol, TextIO, cast
+from typing import Protocol, TextIO, cast
 from weakref import WeakKeyDictionary
 
 from rich.console import Console
 from rich.text import Text
 
 from lab.errors import printable
+from lab.lazy import prompt_toolkit
 from lab.seat.grid_text import ARROWS, DIRECTIONS
-
-if TYPE_CHECKING:
-    from prompt_toolkit.application import Application
-    from prompt_toolkit.input import Input
-    from prompt_toolkit.key_binding import KeyBindings, KeyPressEvent
-    from prompt_toolkit.output import Output
 
 ReadLine = Callable[[str], str]
 LOOK_S = 0.5  # longest delay of Ctrl-C on Windows, where nothing interrupts a wait
@@ -90,9 +85,7 @@ def default_reader(
     stream = stdin or sys.stdin
     if plain or not stream.isatty():
         return PlainReader(console, stream, outside)
-    from prompt_toolkit.utils import is_dumb_terminal
-
-    if is_dumb_terminal():
+    if prompt_toolkit.utils.is_dumb_terminal():
         return PlainReader(console, stream, outside)
     return TerminalReader(console, outside=outside, moves=moves)
 
@@ -197,23 +190,19 @@ class TerminalReader:
     def __init__(
         self,
         console: Console,
-        keys: "Input | None" = None,
-        screen: "Output | None" = None,
+        keys: "prompt_toolkit.input.Input | None" = None,
+        screen: "prompt_toolkit.output.Output | None" = None,
         outside: Outside | None = None,
         *,
         moves: bool = True,
     ) -> None:
-        from prompt_toolkit import PromptSession
-        from prompt_toolkit.output import create_output
-        from prompt_toolkit.output.vt100 import Vt100_Output
-
         self.outside = outside or Outside()
-        output = screen or create_output(stdout=cast(TextIO, console.file))
-        if isinstance(output, Vt100_Output):
+        output = screen or prompt_toolkit.output.create_output(stdout=cast(TextIO, console.file))
+        if isinstance(output, prompt_toolkit.output.vt100.Vt100_Output):
             output.enable_cpr = (
                 False  # one line needs no cursor position, and over a slow link the reply would come too late
             )
-        self._session: PromptSession[str] = PromptSession(
+        self._session: prompt_toolkit.PromptSession[str] = prompt_toolkit.PromptSession(
             input=keys, output=output, key_bindings=_keys() if moves else None
         )
 
@@ -234,7 +223,7 @@ class TerminalReader:
 
         stack.enter_context(self.outside.waking(wake))
 
-    def _deliver(self, app: "Application[str]") -> None:
+    def _deliver(self, app: "prompt_toolkit.application.Application[str]") -> None:
         if app.is_done:
             return  # it is answered already
         word = self.outside.taken()
@@ -242,29 +231,27 @@ class TerminalReader:
             _enter(app, word)
 
 
-def _enter(app: "Application[str]", word: str) -> None:
+def _enter(app: "prompt_toolkit.application.Application[str]", word: str) -> None:
     """Put a word on the line and press enter."""
     app.current_buffer.text = word
     app.current_buffer.validate_and_handle()
 
 
-def _keys() -> "KeyBindings":
-    from prompt_toolkit.application import get_app
-    from prompt_toolkit.filters import Condition
-    from prompt_toolkit.key_binding import KeyBindings
-
-    bindings = KeyBindings()
-    is_empty = Condition(lambda: not get_app().current_buffer.text)
-    is_path = Condition(lambda: get_app().current_buffer.text.startswith("path "))
+def _keys() -> "prompt_toolkit.key_binding.KeyBindings":
+    bindings = prompt_toolkit.key_binding.KeyBindings()
+    is_empty = prompt_toolkit.filters.Condition(lambda: not prompt_toolkit.application.get_app().current_buffer.text)
+    is_path = prompt_toolkit.filters.Condition(
+        lambda: prompt_toolkit.application.get_app().current_buffer.text.startswith("path ")
+    )
 
     def bind(key: str, word: str) -> None:
         @bindings.add(key, filter=is_empty)
-        def _answer(event: "KeyPressEvent") -> None:
+        def _answer(event: "prompt_toolkit.key_binding.KeyPressEvent") -> None:
             _enter(event.app, word)
 
     def insert(key: str, arrow: str) -> None:
         @bindings.add(key, filter=is_path)
-        def _insert(event: "KeyPressEvent") -> None:
+        def _insert(event: "prompt_toolkit.key_binding.KeyPressEvent") -> None:
             event.current_buffer.insert_text(arrow)
 
     for key, arrow in zip(DIRECTIONS, ARROWS, strict=True):

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 from lab.errors import BadInput, WorkFailed, counted
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cyclic.line import CycleMove, Line, at_speed, away_s, lines
+from lab.sequencing.methods import deferred
 from lab.sequencing.simulate.follow import Arc, earliest
 from lab.sequencing.simulate.run import SLACK_S
 
@@ -201,8 +202,6 @@ def shortest(
 
     cell: must have the times of its one robot (`at_speed`).
     """
-    from lab.sequencing.cyclic.model import CycleModel, Units  # only here: OR-Tools takes its time
-
     began = time.perf_counter()
     away = away_s(cell)
     # Of equal periods that with the fewest moves is found first, and stays.
@@ -211,7 +210,7 @@ def shortest(
     best: Cycle | None = None
     above_s, resolution_s = inf, 0.0
     for _, bound_s, _, line in ahead:
-        units = Units.of(line)
+        units = deferred.Units.of(line)
         resolution_s = max(resolution_s, units.resolution_s)
         # A quick solve for a good cycle, one for a bound, and one to close the gap between the two.
         steps = (units.coarse, False), (units.coarse, True), (units.fine, units.rounded)
@@ -220,7 +219,7 @@ def shortest(
             left_s = time_limit_s - (time.perf_counter() - began)
             if bound_s >= best_s - units.resolution_s or left_s <= 0:
                 break
-            answer = CycleModel(line, away, bound_s, best_s, unit, loose).solve(left_s, seed)
+            answer = deferred.CycleModel(line, away, bound_s, best_s, unit, loose).solve(left_s, seed)
             bound_s = max(bound_s, answer.above_s) if step else bound_s
             timed = shortest_period(line, answer.order, answer.wraps) if answer.order else None
             if timed is not None and timed.period_s < best_s:

@@ -7,6 +7,7 @@ from itertools import combinations_with_replacement, islice, product
 from math import comb, inf, prod
 
 import numpy as np
+import scipy
 
 from lab.errors import BadInput, counted
 from lab.sequencing.cell.cell import Cell
@@ -123,9 +124,7 @@ class Line:
         )
         if len(gaps) > 1:
             np.fill_diagonal(gaps, 1e12)
-        from scipy.optimize import linear_sum_assignment
-
-        rows, columns = linear_sum_assignment(gaps)
+        rows, columns = scipy.optimize.linear_sum_assignment(gaps)
         least_s = float(gaps[rows, columns].sum()) + sum(move.work_s for move in self.moves)
         ready_s = {(span.drop, span.pick): span.least_s for span in self.needs}
         for station, numbers in self.holds.items():

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from math import inf
 from typing import Any
 
+import scipy
+
 from lab.errors import BadInput, WorkFailed, counted
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.routes import reached_from
@@ -26,9 +28,6 @@ def least_s(cell: Cell, mix: Sequence[str], away_s: Sequence[Sequence[float]]) -
     until the next one arrives; the robot is busy with the moves and the empty drives between them, and each move has one
     predecessor and one successor. cell: must have the times of its one robot (`at_speed`). away_s: see `Line.bound_s`.
     """
-    from scipy.optimize import linprog
-    from scipy.sparse import coo_array
-
     starts = Counter(cell.starts[cell.order.index(name)] for name in mix)
     within = reached_from(cell.positions, starts)
     ways = [way for way in ways_of(cell) if way.place in within]
@@ -39,10 +38,10 @@ def least_s(cell: Cell, mix: Sequence[str], away_s: Sequence[Sequence[float]]) -
     number = {name: row for row, name in enumerate(names)}
     entries = [(value, number[name], n) for n, column in enumerate(columns) for name, value in column.items()]
     values, rows, at = zip(*entries, strict=True)
-    table = coo_array((values, (rows, at)), shape=(len(names), len(columns))).tocsr()
+    table = scipy.sparse.coo_array((values, (rows, at)), shape=(len(names), len(columns))).tocsr()
     given = [starts.get(name[1], 0) if name[0] == "parts" else 0 for name in names]
     costs = [*[0.0] * (len(columns) - 1), 1.0]
-    solution = linprog(costs, table[:busy], given[:busy], table[busy:], given[busy:], method="highs")
+    solution = scipy.optimize.linprog(costs, table[:busy], given[:busy], table[busy:], given[busy:], method="highs")
     return max(0.0, float(solution.fun) - SOLVER_TOLERANCE_S) if solution.status == 0 else 0.0
 
 

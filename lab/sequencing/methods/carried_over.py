@@ -4,6 +4,7 @@ import numpy as np
 
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import MAKESPAN, cost
+from lab.sequencing.methods import deferred
 from lab.sequencing.methods.carried_over_features import FeatureArrays, feature_arrays, features
 from lab.sequencing.methods.carried_over_policy import DEFAULT, CarriedPolicy
 from lab.sequencing.methods.rules import Rule
@@ -35,9 +36,8 @@ class Decider:
 
     def __init__(self, cell: Cell, objective: str = MAKESPAN) -> None:
         """objective: what runs are judged by; the features use its data, such as due times."""
-        from lab.sequencing.methods import carried_over_kernels as kernels  # numba takes its time
-
-        self._kernels, self._work = kernels, kernels.work_arrays(cell)
+        self._kernels = deferred.carried_over_kernels
+        self._work = self._kernels.work_arrays(cell)
         self._cell, self._run = cell_arrays(cell, objective), run_arrays(cell)
         self._known = feature_arrays(cell, objective)
         self.stuck_cost = float(self._cell.stuck_cost)

@@ -13,6 +13,7 @@ from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import MAKESPAN
 from lab.sequencing.cell.routes import choice_of, part_of
 from lab.sequencing.cell.ways import FAR, TICKS_PER_S, Way
+from lab.sequencing.methods import deferred
 from lab.sequencing.methods.lower_bound import LowerBound
 from lab.sequencing.methods.one_robot import TIME_LIMIT_S as TOURS_S
 from lab.sequencing.methods.one_robot import OneRobot, one_robot, why_not
@@ -235,11 +236,8 @@ def exact(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceResul
     elif search.objective == MAKESPAN and not why_not(cell):
         best = one_robot(cell, shared.left_s(TOURS_S), shared)
     sequence, cost = (best.sequence, best.cost) if best else ((), inf)
-    if best is None or not best.proven:
-        from lab.sequencing.methods.cp_sat import TIME_LIMIT_S, cp_sat, fits  # only here: OR-Tools takes its time
-
-        if best is None or (fits(cell) and not cell.batches):
-            left_s = shared.left_s(TIME_LIMIT_S)
-            other = cp_sat(cell, search.objective, left_s, hint=sequence or None, shared=shared)
-            sequence, cost = min((cost, sequence), (other.cost, other.sequence))[::-1]
+    if best is None or (not best.proven and deferred.fits(cell) and not cell.batches):
+        left_s = shared.left_s(deferred.CP_SAT_TIME_LIMIT_S)
+        other = deferred.cp_sat(cell, search.objective, left_s, hint=sequence or None, shared=shared)
+        sequence, cost = min((cost, sequence), (other.cost, other.sequence))[::-1]
     return only_one(cell, search, sequence, cost, bool(sequence))

@@ -6,6 +6,7 @@ from itertools import accumulate
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from lab.sequencing.cell.cell import Cell
@@ -110,11 +111,8 @@ def _credits(cell: Cell, ways: Sequence[Way], gaps: dict[tuple[int, int], int]) 
     bounds = [(0.0, 0.0) if number in fixed else (-limit_s, limit_s) for number in range(last + 1)]
     entries = [(number, column, sign) for number, (row, _) in enumerate(rows) for column, sign in row.items()]
     at = tuple(np.array(part) for part in zip(*entries, strict=True))
-    from scipy.optimize import linprog  # it takes a while to load, and few cells need it
-    from scipy.sparse import coo_array
-
-    table = coo_array((at[2].astype(float), (at[0], at[1])), shape=(len(rows), last + 1)).tocsr()
-    solution = linprog(-gain, A_ub=table, b_ub=[most for _, most in rows], bounds=bounds, method="highs")
+    table = scipy.sparse.coo_array((at[2].astype(float), (at[0], at[1])), shape=(len(rows), last + 1)).tocsr()
+    solution = scipy.optimize.linprog(-gain, A_ub=table, b_ub=[most for _, most in rows], bounds=bounds, method="highs")
     if solution.x is None:
         return [0] * size
     return [round(float(credit) * TICKS_PER_S) for credit in solution.x[:size]]

@@ -8,7 +8,6 @@ Bilge and Ulusoy with one vehicle); `why_not` says what else a cell has.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from time import perf_counter
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,13 +17,11 @@ from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import MAKESPAN
 from lab.sequencing.cell.routes import SERVER, Option, entry
 from lab.sequencing.cell.ways import FAR, distances
+from lab.sequencing.methods import deferred
 from lab.sequencing.methods.cp_sat_times import Times
 from lab.sequencing.methods.shared import Shared
 from lab.sequencing.simulate.follow import simulate
 from lab.sequencing.simulate.run import Run
-
-if TYPE_CHECKING:
-    from lab.sequencing.methods.one_robot_kernels import CellWork
 
 TIME_LIMIT_S = 60.0
 FIRST_WIDTH = (
@@ -107,8 +104,7 @@ class _SequenceSearch:
     """The best value and sequence so far, and the bound, in the units of `times`."""
 
     def __init__(self, cell: Cell, times: Times) -> None:
-        from lab.sequencing.methods import one_robot_kernels as kernels  # numba takes its time
-
+        kernels = deferred.one_robot_kernels
         self._kernels, self._cell = kernels, cell
         self._work = _work_of(cell, times)
         self._rest = kernels.least_rest(self._work)
@@ -226,9 +222,7 @@ def _sizes(cell: Cell) -> int:
     return size
 
 
-def _work_of(cell: Cell, times: Times) -> "CellWork":
-    from lab.sequencing.methods.one_robot_kernels import CellWork
-
+def _work_of(cell: Cell, times: Times) -> "deferred.one_robot_kernels.CellWork":
     routes = [_ways(cell, part) for part in range(cell.parts)]
     counts = np.array([sum(way.robot != SERVER for way in route) for route in routes], np.int64)
     shape = cell.parts, int(counts.max()) + 1
@@ -251,4 +245,4 @@ def _work_of(cell: Cell, times: Times) -> "CellWork":
     least = np.array(distances(cell, times.per_s), np.int64)
     ready = np.array([times.whole(seconds) for seconds in cell.begin_s], np.int64)
     weight = np.cumprod(np.concatenate([[1], counts[:-1] + 1])).astype(np.int64)
-    return CellWork(counts, at, process, carry, empty, least, queues, ready, tail, weight)
+    return deferred.one_robot_kernels.CellWork(counts, at, process, carry, empty, least, queues, ready, tail, weight)

@@ -15,7 +15,9 @@ from lab.errors import BadInput, WorkFailed
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import MAKESPAN, cost
 from lab.sequencing.cell.routes import entry, part_of
+from lab.sequencing.methods import deferred
 from lab.sequencing.methods.exact import MAX_EXPANDED, optimum
+from lab.sequencing.methods.one_robot import one_robot, why_not
 from lab.sequencing.methods.rules import first_come, loads_s, work_left_s
 from lab.sequencing.methods.shared import Shared, shared_of
 from lab.sequencing.search import SAME, Search, SequenceResult, not_in_time, only_one
@@ -119,8 +121,6 @@ def look_on(
         shared.tell("A*", best.sequence, best.bound_s)
         return known_of(shared)
     tell_alone(shared)
-    from lab.sequencing.methods.one_robot import one_robot, why_not  # here and below: numba takes its time
-
     if objective == MAKESPAN and not why_not(cell):
         one_robot(cell, time_limit_s, shared)
     if not shared.over.is_set():
@@ -219,9 +219,7 @@ def _side_by_side(shared: Shared, until_s: float, seed: int, workers: int) -> No
 
 def _prove(shared: Shared, time_limit_s: float, seed: int, workers: int) -> None:
     """Runs CP-SAT on the shared cell."""
-    from lab.sequencing.methods.cp_sat import beside  # only where it is needed: OR-Tools takes its time
-
-    beside(shared, time_limit_s, seed, workers)
+    deferred.beside(shared, time_limit_s, seed, workers)
 
 
 def _anneal_on(shared: Shared, seed: int) -> None:
@@ -232,11 +230,9 @@ def _anneal_on(shared: Shared, seed: int) -> None:
 
 def _anneal(shared: Shared, seed: int, again: int) -> None:
     """Runs annealing once, longer with each repetition; every third one begins with the incumbent."""
-    from lab.sequencing.methods.anneal import Annealing
-
     if shared.over.is_set():
         return
-    annealing = Annealing(shared.cell, shared.objective, seed, shared.sequence if again % 3 == 1 else ())
+    annealing = deferred.Annealing(shared.cell, shared.objective, seed, shared.sequence if again % 3 == 1 else ())
     size = most_moves(shared.cell)
     steps = max(ROUND, min(MOVES // size, EACH * size**2) << (again + 3) // 4)
     for done in range(0, steps, ROUND):

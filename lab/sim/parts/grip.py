@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.errors import BadInput
+from lab.lazy import scipy
 from lab.sim.arms.fingers import Gripper
 from lab.sim.parts.part_shape import PartShape
 from lab.tasks.part_fields import GripFields
@@ -213,10 +214,8 @@ class _Sections:
     @cached_property
     def _edges(self) -> tuple[Array, Array]:
         """The hull's edges (m, 3), from and to; diagonals of its faces among them."""
-        from scipy.spatial import ConvexHull
-
         corners = self.shape.hull
-        sides = ConvexHull(corners).simplices  # (k, 3)
+        sides = scipy.spatial.ConvexHull(corners).simplices  # (k, 3)
         edges = np.unique(
             np.sort(np.concatenate([sides[:, [0, 1]], sides[:, [1, 2]], sides[:, [2, 0]]]), axis=1), axis=0
         )
@@ -277,13 +276,11 @@ def _across(yaw: float) -> Array:
 
 def _around(points: Array) -> Array | None:
     """The corners of the convex hull of points (n, 2), in order; None when they enclose nothing."""
-    from scipy.spatial import ConvexHull, QhullError
-
     if len(points) < 3:
         return None
     try:
-        return np.asarray(points[ConvexHull(points).vertices])
-    except QhullError:
+        return np.asarray(points[scipy.spatial.ConvexHull(points).vertices])
+    except scipy.spatial.QhullError:
         return None
 
 

@@ -10,21 +10,18 @@ from functools import cached_property
 from io import BytesIO
 from math import cos, pi, sin
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lab.errors import BadInput, counted
 from lab.files import assets_folder, is_file, within
+from lab.lazy import scipy, trimesh
 from lab.sim import urdf_reader
 from lab.sim.frames import Quaternion, Shape, ShapeKind, Vector
 from lab.sim.mesh_file import is_binary, readable, text_corners
 from lab.tasks.part_fields import PartFields
-
-if TYPE_CHECKING:
-    from trimesh import Trimesh
-
 
 MOST_TEXT = 40_000  # triangles of an STL in text, which PyBullet cannot read and gets one by one
 MOST_HULL = 256  # vertices: more make physics slower, not rounder
@@ -69,14 +66,13 @@ class PartShape:
 
         Flat sides are then in contact where they really are; edges are rounded by the margin.
         """
-        from scipy.spatial import ConvexHull, HalfspaceIntersection
-
         corners = self.hull @ urdf_reader.rotation(self.turn)
-        sides = np.unique(ConvexHull(corners).equations.round(9), axis=0)  # (k, 4): normals, and offsets [m]
+        hull = scipy.spatial.ConvexHull(corners)
+        sides = np.unique(hull.equations.round(9), axis=0)  # (k, 4): normals, and offsets [m]
         middle = corners.mean(axis=0)
         margin = min(MARGIN_M, float(np.min(-sides[:, :3] @ middle - sides[:, 3])) / 2)
         sides[:, 3] += margin
-        return np.asarray(HalfspaceIntersection(sides, middle).intersections), margin
+        return np.asarray(scipy.spatial.HalfspaceIntersection(sides, middle).intersections), margin
 
     @property
     def foot_m(self) -> float:
@@ -151,9 +147,8 @@ def _quaternion(turn: Array) -> Quaternion:
     """Of a turn (3, 3), as xyzw; exactly (0, 0, 0, 1) for none, for which scipy is not loaded."""
     if np.array_equal(turn, np.eye(3)):
         return (0.0, 0.0, 0.0, 1.0)
-    from scipy.spatial.transform import Rotation
-
-    x, y, z, w = (float(value) + 0.0 for value in Rotation.from_matrix(turn).as_quat(canonical=True))
+    rotation = scipy.spatial.transform.Rotation.from_matrix(turn)
+    x, y, z, w = (float(value) + 0.0 for value in rotation.as_quat(canonical=True))
     return x, y, z, w
 
 
@@ -220,10 +215,8 @@ def _look(part: PartFields, folder: Path) -> tuple[Shape, ...]:
     return links[""]
 
 
-def _mesh(part: PartFields, path: Path) -> "Trimesh":
+def _mesh(part: PartFields, path: Path) -> "trimesh.Trimesh":
     """The mesh in metres, closed, its faces outwards; or its hull, where the part asks for that."""
-    import trimesh
-
     where = f"part '{part.name}': file = '{part.file}'"
     try:
         kind = path.suffix.lower().removeprefix(".")
@@ -254,7 +247,7 @@ def _mesh(part: PartFields, path: Path) -> "Trimesh":
     except Exception:  # Qhull's own kind of error
         raise BadInput(f"{where}: it is flat: wanted a solid") from None
     if part.hull:
-        return cast("Trimesh", hull)
+        return cast("trimesh.Trimesh", hull)
     _check_closed(where, mesh)
     if not mesh.is_winding_consistent or mesh.volume <= 0:
         trimesh.repair.fix_normals(mesh, multibody=True)  # type: ignore[no-untyped-call]
@@ -284,7 +277,7 @@ def _check_size(part: PartFields, where: str, longest: float) -> None:
     )
 
 
-def _check_closed(where: str, mesh: "Trimesh") -> None:
+def _check_closed(where: str, mesh: "trimesh.Trimesh") -> None:
     """Raises BadInput for a mesh with holes, which has neither mass nor inertia."""
     if mesh.is_watertight:
         return

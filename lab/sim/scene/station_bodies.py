@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from lab.errors import BadInput
 from lab.files import beside_or_asset
+from lab.lazy import trimesh
 from lab.sim import urdf_reader
 from lab.sim.frames import Rgba, Vector
 from lab.sim.mesh_file import readable
@@ -94,8 +95,6 @@ def _bounds(path: Path) -> tuple[Vector, Vector]:
 
 
 def _mesh_bounds(path: Path) -> tuple[Array, Array]:
-    import trimesh
-
     kind = path.suffix.lower().removeprefix(".")
     try:
         mesh: Any = trimesh.load(

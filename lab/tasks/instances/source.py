@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from lab.errors import BadInput
+from lab.lazy import yaml
 from lab.sequencing.cell.cell import MAX_PARTS
 
 MOST_MACHINES = 98  # a cell has up to 100 stations, two of which are for input and output
@@ -76,8 +77,6 @@ class Source:
 
 def json_line(text: str, way: Sequence[str | int]) -> int:
     """The line of the value at a path in a JSON text, or of the nearest value around it; the YAML reader knows lines."""
-    import yaml  # slow to import, and only errors need it
-
     try:
         node = yaml.compose(text, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader))
     except yaml.YAMLError:  # for example a tab, which YAML does not accept as a space
