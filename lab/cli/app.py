@@ -332,9 +332,8 @@ def _usage(error: Exception) -> int:
     else:
         path = context.command_path if context is not None else "lab"
         text = " ".join(str(explain()).split()).rstrip(".")
-        for row in getattr(
-            error.__cause__, "errors", list
-        )():  # typer's own words leave out the value that pydantic refuses
+        refused: Any = getattr(error.__cause__, "errors", list)()  # by pydantic: typer's own words leave out the value
+        for row in refused:
             text = text.replace(row["msg"], f"{shortened(repr(row['input']))}: {row['msg']}", 1)
         fail(f"{text[:1].lower()}{text[1:]} (see {path} --help)", 2)
     return 2

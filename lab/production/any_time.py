@@ -20,7 +20,7 @@ from lab.teaching.events import SequenceFound, SequencingBegan, SequencingStands
 CTRL_C, FIRST_COME = "Ctrl-C", "first come, first served"
 
 
-class Session(Protocol):
+class MethodSession(Protocol):
     """A session of a method."""
 
     def __call__(self, search: Search, *, session: int) -> SequenceResult:
@@ -88,7 +88,7 @@ class SearchPlan:
     gate: GateSettings | None = None
 
 
-def looked_for(cell: Cell, plan: SearchPlan, find: Session, tell: Tell) -> SearchResults:
+def looked_for(cell: Cell, plan: SearchPlan, find: MethodSession, tell: Tell) -> SearchResults:
     """What the sessions find, and what is proven of the best order, unless the method's answer needs no proof beside it.
 
     find: carries out a session. A bound is known within a second, for small cells the optimum; with limits a proof is looked for

@@ -16,7 +16,7 @@ from lab.interrupts import uninterrupted
 from lab.learning.requests import Ask
 from lab.learning.settings import GateSettings
 from lab.production import deferred
-from lab.production.any_time import CTRL_C, SearchPlan, SearchResults, Session, looked_for
+from lab.production.any_time import CTRL_C, MethodSession, SearchPlan, SearchResults, looked_for
 from lab.production.order import NOBODY, KeepOrder, OrderAdvice, advised_session
 from lab.sequencing import SEQUENCERS, carried_reaction, check_method, find_sequence
 from lab.sequencing import deferred as methods
@@ -196,7 +196,7 @@ def sequence_cell(
     tell(PhaseBegan("sequence", wanted.sessions))
     journal = wanted.keep(cell, search.objective) if wanted.advisor.row in PEOPLE else None
     plan = SearchPlan(method, search, wanted.sessions, Limits.of(wanted.seconds, wanted.gap))
-    find: Session = partial(find_sequence, cell, method, seed=wanted.seed)
+    find: MethodSession = partial(find_sequence, cell, method, seed=wanted.seed)
     if wanted.advisor.row != "none":
         plan = replace(plan, gate=GateSettings(wanted.gate, spare_best=True))
         advice = OrderAdvice("", wanted.advisor, wanted.gate, wanted.people)

@@ -1,7 +1,6 @@
 """What every member of a family is held to, ours and yours: a function for each family, an AssertionError that says why."""
 
 import json
-from collections.abc import Callable
 from dataclasses import asdict, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -55,7 +54,7 @@ def board(size: int) -> TabularMDP:
 
 
 def session(
-    mdp: TabularMDP, advisor: str | Advisor | Ask = "expert", seed: int = 0, **changes: Any
+    mdp: TabularMDP, advisor: str | Advisor | Ask | type[Advisor] = "expert", seed: int = 0, **changes: Any
 ) -> tuple[SessionResult, list[Event]]:
     """The result and the events of a session of 60 episodes; changes: settings of learner and gate."""
     learner = replace(SHORT, **{name: value for name, value in changes.items() if hasattr(SHORT, name)})
@@ -92,13 +91,12 @@ def check_gate(gate: str | type[Gate]) -> None:
     require(spent.helped_steps <= 3, f"gate '{name}': {spent.helped_steps} helped steps, the budget has 3")
 
 
-def check_advisor(advisor: str | Advisor | Ask | Callable[[], Advisor]) -> None:
+def check_advisor(advisor: str | Advisor | Ask | type[Advisor]) -> None:
     """Tests an advisor, given by name, as a function of a request, or as an object or class with `advise`."""
     if isinstance(advisor, str):
         require(advisor in ADVISORS, f"advisor '{advisor}': it is in no table")
-    made: Any = advisor() if isinstance(advisor, type) else advisor
     for size in (3, 4):
-        result, events = session(board(size), made, gate="always", episodes=20)
+        result, events = session(board(size), advisor, gate="always", episodes=20)
         require(result.helped_steps <= int(result.visits.sum()), "more helped steps than steps")
         asked = sum(isinstance(event, AdviceRequested) for event in events)
         require(asked == result.requests, f"{asked} episodes were told to ask, {result.requests} were counted")

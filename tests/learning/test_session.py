@@ -407,3 +407,18 @@ def test_the_butter_board_is_covered_in_the_fewest_moves() -> None:
     advisor = TableLevel(mdp, 0.99, np.random.default_rng(1)).advisor(AdvisorName.of("expert"))
     result = Session(mdp, LearnerSettings(), GateSettings(), advisor, np.random.default_rng(0)).run()
     assert (result.solved, result.final_steps) == (True, 8)
+
+
+class AtRandom:
+    """Answers by a generator of the session."""
+
+    def __init__(self, rng: np.random.Generator):
+        self.rng = rng
+
+    def advise(self, request: AdviceRequest) -> int:
+        """Any action."""
+        return int(self.rng.integers(len(request.allowed)))
+
+
+def test_an_advisor_that_takes_a_generator_is_held_to_its_contract() -> None:
+    check_advisor(AtRandom)
