@@ -44,9 +44,7 @@ ASKED: dict[str, Callable[[], object]] = {
     "unknown setting 'alpa' (learner and gate): did you mean 'alpha'?": lambda: lab.teach(MAZE, alpa=1),  # type: ignore[call-arg]
     "gates: 3: wanted a name or a class": lambda: lab.teach(MAZE, gate=3),  # type: ignore[arg-type]
     "too many positional arguments: wanted a function of a request": lambda: lab.teach(MAZE, advisor=lambda: 0),  # type: ignore[arg-type]
-    "advisor <class 'object'>: wanted a name, a function of a request, or a class with `advise`": lambda: lab.teach(
-        MAZE, advisor=object
-    ),  # type: ignore[arg-type]
+    "advisor <class 'object'>: wanted a name, a function of a request": lambda: lab.teach(MAZE, advisor=object),  # type: ignore[arg-type]
     "state 6 (world): wanted a whole number, at least 0, below 6": lambda: lab.teach(MAZE).act(6),
     "file 3 (save): wanted a path": lambda: lab.Page("").save(3),  # type: ignore[arg-type]
     "workers 0 (lab.compare): wanted a whole number": lambda: lab.compare(MAZE, workers=0),
