@@ -99,7 +99,7 @@ class Batch(NamedTuple):
     rejected_at_episode: NDArray[np.int64]
     moves: NDArray[np.int64]
     q: FloatArray
-    greedy: FloatArray
+    greedy: FloatArray = np.zeros((0, 0))
 
 
 def run_sessions(

@@ -148,10 +148,10 @@ def _greedy_steps(work: Any, chances: Any, table: Any, seed: Any, number: int) -
         while moves < learning.max_moves and problem.ends[state] == 0:
             best, at = -np.inf, state * width
             for a in range(len(learning.actions)):
-                number = state * width + np.uint64(a)
-                value = offset + factor * table[np.uint64(problem.successor[number]) if learning.afterstate else number]
+                move = state * width + np.uint64(a)
+                value = offset + factor * table[np.uint64(problem.successor[move]) if learning.afterstate else move]
                 if value > best:
-                    best, at = value, number
+                    best, at = value, move
             if chances is None:
                 state = np.uint64(problem.successor[at])
             else:
@@ -161,7 +161,7 @@ def _greedy_steps(work: Any, chances: Any, table: Any, seed: Any, number: int) -
                 state = np.uint64(chances.entered[at, k])
             moves += 1
         total += moves + learning.count_start if problem.ends[state] == 1 else learning.max_steps + 1
-    return total / sessions.walks
+    return float(total / sessions.walks)
 
 
 @inlined
