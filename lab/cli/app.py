@@ -12,7 +12,7 @@ from typer.core import TyperCommand, TyperGroup
 
 from lab.cli.families import CommandOfFamilies
 from lab.cli.output import begin, end, fail, silence, write
-from lab.errors import LabError, out_of_memory
+from lab.errors import LabError, out_of_memory, shortened
 from lab.lazy import rich
 from lab.plugins.family import blame
 from lab.version import __version__
@@ -332,5 +332,9 @@ def _usage(error: Exception) -> int:
     else:
         path = context.command_path if context is not None else "lab"
         text = " ".join(str(explain()).split()).rstrip(".")
+        for row in getattr(
+            error.__cause__, "errors", list
+        )():  # typer's own words leave out the value that pydantic refuses
+            text = text.replace(row["msg"], f"{shortened(repr(row['input']))}: {row['msg']}", 1)
         fail(f"{text[:1].lower()}{text[1:]} (see {path} --help)", 2)
     return 2

@@ -46,7 +46,7 @@ def test_a_session_goes_on_from_another_folder(lab: Lab, folder: Path, monkeypat
         ),
         ("teach world-1 --advisor none --advisor expert", "advisor 'none' (--advisor) beside 1 more"),
         ("teach world-1 --advisor web --advisor web", "advisor 'web' (--advisor) is named 2 times: once is enough"),
-        ("teach world-1 --wait 0", "invalid value for '--wait'"),
+        ("teach world-1 --wait 0", "invalid value for '--wait': '0'"),
         ("teach gym:FrozenLak-v1", "FrozenLake-v1"),
         ("teach gym:Pendulum-v1", "its action space is Box"),
         ("teach gym:Pendulum-v1", "supported are Discrete, MultiDiscrete, MultiBinary"),

@@ -107,7 +107,7 @@ def test_a_person_may_say_nothing_or_leave(toast_cell: CellMaker) -> None:
 
 def test_what_cannot_be(toast_cell: CellMaker) -> None:
     cell = toast_cell("I", 2)
-    with pytest.raises(BadInput, match="the advisor named 7: allowed 1, 2"):
+    with pytest.raises(BadInput, match="the advisor named action 7: allowed 1, 2"):
         learned(cell, Person(lambda request: 7), gate="always")
     with pytest.raises(BadInput, match=r"gate 'ia' .--gate.: .*table of states"):
         check_gate("ia")
