@@ -14,7 +14,8 @@ from lab_studies.comparisons.advice_bench.advice_bench import advice_bench
 from lab_studies.comparisons.advice_bench.bad_advisors import ADVISORS, advice_of, importance
 from lab_studies.comparisons.advice_bench.problems import problem
 from lab_studies.comparisons.advice_bench.ranks import holm, ranks
-from lab_studies.comparisons.advice_bench.sessions import RULES, Case, case_outcomes
+from lab_studies.comparisons.advice_bench.rules import RULES
+from lab_studies.comparisons.advice_bench.sessions import Case, case_outcomes
 
 
 def test_layouts_take_as_many_moves_as_by_hand() -> None:
@@ -127,4 +128,6 @@ def test_a_file_of_ones_own_and_any_advisor_that_always_answers_alike(tmp_path: 
     )
     assert found.rows[-1]["value"] > 0.0
     place = problem(str(maze))
-    assert advice_of("tau=0.05", place).thresholds.shape == (1, *place.mdp.successor.shape)
+    advice = advice_of("tau=0.05", place)
+    assert advice is not None
+    assert advice.thresholds.shape == (1, *place.mdp.successor.shape)
