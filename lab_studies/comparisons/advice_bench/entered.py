@@ -48,8 +48,8 @@ class Entered:
         problems = [_problem(given, places) for given in _listed(reading, "problem", (*PROBLEMS, *HELD_OUT))]
         advisors = [_advisor(given, made) for given in _listed(reading, "advisors", ADVISORS)]
         files = {name: file for name, file in files_taken().items() if name in (*rules, *advisors)}
-        names = (tuple(dict.fromkeys(several)) for several in (rules, advisors, problems))
-        entered = cls(*names, gates, made, places, files)
+        once = [tuple(dict.fromkeys(several)) for several in (rules, advisors, problems)]
+        entered = cls(once[0], once[1], once[2], gates, made, places, files)
         for name in entered.advisors:
             if name not in ADVISORS:
                 for where in entered.problems:

@@ -165,7 +165,7 @@ def first(request: lab.AdviceRequest) -> int:
 
 def test_members_made_in_python_are_measured_alike_in_several_processes() -> None:
     maze = lab.world("S..\n.#.\n..G", name="maze")
-    reading = {
+    reading: dict[str, Any] = {
         "methods": [EveryOther, "ccrl", "ia", "predictive"],
         "advisors": [Tiring, first],
         "problem": [maze, lab.Problem("board", "push", maze.mdp())],
