@@ -1,7 +1,7 @@
 """Statistics of sessions: confidence intervals, the score of chapter 9, comparisons of groups, agreement with printed figures."""
 
 import warnings
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from math import hypot, sqrt
@@ -113,6 +113,57 @@ def ranges(sp: ArrayLike, hs: ArrayLike) -> tuple[Range, Range]:
     """
     percents, steps = _sample(sp, "range of SP", 1), _sample(hs, "range of HS", 1)
     return (float(percents.min()), float(percents.max())), (float(steps.min()), float(steps.max()))
+
+
+# ---- aggregates over tasks --------------------------------------------------------------------------------------------
+
+
+def interquartile_mean(scores: ArrayLike) -> float:
+    """The mean of the middle half of scores (runs, tasks), all of them together.
+
+    Of n scores the n // 4 lowest and as many of the highest are left out. Raises BadInput for fewer than four scores and for
+    scores that are not finite. Source: Agarwal et al., Deep reinforcement learning at the edge of the statistical precipice,
+    NeurIPS 2021.
+    """
+    sample = np.sort(_sample(np.ravel(scores), "interquartile mean", 4))
+    cut = len(sample) // 4
+    return float(sample[cut : len(sample) - cut].mean())
+
+
+def stratified_interval(
+    scores: ArrayLike, statistic: Callable[[FloatArray], float], seed: int, repeats: int = 2000
+) -> tuple[float, float, float]:
+    """(value, low, high): a statistic of scores (runs, tasks) and its percentile bootstrap interval.
+
+    The runs of each task are drawn anew, with replacement; tasks are not. Raises BadInput for scores that are no such table.
+    Source: Agarwal et al. 2021.
+    """
+    table = np.asarray(scores, np.float64)
+    if table.ndim != 2 or table.shape[0] < 2 or not table.shape[1]:
+        raise BadInput(f"scores of shape {table.shape}: wanted at least two runs of at least one task, (runs, tasks)")
+    rng, (runs, tasks) = np.random.default_rng(seed), table.shape
+    drawn = [statistic(table[rng.integers(runs, size=(runs, tasks)), np.arange(tasks)]) for _ in range(repeats)]
+    low, high = np.quantile(drawn, (TAIL, 1 - TAIL))
+    return statistic(table), float(low), float(high)
+
+
+def performance_profile(scores: ArrayLike, thresholds: ArrayLike) -> FloatArray:
+    """The share of all runs that score above each threshold (n,), for scores (runs, tasks). Source: Agarwal et al. 2021."""
+    above = np.ravel(np.asarray(scores, np.float64))[:, None] > np.asarray(thresholds, np.float64)[None, :]
+    shares: FloatArray = above.mean(axis=0)
+    return shares
+
+
+def probability_of_improvement(scores: ArrayLike, other: ArrayLike) -> float:
+    """The chance that a run scores above one of another method in the same task, mean over tasks; a tie counts half.
+
+    scores, other: (runs, tasks), with as many tasks. Raises BadInput otherwise. Source: Agarwal et al. 2021.
+    """
+    own, theirs = np.asarray(scores, np.float64), np.asarray(other, np.float64)
+    if own.ndim != 2 or theirs.ndim != 2 or own.shape[1] != theirs.shape[1]:
+        raise BadInput(f"scores of shapes {own.shape} and {theirs.shape}: wanted (runs, tasks) with as many tasks")
+    differences = own[:, None, :] - theirs[None, :, :]
+    return float(((differences > 0).mean(axis=(0, 1)) + 0.5 * (differences == 0).mean(axis=(0, 1))).mean())
 
 
 def part_means(values: ArrayLike, parts: int) -> FloatArray:

@@ -6,19 +6,24 @@ import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
+from scipy.stats import mannwhitneyu, trim_mean
 
 from lab.errors import BadInput
 from lab.statistics import (
     FloatArray,
     allowed,
     compare,
+    interquartile_mean,
     interval,
     mean_error,
+    performance_profile,
+    probability_of_improvement,
     proportion_interval,
     ranges,
     ranks,
     score,
     share_error,
+    stratified_interval,
     within,
     within_errors,
 )
@@ -331,3 +336,53 @@ def test_within_both_errors() -> None:
     """Errors of 3 and 4 make 5, and 1.96 of these 9.8."""
     assert [within_errors(50, thesis, (3, 4)) for thesis in (59.7, 59.9, 40.3)] == [True, False, True]
     assert within_errors(1.0, 1.0, (0, 0))
+
+
+# Aggregates over tasks
+
+
+def test_an_interquartile_mean_by_hand() -> None:
+    """Of 0, 1, 2, 3, 100 one is left out at each end: (1 + 2 + 3) / 3."""
+    assert interquartile_mean([[3.0, 1.0], [100.0, 0.0]]) == 2.0  # the middle two of four
+    assert interquartile_mean([0.0, 100.0, 1.0, 3.0, 2.0]) == 2.0
+    with pytest.raises(BadInput, match="interquartile mean"):
+        interquartile_mean([1.0, 2.0, 3.0])
+
+
+@given(st.lists(finite, min_size=4, max_size=40))
+def test_an_interquartile_mean_is_scipys_trimmed_mean(values: list[float]) -> None:
+    assert interquartile_mean(values) == pytest.approx(trim_mean(values, 0.25), abs=1e-6)
+
+
+def test_a_profile_by_hand() -> None:
+    assert performance_profile([[1.0, 2.0], [3.0, 4.0]], [0.0, 2.0, 4.0]).tolist() == [1.0, 0.5, 0.0]
+
+
+def test_a_chance_of_improvement_by_hand() -> None:
+    """Task 1: 1, 3 against 2, 3: one of four pairs is above, one is a tie, so 3/8; task 2: always above."""
+    assert probability_of_improvement([[1.0, 9.0], [3.0, 9.0]], [[2.0, 0.0], [3.0, 0.0]]) == (3 / 8 + 1) / 2
+    with pytest.raises(BadInput, match=r"shapes \(1, 2\) and \(1, 1\)"):
+        probability_of_improvement([[1.0, 2.0]], [[1.0]])
+
+
+@given(st.lists(finite, min_size=2, max_size=9), st.lists(finite, min_size=2, max_size=9))
+def test_a_chance_of_improvement_is_mann_and_whitneys(own: list[float], other: list[float]) -> None:
+    found = probability_of_improvement(np.array(own)[:, None], np.array(other)[:, None])
+    assert found == pytest.approx(mannwhitneyu(own, other).statistic / (len(own) * len(other)))
+
+
+def test_a_stratified_interval_draws_within_tasks() -> None:
+    """Task 1 always gives 0 and task 2 always 10: drawn within tasks, the mean is 5 in every sample."""
+    table = np.tile([0.0, 10.0], (6, 1))
+    assert stratified_interval(table, np.mean, seed=1, repeats=50) == (5.0, 5.0, 5.0)
+    with pytest.raises(BadInput, match=r"shape \(6,\)"):
+        stratified_interval(table[:, 0], np.mean, seed=1)
+
+
+def test_a_stratified_interval_covers_the_truth() -> None:
+    """Of 200 intervals of 95 % for the mean of 20 runs of a normal, between 86 and 100 % cover it (binomial, 1 in 10^5)."""
+    rng = np.random.default_rng(5)
+    tables = rng.normal(size=(200, 20, 2))
+    found = [stratified_interval(table, np.mean, seed, 300) for seed, table in enumerate(tables)]
+    assert 0.86 <= np.mean([low <= 0.0 <= high for _, low, high in found]) <= 1.0
+    assert stratified_interval(tables[0], np.mean, 0, 300) == found[0]

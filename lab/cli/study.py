@@ -43,16 +43,26 @@ def study_run(
     ] = None,
     methods: Annotated[
         str | None,
-        typer.Option("--methods", help="transport, advicebench: only these methods or rules, separated by commas."),
+        typer.Option(
+            "--methods",
+            help="transport, advicebench: only these methods or rules, separated by commas; a rule of advicebench may be any "
+            "gate, also ./mine.py:Gate.",
+            callback=from_files("gates"),
+        ),
     ] = None,
     problem: Annotated[
         list[str] | None,
-        typer.Option("--problem", help="advicebench: one of its own problems, a world's file or gym:ID instead."),
+        typer.Option(
+            "--problem",
+            help="advicebench: one of its own problems, a world's file or gym:ID with a model instead; it may be repeated.",
+        ),
     ] = None,
     advisors: Annotated[
         str | None,
         typer.Option(
-            "--advisors", help="advicebench: only these advisors, or others such as recorded:DIR, separated by commas."
+            "--advisors",
+            help="advicebench: only these advisors, or others such as recorded:DIR or ./mine.py:Advisor, separated by commas.",
+            callback=from_files("advisors"),
         ),
     ] = None,
     instances: Annotated[

@@ -4,6 +4,7 @@ Settings without a compiled form run in the interactive session, one after the o
 """
 
 from collections.abc import Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -32,6 +33,7 @@ from lab.learning.updates.update import STATE_VALUES
 from lab.mdp import FloatArray, IntArray, TabularMDP
 
 Outcome = tuple[float, int, float]  # chance, state entered, reward
+WALKS = 10  # episodes that measure a greedy policy where they differ
 
 
 class ChanceTable(TableEnvironment):
@@ -85,7 +87,8 @@ class Batch(NamedTuple):
 
     steps: (N, E) int32, a failed episode counts as max_steps + 1; guided: (N, E) bool, episodes with a helped step; requests,
     helped_steps, misleads: (N,) int64, as in `SessionResult`; rejected_at_episode: (N,) int64, 0 if no advisor was rejected;
-    moves: (N,) int64, all moves made; q: (N, S, A) float64, or (0, S, A) unless the tables were asked for.
+    moves: (N,) int64, all moves made; q: (N, S, A) float64, or (0, S, A) unless the tables were asked for; greedy: (N, K), see
+    `run_sessions`.
     """
 
     steps: NDArray[np.int32]
@@ -96,6 +99,7 @@ class Batch(NamedTuple):
     rejected_at_episode: NDArray[np.int64]
     moves: NDArray[np.int64]
     q: FloatArray
+    greedy: FloatArray = np.zeros((0, 0))
 
 
 def run_sessions(
@@ -106,24 +110,30 @@ def run_sessions(
     seeds: NDArray[np.uint64],
     *,
     keep_tables: bool = False,
+    greedy_every: int = 0,
 ) -> Batch:
     """The results of N sessions, one per seed.
 
     problem: a table, or the environment in which steps are made; compiled are tables, `ChanceTable` and the worlds of `physics`.
     advice: None if there is nobody to ask; seeds: (N,) uint64; keep_tables: whether the results include the learned tables.
+    greedy_every: after each so-manyth episode the greedy policy is measured without advice, in episodes that nobody learns from;
+    `Batch.greedy` has their mean steps, a failed one as max_steps + 1 (see `greedy_steps`). 0: it is not measured.
 
     The results equal those of `Session.run` with the draws `splitmix.stream(seed)` and a `TableAdvisor` on the same draws.
-    Raises BadInput for an unknown learner, selection or gate, and for advice of another shape.
+    Raises BadInput for an unknown learner, selection or gate, for advice of another shape, and to measure a greedy policy in
+    steps that no table holds.
     """
     check_members(learner, gate)
     place = TableEnvironment(problem) if isinstance(problem, TabularMDP) else problem
     mdp = place.mdp
     if advice is not None and advice.thresholds.shape[1:] != mdp.successor.shape:
         raise BadInput(f"advice of shape {advice.thresholds.shape}: the problem has {mdp.successor.shape}")
+    if greedy_every and not (isinstance(place, TableEnvironment) and learner.tilings == 1):
+        raise BadInput(f"greedy_every {greedy_every}: the greedy policy is measured along the way on tables only")
     steps_known = isinstance(place, TableEnvironment) or isinstance(mdp, CellTable)
     by_chance_on_tiles = isinstance(place, ChanceTable) and learner.tilings > 1
     if by_chance_on_tiles or not (steps_known and is_compiled(mdp, learner, gate, advice)):
-        return _one_by_one(place, learner, gate, advice, seeds, keep_tables)
+        return _one_by_one(place, learner, gate, advice, seeds, keep_tables, greedy_every)
     asking = _asking(gate, advice is not None, learner.max_steps)
     learning, arrays = _learning(mdp, learner), _problem(mdp, learner)
     advice_arrays = (np.zeros((1, 1, mdp.n_actions)), np.zeros(mdp.n_states, np.bool_))
@@ -135,7 +145,7 @@ def run_sessions(
         learning = learning._replace(actions=np.zeros(mdp.n_actions))  # of any length: compiled once for all
         return _on_tiles(mdp, learner, records.Work(arrays, learning, asking, *advice_arrays, sessions, lanes))
     size = mdp.n_states * (1 if _is_afterstate(learner) else mdp.n_actions)
-    sessions = _sessions(learner, seeds, size, keep_tables)
+    sessions = _sessions(learner, seeds, size, keep_tables, greedy_every, walks_of(place))
     ensemble = gate.ensemble if asking.gate.asks == ASKS_WHERE_TABLES_DIFFER else 0
     lanes = _lanes(mdp.n_actions, learner.episodes, sessions.kept.shape[1], ensemble)
     memories = _memories(mdp.n_states, mdp.n_actions, learning.max_moves) if gate.memory else None
@@ -147,11 +157,34 @@ def run_sessions(
         _chances(place),
         walks,
     )
-    return _batch(sessions.steps, sessions.guided, sessions.counts, _action_values(mdp, learning, sessions.kept))
+    tables = _action_values(mdp, learning, sessions.kept)
+    return _batch(sessions.steps, sessions.guided, sessions.counts, tables, sessions.greedy)
 
 
-def _batch(steps: NDArray[np.int32], guided: NDArray[np.bool_], counts: NDArray[np.void], q: FloatArray) -> Batch:
-    return Batch(steps, guided, **{name: counts[name] for name in records.COUNTS.names or ()}, q=q)
+def _batch(
+    steps: NDArray[np.int32], guided: NDArray[np.bool_], counts: NDArray[np.void], q: FloatArray, greedy: FloatArray
+) -> Batch:
+    return Batch(steps, guided, **{name: counts[name] for name in records.COUNTS.names or ()}, q=q, greedy=greedy)
+
+
+def walks_of(place: Environment) -> int:
+    """How many episodes of a greedy policy measure it: one where all are the same, WALKS where starts or steps are drawn."""
+    return WALKS if isinstance(place, ChanceTable) or place.mdp.starts else 1
+
+
+def greedy_steps(place: TableEnvironment, q: FloatArray, learner: LearnerSettings, draw: Draw, walks: int) -> float:
+    """The mean steps of that many episodes of the greedy policy of q (S, A), a failed one as max_steps + 1.
+
+    Ties go to the lowest action; starts and steps that are left to chance come from `draw`.
+    """
+    greedy, total = q.argmax(axis=1).tolist(), 0
+    for _ in range(walks):
+        state, reached, moves = place.reset(1, draw), False, 0
+        while moves < learner.max_steps - learner.count_start and not place.mdp.terminal[state]:
+            step = place.step(state, greedy[state], draw)
+            state, reached, moves = step.state, step.reached, moves + 1
+        total += moves + learner.count_start if reached else learner.max_steps + 1
+    return total / walks
 
 
 def is_compiled(mdp: TabularMDP, learner: LearnerSettings, gate: GateSettings, advice: Advice | None = None) -> bool:
@@ -216,15 +249,18 @@ def _one_by_one(
     advice: Advice | None,
     seeds: NDArray[np.uint64],
     keep_tables: bool,
+    greedy_every: int,
 ) -> Batch:
     """The same sessions without the kernel, each with the draws that it would have there."""
     steps, counts = np.zeros((len(seeds), learner.episodes), np.int32), np.zeros(len(seeds), records.COUNTS)
     q = np.zeros((len(seeds) if keep_tables else 0, *place.mdp.successor.shape))
-    batch = _batch(steps, np.zeros(steps.shape, np.bool_), counts, q)
+    greedy = np.zeros((len(seeds), learner.episodes // greedy_every if greedy_every else 0))
+    batch = _batch(steps, np.zeros(steps.shape, np.bool_), counts, q, greedy)
     for n, seed in enumerate(seeds):
         draw = splitmix.stream(int(seed))
         advisor = None if advice is None else TableAdvisor(advice, draw)
-        result = Session(place, learner, gate, advisor, draw).run()
+        session = Session(place, learner, gate, advisor, draw)
+        result = session.run(enough=partial(_measured, session, int(seed), greedy_every, greedy[n]))
         if result.interrupted:
             raise KeyboardInterrupt
         batch.steps[n], batch.guided[n], batch.moves[n] = result.steps, result.guided, result.visits.sum()
@@ -233,6 +269,15 @@ def _one_by_one(
         if keep_tables:
             batch.q[n] = result.q
     return batch
+
+
+def _measured(session: Session, seed: int, every: int, greedy: FloatArray) -> bool:
+    """Measures the greedy policy of a session after each `every`-th episode, into greedy (K,); returns False: it goes on."""
+    number, left = divmod(session.episode, every) if every else (0, 1)
+    if not left and isinstance(session.environment, TableEnvironment):
+        draw, place = splitmix.stream(splitmix.apart(seed, number)), session.environment
+        greedy[number - 1] = greedy_steps(place, session.update.table(), session.settings, draw, walks_of(place))
+    return False
 
 
 def _on_tiles(mdp: TabularMDP, learner: LearnerSettings, work: records.Work) -> Batch:
@@ -259,7 +304,7 @@ def _on_tiles(mdp: TabularMDP, learner: LearnerSettings, work: records.Work) -> 
     linear_loop.run(work, linear, _world(mdp))
     sessions, tables = work.sessions, work.sessions.kept.reshape(-1, coding.count, mdp.n_actions)
     q = np.array([coding.values(weights) for weights in tables]).reshape(-1, *mdp.successor.shape)
-    return _batch(sessions.steps, sessions.guided, sessions.counts, q)
+    return _batch(sessions.steps, sessions.guided, sessions.counts, q, sessions.greedy)
 
 
 def _world(mdp: TabularMDP) -> linear_loop.LinearWorld:
@@ -286,7 +331,9 @@ def play(mdp: CellTable, policy: NDArray[np.int64], drawn: FloatArray, most: int
     return moves
 
 
-def _sessions(learner: LearnerSettings, seeds: NDArray[np.uint64], size: int, keep: bool) -> records.KernelSessions:
+def _sessions(
+    learner: LearnerSettings, seeds: NDArray[np.uint64], size: int, keep: bool, every: int = 0, walks: int = 1
+) -> records.KernelSessions:
     shape = (len(seeds), learner.episodes)
     warm = [selection.temperature(n, learner.beta, learner.exploration) for n in range(1, learner.episodes + 1)]
     return records.KernelSessions(
@@ -296,6 +343,10 @@ def _sessions(learner: LearnerSettings, seeds: NDArray[np.uint64], size: int, ke
         guided=np.zeros(shape, np.bool_),
         counts=np.zeros(len(seeds), records.COUNTS),
         kept=np.zeros((len(seeds) if keep else 0, size)),
+        greedy=np.zeros((len(seeds), learner.episodes // every if every else 0)),
+        every=max(1, every),
+        walks=walks,
+        walk_rng=np.zeros(1, np.uint64),
     )
 
 

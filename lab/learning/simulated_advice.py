@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import exp, log
 
 import numpy as np
 
@@ -12,6 +13,8 @@ from lab.mdp import BoolArray, FloatArray
 
 # When an advisor answers: always; if the learner would choose another action; if it did so when it last asked there.
 SPEAKS_ALWAYS, SPEAKS_TO_CORRECT, SPEAKS_AS_EXPECTED = range(3)
+SAME_VALUE = 1e-9  # of the span of the values: actions that differ by less are equally good
+BISECTIONS = 60
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +61,36 @@ def advice_chances(q: FloatArray, tau: float | Sequence[float]) -> FloatArray:
         weights = np.exp(best[None] / taus[:, None, None])
     chances: FloatArray = weights / weights.sum(axis=2, keepdims=True)
     return chances[0] if np.isscalar(tau) else chances
+
+
+def accuracy(chances: FloatArray, q: FloatArray, states: BoolArray) -> float:
+    """The share of optimal answers of an advisor: the mean over states (S,) of the chance of an action of the best value.
+
+    chances, q: (S, A); values within SAME_VALUE of the best one, as a fraction of the span of all values, count as the best.
+    """
+    near = SAME_VALUE * float(np.ptp(q[states]))
+    best = q >= q.max(axis=1, keepdims=True) - near
+    return float(np.where(best, chances, 0.0).sum(axis=1)[states].mean())
+
+
+def tau_of_accuracy(q: FloatArray, states: BoolArray, share: float) -> float:
+    """The tau at which an advisor that draws from a table q (S, A) gives this share of optimal answers, see `accuracy`.
+
+    The share falls from 1 to that of an advisor that draws evenly as tau grows; tau is found by bisection, so that it means the
+    same skill whatever the scale of the rewards. Raises BadInput for a share outside these limits, and where all answers are
+    optimal.
+    """
+    span = float(np.ptp(q[states]))
+    evenly = accuracy(np.full(q.shape, 1.0 / q.shape[1]), q, states)
+    if not evenly < share < 1.0:
+        raise BadInput(
+            f"accuracy {share:g}: allowed are shares of optimal answers above {evenly:.3f}, at random, and below 1"
+        )
+    low, high = log(span * 1e-9), log(span * 1e3)
+    for _ in range(BISECTIONS):
+        middle = (low + high) / 2
+        low, high = (middle, high) if accuracy(advice_chances(q, exp(middle)), q, states) > share else (low, middle)
+    return exp((low + high) / 2)
 
 
 def tau_schedule(taus: Sequence[float], episodes: int) -> list[float]:

@@ -31,6 +31,11 @@ def state_at(seed: int, number: int) -> int:
     return seed + STEP + number * STEP & MASK
 
 
+def apart(seed: int, number: int) -> int:
+    """A seed whose stream is independent of that of `seed`, for the purpose with that number."""
+    return mixed(seed + number & MASK)
+
+
 def uniform(seed: int, number: int) -> float:
     """Uniform number `number` (from 0) in the stream of a seed."""
     return fraction(mixed(state_at(seed, number)))

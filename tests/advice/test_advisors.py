@@ -23,7 +23,7 @@ from lab.errors import BadInput
 from lab.learning.requests import AdviceRequest, Advisor, AdvisorLeft
 from lab.learning.selection import softmax
 from lab.learning.session_events import AdviceGiven
-from lab.learning.simulated_advice import Advice, TableAdvisor, advice_chances
+from lab.learning.simulated_advice import Advice, TableAdvisor, accuracy, advice_chances, tau_of_accuracy
 from lab.mdp import FloatArray, TabularMDP, grid, optimal_values, shortest_steps
 from lab.sequencing.search import SequenceRequest, state_of
 from lab.sequencing.simulate.follow import follow
@@ -283,3 +283,20 @@ def test_where_the_work_stands_is_one_number() -> None:
         assert state_of(run) not in seen
         seen.add(state_of(run))
     assert state_of(follow(cell, (1, 2, 1))) == state_of(run)
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1.0, 500.0])
+@pytest.mark.parametrize("share", [0.6, 0.9, 0.99])
+def test_a_tau_gives_the_share_of_optimal_answers_by_hand(share: float, scale: float) -> None:
+    """Two actions whose values lie 1 apart: the better one has the chance 1 / (1 + exp(-1 / tau)), so tau is 1 / logit."""
+    q, states = scale * np.array([[0.0, 1.0], [1.0, 0.0], [0.0, 0.0]]), np.array([True, True, False])
+    tau = tau_of_accuracy(q, states, share)
+    assert tau == pytest.approx(scale / np.log(share / (1 - share)))
+    assert accuracy(advice_chances(q, tau), q, states) == pytest.approx(share)
+
+
+def test_actions_of_equal_values_are_equally_good() -> None:
+    q, everywhere = np.array([[1.0, 1.0, 0.0]]), np.array([True])
+    assert accuracy(np.array([[0.5, 0.25, 0.25]]), q, everywhere) == 0.75
+    with pytest.raises(BadInput, match=r"accuracy 0\.6: .*above 0\.667"):
+        tau_of_accuracy(q, everywhere, 0.6)

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from lab.errors import BadInput
-from lab.learning.batch import ChanceTable, Outcome, run_sessions
+from lab.learning.batch import ChanceTable, Outcome, _one_by_one, greedy_steps, run_sessions
+from lab.learning.environment import TableEnvironment
 from lab.learning.gates import GATES
 from lab.learning.requests import AdviceRequest
 from lab.learning.session import Session
@@ -86,3 +87,40 @@ def test_advisors_that_are_late_or_hold_back() -> None:
     assert [correcting.advise(request(mdp, 0, own)) for own in (0, right)] == [right, None]
     expecting = TableAdvisor(replace(sure, speaks=SPEAKS_AS_EXPECTED), stream(0))
     assert [expecting.advise(request(mdp, 0, own)) for own in (right, 0, 0)] == [right, None, right]
+
+
+@pytest.mark.parametrize("gate", ["never", "ccrl", "earned-trust"])
+@pytest.mark.parametrize("learner", ["q", "afterstate"])
+@pytest.mark.parametrize("starts", [(), (0, 3, 12)])
+def test_the_greedy_policy_is_measured_along_the_way_as_in_the_session(
+    gate: str, learner: str, starts: tuple[int, ...]
+) -> None:
+    """It costs no draw: the sessions are the same as without."""
+    mdp = replace(slippery().mdp, starts=starts)
+    place: TabularMDP | ChanceTable = mdp if learner == "afterstate" else slippery()
+    how, who, seeds = replace(EAGER, gate=gate), advice(mdp), np.arange(3, 9, dtype=np.uint64)
+    settings = replace(LEARNER, learner=learner, episodes=24)
+    batch = run_sessions(place, settings, how, who, seeds, greedy_every=5)
+    plain = run_sessions(place, settings, how, who, seeds)
+    np.testing.assert_array_equal(batch.steps, plain.steps)
+    assert (batch.greedy.shape, plain.greedy.shape) == ((6, 4), (6, 0))
+    one_by_one = _one_by_one(
+        TableEnvironment(place) if isinstance(place, TabularMDP) else place, settings, how, who, seeds, False, 5
+    )
+    np.testing.assert_array_equal(batch.greedy, one_by_one.greedy)
+
+
+def test_a_greedy_policy_by_hand() -> None:
+    """Three cells in a row, right is 1: two moves to the goal; a table of nothing goes left for ever."""
+    place = TableEnvironment(grid((3,), np.zeros(3, bool), (0,), (2,)))
+    learner, right = LearnerSettings(max_steps=9), np.tile([0.0, 1.0], (3, 1))
+    assert greedy_steps(place, right, learner, stream(0), 1) == 2.0
+    assert greedy_steps(place, right, replace(learner, count_start=True), stream(0), 1) == 3.0
+    assert greedy_steps(place, np.zeros((3, 2)), learner, stream(0), 1) == 10.0
+
+
+def test_a_learner_on_tiles_is_not_measured_along_the_way() -> None:
+    with pytest.raises(BadInput, match=r"greedy_every 5: .*on tables only"):
+        run_sessions(
+            slippery().mdp, replace(LEARNER, tilings=4), EAGER, None, np.arange(2, dtype=np.uint64), greedy_every=5
+        )

@@ -76,6 +76,8 @@ class KernelSessions(NamedTuple):
     """The inputs and results of N sessions of E episodes; the results are those of `batch.Batch`.
 
     seeds (N,); per_tau (E,): 1 / temperature; counts (N,) of COUNTS; kept (N, size): the tables, or (0, size) if not wanted.
+    greedy (N, E // every), or (N, 0) if not wanted: after each `every`-th episode, the mean steps of `walks` episodes of the
+    greedy policy; walk_rng (1,): the state of their generator.
     """
 
     seeds: NDArray[np.uint64]
@@ -84,6 +86,10 @@ class KernelSessions(NamedTuple):
     guided: NDArray[np.bool_]
     counts: NDArray[np.void]
     kept: FloatArray
+    greedy: FloatArray
+    every: int
+    walks: int
+    walk_rng: NDArray[np.uint64]
 
 
 class Lanes(NamedTuple):
@@ -176,6 +182,12 @@ def draw(rng: Any, j: int) -> float:
     """`splitmix.stream` for lane j."""
     rng[j] = _following(rng[j])
     return float(_fraction(_mixed(rng[j])))
+
+
+@inlined
+def begin_walks(rng: Any, seed: Any, number: int) -> None:
+    """`splitmix.stream(splitmix.apart(seed, number))`, whose state is rng[0]."""
+    rng[0] = _mixed(seed + np.uint64(number))
 
 
 @inlined

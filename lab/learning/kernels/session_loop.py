@@ -14,7 +14,7 @@ from lab.learning import selection
 from lab.learning.compiled import inlined, inner, without_refcounts
 from lab.learning.kernels import asking as hears
 from lab.learning.kernels.asking import decided, judge, judge_moved, knows, opens
-from lab.learning.kernels.records import LANES, choose, draw, learn
+from lab.learning.kernels.records import LANES, begin_walks, choose, draw, learn
 
 _Memory: Any = memory.Memory
 _Move: Any = memory.RememberedMove
@@ -134,8 +134,38 @@ def _step(work: Any, memories: Any, hearing: Any, chances: Any, walks: Any, j: i
     return bool(ends != 0 or lanes.moves[j] == learning.max_moves)
 
 
+@inner
+def _greedy_steps(work: Any, chances: Any, table: Any, seed: Any, number: int) -> float:
+    """`batch.greedy_steps` of a flat table."""
+    sessions, problem, learning = work.sessions, work.problem, work.learning
+    width, starts, total = np.uint64(len(learning.actions)), problem.starts, 0.0
+    offset, factor = (problem.step_reward, learning.discount) if learning.afterstate else (0.0, 1.0)
+    begin_walks(sessions.walk_rng, seed, number)
+    for _ in range(sessions.walks):
+        state, moves = np.uint64(starts[0]), 0
+        if len(starts) > 1:
+            state = np.uint64(starts[int(draw(sessions.walk_rng, 0) * len(starts))])
+        while moves < learning.max_moves and problem.ends[state] == 0:
+            best, at = -np.inf, state * width
+            for a in range(len(learning.actions)):
+                move = state * width + np.uint64(a)
+                value = offset + factor * table[np.uint64(problem.successor[move]) if learning.afterstate else move]
+                if value > best:
+                    best, at = value, move
+            if chances is None:
+                state = np.uint64(problem.successor[at])
+            else:
+                u, k = draw(sessions.walk_rng, 0), 0
+                while u >= chances.below[at, k]:
+                    k += 1
+                state = np.uint64(chances.entered[at, k])
+            moves += 1
+        total += moves + learning.count_start if problem.ends[state] == 1 else learning.max_steps + 1
+    return float(total / sessions.walks)
+
+
 @inlined
-def _end(work: Any, memories: Any, hearing: Any, walks: Any, j: int) -> int:
+def _end(work: Any, memories: Any, hearing: Any, chances: Any, walks: Any, j: int) -> int:
     """Records the last episode of lane j; returns 1 if its session has ended, too."""
     lanes, sessions, learning = work.lanes, work.sessions, work.learning
     lane, moves, won = lanes.lane[j], lanes.moves[j], work.problem.ends[lanes.states[j]] == 1
@@ -159,6 +189,9 @@ def _end(work: Any, memories: Any, hearing: Any, walks: Any, j: int) -> int:
     if memories is not None:
         went = moves if won else learning.max_moves + 1
         _ended(_of_lane(memories, j), went, won, lane.helped)
+    if sessions.greedy.shape[1] and episode % sessions.every == 0:
+        number = episode // sessions.every
+        sessions.greedy[n, number - 1] = _greedy_steps(work, chances, lanes.tables[j], sessions.seeds[n], number)
     if episode < len(sessions.per_tau):
         return 0
     lanes.is_open[j] = False
@@ -185,4 +218,4 @@ def run(work: Any, memories: Any, hearing: Any, chances: Any, walks: Any) -> Non
         for j in range(LANES):
             if _step(work, memories, hearing, chances, walks, j):
                 fresh = True
-                over += _end(work, memories, hearing, walks, j)
+                over += _end(work, memories, hearing, chances, walks, j)

@@ -6,20 +6,17 @@ from typing import Any
 
 import numpy as np
 
-from lab.errors import unknown
 from lab.statistics import interval
 from lab.studies.findings import Findings, Row, row
 from lab.studies.runner import Job
-from lab_studies.comparisons.advice_bench.bad_advisors import ADVISORS, advice_of
+from lab_studies.comparisons.advice_bench.entered import Entered
 from lab_studies.comparisons.advice_bench.figures import answers_and_gain, distances, gains, worst_cells
-from lab_studies.comparisons.advice_bench.problems import HELD_OUT, PROBLEMS, problem
+from lab_studies.comparisons.advice_bench.problems import HELD_OUT, Benched
 from lab_studies.comparisons.advice_bench.ranks import Cell, Ranks, ranks
+from lab_studies.comparisons.advice_bench.rules import NOBODY, OURS
 from lab_studies.comparisons.advice_bench.sessions import (
     BINS,
     BUDGETS,
-    NOBODY,
-    OURS,
-    RULES,
     Case,
     Outcome,
     Outcomes,
@@ -59,51 +56,50 @@ RANKED = (
 
 
 def advice_bench(job: Job, reading: Mapping[str, Any]) -> Findings:
-    """The results of the bench; reading: lists "problem", "methods" (rules) and "advisors" of names, which replace all.
+    """The results of the bench; reading: lists "problem", "methods" (rules) and "advisors", which replace all: see `Entered.of`.
 
     Raises BadInput for a problem that cannot be a table, and for an unknown rule or advisor.
     """
-    rules = tuple(reading.get("methods", RULES))
-    for name in rules:
-        if name not in RULES:
-            raise unknown("rule", name, RULES, "--methods")
-    problems = list(reading.get("problem", (*PROBLEMS, *HELD_OUT)))
-    advisors = list(reading.get("advisors", ADVISORS))
-    for name in problems:
-        place = problem(name)
-        for advisor in advisors:
-            if advisor not in ADVISORS:
-                advice_of(advisor, place)
-    cases = [Case(name, advisor) for name in problems for advisor in (None, *advisors)]
-    outcomes = measured(job, cases, rules)
-    rows = [result for name in problems for result in rows_of(name, outcomes, advisors, rules)]
-    says, pictures = in_short(rows, problems, rules)
+    entered = Entered.of(reading)
+    cases = [Case(name, advisor) for name in entered.problems for advisor in (None, *entered.advisors)]
+    outcomes = measured(job, cases, entered)
+    rows = [
+        result
+        for name in entered.problems
+        for result in rows_of(entered.place(name), outcomes, entered.advisors, entered.rules)
+    ]
+    says, pictures = in_short(rows, entered.problems, entered.rules)
     return Findings(rows, says, pictures, (MEASURES, RULES_NOTE, CHOSEN, RANKED))
 
 
-def measured(job: Job, cases: Sequence[Case], rules: tuple[str, ...]) -> dict[Case, Outcomes]:
+def measured(job: Job, cases: Sequence[Case], entered: Entered) -> dict[Case, Outcomes]:
     """The outcomes of each case; cases whose results are in the job's folder are not run again."""
-    mark = [job.sessions, job.seed, *rules]
+    # without a folder nothing is kept, and own code needs no source file
+    own = {case: "" if job.folder is None else entered.key(case.problem, case.advisor) for case in cases}
+    marks = {case: [job.sessions, job.seed, *entered.rules, *filter(None, [key])] for case, key in own.items()}
 
     def read(entry: Any) -> tuple[Case, Outcomes] | None:
         case = Case(*entry["case"])
         outcomes = {(str(rule), str(budget)): Outcome.from_json(lists) for (rule, budget), lists in entry["found"]}
-        return (case, outcomes) if entry["of"] == mark and case in cases else None
+        return (case, outcomes) if case in marks and entry["of"] == marks[case] else None
 
     done: dict[Case, Outcomes] = job.kept_as(read)
     left = [case for case in cases if case not in done]
     job.progress(len(done), len(cases))
-    work = partial(case_outcomes, sessions=job.sessions, seed=job.seed, rules=rules)
+    work = partial(case_outcomes, sessions=job.sessions, seed=job.seed, entered=entered)
     for case, outcomes in job.computed(work, left, 1):
         done[case] = outcomes
-        entry = {"case": [case.problem, case.advisor], "of": mark}
+        entry = {"case": [case.problem, case.advisor], "of": marks[case]}
         job.keep(entry | {"found": [[list(key), outcome.to_json()] for key, outcome in outcomes.items()]})
         job.progress(len(done), len(cases))
     return done
 
 
-def rows_of(name: str, outcomes: Mapping[Case, Outcomes], advisors: Sequence[str], rules: Sequence[str]) -> list[Row]:
+def rows_of(
+    place: Benched, outcomes: Mapping[Case, Outcomes], advisors: Sequence[str], rules: Sequence[str]
+) -> list[Row]:
     """One row for nobody, and one for each advisor, budget and rule in a problem."""
+    name, episodes = place.name, place.learner.episodes
     nobody = outcomes[Case(name, None)][NOBODY, "any"]
     group = {"held_out": name in HELD_OUT}
     alone = {
@@ -112,7 +108,7 @@ def rows_of(name: str, outcomes: Mapping[Case, Outcomes], advisors: Sequence[str
         "budget": None,
         "rule": NOBODY,
         **group,
-        **_shown(nobody, nobody, name),
+        **_shown(nobody, nobody, episodes),
     }
     rows = [row(alone, "gain_points", 0.0)]
     for advisor in advisors:
@@ -121,13 +117,13 @@ def rows_of(name: str, outcomes: Mapping[Case, Outcomes], advisors: Sequence[str
                 outcome = outcomes[Case(name, advisor)][rule, budget]
                 named = {"problem": name, "advisor": advisor, "budget": budget, "rule": rule, **group}
                 mean, *ends = interval(outcome.points - nobody.points)
-                rows.append(row(named | _shown(outcome, nobody, name), "gain_points", mean, ends))
+                rows.append(row(named | _shown(outcome, nobody, episodes), "gain_points", mean, ends))
     return rows
 
 
-def _shown(outcome: Outcome, nobody: Outcome, name: str) -> Row:
+def _shown(outcome: Outcome, nobody: Outcome, episodes: int) -> Row:
     """The measures that are shown beside the gain."""
-    later = _recovered(outcome, nobody, name), _recovered(nobody, nobody, name)
+    later = _recovered(outcome, nobody, episodes), _recovered(nobody, nobody, episodes)
     return {
         "points": round(float(outcome.points.mean()), 2),
         "last": round(float(outcome.last.mean()), 2),
@@ -136,12 +132,12 @@ def _shown(outcome: Outcome, nobody: Outcome, name: str) -> Row:
     }
 
 
-def _recovered(outcome: Outcome, nobody: Outcome, name: str) -> float | None:
+def _recovered(outcome: Outcome, nobody: Outcome, episodes: int) -> float | None:
     """The episode from which the mean curve stays above nine tenths of nobody's last points; None if it does not."""
     enough = outcome.curve >= LEVEL * nobody.last.mean()
     below = np.flatnonzero(~enough)
     first = 0 if len(below) == 0 else int(below[-1]) + 1
-    return None if first == BINS else first * problem(name).learner.episodes / BINS
+    return None if first == BINS else first * episodes / BINS
 
 
 def in_short(rows: Sequence[Row], problems: Sequence[str], rules: Sequence[str]) -> tuple[Row, dict[str, bytes]]:

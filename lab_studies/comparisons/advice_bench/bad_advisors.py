@@ -6,10 +6,16 @@ from zlib import crc32
 
 import numpy as np
 
-from lab.advice.advisors import SKILL_TAUS, AdvisorName
-from lab.advice.table_level import TableLevel
-from lab.learning.requests import AdviceRequest
-from lab.learning.simulated_advice import Advice, TableAdvisor, advice_chances
+from lab.advice.advisors import SKILL_TAUS, AdvisorName, RecordedAdvisor
+from lab.advice.table_level import PolicyAdvisor, TableLevel
+from lab.learning.requests import AdviceRequest, Advisor
+from lab.learning.simulated_advice import (
+    SPEAKS_AS_EXPECTED,
+    SPEAKS_TO_CORRECT,
+    Advice,
+    TableAdvisor,
+    advice_chances,
+)
 from lab.mdp import BoolArray, FloatArray
 from lab_studies.comparisons.advice_bench.problems import Benched
 
@@ -84,19 +90,25 @@ ADVISORS: Mapping[str, Made] = {
 }
 
 
-def advice_of(name: str, benched: Benched) -> Advice:
-    """The advice of an advisor of the bench, or of another one that always answers a question alike, such as a recorded one.
+def advisor_of(name: AdvisorName, benched: Benched, rng: np.random.Generator) -> Advisor | None:
+    """The advisor of that name in a problem, None for "none". Raises BadInput for a record of another problem."""
+    level = TableLevel(benched.mdp, benched.learner.discount, rng, episodes=benched.learner.episodes)
+    return level.advisor(name)
+
+
+def advice_of(name: str | AdvisorName, benched: Benched) -> Advice | None:
+    """The advice of an advisor of the bench, or of one whose answers are a table, such as a recorded one; None for any other.
 
     Raises BadInput for an unknown advisor, and for a record of another problem.
     """
-    if name in ADVISORS:
+    if isinstance(name, str) and name in ADVISORS:
         return ADVISORS[name](benched)
-    level = TableLevel(
-        benched.mdp, benched.learner.discount, np.random.default_rng(0), episodes=benched.learner.episodes
-    )
-    advisor = level.advisor(AdvisorName.of(name, "--advisors"))
+    parsed = AdvisorName.of(name, "--advisors") if isinstance(name, str) else name
+    advisor = advisor_of(parsed, benched, np.random.default_rng(0))
     if isinstance(advisor, TableAdvisor):
         return advisor.advice
+    if not (advisor is None or isinstance(advisor, RecordedAdvisor | PolicyAdvisor)):
+        return None
     says = np.zeros(benched.mdp.successor.shape)
     q = [[0.0] * benched.mdp.n_actions] * benched.mdp.n_states
     for state in np.flatnonzero(~benched.mdp.terminal).tolist():
@@ -109,6 +121,30 @@ def advice_of(name: str, benched: Benched) -> Advice:
     heard: BoolArray = says.sum(axis=1) > 0.0
     says[~heard, 0] = 1.0
     return Advice.of(says, heard)
+
+
+class HoldingBack:
+    """An advisor that is asked only in a region, (S,) bool, and keeps an answer that it expects of the learner to itself.
+
+    speaks: as in `Advice`, whose rules these are.
+    """
+
+    def __init__(self, advisor: Advisor, region: BoolArray, speaks: int):
+        self._advisor, self._region, self._speaks = advisor, region, speaks
+        self._chose: dict[int, int] = {}  # what the learner would have chosen in a state when it last asked there
+        self.followed = getattr(advisor, "followed", None)
+
+    def advise(self, request: AdviceRequest) -> int | None:
+        """The advisor's answer, None outside the region and for the action that is expected."""
+        if not self._region[request.state]:
+            return None
+        action, expected = self._advisor.advise(request), None
+        if self._speaks == SPEAKS_TO_CORRECT:
+            expected = request.own
+        elif self._speaks == SPEAKS_AS_EXPECTED:
+            expected = self._chose.get(request.state)
+            self._chose[request.state] = request.own
+        return None if action == expected else action
 
 
 def importance(benched: Benched, share: float = 0.5) -> BoolArray:

@@ -8,7 +8,8 @@ import numpy as np
 from lab.studies.findings import Row
 from lab.view.canvas import BLUE, GREY, INK, ORANGE, RED, picture_bytes
 from lab_studies.comparisons.advice_bench.ranks import Ranks
-from lab_studies.comparisons.advice_bench.sessions import BUDGETS, OURS
+from lab_studies.comparisons.advice_bench.rules import OURS
+from lab_studies.comparisons.advice_bench.sessions import BUDGETS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -3,17 +3,22 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lab.errors import BadInput
+from lab.errors import BadInput, WorkFailed
 from lab.learning.batch import ChanceTable, run_sessions
+from lab.learning.environment import Environment, TableEnvironment, check_solvable
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.learning.simulated_advice import Advice, advice_chances
 from lab.mdp import FloatArray, TabularMDP, optimal_values
-from lab.teaching.subjects import subject_from
+from lab.teaching.subjects import Teachable, subject_from
 from lab_studies.comparisons.advice_bench import layouts
+
+if TYPE_CHECKING:
+    from lab.gym.transition_model import TransitionModel
 
 RANDOM_WORLDS = 100
 OTHERS = 1000  # the number of the first random world that is held out
@@ -29,11 +34,12 @@ class Benched:
     mdp: TabularMDP
     learner: LearnerSettings
     values: FloatArray
-    chances: ChanceTable | None = None
+    chances: Environment | None = None
+    modules: tuple[str, ...] = ()  # of the environment's code, see `lab.files.code_key`
 
     @property
-    def place(self) -> TabularMDP | ChanceTable:
-        """The table, or table with chances, in which sessions run."""
+    def place(self) -> TabularMDP | Environment:
+        """The table, or the environment with random moves, in which sessions run."""
         return self.mdp if self.chances is None else self.chances
 
     @cached_property
@@ -50,36 +56,61 @@ def _table(mdp: TabularMDP, **changes: Any) -> Benched:
     return Benched("", mdp, learner, optimal_values(mdp, learner.discount))
 
 
-def _named(name: str, task: str | None = None, **changes: Any) -> Benched:
-    """The problem that `lab teach` has by a name. Raises BadInput for an environment of Gymnasium without a model."""
+def _named(name: Teachable, task: str | None = None, **changes: Any) -> Benched:
+    """The problem that `lab teach` has by a name, or one made in Python.
+
+    Raises BadInput for an environment of Gymnasium without a model, and for one whose optimal values are unknown.
+    """
     subject = subject_from(name, task)
     problem = subject.prepare(0)
     learner = replace(COMMON, max_steps=subject.settings.learner.max_steps, **changes)
     if problem.environment is None:
-        return Benched("", problem.mdp, learner, optimal_values(problem.mdp, learner.discount))
-    return _of_model(name, problem.mdp, learner)
+        return Benched(problem.name, problem.mdp, learner, optimal_values(problem.mdp, learner.discount))
+    modules = tuple(getattr(problem.environment, "modules", ()))
+    if isinstance(name, str):
+        model = getattr(problem.environment, "model", None)
+        if model is None:
+            raise BadInput(f"problem '{name}' (--problem): AdviceBench needs a table or a model, and it brings neither")
+        return replace(_of_model(name, model, problem.mdp, learner), modules=modules)
+    if problem.mdp.cells != problem.mdp.shape:
+        raise BadInput(f"problem '{problem.name}' (--problem): AdviceBench needs a table, and it has continuous states")
+    try:
+        values = problem.environment.values(learner.discount)
+    except WorkFailed as error:
+        raise BadInput(f"problem '{problem.name}' (--problem): its optimal values are unknown: {error}") from None
+    return Benched(problem.name, problem.mdp, learner, values, problem.environment, modules)
 
 
-def _of_model(name: str, mdp: TabularMDP, learner: LearnerSettings) -> Benched:
-    import gymnasium
+def _of_model(name: str, model: "TransitionModel", mdp: TabularMDP, learner: LearnerSettings) -> Benched:
+    from lab.gym.environment_name import make, parse_name
 
-    from lab.gym.transition_model import TransitionModel
-
-    inside: Any = gymnasium.make(name.removeprefix("gym:")).unwrapped
-    outcomes = getattr(inside, "P", None)
-    if outcomes is None:
-        raise BadInput(f"problem '{name}' (--problem): AdviceBench needs a table or a model, and it brings neither")
-    starts = np.asarray(inside.initial_state_distrib, np.float64)
-    model = TransitionModel(outcomes, starts, mdp.n_actions)
     best = model.optimal(learner.discount)
     if model.certain:
         return Benched("", mdp, learner, best)
+    inside: Any = make(parse_name(name, "--problem"), "--problem").unwrapped
+    outcomes = inside.P
     moves = [
         [(chance, entered, reward) for chance, entered, reward, _ in outcomes[state][action]]
         for state in range(mdp.n_states)
         for action in range(mdp.n_actions)
     ]
     return Benched("", mdp, learner, best, ChanceTable(mdp, moves, best))
+
+
+def own_problem(given: Teachable) -> Benched:
+    """The problem of a world's file, of gym:ID with a model, or of an object made in Python.
+
+    Raises BadInput for one that is no table, and for one whose best policy needs more steps than an episode has; NoPath if
+    no path leads to its goal.
+    """
+    made = _named(str(given) if isinstance(given, Path) else given)
+    made = replace(made, name=str(given) if isinstance(given, str | Path) else made.name)
+    check_solvable(TableEnvironment(made.place) if isinstance(made.place, TabularMDP) else made.place)
+    if made.par > made.learner.max_steps:
+        raise BadInput(
+            f"problem '{made.name}' (--problem): its best policy needs more than an episode's {made.learner.max_steps} steps"
+        )
+    return made
 
 
 PROBLEMS: Mapping[str, Callable[[], Benched]] = {

@@ -1,11 +1,16 @@
 """AdviceBench: its problems and advisors by hand, its ranks, and a small run of it that goes on where it stopped."""
 
 import json
+import os
+import subprocess
+import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+import lab
 from lab.errors import BadInput
 from lab.mdp import greedy_path, optimal_values, shortest_steps
 from lab.studies.runner import Job
@@ -14,7 +19,8 @@ from lab_studies.comparisons.advice_bench.advice_bench import advice_bench
 from lab_studies.comparisons.advice_bench.bad_advisors import ADVISORS, advice_of, importance
 from lab_studies.comparisons.advice_bench.problems import problem
 from lab_studies.comparisons.advice_bench.ranks import holm, ranks
-from lab_studies.comparisons.advice_bench.sessions import RULES, Case, case_outcomes
+from lab_studies.comparisons.advice_bench.rules import RULES
+from lab_studies.comparisons.advice_bench.sessions import Case, case_outcomes
 
 
 def test_layouts_take_as_many_moves_as_by_hand() -> None:
@@ -127,4 +133,93 @@ def test_a_file_of_ones_own_and_any_advisor_that_always_answers_alike(tmp_path: 
     )
     assert found.rows[-1]["value"] > 0.0
     place = problem(str(maze))
-    assert advice_of("tau=0.05", place).thresholds.shape == (1, *place.mdp.successor.shape)
+    advice = advice_of("tau=0.05", place)
+    assert advice is not None
+    assert advice.thresholds.shape == (1, *place.mdp.successor.shape)
+
+
+# ---- members of the user -------------------------------------------------------------------------------------------
+
+
+class EveryOther(lab.Gate):
+    """Asks in every other episode."""
+
+    def opens(self, episode: int, steps: lab.Steps) -> bool:
+        return episode % 2 == 0
+
+
+class Tiring:
+    """Answers at random, and only the first 30 questions of a session."""
+
+    def __init__(self, rng: np.random.Generator):
+        self.rng, self.left = rng, 30
+
+    def advise(self, request: lab.AdviceRequest) -> int | None:
+        self.left -= 1
+        return int(self.rng.integers(len(request.allowed))) if self.left >= 0 else None
+
+
+def first(request: lab.AdviceRequest) -> int:
+    return 0
+
+
+def test_members_made_in_python_are_measured_alike_in_several_processes() -> None:
+    maze = lab.world("S..\n.#.\n..G", name="maze")
+    reading: dict[str, Any] = {
+        "methods": [EveryOther, "ccrl", "ia", "predictive"],
+        "advisors": [Tiring, first],
+        "problem": [maze, lab.Problem("board", "push", maze.mdp())],
+    }
+    found = lab.study("advicebench", sessions=2, **reading)
+    assert len(found.rows) == 2 * (1 + 2 * 2 * 4)
+    assert {row["rule"] for row in found.rows} == {"nobody", "EveryOther", "ccrl", "ia", "predictive"}
+    tired = [row["answers"] for row in found.rows if (row["advisor"], row["rule"]) == ("Tiring", "EveryOther")]
+    assert tired == [30.0] * 4  # each session has an advisor of its own
+    assert "EveryOther" in found.summary["best three mean ranks"] + found.summary["harm by EveryOther"]
+    assert len(found.figures) == 4
+    assert lab.study("advicebench", sessions=2, workers=2, **reading).rows == found.rows
+
+
+def test_an_own_gate_that_was_edited_is_run_again(tmp_path: Path) -> None:
+    (tmp_path / "maze.txt").write_text("S..\n.#.\n..G\n")
+    gate = (
+        "import lab\n\n\nclass Mine(lab.Gate):\n    def opens(self, episode, steps):\n        return episode % 2 == 0\n"
+    )
+    says = "\n\ndef says(request):\n    return 3\n"
+    options = ["--methods=./mine.py:Mine,ccrl", "--advisors=./mine.py:says", "--problem=maze.txt", "--sessions=2"]
+    program = [sys.executable, "-c", "from lab.cli import main; main()", "study", "run", "advicebench", *options]
+
+    def rows(code: str) -> Any:
+        (tmp_path / "mine.py").write_text(code)
+        path = {"PYTHONPATH": str(Path(lab.__file__).parents[1])}
+        ran = subprocess.run([*program, "--json"], cwd=tmp_path, env=os.environ | path, capture_output=True, check=True)
+        return json.loads(ran.stdout)["rows"]
+
+    kept = tmp_path / "advicebench-study" / "sessions.jsonl"
+    before = rows(gate + says)
+    assert {row["rule"] for row in before} == {"nobody", "mine.Mine", "ccrl"}
+    assert len(kept.read_text().splitlines()) == 2
+    assert rows(gate + says) == before
+    assert len(kept.read_text().splitlines()) == 2  # nothing was run twice
+    assert rows(gate.replace("% 2", "% 5") + says) != before
+    assert len(kept.read_text().splitlines()) == 3  # nobody's sessions are as they were
+
+
+@pytest.mark.parametrize(
+    ("reading", "why"),
+    [
+        ({"methods": [Tiring]}, "Tiring.*wanted a subclass of lab.Gate"),
+        ({"methods": [type("ccrl", (EveryOther,), {})]}, "two rules are called 'ccrl'"),
+        ({"methods": []}, "methods: nothing to measure"),
+        ({"methods": ["mine.Gate"]}, "'mine.Gate'.*it came from a file"),
+        ({"advisors": [7]}, "advisor 7: wanted a name"),
+        ({"advisors": [Tiring, type("Tiring", (Tiring,), {})]}, "two advisors are called 'Tiring'"),
+        ({"problem": [7]}, "problem 7.*wanted a name, a GridWorld"),
+        ({"problem": [lab.world("S.G", name="empty")]}, "two problems are called 'empty'"),
+        ({"problem": ["gym:MountainCar-v0"]}, "problem 'gym:MountainCar-v0'.*needs a table or a model"),
+    ],
+)
+def test_a_member_that_cannot_enter_is_named_in_one_line(reading: dict[str, Any], why: str) -> None:
+    with pytest.raises(BadInput, match=why) as refused:
+        advice_bench(Job(sessions=2), {"problem": ["empty"]} | reading)
+    assert "\n" not in str(refused.value)

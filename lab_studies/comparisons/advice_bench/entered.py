@@ -1,0 +1,149 @@
+"""The rules, advisors and problems that enter a run of AdviceBench: its own, and those of the user."""
+
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from hashlib import sha256
+from typing import Any
+
+from lab.advice.advisors import ADVISORS as ADDED
+from lab.advice.advisors import AdvisorName
+from lab.errors import BadInput, unknown
+from lab.files import code_key
+from lab.learning.gates import GATES, Gate
+from lab.plugins.code_file import files_taken, from_file, take
+from lab.studies.compared import FAMILIES
+from lab_studies.comparisons.advice_bench.bad_advisors import ADVISORS, advice_of
+from lab_studies.comparisons.advice_bench.problems import HELD_OUT, PROBLEMS, Benched, own_problem, problem
+from lab_studies.comparisons.advice_bench.rules import NOBODY, RULES, Rule, rule_of
+
+
+@dataclass(frozen=True, eq=False)
+class Entered:
+    """The members of a run by name, in the order of its rows, as another process can make them.
+
+    rules, advisors, problems: the names of all; gates, made, places: what was made in Python, and all problems of the user;
+    files: the members from files, see `lab.plugins.code_file.files_taken`.
+    """
+
+    rules: tuple[str, ...] = tuple(RULES)
+    advisors: tuple[str, ...] = tuple(ADVISORS)
+    problems: tuple[str, ...] = (*PROBLEMS, *HELD_OUT)
+    gates: Mapping[str, type[Gate]] = field(default_factory=dict)
+    made: Mapping[str, AdvisorName] = field(default_factory=dict)
+    places: Mapping[str, Benched] = field(default_factory=dict)
+    files: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, reading: Mapping[str, Any]) -> "Entered":
+        """The members that a reading names: "methods" (rules), "advisors" and "problem", a list or a single one each.
+
+        A rule is a name of the bench, a gate's name or a subclass of `lab.Gate`; an advisor a name, a function, an object or a
+        class; a problem a name, a file, gym:ID or an object that `lab.teach` takes. Raises BadInput, which names the member.
+        """
+        gates: dict[str, type[Gate]] = {}
+        made: dict[str, AdvisorName] = {}
+        places: dict[str, Benched] = {}
+        rules = [_rule(given, gates) for given in _listed(reading, "methods", RULES)]
+        problems = [_problem(given, places) for given in _listed(reading, "problem", (*PROBLEMS, *HELD_OUT))]
+        advisors = [_advisor(given, made) for given in _listed(reading, "advisors", ADVISORS)]
+        files = {name: file for name, file in files_taken().items() if name in (*rules, *advisors)}
+        once = [tuple(dict.fromkeys(several)) for several in (rules, advisors, problems)]
+        entered = cls(once[0], once[1], once[2], gates, made, places, files)
+        for name in entered.advisors:
+            if name not in ADVISORS:
+                for where in entered.problems:
+                    advice_of(entered.advisor(name), entered.place(where))
+        return entered
+
+    def load(self) -> None:
+        """Adds the members from files, and the classes, to the families of this process."""
+        for kind, word in self.files.values():
+            take(FAMILIES[kind], word)
+        for gate in self.gates.values():
+            GATES.named(gate)
+
+    def own_rules(self) -> dict[str, Rule]:
+        """The rules by name."""
+        return {name: rule_of(name) for name in self.rules}
+
+    def advisor(self, name: str) -> str | AdvisorName:
+        """The name of an advisor of the bench, the parsed one of any other."""
+        return name if name in ADVISORS else self.made.get(name) or AdvisorName.of(name, "--advisors")
+
+    def place(self, name: str, world: int = 0) -> Benched:
+        """The problem of that name; world: the number of a random one."""
+        return self.places[name] if name in self.places else problem(name, world)
+
+    def key(self, name: str, advisor: str | None) -> str:
+        """A key of what is the user's own in a case (a problem's name and an advisor's): its code and tables; "" for nothing."""
+        modules = list(self.places[name].modules) if name in self.places else []
+        tables: list[Any] = []
+        if name in self.places:
+            place = self.places[name]
+            tables += [place.mdp.signature, sha256(place.values.tobytes()).hexdigest(), vars(place.learner)]
+        if advisor is not None:
+            modules += [module for rule in self.rules if rule not in RULES for module in GATES.modules_of(rule)]
+        if advisor is not None and advisor not in ADVISORS:
+            parsed = self.advisor(advisor)
+            advice = advice_of(parsed, self.place(name))
+            if advice is not None:
+                tables += [sha256(array.tobytes()).hexdigest() for array in (advice.thresholds, advice.region)]
+            elif advisor in self.made:
+                thing = self.made[advisor].itself
+                modules.append(str(getattr(thing, "__module__", type(thing).__module__)))
+            else:
+                modules += ADDED.modules_of(advisor)
+        if not (modules or tables):
+            return ""
+        return sha256(json.dumps([code_key(*sorted(modules)), *tables]).encode()).hexdigest()[:16]
+
+
+def _listed(reading: Mapping[str, Any], name: str, default: Iterable[str]) -> list[Any]:
+    """The values of an option. Raises BadInput for an empty list."""
+    given = reading.get(name, default)
+    several = [given] if isinstance(given, str) or not isinstance(given, Iterable) else list(given)
+    if not several:
+        raise BadInput(f"{name}: nothing to measure: wanted one or several")
+    return several
+
+
+def _rule(given: Any, gates: dict[str, type[Gate]]) -> str:
+    """The name of a rule; a class is added to `gates`."""
+    if isinstance(given, str):
+        if given not in {*RULES, *GATES}:  # a class of an earlier run is in the family, but not listed
+            raise from_file("gate", given, "--methods") or unknown("rule", given, {*RULES, *GATES}, "--methods")
+        return given
+    if isinstance(given, type) and (
+        given.__name__ in {*RULES, *GATES, NOBODY} or gates.get(given.__name__, given) is not given
+    ):
+        raise BadInput(f"methods: two rules are called '{given.__name__}': give the class another name")
+    name = GATES.named(given)
+    gates[name] = given
+    return name
+
+
+def _advisor(given: Any, made: dict[str, AdvisorName]) -> str:
+    """The name of an advisor; one that was made in Python is added to `made`."""
+    if isinstance(given, str):
+        if given not in ADVISORS:
+            AdvisorName.of(given, "--advisors")
+        return given
+    parsed = AdvisorName.made(given)
+    name = str(parsed)
+    if name in {*ADVISORS, *ADDED, NOBODY} or (name in made and made[name].itself is not given):
+        raise BadInput(f"advisors: two advisors are called '{name}': give its class or function another name")
+    made[name] = parsed
+    return name
+
+
+def _problem(given: Any, places: dict[str, Benched]) -> str:
+    """The name of a problem; one of the user is added to `places`."""
+    if isinstance(given, str) and (given in PROBLEMS or given in HELD_OUT):
+        return given
+    place = own_problem(given)
+    twice = place.name in places and places[place.name].mdp.signature != place.mdp.signature
+    if place.name in PROBLEMS or place.name in HELD_OUT or twice:
+        raise BadInput(f"problem: two problems are called '{place.name}': give one a name of its own, see lab.Problem")
+    places[place.name] = place
+    return place.name
