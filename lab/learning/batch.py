@@ -34,6 +34,7 @@ from lab.mdp import FloatArray, IntArray, TabularMDP
 
 Outcome = tuple[float, int, float]  # chance, state entered, reward
 WALKS = 10  # episodes that measure a greedy policy where they differ
+GREEDY_EVERY = 10  # episodes between the measurements of studies
 
 
 class ChanceTable(TableEnvironment):
@@ -172,6 +173,15 @@ def walks_of(place: Environment) -> int:
     return WALKS if isinstance(place, ChanceTable) or place.mdp.starts else 1
 
 
+def greedy_every(problem: TabularMDP | Environment, learner: LearnerSettings) -> int:
+    """The episodes between two measurements of the greedy policy in a study: GREEDY_EVERY, or all if there are fewer.
+
+    0, for no measurement, where steps are in no table or values are in tiles.
+    """
+    on_table = isinstance(problem, TabularMDP | TableEnvironment) and not isinstance(problem, CellTable)
+    return min(GREEDY_EVERY, learner.episodes) if on_table and learner.tilings == 1 else 0
+
+
 def greedy_steps(place: TableEnvironment, q: FloatArray, learner: LearnerSettings, draw: Draw, walks: int) -> float:
     """The mean steps of that many episodes of the greedy policy of q (S, A), a failed one as max_steps + 1.
 
@@ -260,7 +270,7 @@ def _one_by_one(
         draw = splitmix.stream(int(seed))
         advisor = None if advice is None else TableAdvisor(advice, draw)
         session = Session(place, learner, gate, advisor, draw)
-        result = session.run(enough=partial(_measured, session, int(seed), greedy_every, greedy[n]))
+        result = session.run(enough=partial(measure_greedy, session, int(seed), greedy_every, greedy[n]))
         if result.interrupted:
             raise KeyboardInterrupt
         batch.steps[n], batch.guided[n], batch.moves[n] = result.steps, result.guided, result.visits.sum()
@@ -271,8 +281,11 @@ def _one_by_one(
     return batch
 
 
-def _measured(session: Session, seed: int, every: int, greedy: FloatArray) -> bool:
-    """Measures the greedy policy of a session after each `every`-th episode, into greedy (K,); returns False: it goes on."""
+def measure_greedy(session: Session, seed: int, every: int, greedy: FloatArray) -> bool:
+    """False, as the session goes on: the `enough` of one whose greedy policy is measured after each `every`-th episode.
+
+    greedy: (K,), receives the mean steps that `run_sessions` has in `Batch.greedy`; seed: the session's; every: 0 for never.
+    """
     number, left = divmod(session.episode, every) if every else (0, 1)
     if not left and isinstance(session.environment, TableEnvironment):
         draw, place = splitmix.stream(splitmix.apart(seed, number)), session.environment

@@ -1,5 +1,6 @@
 """AdviceBench: its problems and advisors by hand, its ranks, and a small run of it that goes on where it stopped."""
 
+import csv
 import json
 import os
 import subprocess
@@ -15,12 +16,13 @@ from lab.errors import BadInput
 from lab.mdp import greedy_path, optimal_values, shortest_steps
 from lab.studies.runner import Job
 from lab_studies.comparisons.advice_bench import layouts
-from lab_studies.comparisons.advice_bench.advice_bench import advice_bench
+from lab_studies.comparisons.advice_bench.advice_bench import _later, advice_bench
+from lab_studies.comparisons.advice_bench.aggregates import RETURN, aggregates, table_of
 from lab_studies.comparisons.advice_bench.bad_advisors import ADVISORS, advice_of, importance
 from lab_studies.comparisons.advice_bench.problems import problem
 from lab_studies.comparisons.advice_bench.ranks import holm, ranks
 from lab_studies.comparisons.advice_bench.rules import RULES
-from lab_studies.comparisons.advice_bench.sessions import Case, case_outcomes
+from lab_studies.comparisons.advice_bench.sessions import Case, Outcome, Outcomes, case_outcomes
 
 
 def test_layouts_take_as_many_moves_as_by_hand() -> None:
@@ -97,6 +99,34 @@ def test_every_rule_runs_and_nobody_is_the_same_whatever_the_advisor() -> None:
     nobody = case_outcomes(Case("empty", None), 3, 0)["nobody", "any"]
     assert found["always", "any"].points == pytest.approx([100.0] * 3, abs=0.5)
     assert found["earned-trust", "any"].points.mean() > nobody.points.mean()
+    assert nobody.greedy_curve.shape == (20,)  # 200 episodes, every tenth
+    np.testing.assert_allclose(nobody.greedy_curve.mean(), nobody.greedy.mean(), atol=0.01)
+    np.testing.assert_allclose(nobody.greedy_curve[-1], nobody.greedy_last.mean(), atol=0.01)
+
+
+def test_recovery_is_the_episode_from_which_a_curve_stays_up() -> None:
+    nobody, late = np.array([0.0, 90.0, 100.0, 100.0]), np.array([95.0, 0.0, 0.0, 90.0])
+    assert _later(nobody, nobody, 100.0, 40) == 0  # from the second of four bins on, as nobody's own
+    assert _later(late, nobody, 100.0, 40) == 20
+    assert _later(np.zeros(4), nobody, 100.0, 40) is None
+
+
+def test_aggregates_by_hand() -> None:
+    outcomes: dict[Case, Outcomes] = {}
+    for name, points in (("maze", [0.0, 100.0]), ("lake", [50.0, 50.0, 7.0])):
+        none = np.zeros(0)
+        alone = Outcome(np.array(points), none, none, none, none, none, none)
+        better = alone._replace(points=alone.points + 1.0)
+        outcomes[Case(name, None)] = {("nobody", "any"): alone}
+        outcomes[Case(name, "expert")] = {("ours", "100"): better, ("ours", "any"): better}
+    tables = {rule: table_of(outcomes, rule, RETURN, ["maze", "lake"], ["expert"]) for rule in ("ours", "nobody")}
+    assert tables["nobody"].scores.tolist() == [[0.0, 0.0, 50.0, 50.0], [100.0, 100.0, 50.0, 50.0]]
+    assert tables["ours"].strata.tolist() == [0, 0, 1, 1]
+    found = aggregates(tables, "ours", 0)
+    assert found["ours"].iqm[0] == 51.0
+    assert found["nobody"].improvement == (0.75 + 1.0) / 2  # of the maze's four pairs three, of the lake's all
+    assert found["ours"].improvement is None
+    assert found["nobody"].profile[[0, 20, 70, 120]].tolist() == [1.0, 0.75, 0.25, 0.0]  # above -20, 0, 50, 100
 
 
 def test_a_small_bench_goes_on_where_it_stopped_and_says_the_same(tmp_path: Path) -> None:
@@ -107,12 +137,18 @@ def test_a_small_bench_goes_on_where_it_stopped_and_says_the_same(tmp_path: Path
     harm = [one for one in found.rows if (one["rule"], one["advisor"], one["budget"]) == ("always", "contrary", "any")]
     assert harm[0]["value"] < -80.0
     assert "rank 1" in found.summary["'earned-trust'"]
+    assert {"winner", "greedy policy: winner", "greedy policy: harm by always"} <= {*found.summary}
+    assert harm[0]["greedy_high"] < -80.0
+    aggregated = list(csv.DictReader(found.files["aggregates.csv"].splitlines()))
+    assert len(aggregated) == 2 * 3
+    assert {line["rule"] for line in aggregated} == {"always", "earned-trust", "nobody"}
     lines = (tmp_path / "sessions.jsonl").read_text().splitlines()
     assert [json.loads(line)["case"][1] for line in lines] == [None, "expert", "contrary"]
     (tmp_path / "sessions.jsonl").write_text("\n".join([*lines[:2], "cut"]))
     again = advice_bench(job, reading)
     assert again.rows == found.rows
     assert again.summary == found.summary
+    assert again.files == found.files
 
 
 def test_what_cannot_be_benched_is_refused() -> None:
@@ -176,7 +212,10 @@ def test_members_made_in_python_are_measured_alike_in_several_processes() -> Non
     tired = [row["answers"] for row in found.rows if (row["advisor"], row["rule"]) == ("Tiring", "EveryOther")]
     assert tired == [30.0] * 4  # each session has an advisor of its own
     assert "EveryOther" in found.summary["best three mean ranks"] + found.summary["harm by EveryOther"]
-    assert len(found.figures) == 4
+    assert len(found.figures) == 7
+    gains = [row["greedy_gain"] for row in found.rows if row["rule"] == "EveryOther"]
+    assert len(gains) == 8
+    assert None not in gains  # sessions that run one by one are measured as well
     assert lab.study("advicebench", sessions=2, workers=2, **reading).rows == found.rows
 
 
