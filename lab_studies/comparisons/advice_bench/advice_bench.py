@@ -46,8 +46,8 @@ MEASURES = (
     "policy's mean, 0 an episode that fails, and steps count in between. gain_points: points minus those of nobody's sessions "
     "with the same seeds, with the 95 % interval of the paired differences; below 0 is harm. last: points of the last tenth of "
     "the episodes. greedy_points: the points of the greedy policy without the advisor, measured after every tenth episode in "
-    "episodes that nobody learns from, mean over these; greedy_last: of the last of them; greedy_gain, greedy_low, greedy_high: "
-    "greedy_points minus nobody's, with its interval. answers: the advisor's answers in a session. later, greedy_later: "
+    "episodes that nobody learns from, mean over these; greedy_last: of the last of them; greedy_gain: greedy_points minus "
+    "nobody's, with its interval. answers: the advisor's answers in a session. later, greedy_later: "
     "episodes until the mean curve (of points, of greedy points) reaches nine tenths of nobody's last points and stays above, "
     "minus nobody's own; empty if it never does. Budget: answers of a session. Where moves are random (lake) there are four "
     "times as many sessions."
@@ -79,8 +79,8 @@ AGGREGATED = (
     "cells; performance profiles, the share of sessions above each score; improvement, the chance that a session of "
     f"'{OURS}' scores above one of the rule in the same cell, a tie counting half. Every problem counts with as many sessions."
 )
-# by headline score: the beginning of its lines in short, and the columns of the points and of the gain
-COLUMNS = {RETURN: ("", "points", "value"), GREEDY: (f"{GREEDY}: ", "greedy_points", "greedy_gain")}
+# by headline score: the beginning of its lines in short, the column of its points, and the measure of its gain
+COLUMNS = {RETURN: ("", "points", "gain_points"), GREEDY: (f"{GREEDY}: ", "greedy_points", "greedy_gain")}
 
 
 def advice_bench(job: Job, reading: Mapping[str, Any]) -> Findings:
@@ -127,53 +127,43 @@ def measured(job: Job, cases: Sequence[Case], entered: Entered) -> dict[Case, Ou
 def rows_of(
     place: Benched, outcomes: Mapping[Case, Outcomes], advisors: Sequence[str], rules: Sequence[str]
 ) -> list[Row]:
-    """One row for nobody, and one for each advisor, budget and rule in a problem."""
+    """The rows for nobody, and for each advisor, budget and rule in a problem."""
     name, episodes = place.name, place.learner.episodes
     nobody = outcomes[Case(name, None)][NOBODY, "any"]
     group = {"held_out": name in HELD_OUT}
-    alone = {
-        "problem": name,
-        "advisor": NOBODY,
-        "budget": None,
-        "rule": NOBODY,
-        **group,
-        **_shown(nobody, nobody, episodes),
-    }
-    rows = [row(alone, "gain_points", 0.0)]
+    alone = {"problem": name, "advisor": NOBODY, "budget": None, "rule": NOBODY, **group}
+    rows = _cell_rows(alone, nobody, nobody, episodes)
     for advisor in advisors:
         for budget in BUDGETS:
             for rule in rules:
                 outcome = outcomes[Case(name, advisor)][rule, budget]
                 named = {"problem": name, "advisor": advisor, "budget": budget, "rule": rule, **group}
-                mean, *ends = interval(outcome.points - nobody.points)
-                rows.append(row(named | _shown(outcome, nobody, episodes), "gain_points", mean, ends))
+                rows += _cell_rows(named, outcome, nobody, episodes)
     return rows
 
 
-def _shown(outcome: Outcome, nobody: Outcome, episodes: int) -> Row:
-    """The measures that are shown beside the gain."""
-    shown: Row = {
+def _cell_rows(named: Row, outcome: Outcome, nobody: Outcome, episodes: int) -> list[Row]:
+    """The rows of a cell: the gains in both scores, the one of the greedy policy only where that was measured."""
+    measured = bool(len(outcome.greedy))
+    last = float(nobody.greedy_last.mean()) if measured else 0.0
+    shown = named | {
         "points": round(float(outcome.points.mean()), 2),
         "last": round(float(outcome.last.mean()), 2),
-        "greedy_points": None,
-        "greedy_last": None,
-        "greedy_gain": None,
-        "greedy_low": None,
-        "greedy_high": None,
+        "greedy_points": round(float(outcome.greedy.mean()), 2) if measured else None,
+        "greedy_last": round(float(outcome.greedy_last.mean()), 2) if measured else None,
         "answers": round(float(outcome.answers.mean()), 1),
         "later": _later(outcome.curve, nobody.curve, float(nobody.last.mean()), episodes),
-        "greedy_later": None,
+        "greedy_later": _later(outcome.greedy_curve, nobody.greedy_curve, last, episodes) if measured else None,
     }
-    if len(outcome.greedy):
-        gain = (0.0, 0.0, 0.0) if outcome is nobody else interval(outcome.greedy - nobody.greedy)
-        last = float(nobody.greedy_last.mean())
-        shown |= {
-            "greedy_points": round(float(outcome.greedy.mean()), 2),
-            "greedy_last": round(float(outcome.greedy_last.mean()), 2),
-            **dict(zip(("greedy_gain", "greedy_low", "greedy_high"), gain, strict=True)),
-            "greedy_later": _later(outcome.greedy_curve, nobody.greedy_curve, last, episodes),
-        }
-    return shown
+    rows: list[Row] = []
+    for measure, field in (("gain_points", "points"), ("greedy_gain", "greedy")):
+        own, others = getattr(outcome, field), getattr(nobody, field)
+        if outcome is nobody and len(own):
+            rows.append(row(shown, measure, 0.0))
+        elif len(own):
+            mean, *ends = interval(own - others)
+            rows.append(row(shown, measure, mean, ends))
+    return rows
 
 
 def _later(curve: FloatArray, nobody: FloatArray, last: float, episodes: int) -> int | None:
@@ -197,7 +187,7 @@ def in_short(
     Problems used for development and those held out are apart. seed: of the bootstrap.
     """
     advised = [result for result in rows if result["rule"] != NOBODY]
-    says: Row = {"rules": len(entered.rules), "advisors": len({result["advisor"] for result in advised})}
+    says: Row = {"rules": len(entered.rules), "advisors": len(entered.advisors)}
     pictures: dict[str, bytes] = {}
     lines: list[Row] = []
     held_out = [name for name in entered.problems if name in HELD_OUT]
@@ -206,7 +196,7 @@ def in_short(
         if not those:
             continue
         where = f"{len(those)} {'held-out problems' if words else 'problems'}"
-        here = [result for result in advised if result["problem"] in those]
+        here = [result for result in advised if result["problem"] in those and result["measure"] == "gain_points"]
         found: dict[str, dict[str, Aggregate]] = {}
         order: list[str] = []
         for score, (prefix, points, gain) in COLUMNS.items():
@@ -219,9 +209,9 @@ def in_short(
             ranked = ranks(_means(rows, points), whole, OURS)
             found[score] = aggregates(tables, OURS, seed)
             order = order or list(ranked.mean)
-            measured = [result for result in here if result["problem"] in whole]
+            gained = [result for result in advised if result["problem"] in whole and result["measure"] == gain]
             says |= _ranked(words + prefix, ranked) | _in_short(words + prefix, found[score])
-            says |= _harm(words + prefix, measured, entered.rules, gain)
+            says |= _harm(words + prefix, gained, entered.rules)
             lines += _lines("held out" if words else "development", score, found[score], ranked)
             caption = f"Mean ranks in {where}" if score == RETURN else f"Mean ranks by the greedy policy in {where}"
             pictures[f"{caption}; rules joined by a bar are not told apart"] = distances(ranked)
@@ -291,23 +281,17 @@ def _ranked(words: str, ranked: Ranks) -> Row:
     return says | {f"{words}critical difference of ranks": round(ranked.critical, 2), f"{words}Friedman p": ranked.p}
 
 
-def _ends(result: Row, gain: str) -> tuple[float, float]:
-    """The ends of the interval of a gain."""
-    low, high = result["ci95"] if gain == "value" else (result["greedy_low"], result["greedy_high"])
-    return low, high
-
-
-def _harm(words: str, rows: Sequence[Row], rules: Sequence[str], gain: str) -> Row:
-    """The number of cells in which each rule's interval of a gain, a column, reaches below the target, and the worst cell."""
+def _harm(words: str, rows: Sequence[Row], rules: Sequence[str]) -> Row:
+    """The number of cells in which each rule's interval reaches below the target, and the worst cell."""
     says: Row = {}
     for rule in rules:
-        own = [(result[gain], *_ends(result, gain), result) for result in rows if result["rule"] == rule]
-        below = sum(low < MOST_BELOW for _, low, _, _ in own)
-        surely = sum(high < MOST_BELOW for _, _, high, _ in own)
-        value, low, high, worst = min(own, key=lambda cell: cell[1])
+        own = [result for result in rows if result["rule"] == rule]
+        below = sum(result["ci95"][0] < MOST_BELOW for result in own)
+        surely = sum(result["ci95"][1] < MOST_BELOW for result in own)
+        worst = min(own, key=lambda result: result["ci95"][0])
         place = f"{worst['problem']}, {worst['advisor']}, budget {worst['budget']}"
         says[f"{words}harm by {rule}"] = (
             f"{below} of {len(own)} intervals reach below {MOST_BELOW:g}, {surely} lie there whole; "
-            f"worst {value:+.1f} ({low:.1f} to {high:.1f}): {place}"
+            f"worst {worst['value']:+.1f} ({worst['ci95'][0]:.1f} to {worst['ci95'][1]:.1f}): {place}"
         )
     return says
