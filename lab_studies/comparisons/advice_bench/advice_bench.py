@@ -1,7 +1,10 @@
 """AdviceBench: every rule of when to ask and whom to believe, with every advisor, at every budget, on every problem."""
 
+import json
+import re
 from collections.abc import Mapping, Sequence
 from functools import partial
+from hashlib import sha256
 from typing import Any
 
 import numpy as np
@@ -9,6 +12,7 @@ import numpy as np
 from lab.mdp import FloatArray
 from lab.statistics import interval
 from lab.studies.findings import Findings, Row, row
+from lab.studies.leaderboard import scores_file
 from lab.studies.runner import Job
 from lab_studies.comparisons.advice_bench.aggregates import (
     GREEDY,
@@ -19,6 +23,7 @@ from lab_studies.comparisons.advice_bench.aggregates import (
     csv_of,
     table_of,
 )
+from lab_studies.comparisons.advice_bench.bad_advisors import ADVISORS
 from lab_studies.comparisons.advice_bench.entered import Entered
 from lab_studies.comparisons.advice_bench.figures import (
     answers_and_gain,
@@ -98,7 +103,8 @@ def advice_bench(job: Job, reading: Mapping[str, Any]) -> Findings:
     ]
     says, pictures, lines = in_short(rows, outcomes, entered, job.seed)
     notes = (MEASURES, RULES_NOTE, CHOSEN, RANKED, AGGREGATED)
-    return Findings(rows, says, pictures, notes, {"aggregates.csv": csv_of(lines)})
+    files = {"aggregates.csv": csv_of(lines)} | score_files(rows, outcomes, entered, job)
+    return Findings(rows, says, pictures, notes, files)
 
 
 def measured(job: Job, cases: Sequence[Case], entered: Entered) -> dict[Case, Outcomes]:
@@ -122,6 +128,31 @@ def measured(job: Job, cases: Sequence[Case], entered: Entered) -> dict[Case, Ou
         job.keep(entry | {"found": [[list(key), outcome.to_json()] for key, outcome in outcomes.items()]})
         job.progress(len(done), len(cases))
     return done
+
+
+def score_files(rows: Sequence[Row], outcomes: Mapping[Case, Outcomes], entered: Entered, job: Job) -> dict[str, str]:
+    """A file of scores for each rule, by file name, for a leaderboard; none with problems or advisors that are not the bench's.
+
+    The version is a hash of problems, learners, advisors, budgets and seeds, and of nobody's scores, which change with whatever
+    else learning and scoring depend on.
+    """
+    if entered.places or any(name not in ADVISORS for name in entered.advisors):
+        return {}
+    digest = sha256(json.dumps([job.sessions, job.seed, BUDGETS, entered.problems, entered.advisors]).encode())
+    for name in entered.problems:
+        place = entered.place(name)
+        digest.update(json.dumps([place.mdp.signature, vars(place.learner)]).encode())
+        digest.update(json.dumps(outcomes[Case(name, None)][NOBODY, "any"].to_json()).encode())
+        for advisor in entered.advisors:
+            advice = ADVISORS[advisor](place)
+            digest.update(np.round(advice.thresholds, 6).tobytes() + advice.region.tobytes() + bytes([advice.late]))
+    cell = ("problem", "advisor", "budget")
+    return {
+        f"scores/{re.sub('[^a-z0-9]+', '-', rule.lower()).strip('-')}.csv": scores_file(
+            "advicebench", digest.hexdigest()[:16], rule, [result for result in rows if result["rule"] == rule], cell
+        )
+        for rule in entered.rules
+    }
 
 
 def rows_of(

@@ -62,14 +62,14 @@ def profiles(found: Mapping[str, Mapping[str, Aggregate]]) -> bytes:
         columns = np.atleast_1d(figure.subplots(1, len(found), sharey=True))
         for axes, (score, by_rule) in zip(columns, found.items(), strict=True):
             others = {rule: own for rule, own in by_rule.items() if rule not in (OURS, NOBODY)}
-            best = max(others, key=lambda rule: others[rule].iqm[0], default=None)
+            best = max(others, key=lambda rule: others[rule].iqm[0], default=OURS)
             for own in others.values():
                 axes.plot(THRESHOLDS, own.profile, color=GREY, linewidth=0.5)
-            for rule, colour, dash in ((best, BLUE, "-"), (NOBODY, INK, "--"), (OURS, ORANGE, "-")):
+            lines = {best: (BLUE, "-"), NOBODY: (INK, "--"), OURS: (ORANGE, "-")}
+            for rule, (colour, dash) in lines.items():
                 if rule in by_rule:
-                    axes.plot(
-                        THRESHOLDS, by_rule[rule].profile, color=colour, linestyle=dash, linewidth=1.6, label=rule
-                    )
+                    own = by_rule[rule]
+                    axes.plot(THRESHOLDS, own.profile, color=colour, linestyle=dash, linewidth=1.6, label=rule)
             axes.set(xlabel="points", title=score, ylim=(0.0, 1.02))
             axes.grid()
             axes.legend(loc="lower left")

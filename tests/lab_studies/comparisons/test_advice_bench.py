@@ -169,6 +169,11 @@ def test_a_small_bench_goes_on_where_it_stopped_and_says_the_same(tmp_path: Path
     assert again.rows == found.rows
     assert again.summary == found.summary
     assert again.files == found.files
+    versions = {text.splitlines()[2] for name, text in found.files.items() if name.startswith("scores/")}
+    assert len(versions) == 1
+    assert {"scores/always.csv", "scores/earned-trust.csv"} < {*found.files}
+    other = advice_bench(Job(sessions=3, seed=1), reading)
+    assert other.files["scores/always.csv"].splitlines()[2] not in versions
 
 
 def test_what_cannot_be_benched_is_refused() -> None:
@@ -188,6 +193,7 @@ def test_a_file_of_ones_own_and_any_advisor_that_always_answers_alike(tmp_path: 
         Job(sessions=3), {"problem": [str(maze)], "methods": ["earned-trust"], "advisors": ["tau=0.05"]}
     )
     assert found.rows[-2]["measure"] == "gain_points"
+    assert {*found.files} == {"aggregates.csv"}  # a problem of the user is on no leaderboard
     assert found.rows[-2]["value"] > 0.0
     place = problem(str(maze))
     advice = advice_of("tau=0.05", place)
