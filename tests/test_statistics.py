@@ -379,6 +379,15 @@ def test_a_stratified_interval_draws_within_tasks() -> None:
         stratified_interval(table[:, 0], np.mean, seed=1)
 
 
+def test_tasks_of_one_stratum_are_drawn_together() -> None:
+    """Two tasks whose runs add up to 10: drawn together, the mean is 5 in every sample, apart it is not."""
+    table = np.array([[0.0, 10.0], [10.0, 0.0], [3.0, 7.0]])
+    assert stratified_interval(table, np.mean, seed=1, repeats=50, strata=[0, 0]) == (5.0, 5.0, 5.0)
+    assert stratified_interval(table, np.mean, seed=1, repeats=50)[1] < 4.0
+    with pytest.raises(BadInput, match=r"strata of shape \(1,\): wanted one for each of 2 tasks"):
+        stratified_interval(table, np.mean, seed=1, strata=[0])
+
+
 def test_a_stratified_interval_covers_the_truth() -> None:
     """Of 200 intervals of 95 % for the mean of 20 runs of a normal, between 86 and 100 % cover it (binomial, 1 in 10^5)."""
     rng = np.random.default_rng(5)

@@ -38,6 +38,12 @@ class Level(Protocol):
     def simulated(self, taus: tuple[float, ...], sign: float) -> "Advisor":
         """An advisor that draws from the exact values with tau, or from the first to the last tau; sign -1 inverts the values."""
 
+    def of_accuracy(self, share: float) -> "Advisor":
+        """An advisor that draws from the exact values, with the tau that gives this share of optimal answers.
+
+        Raises BadInput for a share that an advisor has at random.
+        """
+
     def check(self, recorded: Read) -> None:
         """Raises BadInput if the record is about another problem."""
 
@@ -52,7 +58,7 @@ class Level(Protocol):
 class AdvisorName:
     """A parsed advisor name.
 
-    text: as it was typed; row: the key in ADVISORS; taus, folder, policy, answers: the parameters in the name.
+    text: as it was typed; row: the key in ADVISORS; taus, folder, policy, answers, accuracy: the parameters in the name.
     itself: an advisor made in Python, or its class, which is in no table.
     """
 
@@ -63,6 +69,7 @@ class AdvisorName:
     policy: str = ""
     answers: Path | None = None
     itself: "Advisor | Ask | type[Advisor] | None" = None
+    accuracy: float = 0.0
 
     @classmethod
     def made(cls, advisor: "Advisor | Ask | type[Advisor]") -> "AdvisorName":
@@ -96,13 +103,15 @@ class AdvisorName:
 
     @classmethod
     def of(cls, text: str, where: str = "advisor") -> "AdvisorName":
-        """The parsed name: "expert", "tau=0.2", "recorded:DIR", "answers:FILE", "policy:NAME"... Raises BadInput."""
+        """The parsed name: "expert", "tau=0.2", "accuracy=0.8", "recorded:DIR", "policy:NAME"... Raises BadInput."""
         kind, colon, rest = text.partition(":")
         if colon and kind in PREFIXED:
             row, field, make, wanted = PREFIXED[kind]
             if not Path(rest).name.strip():
                 raise BadInput(f"advisor '{text}' ({where}): it names {wanted}")
             return cls(text, row, **{field: make(rest)})
+        if text.startswith("accuracy="):
+            return cls(text, "accuracy=X", accuracy=_share(text, where))
         if not text.startswith("tau="):
             if text in ADVISORS:
                 return cls(text, text, (SKILL_TAUS[text],) if text in SKILL_TAUS else ())
@@ -117,6 +126,16 @@ class AdvisorName:
 
     def __str__(self) -> str:
         return self.text
+
+
+def _share(text: str, where: str) -> float:
+    """The share in "accuracy=0.8". Raises BadInput."""
+    with suppress(ValueError):
+        if 0.0 < (share := float(text.removeprefix("accuracy="))) < 1.0:
+            return share
+    raise BadInput(
+        f"advisor '{text}' ({where}): accuracy must be a share of optimal answers between 0 and 1, such as accuracy=0.8"
+    )
 
 
 class AdvisorKind(NamedTuple):
@@ -151,6 +170,13 @@ class RecordedAdvisor:
 
 def _simulated(name: AdvisorName, level: Level) -> "Advisor":
     return level.simulated(name.taus, 1.0)
+
+
+def _of_accuracy(name: AdvisorName, level: Level) -> "Advisor":
+    try:
+        return level.of_accuracy(name.accuracy)
+    except BadInput as error:
+        raise BadInput(f"advisor '{name}': {error}") from None
 
 
 def _person(name: AdvisorName, level: Level) -> "Advisor":
@@ -236,6 +262,7 @@ _SHIPPED: dict[str, AdvisorKind] = {
     "none": AdvisorKind(lambda name, level: None),
     "tau=X": AdvisorKind(_simulated),
     "tau=X..Y": AdvisorKind(_simulated, "changing over the episodes"),
+    "accuracy=X": AdvisorKind(_of_accuracy, "the share of optimal answers"),
     "recorded:DIR": AdvisorKind(_recorded, "a session's folder"),
     "answers:FILE": AdvisorKind(_answers, 'answers kept as JSON, {"state": "action"}'),
     "policy:NAME": AdvisorKind(_learned, "a policy in the toolbox, or its file"),

@@ -12,10 +12,14 @@ from lab.advice.entries import Read
 from lab.errors import BadInput
 from lab.learning.requests import Advisor, Ask
 from lab.learning.selection import softmax
-from lab.learning.simulated_advice import tau_schedule
+from lab.learning.simulated_advice import decisive, tau_of_accuracy, tau_schedule
+from lab.mdp import FloatArray
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.methods.exact import ExactValues, optimum
 from lab.sequencing.search import SequenceRequest
+from lab.sequencing.simulate.run import Run
+
+DRAWN_ORDERS = 50  # whose states weigh an advisor's accuracy
 
 
 def signature_of(cell: Cell, objective: str) -> str:
@@ -50,6 +54,16 @@ class OrderLevel:
         """An advisor that knows the exact values. Raises BadInput for a cell with too many states."""
         return OrderAdvisor(self.cell, tau_schedule(taus, self.episodes), self.rng, sign)
 
+    def of_accuracy(self, share: float) -> Advisor:
+        """An advisor with this share of optimal answers over the states of orders that are drawn evenly.
+
+        Raises BadInput for a share that an advisor has at random, and for a cell with too many states.
+        """
+        advisor = OrderAdvisor(self.cell, (1.0,), self.rng)
+        q = advisor.drawn_values()
+        advisor.taus = (tau_of_accuracy(q, decisive(q, np.ones(len(q), np.bool_)), share),)
+        return advisor
+
     def check(self, recorded: Read) -> None:
         """Raises BadInput for advice about another cell."""
         if recorded.session.signature != self.signature:
@@ -72,14 +86,33 @@ class OrderAdvisor:
     """
 
     def __init__(self, cell: Cell, taus: Sequence[float], rng: np.random.Generator, sign: float = 1.0) -> None:
-        self._values, self._rng, self._taus, self._sign = ExactValues(cell), rng, taus, sign
+        self._values, self._rng, self.taus, self._sign = ExactValues(cell), rng, taus, sign
         best = optimum(cell)
         self._unit_s = best.cost / len(best.sequence) or 1.0
 
     def advise(self, request: SequenceRequest) -> int | None:
         """A decision, drawn among the allowed ones."""
-        left_s = self._values.of(request.run, tuple(request.allowed))
-        worst_s = max((value for value in left_s if value < np.inf), default=0.0) + 10 * self._unit_s
-        worth = [-self._sign * min(value, worst_s) / self._unit_s for value in left_s]
-        tau = self._taus[min(request.episode, len(self._taus)) - 1]
+        worth = self._worth(request.run, tuple(request.allowed))
+        tau = self.taus[min(request.episode, len(self.taus)) - 1]
         return request.allowed[int(self._rng.choice(len(worth), p=softmax(worth, tau)))]
+
+    def _worth(self, run: Run, allowed: tuple[int, ...]) -> list[float]:
+        left_s = self._values.of(run, allowed)
+        worst_s = max((value for value in left_s if value < np.inf), default=0.0) + 10 * self._unit_s
+        return [-self._sign * min(value, worst_s) / self._unit_s for value in left_s]
+
+    def drawn_values(self) -> FloatArray:
+        """The worth (states, decisions) of each decision in the states of DRAWN_ORDERS orders, -inf for those not allowed.
+
+        The orders are drawn evenly, the same ones for every advisor of a cell.
+        """
+        rng, rows = np.random.default_rng(0), list[list[float]]()
+        for _ in range(DRAWN_ORDERS):
+            run = Run(self._values.cell)
+            while not run.done and (allowed := run.allowed()):
+                rows.append(self._worth(run, allowed))
+                run.move(allowed[int(rng.integers(len(allowed)))])
+        table = np.full((len(rows), max(map(len, rows))), -np.inf)
+        for line, row in zip(table, rows, strict=True):
+            line[: len(row)] = row
+        return table

@@ -12,7 +12,14 @@ from lab.errors import BadInput, counted, unknown
 from lab.files import is_file, json_of, read_limited
 from lab.learning.requests import AdviceRequest, Advisor, Ask, Request
 from lab.learning.selection import uniforms
-from lab.learning.simulated_advice import Advice, TableAdvisor, advice_chances, tau_schedule
+from lab.learning.simulated_advice import (
+    Advice,
+    TableAdvisor,
+    advice_chances,
+    decisive,
+    tau_of_accuracy,
+    tau_schedule,
+)
 from lab.mdp import BoolArray, FloatArray, IntArray, TabularMDP, optimal_values
 from lab.toolbox.names import SUFFIX
 from lab.toolbox.policy import ON, Policy
@@ -150,9 +157,20 @@ class TableLevel:
 
     def simulated(self, taus: tuple[float, ...], sign: float) -> Advisor:
         """An advisor that draws from the optimal values; sign: -1 prefers the worst action."""
-        known = optimal_values(self.mdp, self.discount) if self.values is None else self.values(self.discount)
-        chances = advice_chances(sign * known, tau_schedule(taus, self.episodes))
+        chances = advice_chances(sign * self._known(), tau_schedule(taus, self.episodes))
         return TableAdvisor(Advice.of(chances, self.region), uniforms(self.rng))
+
+    def of_accuracy(self, share: float) -> Advisor:
+        """An advisor with this share of optimal answers over the states in which an answer matters.
+
+        Raises BadInput for a share that an advisor has at random.
+        """
+        known = self._known()
+        tau = tau_of_accuracy(known, decisive(known, ~self.mdp.terminal), share)
+        return TableAdvisor(Advice.of(advice_chances(known, tau), self.region), uniforms(self.rng))
+
+    def _known(self) -> FloatArray:
+        return optimal_values(self.mdp, self.discount) if self.values is None else self.values(self.discount)
 
     def check(self, recorded: Read) -> None:
         """Raises BadInput for advice about another problem, or about states that this one does not have."""

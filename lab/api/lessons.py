@@ -130,8 +130,8 @@ def teach(
     """The result of one teaching session; the same problem, settings and seed give the same table.
 
     problem: a name as for `lab teach` (a sub-task of `task`, a world, "gym:ID"), a `GridWorld`, a `TabularMDP` or a `Problem`.
-    advisor: a name ("expert", "tau=0.2", "none"), a function of an `AdviceRequest` that returns an action or None, an object with
-    `advise`, or a list of these.
+    advisor: a name ("expert", "tau=0.2", "accuracy=0.8", "none"), a function of an `AdviceRequest` that returns an action or
+    None, an object with `advise`, or a list of these.
     seed: of all randomness.
     toolbox: saves the policy, and provides an unfinished one to continue; None (default): nothing is saved, see
     `LessonResult.keep`.

@@ -229,6 +229,11 @@ COMMANDS = {  # words after `lab` -> the command
         "Run a study and write its report. Results that its folder already holds are not computed again.",
         "lab study run table-9.2 --workers 2",
     ),
+    "study board": Command(
+        "study",
+        "Draw a leaderboard from files of scores, one for each member of a study.",
+        "lab study board advicebench-study/scores/*.csv",
+    ),
     "study compare": Command(
         "compare",
         "Compare settings: every combination of the options' values, separated by commas, in many sessions each.",

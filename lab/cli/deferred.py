@@ -62,6 +62,7 @@ if TYPE_CHECKING:
     from lab.skills.scored_pictures import parts_seen, score_pictures
     from lab.studies import STUDIES, Study, carried_out, run_study, study_of
     from lab.studies.compared import Compared, compared
+    from lab.studies.leaderboard import draw_board, leaderboard
     from lab.studies.runner import Job
     from lab.studies.tuning import FILE, Tuning, tuned
     from lab.tasks.cell_file import CellFile, toml_of
@@ -179,6 +180,7 @@ TABLE = {
     "lab.skills.scored_pictures": ("parts_seen", "score_pictures"),
     "lab.studies": ("carried_out", "run_study", "STUDIES", "Study", "study_of"),
     "lab.studies.compared": ("Compared", "compared"),
+    "lab.studies.leaderboard": ("draw_board", "leaderboard"),
     "lab.studies.runner": ("Job",),
     "lab.studies.tuning": ("FILE", "tuned", "Tuning"),
     "lab.tasks.cell_file": ("CellFile", "toml_of"),

@@ -57,8 +57,8 @@ AdvisorNames = Annotated[
     list[str] | None,
     typer.Option(
         "--advisor",
-        help="Who advises: {advisors} (X..Y: changing over the episodes; DIR: a session's folder; "
-        "FILE: answers as JSON; NAME: a policy in the toolbox, also of another world); "
+        help="Who advises: {advisors} (X..Y: changing over the episodes; accuracy: the share of optimal answers; "
+        "DIR: a session's folder; FILE: answers as JSON; NAME: a policy in the toolbox, also of another world); "
         "several times for several advisors.",
         autocompletion=offers("advisors"),
         callback=from_files("advisors"),

@@ -97,5 +97,20 @@ def study_run(
     show(document, as_json, deferred.study_summary)
 
 
+def study_board(
+    files: Annotated[list[Path], typer.Argument(help="Files of scores, as the study advicebench writes them.")],
+    plot: Annotated[Path | None, typer.Option("--plot", help="A .png or .svg file for the mean ranks.")] = None,
+    as_json: Json = False,
+) -> None:
+    """Draw a leaderboard from files of scores, one for each member of a study.
+
+    All have to be of one version of the study: the same problems, seeds, advisors, budgets and scores.
+    """
+    board = deferred.leaderboard(files)
+    if plot is not None:
+        deferred.draw_board(board, plot)
+    show(board, as_json, lambda document: deferred.table_of(document["members"], [*document["members"][0]]))
+
+
 def _listed(names: str | None) -> list[str] | None:
     return None if names is None else [name.strip() for name in names.split(",")]

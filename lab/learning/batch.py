@@ -34,6 +34,7 @@ from lab.mdp import FloatArray, IntArray, TabularMDP
 
 Outcome = tuple[float, int, float]  # chance, state entered, reward
 WALKS = 10  # episodes that measure a greedy policy where they differ
+GREEDY_EVERY = 10  # episodes between the measurements of studies
 
 
 class ChanceTable(TableEnvironment):
@@ -88,7 +89,7 @@ class Batch(NamedTuple):
     steps: (N, E) int32, a failed episode counts as max_steps + 1; guided: (N, E) bool, episodes with a helped step; requests,
     helped_steps, misleads: (N,) int64, as in `SessionResult`; rejected_at_episode: (N,) int64, 0 if no advisor was rejected;
     moves: (N,) int64, all moves made; q: (N, S, A) float64, or (0, S, A) unless the tables were asked for; greedy: (N, K), see
-    `run_sessions`.
+    `run_sessions`; returns: (N, E) float64, the sums of rewards, or (0, E) unless they were asked for.
     """
 
     steps: NDArray[np.int32]
@@ -100,6 +101,7 @@ class Batch(NamedTuple):
     moves: NDArray[np.int64]
     q: FloatArray
     greedy: FloatArray = np.zeros((0, 0))
+    returns: FloatArray = np.zeros((0, 0))
 
 
 def run_sessions(
@@ -110,12 +112,14 @@ def run_sessions(
     seeds: NDArray[np.uint64],
     *,
     keep_tables: bool = False,
+    keep_returns: bool = False,
     greedy_every: int = 0,
 ) -> Batch:
     """The results of N sessions, one per seed.
 
     problem: a table, or the environment in which steps are made; compiled are tables, `ChanceTable` and the worlds of `physics`.
-    advice: None if there is nobody to ask; seeds: (N,) uint64; keep_tables: whether the results include the learned tables.
+    advice: None if there is nobody to ask; seeds: (N,) uint64; keep_tables, keep_returns: whether the results include
+    the learned tables, and the returns.
     greedy_every: after each so-manyth episode the greedy policy is measured without advice, in episodes that nobody learns from;
     `Batch.greedy` has their mean steps, a failed one as max_steps + 1 (see `greedy_steps`). 0: it is not measured.
 
@@ -133,7 +137,7 @@ def run_sessions(
     steps_known = isinstance(place, TableEnvironment) or isinstance(mdp, CellTable)
     by_chance_on_tiles = isinstance(place, ChanceTable) and learner.tilings > 1
     if by_chance_on_tiles or not (steps_known and is_compiled(mdp, learner, gate, advice)):
-        return _one_by_one(place, learner, gate, advice, seeds, keep_tables, greedy_every)
+        return _one_by_one(place, learner, gate, advice, seeds, keep_tables, greedy_every, keep_returns)
     asking = _asking(gate, advice is not None, learner.max_steps)
     learning, arrays = _learning(mdp, learner), _problem(mdp, learner)
     advice_arrays = (np.zeros((1, 1, mdp.n_actions)), np.zeros(mdp.n_states, np.bool_))
@@ -141,11 +145,13 @@ def run_sessions(
         advice_arrays = advice.thresholds, advice.region
     if learner.tilings > 1:
         sessions = _sessions(learner, seeds, TileCoding(mdp.cells, learner.tilings).count * mdp.n_actions, keep_tables)
+        sessions = sessions._replace(returns=_returns(learner, seeds, keep_returns))
         lanes = _lanes(mdp.n_actions, learner.episodes, 0, 0)
         learning = learning._replace(actions=np.zeros(mdp.n_actions))  # of any length: compiled once for all
         return _on_tiles(mdp, learner, records.Work(arrays, learning, asking, *advice_arrays, sessions, lanes))
     size = mdp.n_states * (1 if _is_afterstate(learner) else mdp.n_actions)
     sessions = _sessions(learner, seeds, size, keep_tables, greedy_every, walks_of(place))
+    sessions = sessions._replace(returns=_returns(learner, seeds, keep_returns))
     ensemble = gate.ensemble if asking.gate.asks == ASKS_WHERE_TABLES_DIFFER else 0
     lanes = _lanes(mdp.n_actions, learner.episodes, sessions.kept.shape[1], ensemble)
     memories = _memories(mdp.n_states, mdp.n_actions, learning.max_moves) if gate.memory else None
@@ -158,18 +164,30 @@ def run_sessions(
         walks,
     )
     tables = _action_values(mdp, learning, sessions.kept)
-    return _batch(sessions.steps, sessions.guided, sessions.counts, tables, sessions.greedy)
+    return _batch(sessions, tables)
 
 
-def _batch(
-    steps: NDArray[np.int32], guided: NDArray[np.bool_], counts: NDArray[np.void], q: FloatArray, greedy: FloatArray
-) -> Batch:
-    return Batch(steps, guided, **{name: counts[name] for name in records.COUNTS.names or ()}, q=q, greedy=greedy)
+def _batch(sessions: records.KernelSessions, q: FloatArray) -> Batch:
+    counts = {name: sessions.counts[name] for name in records.COUNTS.names or ()}
+    return Batch(sessions.steps, sessions.guided, **counts, q=q, greedy=sessions.greedy, returns=sessions.returns)
+
+
+def _returns(learner: LearnerSettings, seeds: NDArray[np.uint64], keep: bool) -> FloatArray:
+    return np.zeros((len(seeds) if keep else 0, learner.episodes))
 
 
 def walks_of(place: Environment) -> int:
     """How many episodes of a greedy policy measure it: one where all are the same, WALKS where starts or steps are drawn."""
     return WALKS if isinstance(place, ChanceTable) or place.mdp.starts else 1
+
+
+def greedy_every(problem: TabularMDP | Environment, learner: LearnerSettings) -> int:
+    """The episodes between two measurements of the greedy policy in a study: GREEDY_EVERY, or all if there are fewer.
+
+    0, for no measurement, where steps are in no table or values are in tiles.
+    """
+    on_table = isinstance(problem, TabularMDP | TableEnvironment) and not isinstance(problem, CellTable)
+    return min(GREEDY_EVERY, learner.episodes) if on_table and learner.tilings == 1 else 0
 
 
 def greedy_steps(place: TableEnvironment, q: FloatArray, learner: LearnerSettings, draw: Draw, walks: int) -> float:
@@ -250,17 +268,18 @@ def _one_by_one(
     seeds: NDArray[np.uint64],
     keep_tables: bool,
     greedy_every: int,
+    keep_returns: bool,
 ) -> Batch:
     """The same sessions without the kernel, each with the draws that it would have there."""
-    steps, counts = np.zeros((len(seeds), learner.episodes), np.int32), np.zeros(len(seeds), records.COUNTS)
-    q = np.zeros((len(seeds) if keep_tables else 0, *place.mdp.successor.shape))
-    greedy = np.zeros((len(seeds), learner.episodes // greedy_every if greedy_every else 0))
-    batch = _batch(steps, np.zeros(steps.shape, np.bool_), counts, q, greedy)
+    batch = _batch(
+        _sessions(learner, seeds, 0, False, greedy_every)._replace(returns=_returns(learner, seeds, keep_returns)),
+        np.zeros((len(seeds) if keep_tables else 0, *place.mdp.successor.shape)),
+    )
     for n, seed in enumerate(seeds):
         draw = splitmix.stream(int(seed))
         advisor = None if advice is None else TableAdvisor(advice, draw)
         session = Session(place, learner, gate, advisor, draw)
-        result = session.run(enough=partial(_measured, session, int(seed), greedy_every, greedy[n]))
+        result = session.run(enough=partial(measure_greedy, session, int(seed), greedy_every, batch.greedy[n]))
         if result.interrupted:
             raise KeyboardInterrupt
         batch.steps[n], batch.guided[n], batch.moves[n] = result.steps, result.guided, result.visits.sum()
@@ -268,11 +287,16 @@ def _one_by_one(
         batch.misleads[n], batch.rejected_at_episode[n] = result.misleads, result.rejected_at_episode or 0
         if keep_tables:
             batch.q[n] = result.q
+        if keep_returns:
+            batch.returns[n] = result.returns
     return batch
 
 
-def _measured(session: Session, seed: int, every: int, greedy: FloatArray) -> bool:
-    """Measures the greedy policy of a session after each `every`-th episode, into greedy (K,); returns False: it goes on."""
+def measure_greedy(session: Session, seed: int, every: int, greedy: FloatArray) -> bool:
+    """False, as the session goes on: the `enough` of one whose greedy policy is measured after each `every`-th episode.
+
+    greedy: (K,), receives the mean steps that `run_sessions` has in `Batch.greedy`; seed: the session's; every: 0 for never.
+    """
     number, left = divmod(session.episode, every) if every else (0, 1)
     if not left and isinstance(session.environment, TableEnvironment):
         draw, place = splitmix.stream(splitmix.apart(seed, number)), session.environment
@@ -304,7 +328,7 @@ def _on_tiles(mdp: TabularMDP, learner: LearnerSettings, work: records.Work) -> 
     linear_loop.run(work, linear, _world(mdp))
     sessions, tables = work.sessions, work.sessions.kept.reshape(-1, coding.count, mdp.n_actions)
     q = np.array([coding.values(weights) for weights in tables]).reshape(-1, *mdp.successor.shape)
-    return _batch(sessions.steps, sessions.guided, sessions.counts, q, sessions.greedy)
+    return _batch(sessions, q)
 
 
 def _world(mdp: TabularMDP) -> linear_loop.LinearWorld:
@@ -347,6 +371,7 @@ def _sessions(
         every=max(1, every),
         walks=walks,
         walk_rng=np.zeros(1, np.uint64),
+        returns=np.zeros((0, learner.episodes)),
     )
 
 
@@ -364,6 +389,7 @@ def _lanes(actions: int, episodes: int, size: int, ensemble: int) -> records.Lan
         rng=np.zeros(LANES, np.uint64),
         fresh=np.ones(LANES, np.bool_),
         is_open=np.zeros(LANES, np.bool_),
+        returned=np.zeros(LANES),
         tables=np.zeros((LANES, size)),
         others=np.zeros((LANES, ensemble, size)),
     )

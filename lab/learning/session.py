@@ -78,11 +78,12 @@ class Session:
         self.judge_unhelped = gate.judge_unhelped and not gate.memory
         self.steps: list[int] = []
         self.guided: list[bool] = []
+        self.returns: list[float] = []
         self.requests = self.helped_steps = 0
         self.rejected_at: int | None = None
         self.episode, self.tau = 0, 1.0  # from here on: the state of the current episode
         self.improved: events.Improvement | None = None
-        self.asked_now, self.helped_now = False, 0
+        self.asked_now, self.helped_now, self.returned_now = False, 0, 0.0
         self.trail: list[tuple[int, int, int]] | None = None  # recorded if the advisor has `followed`
 
     def run(self, on_event: OnEvent | None = None, enough: Callable[[], bool] = lambda: False) -> SessionResult:
@@ -95,7 +96,7 @@ class Session:
         settings, gate, recall, interrupted = self.settings, self.gate, self.recall, False
         try:
             for episode in range(1, settings.episodes + 1):
-                self.episode, self.asked_now, self.helped_now = episode, False, 0
+                self.episode, self.asked_now, self.helped_now, self.returned_now = episode, False, 0, 0.0
                 self.tau = temperature(episode, settings.beta, settings.exploration)  # eq. 9.2
                 was_converged = gate.converged
                 is_open = gate.opens(episode, self.steps) and self.advisor is not None  # eqs. 6.1 and 6.2
@@ -130,6 +131,7 @@ class Session:
         for step in range(1, self.max_moves + 1):
             visits[state][action] += 1
             reward, entered, over, reached, truncated = act(state, action, draw)
+            self.returned_now += reward
             if recall is not None:
                 recall.moved(state, action, entered, over, reached)
             last = truncated or step == self.max_moves
@@ -212,6 +214,7 @@ class Session:
         self.helped_steps += helped
         self.steps.append(steps)
         self.guided.append(helped > 0)
+        self.returns.append(self.returned_now)
         self.improved = improvement(self.steps, limits.window)
         gate.judges(self.steps, is_open and (helped > 0 or self.judge_unhelped))
         if self.trail is not None and self.followed is not None:
@@ -245,4 +248,5 @@ class Session:
             final_steps=final_steps,
             solved=solved,
             interrupted=interrupted,
+            returns=np.array(self.returns[:finished], np.float64),
         )

@@ -22,6 +22,7 @@ class SessionResult:
 
     q: (S, A) float64, the action values; visits: (S, A) int64.
     steps: (episodes,) int64, a failed episode counts as max_steps + 1; guided: (episodes,) bool, episodes with an advised step.
+    returns: (episodes,) float64, the sum of each episode's rewards.
     requests: episodes in which the learner asked; helped_steps: advised steps that were carried out.
     misleads, rejected_at_episode: see lab/learning/gates.
     optimal_steps: the fewest possible, None if unknown; final_steps: those of the greedy path from the start, None if it misses
@@ -41,6 +42,7 @@ class SessionResult:
     final_steps: int | None
     solved: bool
     interrupted: bool
+    returns: FloatArray
 
 
 def check_members(

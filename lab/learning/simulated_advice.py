@@ -68,20 +68,42 @@ def accuracy(chances: FloatArray, q: FloatArray, states: BoolArray) -> float:
 
     chances, q: (S, A); values within SAME_VALUE of the best one, as a fraction of the span of all values, count as the best.
     """
-    near = SAME_VALUE * float(np.ptp(q[states]))
-    best = q >= q.max(axis=1, keepdims=True) - near
-    return float(np.where(best, chances, 0.0).sum(axis=1)[states].mean())
+    return float(np.where(_best(q, states), chances, 0.0).sum(axis=1)[states].mean())
+
+
+def decisive(q: FloatArray, states: BoolArray) -> BoolArray:
+    """The states (S,) bool, of those given, in which an answer matters: some action has a lower value than the best one."""
+    some: BoolArray = states & (~_best(q, states) & np.isfinite(q)).any(axis=1)
+    return some
+
+
+def _best(q: FloatArray, states: BoolArray) -> BoolArray:
+    """The actions (S, A) bool of the best value."""
+    best: BoolArray = q >= q.max(axis=1, keepdims=True) - SAME_VALUE * _span(q, states)
+    return best
+
+
+def _span(q: FloatArray, states: BoolArray) -> float:
+    values = q[states]
+    return float(np.ptp(values[np.isfinite(values)])) if len(values) else 0.0
+
+
+def chance_accuracy(q: FloatArray, states: BoolArray) -> float:
+    """The `accuracy` of an advisor that draws evenly; q: as in `tau_of_accuracy`."""
+    shares: FloatArray = _best(q, states).sum(axis=1) / np.isfinite(q).sum(axis=1)
+    return float(shares[states].mean())
 
 
 def tau_of_accuracy(q: FloatArray, states: BoolArray, share: float) -> float:
     """The tau at which an advisor that draws from a table q (S, A) gives this share of optimal answers, see `accuracy`.
 
     The share falls from 1 to that of an advisor that draws evenly as tau grows; tau is found by bisection, so that it means the
-    same skill whatever the scale of the rewards. Raises BadInput for a share outside these limits, and where all answers are
-    optimal.
+    same skill whatever the scale of the rewards. q: finite, -inf for actions that a state does not have. Raises BadInput for a
+    share outside these limits, and where all answers are optimal.
     """
-    span = float(np.ptp(q[states]))
-    evenly = accuracy(np.full(q.shape, 1.0 / q.shape[1]), q, states)
+    if not states.any():
+        raise BadInput(f"accuracy {share:g}: every answer is optimal here, so that none shows an advisor's skill")
+    span, evenly, below = _span(q, states), chance_accuracy(q, states), q - q.max(axis=1, keepdims=True)
     if not evenly < share < 1.0:
         raise BadInput(
             f"accuracy {share:g}: allowed are shares of optimal answers above {evenly:.3f}, at random, and below 1"
@@ -89,7 +111,9 @@ def tau_of_accuracy(q: FloatArray, states: BoolArray, share: float) -> float:
     low, high = log(span * 1e-9), log(span * 1e3)
     for _ in range(BISECTIONS):
         middle = (low + high) / 2
-        low, high = (middle, high) if accuracy(advice_chances(q, exp(middle)), q, states) > share else (low, middle)
+        weights = np.exp(below / exp(middle))
+        chances: FloatArray = weights / weights.sum(axis=1, keepdims=True)
+        low, high = (middle, high) if accuracy(chances, q, states) > share else (low, middle)
     return exp((low + high) / 2)
 
 

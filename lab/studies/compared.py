@@ -17,7 +17,7 @@ from lab.advice.advisors import ADVISORS
 from lab.errors import BadInput
 from lab.files import code_key
 from lab.lazy import matplotlib
-from lab.learning.batch import run_sessions
+from lab.learning.batch import greedy_every, measure_greedy, run_sessions
 from lab.learning.environment import Environment, TableEnvironment
 from lab.learning.gates import GATES
 from lab.learning.physics.environment import PhysicsEnvironment
@@ -115,7 +115,11 @@ def _curves(results: Sequence[Result]) -> bytes:
 
 @dataclass(frozen=True, eq=False)
 class ComparedSessions:
-    """The results of N sessions of E episodes: curve (E,), the mean steps by episode; all others (N,), by session."""
+    """The results of N sessions of E episodes: curve (E,), the mean steps by episode; all others (N,), by session.
+
+    returns: the mean sum of an episode's rewards; greedy_steps, greedy_last_steps: of the greedy policy without advice, the mean
+    of its measurements along the way and the last one; without values where no table says what a greedy policy does.
+    """
 
     curve: FloatArray
     solved: BoolArray
@@ -125,6 +129,9 @@ class ComparedSessions:
     requests: FloatArray
     misleads: FloatArray
     rejected: BoolArray
+    returns: FloatArray
+    greedy_steps: FloatArray
+    greedy_last_steps: FloatArray
 
     def to_json(self) -> dict[str, list[float]]:
         """The arrays as lists of floats, by name."""
@@ -144,8 +151,10 @@ FAMILIES: dict[str, Family[Any]] = {"gates": GATES, "learners": UPDATES, "adviso
 MEASURES = (
     "solved_percent: sessions whose final greedy path is optimal. mean_steps: of all episodes, a failed one as the "
     "step limit + 1 (the area under the learning curve). last_steps: of the last episode. helped_steps, requests, misleads, "
-    "rejected_percent: of a session, as lab teach counts them. Every setting meets the same chances: session n has the same "
-    "seed in each."
+    "rejected_percent: of a session, as lab teach counts them. return: the mean sum of an episode's rewards. greedy_steps: of "
+    "the greedy policy without advice, after every tenth episode, in episodes that nobody learns from, mean over these (a failed "
+    "one as in mean_steps); greedy_last_steps: of the last of them; both need a table of the steps. Every setting meets the same "
+    "chances: session n has the same seed in each."
 )
 
 
@@ -237,30 +246,51 @@ def sessions_of(setting: ComparedSetting, sessions: int, seed: int, stream: int 
     rng = np.random.default_rng(chances if stream is None else [*chances, stream])
     seeds = rng.integers(2**64, size=sessions, dtype=np.uint64)
     advisor = advising.for_session().gather(environment, how.learner, np.random.default_rng(0))
+    every = greedy_every(environment, how.learner)
     at_once = problem.environment is None or isinstance(environment, PhysicsEnvironment)
     if at_once and (advisor is None or isinstance(advisor, TableAdvisor)):
         advice = None if advisor is None else advisor.advice
-        batch = run_sessions(environment, how.learner, how.gate, advice, seeds, keep_tables=True)
+        batch = run_sessions(
+            environment, how.learner, how.gate, advice, seeds, keep_tables=True, keep_returns=True, greedy_every=every
+        )
         rejected, steps, q = batch.rejected_at_episode > 0, batch.steps, batch.q
+        returns, greedy = batch.returns.mean(axis=1), batch.greedy
         counts: tuple[NDArray[np.int64], ...] = (batch.helped_steps, batch.requests, batch.misleads)
     else:
-        alone = [_alone(environment, how.learner, how.gate, advising, int(own)) for own in seeds]
+        greedy = np.zeros((len(seeds), how.learner.episodes // every if every else 0))
+        alone = [
+            _alone(environment, how.learner, how.gate, advising, int(own), every, measured)
+            for own, measured in zip(seeds, greedy, strict=True)
+        ]
         rejected, steps, q = (np.array([session[n] for session in alone]) for n in range(3))
         counts = tuple(np.array([session[n] for session in alone]) for n in range(3, 6))
+        returns = np.array([session[6] for session in alone])
     solved = np.array([environment.judge(table, how.learner).solved for table in q])
     helped, requests, misleads = (np.asarray(count, np.float64) for count in counts)
+    along = (greedy.mean(axis=1), greedy[:, -1]) if every else (np.zeros(0), np.zeros(0))
+    mean, last = steps.mean(axis=1), steps[:, -1].astype(float)
     return ComparedSessions(
-        steps.mean(axis=0), solved, steps.mean(axis=1), steps[:, -1].astype(float), helped, requests, misleads, rejected
+        steps.mean(axis=0), solved, mean, last, helped, requests, misleads, rejected, returns, *along
     )
 
 
 def _alone(
-    environment: Environment, learner: LearnerSettings, gate: GateSettings, advising: Advising, seed: int
-) -> tuple[bool, NDArray[np.int64], FloatArray, int, int, int]:
-    """(rejected, steps (E,), q (S, A), helped steps, requests, misleads) of one session that is not compiled."""
+    environment: Environment,
+    learner: LearnerSettings,
+    gate: GateSettings,
+    advising: Advising,
+    seed: int,
+    every: int,
+    greedy: FloatArray,
+) -> tuple[bool, NDArray[np.int64], FloatArray, int, int, int, float]:
+    """(rejected, steps (E,), q (S, A), helped steps, requests, misleads, return) of one session that is not compiled.
+
+    every, greedy: as in `measure_greedy`.
+    """
     rng = np.random.default_rng(seed)
     advisor = advising.for_session().gather(environment, learner, rng)
-    session = Session(environment, learner, gate, advisor, rng).run()
+    running = Session(environment, learner, gate, advisor, rng)
+    session = running.run(enough=partial(measure_greedy, running, seed, every, greedy))
     if session.interrupted:
         raise KeyboardInterrupt
     return (
@@ -270,17 +300,21 @@ def _alone(
         session.helped_steps,
         session.requests,
         session.misleads,
+        float(session.returns.mean()),
     )
 
 
 def rows_of(named: Row, measured: ComparedSessions) -> list[Row]:
     """The rows of one setting, one per measure."""
+    greedy = ("greedy_steps", "greedy_last_steps") if len(measured.greedy_steps) else ()
     return [
         share_row(named, "solved_percent", measured.solved),
         mean_row(named, "mean_steps", measured.mean_steps),
         *(varying_row(named, name, getattr(measured, name)) for name in ("last_steps", "helped_steps")),
         *(varying_row(named, name, getattr(measured, name)) for name in ("requests", "misleads")),
         share_row(named, "rejected_percent", measured.rejected),
+        varying_row(named, "return", measured.returns),
+        *(varying_row(named, name, getattr(measured, name)) for name in greedy),
     ]
 
 

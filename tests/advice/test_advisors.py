@@ -17,13 +17,21 @@ from lab.advice.advisors import (
 )
 from lab.advice.entries import FILE, SessionEntry
 from lab.advice.journal import Journal
-from lab.advice.order_level import OrderLevel
+from lab.advice.order_level import OrderAdvisor, OrderLevel
 from lab.advice.table_level import TableLevel
 from lab.errors import BadInput
 from lab.learning.requests import AdviceRequest, Advisor, AdvisorLeft
 from lab.learning.selection import softmax
 from lab.learning.session_events import AdviceGiven
-from lab.learning.simulated_advice import Advice, TableAdvisor, accuracy, advice_chances, tau_of_accuracy
+from lab.learning.simulated_advice import (
+    Advice,
+    TableAdvisor,
+    accuracy,
+    advice_chances,
+    chance_accuracy,
+    decisive,
+    tau_of_accuracy,
+)
 from lab.mdp import FloatArray, TabularMDP, grid, optimal_values, shortest_steps
 from lab.sequencing.search import SequenceRequest, state_of
 from lab.sequencing.simulate.follow import follow
@@ -128,13 +136,18 @@ def test_a_person_may_leave() -> None:
 
 
 def test_names_are_checked() -> None:
-    for name in (*named(), "tau=0.25", "tau=1..0.01", "recorded:some/file"):
+    for name in (*named(), "tau=0.25", "tau=1..0.01", "accuracy=0.8", "recorded:some/file"):
         assert AdvisorName.of(name).text == name
     with pytest.raises(BadInput, match=r"unknown advisor 'exprt' \(--advisor\): did you mean 'expert'\?.*tau=X"):
         AdvisorName.of("exprt", "--advisor")
     for bad in ("tau=", "tau=x", "tau=0", "tau=-1", "tau=nan", "tau=inf", "tau=1..", "tau=1..0"):
         with pytest.raises(BadInput, match="tau must be a number above 0"):
             AdvisorName.of(bad)
+    for bad in ("accuracy=", "accuracy=x", "accuracy=0", "accuracy=1", "accuracy=nan", "accuracy=0.5..0.9"):
+        with pytest.raises(BadInput, match="accuracy must be a share of optimal answers between 0 and 1"):
+            AdvisorName.of(bad)
+    with pytest.raises(BadInput, match=r"unknown advisor 'acuracy=0.8' .*did you mean 'accuracy=X'\?"):
+        AdvisorName.of("acuracy=0.8")
 
 
 @pytest.mark.parametrize("answer", [1.0, True, np.float64(1.0), np.bool_(True), "up", 4, -1, [1]])
@@ -245,7 +258,9 @@ def test_a_record_of_another_problem_or_of_none(tmp_path: Path) -> None:
         made(f"recorded:{tmp_path / 'none'}", board())
 
 
-@pytest.mark.parametrize("name", [name for name in named() if name not in PEOPLE] + ["tau=0.05", "tau=1..0.01"])
+@pytest.mark.parametrize(
+    "name", [name for name in named() if name not in PEOPLE] + ["tau=0.05", "tau=1..0.01", "accuracy=0.9"]
+)
 def test_every_name_serves_both_levels(name: str) -> None:
     """One row makes who advises in a table and on the order; what is said is allowed."""
     mdp, run = board(), Run(load_cell("toast-case-1").cell(3))
@@ -300,3 +315,35 @@ def test_actions_of_equal_values_are_equally_good() -> None:
     assert accuracy(np.array([[0.5, 0.25, 0.25]]), q, everywhere) == 0.75
     with pytest.raises(BadInput, match=r"accuracy 0\.6: .*above 0\.667"):
         tau_of_accuracy(q, everywhere, 0.6)
+
+
+def test_states_in_which_every_action_is_best_say_nothing_of_skill() -> None:
+    q, states = np.array([[1.0, 0.0], [2.0, 2.0], [5.0, 0.0], [3.0, -np.inf]]), np.array([True, True, False, True])
+    assert decisive(q, states).tolist() == [True, False, False, False]
+    assert chance_accuracy(q, states) == (0.5 + 1.0 + 1.0) / 3  # an action that is not allowed is not drawn
+    with pytest.raises(BadInput, match="every answer is optimal here"):
+        tau_of_accuracy(q, decisive(q, np.array([False, True, False, False])), 0.9)
+
+
+@pytest.mark.parametrize("share", [0.6, 0.9])
+def test_an_advisor_of_an_accuracy_is_right_as_often(share: float) -> None:
+    mdp = board()
+    q = optimal_values(mdp, 0.99)
+    best = q > q.max(axis=1, keepdims=True) - 1e-6
+    asked = np.flatnonzero(~best.all(axis=1) & ~mdp.terminal).tolist() * 300
+    advisor = made(f"accuracy={share}", mdp)
+    right = [best[state, advisor.advise(request(mdp, state))] for state in asked]
+    assert np.mean(right) == pytest.approx(share, abs=0.03)
+
+
+def test_an_advisor_of_the_order_is_right_as_often_over_drawn_orders() -> None:
+    level = OrderLevel(load_cell("toast-case-1").cell(3), np.random.default_rng(0))
+    advisor = make_advisor(AdvisorName.of("accuracy=0.9"), level)
+    assert isinstance(advisor, OrderAdvisor)
+    q = advisor.drawn_values()
+    matters = decisive(q, np.ones(len(q), np.bool_))
+    best = q >= q.max(axis=1, keepdims=True) - 1e-6
+    weights = np.exp((q - q.max(axis=1, keepdims=True)) / advisor.taus[0])
+    assert ((weights * best).sum(axis=1) / weights.sum(axis=1))[matters].mean() == pytest.approx(0.9, abs=1e-3)
+    with pytest.raises(BadInput, match=r"advisor 'accuracy=0\.1': accuracy 0\.1: .* at random"):
+        make_advisor(AdvisorName.of("accuracy=0.1"), level)

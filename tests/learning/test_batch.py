@@ -100,14 +100,16 @@ def test_the_greedy_policy_is_measured_along_the_way_as_in_the_session(
     place: TabularMDP | ChanceTable = mdp if learner == "afterstate" else slippery()
     how, who, seeds = replace(EAGER, gate=gate), advice(mdp), np.arange(3, 9, dtype=np.uint64)
     settings = replace(LEARNER, learner=learner, episodes=24)
-    batch = run_sessions(place, settings, how, who, seeds, greedy_every=5)
+    batch = run_sessions(place, settings, how, who, seeds, greedy_every=5, keep_returns=True)
     plain = run_sessions(place, settings, how, who, seeds)
     np.testing.assert_array_equal(batch.steps, plain.steps)
     assert (batch.greedy.shape, plain.greedy.shape) == ((6, 4), (6, 0))
     one_by_one = _one_by_one(
-        TableEnvironment(place) if isinstance(place, TabularMDP) else place, settings, how, who, seeds, False, 5
+        TableEnvironment(place) if isinstance(place, TabularMDP) else place, settings, how, who, seeds, False, 5, True
     )
     np.testing.assert_array_equal(batch.greedy, one_by_one.greedy)
+    np.testing.assert_array_equal(batch.returns, one_by_one.returns)
+    assert (batch.returns.shape, plain.returns.shape) == ((6, 24), (0, 24))
 
 
 def test_a_greedy_policy_by_hand() -> None:
@@ -117,6 +119,20 @@ def test_a_greedy_policy_by_hand() -> None:
     assert greedy_steps(place, right, learner, stream(0), 1) == 2.0
     assert greedy_steps(place, right, replace(learner, count_start=True), stream(0), 1) == 3.0
     assert greedy_steps(place, np.zeros((3, 2)), learner, stream(0), 1) == 10.0
+
+
+@pytest.mark.parametrize("tilings", [1, 4])
+def test_a_return_is_the_sum_of_an_episodes_rewards(tilings: int) -> None:
+    """Each move of the board costs as much, but the one that reaches the goal has its own reward."""
+    mdp, settings = slippery().mdp, replace(LEARNER, tilings=tilings, episodes=8)
+    seeds = np.arange(4, dtype=np.uint64)
+    batch = run_sessions(mdp, settings, GateSettings("never"), None, seeds, keep_returns=True)
+    one = Session(mdp, settings, GateSettings("never"), None, stream(3)).run()
+    np.testing.assert_array_equal(batch.returns[3], one.returns)
+    reached = batch.steps <= settings.max_steps
+    assert reached.any()
+    step, last = mdp.reward[mdp.start].max(), mdp.reward.max()
+    np.testing.assert_allclose(batch.returns[reached], (batch.steps[reached] - 1) * step + last)
 
 
 def test_a_learner_on_tiles_is_not_measured_along_the_way() -> None:

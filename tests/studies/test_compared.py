@@ -52,12 +52,25 @@ def test_its_sessions_are_those_of_the_kernel() -> None:
     assert found.last_steps.tolist() == batch.steps[:, -1].tolist()
 
 
+def test_returns_and_greedy_steps_are_rows_where_steps_are_in_a_table() -> None:
+    rows = compared(Compared(WORLD, ("none",), {"gate": ["never"], "episodes": [200]}), Job(3, 0)).rows
+    values = {row["measure"]: row["value"] for row in rows}
+    assert values["greedy_last_steps"] == 4.0  # the shortest path
+    assert values["greedy_steps"] >= 4.0
+    assert values["return"] < WORLD.mdp().reward.max()
+    tiles = compared(Compared(WORLD, ("none",), {"learner": ["sarsa-lambda"], "tilings": [2], **SHORT}), Job(2, 0)).rows
+    assert "return" in {row["measure"] for row in tiles}
+    assert not {row["measure"] for row in tiles} & {"greedy_steps", "greedy_last_steps"}
+
+
 def test_what_is_not_compiled_is_run_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(GATES, "plain", Member(GATES["always"].make, "always, without a compiled form"))
     for advisor in ("expert", lambda request: 3):
         found = sessions_of(one(Compared(WORLD, (advisor,), {"gate": ["plain"], **SHORT})), 3, 0)
         assert found.curve.shape == (8,)
         assert (found.helped_steps > 0).all()
+        assert found.greedy_steps.tolist() == found.greedy_last_steps.tolist()  # eight episodes: measured once
+        assert (found.greedy_steps > 0.0).all()
 
 
 @pytest.mark.parametrize("name", ["gym:FrozenLake-v1", "random:4x4:0.2:1"])

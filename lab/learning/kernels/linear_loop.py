@@ -232,7 +232,7 @@ def _episode(work: Any, linear: Any, world: Any) -> None:
     state: Any = _start(work, world)
     _choose(work, linear, state)
     action: Any = np.int64(decided(work, None, None, 0)[0])
-    moves, over, won = 0, False, False
+    moves, over, won, returned = 0, False, False, 0.0
     entered: Any = 0
     following: Any = np.int64(0)
     while not over and moves < learning.max_moves:
@@ -245,6 +245,7 @@ def _episode(work: Any, linear: Any, world: Any) -> None:
             over = _moved(world, action)
             entered, reward = _number(world), world.last_reward if over else world.reward
             won = over and not world.longer_is_better
+        returned += reward
         last = moves == learning.max_moves
         if linear.lookahead and not over:
             _choose(work, linear, entered)
@@ -260,6 +261,8 @@ def _episode(work: Any, linear: Any, world: Any) -> None:
     else:
         sessions.steps[n, lane.episode - 1] = moves + learning.count_start if won else learning.max_steps + 1
     sessions.guided[n, lane.episode - 1] = lane.helped > 0
+    if len(sessions.returns):
+        sessions.returns[n, lane.episode - 1] = returned
     count.requests += lane.asked
     count.helped_steps += lane.helped
     count.moves += moves

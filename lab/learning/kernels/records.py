@@ -77,7 +77,7 @@ class KernelSessions(NamedTuple):
 
     seeds (N,); per_tau (E,): 1 / temperature; counts (N,) of COUNTS; kept (N, size): the tables, or (0, size) if not wanted.
     greedy (N, E // every), or (N, 0) if not wanted: after each `every`-th episode, the mean steps of `walks` episodes of the
-    greedy policy; walk_rng (1,): the state of their generator.
+    greedy policy; walk_rng (1,): the state of their generator. returns (N, E), or (0, E) if not wanted: sums of rewards.
     """
 
     seeds: NDArray[np.uint64]
@@ -90,6 +90,7 @@ class KernelSessions(NamedTuple):
     every: int
     walks: int
     walk_rng: NDArray[np.uint64]
+    returns: FloatArray
 
 
 class Lanes(NamedTuple):
@@ -108,6 +109,7 @@ class Lanes(NamedTuple):
     rng: NDArray[np.uint64]
     fresh: NDArray[np.bool_]
     is_open: NDArray[np.bool_]
+    returned: FloatArray
     tables: FloatArray
     others: FloatArray
 

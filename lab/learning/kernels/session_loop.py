@@ -89,6 +89,7 @@ def _begin(work: Any, memories: Any, hearing: Any, walks: Any, started: int) -> 
         if lanes.fresh[j]:
             lane = lanes.lane[j]
             lanes.fresh[j], lanes.moves[j], lanes.states[j] = False, 0, work.problem.starts[0]
+            lanes.returned[j] = 0.0
             if lane.episode == len(work.sessions.per_tau):
                 lane.session = -1  # an idle lane keeps making steps, which are ignored
                 if started < len(seeds):
@@ -131,6 +132,7 @@ def _step(work: Any, memories: Any, hearing: Any, chances: Any, walks: Any, j: i
         walks.walk[j, lanes.moves[j]] = state
     lanes.states[j] = entered
     lanes.moves[j] += 1
+    lanes.returned[j] += reward
     return bool(ends != 0 or lanes.moves[j] == learning.max_moves)
 
 
@@ -175,6 +177,8 @@ def _end(work: Any, memories: Any, hearing: Any, chances: Any, walks: Any, j: in
     n, episode, count = lane.session, lane.episode, sessions.counts[lane.session]
     sessions.steps[n, episode - 1] = moves + learning.count_start if won else learning.max_steps + 1
     sessions.guided[n, episode - 1] = lane.helped > 0
+    if len(sessions.returns):
+        sessions.returns[n, episode - 1] = lanes.returned[j]
     count.requests += lane.asked
     count.helped_steps += lane.helped
     count.moves += moves

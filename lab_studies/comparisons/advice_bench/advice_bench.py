@@ -1,21 +1,42 @@
 """AdviceBench: every rule of when to ask and whom to believe, with every advisor, at every budget, on every problem."""
 
+import json
+import re
 from collections.abc import Mapping, Sequence
 from functools import partial
+from hashlib import sha256
 from typing import Any
 
 import numpy as np
 
+from lab.mdp import FloatArray
 from lab.statistics import interval
 from lab.studies.findings import Findings, Row, row
+from lab.studies.leaderboard import scores_file
 from lab.studies.runner import Job
+from lab_studies.comparisons.advice_bench.aggregates import (
+    GREEDY,
+    RETURN,
+    SCORES,
+    Aggregate,
+    aggregates,
+    csv_of,
+    table_of,
+)
+from lab_studies.comparisons.advice_bench.bad_advisors import ADVISORS
 from lab_studies.comparisons.advice_bench.entered import Entered
-from lab_studies.comparisons.advice_bench.figures import answers_and_gain, distances, gains, worst_cells
+from lab_studies.comparisons.advice_bench.figures import (
+    answers_and_gain,
+    distances,
+    gains,
+    means,
+    profiles,
+    worst_cells,
+)
 from lab_studies.comparisons.advice_bench.problems import HELD_OUT, Benched
 from lab_studies.comparisons.advice_bench.ranks import Cell, Ranks, ranks
 from lab_studies.comparisons.advice_bench.rules import NOBODY, OURS
 from lab_studies.comparisons.advice_bench.sessions import (
-    BINS,
     BUDGETS,
     Case,
     Outcome,
@@ -23,15 +44,18 @@ from lab_studies.comparisons.advice_bench.sessions import (
     case_outcomes,
 )
 
-MOST_BELOW = -2.0  # the project's target: no interval of the gain reaches below it
+MOST_BELOW = -1.0  # the project's target: no interval of the gain reaches below it
 LEVEL = 0.9  # a learner has recovered at this share of nobody's last points
 MEASURES = (
-    "Points: the mean over all episodes (the area under the learning curve); 100 is the best policy's mean, 0 an episode that "
-    "fails, and steps count in between. gain_points: points minus those of nobody's sessions with the same seeds, with the "
-    "95 % interval of the paired differences; below 0 is harm. last: points of the last tenth of the episodes. answers: the "
-    "advisor's answers in a session. later: episodes until the mean curve reaches nine tenths of nobody's last points, minus "
-    "nobody's own; empty if it never does. Budget: answers of a session. Where moves are random (lake) there are four times as "
-    "many sessions."
+    "Points: the return while advised, as the mean over all episodes (the area under the learning curve); 100 is the best "
+    "policy's mean, 0 an episode that fails, and steps count in between. gain_points: points minus those of nobody's sessions "
+    "with the same seeds, with the 95 % interval of the paired differences; below 0 is harm. last: points of the last tenth of "
+    "the episodes. greedy_points: the points of the greedy policy without the advisor, measured after every tenth episode in "
+    "episodes that nobody learns from, mean over these; greedy_last: of the last of them; greedy_gain: greedy_points minus "
+    "nobody's, with its interval. answers: the advisor's answers in a session. later, greedy_later: "
+    "episodes until the mean curve (of points, of greedy points) reaches nine tenths of nobody's last points and stays above, "
+    "minus nobody's own; empty if it never does. Budget: answers of a session. Where moves are random (lake) there are four "
+    "times as many sessions."
 )
 RULES_NOTE = (
     "always with a budget is early advising. importance (teacher's): the advisor speaks only in the half of the states where "
@@ -51,8 +75,17 @@ CHOSEN = (
 RANKED = (
     "Ranks: the ranks of the points in each cell (problem, advisor, budget), ties shared, averaged within each problem, then "
     "over problems; the critical difference is Nemenyi's at 5 %, with problems as blocks. Whether points are above others': "
-    "Wilcoxon's signed ranks of the problems' means with Holm's correction."
+    "Wilcoxon's signed ranks of the problems' means with Holm's correction. Both headline scores are ranked: points, and "
+    "greedy_points."
 )
+AGGREGATED = (
+    "Aggregates (aggregates.csv), as rliable defines them (Agarwal et al. 2021), over the sessions in all cells: the "
+    "interquartile mean, with the 95 % interval of a bootstrap that draws each problem's sessions anew, the same in all of its "
+    "cells; performance profiles, the share of sessions above each score; improvement, the chance that a session of "
+    f"'{OURS}' scores above one of the rule in the same cell, a tie counting half. Every problem counts with as many sessions."
+)
+# by headline score: the beginning of its lines in short, the column of its points, and the measure of its gain
+COLUMNS = {RETURN: ("", "points", "gain_points"), GREEDY: (f"{GREEDY}: ", "greedy_points", "greedy_gain")}
 
 
 def advice_bench(job: Job, reading: Mapping[str, Any]) -> Findings:
@@ -68,8 +101,10 @@ def advice_bench(job: Job, reading: Mapping[str, Any]) -> Findings:
         for name in entered.problems
         for result in rows_of(entered.place(name), outcomes, entered.advisors, entered.rules)
     ]
-    says, pictures = in_short(rows, entered.problems, entered.rules)
-    return Findings(rows, says, pictures, (MEASURES, RULES_NOTE, CHOSEN, RANKED))
+    says, pictures, lines = in_short(rows, outcomes, entered, job.seed)
+    notes = (MEASURES, RULES_NOTE, CHOSEN, RANKED, AGGREGATED)
+    files = {"aggregates.csv": csv_of(lines)} | score_files(rows, outcomes, entered, job)
+    return Findings(rows, says, pictures, notes, files)
 
 
 def measured(job: Job, cases: Sequence[Case], entered: Entered) -> dict[Case, Outcomes]:
@@ -95,82 +130,179 @@ def measured(job: Job, cases: Sequence[Case], entered: Entered) -> dict[Case, Ou
     return done
 
 
+def score_files(rows: Sequence[Row], outcomes: Mapping[Case, Outcomes], entered: Entered, job: Job) -> dict[str, str]:
+    """A file of scores for each rule, by file name, for a leaderboard; none with problems or advisors that are not the bench's.
+
+    The version is a hash of problems, learners, advisors, budgets and seeds, and of nobody's scores, which change with whatever
+    else learning and scoring depend on.
+    """
+    if entered.places or any(name not in ADVISORS for name in entered.advisors):
+        return {}
+    digest = sha256(json.dumps([job.sessions, job.seed, BUDGETS, entered.problems, entered.advisors]).encode())
+    for name in entered.problems:
+        place = entered.place(name)
+        digest.update(json.dumps([place.mdp.signature, vars(place.learner)]).encode())
+        digest.update(json.dumps(outcomes[Case(name, None)][NOBODY, "any"].to_json()).encode())
+        for advisor in entered.advisors:
+            advice = ADVISORS[advisor](place)
+            digest.update(np.round(advice.thresholds, 6).tobytes() + advice.region.tobytes() + bytes([advice.late]))
+    cell = ("problem", "advisor", "budget")
+    return {
+        f"scores/{re.sub('[^a-z0-9]+', '-', rule.lower()).strip('-')}.csv": scores_file(
+            "advicebench", digest.hexdigest()[:16], rule, [result for result in rows if result["rule"] == rule], cell
+        )
+        for rule in entered.rules
+    }
+
+
 def rows_of(
     place: Benched, outcomes: Mapping[Case, Outcomes], advisors: Sequence[str], rules: Sequence[str]
 ) -> list[Row]:
-    """One row for nobody, and one for each advisor, budget and rule in a problem."""
+    """The rows for nobody, and for each advisor, budget and rule in a problem."""
     name, episodes = place.name, place.learner.episodes
     nobody = outcomes[Case(name, None)][NOBODY, "any"]
     group = {"held_out": name in HELD_OUT}
-    alone = {
-        "problem": name,
-        "advisor": NOBODY,
-        "budget": None,
-        "rule": NOBODY,
-        **group,
-        **_shown(nobody, nobody, episodes),
-    }
-    rows = [row(alone, "gain_points", 0.0)]
+    alone = {"problem": name, "advisor": NOBODY, "budget": None, "rule": NOBODY, **group}
+    rows = _cell_rows(alone, nobody, nobody, episodes)
     for advisor in advisors:
         for budget in BUDGETS:
             for rule in rules:
                 outcome = outcomes[Case(name, advisor)][rule, budget]
                 named = {"problem": name, "advisor": advisor, "budget": budget, "rule": rule, **group}
-                mean, *ends = interval(outcome.points - nobody.points)
-                rows.append(row(named | _shown(outcome, nobody, episodes), "gain_points", mean, ends))
+                rows += _cell_rows(named, outcome, nobody, episodes)
     return rows
 
 
-def _shown(outcome: Outcome, nobody: Outcome, episodes: int) -> Row:
-    """The measures that are shown beside the gain."""
-    later = _recovered(outcome, nobody, episodes), _recovered(nobody, nobody, episodes)
-    return {
+def _cell_rows(named: Row, outcome: Outcome, nobody: Outcome, episodes: int) -> list[Row]:
+    """The rows of a cell: the gains in both scores, the one of the greedy policy only where that was measured."""
+    measured = bool(len(outcome.greedy))
+    last = float(nobody.greedy_last.mean()) if measured else 0.0
+    shown = named | {
         "points": round(float(outcome.points.mean()), 2),
         "last": round(float(outcome.last.mean()), 2),
+        "greedy_points": round(float(outcome.greedy.mean()), 2) if measured else None,
+        "greedy_last": round(float(outcome.greedy_last.mean()), 2) if measured else None,
         "answers": round(float(outcome.answers.mean()), 1),
-        "later": None if None in later else round(later[0] - later[1]),  # type: ignore[operator]
+        "later": _later(outcome.curve, nobody.curve, float(nobody.last.mean()), episodes),
+        "greedy_later": _later(outcome.greedy_curve, nobody.greedy_curve, last, episodes) if measured else None,
     }
+    rows: list[Row] = []
+    for measure, field in (("gain_points", "points"), ("greedy_gain", "greedy")):
+        own, others = getattr(outcome, field), getattr(nobody, field)
+        if outcome is nobody and len(own):
+            rows.append(row(shown, measure, 0.0))
+        elif len(own):
+            mean, *ends = interval(own - others)
+            rows.append(row(shown, measure, mean, ends))
+    return rows
 
 
-def _recovered(outcome: Outcome, nobody: Outcome, episodes: int) -> float | None:
-    """The episode from which the mean curve stays above nine tenths of nobody's last points; None if it does not."""
-    enough = outcome.curve >= LEVEL * nobody.last.mean()
-    below = np.flatnonzero(~enough)
+def _later(curve: FloatArray, nobody: FloatArray, last: float, episodes: int) -> int | None:
+    """Episodes until a mean curve has recovered, minus those of nobody's; None if one of them never does."""
+    ends = _recovered(curve, last, episodes), _recovered(nobody, last, episodes)
+    return None if ends[0] is None or ends[1] is None else round(ends[0] - ends[1])
+
+
+def _recovered(curve: FloatArray, last: float, episodes: int) -> float | None:
+    """The episode from which a mean curve stays above nine tenths of nobody's last points; None if it does not."""
+    below = np.flatnonzero(curve < LEVEL * last)
     first = 0 if len(below) == 0 else int(below[-1]) + 1
-    return None if first == BINS else first * episodes / BINS
+    return None if first == len(curve) else first * episodes / len(curve)
 
 
-def in_short(rows: Sequence[Row], problems: Sequence[str], rules: Sequence[str]) -> tuple[Row, dict[str, bytes]]:
-    """The ranks and the harm, and their pictures, on the problems used for development and on those held out."""
+def in_short(
+    rows: Sequence[Row], outcomes: Mapping[Case, Outcomes], entered: Entered, seed: int
+) -> tuple[Row, dict[str, bytes], list[Row]]:
+    """Ranks, harm and aggregates in both scores, their pictures, and the lines of aggregates.csv.
+
+    Problems used for development and those held out are apart. seed: of the bootstrap.
+    """
     advised = [result for result in rows if result["rule"] != NOBODY]
-    alone = {result["problem"]: result["points"] for result in rows if result["rule"] == NOBODY}
-    scores: dict[str, dict[Cell, float]] = {rule: {} for rule in rules}
-    scores[NOBODY] = {}
-    for result in advised:
-        cell = result["problem"], result["advisor"], result["budget"]
-        scores[result["rule"]][cell], scores[NOBODY][cell] = result["points"], alone[result["problem"]]
-    says: Row = {"rules": len(rules), "advisors": len({result["advisor"] for result in advised})}
+    says: Row = {"rules": len(entered.rules), "advisors": len(entered.advisors)}
     pictures: dict[str, bytes] = {}
-    groups = {"": [name for name in problems if name not in HELD_OUT], "held out: ": [*filter(HELD_OUT.get, problems)]}
+    lines: list[Row] = []
+    held_out = [name for name in entered.problems if name in HELD_OUT]
+    groups = {"": [name for name in entered.problems if name not in HELD_OUT], "held out: ": held_out}
     for words, those in groups.items():
         if not those:
             continue
-        here = [result for result in advised if result["problem"] in those]
-        ranked = ranks(scores, those, OURS)
-        says |= _ranked(words, ranked) | _harm(words, here, rules)
-        where = "held-out problems" if words else "problems"
+        where = f"{len(those)} {'held-out problems' if words else 'problems'}"
+        here = [result for result in advised if result["problem"] in those and result["measure"] == "gain_points"]
+        found: dict[str, dict[str, Aggregate]] = {}
+        order: list[str] = []
+        for score, (prefix, points, gain) in COLUMNS.items():
+            whole = [name for name in those if len(getattr(outcomes[Case(name, None)][NOBODY, "any"], SCORES[score]))]
+            if not whole:
+                continue
+            tables = {
+                rule: table_of(outcomes, rule, score, whole, entered.advisors) for rule in (*entered.rules, NOBODY)
+            }
+            ranked = ranks(_means(rows, points), whole, OURS)
+            found[score] = aggregates(tables, OURS, seed)
+            order = order or list(ranked.mean)
+            gained = [result for result in advised if result["problem"] in whole and result["measure"] == gain]
+            says |= _ranked(words + prefix, ranked) | _in_short(words + prefix, found[score])
+            says |= _harm(words + prefix, gained, entered.rules)
+            lines += _lines("held out" if words else "development", score, found[score], ranked)
+            caption = f"Mean ranks in {where}" if score == RETURN else f"Mean ranks by the greedy policy in {where}"
+            pictures[f"{caption}; rules joined by a bar are not told apart"] = distances(ranked)
         pictures |= {
-            f"Mean ranks in {len(those)} {where}; rules joined by a bar are not told apart": distances(ranked),
-            f"Points gained over nobody, means over {len(those)} {where}": gains(here, list(ranked.mean)),
-            f"The worst cell of each rule in {len(those)} {where}": worst_cells(here, list(ranked.mean), MOST_BELOW),
-            f"Answers and points gained, means over {len(those)} {where}": answers_and_gain(here, rules),
+            f"Interquartile means of both scores in {where}, with bootstrap intervals": means(found, order),
+            f"Performance profiles of both scores in {where}": profiles(found),
+            f"Points gained over nobody, means over {where}": gains(here, order),
+            f"The worst cell of each rule in {where}": worst_cells(here, order, MOST_BELOW),
+            f"Answers and points gained, means over {where}": answers_and_gain(here, entered.rules),
         }
-    return says, pictures
+    return says, pictures, lines
+
+
+def _means(rows: Sequence[Row], measure: str) -> dict[str, dict[Cell, float]]:
+    """The scores by rule and cell; nobody's stand in each cell of their problem."""
+    alone = {result["problem"]: result[measure] for result in rows if result["rule"] == NOBODY}
+    scores: dict[str, dict[Cell, float]] = {}
+    for result in rows:
+        if result["rule"] != NOBODY:
+            cell = result["problem"], result["advisor"], result["budget"]
+            scores.setdefault(result["rule"], {})[cell] = result[measure]
+            scores.setdefault(NOBODY, {})[cell] = alone[result["problem"]]
+    return scores
+
+
+def _lines(group: str, score: str, found: Mapping[str, Aggregate], ranked: Ranks) -> list[Row]:
+    """The lines of aggregates.csv, best rank first."""
+    lines: list[Row] = []
+    for rule, rank in ranked.mean.items():
+        own, p = found[rule], ranked.beaten.get(rule)
+        numbers = *own.iqm, own.improvement, rank, p
+        names = "interquartile_mean", "ci95_low", "ci95_high", "improvement", "mean_rank", "p"
+        rounded = (None if number is None else round(number, 4) for number in numbers)
+        lines.append({"problems": group, "score": score, "rule": rule} | dict(zip(names, rounded, strict=True)))
+    return lines
+
+
+def _in_short(words: str, found: Mapping[str, Aggregate]) -> Row:
+    """The best interquartile mean and ours, and the rival with the lowest chance that ours is better."""
+    best = max(found, key=lambda rule: found[rule].iqm[0])
+    says: Row = {}
+    for rule in dict.fromkeys((best, OURS)):
+        if rule in found:
+            says[f"{words}interquartile mean of '{rule}'"] = "{:.1f} ({:.1f} to {:.1f})".format(*found[rule].iqm)
+    chances = {rule: own.improvement for rule, own in found.items() if own.improvement is not None}
+    if chances:
+        rival = min(chances, key=lambda rule: chances[rule])
+        says[f"{words}'{OURS}' improves on"] = (
+            f"{sum(chance > 0.5 for chance in chances.values())} of {len(chances)} others with a chance above 0.5; "
+            f"least on '{rival}', {chances[rival]:.2f}"
+        )
+    return says
 
 
 def _ranked(words: str, ranked: Ranks) -> Row:
     best = [*ranked.mean.items()][:3]
-    says: Row = {f"{words}best three mean ranks": ", ".join(f"{rule} {rank:.2f}" for rule, rank in best)}
+    says: Row = {
+        f"{words}winner": best[0][0],
+        f"{words}best three mean ranks": ", ".join(f"{rule} {rank:.2f}" for rule, rank in best),
+    }
     if OURS in ranked.mean:
         ahead = [rule for rule, rank in ranked.mean.items() if rank < ranked.mean[OURS]]
         sure = sum(p < 0.05 for p in ranked.beaten.values())

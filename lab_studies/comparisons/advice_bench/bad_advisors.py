@@ -6,7 +6,7 @@ from zlib import crc32
 
 import numpy as np
 
-from lab.advice.advisors import SKILL_TAUS, AdvisorName, RecordedAdvisor
+from lab.advice.advisors import AdvisorName, RecordedAdvisor
 from lab.advice.table_level import PolicyAdvisor, TableLevel
 from lab.learning.requests import AdviceRequest, Advisor
 from lab.learning.simulated_advice import (
@@ -15,34 +15,52 @@ from lab.learning.simulated_advice import (
     Advice,
     TableAdvisor,
     advice_chances,
+    chance_accuracy,
+    decisive,
+    tau_of_accuracy,
 )
 from lab.mdp import BoolArray, FloatArray
 from lab_studies.comparisons.advice_bench.problems import Benched
 
-EXPERT = SKILL_TAUS["expert"]
+# The share of optimal answers, over the states in which an answer matters. An advisor that draws evenly has 0.23 to 0.44 in the
+# problems of the bench; in world 1 the thesis's taus give 1.00, 0.83, 0.60 and 0.50.
+ACCURACIES = {"expert": 0.99, "moderate": 0.85, "limited": 0.7, "novice": 0.55}
+EVEN = 1e6  # times the span of the values: a tau with which answers are drawn almost evenly
 WRONG_THERE, SILENT = 0.25, 0.75  # the shares of states with wrong and without answers
 DRIFTS = 50  # the steps in which an expert becomes contrary
 Made = Callable[[Benched], Advice]
 
 
-def _skill(tau: float) -> Made:
-    return lambda benched: Advice.of(advice_chances(benched.values, tau))
+def tau_for(benched: Benched, share: float = ACCURACIES["expert"]) -> float:
+    """The tau of a simulated advisor with that share of optimal answers over the states in which an answer matters.
+
+    Where an advisor that draws evenly has that share or more, a tau with which nearly that is drawn.
+    """
+    states = decisive(benched.values, ~benched.mdp.terminal)
+    if not states.any() or chance_accuracy(benched.values, states) >= share:
+        return EVEN * (1.0 + float(np.ptp(benched.values)))
+    return tau_of_accuracy(benched.values, states, share)
+
+
+def skilled(share: float) -> Made:
+    """The simulated advisor with that share of optimal answers, see `tau_for`."""
+    return lambda benched: Advice.of(advice_chances(benched.values, tau_for(benched, share)))
 
 
 def contrary(benched: Benched) -> Advice:
     """An advisor that takes the worst action for the best."""
-    return Advice.of(advice_chances(-benched.values, EXPERT))
+    return Advice.of(advice_chances(-benched.values, tau_for(benched)))
 
 
 def wrong_there(benched: Benched) -> Advice:
     """An expert that is contrary in a quarter of the states, which are drawn once."""
     wrong = _drawn(benched, WRONG_THERE)
-    return Advice.of(advice_chances(np.where(wrong[:, None], -benched.values, benched.values), EXPERT))
+    return Advice.of(advice_chances(np.where(wrong[:, None], -benched.values, benched.values), tau_for(benched)))
 
 
 def late(benched: Benched) -> Advice:
     """An expert that answers the previous question."""
-    return replace(Advice.of(advice_chances(benched.values, EXPERT)), late=True)
+    return replace(Advice.of(advice_chances(benched.values, tau_for(benched))), late=True)
 
 
 def stuck(benched: Benched) -> Advice:
@@ -53,7 +71,8 @@ def stuck(benched: Benched) -> Advice:
 
 def drifting(benched: Benched) -> Advice:
     """An expert whose chance of a contrary answer grows from 0 to 1 over the session."""
-    good, bad = advice_chances(benched.values, EXPERT), advice_chances(-benched.values, EXPERT)
+    tau = tau_for(benched)
+    good, bad = advice_chances(benched.values, tau), advice_chances(-benched.values, tau)
     rows = np.minimum(np.arange(benched.learner.episodes) * DRIFTS // benched.learner.episodes, DRIFTS - 1)
     shares = np.linspace(0.0, 1.0, DRIFTS)[rows]
     return Advice.of((1.0 - shares)[:, None, None] * good + shares[:, None, None] * bad)
@@ -61,7 +80,7 @@ def drifting(benched: Benched) -> Advice:
 
 def long_winded(benched: Benched) -> Advice:
     """An advisor that gives the best action in half of its answers, else any action without failure: it makes detours."""
-    best = advice_chances(benched.values, EXPERT)
+    best = advice_chances(benched.values, tau_for(benched))
     mdp = benched.mdp
     safe = (~(mdp.terminal & ~mdp.goal)[mdp.successor]).astype(np.float64)
     safe[safe.sum(axis=1) == 0.0] = 1.0
@@ -70,7 +89,7 @@ def long_winded(benched: Benched) -> Advice:
 
 def silent(benched: Benched) -> Advice:
     """An expert that is silent in three quarters of the states, which are drawn once."""
-    return Advice.of(advice_chances(benched.values, EXPERT), ~_drawn(benched, SILENT))
+    return Advice.of(advice_chances(benched.values, tau_for(benched)), ~_drawn(benched, SILENT))
 
 
 def _drawn(benched: Benched, share: float) -> BoolArray:
@@ -79,7 +98,7 @@ def _drawn(benched: Benched, share: float) -> BoolArray:
 
 
 ADVISORS: Mapping[str, Made] = {
-    **{name: _skill(tau) for name, tau in SKILL_TAUS.items()},
+    **{name: skilled(share) for name, share in ACCURACIES.items()},
     "contrary": contrary,
     "wrong there": wrong_there,
     "late": late,
@@ -92,7 +111,8 @@ ADVISORS: Mapping[str, Made] = {
 
 def advisor_of(name: AdvisorName, benched: Benched, rng: np.random.Generator) -> Advisor | None:
     """The advisor of that name in a problem, None for "none". Raises BadInput for a record of another problem."""
-    level = TableLevel(benched.mdp, benched.learner.discount, rng, episodes=benched.learner.episodes)
+    own = benched.learner.discount, rng
+    level = TableLevel(benched.mdp, *own, episodes=benched.learner.episodes, values=lambda discount: benched.values)
     return level.advisor(name)
 
 

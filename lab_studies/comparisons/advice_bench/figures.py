@@ -1,14 +1,15 @@
-"""The pictures of AdviceBench: mean ranks with their critical difference, gains by advisor, worst cells, answers against gain."""
+"""The pictures of AdviceBench: ranks, means and profiles of both scores, gains by advisor, worst cells, answers against gain."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from lab.studies.findings import Row
 from lab.view.canvas import BLUE, GREY, INK, ORANGE, RED, picture_bytes
+from lab_studies.comparisons.advice_bench.aggregates import THRESHOLDS, Aggregate
 from lab_studies.comparisons.advice_bench.ranks import Ranks
-from lab_studies.comparisons.advice_bench.rules import OURS
+from lab_studies.comparisons.advice_bench.rules import NOBODY, OURS
 from lab_studies.comparisons.advice_bench.sessions import BUDGETS
 
 if TYPE_CHECKING:
@@ -34,6 +35,47 @@ def distances(ranked: Ranks) -> bytes:
         axes.grid(axis="x")
 
     return picture_bytes(draw, 7.5, 0.9 + 0.24 * len(rules))
+
+
+def means(found: Mapping[str, Mapping[str, Aggregate]], rules: Sequence[str]) -> bytes:
+    """A picture of the interquartile means by score and rule, with their intervals."""
+
+    def draw(figure: "Figure") -> None:
+        columns = np.atleast_1d(figure.subplots(1, len(found), sharey=True))
+        for axes, (score, by_rule) in zip(columns, found.items(), strict=True):
+            for line, rule in enumerate(rules):
+                value, low, high = by_rule[rule].iqm
+                colour = ORANGE if rule == OURS else BLUE
+                axes.hlines(line, low, high, color=colour, linewidth=1.6)
+                axes.plot(value, line, "o", color=colour, markersize=4)
+            axes.set(xlabel="points, interquartile mean", title=score, ylim=(len(rules) - 0.5, -0.5))
+            axes.grid(axis="x")
+        columns[0].set_yticks(range(len(rules)), rules)
+
+    return picture_bytes(draw, 9.5, 1.0 + 0.24 * len(rules))
+
+
+def profiles(found: Mapping[str, Mapping[str, Aggregate]]) -> bytes:
+    """A picture of the share of sessions above each score: ours, nobody, the best other rule, and all others in grey."""
+
+    def draw(figure: "Figure") -> None:
+        columns = np.atleast_1d(figure.subplots(1, len(found), sharey=True))
+        for axes, (score, by_rule) in zip(columns, found.items(), strict=True):
+            others = {rule: own for rule, own in by_rule.items() if rule not in (OURS, NOBODY)}
+            best = max(others, key=lambda rule: others[rule].iqm[0], default=OURS)
+            for own in others.values():
+                axes.plot(THRESHOLDS, own.profile, color=GREY, linewidth=0.5)
+            lines = {best: (BLUE, "-"), NOBODY: (INK, "--"), OURS: (ORANGE, "-")}
+            for rule, (colour, dash) in lines.items():
+                if rule in by_rule:
+                    own = by_rule[rule]
+                    axes.plot(THRESHOLDS, own.profile, color=colour, linestyle=dash, linewidth=1.6, label=rule)
+            axes.set(xlabel="points", title=score, ylim=(0.0, 1.02))
+            axes.grid()
+            axes.legend(loc="lower left")
+        columns[0].set_ylabel("share of sessions above")
+
+    return picture_bytes(draw, 9.5, 3.8)
 
 
 def gains(rows: Sequence[Row], rules: Sequence[str]) -> bytes:

@@ -51,7 +51,12 @@ def ranks(scores: Mapping[str, Mapping[Cell, float]], problems: Sequence[str], o
         for rule, scores_of_rule in scores.items()
     }
     others = [rule for rule in rules if rule != ours] if ours in means else []
-    single = {rule: float(wilcoxon(means[ours], means[rule], alternative="greater").pvalue) for rule in others}
+    single = {
+        rule: 1.0  # the test is not defined where nothing differs
+        if (means[ours] == means[rule]).all()
+        else float(wilcoxon(means[ours], means[rule], alternative="greater").pvalue)
+        for rule in others
+    }
     return Ranks(dict(ordered), critical, p, holm(single))
 
 

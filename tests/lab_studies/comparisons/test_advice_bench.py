@@ -1,5 +1,6 @@
 """AdviceBench: its problems and advisors by hand, its ranks, and a small run of it that goes on where it stopped."""
 
+import csv
 import json
 import os
 import subprocess
@@ -12,15 +13,17 @@ import pytest
 
 import lab
 from lab.errors import BadInput
-from lab.mdp import greedy_path, optimal_values, shortest_steps
+from lab.learning.settings import LearnerSettings
+from lab.mdp import greedy_path, grid, optimal_values, shortest_steps
 from lab.studies.runner import Job
 from lab_studies.comparisons.advice_bench import layouts
-from lab_studies.comparisons.advice_bench.advice_bench import advice_bench
-from lab_studies.comparisons.advice_bench.bad_advisors import ADVISORS, advice_of, importance
-from lab_studies.comparisons.advice_bench.problems import problem
+from lab_studies.comparisons.advice_bench.advice_bench import _later, advice_bench
+from lab_studies.comparisons.advice_bench.aggregates import RETURN, aggregates, table_of
+from lab_studies.comparisons.advice_bench.bad_advisors import ACCURACIES, ADVISORS, advice_of, importance
+from lab_studies.comparisons.advice_bench.problems import Benched, problem
 from lab_studies.comparisons.advice_bench.ranks import holm, ranks
 from lab_studies.comparisons.advice_bench.rules import RULES
-from lab_studies.comparisons.advice_bench.sessions import Case, case_outcomes
+from lab_studies.comparisons.advice_bench.sessions import Case, Outcome, Outcomes, case_outcomes
 
 
 def test_layouts_take_as_many_moves_as_by_hand() -> None:
@@ -62,10 +65,10 @@ def test_bad_advisors_are_bad_in_their_way() -> None:
         chances = np.diff(advice.thresholds[0, heard], axis=1, prepend=0.0)
         return float((chances * right).sum(axis=1).mean())
 
-    assert share("expert") > 0.99 > share("moderate") > share("limited") > share("novice")
-    assert share("contrary") < 0.01
+    assert [share(name) for name in ACCURACIES] == pytest.approx([*ACCURACIES.values()])
+    assert share("contrary") < 0.02
     assert 0.65 < share("wrong there") < 0.85
-    assert share("silent") > 0.99  # what it says
+    assert share("silent") > 0.98  # what it says
     assert 0.1 < ADVISORS["silent"](place).region.mean() < 0.4
     stuck = ADVISORS["stuck"](place).thresholds[0]
     assert (np.diff(stuck, axis=1, prepend=0.0).argmax(axis=1) == best[place.mdp.start]).all()
@@ -73,6 +76,24 @@ def test_bad_advisors_are_bad_in_their_way() -> None:
     assert drifting[0, live, best[live]].min() > 0.3 > drifting[-1, live].max(axis=1).min() - 1.0
     assert ADVISORS["late"](place).late
     assert 0.3 < importance(place)[live].mean() < 0.9
+
+
+@pytest.mark.parametrize("name", ["lake", "taxi", "toast-order", "place"])
+def test_a_label_means_the_same_share_of_optimal_answers_in_every_problem(name: str) -> None:
+    place, rng = problem(name), np.random.default_rng(3)
+    best = place.values > place.values.max(axis=1, keepdims=True) - 1e-6
+    asked = rng.choice(np.flatnonzero(~best.all(axis=1) & ~place.mdp.terminal), size=4000)
+    for label, share in ACCURACIES.items():
+        thresholds = ADVISORS[label](place).thresholds[0, asked]
+        answers = (thresholds <= rng.random(4000)[:, None]).sum(axis=1).clip(max=place.mdp.n_actions - 1)
+        assert best[asked, answers].mean() == pytest.approx(share, abs=0.03)
+
+
+def test_where_drawing_evenly_is_as_good_a_novice_draws_evenly() -> None:
+    three_of_four = np.array([[0.0, 0.0, 0.0, -1.0], [0.0, 0.0, 0.0, 0.0]])
+    mdp = grid((1, 2), np.zeros((1, 2), bool), (0, 0), (0, 1))
+    place = Benched("two", mdp, LearnerSettings(), three_of_four)
+    assert ADVISORS["novice"](place).thresholds[0, 0] == pytest.approx([0.25, 0.5, 0.75, 1.0], abs=1e-4)
 
 
 def test_ranks_by_hand() -> None:
@@ -97,22 +118,62 @@ def test_every_rule_runs_and_nobody_is_the_same_whatever_the_advisor() -> None:
     nobody = case_outcomes(Case("empty", None), 3, 0)["nobody", "any"]
     assert found["always", "any"].points == pytest.approx([100.0] * 3, abs=0.5)
     assert found["earned-trust", "any"].points.mean() > nobody.points.mean()
+    assert nobody.greedy_curve.shape == (20,)  # 200 episodes, every tenth
+    np.testing.assert_allclose(nobody.greedy_curve.mean(), nobody.greedy.mean(), atol=0.01)
+    np.testing.assert_allclose(nobody.greedy_curve[-1], nobody.greedy_last.mean(), atol=0.01)
+
+
+def test_recovery_is_the_episode_from_which_a_curve_stays_up() -> None:
+    nobody, late = np.array([0.0, 90.0, 100.0, 100.0]), np.array([95.0, 0.0, 0.0, 90.0])
+    assert _later(nobody, nobody, 100.0, 40) == 0  # from the second of four bins on, as nobody's own
+    assert _later(late, nobody, 100.0, 40) == 20
+    assert _later(np.zeros(4), nobody, 100.0, 40) is None
+
+
+def test_aggregates_by_hand() -> None:
+    outcomes: dict[Case, Outcomes] = {}
+    for name, points in (("maze", [0.0, 100.0]), ("lake", [50.0, 50.0, 7.0])):
+        none = np.zeros(0)
+        alone = Outcome(np.array(points), none, none, none, none, none, none)
+        better = alone._replace(points=alone.points + 1.0)
+        outcomes[Case(name, None)] = {("nobody", "any"): alone}
+        outcomes[Case(name, "expert")] = {("ours", "100"): better, ("ours", "any"): better}
+    tables = {rule: table_of(outcomes, rule, RETURN, ["maze", "lake"], ["expert"]) for rule in ("ours", "nobody")}
+    assert tables["nobody"].scores.tolist() == [[0.0, 0.0, 50.0, 50.0], [100.0, 100.0, 50.0, 50.0]]
+    assert tables["ours"].strata.tolist() == [0, 0, 1, 1]
+    found = aggregates(tables, "ours", 0)
+    assert found["ours"].iqm[0] == 51.0
+    assert found["nobody"].improvement == (0.75 + 1.0) / 2  # of the maze's four pairs three, of the lake's all
+    assert found["ours"].improvement is None
+    assert found["nobody"].profile[[0, 20, 70, 120]].tolist() == [1.0, 0.75, 0.25, 0.0]  # above -20, 0, 50, 100
 
 
 def test_a_small_bench_goes_on_where_it_stopped_and_says_the_same(tmp_path: Path) -> None:
     reading = {"problem": ["empty"], "methods": ["always", "earned-trust"], "advisors": ["expert", "contrary"]}
     job = Job(sessions=3, folder=tmp_path)
     found = advice_bench(job, reading)
-    assert len(found.rows) == 1 + 2 * 2 * 2
+    assert len(found.rows) == 2 * (1 + 2 * 2 * 2)  # two scores
     harm = [one for one in found.rows if (one["rule"], one["advisor"], one["budget"]) == ("always", "contrary", "any")]
+    assert {one["measure"] for one in harm} == {"gain_points", "greedy_gain"}
     assert harm[0]["value"] < -80.0
     assert "rank 1" in found.summary["'earned-trust'"]
+    assert {"winner", "greedy policy: winner", "greedy policy: harm by always"} <= {*found.summary}
+    assert harm[1]["ci95"][1] < -80.0
+    aggregated = list(csv.DictReader(found.files["aggregates.csv"].splitlines()))
+    assert len(aggregated) == 2 * 3
+    assert {line["rule"] for line in aggregated} == {"always", "earned-trust", "nobody"}
     lines = (tmp_path / "sessions.jsonl").read_text().splitlines()
     assert [json.loads(line)["case"][1] for line in lines] == [None, "expert", "contrary"]
     (tmp_path / "sessions.jsonl").write_text("\n".join([*lines[:2], "cut"]))
     again = advice_bench(job, reading)
     assert again.rows == found.rows
     assert again.summary == found.summary
+    assert again.files == found.files
+    versions = {text.splitlines()[2] for name, text in found.files.items() if name.startswith("scores/")}
+    assert len(versions) == 1
+    assert {"scores/always.csv", "scores/earned-trust.csv"} < {*found.files}
+    other = advice_bench(Job(sessions=3, seed=1), reading)
+    assert other.files["scores/always.csv"].splitlines()[2] not in versions
 
 
 def test_what_cannot_be_benched_is_refused() -> None:
@@ -131,7 +192,9 @@ def test_a_file_of_ones_own_and_any_advisor_that_always_answers_alike(tmp_path: 
     found = advice_bench(
         Job(sessions=3), {"problem": [str(maze)], "methods": ["earned-trust"], "advisors": ["tau=0.05"]}
     )
-    assert found.rows[-1]["value"] > 0.0
+    assert found.rows[-2]["measure"] == "gain_points"
+    assert {*found.files} == {"aggregates.csv"}  # a problem of the user is on no leaderboard
+    assert found.rows[-2]["value"] > 0.0
     place = problem(str(maze))
     advice = advice_of("tau=0.05", place)
     assert advice is not None
@@ -171,12 +234,12 @@ def test_members_made_in_python_are_measured_alike_in_several_processes() -> Non
         "problem": [maze, lab.Problem("board", "push", maze.mdp())],
     }
     found = lab.study("advicebench", sessions=2, **reading)
-    assert len(found.rows) == 2 * (1 + 2 * 2 * 4)
+    assert len(found.rows) == 2 * 2 * (1 + 2 * 2 * 4)
     assert {row["rule"] for row in found.rows} == {"nobody", "EveryOther", "ccrl", "ia", "predictive"}
     tired = [row["answers"] for row in found.rows if (row["advisor"], row["rule"]) == ("Tiring", "EveryOther")]
-    assert tired == [30.0] * 4  # each session has an advisor of its own
+    assert tired == [30.0] * 8  # each session has an advisor of its own
     assert "EveryOther" in found.summary["best three mean ranks"] + found.summary["harm by EveryOther"]
-    assert len(found.figures) == 4
+    assert len(found.figures) == 7
     assert lab.study("advicebench", sessions=2, workers=2, **reading).rows == found.rows
 
 
