@@ -34,7 +34,7 @@ def replay(
         typer.Option(
             "--own",
             help="A gate, learner or advisor of your own that the session had, ./mine.py:MyGate; its code runs.",
-            callback=from_files("gates", "learners", "advisors"),
+            callback=from_files("gates", "learners", "advisors", "problems"),
         ),
     ] = None,
     minari: Annotated[
