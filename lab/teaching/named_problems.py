@@ -8,11 +8,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
-from lab.errors import BadInput, unknown
+from lab.errors import BadInput
 from lab.learning.problem import Problem
 from lab.learning.settings import LearnerSettings
 from lab.mdp import TabularMDP
-from lab.plugins.code_file import from_file
 from lab.plugins.family import Family, first_line, takes, wanted
 from lab.skills import SKILLS
 from lab.tasks.grid_world import GridWorld
@@ -20,6 +19,7 @@ from lab.tasks.task_file import names_file
 
 WANTED = "a GridWorld, a TabularMDP, a Problem, an environment, or a function or class without arguments that gives one"
 MAX_NUMBER = 10**9
+FROM_FILE = r"[^\W\d]\w*\.[^\W\d]\w*"  # "mine.made", as `lab.plugins.code_file.take` calls what a file has
 Made = GridWorld | TabularMDP | Problem
 
 
@@ -80,18 +80,22 @@ PROBLEMS: Family[NamedProblem] = Family("problems", {}, _adopted)
 
 def is_named(word: str) -> bool:
     """Whether a word is the name of an added problem or of an instance, or that of one whose file was not named."""
-    head = word.partition(":")[0]
-    return head in PROBLEMS or from_file("problem", word, "") is not None
+    return word.partition(":")[0] in PROBLEMS or bool(re.fullmatch(FROM_FILE, word))
 
 
 def problem_named(word: str) -> tuple[GridWorld | Problem, LearnerSettings | None]:
     """The problem of a name such as "door-key" or "hanoi:3", and its settings of the learner.
 
-    Raises BadInput for an unknown name, a number beside a name that has no instances, and a missing or bad number.
+    Raises BadInput for the name of one whose file was not named, a number beside a name that has no instances, and a missing or
+    bad number.
     """
     name, colon, number = word.partition(":")
     if name not in PROBLEMS:
-        raise from_file("problem", word, "SUBTASK") or unknown("problem", word, PROBLEMS, "SUBTASK")
+        again = f"./{word.replace('.', '.py:', 1)}"
+        raise BadInput(
+            f"problem '{word}' (SUBTASK): it came from a file, whose code is not run unasked: name it again, such as {again} "
+            f"(lab replay: --own {again})"
+        )
     member = PROBLEMS[name]
     if not member.numbered:
         if colon:

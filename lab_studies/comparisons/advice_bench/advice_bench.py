@@ -30,8 +30,8 @@ MEASURES = (
     "fails, and steps count in between. gain_points: points minus those of nobody's sessions with the same seeds, with the "
     "95 % interval of the paired differences; below 0 is harm. last: points of the last tenth of the episodes. answers: the "
     "advisor's answers in a session. later: episodes until the mean curve reaches nine tenths of nobody's last points, minus "
-    "nobody's own; empty if it never does. Budget: answers of a session. Where moves are random (lake) there are four times as "
-    "many sessions."
+    "nobody's own; empty if it never does. Budget: answers of a session. Where moves are random (lake, windy-grids, inventory, "
+    "queues) there are four times as many sessions."
 )
 RULES_NOTE = (
     "always with a budget is early advising. importance (teacher's): the advisor speaks only in the half of the states where "
