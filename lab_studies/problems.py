@@ -10,8 +10,7 @@ from functools import partial
 from lab.learning.problem import Problem
 from lab.learning.settings import LearnerSettings
 from lab.teaching.named_problems import NamedProblem
-
-COMMON = LearnerSettings(learner="q", alpha=0.95, beta=1.0, episodes=200, max_steps=200)
+from lab_studies.comparisons.advice_bench.common_learner import COMMON
 
 
 def _made(name: str) -> Callable[..., Problem]:

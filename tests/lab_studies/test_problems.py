@@ -9,8 +9,9 @@ import lab
 from lab.errors import BadInput
 from lab.teaching.named_problems import PROBLEMS as NAMED
 from lab.teaching.named_problems import problem_named
+from lab_studies.comparisons.advice_bench.common_learner import COMMON
 from lab_studies.comparisons.advice_bench.problems import HELD_OUT, problem, to_teach
-from lab_studies.problems import COMMON, PROBLEMS
+from lab_studies.problems import PROBLEMS
 
 ROOT = Path(__file__).resolve().parents[2]
 

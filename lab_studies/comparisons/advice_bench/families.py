@@ -246,7 +246,7 @@ def windy_grids(rng: np.random.Generator) -> Parts:
     def leads(cell: Cell, action: int) -> Mapping[Any, float]:
         down, right = _moved(cell, action)
         wind = winds[cell[1]]
-        outcomes = []
+        outcomes: list[tuple[Any, float]] = []
         for strength in (wind, wind - 1, wind + 1) if wind else (0,):
             entered = min(max(down + up * strength, 0), height - 1), min(max(right, 0), width - 1)
             outcomes.append((WON if entered == goal else entered, 1.0 / 3.0 if wind else 1.0))
@@ -325,7 +325,7 @@ def inventory(rng: np.random.Generator) -> Parts:
     def leads(day: tuple[int, int, int], action: int) -> Mapping[Any, float]:
         stock, ordered, sold = day
         stock += ordered if stock + ordered <= room else 0
-        outcomes = []
+        outcomes: list[tuple[Any, float]] = []
         for asked, chance in enumerate(demand):
             sells = min(asked, stock)
             entered = WON if sold + sells >= wanted else (stock - sells, sizes[action], sold + sells)
@@ -351,7 +351,7 @@ def queues(rng: np.random.Generator) -> Parts:
     def leads(state: tuple[tuple[int, ...], int, int], action: int) -> Mapping[Any, float]:
         waiting, at, served = state
         serves = served_by[action] if at == action and waiting[action] else 0.0
-        outcomes = []
+        outcomes: list[tuple[Any, float]] = []
         for done, chance in ((1, serves), (0, 1.0 - serves)):
             if served + done >= wanted and chance:
                 outcomes.append((WON, chance))

@@ -17,7 +17,7 @@ from lab.learning.simulated_advice import Advice, advice_chances
 from lab.mdp import FloatArray, TabularMDP, optimal_values
 from lab.teaching.subjects import GYM, Teachable, subject_from
 from lab_studies.comparisons.advice_bench import families, layouts
-from lab_studies.problems import COMMON
+from lab_studies.comparisons.advice_bench.common_learner import COMMON
 
 if TYPE_CHECKING:
     from lab.gym.transition_model import TransitionModel

@@ -9,9 +9,9 @@ import pytest
 from lab.errors import BadInput
 from lab.studies.runner import Job
 from lab_studies.comparisons.advice_bench.advice_bench import advice_bench
+from lab_studies.comparisons.advice_bench.common_learner import COMMON
 from lab_studies.comparisons.advice_bench.families import FAMILIES, Drawn, drawn, hanoi
 from lab_studies.comparisons.advice_bench.problems import HELD_OUT, PROBLEMS, problem
-from lab_studies.problems import COMMON
 
 INSTANCES = 20
 BY_CHANCE = {"windy-grids", "inventory", "queues"}
@@ -89,7 +89,7 @@ def test_instances_are_fit_distinct_and_the_same_for_a_seed(family: str) -> None
         worth = instance.model.worth(instance.values.argmax(axis=1), COMMON.max_steps)
         assert 5 <= worth.steps <= 100
         if family not in BY_CHANCE:
-            lists: Any = mdp.successor.tolist(), mdp.terminal.tolist(), mdp.goal.tolist()
+            lists: tuple[Any, Any, Any] = mdp.successor.tolist(), mdp.terminal.tolist(), mdp.goal.tolist()
             moves = [fewest_moves(*lists, start) for start in mdp.starts or (mdp.start,)]
             assert None not in moves
             assert worth.steps == pytest.approx(np.mean([move or 0 for move in moves]))
@@ -121,7 +121,7 @@ def test_only_families_are_held_out_with_the_common_learner() -> None:
     assert {"other-worlds", "place", "butter", "far-door", "four-rooms", "crossing"} <= {*PROBLEMS}
     place = problem("traps", 2)
     assert place.learner == COMMON
-    lists: Any = place.mdp.successor.tolist(), place.mdp.terminal.tolist(), place.mdp.goal.tolist()
+    lists: tuple[Any, Any, Any] = place.mdp.successor.tolist(), place.mdp.terminal.tolist(), place.mdp.goal.tolist()
     assert place.par == fewest_moves(*lists, place.mdp.start)
 
 
