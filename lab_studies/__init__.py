@@ -84,7 +84,7 @@ STUDIES: dict[str, Study] = {
     "advicebench": Study(
         "AdviceBench: rules of when to ask, whatever the advisor, the budget and the problem",
         _In("comparisons.advice_bench.advice_bench", "advice_bench"),
-        ("methods", "problem", "advisors"),
+        ("methods", "problem", "advisors", "families_seed"),
         sessions=100,
         least=2,
     ),

@@ -83,6 +83,7 @@ if TYPE_CHECKING:
     from lab.teaching.lesson import replay as replay_session
     from lab.teaching.lesson import teach as teach_session
     from lab.teaching.lesson_options import DEFAULT_ADVISORS, LessonOptions
+    from lab.teaching.named_problems import PROBLEMS
     from lab.teaching.session_list import session_rows
     from lab.teaching.step_record import StepRecord, check_libraries
     from lab.teaching.subjects import subject_of
@@ -198,6 +199,7 @@ TABLE = {
     "lab.teaching.kept_session": ("check_new", "KeptSession"),
     "lab.teaching.lesson": ("replay as replay_session", "teach as teach_session"),
     "lab.teaching.lesson_options": ("DEFAULT_ADVISORS", "LessonOptions"),
+    "lab.teaching.named_problems": ("PROBLEMS",),
     "lab.teaching.session_list": ("session_rows",),
     "lab.teaching.step_record": ("check_libraries", "StepRecord"),
     "lab.teaching.subjects": ("subject_of",),

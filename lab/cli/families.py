@@ -46,6 +46,7 @@ def _of_teaching() -> Tables:
     return {
         "terms": TERMS,
         "skills": deferred.SKILLS,
+        "problems": deferred.PROBLEMS,
         "learners": deferred.UPDATES,
         "gates": deferred.GATES,
         "selections": deferred.SELECTIONS,
@@ -79,11 +80,11 @@ def members(family: str) -> Mapping[str, Any] | Sequence[str]:
     raise KeyError(family)
 
 
-def offers(family: str) -> Callable[[str], list[str]]:
-    """The function that gives the shell's completions for a family."""
+def offers(*families: str) -> Callable[[str], list[str]]:
+    """The function that gives the shell's completions for families."""
 
     def offered(incomplete: str) -> list[str]:
-        return [name for name in members(family) if name.startswith(incomplete)]
+        return [name for family in families for name in members(family) if name.startswith(incomplete)]
 
     return offered
 

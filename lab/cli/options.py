@@ -46,7 +46,9 @@ MethodName = Annotated[
 ProblemName = Annotated[
     str,
     typer.Argument(
-        help="A world: its name, a .toml file, a .txt grid, random:SHAPE:DENSITY:SEED; gym:ID; or a sub-task of --task."
+        help="A world: its name, a .toml file, a .txt grid, random:SHAPE:DENSITY:SEED; gym:ID; ./mine.py:Problem; a problem "
+        "that packages add: {problems}; or a sub-task of --task.",
+        callback=from_files("problems"),
     ),
 ]
 TaskOfSkill = Annotated[str | None, typer.Option("--task", help="The task that a sub-task is of; default: toast.")]

@@ -33,8 +33,8 @@ def replay(
         list[str] | None,
         typer.Option(
             "--own",
-            help="A gate, learner or advisor of your own that the session had, ./mine.py:MyGate; its code runs.",
-            callback=from_files("gates", "learners", "advisors"),
+            help="A gate, learner, advisor or problem of your own that the session had, ./mine.py:MyGate; its code runs.",
+            callback=from_files("gates", "learners", "advisors", "problems"),
         ),
     ] = None,
     minari: Annotated[

@@ -54,8 +54,14 @@ def study_run(
         list[str] | None,
         typer.Option(
             "--problem",
-            help="advicebench: one of its own problems, a world's file or gym:ID with a model instead; it may be repeated.",
+            help="advicebench: one of its own problems, a world's file, gym:ID with a model or ./mine.py:Problem instead; it may "
+            "be repeated.",
+            callback=from_files("problems"),
         ),
+    ] = None,
+    families_seed: Annotated[
+        int | None,
+        typer.Option("--families-seed", min=0, help="advicebench: seed of the held-out instances; default: 2026."),
     ] = None,
     advisors: Annotated[
         str | None,
@@ -86,6 +92,7 @@ def study_run(
         "seconds": seconds,
         "methods": _listed(methods),
         "problem": problem or None,
+        "families_seed": families_seed,
         "advisors": _listed(advisors),
         "instances": instances or None,
         "verify": verify or None,

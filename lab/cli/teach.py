@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from lab.cli import deferred
-from lab.cli.families import offers
+from lab.cli.families import from_files, offers
 from lab.cli.lessons import lesson_seat, say_read, teacher_of
 from lab.cli.options import (
     AdvisorNames,
@@ -32,8 +32,10 @@ def teach(
         str | None,
         typer.Argument(
             help="{skills}, one skill by its full name; a world: its name, a .toml file, a .txt grid, random:SHAPE:DENSITY:SEED; "
-            "a Gymnasium environment: gym:ID, such as gym:FrozenLake-v1.",
-            autocompletion=offers("skills"),
+            "a Gymnasium environment: gym:ID, such as gym:FrozenLake-v1; ./mine.py:Problem; a problem that packages add (one "
+            "with instances as NAME:NUMBER): {problems}.",
+            autocompletion=offers("skills", "problems"),
+            callback=from_files("problems"),
         ),
     ] = None,
     task: Annotated[

@@ -35,6 +35,7 @@ from lab.studies.charts import legend_below
 from lab.studies.findings import Findings, Row, mean_row, share_row, varying_row
 from lab.studies.runner import Job
 from lab.teaching.lesson import Subject
+from lab.teaching.named_problems import PROBLEMS
 from lab.teaching.subjects import Teachable, subject_from
 from lab.version import __version__
 from lab.view.canvas import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, RED, SKY, picture_bytes
@@ -147,7 +148,7 @@ class ComparedSessions:
 # ---- the comparison -------------------------------------------------------------------------------------------------
 
 
-FAMILIES: dict[str, Family[Any]] = {"gates": GATES, "learners": UPDATES, "advisors": ADVISORS}
+FAMILIES: dict[str, Family[Any]] = {"gates": GATES, "learners": UPDATES, "advisors": ADVISORS, "problems": PROBLEMS}
 MEASURES = (
     "solved_percent: sessions whose final greedy path is optimal. mean_steps: of all episodes, a failed one as the "
     "step limit + 1 (the area under the learning curve). last_steps: of the last episode. helped_steps, requests, misleads, "

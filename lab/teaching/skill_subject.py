@@ -15,6 +15,7 @@ from lab.tasks.task import TAUGHT_WITH, Order, Task
 from lab.tasks.task_file import load, names_of
 from lab.teaching.lesson import Subject
 from lab.teaching.lesson_options import LessonOptions
+from lab.teaching.named_problems import PROBLEMS
 from lab.toolbox.policy import Policy
 from lab.view.plots import values_seen
 
@@ -73,8 +74,9 @@ def find_skill(skills: "dict[str, Skill]", name: str) -> "Skill":
             return skill
     subtasks = sorted({skill.subtask for skill in skills.values()})
     worlds = names_of("world")
-    near = get_close_matches(name, [*subtasks, *worlds, *skills], n=1)
+    near = get_close_matches(name, [*subtasks, *worlds, *PROBLEMS, *skills], n=1)
     hint = f" did you mean '{near[0]}'?" if near else ""
     allowed = f"{', '.join(subtasks)}, or one skill's full name, such as '{next(iter(skills))}'"
     allowed += f", or a world: {', '.join(worlds)}"
+    allowed += f", or a problem: {', '.join(PROBLEMS)}" if PROBLEMS else ""
     raise BadInput(f"unknown sub-task '{name}' (SUBTASK):{hint} known: {allowed}")

@@ -1,4 +1,4 @@
-"""The subjects of lessons, by name or object: worlds, skills of tasks, Gymnasium environments, tables; `lab.world`."""
+"""The subjects of lessons, by name or object: worlds, skills, Gymnasium environments, tables, added problems; `lab.world`."""
 
 import re
 from dataclasses import dataclass
@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING
 from lab.errors import BadInput, check_value
 from lab.learning.problem import Problem
 from lab.mdp import TabularMDP
+from lab.skills import SKILLS
 from lab.tasks.grid_world import GridWorld, from_rows
 from lab.tasks.record import NAME_PATTERN, Learned
 from lab.tasks.task_file import names_file
 from lab.teaching.lesson import Subject
 from lab.teaching.lesson_options import LessonOptions
+from lab.teaching.named_problems import is_named, problem_named
 from lab.teaching.skill_subject import SkillSubject
 from lab.teaching.world_subject import WorldSubject
 from lab.toolbox.policy import Policy
@@ -29,7 +31,7 @@ KINDS = "a name, a GridWorld, a TabularMDP or a Problem"
 
 @dataclass
 class TableSubject(Subject):
-    """A problem that was made in Python."""
+    """A problem that was made in Python, or that has a name which another package or a file adds."""
 
     problem: Problem
 
@@ -87,7 +89,7 @@ def subject_from(problem: Teachable, task: str | None = None, sight: str | None 
 
 
 def subject_of(options: LessonOptions, kept: "KeptSession | None" = None) -> Subject:
-    """The subject that the options name: an environment, a world or a skill of a task. Raises BadInput for bad options.
+    """The subject that the options name: an environment, a world, an added problem or a skill. Raises BadInput for bad options.
 
     If the options come from a stored session (`kept`), a module that they name is imported only if the user trusts it.
     """
@@ -105,4 +107,19 @@ def subject_of(options: LessonOptions, kept: "KeptSession | None" = None) -> Sub
         return GymSubject.of(options)
     if names_file(options.subtask):
         return WorldSubject.of(options)
+    if options.task is None and options.subtask not in SKILLS and is_named(options.subtask):
+        return _named_subject(options)
     return SkillSubject.of(options)
+
+
+def _named_subject(options: LessonOptions) -> Subject:
+    made, learner = problem_named(options.subtask)
+    if isinstance(made, GridWorld):
+        return WorldSubject(options.changed(made), options.view or "full")
+    if options.view is not None:
+        raise BadInput(f"sight '{options.view}' (--sight): only a world has one, '{options.subtask}' is none")
+    subject = TableSubject(made)
+    if learner is not None:
+        subject.settings = Learned(learner=learner)
+    subject.settings = options.changed(subject.settings)
+    return subject

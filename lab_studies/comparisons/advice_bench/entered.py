@@ -4,15 +4,18 @@ import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from hashlib import sha256
-from typing import Any
+from typing import Annotated, Any
+
+from annotated_types import Ge
 
 from lab.advice.advisors import ADVISORS as ADDED
 from lab.advice.advisors import AdvisorName
-from lab.errors import BadInput, unknown
+from lab.errors import BadInput, check_value, unknown
 from lab.files import code_key
 from lab.learning.gates import GATES, Gate
 from lab.plugins.code_file import files_taken, from_file, take
 from lab.studies.compared import FAMILIES
+from lab_studies.comparisons.advice_bench import families
 from lab_studies.comparisons.advice_bench.bad_advisors import ADVISORS, advice_of
 from lab_studies.comparisons.advice_bench.problems import HELD_OUT, PROBLEMS, Benched, own_problem, problem
 from lab_studies.comparisons.advice_bench.rules import NOBODY, RULES, Rule, rule_of
@@ -23,7 +26,8 @@ class Entered:
     """The members of a run by name, in the order of its rows, as another process can make them.
 
     rules, advisors, problems: the names of all; gates, made, places: what was made in Python, and all problems of the user;
-    files: the members from files, see `lab.plugins.code_file.files_taken`.
+    files: the members from files, see `lab.plugins.code_file.files_taken`; a problem from a file is made anew in each process.
+    families_seed: of the instances of the families that are held out.
     """
 
     rules: tuple[str, ...] = tuple(RULES)
@@ -33,10 +37,13 @@ class Entered:
     made: Mapping[str, AdvisorName] = field(default_factory=dict)
     places: Mapping[str, Benched] = field(default_factory=dict)
     files: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    families_seed: int = families.SEED
 
     @classmethod
     def of(cls, reading: Mapping[str, Any]) -> "Entered":
         """The members that a reading names: "methods" (rules), "advisors" and "problem", a list or a single one each.
+
+        "families_seed" is that of the families' instances.
 
         A rule is a name of the bench, a gate's name or a subclass of `lab.Gate`; an advisor a name, a function, an object or a
         class; a problem a name, a file, gym:ID or an object that `lab.teach` takes. Raises BadInput, which names the member.
@@ -47,9 +54,12 @@ class Entered:
         rules = [_rule(given, gates) for given in _listed(reading, "methods", RULES)]
         problems = [_problem(given, places) for given in _listed(reading, "problem", (*PROBLEMS, *HELD_OUT))]
         advisors = [_advisor(given, made) for given in _listed(reading, "advisors", ADVISORS)]
-        files = {name: file for name, file in files_taken().items() if name in (*rules, *advisors)}
+        files = {name: file for name, file in files_taken().items() if name in (*rules, *advisors, *problems)}
         once = [tuple(dict.fromkeys(several)) for several in (rules, advisors, problems)]
-        entered = cls(once[0], once[1], once[2], gates, made, places, files)
+        drawn_from = reading.get("families_seed", families.SEED)
+        check_value("families_seed", drawn_from, Annotated[int, Ge(0)], "AdviceBench")
+        places = {name: place for name, place in places.items() if name not in files}
+        entered = cls(once[0], once[1], once[2], gates, made, places, files, drawn_from)
         for name in entered.advisors:
             if name not in ADVISORS:
                 for where in entered.problems:
@@ -72,15 +82,16 @@ class Entered:
         return name if name in ADVISORS else self.made.get(name) or AdvisorName.of(name, "--advisors")
 
     def place(self, name: str, world: int = 0) -> Benched:
-        """The problem of that name; world: the number of a random one."""
-        return self.places[name] if name in self.places else problem(name, world)
+        """The problem of that name; world: the number of a random one, or of an instance of a family."""
+        return self.places[name] if name in self.places else problem(name, world, self.families_seed)
 
     def key(self, name: str, advisor: str | None) -> str:
         """A key of what is the user's own in a case (a problem's name and an advisor's): its code and tables; "" for nothing."""
-        modules = list(self.places[name].modules) if name in self.places else []
-        tables: list[Any] = []
-        if name in self.places:
-            place = self.places[name]
+        modules: list[str] = []
+        tables: list[Any] = [self.families_seed] if name in HELD_OUT else []
+        if name not in PROBLEMS and name not in HELD_OUT:
+            place = self.place(name)
+            modules += place.modules
             tables += [place.mdp.signature, sha256(place.values.tobytes()).hexdigest(), vars(place.learner)]
         if advisor is not None:
             modules += [module for rule in self.rules if rule not in RULES for module in GATES.modules_of(rule)]

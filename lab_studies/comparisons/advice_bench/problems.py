@@ -11,19 +11,20 @@ import numpy as np
 from lab.errors import BadInput, WorkFailed
 from lab.learning.batch import ChanceTable, run_sessions
 from lab.learning.environment import Environment, TableEnvironment, check_solvable
+from lab.learning.problem import Problem
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.learning.simulated_advice import Advice, advice_chances
 from lab.mdp import FloatArray, TabularMDP, optimal_values
-from lab.teaching.subjects import Teachable, subject_from
-from lab_studies.comparisons.advice_bench import layouts
+from lab.teaching.subjects import GYM, Teachable, subject_from
+from lab_studies.comparisons.advice_bench import families, layouts
+from lab_studies.comparisons.advice_bench.common_learner import COMMON
 
 if TYPE_CHECKING:
     from lab.gym.transition_model import TransitionModel
 
 RANDOM_WORLDS = 100
-OTHERS = 1000  # the number of the first random world that is held out
+OTHERS = 1000  # the number of the first of the other random worlds
 WALKS = 480  # walks of the best policy, of which `par` is the mean
-COMMON = LearnerSettings(learner="q", alpha=0.95, beta=1.0, episodes=200, max_steps=200)
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,8 +67,8 @@ def _named(name: Teachable, task: str | None = None, **changes: Any) -> Benched:
     learner = replace(COMMON, max_steps=subject.settings.learner.max_steps, **changes)
     if problem.environment is None:
         return Benched(problem.name, problem.mdp, learner, optimal_values(problem.mdp, learner.discount))
-    modules = tuple(getattr(problem.environment, "modules", ()))
-    if isinstance(name, str):
+    modules = _modules(problem.environment)
+    if isinstance(name, str) and name.startswith(GYM):
         model = getattr(problem.environment, "model", None)
         if model is None:
             raise BadInput(f"problem '{name}' (--problem): AdviceBench needs a table or a model, and it brings neither")
@@ -79,6 +80,13 @@ def _named(name: Teachable, task: str | None = None, **changes: Any) -> Benched:
     except WorkFailed as error:
         raise BadInput(f"problem '{problem.name}' (--problem): its optimal values are unknown: {error}") from None
     return Benched(problem.name, problem.mdp, learner, values, problem.environment, modules)
+
+
+def _modules(environment: Environment) -> tuple[str, ...]:
+    """The modules of an environment's code, see `lab.files.code_key`; none for the lab's own."""
+    module = type(environment).__module__
+    own = () if module.partition(".")[0] in ("lab", "lab_studies") else (module,)
+    return tuple(getattr(environment, "modules", own))
 
 
 def _of_model(name: str, model: "TransitionModel", mdp: TabularMDP, learner: LearnerSettings) -> Benched:
@@ -126,11 +134,7 @@ PROBLEMS: Mapping[str, Callable[[], Benched]] = {
     "door-key": lambda: _table(layouts.minigrid(layouts.DOOR_KEY_ROWS)),
     "lava": lambda: _table(layouts.minigrid(layouts.LAVA_ROWS), beta=0.7),
     "toast-order": lambda: _table(layouts.toast_order(), max_steps=100),
-}
-
-
-# nothing was chosen on these, neither a constant of a rule nor a learner's setting
-HELD_OUT: Mapping[str, Callable[[], Benched]] = {
+    # these six were held out until their figures had been published: nothing was chosen on them, but they have been seen
     "other-worlds": lambda: _named(f"random:10x10x10:0.06:{OTHERS}", learner="afterstate"),
     "place": lambda: _named("place", "toast"),
     "butter": lambda: _named("butter", "toast"),
@@ -138,15 +142,32 @@ HELD_OUT: Mapping[str, Callable[[], Benched]] = {
     "four-rooms": lambda: _table(layouts.minigrid(layouts.FOUR_ROOMS_ROWS)),
     "crossing": lambda: _table(layouts.minigrid(layouts.CROSSING_ROWS)),
 }
-SEVERAL = {"random-worlds": 0, "other-worlds": OTHERS}  # the number of the first world
+HELD_OUT = tuple(families.FAMILIES)  # nothing was chosen on these; their learner is COMMON as it is
+SEVERAL = {"random-worlds": 0, "other-worlds": OTHERS, **dict.fromkeys(HELD_OUT, 0)}  # the number of the first one
 
 
 @lru_cache(maxsize=256)
-def problem(name: str, world: int = 0) -> Benched:
-    """The problem of a name, or one of the user's own; world: the number of a random one. Raises BadInput for an unknown name."""
-    if name in SEVERAL:
+def problem(name: str, world: int = 0, families_seed: int = families.SEED) -> Benched:
+    """The problem of a name, or one of the user's own. Raises BadInput for an unknown name.
+
+    world: the number of a random world, or of an instance of a family; families_seed: of the instances.
+    """
+    if name in families.FAMILIES:
+        made = _instance(name, world, families_seed)
+    elif name in SEVERAL:
         made = _named(f"random:10x10x10:0.06:{SEVERAL[name] + world}", learner="afterstate")
     else:
-        known = {**PROBLEMS, **HELD_OUT}
-        made = known[name]() if name in known else _named(name)
+        made = PROBLEMS[name]() if name in PROBLEMS else _named(name)
     return replace(made, name=name)
+
+
+def _instance(family: str, number: int, seed: int) -> Benched:
+    drawn = families.drawn(family, number, COMMON, seed)
+    return Benched(family, drawn.mdp, COMMON, drawn.values, drawn.chances)
+
+
+def to_teach(name: str, number: int | None = None) -> Problem:
+    """The problem of that name as `lab teach` takes it; number: of an instance of a family, drawn from the default seed."""
+    benched = problem(name, number or 0)
+    full = name if number is None else f"{name}:{number}"
+    return Problem(full, "table", benched.mdp, benched.chances)

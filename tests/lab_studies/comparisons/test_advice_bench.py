@@ -13,6 +13,8 @@ import pytest
 
 import lab
 from lab.errors import BadInput
+from lab.learning.environment import Step, TableEnvironment
+from lab.learning.selection import Draw
 from lab.learning.settings import LearnerSettings
 from lab.mdp import greedy_path, grid, optimal_values, shortest_steps
 from lab.studies.runner import Job
@@ -286,3 +288,58 @@ def test_a_member_that_cannot_enter_is_named_in_one_line(reading: dict[str, Any]
     with pytest.raises(BadInput, match=why) as refused:
         advice_bench(Job(sessions=2), {"problem": ["empty"]} | reading)
     assert "\n" not in str(refused.value)
+
+
+class Slippery(TableEnvironment):
+    """A corridor in which every third draw does not move the learner."""
+
+    def __init__(self) -> None:
+        super().__init__(lab.grid((1, 4), [[0, 0, 0, 0]], (0, 0), (0, 3)))
+
+    def step(self, state: int, action: int, draw: Draw) -> Step:
+        return Step(-0.1, state, False) if draw() < 1 / 3 else super().step(state, action, draw)
+
+
+class Right:
+    """An advisor's object: always names the last action."""
+
+    def advise(self, request: lab.AdviceRequest) -> int | None:
+        return request.allowed[-1]
+
+
+def test_a_problem_with_an_environment_and_an_advisors_object_are_measured() -> None:
+    slippery = lab.Problem("slippery", "walk", Slippery().mdp, Slippery())
+    reading: dict[str, Any] = {"methods": ["always"], "advisors": [Right(), "expert"], "problem": [slippery]}
+    found = lab.study("advicebench", sessions=2, **reading)
+    points = {row["advisor"]: row["points"] for row in found.rows if row["budget"] == "any"}
+    assert {*points} == {"Right", "expert"}
+    assert all(99.0 < value < 101.0 for value in points.values())  # of the best policy, which slips as well
+    assert lab.study("advicebench", sessions=2, workers=2, **reading).rows == found.rows
+
+
+def _ran(folder: Path, *options: str) -> "subprocess.CompletedProcess[str]":
+    program = [sys.executable, "-c", "from lab.cli import main; main()", "study", "run", "advicebench", "--json"]
+    few = ["--methods=always", "--advisors=expert", "--sessions=2", *options]
+    path = {"PYTHONPATH": str(Path(lab.__file__).parents[1])}
+    return subprocess.run([*program, *few], cwd=folder, env=os.environ | path, capture_output=True, text=True)
+
+
+def test_problems_from_a_file_and_from_a_module_are_measured_in_several_processes(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text(
+        "import gymnasium\nimport lab\nfrom gymnasium.envs.toy_text.frozen_lake import FrozenLakeEnv\n"
+        "from lab.learning.environment import TableEnvironment\n\n\n"
+        "class Corridor(TableEnvironment):\n    def __init__(self):\n"
+        "        super().__init__(lab.grid((1, 4), [[0, 0, 0, 0]], (0, 0), (0, 3)))\n\n\n"
+        "made = Corridor().mdp\ngymnasium.register('Own-v0', 'mine:FrozenLakeEnv', max_episode_steps=90)\n"
+    )
+    problems = ["--problem=./mine.py:Corridor", "--problem=./mine.py:made", "--problem=gym:mine:Own-v0"]
+    ran = _ran(tmp_path, *problems, "--workers=2")
+    assert ran.returncode == 0, ran.stderr
+    rows = json.loads(ran.stdout)["rows"]
+    assert {row["problem"] for row in rows} == {"mine.Corridor", "mine.made", "gym:mine:Own-v0"}
+    kept = (tmp_path / "advicebench-study" / "sessions.jsonl").read_text()
+    assert _ran(tmp_path, *problems).returncode == 0
+    assert (tmp_path / "advicebench-study" / "sessions.jsonl").read_text() == kept  # nothing was run twice
+    wrong = _ran(tmp_path, "--problem=./mine.py:Coridor")
+    assert (wrong.returncode, wrong.stdout.count("\n") <= 1) == (2, True)
+    assert "did you mean 'Corridor'" in wrong.stderr
