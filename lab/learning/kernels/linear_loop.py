@@ -264,7 +264,7 @@ def _episode(work: Any, linear: Any, world: Any) -> None:
     count.helped_steps += lane.helped
     count.moves += moves
     if lane.is_open and work.asking.gate.judges:
-        judge(work.asking, lane, sessions.steps[n], count)
+        judge(work.asking, lane, (sessions.steps[n], sessions.guided[n]), count, moves)
 
 
 @without_refcounts
