@@ -154,7 +154,8 @@ def skill_of(answers: Sequence[Pair], values: FloatArray) -> SkillEstimate | Non
     """The maximum-likelihood tau of answers drawn from a softmax over values (S, A), with its likelihood interval.
 
     A share of the answers may be slips, drawn evenly from the actions, so that a single one that costs much does not outweigh
-    many best ones: each tau has the share of SLIPS that makes the answers likeliest, with an exponential prior. Only states count in which the actions differ in value; None for fewer than FEWEST of them. Source: thesis eq. 9.1.
+    many best ones: each tau has the share of SLIPS that makes the answers likeliest, with an exponential prior. Only states
+    count in which the actions differ in value; None for fewer than FEWEST of them. Source: thesis eq. 9.1.
     """
     table = values[[state for state, _ in answers]] if answers else values[:0]
     below = table - table.max(axis=1, keepdims=True)

@@ -112,5 +112,7 @@ def in_short(rows: list[Row]) -> Row:
     shares: dict[str, list[float]] = {}
     for row in rows:
         if row["measure"] == "rejected_percent":
-            shares.setdefault(f"{row['rule']}, {row['subtask']}, {row['advisor']}: rejected [%]", []).append(row["value"])
+            shares.setdefault(f"{row['rule']}, {row['subtask']}, {row['advisor']}: rejected [%]", []).append(
+                row["value"]
+            )
     return {words: f"{min(of):.1f} to {max(of):.1f}" for words, of in shares.items()}
