@@ -81,6 +81,12 @@ STUDIES: dict[str, Study] = {
         "What an advisor's help is worth over nobody's, for every skill of toast",
         _In("comparisons.advice_worth", "advice_worth"),
     ),
+    "rejection": Study(
+        "Whom CCRL rejects before a budget is spent, for every sub-task of toast and every learner",
+        _In("comparisons.rejection", "rejection"),
+        sessions=40,
+        least=1,
+    ),
     "advicebench": Study(
         "AdviceBench: rules of when to ask, whatever the advisor, the budget and the problem",
         _In("comparisons.advice_bench.advice_bench", "advice_bench"),

@@ -257,6 +257,8 @@ def _notices(entries: Sequence[Entry]) -> Iterator[str]:
         if isinstance(entry, AdviceRejected):
             left = sum(isinstance(later, EpisodeEnded) for later in entries[n:])
             why = f"{counted(entry.misleads, 'episode')} no better than before, {entry.omega} tolerated"
+            if entry.misleads <= entry.omega:  # `GateSettings.by_evidence`
+                why = f"{counted(entry.misleads, 'episode')} much longer than its own"
             yield f"episode {entry.episode}: advice rejected ({why}); alone for the {counted(left, 'episode')} after it"
         elif isinstance(entry, AdviceEnded):
             yield f"episode {entry.episode}: no more advice: {entry.reason}"

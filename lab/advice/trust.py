@@ -26,6 +26,8 @@ ENOUGH = 10  # judged answers before an advisor may be dropped
 
 FEWEST = 5  # answers from which a skill is estimated
 TAUS = (0.001, 100.0)
+SLIPS = tuple(n / 50 for n in range(6))  # shares of slips
+SLIP_MEAN, GRID = 0.05, 101  # the expected share; the points in which the likelihood of a skill is looked at
 SAME = 1e-9  # values that differ by less are equally good
 EDGE = 1.920729410347062  # half the 95 % quantile of chi-squared with one degree of freedom
 
@@ -151,7 +153,9 @@ class SkillEstimate:
 def skill_of(answers: Sequence[Pair], values: FloatArray) -> SkillEstimate | None:
     """The maximum-likelihood tau of answers drawn from a softmax over values (S, A), with its likelihood interval.
 
-    Only states count in which the actions differ in value; None for fewer than FEWEST of them. Source: thesis eq. 9.1.
+    A share of the answers may be slips, drawn evenly from the actions, so that a single one that costs much does not outweigh
+    many best ones: each tau has the share of SLIPS that makes the answers likeliest, with an exponential prior. Only states
+    count in which the actions differ in value; None for fewer than FEWEST of them. Source: thesis eq. 9.1.
     """
     table = values[[state for state, _ in answers]] if answers else values[:0]
     below = table - table.max(axis=1, keepdims=True)
@@ -163,11 +167,20 @@ def skill_of(answers: Sequence[Pair], values: FloatArray) -> SkillEstimate | Non
 
     def likelihood(log_tau: float) -> float:
         tau = exp(log_tau)
-        return float(chosen.sum() / tau - np.log(np.exp(below / tau).sum(axis=1)).sum())
+        meant = np.exp(chosen / tau) / np.exp(below / tau).sum(axis=1)
+        with np.errstate(divide="ignore"):
+            by_share = (np.log((1.0 - slips) * meant + slips / actions).sum() - slips / SLIP_MEAN for slips in SLIPS)
+            return max(map(float, by_share))
 
-    ends = log(TAUS[0]), log(TAUS[1])  # one peak: the likelihood is concave in 1/tau
+    actions = below.shape[1]
+
+    ends = log(TAUS[0]), log(TAUS[1])
     optimize = scipy.optimize
-    inner = float(optimize.minimize_scalar(lambda at: -likelihood(at), bounds=ends, method="bounded").x)
+    grid = np.linspace(*ends, GRID)  # there may be several peaks
+    levels = [likelihood(at) for at in grid]
+    peak = int(np.argmax(levels))
+    around = grid[max(peak - 1, 0)], grid[min(peak + 1, GRID - 1)]
+    inner = float(optimize.minimize_scalar(lambda at: -likelihood(at), bounds=around, method="bounded").x)
     best = max((*ends, inner), key=lambda at: likelihood(at) + SAME * (at in ends))
     floor = likelihood(best) - EDGE
     low, high = (

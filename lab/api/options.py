@@ -61,6 +61,7 @@ class Settings(TypedDict, total=False):
     budget: int
     judge_unhelped: bool
     spare_best: bool
+    by_evidence: bool
     memory: bool
 
 

@@ -424,7 +424,10 @@ def _learning(mdp: TabularMDP, learner: LearnerSettings) -> records.CompiledLear
 
 def _asking(gate: GateSettings, somebody: bool, max_steps: int) -> records.Asking:
     rules = GATES[gate.gate if somebody else "never"].compiled
-    given = vars(gate) | {"gate": rules, "judge_unhelped": gate.judge_unhelped and not gate.memory}
+    given = vars(gate) | {
+        "gate": rules,
+        "judge_unhelped": gate.judge_unhelped and not (gate.memory or gate.by_evidence),
+    }
     given["max_steps"] = max_steps
     return records.Asking(**{name: given[name] for name in records.Asking._fields})
 

@@ -75,7 +75,7 @@ class Session:
         self.gate = make(gate, learner.episodes, learner.max_steps, around)
         self.max_moves = learner.max_steps - learner.count_start
         self.recall = Recall(*size, self.max_moves, learner.episodes, gate.window) if gate.memory else None
-        self.judge_unhelped = gate.judge_unhelped and not gate.memory
+        self.judge_unhelped = gate.judge_unhelped and not (gate.memory or gate.by_evidence)
         self.steps: list[int] = []
         self.guided: list[bool] = []
         self.returns: list[float] = []

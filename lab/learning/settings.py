@@ -83,7 +83,8 @@ class LearnerSettings:
 class GateSettings:
     """The settings of a gate: when a learner asks and when it stops; defaults: thesis, chapter 6 and section 9.3.
 
-    spare_best is off as in the thesis; lessons and runs switch it on (lab/tasks/record.py). memory:
+    spare_best is off as in the thesis; lessons and runs switch it on (lab/tasks/record.py). by_evidence:
+    lab/learning/gates/gate.py, `evidence`; it is off as in the thesis, and on in the task files that ship. memory:
     lab/learning/advice_memory.py.
     Raises BadInput for a value outside its range, or for X < 2K with a gate that compares moving averages.
     """
@@ -119,6 +120,10 @@ class GateSettings:
         doc("an episode that was open for advice and got none is judged, too (the thesis's listing, not its text)"),
     ] = True
     spare_best: Annotated[bool, doc("an episode as good as the best so far is no mislead")] = False
+    by_evidence: Annotated[
+        bool,
+        doc("an advisor is rejected by a sequential test against the learner's own episodes, not after Omega misleads"),
+    ] = False
     memory: Annotated[bool, doc("what was shown, or found alone, is remembered and practised without asking again")] = (
         False
     )
@@ -193,6 +198,7 @@ RANGES: dict[str, Range] = {
     "ensemble": Span(2, 10),
     "judge_unhelped": (False, True),
     "spare_best": (False, True),
+    "by_evidence": (False, True),
     "memory": (False, True),
 }
 USUAL = ("alpha", "trace", "exploration", "beta", "lambda_threshold", "omega")  # the settings that are tuned by default

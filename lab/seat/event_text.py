@@ -93,8 +93,9 @@ class SessionText:
             case EpisodeEnded(guided=True):
                 return self._episode(event)
             case AdviceRejected():
+                limit = f", tolerated: {event.omega}" if event.misleads > event.omega else "; the evidence is enough"
                 return Told(
-                    f"The learner takes no more advice (episodes misled: {event.misleads}, tolerated: {event.omega}). "
+                    f"The learner takes no more advice (episodes misled: {event.misleads}{limit}). "
                     f"Episode {event.episode} {self._counted(event.steps)}, those before it {event.mean_before:.1f}.",
                     "lost",
                 )

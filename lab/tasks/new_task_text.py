@@ -145,17 +145,17 @@ _LEARNING = """\
 [subtasks.transfer]
 rewards = { goal = 1.5, step = -0.1 }
 learner = { learner = "dyna-q", alpha = 0.95, discount = 0.99, beta = 1.3, episodes = 200, max_steps = 200 }
-gate = { gate = "ccrl", lambda_threshold = 0.05, omega = 7, first_episode = 10, window = 5 }
+gate = { gate = "ccrl", lambda_threshold = 0.05, omega = 7, first_episode = 10, window = 5, by_evidence = true }
 
 [subtasks.grasp]
 rewards = { goal = 1.5, step = -0.1 }
 learner = { learner = "dyna-q", alpha = 0.95, discount = 0.99, beta = 1.3, episodes = 1500, max_steps = 200 }
-gate = { gate = "ccrl", lambda_threshold = 0.05, omega = 7, first_episode = 30, window = 5, budget = 1000 }
+gate = { gate = "ccrl", lambda_threshold = 0.05, omega = 7, first_episode = 30, window = 5, by_evidence = true, budget = 1000 }
 
 [subtasks.place]
 rewards = { goal = 1.5, step = -0.1 }
 learner = { learner = "dyna-q", alpha = 0.95, discount = 0.99, beta = 1.3, episodes = 200, max_steps = 200 }
-gate = { gate = "ccrl", lambda_threshold = 0.05, omega = 7, first_episode = 10, window = 5, budget = 500 }
+gate = { gate = "ccrl", lambda_threshold = 0.05, omega = 7, first_episode = 10, window = 5, by_evidence = true, budget = 500 }
 
 # ---- the order of the robot's transfers ----------------------------------------------------------------------------
 

@@ -147,7 +147,10 @@ def test_the_likeliest_tau_of_two_actions(good: int) -> None:
         return -good * log(1 + np.exp(-1 / tau)) - (10 - good) * log(1 + np.exp(1 / tau))
 
     assert found.low < found.tau < found.high
-    assert likelihood(found.low) == pytest.approx(likelihood(found.tau) - EDGE, abs=1e-4)
+    if good < 9:
+        assert likelihood(found.low) == pytest.approx(likelihood(found.tau) - EDGE, abs=1e-4)
+    else:
+        assert found.low == 0.001  # an expert's, if the one other answer was a slip
     if found.high < 100:
         assert likelihood(found.high) == pytest.approx(likelihood(found.tau) - EDGE, abs=1e-4)
 
@@ -161,6 +164,16 @@ def test_skills_at_the_ends() -> None:
     assert (worst.tau, worst.high, worst.word) == (100.0, 100.0, "novice")
     assert str(best) == f"tau 0.001 (0.001 to {best.high:.3g}, from 20 answers): nearest to expert"
     assert str(worst).endswith(": no better than chance")
+
+
+def test_one_slip_of_26_answers_is_still_an_expert() -> None:
+    """25 choices of the best by 0.1, and one that is worse by 10: likeliest as an expert's, of whose answers 1 in 26 is a slip.
+
+    As a softmax alone they would be a novice's: at tau 0.1 the slip has the chance exp(-100), at tau 1 exp(-10).
+    """
+    found = skill_of([(0, 0)] * 25 + [(1, 1)], np.array([[0.0, -0.1], [0.0, -10.0]]))
+    assert found is not None
+    assert found.word == "expert"
 
 
 def test_too_few_answers_show_no_skill() -> None:

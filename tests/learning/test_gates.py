@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from math import log
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from lab.advice.advisors import AdvisorName
 from lab.advice.table_level import TableLevel
 from lab.errors import BadInput
 from lab.learning.gates import GATES, Gate, Surroundings, deviation, improvement
+from lab.learning.gates.gate import evidence
 from lab.learning.members import Member
 from lab.learning.requests import TooSlow
 from lab.learning.session import Session
@@ -264,3 +266,38 @@ def test_each_reason_is_a_record_of_its_figures() -> None:
     assert one.opens(5, [100, 100, 96, 96])
     assert isinstance(one.why, TooSlow)
     assert (round(one.why.rate, 9), one.why.threshold) == (0.04, 0.05)
+
+
+def test_evidence_by_hand() -> None:
+    """Times longer than its own, times 2/3, less log 3 where the goal was reached; between -log 50 and what it comes to."""
+    assert evidence(0.0, 60, 100.0, 5, failed=False, throughout=True) == pytest.approx(3 * 2 / 3 - log(3))
+    assert evidence(0.0, 20, 100.0, 5, failed=False, throughout=True) == pytest.approx(2 / 3 - log(3))
+    assert evidence(0.0, FAILED, 5 * FAILED, 1, failed=True, throughout=False) == pytest.approx(2 / 3 / 5)
+    assert evidence(0.0, FAILED, 5 * FAILED, 0, failed=True, throughout=True) == pytest.approx(2)  # counts three times
+    assert evidence(0.0, FAILED, 5 * FAILED, 0, failed=True, throughout=False) == 0.0
+    assert evidence(-3.9, 1, 100.0, 5, failed=False, throughout=True) == -log(50)
+
+
+def test_by_evidence_two_failures_by_advice_reject_and_own_episodes_do_not_count() -> None:
+    """2 + 2 exceeds log 50 = 3.91; a success between them, as long as the learner's own, takes log 3 - 2/3 = 0.43 off."""
+
+    def judged(*results: int) -> Gate:
+        one = gate("ccrl", replace(SETTINGS, by_evidence=True))
+        steps = [10, 10]
+        for n in (1, 2):
+            one.judges(steps[:n], False)
+        for result in results:
+            one.begins(0)
+            for _ in range(min(result, LIMIT)):
+                one.takes(0, 0, 0)
+                one.saw(0, 0, 0.0, 1.0, 0, 0)
+            steps.append(result)
+            one.judges(steps, True)
+        return one
+
+    assert not judged(10, 10, 10, 10).misleads
+    assert judged(FAILED).rejected  # 20 times as long as its own
+    slow = judged(29)  # 2.9 * 2/3 - log 3 = 0.83
+    assert (slow.misleads, slow.verdict, slow.rejected) == (1, "misled", False)
+    assert judged(*[29] * 5).rejected  # 5 * 0.83 > 3.91
+    assert not judged(*[29] * 4).rejected

@@ -100,6 +100,20 @@ def test_they_are_the_same_where_the_best_episodes_are_spared(gate: str) -> None
     assert 0 < batch.misleads.sum() < plain.misleads.sum()
 
 
+@pytest.mark.parametrize("gate", ["ccrl", "combined"])
+@pytest.mark.parametrize("several", [False, True])
+def test_they_are_the_same_where_gates_judge_by_evidence(gate: str, several: bool) -> None:
+    starts = tuple(np.flatnonzero(~board().terminal).tolist()) if several else ()
+    place, seeds = replace(board(), starts=starts), np.arange(6, dtype=np.uint64)
+    how = replace(EAGER, gate=gate, by_evidence=True, budget=2000, lambda_threshold=1.0)
+    for values in (optimal_values(board(), SHORT.discount), -optimal_values(board(), SHORT.discount)):
+        said = Advice.of(advice_chances(values, 0.3))
+        batch = run_sessions(place, SHORT, how, said, seeds, keep_tables=True)
+        for n in range(6):
+            assert_same(batch, n, alone(place, SHORT, how, said, n))
+    assert batch.rejected_at_episode.any()
+
+
 class EveryOther(Gate):
     """A gate of somebody else's, which has no compiled form."""
 

@@ -80,6 +80,14 @@ def test_every_learner_and_selection_on_a_grid(learner: str, selection: str) -> 
         both(place, replace(settings, replacing=replacing), EAGER, advice(place))
 
 
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_advisors_are_judged_by_evidence_alike(sign: float) -> None:
+    settings = LearnerSettings("sarsa-lambda", alpha=0.5, tilings=2, episodes=30, max_steps=60)
+    place, how = TableEnvironment(board()), replace(EAGER, by_evidence=True, lambda_threshold=1.0)
+    who = Advice.of(advice_chances(sign * optimal_values(board(), 0.99), 0.01))
+    assert both(place, settings, how, who).rejected_at_episode.any() == (sign < 0)
+
+
 def test_several_starts_are_drawn_alike() -> None:
     place = TableEnvironment(replace(board(), starts=(0, 3, 30)))
     both(place, LearnerSettings("sarsa", tilings=2, episodes=20, max_steps=40), replace(EAGER, gate="ia"), None)

@@ -43,6 +43,7 @@ def test_the_defaults_are_those_of_the_thesis() -> None:
         "budget": 1_000_000_000,
         "judge_unhelped": True,
         "spare_best": False,
+        "by_evidence": False,
         "memory": False,
     }
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from math import log
 from typing import NamedTuple
 
 from lab.learning.requests import ByChance, Reason, ValuesAlike, ValuesApart
@@ -15,6 +16,9 @@ Steps = Sequence[float]  # step counts of the finished episodes; for orders of t
 OPENS_NEVER, OPENS_ALWAYS, OPENS_FROM_X, OPENS_WHILE_SLOW, OPENS_WHILE_LONG = range(5)
 WEIGHS_NOTHING, WEIGHS_NOVELTY, WEIGHS_FADING, WEIGHS_SHAPING, WEIGHS_RELIABILITY, WEIGHS_WORTH, WEIGHS_TRUST = range(7)
 ASKS_ALWAYS, ASKS_WHERE_ALIKE, ASKS_WHERE_APART, ASKS_BY_CHANCE, ASKS_WHERE_TABLES_DIFFER = range(5)
+
+TIMES_LONGER = 3.0  # how much longer than its own a learner's episodes are with an advisor that is to be rejected
+ENOUGH_EVIDENCE = log(50.0)  # Wald's bound: a useful advisor is rejected with a chance of about 2 %
 
 
 class CompiledGate(NamedTuple):
@@ -46,6 +50,25 @@ def too_slow(current_mean: float, previous_mean: float, threshold: float) -> boo
 def misled(result: float, mean_before: float) -> bool:
     """Whether an episode was not better than the mean of the K before it. Source: thesis eq. 6.3 and listing."""
     return result >= mean_before
+
+
+def evidence(before: float, result: float, own: float, reached: int, failed: bool, throughout: bool) -> float:
+    """The evidence against an advisor after another advised episode: a log-likelihood ratio, at least -ENOUGH_EVIDENCE.
+
+    The learner reaches the goal at a constant rate per step: its own rate if the advisor does no harm, a TIMES_LONGER-th of it if
+    the advisor is to be rejected. before: the evidence so far; result: the steps of the episode; own, reached: the steps of the
+    learner's last own episodes, summed, and how many of them reached the goal; failed: whether the advised one did not.
+    throughout: whether each of its moves was advised; such an episode that fails counts as at least TIMES_LONGER own ones,
+    because the learner alone may not have reached the goal yet either. Source: Wald 1945, with a floor so that an advisor whose
+    answers become worse is rejected, too.
+    """
+    times = result * reached / own if own > 0.0 else 0.0
+    if failed and throughout:
+        times = max(times, TIMES_LONGER)
+    gained = times * (1.0 - 1.0 / TIMES_LONGER)
+    if not failed:
+        gained -= log(TIMES_LONGER)
+    return max(before + gained, -ENOUGH_EVIDENCE)
 
 
 def unsure(width: float, psi: float) -> bool:

@@ -162,6 +162,7 @@ def answered(work: Any, hearing: Any, j: int, state: Any, own: Any) -> int:
 _window_mean: Any = inner(rules.window_mean)
 _too_slow: Any = inner(rules.too_slow)
 _misled: Any = inner(rules.misled)
+_evidence: Any = inner(rules.evidence)
 _unsure: Any = inlined(rules.unsure)
 
 
@@ -191,12 +192,22 @@ def opens(asking: Any, lane: Any, steps: Any, max_steps: int, rejected: bool) ->
 
 
 @inner
-def judge(asking: Any, lane: Any, steps: Any, count: Any) -> None:
-    """`Ccrl.judges` if all episodes begin in the same state; steps (E,) are those of the lane's session."""
+def judge(asking: Any, lane: Any, told: Any, count: Any, moves: int) -> None:
+    """`Ccrl.judges` if all episodes begin in the same state; told: steps (E,) and guided (E,) of the lane's session."""
     episode, window = lane.episode, asking.window
     if not _judged(asking, lane, count):
         return
+    steps, guided = told
     result = steps[episode - 1]
+    if asking.by_evidence:
+        own, reached, found, i = 0.0, 0, 0, episode - 2
+        while i >= 0 and found < window:
+            if not guided[i]:
+                own, found = own + steps[i], found + 1
+                reached += steps[i] <= asking.max_steps
+            i -= 1
+        _weighs(asking, lane, count, result, own, reached, moves)
+        return
     if _misled(result, _window_mean(steps, episode - 1, window)):
         # With one start the fewest known steps are those of the best episode.
         best = bool(asking.spare_best and result <= asking.max_steps)
@@ -218,13 +229,26 @@ def knows(lane: Any, steps: Any, walked: int, fewest: Any, walk: Any, max_steps:
 
 
 @inner
-def judge_moved(asking: Any, lane: Any, steps: Any, count: Any, fewest: Any, begun: Any) -> None:
+def judge_moved(asking: Any, lane: Any, told: Any, count: Any, moves: int, fewest: Any, begun: Any) -> None:
     """`Ccrl.judges` if episodes begin in different states: earlier step counts are corrected by their starts."""
     episode, window = lane.episode, asking.window
     if not _judged(asking, lane, count):
         return
+    steps, guided = told
     result, now = steps[episode - 1], begun[episode - 1]
     here, total = fewest[now], 0.0
+    if asking.by_evidence:
+        reached, found, i = 0, 0, episode - 2
+        while i >= 0 and found < window:
+            if not guided[i]:
+                value = float(steps[i])
+                if begun[i] != now and here < np.inf and steps[i] <= asking.max_steps:
+                    value = value - fewest[begun[i]] + here
+                total, found = total + value, found + 1
+                reached += steps[i] <= asking.max_steps
+            i -= 1
+        _weighs(asking, lane, count, result, total, reached, moves)
+        return
     for i in range(episode - 1 - window, episode - 1):
         value = float(steps[i])
         if begun[i] != now and here < np.inf and steps[i] <= asking.max_steps:
@@ -240,6 +264,16 @@ def _judged(asking: Any, lane: Any, count: Any) -> bool:
     """Whether the last episode is compared with those before it."""
     may = asking.judge_unhelped or lane.helped > 0
     return bool(may and count.rejected_at_episode == 0 and lane.episode > asking.window)
+
+
+@inlined
+def _weighs(asking: Any, lane: Any, count: Any, result: Any, own: float, reached: int, moves: int) -> None:
+    """`Ccrl._weighs` of an advised episode; own, reached: see `gates.gate.evidence`."""
+    before, failed = lane.evidence, result > asking.max_steps
+    lane.evidence = _evidence(before, result, own, reached, failed, lane.helped >= moves)
+    count.misleads += lane.evidence > before
+    if lane.evidence > rules.ENOUGH_EVIDENCE:
+        count.rejected_at_episode = lane.episode
 
 
 @inlined

@@ -204,6 +204,7 @@ def _begin_session(work: Any, linear: Any, n: int) -> None:
     lane = lanes.lane[0]
     lane.session, lane.episode, lanes.rng[0] = n, 0, work.sessions.seeds[n]
     lane.last_result, lane.equal_results, lane.converged = 0, 0, 0
+    lane.evidence = 0.0
     for i in range(len(linear.weights)):
         linear.weights[i] = linear.start
 
@@ -267,7 +268,7 @@ def _episode(work: Any, linear: Any, world: Any) -> None:
     count.helped_steps += lane.helped
     count.moves += moves
     if lane.is_open and work.asking.gate.judges:
-        judge(work.asking, lane, sessions.steps[n], count)
+        judge(work.asking, lane, (sessions.steps[n], sessions.guided[n]), count, moves)
 
 
 @without_refcounts

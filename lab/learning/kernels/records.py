@@ -57,13 +57,15 @@ class Asking(NamedTuple):
     budget: int
     judge_unhelped: bool
     spare_best: bool
+    by_evidence: bool
     max_steps: int
 
 
-# The state of each running session; session -1: none. `converged` is that of `gates.Ccrl`.
+# The state of each running session; session -1: none. `converged` and `evidence` are those of `gates.Ccrl`.
 LANE = np.dtype(
     [(name, np.int64) for name in ("session", "episode", "is_open", "asked", "helped", "left")]
     + [(name, np.int64) for name in ("last_result", "equal_results", "converged")]
+    + [("evidence", np.float64)]
 )
 COUNTS = np.dtype(
     [(name, np.int64) for name in ("requests", "helped_steps", "misleads", "rejected_at_episode", "moves")]

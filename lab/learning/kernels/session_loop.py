@@ -41,6 +41,7 @@ def _begin_session(work: Any, hearing: Any, walks: Any, j: int, n: int) -> None:
     lane = lanes.lane[j]
     lane.session, lane.episode, lanes.rng[j] = n, 0, work.sessions.seeds[n]
     lane.last_result, lane.equal_results, lane.converged = 0, 0, 0
+    lane.evidence = 0.0
     for i in range(lanes.tables.shape[1]):
         lanes.tables[j, i] = 0.0
     for k in range(lanes.others.shape[1]):
@@ -185,9 +186,10 @@ def _end(work: Any, memories: Any, hearing: Any, chances: Any, walks: Any, j: in
     if walks is not None:
         knows(lane, sessions.steps[n], moves, walks.fewest[j], walks.walk[j], learning.max_steps)
         if lane.is_open:
-            judge_moved(work.asking, lane, sessions.steps[n], count, walks.fewest[j], walks.begun[j])
+            told = sessions.steps[n], sessions.guided[n]
+            judge_moved(work.asking, lane, told, count, moves, walks.fewest[j], walks.begun[j])
     elif lane.is_open and work.asking.gate.judges:
-        judge(work.asking, lane, sessions.steps[n], count)
+        judge(work.asking, lane, (sessions.steps[n], sessions.guided[n]), count, moves)
     if hearing is not None:
         hears.ended(work, hearing, j, sessions.steps[n, episode - 1], won, work.problem.ends[lanes.states[j]] != 0)
     if memories is not None:
