@@ -17,9 +17,10 @@ from lab.advice.advisors import ADVISORS
 from lab.errors import BadInput
 from lab.files import code_key
 from lab.lazy import matplotlib
-from lab.learning.batch import run_sessions
+from lab.learning.batch import Batch, run_sessions
 from lab.learning.environment import Environment, TableEnvironment
 from lab.learning.gates import GATES
+from lab.learning.kernels.records import LANES
 from lab.learning.physics.environment import PhysicsEnvironment
 from lab.learning.problem import Problem
 from lab.learning.requests import Advisor, Ask
@@ -34,6 +35,7 @@ from lab.statistics import interval, share
 from lab.studies.charts import legend_below
 from lab.studies.findings import Findings, Row, mean_row, share_row, varying_row
 from lab.studies.runner import Job
+from lab.tasks.record import Learned
 from lab.teaching.lesson import Subject
 from lab.teaching.subjects import Teachable, subject_from
 from lab.version import __version__
@@ -44,6 +46,7 @@ COLOURS = (BLUE, ORANGE, GREEN, RED, PURPLE, SKY, GREY)
 DASHES = ("-", "--", ":", "-.")
 MOST_CURVES = 12  # more could not be distinguished
 MOST_DOTS = 60  # lines of a picture
+MOST_ENTRIES = 4_000_000  # of the tables that are held at once, 32 MB, unless a single round of the kernel has more
 
 
 def figures(results: Sequence[Result]) -> dict[str, bytes]:
@@ -240,37 +243,45 @@ def sessions_of(setting: ComparedSetting, sessions: int, seed: int, stream: int 
     at_once = problem.environment is None or isinstance(environment, PhysicsEnvironment)
     if at_once and (advisor is None or isinstance(advisor, TableAdvisor)):
         advice = None if advisor is None else advisor.advice
-        batch = run_sessions(environment, how.learner, how.gate, advice, seeds, keep_tables=True)
-        rejected, steps, q = batch.rejected_at_episode > 0, batch.steps, batch.q
-        counts: tuple[NDArray[np.int64], ...] = (batch.helped_steps, batch.requests, batch.misleads)
+        some = max(
+            LANES, MOST_ENTRIES // problem.mdp.successor.size
+        )  # sessions whose tables are held at once, to be judged
+        told = [
+            _judged(run_sessions(environment, how.learner, how.gate, advice, part, keep_tables=True), environment, how)
+            for part in np.split(seeds, range(some, sessions, some))
+        ]
     else:
-        alone = [_alone(environment, how.learner, how.gate, advising, int(own)) for own in seeds]
-        rejected, steps, q = (np.array([session[n] for session in alone]) for n in range(3))
-        counts = tuple(np.array([session[n] for session in alone]) for n in range(3, 6))
-    solved = np.array([environment.judge(table, how.learner).solved for table in q])
+        told = [_alone(environment, how.learner, how.gate, advising, int(own)) for own in seeds]
+    steps, solved, rejected = (np.concatenate([part[n] for part in told]) for n in range(3))
+    counts = [np.concatenate([part[n] for part in told]) for n in range(3, 6)]
     helped, requests, misleads = (np.asarray(count, np.float64) for count in counts)
     return ComparedSessions(
         steps.mean(axis=0), solved, steps.mean(axis=1), steps[:, -1].astype(float), helped, requests, misleads, rejected
     )
 
 
+# Of N sessions of E episodes: steps (N, E), solved (N,), rejected (N,), and three counts (N,): helped steps, requests, misleads.
+Measured = tuple[NDArray[Any], BoolArray, BoolArray, NDArray[Any], NDArray[Any], NDArray[Any]]
+
+
+def _judged(batch: Batch, environment: Environment, how: Learned) -> Measured:
+    """The results of compiled sessions, whose tables are judged and not kept."""
+    solved = np.array([environment.judge(table, how.learner).solved for table in batch.q])
+    return batch.steps, solved, batch.rejected_at_episode > 0, batch.helped_steps, batch.requests, batch.misleads
+
+
 def _alone(
     environment: Environment, learner: LearnerSettings, gate: GateSettings, advising: Advising, seed: int
-) -> tuple[bool, NDArray[np.int64], FloatArray, int, int, int]:
-    """(rejected, steps (E,), q (S, A), helped steps, requests, misleads) of one session that is not compiled."""
+) -> Measured:
+    """The results of one session that is not compiled."""
     rng = np.random.default_rng(seed)
     advisor = advising.for_session().gather(environment, learner, rng)
     session = Session(environment, learner, gate, advisor, rng).run()
     if session.interrupted:
         raise KeyboardInterrupt
-    return (
-        session.rejected_at_episode is not None,
-        session.steps,
-        session.q,
-        session.helped_steps,
-        session.requests,
-        session.misleads,
-    )
+    counts = (np.array([count]) for count in (session.helped_steps, session.requests, session.misleads))
+    rejected = session.rejected_at_episode is not None
+    return session.steps[None], np.array([session.solved]), np.array([rejected]), *counts
 
 
 def rows_of(named: Row, measured: ComparedSessions) -> list[Row]:

@@ -14,7 +14,7 @@ import pytest
 
 import lab
 from lab.errors import BadInput
-from lab.learning.batch import run_sessions
+from lab.learning.batch import Batch, run_sessions
 from lab.learning.gates import GATES, Gate
 from lab.learning.members import Member
 from lab.studies.compared import Compared, ComparedSetting, compared, sessions_of, words
@@ -50,6 +50,22 @@ def test_its_sessions_are_those_of_the_kernel() -> None:
     batch = run_sessions(WORLD.mdp(), how.learner, how.gate, None, seeds.integers(2**64, size=4, dtype=np.uint64))
     assert found.mean_steps.tolist() == batch.steps.mean(axis=1).tolist()
     assert found.last_steps.tolist() == batch.steps[:, -1].tolist()
+
+
+def test_the_tables_of_few_sessions_are_held_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """60 sessions in rounds of 24, 24 and 12, with the same results as in one."""
+    setting, held = one(Compared(WORLD, ("expert",), SHORT)), []
+    whole = sessions_of(setting, 60, 0)
+
+    def recorded(*given: Any, **how: Any) -> Batch:
+        batch = run_sessions(*given, **how)
+        held.append(len(batch.q))
+        return batch
+
+    monkeypatch.setattr("lab.studies.compared.MOST_ENTRIES", 1)
+    monkeypatch.setattr("lab.studies.compared.run_sessions", recorded)
+    assert sessions_of(setting, 60, 0).to_json() == whole.to_json()
+    assert held == [24, 24, 12]
 
 
 def test_what_is_not_compiled_is_run_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
