@@ -27,6 +27,8 @@ class SessionResult:
     optimal_steps: the fewest possible, None if unknown; final_steps: those of the greedy path from the start, None if it misses
     the goal; both are counted as in `steps`. solved: see `Environment.judge`.
     interrupted: whether Ctrl-C stopped the session; then only finished episodes count.
+    In a problem that is scored by return (see `environment.highest_reward`) no episode fails, and there are also: returns:
+    (episodes,) float64, the sum of the rewards of each, NaN where it is not known; final_return, best_return: see `Judged`.
     """
 
     q: FloatArray
@@ -41,6 +43,9 @@ class SessionResult:
     final_steps: int | None
     solved: bool
     interrupted: bool
+    returns: FloatArray | None = None
+    final_return: float | None = None
+    best_return: float | None = None
 
 
 def check_members(

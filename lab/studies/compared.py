@@ -42,6 +42,7 @@ from lab.version import __version__
 from lab.view.canvas import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, RED, SKY, picture_bytes
 
 Result = tuple[Row, "ComparedSessions"]
+_RETURNS = ("return", "return_curve")  # the ends of the names of fields that only problems scored by return have
 COLOURS = (BLUE, ORANGE, GREEN, RED, PURPLE, SKY, GREY)
 DASHES = ("-", "--", ":", "-.")
 MOST_CURVES = 12  # more could not be distinguished
@@ -51,12 +52,15 @@ MOST_ENTRIES = 4_000_000  # of the tables that are held at once, 32 MB, unless a
 
 def figures(results: Sequence[Result]) -> dict[str, bytes]:
     """SVG pictures by caption; if there are many settings, of the best ones."""
-    ranked = sorted(results, key=lambda result: (-result[1].solved.mean(), result[1].mean_steps.mean()))
+    ranked = sorted(results, key=lambda result: (-result[1].solved.mean(), result[1].cost.mean()))
+    score = "return" if ranked[0][1].by_return else "steps"
     most = "" if len(ranked) <= MOST_DOTS else f", the best {MOST_DOTS} of {len(ranked)} settings"
     several = "" if len(ranked) <= MOST_CURVES else f", the best {MOST_CURVES} of {len(ranked)} settings"
     return {
-        f"Sessions that are solved in the end, steps and helped steps, with intervals{most}": _dots(ranked[:MOST_DOTS]),
-        f"Mean steps of each episode{several}": _curves(ranked[:MOST_CURVES]),
+        f"Sessions that are solved in the end, {score} and helped steps, with intervals{most}": _dots(
+            ranked[:MOST_DOTS]
+        ),
+        f"Mean {score} of each episode{several}": _curves(ranked[:MOST_CURVES]),
     }
 
 
@@ -70,12 +74,17 @@ def words(named: Row, among: Sequence[Row]) -> str:
 def _dots(results: Sequence[Result]) -> bytes:
     """A picture with a line per setting and a column per measure."""
     names = [words(named, [other for other, _ in results]) for named, _ in results]
+    by_return = results[0][1].by_return
+    score = "return" if by_return else "steps"
 
     def draw(figure: "matplotlib.figure.Figure") -> None:
         columns = figure.subplots(1, 3, sharey=True)
         measured: list[tuple[str, list[Any]]] = [
             ("solved [%]", [share(found.solved) for _, found in results]),
-            ("mean steps of an episode", [_mean(found.mean_steps) for _, found in results]),
+            (
+                f"mean {score} of an episode",
+                [_mean(found.mean_return if by_return else found.mean_steps) for _, found in results],
+            ),
             ("helped steps of a session", [_mean(found.helped_steps) for _, found in results]),
         ]
         for axes, (title, values) in zip(columns, measured, strict=True):
@@ -84,7 +93,8 @@ def _dots(results: Sequence[Result]) -> bytes:
                 axes.plot(middle, line, "o", color=BLUE, markersize=4)
             axes.set_title(title)
             axes.grid(axis="x")
-            axes.set_xlim(left=0)
+            if not by_return or axes is not columns[1]:
+                axes.set_xlim(left=0)
         columns[0].set_xlim(0, 103)
         columns[0].set_yticks(range(len(names)), names)
         columns[0].set_ylim(len(names) - 0.5, -0.5)
@@ -99,13 +109,18 @@ def _mean(values: Any) -> tuple[float, float, float]:
 
 
 def _curves(results: Sequence[Result]) -> bytes:
+    by_return = results[0][1].by_return
+
     def draw(figure: "matplotlib.figure.Figure") -> None:
         axes: matplotlib.axes.Axes = figure.add_subplot()
         for n, (named, measured) in enumerate(results):
             name = words(named, [other for other, _ in results])
             look: dict[str, Any] = {"color": COLOURS[n % len(COLOURS)], "linestyle": DASHES[n // len(COLOURS)]}
-            axes.plot(np.arange(1, len(measured.curve) + 1), measured.curve, label=name, linewidth=1.3, **look)
-        axes.set(xlabel="episode", ylabel="steps", ylim=(0, None))
+            curve = measured.return_curve if by_return else measured.curve
+            axes.plot(np.arange(1, len(curve) + 1), curve, label=name, linewidth=1.3, **look)
+        axes.set(xlabel="episode", ylabel="return" if by_return else "steps")
+        if not by_return:
+            axes.set_ylim(0, None)
         axes.yaxis.label.set_color(INK)
         axes.grid(axis="y")
         legend_below(figure)
@@ -116,9 +131,16 @@ def _curves(results: Sequence[Result]) -> bytes:
 # ---- the sessions of a setting --------------------------------------------------------------------------------------
 
 
+def _no_returns() -> FloatArray:
+    return np.zeros(0)
+
+
 @dataclass(frozen=True, eq=False)
 class ComparedSessions:
-    """The results of N sessions of E episodes: curve (E,), the mean steps by episode; all others (N,), by session."""
+    """The results of N sessions of E episodes: curve (E,), the mean steps by episode; all others (N,), by session.
+
+    In a problem that is scored by return, also return_curve (E,), the mean returns by episode; mean_return and last_return.
+    """
 
     curve: FloatArray
     solved: BoolArray
@@ -128,16 +150,31 @@ class ComparedSessions:
     requests: FloatArray
     misleads: FloatArray
     rejected: BoolArray
+    return_curve: FloatArray = field(default_factory=_no_returns)
+    mean_return: FloatArray = field(default_factory=_no_returns)
+    last_return: FloatArray = field(default_factory=_no_returns)
+
+    @property
+    def by_return(self) -> bool:
+        """Whether the problem is scored by return."""
+        return len(self.return_curve) > 0
+
+    @property
+    def cost(self) -> FloatArray:
+        """The mean score of each session, lower is better: its steps, or minus its return."""
+        return -self.mean_return if self.by_return else self.mean_steps
 
     def to_json(self) -> dict[str, list[float]]:
         """The arrays as lists of floats, by name."""
-        return {name: np.asarray(value, np.float64).tolist() for name, value in vars(self).items()}
+        told = {name: np.asarray(value, np.float64).tolist() for name, value in vars(self).items()}
+        return {name: values for name, values in told.items() if self.by_return or not name.endswith(_RETURNS)}
 
     @classmethod
     def from_json(cls, record: Mapping[str, list[float]]) -> "ComparedSessions":
         """The results that `to_json` wrote. Raises KeyError, TypeError or ValueError for anything else."""
         kinds: dict[str, Any] = {"solved": np.bool_, "rejected": np.bool_}
-        return cls(**{name: np.array(record[name], kinds.get(name, np.float64)) for name in cls.__dataclass_fields__})
+        fields = [name for name in cls.__dataclass_fields__ if name in record or not name.endswith(_RETURNS)]
+        return cls(**{name: np.array(record[name], kinds.get(name, np.float64)) for name in fields})
 
 
 # ---- the comparison -------------------------------------------------------------------------------------------------
@@ -147,7 +184,8 @@ FAMILIES: dict[str, Family[Any]] = {"gates": GATES, "learners": UPDATES, "adviso
 MEASURES = (
     "solved_percent: sessions whose final greedy path is optimal. mean_steps: of all episodes, a failed one as the "
     "step limit + 1 (the area under the learning curve). last_steps: of the last episode. helped_steps, requests, misleads, "
-    "rejected_percent: of a session, as lab teach counts them. Every setting meets the same chances: session n has the same "
+    "rejected_percent: of a session, as lab teach counts them. Without a goal, mean_return and last_return: the undiscounted sum "
+    "of an episode's rewards, which is its score. Every setting meets the same chances: session n has the same "
     "seed in each."
 )
 
@@ -255,19 +293,33 @@ def sessions_of(setting: ComparedSetting, sessions: int, seed: int, stream: int 
     steps, solved, rejected = (np.concatenate([part[n] for part in told]) for n in range(3))
     counts = [np.concatenate([part[n] for part in told]) for n in range(3, 6)]
     helped, requests, misleads = (np.asarray(count, np.float64) for count in counts)
+    returned = np.concatenate([part[6] for part in told])
+    returns = (returned.mean(axis=0), returned.mean(axis=1), returned[:, -1]) if returned.shape[1] else ()
     return ComparedSessions(
-        steps.mean(axis=0), solved, steps.mean(axis=1), steps[:, -1].astype(float), helped, requests, misleads, rejected
+        *(
+            steps.mean(axis=0),
+            solved,
+            steps.mean(axis=1),
+            steps[:, -1].astype(float),
+            helped,
+            requests,
+            misleads,
+            rejected,
+        ),
+        *returns,
     )
 
 
-# Of N sessions of E episodes: steps (N, E), solved (N,), rejected (N,), and three counts (N,): helped steps, requests, misleads.
-Measured = tuple[NDArray[Any], BoolArray, BoolArray, NDArray[Any], NDArray[Any], NDArray[Any]]
+# Of N sessions of E episodes: steps (N, E), solved (N,), rejected (N,), three counts (N,): helped steps, requests, misleads; and
+# the returns (N, E), (N, 0) unless the problem is scored by them.
+Measured = tuple[NDArray[Any], BoolArray, BoolArray, NDArray[Any], NDArray[Any], NDArray[Any], FloatArray]
 
 
 def _judged(batch: Batch, environment: Environment, how: Learned) -> Measured:
     """The results of compiled sessions, whose tables are judged and not kept."""
     solved = np.array([environment.judge(table, how.learner).solved for table in batch.q])
-    return batch.steps, solved, batch.rejected_at_episode > 0, batch.helped_steps, batch.requests, batch.misleads
+    counts = batch.helped_steps, batch.requests, batch.misleads
+    return batch.steps, solved, batch.rejected_at_episode > 0, *counts, np.zeros((len(solved), 0))
 
 
 def _alone(
@@ -279,15 +331,21 @@ def _alone(
     session = Session(environment, learner, gate, advisor, rng).run()
     if session.interrupted:
         raise KeyboardInterrupt
-    counts = (np.array([count]) for count in (session.helped_steps, session.requests, session.misleads))
-    rejected = session.rejected_at_episode is not None
-    return session.steps[None], np.array([session.solved]), np.array([rejected]), *counts
+    helped, requests, misleads = (np.array([n]) for n in (session.helped_steps, session.requests, session.misleads))
+    rejected, returns = session.rejected_at_episode is not None, session.returns
+    returned = np.zeros((1, 0)) if returns is None else returns[None]
+    return session.steps[None], np.array([session.solved]), np.array([rejected]), helped, requests, misleads, returned
 
 
 def rows_of(named: Row, measured: ComparedSessions) -> list[Row]:
     """The rows of one setting, one per measure."""
+    returns = []
+    if measured.by_return:
+        returns = [mean_row(named, "mean_return", measured.mean_return)]
+        returns.append(varying_row(named, "last_return", measured.last_return))
     return [
         share_row(named, "solved_percent", measured.solved),
+        *returns,
         mean_row(named, "mean_steps", measured.mean_steps),
         *(varying_row(named, name, getattr(measured, name)) for name in ("last_steps", "helped_steps")),
         *(varying_row(named, name, getattr(measured, name)) for name in ("requests", "misleads")),
@@ -296,8 +354,8 @@ def rows_of(named: Row, measured: ComparedSessions) -> list[Row]:
 
 
 def in_short(results: "Iterator[tuple[Row, ComparedSessions]] | Any") -> Row:
-    """The summary: the setting that solves most sessions, of equal ones the one with the fewest mean steps."""
-    named, best = max(results, key=lambda result: (result[1].solved.mean(), -result[1].mean_steps.mean()))
+    """The summary: the setting that solves most sessions, of equal ones that with the fewest steps, or the highest return."""
+    named, best = max(results, key=lambda result: (result[1].solved.mean(), -result[1].cost.mean()))
     what = ", ".join(f"{name} {value}" for name, value in named.items())
     return {"best": what, "best solves [%]": round(100 * float(best.solved.mean()), 1)}
 

@@ -34,10 +34,15 @@ class TableSubject(Subject):
     problem: Problem
 
     def __post_init__(self) -> None:
-        self.name, self.settings = self.problem.name, Learned()
+        given = {"learner": self.problem.learner, "gate": self.problem.gate}
+        self.name = self.problem.name
+        self.settings = Learned.model_validate({name: value for name, value in given.items() if value is not None})
 
     def prepare(self, seed: int) -> Problem:
-        """The problem."""
+        """The problem. Raises BadInput for the learner "afterstate" where steps are stochastic."""
+        if self.settings.learner.learner == "afterstate" and not getattr(self.problem.environment, "certain", True):
+            why = f"where the steps of '{self.name}' lead is not certain, and it looks at the states after them"
+            raise BadInput(f"learner 'afterstate': {why}: wanted another one, such as q")
         return self.problem
 
     def draw(self, policy: Policy, out: Path) -> dict[str, str]:

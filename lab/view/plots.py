@@ -41,9 +41,12 @@ class Curve(Protocol):
     def optimal_steps(self) -> int | None: ...
 
 
-def learning_curves(policies: Mapping[str, Curve], path: Path) -> None:
+def learning_curves(
+    policies: Mapping[str, Curve], path: Path, returns: Mapping[str, "NDArray[np.float64]"] | None = None
+) -> None:
     """Plot the steps of each episode, one small plot per policy: guided episodes marked, the fewest possible steps as a line.
 
+    returns: by the name of the policy, the returns of its last episodes, which are plotted instead of steps.
     Raises BadInput without policies. Source: the curves of thesis ch. 8 and 9.
     """
     if not policies:
@@ -64,7 +67,11 @@ def learning_curves(policies: Mapping[str, Curve], path: Path) -> None:
         for axes in grid[len(policies) :]:
             axes.remove()
         for axes, (name, policy) in zip(grid, policies.items(), strict=False):
-            _draw_curve(axes, policy)
+            returned = (returns or {}).get(name)
+            if returned is None:
+                _draw_curve(axes, policy)
+            else:
+                _draw_returns(axes, policy, returned)
             axes.set_title(name if policy.subtask in name else f"{name} ({policy.subtask})", fontsize=8.5)
         handles = list(grid[0].get_lines())
         figure.legend(handles=handles, loc="lower center", ncols=len(handles))
@@ -183,6 +190,18 @@ def _draw_curve(axes: "matplotlib.axes.Axes", policy: Curve) -> None:
     else:
         axes.set_ylim(0, 1.15 * max(2, fewest, *policy.curve))
         axes.yaxis.set_major_locator(matplotlib.ticker.MaxNLocator(integer=True))
+    axes.xaxis.set_major_locator(matplotlib.ticker.MaxNLocator(integer=True))
+    axes.grid()
+
+
+def _draw_returns(axes: "matplotlib.axes.Axes", policy: Curve, returns: "NDArray[np.float64]") -> None:
+    """Draw the returns of a policy's last episodes."""
+    first = len(policy.curve) - len(returns)
+    episodes = np.arange(first + 1, len(policy.curve) + 1)
+    guided = np.asarray(policy.guided[first:], dtype=np.bool_)
+    axes.plot(episodes, returns, color=BLUE, linewidth=0.9, label="return")
+    axes.plot(episodes[guided], returns[guided], "o", color=ORANGE, markersize=3.5, label="guided episodes")
+    axes.set(xlabel="episode", ylabel="return", xlim=(0, 1.02 * max(2, len(policy.curve))))
     axes.xaxis.set_major_locator(matplotlib.ticker.MaxNLocator(integer=True))
     axes.grid()
 

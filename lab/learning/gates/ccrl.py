@@ -32,10 +32,13 @@ class Ccrl(Gate):
     an upper bound at first and, if steps are stochastic, the luckiest outcome. The counts of failed episodes are not
     corrected, nor are the counts that decide when to ask. With `settings.spare_best`, an episode with the fewest known steps
     from its start is no mislead, because no advice could have improved it; the thesis counts it as one.
+
+    Where episodes are scored by return, equal results do not show that a goal was reached: then they never stop it for good.
     """
 
     def __init__(self, settings: GateSettings, episodes: int, max_steps: int, around: Surroundings | None = None):
         super().__init__(settings, episodes, max_steps, around)
+        self._by_return = around is not None and around.by_return
         self.watches = around is not None and around.several_starts
         self._slow = Reason()
         self._last_result: float = 0
@@ -64,7 +67,7 @@ class Ccrl(Gate):
         return slow and not self.converged and episode < self.episodes
 
     def _watch_convergence(self, result: float) -> None:
-        if result == self._last_result and result < self.max_steps:
+        if result == self._last_result and result < self.max_steps and not self._by_return:
             self._equal_results += 1
             self.converged = self.converged or self._equal_results > 2 * self.settings.window
         else:
