@@ -54,9 +54,11 @@ class TableSubject(Subject):
         return {"value_map": str(path)}
 
 
-def world(rows: str, name: str = "world") -> GridWorld:
+def world(rows: str, name: str = "world", *, deadly: bool = False) -> GridWorld:
     """A grid world from its rows of cells: '.' free, '#' obstacle, one 'S' (start), one 'G' (goal).
 
+    deadly: whether an obstacle ends the episode, as the line "deadly = true" above the rows says, too; default: it blocks, the
+    robot stays where it is, and the move costs a step.
     name: 1 to 40 letters, digits, spaces, - and _.
     Raises BadInput for other characters or rows of different lengths, and NoPath if no path joins start and goal.
 
@@ -68,8 +70,9 @@ def world(rows: str, name: str = "world") -> GridWorld:
     check_value("rows", rows, str, "lab.world")
     if not isinstance(name, str) or not re.match(NAME_PATTERN, name):
         raise BadInput(f"name {name!r} (lab.world): wanted 1 to 40 letters, digits, spaces, - and _")
+    check_value("deadly", deadly, bool, "lab.world")
     lines = [line.strip() for line in rows.strip().splitlines()]
-    return from_rows("\n".join(lines), name, f"world '{name}'")
+    return from_rows("\n".join(lines), name, f"world '{name}'", deadly)
 
 
 def subject_from(problem: Teachable, task: str | None = None, sight: str | None = None) -> Subject:
