@@ -33,6 +33,7 @@ _TRIES = 10  # draws of obstacles before a path is kept free
 _ALONE: dict[str, Any] = {"learner": "afterstate", "beta": 1.0, "episodes": 500}
 _FAR = 300  # moves to a goal that no learner finds by chance, and that the usual discount makes worthless
 _SHOWN: dict[str, Any] = {"learner": "monte-carlo", "alpha": 1.0, "beta": 3.0, "episodes": 60}
+_MOST_STEPS = 1_000_000  # of an episode, see `LearnerSettings`
 _ROOM = 4  # the step limit of a drawn world, in lengths of the shortest path
 _WANTED = "wanted random:SHAPE:DENSITY:SEED, such as random:10x10x10:0.06:7"
 
@@ -337,7 +338,7 @@ def _staircase(start: Ints, goal: Ints, rng: np.random.Generator) -> Ints:
 def _fitted(world: GridWorld) -> GridWorld:
     """The world with settings of its learner that fit: to find a path alone or, to a far goal, to learn a path it is shown."""
     moves, learner = shortest_steps(world.mdp()), world.learner
-    room = max(learner.max_steps, _ROOM * moves)
+    room = min(max(learner.max_steps, _ROOM * moves), _MOST_STEPS)
     if moves > _FAR:
         learner = replace(learner, **_SHOWN, discount=1.0 - 1.0 / (10.0 * moves), max_steps=room)
         lost = round(walking(world.rewards.step, learner), 6)

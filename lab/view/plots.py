@@ -26,6 +26,7 @@ class MapMarks(NamedTuple):
 
 
 NOTHING = MapMarks()
+FINE = 40_000  # cells of a value map above which they have no outlines and no hatching, which would be smaller than a pixel
 
 
 class Curve(Protocol):
@@ -104,7 +105,8 @@ def value_map(
         if picture is not None:
             axes.imshow(_muted(picture))
         shown = np.ma.masked_where(hidden, table)
-        tint = axes.pcolormesh(across, down, shown, cmap="viridis", alpha=0.5, edgecolors="#FFFFFF60", linewidth=0.4)
+        lines = {} if table.size > FINE else {"edgecolors": "#FFFFFF60", "linewidth": 0.4}
+        tint = axes.pcolormesh(across, down, shown, cmap="viridis", alpha=0.5, **lines)
         figure.colorbar(tint, ax=axes, shrink=0.9, label="value of the best action, max Q")
         _draw_places(axes, crossings, walls, places)
         axes.set_aspect("equal")
@@ -211,7 +213,12 @@ def _draw_places(
 ) -> None:
     """Draw blocked cells, the greedy path, start and goal on a value map."""
     middles = (crossings[:-1, :-1] + crossings[1:, 1:]) / 2
-    outlines = [crossings[[i, i, i + 1, i + 1], [j, j + 1, j + 1, j]] for i, j in np.argwhere(walls)]
+    fine = walls.size > FINE
+    outlines = [] if fine else [crossings[[i, i, i + 1, i + 1], [j, j + 1, j + 1, j]] for i, j in np.argwhere(walls)]
+    if fine and walls.any():
+        grey = matplotlib.colors.ListedColormap(["#555555"])
+        axes.pcolormesh(crossings[..., 0], crossings[..., 1], np.ma.masked_where(~walls, walls), cmap=grey)
+        axes.plot([], [], "s", color="#555555", label="blocked")  # its line in the legend
     if outlines:
         hatched = matplotlib.collections.PolyCollection(
             outlines, facecolor="#00000055", edgecolor="white", hatch="xxx", label="blocked"
