@@ -94,7 +94,7 @@ class ArrayEnvironment(ChanceTable):
         begins = _distribution(start, ends)
         chances[ends], rewards[ends] = np.eye(states)[ends][:, None, :], 0.0
         chances /= chances.sum(axis=2, keepdims=True)
-        labels = tuple(f"action {a}" for a in range(actions)) if action_labels is None else action_labels
+        labels = tuple(f"action {a}" for a in range(actions)) if action_labels is None else tuple(action_labels)
         digest = sha256(b"".join(array.tobytes() for array in (chances, rewards, begins))).hexdigest()
         starts = tuple(np.flatnonzero(begins).tolist())
         mdp = ArrayTable(

@@ -120,7 +120,7 @@ class SessionText:
         tone: Tone = "" if good is None else "good" if good else "bad"
         return Told(f"{text}; moves advised: {event.helped_steps}.", tone)
 
-    def _counted(self, steps: float) -> str:
+    def _counted(self, steps: int | float) -> str:
         if self.kind == "order":
             return f"cost {steps:.1f}"
         if isinstance(steps, float):  # without a goal

@@ -105,7 +105,7 @@ def value_map(
         if picture is not None:
             axes.imshow(_muted(picture))
         shown = np.ma.masked_where(hidden, table)
-        lines = {} if table.size > FINE else {"edgecolors": "#FFFFFF60", "linewidth": 0.4}
+        lines: dict[str, Any] = {} if table.size > FINE else {"edgecolors": "#FFFFFF60", "linewidth": 0.4}
         tint = axes.pcolormesh(across, down, shown, cmap="viridis", alpha=0.5, **lines)
         figure.colorbar(tint, ax=axes, shrink=0.9, label="value of the best action, max Q")
         _draw_places(axes, crossings, walls, places)
