@@ -106,8 +106,8 @@ class Sessions:
         if moves_to_goal(q0, plan.problem, plan.learner) >= moves_to_goal(result.q, plan.problem, plan.learner):
             return result
         judged = self.place.judge(q0, plan.learner)
-        kept = {"final_steps": judged.final_steps, "final_return": judged.final_return, "solved": judged.solved}
-        return replace(result, q=q0, **kept)
+        final = replace(result, final_steps=judged.final_steps, final_return=judged.final_return)
+        return replace(final, q=q0, solved=judged.solved)
 
     def _advisor(self) -> Advisor | None:
         made = self.advising.gather(self.place, self.plan.learner, self.rng, journal=self.journal, tell=self._hear)

@@ -24,7 +24,7 @@ def coin(**given: Any) -> ArrayEnvironment:
 
 
 def swim(**given: Any) -> lab.Problem:
-    named = {"horizon": 20, "name": "riverswim", "action_labels": ("left", "right")} | given
+    named: dict[str, Any] = {"horizon": 20, "name": "riverswim", "action_labels": ("left", "right")} | given
     return lab.Problem.from_arrays(*river_swim(), **named)
 
 
@@ -56,7 +56,7 @@ def test_a_goal_that_cannot_be_reached_is_refused() -> None:
 
 def test_starts_are_drawn_from_their_distribution() -> None:
     place = coin(start=[0.25, 0.75])
-    assert [place.reset(1, lambda u=u: u) for u in (0.0, 0.24, 0.25, 0.99)] == [0, 0, 1, 1]
+    assert [place.reset(1, iter([u]).__next__) for u in (0.0, 0.24, 0.25, 0.99)] == [0, 0, 1, 1]
     assert place.mdp.starts == (0, 1)
 
 
@@ -103,10 +103,8 @@ def test_river_swim_is_learned_with_advice_and_not_without() -> None:
 
 @pytest.mark.parametrize("gate", [name for name in GATES if name != "never"])
 def test_every_gate_teaches_it(gate: str) -> None:
-    settings = {"cq": {"enough_steps": 10}, "importance": {"psi": 0.0}}.get(
-        gate, {}
-    )  # as much as these shortfalls and values
-    session = lab.teach(swim(), gate=gate, episodes=100, **settings).session
+    enough: dict[str, dict[str, Any]] = {"cq": {"enough_steps": 10}, "importance": {"psi": 0.0}}
+    session = lab.teach(swim(), gate=gate, episodes=100, **enough.get(gate, {})).session
     assert session.returns is not None
     assert session.steps.tolist() == [20] * 100
     assert session.helped_steps > 0
