@@ -249,6 +249,8 @@ def grid(
     goal: Sequence[int],
     rewards: Rewards | None = None,
     action_labels: Sequence[str] | None = None,
+    *,
+    deadly: bool = True,
 ) -> TabularMDP:
     """The problem of reaching a goal on a grid of any dimension with obstacles.
 
@@ -258,6 +260,7 @@ def grid(
     rewards: default `Rewards()`. Entering a blocked cell yields `collision`, entering the goal yields `goal`, and both end the
     episode; any other move yields `step`, also one against the border, which does not change the state.
     action_labels: the names of the actions -axis0, +axis0, -axis1, ...; default these words.
+    deadly: false: a blocked cell is a wall, and a move against it is like one against the border.
 
     Raises BadInput if start or goal is outside, blocked or the same cell, and NoPath if no path joins them.
     Source: thesis, sections 8.3 and 9.7.
@@ -287,6 +290,9 @@ def grid(
     _require_path(moves, wall, first, last)
     goals = np.zeros(closed.size, bool)
     goals[last] = True
+    check_value("deadly", deadly, bool, "lab.grid")
+    if not deadly:
+        moves = np.where(closed[moves], np.arange(closed.size, dtype=np.int32)[:, None], moves)
     terminal = closed | goals
     reward = np.where(closed[moves], rewards.collision, np.where(goals[moves], rewards.goal, rewards.step))
     reward[terminal] = 0.0

@@ -66,6 +66,7 @@ class Receipt:
     state asked about before in the episode.
     against_best: taken steps that were not the best; differences: the LISTED most frequent of them; None and () if the optimal
     values are unknown. skill: estimated from the taken steps; voices: by advisor, if there are several.
+    score: what the means are of, "steps", or "shortfall of the return" without a goal.
     notices: rejections and the like; hints: for better advice next time; yours: whether people gave all of the advice.
     """
 
@@ -93,6 +94,7 @@ class Receipt:
     notices: tuple[str, ...]
     yours: bool = False
     hints: tuple[str, ...] = ()
+    score: str = "steps"
 
     def to_json(self) -> dict[str, Any]:
         """The receipt as JSON values."""
@@ -136,7 +138,9 @@ def receipt(
     led = [int(mdp.successor[pair]) for pair in there] if certain and mdp else []
     voices = _voices(questions, {entry.by for entry in entries if isinstance(entry, Answer)}, mdp, values)
     wrong = None if values is None else worse(there, values)
+    by_return = mdp is not None and any(isinstance(e, EpisodeEnded) and isinstance(e.steps, float) for e in entries)
     counted = Receipt(
+        score="shortfall of the return" if by_return else "steps",
         requests=sum(isinstance(entry, AdviceRequested) for entry in entries),
         questions=len(questions),
         taken=len(taken),
@@ -317,7 +321,7 @@ def _lines(of: Receipt) -> Iterator[str]:
         yield f"  {counted(of.remembered, 'step')} more from memory, without asking"
     if of.change_percent is not None:
         yield (
-            f"  mean steps {of.mean_before:.1f} before the first of them, {of.mean_after:.1f} after the last "
+            f"  mean {of.score} {of.mean_before:.1f} before the first of them, {of.mean_after:.1f} after the last "
             f"({of.change_percent:+.0f} %; what it learned by itself is in it)"
         )
     if of.taken:

@@ -73,9 +73,16 @@ class LessonResult:
         return int(self.q[state].argmax())
 
     def rows(self) -> list[dict[str, Any]]:
-        """One row per episode: its number, its steps (max_steps + 1 if it failed), and whether any step was advised."""
+        """One row per episode: its number, its steps (max_steps + 1 if it failed), and whether any step was advised.
+
+        In a problem that is scored by return, also its return.
+        """
         curve = zip(self.session.steps.tolist(), self.session.guided.tolist(), strict=True)
-        return [{"episode": n, "steps": steps, "guided": guided} for n, (steps, guided) in enumerate(curve, start=1)]
+        rows = [{"episode": n, "steps": steps, "guided": guided} for n, (steps, guided) in enumerate(curve, start=1)]
+        if self.session.by_return:
+            for row, returned in zip(rows, self.session.returns.tolist(), strict=True):
+                row["return"] = returned
+        return rows
 
     def to_dataframe(self) -> "pandas.DataFrame":
         """`rows` as a DataFrame. Raises BadInput if pandas is not installed."""
@@ -83,8 +90,10 @@ class LessonResult:
 
     @cached_property
     def curve(self) -> Picture:
-        """The learning curve: steps by episode, with the advised episodes marked."""
-        return Picture.drawn(lambda path: learning_curves({self.problem.name: self.policy}, path))
+        """The learning curve: steps, or returns, by episode, with the advised episodes marked."""
+        name = self.problem.name
+        returns = {name: self.session.returns} if self.session.by_return else None
+        return Picture.drawn(lambda path: learning_curves({name: self.policy}, path, returns))
 
     @cached_property
     def map(self) -> Picture:
@@ -108,6 +117,11 @@ class LessonResult:
 
     def __str__(self) -> str:
         how = f"{self.session.helped_steps} helped steps in {self.session.guided.sum()} of {len(self.session.steps)} episodes"
+        if self.session.final_return is not None:
+            best = (
+                "" if self.session.best_return is None else f", that of the best policy {self.session.best_return:.4g}"
+            )
+            return f"{self.problem.name}: mean return {self.session.final_return:.4g}{best}; {how}"
         return (
             f"{self.problem.name}: {self.session.final_steps} steps, the fewest are {self.session.optimal_steps}; {how}"
         )

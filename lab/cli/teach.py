@@ -107,7 +107,7 @@ def teach(
     show(document, as_json, deferred.lesson_summary)
     if document["failure"] is not None:
         end(document["failure"], 1)
-    if document["final_steps"] is None:
+    if document["final_steps"] is None and "final_return" not in document:
         end(
             f"'{document['skill']}' does not reach its goal after {counted(document['episodes'], 'episode')}: "
             "try another advisor, more --episodes or another --learner",

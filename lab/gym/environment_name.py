@@ -6,6 +6,8 @@ import sys
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
+from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 from urllib.parse import parse_qsl
@@ -15,6 +17,7 @@ from gymnasium import error as refused
 from gymnasium.envs.registration import load_env_creator
 
 from lab.errors import BadInput, unknown
+from lab.gym import symbolic_view
 from lab.gym.our_environments import register
 
 PREFIX = "gym:"
@@ -86,6 +89,8 @@ def quiet() -> "warnings.catch_warnings[None]":
 def make(name: GymName, where: str, render_mode: str | None = None) -> Env:
     """The environment of that name, whose module may be in the current folder. Raises BadInput if it cannot be made."""
     register()
+    if name.id.rpartition(":")[2].startswith(symbolic_view.PREFIX):
+        return _minigrid(name, where, render_mode)
     mode = {} if render_mode is None else {"render_mode": render_mode}
     here = str(Path.cwd())
     adds = bool(name.module) and here not in sys.path
@@ -99,6 +104,27 @@ def make(name: GymName, where: str, render_mode: str | None = None) -> Env:
     finally:
         if adds:
             sys.path.remove(here)
+
+
+def _minigrid(name: GymName, where: str, render_mode: str | None) -> Env:
+    """A world of MiniGrid by its symbolic view; its keyword `seed`, default 0, draws the layout."""
+    if find_spec("minigrid") is None:
+        raise BadInput(
+            f"environment '{name}' ({where}): it needs minigrid, which is not installed: pip install minigrid"
+        )
+    import_module("minigrid")  # which registers its worlds
+    options = {key: value for key, value in name.options.items() if key != "seed"}
+    try:
+        with quiet():
+            env = gymnasium.make(name.id, disable_env_checker=True, **options).unwrapped  # type: ignore[arg-type]
+            if symbolic_view.is_minigrid(env):
+                which = f"environment '{name}' ({where})"
+                return symbolic_view.SymbolicEnv(env, name.options.get("seed", 0), which, render_mode)
+    except BadInput:
+        raise
+    except Exception as error:
+        raise _refusal(name, where, error) from None
+    return env
 
 
 def said(error: Exception) -> str:

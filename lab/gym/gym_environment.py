@@ -242,6 +242,11 @@ class GymEnvironment:
         return self.live.picture(state)
 
     @property
+    def highest_reward(self) -> float | None:
+        """The highest reward of a step if no episode ever ends in a goal, as a model shows; None otherwise."""
+        return None if self.model is None or self.model.goal.any() else self.model.highest
+
+    @property
     def modules(self) -> tuple[str, ...]:
         """The module of the environment's code, see `lab.files.code_key`."""
         return (type(self.live.inside).__module__,)
@@ -280,10 +285,14 @@ class GymEnvironment:
         final_steps, optimal_steps: the mean steps to the goal, rounded; final_steps is None if the greedy policy reaches it less
         than half as often as the best one, optimal_steps is None without a model. solved: the mean return is within 1 % (or 0.01)
         of that of the best policy (without a model, of the best known one that reaches a goal), or it reaches the threshold
-        that the environment is registered with, if no keywords were given.
+        that the environment is registered with, if no keywords were given. Where no episode ends in a goal, both steps are None,
+        and there are final_return and best_return.
         """
         own, best = self._compared(q, learner)
         enough = own.reaches > 0.0 and (best is None or own.reaches >= 0.5 * best.reaches)
+        if self.highest_reward is not None:
+            best_return = None if best is None else best.mean_return
+            return Judged(None, None, self._solved(own, best), own.mean_return, best_return)
         exact = self.model is not None and best is not None and best.reaches > 0.0
         return Judged(
             round(own.steps) + learner.count_start if enough else None,

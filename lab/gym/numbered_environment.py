@@ -18,6 +18,11 @@ MOST_AXES, CELLS = (
     {1: 64, 2: 64, 3: 32, 4: 24},
 )  # of a box: the most axes, and the cells along each axis by the number of axes
 
+PICTURES = (
+    "no table holds pictures: wanted a symbolic view, in which the state is what the picture shows, "
+    "as gym:MiniGrid-DoorKey-5x5-v0 has"
+)
+
 Digit = tuple[int, int]  # the number of its values, and the first value
 
 
@@ -100,6 +105,19 @@ def _digits(space: spaces.Space[Any]) -> Iterator[Digit]:
 
 def _parts(space: "spaces.Tuple[Any] | spaces.Dict") -> list[spaces.Space[Any]]:  # no generic before Gymnasium 1.4
     return list(space.spaces.values() if isinstance(space, spaces.Dict) else space.spaces)
+
+
+def _all_parts(space: Any) -> Iterator[Any]:
+    """A space, or the spaces that a Tuple or Dict consists of."""
+    if isinstance(space, spaces.Tuple | spaces.Dict):
+        for part in _parts(space):
+            yield from _all_parts(part)
+    else:
+        yield space
+
+
+def _is_picture(space: Any) -> bool:
+    return isinstance(space, spaces.Box) and len(space.shape) > 1
 
 
 def _values(space: spaces.Space[Any], value: Any) -> Iterator[Any]:
@@ -200,7 +218,10 @@ class NumberedEnvironment:
         try:
             return Numbering(space)
         except Unsupported:
-            raise BadInput(f"{self.which}: its {kind} space is {space}: supported are {SUPPORTED}") from None
+            what = f"its {kind} space is {' '.join(str(space).split())}"
+            if kind == "observation" and any(map(_is_picture, _all_parts(space))):
+                raise BadInput(f"{self.which}: {what}: {PICTURES}") from None
+            raise BadInput(f"{self.which}: {what}: supported are {SUPPORTED}") from None
 
     def _cells(self) -> CellNumbering | None:
         """The numbering of a box by cells, None for other spaces. Raises BadInput if the box has too many axes, or no bounds."""
@@ -210,6 +231,9 @@ class NumberedEnvironment:
         try:
             return CellNumbering(space)
         except Unsupported:
+            if _is_picture(space):
+                what = " ".join(str(space).split())
+                raise BadInput(f"{self.which}: its observation space is {what}: {PICTURES}") from None
             wanted = f"wanted 1 to {MOST_AXES} axes with finite bounds"
             raise BadInput(f"{self.which}: its observation space is {' '.join(str(space).split())}: {wanted}") from None
 

@@ -9,6 +9,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from lab.errors import BadInput
+from lab.learning.transition_arrays import ArrayEnvironment, river_swim
 from lab.mdp import FloatArray, TabularMDP
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import NO_CHANCE, Chance, Episode
@@ -21,6 +22,7 @@ from lab.tasks.task_file import load, load_cell, load_world
 from lab.view.value_levels import GridPlanes
 
 ROOM = 10  # the limit of decisions of an episode in a cell, as a multiple of the most that its parts need
+MOST_BANKS = 200  # states of RiverSwim
 METADATA: dict[str, Any] = {"render_modes": ["ansi"], "render_fps": 4}
 
 Info = dict[str, Any]
@@ -221,6 +223,44 @@ class FmsEnv(CellEnv):
         super().__init__(cell, file.chance() if stochastic else None, render_mode=render_mode)
 
 
+class RiverSwimEnv(TableEnv):
+    """RiverSwim, a stochastic problem without goals whose episodes have 20 steps; see `transition_arrays.river_swim`."""
+
+    def __init__(self, states: int = 6, max_episode_steps: int | None = 20, render_mode: str | None = None):
+        if not isinstance(states, int) or not 3 <= states <= MOST_BANKS:
+            raise BadInput(f"states {states!r}: allowed are 3 to {MOST_BANKS}")
+        self.river = ArrayEnvironment.of(*river_swim(states), 0, (), (), ("left", "right"))
+        super().__init__(self.river.mdp, max_episode_steps, render_mode)
+
+    @cached_property
+    def P(self) -> dict[int, dict[int, list[tuple[float, int, float, bool]]]]:
+        """The outcomes of each action in each state: (probability, state, reward, whether the episode ends)."""
+        chances, gain = self.river.chances, self.mdp.reward.tolist()
+        return {
+            state: {
+                a: [(float(row[to]), int(to), gain[state][a], False) for to in np.flatnonzero(row)]
+                for a, row in enumerate(rows)
+            }
+            for state, rows in enumerate(chances)
+        }
+
+    def render(self) -> str | None:
+        """The river from bank to bank, with the swimmer as R."""
+        if self.render_mode != "ansi":
+            return None
+        return " ".join("R" if state == self.s else "." for state in range(self.mdp.n_states)) + "\n"
+
+    def step(self, action: int) -> tuple[int, float, bool, bool, Info]:
+        """The outcome that a drawn number selects."""
+        left = self.s
+        self.s, self._moves = (
+            int(self.np_random.choice(self.mdp.n_states, p=self.river.chances[left, action])),
+            self._moves + 1,
+        )
+        truncated = self.max_episode_steps is not None and self._moves >= self.max_episode_steps
+        return self.s, float(self.mdp.reward[left, action]), False, truncated, {"is_success": False}
+
+
 ENVIRONMENTS: dict[str, tuple[type[TableEnv] | type[CellEnv], dict[str, Any]]] = {
     "TeachingLab/World1-v0": (WorldEnv, {"world": "world-1"}),
     "TeachingLab/World2-v0": (WorldEnv, {"world": "world-2"}),
@@ -228,6 +268,7 @@ ENVIRONMENTS: dict[str, tuple[type[TableEnv] | type[CellEnv], dict[str, Any]]] =
     "TeachingLab/Insert-v0": (InsertEnv, {}),
     "TeachingLab/ToastCell-v0": (ToastCellEnv, {}),
     "TeachingLab/FMS-v0": (FmsEnv, {}),
+    "TeachingLab/RiverSwim-v0": (RiverSwimEnv, {}),
 }
 
 

@@ -33,8 +33,8 @@ class TransitionModel:
     """A stochastic problem: the outcomes of all actions, and the distribution (S,) of the starts.
 
     live: (S,) bool, the states in which an episode can continue; terminal: (S,) bool, the states in which episodes end, and
-    absorbing states; best: the highest reward of a step that ends an episode, -inf if there is none; goal: (S,) bool, the
-    terminal states entered with that reward; certain: whether all steps are deterministic.
+    absorbing states; best: the highest reward of a step that ends an episode, -inf if there is none; highest: that of any
+    step; goal: (S,) bool, the terminal states entered with the reward `best`; certain: whether all steps are deterministic.
     """
 
     def __init__(self, outcomes: Transitions, starts: FloatArray, n_actions: int):
@@ -58,6 +58,7 @@ class TransitionModel:
         self.terminal[self._entered[ends]] = True
         self.terminal &= ~self.live
         self.best = float(self._reward[ends].max(initial=-np.inf))
+        self.highest = float(self._reward[self.live[state]].max())
         wins = ends & (self._reward >= self.best - SAME_REWARD)
         self.goal = np.zeros(self.n_states, bool)
         self.goal[self._entered[wins]] = True

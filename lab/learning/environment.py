@@ -34,11 +34,15 @@ class Judged(NamedTuple):
 
     final_steps: the steps of its greedy path, None if that misses the goal; optimal_steps: the fewest possible, None if unknown;
     solved: whether the table solves the problem.
+    final_return, best_return: in a problem that is scored by return, the mean return of the greedy policy, and that of the best
+    known policy, None if there is none; both are undiscounted.
     """
 
     final_steps: int | None
     optimal_steps: int | None
     solved: bool
+    final_return: float | None = None
+    best_return: float | None = None
 
 
 class Environment(Protocol):
@@ -64,6 +68,15 @@ class Environment(Protocol):
         """The judgement of the greedy policy of a table (S, A)."""
 
 
+def highest_reward(environment: Environment) -> float | None:
+    """The highest reward of a step if sessions in the environment are scored by return, None if they are scored by steps.
+
+    An environment without goals has it as the attribute `highest_reward`, at least 0 if its episodes may end early.
+    """
+    highest: float | None = getattr(environment, "highest_reward", None)
+    return highest
+
+
 class TableEnvironment:
     """The environment of a `TabularMDP`, whose steps are deterministic."""
 
@@ -73,6 +86,10 @@ class TableEnvironment:
         self._reward: list[list[float]] = mdp.reward.tolist()
         self._terminal: list[bool] = mdp.terminal.tolist()
         self._goal: list[bool] = mdp.goal.tolist()
+
+    def check(self) -> None:
+        """Raises NoPath if no goal can be reached from the start."""
+        shortest_steps(self.mdp)
 
     def reset(self, episode: int, draw: Draw) -> int:
         """The problem's start; if it has several, one drawn at random."""
@@ -103,6 +120,6 @@ class TableEnvironment:
 
 
 def check_solvable(environment: Environment) -> None:
-    """Raises NoPath if no goal of a deterministic problem can be reached from its start."""
+    """Raises NoPath if no goal of a problem whose table is known can be reached from its start."""
     if isinstance(environment, TableEnvironment):
-        shortest_steps(environment.mdp)
+        environment.check()

@@ -222,7 +222,7 @@ class Walked:
     episode: int
     trail: list[tuple[int, int, int]]
     reached: bool
-    steps: int
+    steps: int | float
     mean_before: float
 
 

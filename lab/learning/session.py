@@ -8,17 +8,20 @@ L_n the steps of episode n (max_steps + 1 where it failed) and m_n = (L_(n-K+1) 
     eqs. 6.1-2  the learner asks in episode n + 1 while its improvement 1 - m_n / m_(n-K) is less than Lambda
     eq. 6.3     an advised episode misled when it took no fewer steps than the K before it took on average
     eq. 6.4     the advisor is rejected after more than Omega misleads; what is learned from a step is in `updates`
+
+Without a goal, L_n is the shortfall of the return: the return of the highest reward in every step, minus that of episode n.
 """
 
 from collections.abc import Callable
 from functools import partial
+from typing import cast
 
 import numpy as np
 
 from lab.errors import BadInput
 from lab.learning import session_events as events
 from lab.learning.advice_memory import Recall
-from lab.learning.environment import Environment, TableEnvironment, check_solvable
+from lab.learning.environment import Environment, TableEnvironment, check_solvable, highest_reward
 from lab.learning.gates import GATES, Surroundings, improvement
 from lab.learning.physics.cells import CellTable
 from lab.learning.requests import AdviceRequest, Advisor, AdvisorLeft, Standing, Walked
@@ -30,6 +33,7 @@ from lab.mdp import FloatArray, TabularMDP
 from lab.plugins.family import checked_action
 
 OnEvent = Callable[[events.Event], None]
+NO_LIMIT = 2**62  # the gate's `max_steps` where no episode fails
 
 
 class Session:
@@ -65,25 +69,33 @@ class Session:
         self.visits: list[list[int]] = [[0] * mdp.n_actions for _ in range(mdp.n_states)]
         self.actions = range(mdp.n_actions)
         self.longer_is_better = cells is not None and cells.physics.longer_is_better
+        self.highest_reward = highest_reward(environment)
+        by_return = self.highest_reward is not None
+        if by_return and gate.memory:
+            raise BadInput("memory: what it remembers leads to a goal, and this problem has none: leave it off")
         self.choose = SELECTIONS[learner.selection].make
         several_starts = bool(mdp.starts) or not (isinstance(environment, TableEnvironment) or cells is not None)
         size = mdp.n_states, mdp.n_actions
         others = partial(scattered, learner, mdp, self.draw)
-        around = Surroundings(self.draw, others, several_starts, self.update.gauge, size, learner)
+        around = Surroundings(
+            self.draw, others, several_starts and not by_return, self.update.gauge, size, learner, by_return
+        )
         self.gate_name = f"gate '{gate.gate}'"
         make = GATES[gate.gate if self.advised else "never"].make
-        self.gate = make(gate, learner.episodes, learner.max_steps, around)
+        self.gate = make(gate, learner.episodes, NO_LIMIT if by_return else learner.max_steps, around)
         self.max_moves = learner.max_steps - learner.count_start
         self.recall = Recall(*size, self.max_moves, learner.episodes, gate.window) if gate.memory else None
         self.judge_unhelped = gate.judge_unhelped and not (gate.memory or gate.by_evidence)
         self.steps: list[int] = []
+        self.scores: list[float] = [] if by_return else cast(list[float], self.steps)  # what the gate compares
+        self.gained = 0.0  # the rewards of this episode
         self.guided: list[bool] = []
         self.returns: list[float] = []
         self.requests = self.helped_steps = 0
         self.rejected_at: int | None = None
         self.episode, self.tau = 0, 1.0  # from here on: the state of the current episode
         self.improved: events.Improvement | None = None
-        self.asked_now, self.helped_now, self.returned_now = False, 0, 0.0
+        self.asked_now, self.helped_now = False, 0
         self.trail: list[tuple[int, int, int]] | None = None  # recorded if the advisor has `followed`
 
     def run(self, on_event: OnEvent | None = None, enough: Callable[[], bool] = lambda: False) -> SessionResult:
@@ -96,10 +108,10 @@ class Session:
         settings, gate, recall, interrupted = self.settings, self.gate, self.recall, False
         try:
             for episode in range(1, settings.episodes + 1):
-                self.episode, self.asked_now, self.helped_now, self.returned_now = episode, False, 0, 0.0
+                self.episode, self.asked_now, self.helped_now = episode, False, 0
                 self.tau = temperature(episode, settings.beta, settings.exploration)  # eq. 9.2
                 was_converged = gate.converged
-                is_open = gate.opens(episode, self.steps) and self.advisor is not None  # eqs. 6.1 and 6.2
+                is_open = gate.opens(episode, self.scores) and self.advisor is not None  # eqs. 6.1 and 6.2
                 is_open = is_open if recall is None else recall.opens(episode, is_open)
                 if gate.converged and not was_converged and self.advisor is not None:
                     self.tell(events.AdviceEnded(episode, "converged"))
@@ -117,11 +129,13 @@ class Session:
     def _walk(self, choose: Callable[[int, int], int]) -> int | None:
         """The number of moves to the goal, None if it was not reached; each move is chosen, made and learned from.
 
-        In worlds where longer episodes are better, it is 1 plus the number of moves by which the episode was too short.
+        In worlds where longer episodes are better, it is 1 plus the number of moves by which the episode was too short; without a
+        goal it is the number of all moves.
         """
         act, draw, discount, visits = self.environment.step, self.draw, self.settings.discount, self.visits
         learn, lookahead, recall = self.update.learn, self.update.lookahead, self.recall
         watch = self.gate.saw if self.gate.watches else None
+        without_goal, self.gained = self.highest_reward is not None, 0.0
         self.update.begin()
         state = self.environment.reset(self.episode, draw)
         self.gate.begins(state)
@@ -131,7 +145,7 @@ class Session:
         for step in range(1, self.max_moves + 1):
             visits[state][action] += 1
             reward, entered, over, reached, truncated = act(state, action, draw)
-            self.returned_now += reward
+            self.gained += reward
             if recall is not None:
                 recall.moved(state, action, entered, over, reached)
             last = truncated or step == self.max_moves
@@ -146,9 +160,9 @@ class Session:
             if watch is not None:
                 watch(state, action, reward, discount_t, entered, following)
             if over:
-                return self.max_moves - step + 2 if self.longer_is_better else step if reached else None
+                return self.max_moves - step + 2 if self.longer_is_better else step if reached or without_goal else None
             if last:
-                return 1 if self.longer_is_better else None
+                return 1 if self.longer_is_better else step if without_goal else None
             state, action = entered, following if lookahead else choose(entered, step + 1)
         return None
 
@@ -208,24 +222,28 @@ class Session:
         self.update.end()
         episode, helped, limits, gate = self.episode, self.helped_now, self.gate_settings, self.gate
         steps = self.settings.max_steps + 1 if moves is None else moves + self.settings.count_start
-        before = self.steps[-limits.window :]
+        before = self.scores[-limits.window :]
         mean_before = sum(before) / len(before) if before else float(self.settings.max_steps + 1)
         self.requests += self.asked_now
         self.helped_steps += helped
         self.steps.append(steps)
+        score: float = steps
+        self.returns.append(self.gained)
+        if self.highest_reward is not None:
+            score = self.max_moves * self.highest_reward - self.gained
+            self.scores.append(score)
         self.guided.append(helped > 0)
-        self.returns.append(self.returned_now)
-        self.improved = improvement(self.steps, limits.window)
-        gate.judges(self.steps, is_open and (helped > 0 or self.judge_unhelped))
+        self.improved = improvement(self.scores, limits.window)
+        gate.judges(self.scores, is_open and (helped > 0 or self.judge_unhelped))
         if self.trail is not None and self.followed is not None:
-            self.followed(Walked(episode, self.trail, moves is not None, steps, mean_before))
+            self.followed(Walked(episode, self.trail, moves is not None, score, mean_before))
         rate = self.improved.rate if self.improved else None
-        self.tell(events.EpisodeEnded(episode, steps, helped > 0, helped, rate, moves is not None, gate.verdict))
+        self.tell(events.EpisodeEnded(episode, score, helped > 0, helped, rate, moves is not None, gate.verdict))
         if helped and self.helped_steps >= limits.budget:
             self.tell(events.AdviceEnded(episode, "budget spent"))
         if gate.rejected and self.rejected_at is None:
             self.rejected_at = episode
-            self.tell(events.AdviceRejected(episode, gate.misleads, limits.omega, steps, mean_before))
+            self.tell(events.AdviceRejected(episode, gate.misleads, limits.omega, score, mean_before))
         for event in self.recall.ended(moves, helped) if self.recall is not None else ():
             self.tell(event)
 
@@ -234,7 +252,7 @@ class Session:
         q, finished, name = self.update.table(), len(self.guided), self.settings.learner
         if UPDATES.is_added(name) and (wrong := int((~np.isfinite(q)).sum())):
             raise BadInput(f"learner '{name}': {wrong} of its {q.size} action values are not finite")
-        final_steps, optimal_steps, solved = self.environment.judge(q, self.settings)
+        judged = self.environment.judge(q, self.settings)
         return SessionResult(
             q=q,
             visits=np.array(self.visits, np.int64),
@@ -244,9 +262,11 @@ class Session:
             helped_steps=self.helped_steps,
             misleads=self.gate.misleads,
             rejected_at_episode=self.rejected_at,
-            optimal_steps=optimal_steps,
-            final_steps=final_steps,
-            solved=solved,
+            optimal_steps=judged.optimal_steps,
+            final_steps=judged.final_steps,
+            solved=judged.solved,
             interrupted=interrupted,
             returns=np.array(self.returns[:finished], np.float64),
+            final_return=judged.final_return,
+            best_return=judged.best_return,
         )

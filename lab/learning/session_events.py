@@ -21,7 +21,8 @@ class Improvement:
 class EpisodeEnded:
     """An episode has ended.
 
-    steps: max_steps + 1 if it failed; for an order of transfers, its cost. guided: whether any step was helped.
+    steps: max_steps + 1 if it failed; for an order of transfers, its cost; without a goal, the shortfall of its return (see
+    `lab.learning.session`). guided: whether any step was helped.
     improvement_rate: None before 2K episodes.
     verdict: "better" than the mean before it; "best", as good as the best so far; "misled"; "" if the gate gives none.
     """

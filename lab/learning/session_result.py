@@ -28,6 +28,8 @@ class SessionResult:
     optimal_steps: the fewest possible, None if unknown; final_steps: those of the greedy path from the start, None if it misses
     the goal; both are counted as in `steps`. solved: see `Environment.judge`.
     interrupted: whether Ctrl-C stopped the session; then only finished episodes count.
+    In a problem that is scored by return (see `environment.highest_reward`) no episode fails, and there are also: returns:
+    (episodes,) float64, the sum of the rewards of each, NaN where it is not known; final_return, best_return: see `Judged`.
     """
 
     q: FloatArray
@@ -43,6 +45,13 @@ class SessionResult:
     solved: bool
     interrupted: bool
     returns: FloatArray
+    final_return: float | None = None
+    best_return: float | None = None
+
+    @property
+    def by_return(self) -> bool:
+        """Whether the problem has no goal, so that an episode's score is its return."""
+        return self.best_return is not None
 
 
 def check_members(

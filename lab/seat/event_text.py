@@ -115,13 +115,18 @@ class SessionText:
         outcome = (
             f"{'reached the goal in' if event.reached else 'did not reach the goal:'} {counted(event.steps, 'step')}"
         )
-        outcome = self._counted(event.steps) if self.kind == "order" else outcome
+        if self.kind == "order" or isinstance(event.steps, float):
+            outcome = self._counted(event.steps)
         text = f"Episode {event.episode} {outcome}{judged and f', {judged}'}"
         tone: Tone = "" if good is None else "good" if good else "bad"
         return Told(f"{text}; moves advised: {event.helped_steps}.", tone)
 
-    def _counted(self, steps: float) -> str:
-        return f"cost {steps:.1f}" if self.kind == "order" else f"counted {counted(steps, 'step')}"
+    def _counted(self, steps: int | float) -> str:
+        if self.kind == "order":
+            return f"cost {steps:.1f}"
+        if isinstance(steps, float):  # without a goal
+            return f"fell {steps:.2f} short of the highest return"
+        return f"counted {counted(steps, 'step')}"
 
     def _disagreed(self, event: AdvisorsDisagreed, mdp: TabularMDP | None) -> Told:
         """The answers of advisors who disagree, and whom the learner follows."""

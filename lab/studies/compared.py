@@ -17,9 +17,10 @@ from lab.advice.advisors import ADVISORS
 from lab.errors import BadInput
 from lab.files import code_key
 from lab.lazy import matplotlib
-from lab.learning.batch import greedy_every, measure_greedy, run_sessions
-from lab.learning.environment import Environment, TableEnvironment
+from lab.learning.batch import Batch, greedy_every, measure_greedy, run_sessions
+from lab.learning.environment import Environment, TableEnvironment, highest_reward
 from lab.learning.gates import GATES
+from lab.learning.kernels.records import LANES
 from lab.learning.physics.environment import PhysicsEnvironment
 from lab.learning.problem import Problem
 from lab.learning.requests import Advisor, Ask
@@ -34,6 +35,7 @@ from lab.statistics import interval, share
 from lab.studies.charts import legend_below
 from lab.studies.findings import Findings, Row, mean_row, share_row, varying_row
 from lab.studies.runner import Job
+from lab.tasks.record import Learned
 from lab.teaching.lesson import Subject
 from lab.teaching.named_problems import PROBLEMS
 from lab.teaching.subjects import Teachable, subject_from
@@ -45,16 +47,20 @@ COLOURS = (BLUE, ORANGE, GREEN, RED, PURPLE, SKY, GREY)
 DASHES = ("-", "--", ":", "-.")
 MOST_CURVES = 12  # more could not be distinguished
 MOST_DOTS = 60  # lines of a picture
+MOST_ENTRIES = 4_000_000  # of the tables that are held at once, 32 MB, unless a single round of the kernel has more
 
 
 def figures(results: Sequence[Result]) -> dict[str, bytes]:
     """SVG pictures by caption; if there are many settings, of the best ones."""
-    ranked = sorted(results, key=lambda result: (-result[1].solved.mean(), result[1].mean_steps.mean()))
+    ranked = sorted(results, key=lambda result: (-result[1].solved.mean(), result[1].cost.mean()))
+    score = "return" if ranked[0][1].by_return else "steps"
     most = "" if len(ranked) <= MOST_DOTS else f", the best {MOST_DOTS} of {len(ranked)} settings"
     several = "" if len(ranked) <= MOST_CURVES else f", the best {MOST_CURVES} of {len(ranked)} settings"
     return {
-        f"Sessions that are solved in the end, steps and helped steps, with intervals{most}": _dots(ranked[:MOST_DOTS]),
-        f"Mean steps of each episode{several}": _curves(ranked[:MOST_CURVES]),
+        f"Sessions that are solved in the end, {score} and helped steps, with intervals{most}": _dots(
+            ranked[:MOST_DOTS]
+        ),
+        f"Mean {score} of each episode{several}": _curves(ranked[:MOST_CURVES]),
     }
 
 
@@ -68,12 +74,17 @@ def words(named: Row, among: Sequence[Row]) -> str:
 def _dots(results: Sequence[Result]) -> bytes:
     """A picture with a line per setting and a column per measure."""
     names = [words(named, [other for other, _ in results]) for named, _ in results]
+    by_return = results[0][1].by_return
+    score = "return" if by_return else "steps"
 
     def draw(figure: "matplotlib.figure.Figure") -> None:
         columns = figure.subplots(1, 3, sharey=True)
         measured: list[tuple[str, list[Any]]] = [
             ("solved [%]", [share(found.solved) for _, found in results]),
-            ("mean steps of an episode", [_mean(found.mean_steps) for _, found in results]),
+            (
+                f"mean {score} of an episode",
+                [_mean(found.mean_return if by_return else found.mean_steps) for _, found in results],
+            ),
             ("helped steps of a session", [_mean(found.helped_steps) for _, found in results]),
         ]
         for axes, (title, values) in zip(columns, measured, strict=True):
@@ -82,7 +93,8 @@ def _dots(results: Sequence[Result]) -> bytes:
                 axes.plot(middle, line, "o", color=BLUE, markersize=4)
             axes.set_title(title)
             axes.grid(axis="x")
-            axes.set_xlim(left=0)
+            if not by_return or axes is not columns[1]:
+                axes.set_xlim(left=0)
         columns[0].set_xlim(0, 103)
         columns[0].set_yticks(range(len(names)), names)
         columns[0].set_ylim(len(names) - 0.5, -0.5)
@@ -97,13 +109,18 @@ def _mean(values: Any) -> tuple[float, float, float]:
 
 
 def _curves(results: Sequence[Result]) -> bytes:
+    by_return = results[0][1].by_return
+
     def draw(figure: "matplotlib.figure.Figure") -> None:
         axes: matplotlib.axes.Axes = figure.add_subplot()
         for n, (named, measured) in enumerate(results):
             name = words(named, [other for other, _ in results])
             look: dict[str, Any] = {"color": COLOURS[n % len(COLOURS)], "linestyle": DASHES[n // len(COLOURS)]}
-            axes.plot(np.arange(1, len(measured.curve) + 1), measured.curve, label=name, linewidth=1.3, **look)
-        axes.set(xlabel="episode", ylabel="steps", ylim=(0, None))
+            curve = measured.return_curve if by_return else measured.curve
+            axes.plot(np.arange(1, len(curve) + 1), curve, label=name, linewidth=1.3, **look)
+        axes.set(xlabel="episode", ylabel="return" if by_return else "steps")
+        if not by_return:
+            axes.set_ylim(0, None)
         axes.yaxis.label.set_color(INK)
         axes.grid(axis="y")
         legend_below(figure)
@@ -118,8 +135,9 @@ def _curves(results: Sequence[Result]) -> bytes:
 class ComparedSessions:
     """The results of N sessions of E episodes: curve (E,), the mean steps by episode; all others (N,), by session.
 
-    returns: the mean sum of an episode's rewards; greedy_steps, greedy_last_steps: of the greedy policy without advice, the mean
-    of its measurements along the way and the last one; without values where no table says what a greedy policy does.
+    return_curve: (E,), the mean sum of an episode's rewards by episode; mean_return, last_return: of all episodes and of the last;
+    by_return: whether the problem has no goal, so that returns are its score. greedy_steps, greedy_last_steps: of the greedy policy
+    without advice, the mean of its measurements along the way and the last one; empty where no table says what the policy does.
     """
 
     curve: FloatArray
@@ -130,9 +148,17 @@ class ComparedSessions:
     requests: FloatArray
     misleads: FloatArray
     rejected: BoolArray
-    returns: FloatArray
+    return_curve: FloatArray
+    mean_return: FloatArray
+    last_return: FloatArray
     greedy_steps: FloatArray
     greedy_last_steps: FloatArray
+    by_return: bool
+
+    @property
+    def cost(self) -> FloatArray:
+        """The mean score of each session, lower is better: its steps, or minus its return."""
+        return -self.mean_return if self.by_return else self.mean_steps
 
     def to_json(self) -> dict[str, list[float]]:
         """The arrays as lists of floats, by name."""
@@ -142,7 +168,8 @@ class ComparedSessions:
     def from_json(cls, record: Mapping[str, list[float]]) -> "ComparedSessions":
         """The results that `to_json` wrote. Raises KeyError, TypeError or ValueError for anything else."""
         kinds: dict[str, Any] = {"solved": np.bool_, "rejected": np.bool_}
-        return cls(**{name: np.array(record[name], kinds.get(name, np.float64)) for name in cls.__dataclass_fields__})
+        arrays = {name: np.array(record[name], kinds.get(name, np.float64)) for name in cls.__dataclass_fields__}
+        return cls(**arrays | {"by_return": bool(record["by_return"])})
 
 
 # ---- the comparison -------------------------------------------------------------------------------------------------
@@ -152,10 +179,10 @@ FAMILIES: dict[str, Family[Any]] = {"gates": GATES, "learners": UPDATES, "adviso
 MEASURES = (
     "solved_percent: sessions whose final greedy path is optimal. mean_steps: of all episodes, a failed one as the "
     "step limit + 1 (the area under the learning curve). last_steps: of the last episode. helped_steps, requests, misleads, "
-    "rejected_percent: of a session, as lab teach counts them. return: the mean sum of an episode's rewards. greedy_steps: of "
-    "the greedy policy without advice, after every tenth episode, in episodes that nobody learns from, mean over these (a failed "
-    "one as in mean_steps); greedy_last_steps: of the last of them; both need a table of the steps. Every setting meets the same "
-    "chances: session n has the same seed in each."
+    "rejected_percent: of a session, as lab teach counts them. mean_return, last_return: the undiscounted sum of an episode's "
+    "rewards, which is its score where there is no goal. greedy_steps: of the greedy policy without advice, after every tenth "
+    "episode, in episodes that nobody learns from, mean over these (a failed one as in mean_steps); greedy_last_steps: of the "
+    "last of them; both need a table of the steps. Every setting meets the same chances: session n has the same seed in each."
 )
 
 
@@ -251,77 +278,84 @@ def sessions_of(setting: ComparedSetting, sessions: int, seed: int, stream: int 
     at_once = problem.environment is None or isinstance(environment, PhysicsEnvironment)
     if at_once and (advisor is None or isinstance(advisor, TableAdvisor)):
         advice = None if advisor is None else advisor.advice
-        batch = run_sessions(
-            environment, how.learner, how.gate, advice, seeds, keep_tables=True, keep_returns=True, greedy_every=every
-        )
-        rejected, steps, q = batch.rejected_at_episode > 0, batch.steps, batch.q
-        returns, greedy = batch.returns.mean(axis=1), batch.greedy
-        counts: tuple[NDArray[np.int64], ...] = (batch.helped_steps, batch.requests, batch.misleads)
-    else:
-        greedy = np.zeros((len(seeds), how.learner.episodes // every if every else 0))
-        alone = [
-            _alone(environment, how.learner, how.gate, advising, int(own), every, measured)
-            for own, measured in zip(seeds, greedy, strict=True)
+        # so many sessions at once that their tables, which are judged and not kept, take little memory
+        some = max(LANES, MOST_ENTRIES // problem.mdp.successor.size)
+        run = partial(run_sessions, environment, how.learner, how.gate, advice)
+        parts = np.split(seeds, range(some, sessions, some))
+        told = [
+            _judged(run(part, keep_tables=True, keep_returns=True, greedy_every=every), environment, how)
+            for part in parts
         ]
-        rejected, steps, q = (np.array([session[n] for session in alone]) for n in range(3))
-        counts = tuple(np.array([session[n] for session in alone]) for n in range(3, 6))
-        returns = np.array([session[6] for session in alone])
-    solved = np.array([environment.judge(table, how.learner).solved for table in q])
-    helped, requests, misleads = (np.asarray(count, np.float64) for count in counts)
-    along = (greedy.mean(axis=1), greedy[:, -1]) if every else (np.zeros(0), np.zeros(0))
-    mean, last = steps.mean(axis=1), steps[:, -1].astype(float)
+    else:
+        told = [_alone(environment, how, advising, int(own), every) for own in seeds]
+    steps, solved, rejected, helped, requests, misleads, returned, greedy = (
+        np.concatenate(several) for several in zip(*told, strict=True)
+    )
+    measured = bool(greedy.shape[1])
     return ComparedSessions(
-        steps.mean(axis=0), solved, mean, last, helped, requests, misleads, rejected, returns, *along
+        curve=steps.mean(axis=0),
+        solved=solved,
+        mean_steps=steps.mean(axis=1),
+        last_steps=steps[:, -1].astype(float),
+        helped_steps=helped.astype(float),
+        requests=requests.astype(float),
+        misleads=misleads.astype(float),
+        rejected=rejected,
+        return_curve=returned.mean(axis=0),
+        mean_return=returned.mean(axis=1),
+        last_return=returned[:, -1],
+        greedy_steps=greedy.mean(axis=1) if measured else np.zeros(0),
+        greedy_last_steps=greedy[:, -1] if measured else np.zeros(0),
+        by_return=highest_reward(environment) is not None,
     )
 
 
-def _alone(
-    environment: Environment,
-    learner: LearnerSettings,
-    gate: GateSettings,
-    advising: Advising,
-    seed: int,
-    every: int,
-    greedy: FloatArray,
-) -> tuple[bool, NDArray[np.int64], FloatArray, int, int, int, float]:
-    """(rejected, steps (E,), q (S, A), helped steps, requests, misleads, return) of one session that is not compiled.
+# Of N sessions of E episodes: steps (N, E), solved (N,), rejected (N,), three counts (N,): helped steps, requests, misleads; the
+# returns (N, E), and the steps of the greedy policy (N, K).
+Measured = tuple[NDArray[Any], BoolArray, BoolArray, NDArray[Any], NDArray[Any], NDArray[Any], FloatArray, FloatArray]
 
-    every, greedy: as in `measure_greedy`.
-    """
+
+def _judged(batch: Batch, environment: Environment, how: Learned) -> Measured:
+    """The results of compiled sessions, whose tables are judged and not kept."""
+    solved = np.array([environment.judge(table, how.learner).solved for table in batch.q])
+    counts = batch.helped_steps, batch.requests, batch.misleads
+    return batch.steps, solved, batch.rejected_at_episode > 0, *counts, batch.returns, batch.greedy
+
+
+def _alone(environment: Environment, how: Learned, advising: Advising, seed: int, every: int) -> Measured:
+    """The results of one session that is not compiled; every: as in `measure_greedy`."""
     rng = np.random.default_rng(seed)
-    advisor = advising.for_session().gather(environment, learner, rng)
-    running = Session(environment, learner, gate, advisor, rng)
+    advisor, greedy = advising.for_session().gather(environment, how.learner, rng), np.zeros(0)
+    if every:
+        greedy = np.zeros(how.learner.episodes // every)
+    running = Session(environment, how.learner, how.gate, advisor, rng)
     session = running.run(enough=partial(measure_greedy, running, seed, every, greedy))
     if session.interrupted:
         raise KeyboardInterrupt
-    return (
-        session.rejected_at_episode is not None,
-        session.steps,
-        session.q,
-        session.helped_steps,
-        session.requests,
-        session.misleads,
-        float(session.returns.mean()),
-    )
+    helped, requests, misleads = (np.array([n]) for n in (session.helped_steps, session.requests, session.misleads))
+    rejected, solved = np.array([session.rejected_at_episode is not None]), np.array([session.solved])
+    return session.steps[None], solved, rejected, helped, requests, misleads, session.returns[None], greedy[None]
 
 
 def rows_of(named: Row, measured: ComparedSessions) -> list[Row]:
     """The rows of one setting, one per measure."""
     greedy = ("greedy_steps", "greedy_last_steps") if len(measured.greedy_steps) else ()
+    returns = [mean_row(named, "mean_return", measured.mean_return)]
+    returns.append(varying_row(named, "last_return", measured.last_return))
     return [
         share_row(named, "solved_percent", measured.solved),
+        *returns,
         mean_row(named, "mean_steps", measured.mean_steps),
         *(varying_row(named, name, getattr(measured, name)) for name in ("last_steps", "helped_steps")),
         *(varying_row(named, name, getattr(measured, name)) for name in ("requests", "misleads")),
         share_row(named, "rejected_percent", measured.rejected),
-        varying_row(named, "return", measured.returns),
         *(varying_row(named, name, getattr(measured, name)) for name in greedy),
     ]
 
 
 def in_short(results: "Iterator[tuple[Row, ComparedSessions]] | Any") -> Row:
-    """The summary: the setting that solves most sessions, of equal ones the one with the fewest mean steps."""
-    named, best = max(results, key=lambda result: (result[1].solved.mean(), -result[1].mean_steps.mean()))
+    """The summary: the setting that solves most sessions, of equal ones that with the fewest steps, or the highest return."""
+    named, best = max(results, key=lambda result: (result[1].solved.mean(), -result[1].cost.mean()))
     what = ", ".join(f"{name} {value}" for name, value in named.items())
     return {"best": what, "best solves [%]": round(100 * float(best.solved.mean()), 1)}
 

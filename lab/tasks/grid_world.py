@@ -33,6 +33,7 @@ _TRIES = 10  # draws of obstacles before a path is kept free
 _ALONE: dict[str, Any] = {"learner": "afterstate", "beta": 1.0, "episodes": 500}
 _FAR = 300  # moves to a goal that no learner finds by chance, and that the usual discount makes worthless
 _SHOWN: dict[str, Any] = {"learner": "monte-carlo", "alpha": 1.0, "beta": 3.0, "episodes": 60}
+_MOST_STEPS = 1_000_000  # of an episode, see `LearnerSettings`
 _ROOM = 4  # the step limit of a drawn world, in lengths of the shortest path
 _WANTED = "wanted random:SHAPE:DENSITY:SEED, such as random:10x10x10:0.06:7"
 
@@ -73,6 +74,8 @@ class GridWorld(Learned):
     """The cell that the learner must reach, such as `[11, 11]`."""
     obstacles: Annotated[tuple[GridCell, ...], BeforeValidator(as_tuple)] = ()
     """The cells that are blocked, such as `[[3, 4], [3, 5]]`."""
+    deadly: bool = True
+    """Whether entering an obstacle ends the episode; false: the obstacle blocks, and a move against it costs a step."""
     view: AdvisorView | None = None
     """The region in which an advisor with a limited view sees the robot; left out: everywhere."""
 
@@ -120,7 +123,8 @@ class GridWorld(Learned):
     def mdp(self) -> TabularMDP:
         """The decision problem of the world, from `lab.mdp.grid`; raises NoPath when obstacles separate start and goal."""
         try:
-            return grid(self.shape, self.blocked(), self.start, self.goal, self.rewards, ACTIONS[len(self.shape)])
+            cells, labels = (self.shape, self.blocked(), self.start, self.goal), ACTIONS[len(self.shape)]
+            return grid(*cells, self.rewards, labels, deadly=self.deadly)
         except NoPath as error:
             raise NoPath(f"world '{self.name}': {error}", error.enclosing, error.around) from None
 
@@ -143,7 +147,7 @@ class GridWorld(Learned):
         if steps > most:
             need = f"the shortest path has {counted(moves, 'move')} and needs {counted(steps, 'step')}"
             raise BadInput(f"world '{self.name}': learner.max_steps = {most}: {need}")
-        if not self.obstacles:
+        if not self.obstacles or not self.deadly:
             return mdp
         near = int(np.abs(np.subtract(self.obstacles, self.start)).sum(axis=1).min())
         crash, way = self.worth(near, collision), self.worth(moves, self.rewards.goal)
@@ -163,6 +167,7 @@ class GridWorld(Learned):
         lines = [f"# {line}" for line in comment.splitlines()]
         lines += [f"{key} = {json.dumps(getattr(self, key))}" for key in head]
         lines += ["obstacles = [", *(f"  {json.dumps(cell)}," for cell in self.obstacles), "]"]
+        lines += [] if self.deadly else ["deadly = false"]
         tables = {"view": self.view.model_dump()} if self.view is not None else {}
         tables |= {"rewards": asdict(self.rewards), "learner": asdict(self.learner), "gate": asdict(self.gate)}
         for name, table in tables.items():
@@ -209,35 +214,48 @@ def from_text(path: Path) -> GridWorld:
     return from_rows(read_text(path), name, str(path))
 
 
-def from_rows(text: str, name: str, where: str) -> GridWorld:
+def from_rows(text: str, name: str, where: str, deadly: bool = False) -> GridWorld:
     """The world of a text grid: rows of equal length with '.' free, '#' obstacle, one 'S' start and one 'G' goal.
 
+    Obstacles block, unless `deadly` is true or the first line is "deadly = true": then they end the episode.
     `lab see --json` writes such rows as "grid". Raises BadInput with the place, line and column, and NoPath.
     """
     rows = [row.removesuffix("\r") for row in text.rstrip("\r\n").split("\n")]
     if rows == [""]:
         raise BadInput(f"{where}: it is empty: wanted rows of . # S G")
+    head = re.fullmatch(r"deadly *= *(true|false) *", rows[0])
+    above = 0 if head is None else 1
+    if head is not None:
+        deadly = head[1] == "true"
+    rows = rows[above:]
+    if not rows:
+        raise BadInput(f"{where}: line 2 is missing: wanted rows of . # S G")
     cells: dict[str, list[Coordinates]] = {"#": [], "S": [], "G": []}
     for i, row in enumerate(rows):
         for j, mark in enumerate(row):
             if mark != "." and mark not in cells:
-                raise BadInput(f"{where}: line {i + 1}, column {j + 1}: {mark!r}: allowed are . # S G")
+                raise BadInput(f"{where}: line {i + 1 + above}, column {j + 1}: {mark!r}: allowed are . # S G")
             if mark in ("S", "G") and cells[mark]:
                 (first,) = cells[mark]
-                place = f"line {first[0] + 1}, column {first[1] + 1}"
-                raise BadInput(f"{where}: line {i + 1}, column {j + 1}: a second '{mark}', the first is in {place}")
+                place = f"line {first[0] + 1 + above}, column {first[1] + 1}"
+                raise BadInput(
+                    f"{where}: line {i + 1 + above}, column {j + 1}: a second '{mark}', the first is in {place}"
+                )
             if mark != ".":
                 cells[mark].append((i, j))
         if len(row) != len(rows[0]):
             raise BadInput(
-                f"{where}: line {i + 1}: {counted(len(row), 'cell')}, line 1 has {len(rows[0])}: wanted the same number"
+                f"{where}: line {i + 1 + above}: {counted(len(row), 'cell')}, line {1 + above} has {len(rows[0])}: "
+                "wanted the same number"
             )
     _check_shape((len(rows), len(rows[0])), where)
     for mark, what in (("S", "start"), ("G", "goal")):
         if not cells[mark]:
             raise BadInput(f"{where}: no '{mark}' ({what}) in {len(rows)} lines: exactly one is wanted")
     shape, (start,), (goal,) = (len(rows), len(rows[0])), cells["S"], cells["G"]
-    return _fitted(GridWorld(name=name, shape=shape, start=start, goal=goal, obstacles=tuple(cells["#"])))
+    return _fitted(
+        GridWorld(name=name, shape=shape, start=start, goal=goal, obstacles=tuple(cells["#"]), deadly=deadly)
+    )
 
 
 def from_words(word: str) -> GridWorld:
@@ -320,7 +338,7 @@ def _staircase(start: Ints, goal: Ints, rng: np.random.Generator) -> Ints:
 def _fitted(world: GridWorld) -> GridWorld:
     """The world with settings of its learner that fit: to find a path alone or, to a far goal, to learn a path it is shown."""
     moves, learner = shortest_steps(world.mdp()), world.learner
-    room = max(learner.max_steps, _ROOM * moves)
+    room = min(max(learner.max_steps, _ROOM * moves), _MOST_STEPS)
     if moves > _FAR:
         learner = replace(learner, **_SHOWN, discount=1.0 - 1.0 / (10.0 * moves), max_steps=room)
         lost = round(walking(world.rewards.step, learner), 6)

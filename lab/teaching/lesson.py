@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import partial
+from math import isnan
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Protocol
@@ -10,7 +11,8 @@ from lab.advice.advisors import PEOPLE
 from lab.errors import BadInput, LabError
 from lab.learning.problem import Problem
 from lab.learning.requests import AdviceRequest, AdvisorLeft
-from lab.mdp import BoolArray
+from lab.learning.session_result import SessionResult
+from lab.mdp import BoolArray, FloatArray
 from lab.tasks.record import Learned
 from lab.teaching.events import ScenePrepared, Tell
 from lab.teaching.kept_session import KeptSession, NewSession, check_new
@@ -96,7 +98,8 @@ def one_lesson(
     if out is None:
         return document
     missing = []
-    for draw in (partial(_draw_curve, problem.name), subject.draw):
+    returns = lesson.result.returns if lesson.result is not None and lesson.result.by_return else None
+    for draw in (partial(_draw_curve, problem.name, returns), subject.draw):
         try:
             document["files"] |= draw(lesson.policy, out)
         except (OSError, LabError) as error:  # the policy has been saved already
@@ -166,10 +169,20 @@ def document_of(problem: Problem, lesson: Lesson, teacher: Teacher) -> dict[str,
         "source": lesson.source,
         "saved_as": policy.name,
         "files": {},
+    } | (_returned(result) if result.by_return else {})
+
+
+def _returned(result: SessionResult) -> dict[str, Any]:
+    """The further items of a problem that is scored by return; a return that is not known is None."""
+    return {
+        "score": "return",
+        "returns_per_episode": [None if isnan(value) else value for value in result.returns.tolist()],
+        "final_return": result.final_return,
+        "best_return": result.best_return,
     }
 
 
-def _draw_curve(name: str, policy: Policy, out: Path) -> dict[str, str]:
+def _draw_curve(name: str, returns: FloatArray | None, policy: Policy, out: Path) -> dict[str, str]:
     out.mkdir(parents=True, exist_ok=True)
-    learning_curves({name: policy}, out / "learning-curve.png")
+    learning_curves({name: policy}, out / "learning-curve.png", None if returns is None else {name: returns})
     return {"learning_curve": str(out / "learning-curve.png")}

@@ -84,7 +84,10 @@ class Sessions:
         assert kept is not None
         if several and not (whole.interrupted or kept.solved) and before == moves < inf and unfinished is not None:
             kept = unfinished  # no shorter path: with the same table, what was measured with it still holds
-        return replace(whole, q=kept.q, final_steps=kept.final_steps, solved=kept.solved)
+        whole = replace(whole, q=kept.q, final_steps=kept.final_steps, solved=kept.solved)
+        if not whole.by_return:
+            return whole
+        return replace(whole, final_return=self.place.judge(kept.q, plan.learner).final_return)
 
     def _begun(self, learner: LearnerSettings, advisor: Advisor | None, q0: FloatArray | None) -> Session:
         """A session that begins from a table (S, A); reports its begin."""
@@ -102,8 +105,9 @@ class Sessions:
         result = self._begun(short, None, q0).run(self._hear)
         if moves_to_goal(q0, plan.problem, plan.learner) >= moves_to_goal(result.q, plan.problem, plan.learner):
             return result
-        final, _, solved = self.place.judge(q0, plan.learner)
-        return replace(result, q=q0, final_steps=final, solved=solved)
+        judged = self.place.judge(q0, plan.learner)
+        final = replace(result, final_steps=judged.final_steps, final_return=judged.final_return)
+        return replace(final, q=q0, solved=judged.solved)
 
     def _advisor(self) -> Advisor | None:
         made = self.advising.gather(self.place, self.plan.learner, self.rng, journal=self.journal, tell=self._hear)
@@ -141,9 +145,12 @@ def fits(q: FloatArray, problem: Problem, learner: LearnerSettings) -> bool:
 
 
 def moves_to_goal(q: FloatArray, problem: Problem, learner: LearnerSettings) -> float:
-    """The total moves of the greedy paths from all starts, inf if one of them misses the goal."""
+    """The total moves of the greedy paths from all starts, inf if one misses the goal; without a goal, minus the return."""
     if problem.environment is not None:
-        steps = problem.environment.judge(q, learner).final_steps
+        judged = problem.environment.judge(q, learner)
+        if judged.final_return is not None:
+            return -judged.final_return
+        steps = judged.final_steps
         return inf if steps is None else steps
     mdp = problem.mdp
     if mdp.starts:
@@ -157,6 +164,7 @@ def joined(before: SessionResult | Policy | None, now: SessionResult) -> Session
     if before is None:
         return now
     steps = before.curve if isinstance(before, Policy) else before.steps
+    earlier = np.full(len(steps), np.nan) if isinstance(before, Policy) else before.returns
     whole = replace(
         now,
         visits=before.visits + now.visits,
@@ -164,6 +172,7 @@ def joined(before: SessionResult | Policy | None, now: SessionResult) -> Session
         guided=np.concatenate([np.asarray(before.guided, bool), now.guided]),
         requests=before.requests + now.requests,
         helped_steps=before.helped_steps + now.helped_steps,
+        returns=np.concatenate([earlier, now.returns]),
     )
     if isinstance(before, Policy):  # it does not know of misleads
         return whole

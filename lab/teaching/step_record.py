@@ -51,7 +51,8 @@ class StepRecord:
         elif isinstance(event, QuestionAnswered):
             self._advised = event.action is not None
         elif isinstance(event, LessonEvent) and isinstance(event.event, EpisodeEnded) and self._now is not None:
-            self._now.steps = int(event.event.steps)
+            steps = event.event.steps  # a float only for a score that is no number of steps
+            self._now.steps = steps if isinstance(steps, int) else len(self._now.actions)
             self.episodes.append(self._now)
             self._now = None
 

@@ -36,10 +36,15 @@ class TableSubject(Subject):
     problem: Problem
 
     def __post_init__(self) -> None:
-        self.name, self.settings = self.problem.name, Learned()
+        given = {"learner": self.problem.learner, "gate": self.problem.gate}
+        self.name = self.problem.name
+        self.settings = Learned.model_validate({name: value for name, value in given.items() if value is not None})
 
     def prepare(self, seed: int) -> Problem:
-        """The problem."""
+        """The problem. Raises BadInput for the learner "afterstate" where steps are stochastic."""
+        if self.settings.learner.learner == "afterstate" and not getattr(self.problem.environment, "certain", True):
+            why = f"where the steps of '{self.name}' lead is not certain, and it looks at the states after them"
+            raise BadInput(f"learner 'afterstate': {why}: wanted another one, such as q")
         return self.problem
 
     def draw(self, policy: Policy, out: Path) -> dict[str, str]:
@@ -51,9 +56,11 @@ class TableSubject(Subject):
         return {"value_map": str(path)}
 
 
-def world(rows: str, name: str = "world") -> GridWorld:
+def world(rows: str, name: str = "world", *, deadly: bool = False) -> GridWorld:
     """A grid world from its rows of cells: '.' free, '#' obstacle, one 'S' (start), one 'G' (goal).
 
+    deadly: whether an obstacle ends the episode, as the line "deadly = true" above the rows says, too; default: it blocks, the
+    robot stays where it is, and the move costs a step.
     name: 1 to 40 letters, digits, spaces, - and _.
     Raises BadInput for other characters or rows of different lengths, and NoPath if no path joins start and goal.
 
@@ -65,8 +72,9 @@ def world(rows: str, name: str = "world") -> GridWorld:
     check_value("rows", rows, str, "lab.world")
     if not isinstance(name, str) or not re.match(NAME_PATTERN, name):
         raise BadInput(f"name {name!r} (lab.world): wanted 1 to 40 letters, digits, spaces, - and _")
+    check_value("deadly", deadly, bool, "lab.world")
     lines = [line.strip() for line in rows.strip().splitlines()]
-    return from_rows("\n".join(lines), name, f"world '{name}'")
+    return from_rows("\n".join(lines), name, f"world '{name}'", deadly)
 
 
 def subject_from(problem: Teachable, task: str | None = None, sight: str | None = None) -> Subject:

@@ -26,6 +26,7 @@ class MapMarks(NamedTuple):
 
 
 NOTHING = MapMarks()
+FINE = 40_000  # cells of a value map above which they have no outlines and no hatching, which would be smaller than a pixel
 
 
 class Curve(Protocol):
@@ -41,9 +42,12 @@ class Curve(Protocol):
     def optimal_steps(self) -> int | None: ...
 
 
-def learning_curves(policies: Mapping[str, Curve], path: Path) -> None:
+def learning_curves(
+    policies: Mapping[str, Curve], path: Path, returns: Mapping[str, "NDArray[np.float64]"] | None = None
+) -> None:
     """Plot the steps of each episode, one small plot per policy: guided episodes marked, the fewest possible steps as a line.
 
+    returns: by the name of the policy, the returns of its last episodes, which are plotted instead of steps.
     Raises BadInput without policies. Source: the curves of thesis ch. 8 and 9.
     """
     if not policies:
@@ -64,7 +68,11 @@ def learning_curves(policies: Mapping[str, Curve], path: Path) -> None:
         for axes in grid[len(policies) :]:
             axes.remove()
         for axes, (name, policy) in zip(grid, policies.items(), strict=False):
-            _draw_curve(axes, policy)
+            returned = (returns or {}).get(name)
+            if returned is None:
+                _draw_curve(axes, policy)
+            else:
+                _draw_returns(axes, policy, returned)
             axes.set_title(name if policy.subtask in name else f"{name} ({policy.subtask})", fontsize=8.5)
         handles = list(grid[0].get_lines())
         figure.legend(handles=handles, loc="lower center", ncols=len(handles))
@@ -97,7 +105,8 @@ def value_map(
         if picture is not None:
             axes.imshow(_muted(picture))
         shown = np.ma.masked_where(hidden, table)
-        tint = axes.pcolormesh(across, down, shown, cmap="viridis", alpha=0.5, edgecolors="#FFFFFF60", linewidth=0.4)
+        lines: dict[str, Any] = {} if table.size > FINE else {"edgecolors": "#FFFFFF60", "linewidth": 0.4}
+        tint = axes.pcolormesh(across, down, shown, cmap="viridis", alpha=0.5, **lines)
         figure.colorbar(tint, ax=axes, shrink=0.9, label="value of the best action, max Q")
         _draw_places(axes, crossings, walls, places)
         axes.set_aspect("equal")
@@ -187,12 +196,29 @@ def _draw_curve(axes: "matplotlib.axes.Axes", policy: Curve) -> None:
     axes.grid()
 
 
+def _draw_returns(axes: "matplotlib.axes.Axes", policy: Curve, returns: "NDArray[np.float64]") -> None:
+    """Draw the returns of a policy's last episodes."""
+    first = len(policy.curve) - len(returns)
+    episodes = np.arange(first + 1, len(policy.curve) + 1)
+    guided = np.asarray(policy.guided[first:], dtype=np.bool_)
+    axes.plot(episodes, returns, color=BLUE, linewidth=0.9, label="return")
+    axes.plot(episodes[guided], returns[guided], "o", color=ORANGE, markersize=3.5, label="guided episodes")
+    axes.set(xlabel="episode", ylabel="return", xlim=(0, 1.02 * max(2, len(policy.curve))))
+    axes.xaxis.set_major_locator(matplotlib.ticker.MaxNLocator(integer=True))
+    axes.grid()
+
+
 def _draw_places(
     axes: "matplotlib.axes.Axes", crossings: NDArray[np.float64], walls: NDArray[np.bool_], places: MapMarks
 ) -> None:
     """Draw blocked cells, the greedy path, start and goal on a value map."""
     middles = (crossings[:-1, :-1] + crossings[1:, 1:]) / 2
-    outlines = [crossings[[i, i, i + 1, i + 1], [j, j + 1, j + 1, j]] for i, j in np.argwhere(walls)]
+    fine = walls.size > FINE
+    outlines = [] if fine else [crossings[[i, i, i + 1, i + 1], [j, j + 1, j + 1, j]] for i, j in np.argwhere(walls)]
+    if fine and walls.any():
+        grey = matplotlib.colors.ListedColormap(["#555555"])
+        axes.pcolormesh(crossings[..., 0], crossings[..., 1], np.ma.masked_where(~walls, walls), cmap=grey)
+        axes.plot([], [], "s", color="#555555", label="blocked")  # its line in the legend
     if outlines:
         hatched = matplotlib.collections.PolyCollection(
             outlines, facecolor="#00000055", edgecolor="white", hatch="xxx", label="blocked"

@@ -194,7 +194,13 @@ def _found(skills: Sequence[Mapping[str, Any]], task: str) -> str:
 
 
 def _way(lesson: Mapping[str, Any]) -> str:
-    """The steps of the learned path and the fewest possible; both are means if starts or transitions are random."""
+    """The steps of the learned path and the fewest possible; both are means if starts or transitions are random.
+
+    In a problem that is scored by return, the mean returns of the learned and the best policy.
+    """
+    if "final_return" in lesson:
+        learned, highest = f"mean return {lesson['final_return']:.4g}", lesson["best_return"]
+        return learned if highest is None else f"{learned}, that of the best policy is {highest:.4g}"
     final, best, drawn = lesson["final_steps"], lesson["optimal_steps"], lesson["steps_are_means"]
     learned = "does not reach the goal" if final is None else counted(final, "step")
     learned += " on average, where it reaches the goal" if drawn and final is not None else ""

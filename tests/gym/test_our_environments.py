@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from lab.errors import BadInput
 from lab.gym import ENVIRONMENTS, CellEnv, FmsEnv, TableEnv, ToastCellEnv, WorldEnv, register
+from lab.gym.gym_environment import GymEnvironment
 from lab.mdp import coverage, grid
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import MAKESPAN, stuck_cost
@@ -21,6 +22,8 @@ from lab.tasks.cell_file import CellFile
 from lab.tasks.grid_world import GridWorld
 from lab.tasks.task_file import load, load_cell, load_world
 from lab.tasks.toml_text import TomlText
+from lab.teaching.lesson_options import LessonOptions
+from lab.teaching.subjects import subject_of
 
 Trace = list[tuple[Any, ...]]
 
@@ -312,3 +315,15 @@ def test_a_cell_that_is_none_is_said(name: str, keywords: dict[str, Any], said: 
 def test_the_cells_are_those_that_ship() -> None:
     assert FmsEnv().cell.order == load_cell("fms").cell().order
     assert ToastCellEnv("III", 4).cell.parts == 4
+
+
+def test_river_swim_is_scored_by_return() -> None:
+    """Its model has no goal, so the document has returns; the best policy always swims right."""
+    subject = subject_of(LessonOptions("gym:TeachingLab/RiverSwim-v0", episodes=60).complete())
+    place = subject.prepare(0).environment
+    assert isinstance(place, GymEnvironment)
+    assert place.highest_reward == 1.0
+    assert place.values(0.99).argmax(axis=1).tolist() == [1] * 6
+    judged = place.judge(place.values(0.99), subject.settings.learner)
+    assert (judged.final_steps, judged.solved) == (None, True)
+    assert round(judged.final_return or 0.0, 4) == 3.3966

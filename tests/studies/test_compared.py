@@ -14,7 +14,7 @@ import pytest
 
 import lab
 from lab.errors import BadInput
-from lab.learning.batch import run_sessions
+from lab.learning.batch import Batch, run_sessions
 from lab.learning.gates import GATES, Gate
 from lab.learning.members import Member
 from lab.studies.compared import Compared, ComparedSetting, compared, sessions_of, words
@@ -57,10 +57,26 @@ def test_returns_and_greedy_steps_are_rows_where_steps_are_in_a_table() -> None:
     values = {row["measure"]: row["value"] for row in rows}
     assert values["greedy_last_steps"] == 4.0  # the shortest path
     assert values["greedy_steps"] >= 4.0
-    assert values["return"] < WORLD.mdp().reward.max()
+    assert values["mean_return"] < WORLD.mdp().reward.max()
     tiles = compared(Compared(WORLD, ("none",), {"learner": ["sarsa-lambda"], "tilings": [2], **SHORT}), Job(2, 0)).rows
-    assert "return" in {row["measure"] for row in tiles}
+    assert "mean_return" in {row["measure"] for row in tiles}
     assert not {row["measure"] for row in tiles} & {"greedy_steps", "greedy_last_steps"}
+
+
+def test_the_tables_of_few_sessions_are_held_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """60 sessions in rounds of 24, 24 and 12, with the same results as in one."""
+    setting, held = one(Compared(WORLD, ("expert",), SHORT)), []
+    whole = sessions_of(setting, 60, 0)
+
+    def recorded(*given: Any, **how: Any) -> Batch:
+        batch = run_sessions(*given, **how)
+        held.append(len(batch.q))
+        return batch
+
+    monkeypatch.setattr("lab.studies.compared.MOST_ENTRIES", 1)
+    monkeypatch.setattr("lab.studies.compared.run_sessions", recorded)
+    assert sessions_of(setting, 60, 0).to_json() == whole.to_json()
+    assert held == [24, 24, 12]
 
 
 def test_what_is_not_compiled_is_run_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -23,6 +23,7 @@ from lab.tasks.grid_world import (
     MAX_DENSITY,
     AdvisorView,
     GridWorld,
+    from_rows,
     from_text,
     from_words,
     parse_shape,
@@ -154,6 +155,31 @@ def test_a_slip_in_a_text_grid_is_said_with_its_place(tmp_path: Path, text: str,
     with pytest.raises(BadInput) as caught:
         from_text(path)
     assert str(caught.value) == f"{path}: {said}"
+
+
+def test_an_obstacle_of_a_text_grid_blocks() -> None:
+    """Down from (0, 1) is the obstacle (1, 1): it stays, for the price of a step; down from (0, 0) is (1, 0)."""
+    world = from_rows("S..\n.#.\n..G", "maze", "test")
+    mdp = world.check()
+    assert (mdp.successor[1, 1], mdp.reward[1, 1], mdp.successor[0, 1]) == (1, -0.1, 3)
+    assert set(mdp.successor[~mdp.terminal].ravel()) == set(range(9)) - {4}
+    assert tomllib.loads(world.to_toml())["deadly"] is False
+
+
+def test_an_obstacle_ends_the_episode_where_the_file_says_so() -> None:
+    text = "S..\n.#.\n..G"
+    above, said = from_rows(f"deadly = true\n{text}", "maze", "test"), from_rows(text, "maze", "test", deadly=True)
+    assert above == said
+    mdp = above.check()
+    assert (mdp.successor[1, 1], mdp.reward[1, 1], bool(mdp.terminal[4])) == (4, above.rewards.collision, True)
+    assert "deadly" not in tomllib.loads(above.to_toml())
+    assert not from_rows(f"deadly = false\n{text}", "maze", "test", deadly=True).deadly
+
+
+def test_the_worlds_of_the_thesis_and_drawn_ones_are_deadly() -> None:
+    """Their signatures are those from before text grids blocked."""
+    assert [load_world(name).deadly for name in ("world-1", "world-2", "random:8x8:0.2:0")] == [True] * 3
+    assert load_world("random:8x8:0.2:0").mdp().signature == "03a93b2db437396c"
 
 
 def test_a_text_grid_that_is_no_text(tmp_path: Path) -> None:

@@ -38,10 +38,13 @@ class Ccrl(Gate):
 
     With `settings.by_evidence`, also beyond the thesis, an episode with advice is compared with the last K without any, and the
     advisor is rejected when the `evidence` against it exceeds ENOUGH_EVIDENCE; a mislead is an episode that adds to it.
+
+    Where episodes are scored by return, equal results do not show that a goal was reached: then they never stop it for good.
     """
 
     def __init__(self, settings: GateSettings, episodes: int, max_steps: int, around: Surroundings | None = None):
         super().__init__(settings, episodes, max_steps, around)
+        self._by_return = around is not None and around.by_return
         self.several_starts = around is not None and around.several_starts
         self.watches = self.several_starts or settings.by_evidence
         self._slow = Reason()
@@ -82,7 +85,7 @@ class Ccrl(Gate):
         return slow and not self.converged and episode < self.episodes
 
     def _watch_convergence(self, result: float) -> None:
-        if result == self._last_result and result < self.max_steps:
+        if result == self._last_result and result < self.max_steps and not self._by_return:
             self._equal_results += 1
             self.converged = self.converged or self._equal_results > 2 * self.settings.window
         else:

@@ -11,7 +11,9 @@ from lab.learning.session_events import Improvement, Verdict
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.learning.updates.update import Update
 
-Steps = Sequence[float]  # step counts of the finished episodes; for orders of transfers, their makespans [s]
+Steps = Sequence[
+    float
+]  # step counts of the finished episodes; for orders of transfers, their makespans [s]; see `by_return`
 
 OPENS_NEVER, OPENS_ALWAYS, OPENS_FROM_X, OPENS_WHILE_SLOW, OPENS_WHILE_LONG = range(5)
 WEIGHS_NOTHING, WEIGHS_NOVELTY, WEIGHS_FADING, WEIGHS_SHAPING, WEIGHS_RELIABILITY, WEIGHS_WORTH, WEIGHS_TRUST = range(7)
@@ -44,7 +46,7 @@ def window_mean(steps: Steps, end: int, window: int) -> float:
 
 def too_slow(current_mean: float, previous_mean: float, threshold: float) -> bool:
     """Whether the improvement rate is below Lambda. Source: thesis eqs. 6.1 and 6.2 and the listing's ratio."""
-    return current_mean / previous_mean > 1.0 - threshold
+    return previous_mean == 0.0 or current_mean / previous_mean > 1.0 - threshold
 
 
 def misled(result: float, mean_before: float) -> bool:
@@ -82,7 +84,7 @@ def improvement(steps: Steps, window: int) -> Improvement | None:
     if n < 2 * window:
         return None
     current, previous = window_mean(steps, n, window), window_mean(steps, n - window, window)
-    return Improvement(1.0 - current / previous, current, previous)
+    return Improvement(1.0 - current / previous if previous else 0.0, current, previous)
 
 
 # ---- the base class -------------------------------------------------------------------------------------------------
@@ -97,7 +99,8 @@ class Surroundings:
 
     draw: returns uniform numbers; learners: returns as many independent learners as asked for, with random start values;
     several_starts: whether episodes may begin in different states; values: the learner's values of a state (`Update.gauge`);
-    size: (S, A); learner: the learner's settings.
+    size: (S, A); learner: the learner's settings; by_return: whether the problem has no goal, so that what is given as the
+    steps of an episode is the shortfall of its return.
     """
 
     draw: Draw
@@ -106,6 +109,7 @@ class Surroundings:
     values: Callable[[int], Values] = lambda state: ()
     size: tuple[int, int] = (0, 0)
     learner: LearnerSettings = field(default_factory=LearnerSettings)
+    by_return: bool = False
 
 
 class Gate:
