@@ -5,6 +5,7 @@ Settings without a compiled form run in the interactive session, one after the o
 
 from collections.abc import Sequence
 from functools import partial
+from math import log
 from typing import NamedTuple
 
 import numpy as np
@@ -29,11 +30,13 @@ from lab.learning.simulated_advice import SPEAKS_ALWAYS, SPEAKS_AS_EXPECTED, Adv
 from lab.learning.tiles import TileCoding
 from lab.learning.updates import LINEAR, UPDATES
 from lab.learning.updates.linear import TileSarsa
-from lab.learning.updates.update import STATE_VALUES
+from lab.learning.updates.tabular import TRACE_FLOOR
+from lab.learning.updates.update import AFTERSTATE, DYNA, Q_TRACES, SARSA, SARSA_TRACES, Q
 from lab.mdp import FloatArray, IntArray, TabularMDP
 
 Outcome = tuple[float, int, float]  # chance, state entered, reward
 WALKS = 10  # episodes that measure a greedy policy where they differ
+SPARE_TRACES = 32  # room for new traces before the kernel has to move the others to the beginning
 
 
 class ChanceTable(TableEnvironment):
@@ -77,9 +80,6 @@ class ChanceTable(TableEnvironment):
 
 
 # ---- many sessions at once --------------------------------------------------------------------------------------------
-
-
-CHOICES = {"softmax": linear_loop.SOFTMAX, "epsilon-greedy": linear_loop.EPSILON_GREEDY, "greedy": linear_loop.GREEDY}
 
 
 class Batch(NamedTuple):
@@ -156,6 +156,8 @@ def run_sessions(
         hearing,
         _chances(place),
         walks,
+        _lookahead(mdp, learner, learning.max_moves),
+        _model(mdp, learner),
     )
     tables = _action_values(mdp, learning, sessions.kept)
     return _batch(sessions.steps, sessions.guided, sessions.counts, tables, sessions.greedy)
@@ -193,13 +195,19 @@ def is_compiled(mdp: TabularMDP, learner: LearnerSettings, gate: GateSettings, a
     if rules is None:
         return False
     if learner.tilings > 1:
-        known = learner.learner in LINEAR and learner.selection in CHOICES and not gate.memory
+        known = learner.learner in LINEAR and SELECTIONS[learner.selection].compiled is not None and not gate.memory
         plain = rules.weighs == WEIGHS_NOTHING and (advice is None or _speaks_at_once(advice))
         simple = rules.asks != ASKS_WHERE_TABLES_DIFFER and (not rules.judges or len(mdp.starts) < 2)
         return known and plain and simple
     if isinstance(mdp, CellTable) or learner.start_value:
         return False  # only the kernel for tile coding makes these steps
-    return UPDATES[learner.learner].compiled is not None and SELECTIONS[learner.selection].compiled is not None
+    form = UPDATES[learner.learner].compiled
+    side_by_side = rules.asks != ASKS_WHERE_TABLES_DIFFER or form in (
+        Q,
+        AFTERSTATE,
+        SARSA,
+    )  # others need more than a table
+    return form is not None and side_by_side and SELECTIONS[learner.selection].compiled is not None
 
 
 def _speaks_at_once(advice: Advice) -> bool:
@@ -240,6 +248,38 @@ def _walks(
 
 def _chances(place: Environment) -> records.Chances | None:
     return records.Chances(place.below, place.entered, place.reward) if isinstance(place, ChanceTable) else None
+
+
+def _lookahead(mdp: TabularMDP, learner: LearnerSettings, moves: int) -> records.Lookahead | None:
+    """The arrays of learners that need the next action; None for others."""
+    form, numbers = UPDATES[learner.learner].compiled, mdp.successor.size
+    if form not in (SARSA, Q_TRACES, SARSA_TRACES):
+        return None
+    decay, most = 0.0 if form == SARSA else learner.discount * learner.trace, min(moves, numbers)
+    if decay < 1.0:  # a trace of at most 1 / (1 - decay) is soon below the floor
+        lasts = log(TRACE_FLOOR * (1.0 - decay)) / log(decay) if decay else 0.0
+        most = min(most, int(lasts) + 2)
+    most += SPARE_TRACES
+    return records.Lookahead(
+        number=np.zeros(LANES, np.uint64),
+        reward=np.zeros(LANES),
+        listed=np.zeros((LANES, most), np.uint32),
+        strength=np.zeros((LANES, most)),
+        first=np.zeros(LANES, np.uint64),
+        last=np.zeros(LANES, np.uint64),
+        decay=decay,
+        growing=not learner.replacing,
+        on_policy=form != Q_TRACES,
+    )
+
+
+def _model(mdp: TabularMDP, learner: LearnerSettings) -> records.Model | None:
+    """The arrays of Dyna-Q; None for other learners."""
+    if UPDATES[learner.learner].compiled != DYNA:
+        return None
+    size, lanes = (LANES, mdp.successor.size), np.zeros((2, LANES), np.int64)
+    entered, moves = np.full(size, -1, np.int32), np.zeros(size, np.int32)
+    return records.Model(entered, np.zeros(size), moves, *lanes, planning=learner.planning)
 
 
 def _one_by_one(
@@ -299,7 +339,7 @@ def _on_tiles(mdp: TabularMDP, learner: LearnerSettings, work: records.Work) -> 
         growing=not learner.replacing,
         on_policy=issubclass(rule, TileSarsa),
         lookahead=rule.lookahead,
-        selection=CHOICES[learner.selection],
+        selection=SELECTIONS[learner.selection].compiled,
     )
     linear_loop.run(work, linear, _world(mdp))
     sessions, tables = work.sessions, work.sessions.kept.reshape(-1, coding.count, mdp.n_actions)
@@ -338,7 +378,7 @@ def _sessions(
     warm = [selection.temperature(n, learner.beta, learner.exploration) for n in range(1, learner.episodes + 1)]
     return records.KernelSessions(
         seeds=np.asarray(seeds, np.uint64),
-        per_tau=1.0 / np.array(warm),
+        warm=np.array(warm),
         steps=np.zeros(shape, np.int32),
         guided=np.zeros(shape, np.bool_),
         counts=np.zeros(len(seeds), records.COUNTS),
@@ -356,7 +396,9 @@ def _lanes(actions: int, episodes: int, size: int, ensemble: int) -> records.Lan
     return records.Lanes(
         lane=lane,
         values=np.zeros(actions * LANES),
+        best=np.zeros(LANES),
         widths=np.zeros(LANES),
+        warm=np.ones(LANES),
         per_tau=np.zeros(LANES),
         chosen=np.zeros(LANES, np.int64),
         moves=np.zeros(LANES, np.int64),
@@ -377,7 +419,7 @@ def _memories(states: int, actions: int, moves: int) -> Memory:
 
 
 def _is_afterstate(learner: LearnerSettings) -> bool:
-    return bool(UPDATES[learner.learner].compiled == STATE_VALUES) and learner.tilings == 1
+    return bool(UPDATES[learner.learner].compiled == AFTERSTATE) and learner.tilings == 1
 
 
 def _problem(mdp: TabularMDP, learner: LearnerSettings) -> records.ProblemArrays:
@@ -391,6 +433,7 @@ def _learning(mdp: TabularMDP, learner: LearnerSettings) -> records.CompiledLear
     given = vars(learner) | {
         "afterstate": _is_afterstate(learner),
         "max_moves": learner.max_steps - learner.count_start,
+        "selection": SELECTIONS[learner.selection].compiled,
         "actions": (0,) * mdp.n_actions,
     }
     return records.CompiledLearner(**{name: given[name] for name in records.CompiledLearner._fields})

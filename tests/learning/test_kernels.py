@@ -5,12 +5,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from lab.errors import BadInput
 from lab.learning.batch import Batch, run_sessions
 from lab.learning.gates import GATES, Gate, Steps
 from lab.learning.kernels.records import LANES
 from lab.learning.members import Member
+from lab.learning.selection import SELECTIONS
 from lab.learning.session import Session
 from lab.learning.session_result import SessionResult
 from lab.learning.settings import GateSettings, LearnerSettings
@@ -117,16 +120,63 @@ def test_a_gate_without_a_compiled_form_is_run_all_the_same(monkeypatch: pytest.
 
 
 def test_a_learner_without_a_compiled_form_is_run_all_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(UPDATES, "another", UPDATES["sarsa"])
+    monkeypatch.setitem(UPDATES, "another", replace(UPDATES["sarsa"], compiled=None))
     mdp, settings = board(), replace(SHORT, learner="another")
     batch = run_sessions(mdp, settings, EAGER, advice(mdp), np.array([1], np.uint64), keep_tables=True)
     assert_same(batch, 0, alone(mdp, replace(SHORT, learner="sarsa"), EAGER, advice(mdp), 1))
 
 
-def test_a_selection_without_a_compiled_form_is_run_all_the_same() -> None:
-    settings = replace(SHORT, selection="epsilon-greedy")
+def test_a_selection_without_a_compiled_form_is_run_all_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(SELECTIONS, "another", replace(SELECTIONS["epsilon-greedy"], compiled=None))
+    settings = replace(SHORT, selection="another")
     batch = run_sessions(board(), settings, EAGER, None, np.array([1], np.uint64), keep_tables=True)
     assert_same(batch, 0, alone(board(), settings, EAGER, None, 1))
+
+
+@pytest.mark.parametrize("selection", ["epsilon-greedy", "greedy"])
+@pytest.mark.parametrize("learner", LEARNERS)
+@pytest.mark.parametrize("exploration", [0.3, 2.0])
+def test_they_are_the_same_with_other_selections(learner: str, selection: str, exploration: float) -> None:
+    settings = replace(SHORT, learner=learner, selection=selection, exploration=exploration, beta=0.4)
+    how, seeds = replace(EAGER, gate="random"), np.arange(LANES + 1, dtype=np.uint64)
+    batch = run_sessions(board(), settings, how, advice(board()), seeds, keep_tables=True)
+    for n in (0, LANES):
+        assert_same(batch, n, alone(board(), settings, how, advice(board()), n))
+
+
+@given(
+    learner=st.sampled_from(["q-lambda", "sarsa-lambda"]),
+    trace=st.sampled_from([0.0, 0.01, 0.5, 0.97, 1.0]),
+    discount=st.sampled_from([0.9, 1.0]),
+    replacing=st.booleans(),
+    max_steps=st.integers(2, 90),
+    seed=st.integers(0, 1000),
+)
+@settings(max_examples=40, deadline=None)
+def test_traces_are_the_same(
+    learner: str, trace: float, discount: float, replacing: bool, max_steps: int, seed: int
+) -> None:
+    """The lists of traces are long or short, kept for whole episodes or cut, and moved when they are full."""
+    how = LearnerSettings(
+        learner,
+        alpha=0.3,
+        discount=discount,
+        trace=trace,
+        replacing=replacing,
+        beta=0.3,
+        episodes=8,
+        max_steps=max_steps,
+    )
+    batch = run_sessions(board(), how, GateSettings("never"), None, np.array([seed], np.uint64), keep_tables=True)
+    assert_same(batch, 0, alone(board(), how, GateSettings("never"), None, seed))
+
+
+@pytest.mark.parametrize("planning", [0, 1, 200])
+def test_planning_is_the_same(planning: int) -> None:
+    how, seeds = replace(SHORT, learner="dyna-q", planning=planning, episodes=12), np.arange(2, dtype=np.uint64)
+    batch = run_sessions(board(), how, GateSettings("never"), None, seeds, keep_tables=True)
+    for n in range(2):
+        assert_same(batch, n, alone(board(), how, GateSettings("never"), None, n))
 
 
 VIEWS = [(gate, view) for gate in GATES for view in ("full", "limited", "nobody")]

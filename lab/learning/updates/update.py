@@ -34,7 +34,7 @@ class ComputedRows(Sequence[Row]):
         return self.row(state)
 
 
-ACTION_VALUES, STATE_VALUES = range(2)  # the forms of learners in the kernel: what they keep a value of
+Q, AFTERSTATE, SARSA, Q_TRACES, SARSA_TRACES, DYNA = range(6)  # the learners of the kernel
 
 
 def towards(value: float, target: float, alpha: float) -> float:
