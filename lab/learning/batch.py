@@ -3,17 +3,21 @@
 Settings without a compiled form run in the interactive session, one after the other: slower, with the same results.
 """
 
-from collections.abc import Sequence
-from functools import partial
+import warnings
+from collections.abc import Callable, Sequence
+from functools import cache, partial
 from math import log
-from typing import NamedTuple
+from multiprocessing import current_process
+from typing import Any, NamedTuple
 
 import numpy as np
+from numba.core.errors import NumbaError
 from numpy.typing import NDArray
 
-from lab.errors import BadInput
+from lab.errors import BadInput, Notice
 from lab.learning import selection, splitmix
 from lab.learning.advice_memory import Memory, places
+from lab.learning.compiled import inner, not_kept
 from lab.learning.environment import Environment, Step, TableEnvironment
 from lab.learning.gates import GATES
 from lab.learning.gates.gate import ASKS_WHERE_TABLES_DIFFER, WEIGHS_NOTHING
@@ -31,11 +35,15 @@ from lab.learning.tiles import TileCoding
 from lab.learning.updates import LINEAR, UPDATES
 from lab.learning.updates.linear import TileSarsa
 from lab.learning.updates.tabular import TRACE_FLOOR
-from lab.learning.updates.update import AFTERSTATE, DYNA, Q_TRACES, SARSA, SARSA_TRACES, Q
+from lab.learning.updates.update import AFTERSTATE, DYNA, OWN_RULE, Q_TRACES, SARSA, SARSA_TRACES, Q, plain_rule
 from lab.mdp import FloatArray, IntArray, TabularMDP
 
 Outcome = tuple[float, int, float]  # chance, state entered, reward
 WALKS = 10  # episodes that measure a greedy policy where they differ
+TIMES_SLOWER = 250  # the session beside the kernel: 275 times with q, 222 with q-lambda, 160 with dyna-q
+WORTH_COMPILING = 20_000  # episodes of a learner with a rule of its own: fewer take less time one by one than compiling
+_compiled_rules: dict[Any, Any] = {}
+_told: set[tuple[str, str]] = set()
 SPARE_TRACES = 32  # room for new traces before the kernel has to move the others to the beginning
 
 
@@ -133,6 +141,7 @@ def run_sessions(
     steps_known = isinstance(place, TableEnvironment) or isinstance(mdp, CellTable)
     by_chance_on_tiles = isinstance(place, ChanceTable) and learner.tilings > 1
     if by_chance_on_tiles or not (steps_known and is_compiled(mdp, learner, gate, advice)):
+        tell_uncompiled(learner.learner, gate.gate)
         return _one_by_one(place, learner, gate, advice, seeds, keep_tables, greedy_every)
     asking = _asking(gate, advice is not None, learner.max_steps)
     learning, arrays = _learning(mdp, learner), _problem(mdp, learner)
@@ -149,18 +158,67 @@ def run_sessions(
     ensemble = gate.ensemble if asking.gate.asks == ASKS_WHERE_TABLES_DIFFER else 0
     lanes = _lanes(mdp.n_actions, learner.episodes, sessions.kept.shape[1], ensemble)
     memories = _memories(mdp.n_states, mdp.n_actions, learning.max_moves) if gate.memory else None
+    lookahead = _lookahead(mdp, learner, learning.max_moves)
     hearing, walks = _hearing(mdp, asking, advice), _walks(mdp, asking, learning, learner.episodes)
-    run(
-        records.Work(arrays, learning, asking, *advice_arrays, sessions, lanes),
-        memories,
-        hearing,
-        _chances(place),
-        walks,
-        _lookahead(mdp, learner, learning.max_moves),
-        _model(mdp, learner),
-    )
+    work = records.Work(arrays, learning, asking, *advice_arrays, sessions, lanes)
+    optional = memories, hearing, _chances(place), walks, lookahead, _model(mdp, learner)
+    if UPDATES[learner.learner].compiled != OWN_RULE:
+        run(work, *optional, None)
+    elif not _runs_by_rule(work, optional, mdp, learner):
+        return _one_by_one(place, learner, gate, advice, seeds, keep_tables, greedy_every)
     tables = _action_values(mdp, learning, sessions.kept)
     return _batch(sessions.steps, sessions.guided, sessions.counts, tables, sessions.greedy)
+
+
+def _runs_by_rule(work: records.Work, optional: tuple[Any, ...], mdp: TabularMDP, learner: LearnerSettings) -> bool:
+    """Runs the sessions of an added learner by its compiled rule; returns False if they have to run one by one.
+
+    That is so if there are too few for what compiling takes, if the rule cannot be compiled, which a notice says, or if it fails:
+    then the session shows in which line. Raises BadInput for values that are not finite.
+    """
+    name, make = learner.learner, UPDATES[learner.learner].make
+    rule, episodes = plain_rule(make), work.sessions.steps.size  # type: ignore[arg-type]
+    if rule not in _compiled_rules and episodes < WORTH_COMPILING:
+        return False
+    if rule not in _compiled_rules:
+        _compiled_rules[rule] = inner(rule, boundscheck=True)
+    shape, tables = mdp.successor.shape, work.lanes.tables
+    own = records.OwnRule(
+        rule=_compiled_rules[rule],
+        settings=records.NumberSettings(**{field: getattr(learner, field) for field in records.NumberSettings._fields}),
+        q=tables.reshape(LANES, *shape),
+        others=work.lanes.others.reshape(LANES, -1, *shape) if work.lanes.others.size else np.zeros((LANES, 0, *shape)),
+        wrong=np.zeros(1, np.int64),
+    )
+    try:
+        _run_by_rule()(work, *optional, own)
+    except NumbaError:
+        tell_uncompiled(name, "never", ": numba cannot compile its rule")
+        return False
+    except Exception:  # whatever the rule raises
+        return False
+    if own.wrong[0]:
+        raise BadInput(f"learner '{name}': {own.wrong[0]} of its action values are not finite")
+    return True
+
+
+@cache
+def _run_by_rule() -> Callable[..., None]:
+    return not_kept(run)
+
+
+class Uncompiled(Notice):
+    """The notice that an added member runs in the session only."""
+
+
+def tell_uncompiled(learner: str, gate: str, why: str = "") -> None:
+    """Tells once for each added learner and gate without a compiled form that its sessions are slow; not in worker processes."""
+    for kind, family, name in (("learner", UPDATES, learner), ("gate", GATES, gate)):
+        slow = family.is_added(name) and (why or family[name].compiled is None)
+        if slow and (kind, name) not in _told and current_process().name == "MainProcess":
+            _told.add((kind, name))
+            text = f"{kind} '{name}' runs uncompiled, about {TIMES_SLOWER} times slower than shipped ones{why}"
+            warnings.warn(text, Uncompiled, stacklevel=3)
 
 
 def _batch(
@@ -202,11 +260,8 @@ def is_compiled(mdp: TabularMDP, learner: LearnerSettings, gate: GateSettings, a
     if isinstance(mdp, CellTable) or learner.start_value:
         return False  # only the kernel for tile coding makes these steps
     form = UPDATES[learner.learner].compiled
-    side_by_side = rules.asks != ASKS_WHERE_TABLES_DIFFER or form in (
-        Q,
-        AFTERSTATE,
-        SARSA,
-    )  # others need more than a table
+    in_a_table = form in (Q, AFTERSTATE, SARSA, OWN_RULE)  # several of the others need more than a table each
+    side_by_side = in_a_table or rules.asks != ASKS_WHERE_TABLES_DIFFER
     return form is not None and side_by_side and SELECTIONS[learner.selection].compiled is not None
 
 
@@ -253,9 +308,10 @@ def _chances(place: Environment) -> records.Chances | None:
 def _lookahead(mdp: TabularMDP, learner: LearnerSettings, moves: int) -> records.Lookahead | None:
     """The arrays of learners that need the next action; None for others."""
     form, numbers = UPDATES[learner.learner].compiled, mdp.successor.size
-    if form not in (SARSA, Q_TRACES, SARSA_TRACES):
+    by_rule = form == OWN_RULE and UPDATES[learner.learner].make.lookahead  # type: ignore[attr-defined]
+    if form not in (SARSA, Q_TRACES, SARSA_TRACES) and not by_rule:
         return None
-    decay, most = 0.0 if form == SARSA else learner.discount * learner.trace, min(moves, numbers)
+    decay, most = 0.0 if form in (SARSA, OWN_RULE) else learner.discount * learner.trace, min(moves, numbers)
     if decay < 1.0:  # a trace of at most 1 / (1 - decay) is soon below the floor
         lasts = log(TRACE_FLOOR * (1.0 - decay)) / log(decay) if decay else 0.0
         most = min(most, int(lasts) + 2)

@@ -87,6 +87,13 @@ def without_refcounts(function: Function, **options: Any) -> Function:
     return compiled(function, **_WITHOUT_REFCOUNTS, **options)
 
 
+def not_kept(function: Function) -> Function:
+    """The function compiled without reference counting for this process only, because its arguments are functions."""
+    jit: Any = numba.njit
+    jitted: Function = jit(nogil=True, **_WITHOUT_REFCOUNTS)(getattr(function, "py_func", function))
+    return jitted
+
+
 def inner(function: Function, **options: Any) -> Function:
     """The function compiled for calls from other functions without reference counting only.
 

@@ -209,6 +209,35 @@ class Model(NamedTuple):
     planning: int
 
 
+class OwnRule(NamedTuple):
+    """The rule of a `RuleUpdate`, compiled, with the settings that it reads.
+
+    q (LANES, S, A), others (LANES, K, S, A): the tables of `Lanes` in that shape; wrong (1,): the number of values that were not
+    finite when their session ended.
+    """
+
+    rule: Any
+    settings: "NumberSettings"
+    q: FloatArray
+    others: FloatArray
+    wrong: NDArray[np.int64]
+
+
+class NumberSettings(NamedTuple):
+    """The numbers of `LearnerSettings`."""
+
+    alpha: float
+    discount: float
+    trace: float
+    replacing: bool
+    start_value: float
+    planning: int
+    exploration: float
+    beta: float
+    episodes: int
+    max_steps: int
+
+
 # ---- the learners of the kernel -------------------------------------------------------------------------------------
 
 
@@ -274,6 +303,15 @@ def learn_following(
     else:
         follow = not over and (lookahead.on_policy or value == best)
         _spread(lookahead, table, j, number, step, follow)
+
+
+@inlined
+def learn_by_rule(work: Any, own: Any, q: Any, number: Any, entered: Any, reward: float, following: Any) -> None:
+    """`RuleUpdate.learn` of one step in a table (S, A); number: state * A + action."""
+    move, actions = np.int64(number), len(work.learning.actions)
+    discount = 0.0 if work.problem.ends[entered] != 0 else work.learning.discount
+    place = move // actions, move % actions
+    own.rule(q, own.settings, *place, reward, discount, np.int64(entered), np.int64(following))
 
 
 @inlined

@@ -14,7 +14,7 @@ from lab.learning import selection
 from lab.learning.compiled import inlined, inner, without_refcounts
 from lab.learning.kernels import asking as hears
 from lab.learning.kernels.asking import decided, judge, judge_moved, knows, opens
-from lab.learning.kernels.records import LANES, begin_walks, choose, draw, learn, learn_following, replay
+from lab.learning.kernels.records import LANES, begin_walks, choose, draw, learn, learn_by_rule, learn_following, replay
 
 _Memory: Any = memory.Memory
 _Move: Any = memory.RememberedMove
@@ -109,21 +109,46 @@ def _begin(work: Any, memories: Any, hearing: Any, walks: Any, lookahead: Any, m
 
 
 @inlined
-def _learn(work: Any, hearing: Any, lookahead: Any, j: int, following: Any, best: float) -> None:
+def _learn(work: Any, hearing: Any, lookahead: Any, own: Any, j: int, following: Any, best: float) -> None:
     """Learns from lane j's last move, now that the next action is chosen; best: the highest value of the state entered."""
     lanes, number, reward = work.lanes, lookahead.number[j], lookahead.reward[j]
     entered = lanes.states[j]
-    learn_following(work, lookahead, lanes.tables[j], j, number, entered, reward, following, best)
+    if own is None:
+        learn_following(work, lookahead, lanes.tables[j], j, number, entered, reward, following, best)
+    else:
+        learn_by_rule(work, own, own.q[j], number, entered, reward, following)
     for k in range(lanes.others.shape[1]):
         if draw(lanes.rng, j) < 0.5:
-            learn_following(work, lookahead, lanes.others[j, k], j, number, entered, reward, following, best)
+            table = lanes.others[j, k]
+            if own is None:
+                learn_following(work, lookahead, table, j, number, entered, reward, following, best)
+            else:
+                learn_by_rule(work, own, own.others[j, k], number, entered, reward, following)
     if hearing is not None and lanes.lane[j].session >= 0:
         over = work.problem.ends[entered] != 0
         hears.saw(work, hearing, j, number // np.uint64(len(work.learning.actions)), number, entered, reward, over)
 
 
 @inlined
-def _step(work: Any, memories: Any, hearing: Any, chances: Any, walks: Any, lookahead: Any, model: Any, j: int) -> bool:
+def _learn_at_once(work: Any, own: Any, j: int, state: Any, number: Any, entered: Any, reward: float) -> None:
+    """Learns from lane j's move without knowing the next action."""
+    lanes = work.lanes
+    if own is None:
+        learn(work, lanes.tables[j], state, number, entered, reward)
+    else:
+        learn_by_rule(work, own, own.q[j], number, entered, reward, 0)
+    for k in range(lanes.others.shape[1]):
+        if draw(lanes.rng, j) < 0.5:
+            if own is None:
+                learn(work, lanes.others[j, k], state, number, entered, reward)
+            else:
+                learn_by_rule(work, own, own.others[j, k], number, entered, reward, 0)
+
+
+@inlined
+def _step(
+    work: Any, memories: Any, hearing: Any, chances: Any, walks: Any, lookahead: Any, model: Any, own: Any, j: int
+) -> bool:
     """Makes one step of lane j and learns from it; returns whether its episode has ended.
 
     With `lookahead` it first learns from the step before, because the next action is known now; the last step of a truncated
@@ -137,7 +162,7 @@ def _step(work: Any, memories: Any, hearing: Any, chances: Any, walks: Any, look
     else:
         action, source = decided(work, memories, hearing, j)
     if lookahead is not None and lanes.moves[j] > 0:
-        _learn(work, hearing, lookahead, j, action, lanes.best[j])
+        _learn(work, hearing, lookahead, own, j, action, lanes.best[j])
     if truncated:
         return True
     number = state * np.uint64(len(learning.actions)) + action
@@ -150,10 +175,7 @@ def _step(work: Any, memories: Any, hearing: Any, chances: Any, walks: Any, look
         entered, reward = np.uint64(chances.entered[number, k]), chances.reward[number, k]
     ends = problem.ends[entered]
     if lookahead is None:
-        learn(work, lanes.tables[j], state, number, entered, reward)
-        for k in range(lanes.others.shape[1]):
-            if draw(lanes.rng, j) < 0.5:
-                learn(work, lanes.others[j, k], state, number, entered, reward)
+        _learn_at_once(work, own, j, state, number, entered, reward)
     if model is not None:
         replay(work, model, j, number, entered, reward)
     if memories is not None and lanes.lane[j].session >= 0:
@@ -170,7 +192,7 @@ def _step(work: Any, memories: Any, hearing: Any, chances: Any, walks: Any, look
     if lookahead is not None:
         lookahead.number[j], lookahead.reward[j] = number, reward
         if ends != 0:
-            _learn(work, hearing, lookahead, j, np.uint64(0), 0.0)
+            _learn(work, hearing, lookahead, own, j, np.uint64(0), 0.0)
         return bool(ends != 0)
     return bool(ends != 0 or lanes.moves[j] == learning.max_moves)
 
@@ -206,7 +228,7 @@ def _greedy_steps(work: Any, chances: Any, table: Any, seed: Any, number: int) -
 
 
 @inlined
-def _end(work: Any, memories: Any, hearing: Any, chances: Any, walks: Any, j: int) -> int:
+def _end(work: Any, memories: Any, hearing: Any, chances: Any, walks: Any, own: Any, j: int) -> int:
     """Records the last episode of lane j; returns 1 if its session has ended, too."""
     lanes, sessions, learning = work.lanes, work.sessions, work.learning
     lane, moves, won = lanes.lane[j], lanes.moves[j], work.problem.ends[lanes.states[j]] == 1
@@ -236,6 +258,9 @@ def _end(work: Any, memories: Any, hearing: Any, chances: Any, walks: Any, j: in
     if episode < len(sessions.warm):
         return 0
     lanes.is_open[j] = False
+    if own is not None:
+        for i in range(lanes.tables.shape[1]):
+            own.wrong[0] += np.int64(not np.isfinite(lanes.tables[j, i]))
     if len(sessions.kept):
         for i in range(lanes.tables.shape[1]):
             sessions.kept[n, i] = lanes.tables[j, i]
@@ -243,12 +268,12 @@ def _end(work: Any, memories: Any, hearing: Any, chances: Any, walks: Any, j: in
 
 
 @without_refcounts
-def run(work: Any, memories: Any, hearing: Any, chances: Any, walks: Any, lookahead: Any, model: Any) -> None:
+def run(work: Any, memories: Any, hearing: Any, chances: Any, walks: Any, lookahead: Any, model: Any, own: Any) -> None:
     """Runs all sessions; each lane takes the next one when its own has ended.
 
     memories: None without memory; hearing: None if the gate weighs no advice and the advisor answers at once; chances: None for
     deterministic moves; walks: None if no gate judges, or if all episodes begin in one state; lookahead: None for a learner that
-    does not need the next action; model: None without planning.
+    does not need the next action; model: None without planning; own: None for a shipped learner.
     """
     started = over = 0
     fresh = True
@@ -258,6 +283,6 @@ def run(work: Any, memories: Any, hearing: Any, chances: Any, walks: Any, lookah
             fresh = False
         choose(work)
         for j in range(LANES):
-            if _step(work, memories, hearing, chances, walks, lookahead, model, j):
+            if _step(work, memories, hearing, chances, walks, lookahead, model, own, j):
                 fresh = True
-                over += _end(work, memories, hearing, chances, walks, j)
+                over += _end(work, memories, hearing, chances, walks, own, j)
