@@ -11,13 +11,12 @@ from multiprocessing import current_process
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba.core.errors import NumbaError
 from numpy.typing import NDArray
 
 from lab.errors import BadInput, Notice
 from lab.learning import selection, splitmix
 from lab.learning.advice_memory import Memory, places
-from lab.learning.compiled import inner, not_kept
+from lab.learning.compiled import NotCompilable, inner, not_kept
 from lab.learning.environment import Environment, Step, TableEnvironment
 from lab.learning.gates import GATES
 from lab.learning.gates.gate import ASKS_WHERE_TABLES_DIFFER, WEIGHS_NOTHING
@@ -192,7 +191,7 @@ def _runs_by_rule(work: records.Work, optional: tuple[Any, ...], mdp: TabularMDP
     )
     try:
         _run_by_rule()(work, *optional, own)
-    except NumbaError:
+    except NotCompilable:
         tell_uncompiled(name, "never", ": numba cannot compile its rule")
         return False
     except Exception:  # whatever the rule raises

@@ -16,6 +16,7 @@ from typing import Any, TypeVar, cast
 
 import numba
 from numba.core.caching import FunctionCache
+from numba.core.errors import NumbaError
 from platformdirs import user_cache_dir
 
 from lab.errors import Notice, WorkFailed
@@ -24,6 +25,7 @@ from lab.files import source_key
 MOST_FOLDERS = 6  # versions of packages whose compiled functions are kept, each of a few tens of MB
 _WITHOUT_REFCOUNTS: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
 _CONFIG: Any = numba.config  # typed as Any, because its type stubs lack the attributes
+NotCompilable = NumbaError  # raised when a function with new argument types cannot be compiled
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
