@@ -41,7 +41,7 @@ Outcome = tuple[float, int, float]  # chance, state entered, reward
 WALKS = 10  # episodes that measure a greedy policy where they differ
 TIMES_SLOWER = 250  # the session beside the kernel: 275 times with q, 222 with q-lambda, 160 with dyna-q
 WORTH_COMPILING = 20_000  # episodes of a learner with a rule of its own: fewer take less time one by one than compiling
-_compiled_rules: dict[Any, Any] = {}
+_compiled_rules: dict[Any, Any] = {}  # None: numba cannot compile it
 _told: set[tuple[str, str]] = set()
 SPARE_TRACES = 32  # room for new traces before the kernel has to move the others to the beginning
 
@@ -181,6 +181,8 @@ def _runs_by_rule(work: records.Work, optional: tuple[Any, ...], mdp: TabularMDP
         return False
     if rule not in _compiled_rules:
         _compiled_rules[rule] = inner(rule, boundscheck=True)
+    if _compiled_rules[rule] is None:
+        return False
     shape, tables = mdp.successor.shape, work.lanes.tables
     own = records.OwnRule(
         rule=_compiled_rules[rule],
@@ -192,6 +194,7 @@ def _runs_by_rule(work: records.Work, optional: tuple[Any, ...], mdp: TabularMDP
     try:
         _run_by_rule()(work, *optional, own)
     except NotCompilable:
+        _compiled_rules[rule] = None
         tell_uncompiled(name, "never", ": numba cannot compile its rule")
         return False
     except Exception:  # whatever the rule raises

@@ -319,7 +319,8 @@ def _spread(lookahead: Any, table: Any, j: int, number: Any, step: float, follow
     """`tabular.Traced._spread` in lane j; step: alpha times the error. Traces decay at the beginning of the next step."""
     listed, strength, decay = lookahead.listed[j], lookahead.strength[j], lookahead.decay
     first, last, one = lookahead.first[j], lookahead.last[j], np.uint64(1)
-    i, faint, own = first, 0, 1.0
+    i, own = first, 1.0
+    faint: Any = 0
     while i < last:  # a loop with two exits, which LLVM does not unroll: that is slower for so few traces
         move = listed[i]
         if move == number:
@@ -385,10 +386,12 @@ def greedy(values: Any, first: int, stride: int, actions: int, best: float, epsi
     """
     explored = np.int64(min(u / max(epsilon, selection.COLDEST) * actions, actions - 1.0))
     left = (u - epsilon) / (1.0 - min(epsilon, selection.BELOW_ONE))
-    ties = 0
+    ties: Any = 0
     for a in range(actions):
         ties += np.int64(values[first + a * stride] == best)
-    chosen, seen, tie = 0, 0, min(np.int64(left * ties), ties - 1)
+    chosen: Any = 0
+    seen: Any = 0
+    tie: Any = min(np.int64(left * ties), ties - 1)
     for a in range(actions):
         seen += np.int64(values[first + a * stride] == best)
         chosen += np.int64(seen <= tie)
