@@ -335,9 +335,15 @@ def _model(mdp: TabularMDP, learner: LearnerSettings) -> records.Model | None:
     """The arrays of Dyna-Q; None for other learners."""
     if UPDATES[learner.learner].compiled != DYNA:
         return None
-    size, lanes = (LANES, mdp.successor.size), np.zeros((2, LANES), np.int64)
-    entered, moves = np.full(size, -1, np.int32), np.zeros(size, np.int32)
-    return records.Model(entered, np.zeros(size), moves, *lanes, planning=learner.planning)
+    size = LANES, mdp.successor.size
+    return records.Model(
+        entered=np.full(size, -1, np.int32),
+        reward=np.zeros(size),
+        moves=np.zeros(size, np.int32),
+        known=np.zeros(LANES, np.int64),
+        turn=np.zeros(LANES, np.int64),
+        planning=learner.planning,
+    )
 
 
 def _one_by_one(
