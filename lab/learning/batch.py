@@ -3,16 +3,20 @@
 Settings without a compiled form run in the interactive session, one after the other: slower, with the same results.
 """
 
-from collections.abc import Sequence
-from functools import partial
-from typing import NamedTuple
+import warnings
+from collections.abc import Callable, Sequence
+from functools import cache, partial
+from math import log
+from multiprocessing import current_process
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lab.errors import BadInput
+from lab.errors import BadInput, Notice
 from lab.learning import selection, splitmix
 from lab.learning.advice_memory import Memory, places
+from lab.learning.compiled import NotCompilable, inner, not_kept
 from lab.learning.environment import Environment, Step, TableEnvironment
 from lab.learning.gates import GATES
 from lab.learning.gates.gate import ASKS_WHERE_TABLES_DIFFER, WEIGHS_NOTHING
@@ -29,12 +33,18 @@ from lab.learning.simulated_advice import SPEAKS_ALWAYS, SPEAKS_AS_EXPECTED, Adv
 from lab.learning.tiles import TileCoding
 from lab.learning.updates import LINEAR, UPDATES
 from lab.learning.updates.linear import TileSarsa
-from lab.learning.updates.update import STATE_VALUES
+from lab.learning.updates.tabular import TRACE_FLOOR
+from lab.learning.updates.update import AFTERSTATE, DYNA, OWN_RULE, Q_TRACES, SARSA, SARSA_TRACES, Q, plain_rule
 from lab.mdp import FloatArray, IntArray, TabularMDP
 
 Outcome = tuple[float, int, float]  # chance, state entered, reward
 WALKS = 10  # episodes that measure a greedy policy where they differ
 GREEDY_EVERY = 10  # episodes between the measurements of studies
+TIMES_SLOWER = 250  # the session beside the kernel: 275 times with q, 222 with q-lambda, 160 with dyna-q
+WORTH_COMPILING = 20_000  # episodes of a learner with a rule of its own: fewer take less time one by one than compiling
+_compiled_rules: dict[Any, Any] = {}  # None: numba cannot compile it
+_told: set[tuple[str, str]] = set()
+SPARE_TRACES = 32  # room for new traces before the kernel has to move the others to the beginning
 
 
 class ChanceTable(TableEnvironment):
@@ -78,9 +88,6 @@ class ChanceTable(TableEnvironment):
 
 
 # ---- many sessions at once --------------------------------------------------------------------------------------------
-
-
-CHOICES = {"softmax": linear_loop.SOFTMAX, "epsilon-greedy": linear_loop.EPSILON_GREEDY, "greedy": linear_loop.GREEDY}
 
 
 class Batch(NamedTuple):
@@ -137,6 +144,7 @@ def run_sessions(
     steps_known = isinstance(place, TableEnvironment) or isinstance(mdp, CellTable)
     by_chance_on_tiles = isinstance(place, ChanceTable) and learner.tilings > 1
     if by_chance_on_tiles or not (steps_known and is_compiled(mdp, learner, gate, advice)):
+        tell_uncompiled(learner.learner, gate.gate)
         return _one_by_one(place, learner, gate, advice, seeds, keep_tables, greedy_every, keep_returns)
     asking = _asking(gate, advice is not None, learner.max_steps)
     learning, arrays = _learning(mdp, learner), _problem(mdp, learner)
@@ -155,16 +163,70 @@ def run_sessions(
     ensemble = gate.ensemble if asking.gate.asks == ASKS_WHERE_TABLES_DIFFER else 0
     lanes = _lanes(mdp.n_actions, learner.episodes, sessions.kept.shape[1], ensemble)
     memories = _memories(mdp.n_states, mdp.n_actions, learning.max_moves) if gate.memory else None
+    lookahead = _lookahead(mdp, learner, learning.max_moves)
     hearing, walks = _hearing(mdp, asking, advice), _walks(mdp, asking, learning, learner.episodes)
-    run(
-        records.Work(arrays, learning, asking, *advice_arrays, sessions, lanes),
-        memories,
-        hearing,
-        _chances(place),
-        walks,
-    )
+    work = records.Work(arrays, learning, asking, *advice_arrays, sessions, lanes)
+    optional = memories, hearing, _chances(place), walks, lookahead, _model(mdp, learner)
+    if UPDATES[learner.learner].compiled != OWN_RULE:
+        run(work, *optional, None)
+    elif not _runs_by_rule(work, optional, mdp, learner):
+        return _one_by_one(place, learner, gate, advice, seeds, keep_tables, greedy_every, keep_returns)
     tables = _action_values(mdp, learning, sessions.kept)
     return _batch(sessions, tables)
+
+
+def _runs_by_rule(work: records.Work, optional: tuple[Any, ...], mdp: TabularMDP, learner: LearnerSettings) -> bool:
+    """Runs the sessions of an added learner by its compiled rule; returns False if they have to run one by one.
+
+    That is so if there are too few for what compiling takes, if the rule cannot be compiled, which a notice says, or if it fails:
+    then the session shows in which line. Raises BadInput for values that are not finite.
+    """
+    name, make = learner.learner, UPDATES[learner.learner].make
+    rule, episodes = plain_rule(make), work.sessions.steps.size  # type: ignore[arg-type]
+    if rule not in _compiled_rules and episodes < WORTH_COMPILING:
+        return False
+    if rule not in _compiled_rules:
+        _compiled_rules[rule] = inner(rule, boundscheck=True)
+    if _compiled_rules[rule] is None:
+        return False
+    shape, tables = mdp.successor.shape, work.lanes.tables
+    own = records.OwnRule(
+        rule=_compiled_rules[rule],
+        settings=records.NumberSettings(**{field: getattr(learner, field) for field in records.NumberSettings._fields}),
+        q=tables.reshape(LANES, *shape),
+        others=work.lanes.others.reshape(LANES, -1, *shape) if work.lanes.others.size else np.zeros((LANES, 0, *shape)),
+        wrong=np.zeros(1, np.int64),
+    )
+    try:
+        _run_by_rule()(work, *optional, own)
+    except NotCompilable:
+        _compiled_rules[rule] = None
+        tell_uncompiled(name, "never", ": numba cannot compile its rule")
+        return False
+    except Exception:  # whatever the rule raises
+        return False
+    if own.wrong[0]:
+        raise BadInput(f"learner '{name}': {own.wrong[0]} of its action values are not finite")
+    return True
+
+
+@cache
+def _run_by_rule() -> Callable[..., None]:
+    return not_kept(run)
+
+
+class Uncompiled(Notice):
+    """The notice that an added member runs in the session only."""
+
+
+def tell_uncompiled(learner: str, gate: str, why: str = "") -> None:
+    """Tells once for each added learner and gate without a compiled form that its sessions are slow; not in worker processes."""
+    for kind, family, name in (("learner", UPDATES, learner), ("gate", GATES, gate)):
+        slow = family.is_added(name) and (why or family[name].compiled is None)
+        if slow and (kind, name) not in _told and current_process().name == "MainProcess":
+            _told.add((kind, name))
+            text = f"{kind} '{name}' runs uncompiled, about {TIMES_SLOWER} times slower than shipped ones{why}"
+            warnings.warn(text, Uncompiled, stacklevel=3)
 
 
 def _batch(sessions: records.KernelSessions, q: FloatArray) -> Batch:
@@ -211,13 +273,16 @@ def is_compiled(mdp: TabularMDP, learner: LearnerSettings, gate: GateSettings, a
     if rules is None:
         return False
     if learner.tilings > 1:
-        known = learner.learner in LINEAR and learner.selection in CHOICES and not gate.memory
+        known = learner.learner in LINEAR and SELECTIONS[learner.selection].compiled is not None and not gate.memory
         plain = rules.weighs == WEIGHS_NOTHING and (advice is None or _speaks_at_once(advice))
         simple = rules.asks != ASKS_WHERE_TABLES_DIFFER and (not rules.judges or len(mdp.starts) < 2)
         return known and plain and simple
     if isinstance(mdp, CellTable) or learner.start_value:
         return False  # only the kernel for tile coding makes these steps
-    return UPDATES[learner.learner].compiled is not None and SELECTIONS[learner.selection].compiled is not None
+    form = UPDATES[learner.learner].compiled
+    in_a_table = form in (Q, AFTERSTATE, SARSA, OWN_RULE)  # several of the others need more than a table each
+    side_by_side = in_a_table or rules.asks != ASKS_WHERE_TABLES_DIFFER
+    return form is not None and side_by_side and SELECTIONS[learner.selection].compiled is not None
 
 
 def _speaks_at_once(advice: Advice) -> bool:
@@ -258,6 +323,45 @@ def _walks(
 
 def _chances(place: Environment) -> records.Chances | None:
     return records.Chances(place.below, place.entered, place.reward) if isinstance(place, ChanceTable) else None
+
+
+def _lookahead(mdp: TabularMDP, learner: LearnerSettings, moves: int) -> records.Lookahead | None:
+    """The arrays of learners that need the next action; None for others."""
+    form, numbers = UPDATES[learner.learner].compiled, mdp.successor.size
+    by_rule = form == OWN_RULE and UPDATES[learner.learner].make.lookahead  # type: ignore[attr-defined]
+    if form not in (SARSA, Q_TRACES, SARSA_TRACES) and not by_rule:
+        return None
+    decay, most = 0.0 if form in (SARSA, OWN_RULE) else learner.discount * learner.trace, min(moves, numbers)
+    if decay < 1.0:  # a trace of at most 1 / (1 - decay) is soon below the floor
+        lasts = log(TRACE_FLOOR * (1.0 - decay)) / log(decay) if decay else 0.0
+        most = min(most, int(lasts) + 2)
+    most += SPARE_TRACES
+    return records.Lookahead(
+        number=np.zeros(LANES, np.uint64),
+        reward=np.zeros(LANES),
+        listed=np.zeros((LANES, most), np.uint32),
+        strength=np.zeros((LANES, most)),
+        first=np.zeros(LANES, np.uint64),
+        last=np.zeros(LANES, np.uint64),
+        decay=decay,
+        growing=not learner.replacing,
+        on_policy=form != Q_TRACES,
+    )
+
+
+def _model(mdp: TabularMDP, learner: LearnerSettings) -> records.Model | None:
+    """The arrays of Dyna-Q; None for other learners."""
+    if UPDATES[learner.learner].compiled != DYNA:
+        return None
+    size = LANES, mdp.successor.size
+    return records.Model(
+        entered=np.full(size, -1, np.int32),
+        reward=np.zeros(size),
+        moves=np.zeros(size, np.int32),
+        known=np.zeros(LANES, np.int64),
+        turn=np.zeros(LANES, np.int64),
+        planning=learner.planning,
+    )
 
 
 def _one_by_one(
@@ -323,7 +427,7 @@ def _on_tiles(mdp: TabularMDP, learner: LearnerSettings, work: records.Work) -> 
         growing=not learner.replacing,
         on_policy=issubclass(rule, TileSarsa),
         lookahead=rule.lookahead,
-        selection=CHOICES[learner.selection],
+        selection=SELECTIONS[learner.selection].compiled,
     )
     linear_loop.run(work, linear, _world(mdp))
     sessions, tables = work.sessions, work.sessions.kept.reshape(-1, coding.count, mdp.n_actions)
@@ -362,7 +466,7 @@ def _sessions(
     warm = [selection.temperature(n, learner.beta, learner.exploration) for n in range(1, learner.episodes + 1)]
     return records.KernelSessions(
         seeds=np.asarray(seeds, np.uint64),
-        per_tau=1.0 / np.array(warm),
+        warm=np.array(warm),
         steps=np.zeros(shape, np.int32),
         guided=np.zeros(shape, np.bool_),
         counts=np.zeros(len(seeds), records.COUNTS),
@@ -381,7 +485,9 @@ def _lanes(actions: int, episodes: int, size: int, ensemble: int) -> records.Lan
     return records.Lanes(
         lane=lane,
         values=np.zeros(actions * LANES),
+        best=np.zeros(LANES),
         widths=np.zeros(LANES),
+        warm=np.ones(LANES),
         per_tau=np.zeros(LANES),
         chosen=np.zeros(LANES, np.int64),
         moves=np.zeros(LANES, np.int64),
@@ -403,7 +509,7 @@ def _memories(states: int, actions: int, moves: int) -> Memory:
 
 
 def _is_afterstate(learner: LearnerSettings) -> bool:
-    return bool(UPDATES[learner.learner].compiled == STATE_VALUES) and learner.tilings == 1
+    return bool(UPDATES[learner.learner].compiled == AFTERSTATE) and learner.tilings == 1
 
 
 def _problem(mdp: TabularMDP, learner: LearnerSettings) -> records.ProblemArrays:
@@ -417,6 +523,7 @@ def _learning(mdp: TabularMDP, learner: LearnerSettings) -> records.CompiledLear
     given = vars(learner) | {
         "afterstate": _is_afterstate(learner),
         "max_moves": learner.max_steps - learner.count_start,
+        "selection": SELECTIONS[learner.selection].compiled,
         "actions": (0,) * mdp.n_actions,
     }
     return records.CompiledLearner(**{name: given[name] for name in records.CompiledLearner._fields})

@@ -16,6 +16,7 @@ from typing import Any, TypeVar, cast
 
 import numba
 from numba.core.caching import FunctionCache
+from numba.core.errors import NumbaError
 from platformdirs import user_cache_dir
 
 from lab.errors import Notice, WorkFailed
@@ -24,6 +25,7 @@ from lab.files import source_key
 MOST_FOLDERS = 6  # versions of packages whose compiled functions are kept, each of a few tens of MB
 _WITHOUT_REFCOUNTS: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
 _CONFIG: Any = numba.config  # typed as Any, because its type stubs lack the attributes
+NotCompilable = NumbaError  # raised when a function with new argument types cannot be compiled
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
@@ -85,6 +87,13 @@ def _not_kept(kept: Path, error: Exception) -> None:
 def without_refcounts(function: Function, **options: Any) -> Function:
     """The function compiled by njit without reference counting; it must not allocate arrays."""
     return compiled(function, **_WITHOUT_REFCOUNTS, **options)
+
+
+def not_kept(function: Function) -> Function:
+    """The function compiled without reference counting for this process only, because its arguments are functions."""
+    jit: Any = numba.njit
+    jitted: Function = jit(nogil=True, **_WITHOUT_REFCOUNTS)(getattr(function, "py_func", function))
+    return jitted
 
 
 def inner(function: Function, **options: Any) -> Function:

@@ -14,6 +14,8 @@ from lab.learning.members import Member
 COLDEST = 1e-300  # dividing by a lower temperature would overflow
 BELOW_ONE = 1.0 - 2.0**-52  # keeps u * total below the total despite rounding
 
+SOFTMAX, EPSILON_GREEDY, GREEDY = range(3)  # the selections of the kernels
+
 Draw = Callable[[], float]
 
 
@@ -78,10 +80,12 @@ def choose_epsilon_greedy(values: Sequence[float], epsilon: float, u: float) -> 
 
 SELECTIONS: dict[str, Member[Callable[[Sequence[float], float, float], int]]] = {
     "softmax": Member(
-        choose_softmax, "at random, better moves with higher probability; it explores less with time", compiled=True
+        choose_softmax, "at random, better moves with higher probability; it explores less with time", SOFTMAX
     ),
-    "epsilon-greedy": Member(choose_epsilon_greedy, "the best move, sometimes a random one: less often with time"),
-    "greedy": Member(choose_greedy, "always the best known move"),
+    "epsilon-greedy": Member(
+        choose_epsilon_greedy, "the best move, sometimes a random one: less often with time", EPSILON_GREEDY
+    ),
+    "greedy": Member(choose_greedy, "always the best known move", GREEDY),
 }
 
 

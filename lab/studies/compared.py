@@ -25,7 +25,6 @@ from lab.learning.physics.environment import PhysicsEnvironment
 from lab.learning.problem import Problem
 from lab.learning.requests import Advisor, Ask
 from lab.learning.session import Session
-from lab.learning.settings import GateSettings, LearnerSettings
 from lab.learning.simulated_advice import TableAdvisor
 from lab.learning.updates import UPDATES
 from lab.mdp import BoolArray, FloatArray
@@ -135,9 +134,9 @@ def _curves(results: Sequence[Result]) -> bytes:
 class ComparedSessions:
     """The results of N sessions of E episodes: curve (E,), the mean steps by episode; all others (N,), by session.
 
-    return_curve: (E,), the mean sum of an episode's rewards by episode; mean_return, last_return: of all episodes and of the last;
-    by_return: whether the problem has no goal, so that returns are its score. greedy_steps, greedy_last_steps: of the greedy policy
-    without advice, the mean of its measurements along the way and the last one; empty where no table says what the policy does.
+    return_curve (E,): the mean sum of an episode's rewards; mean_return, last_return: of all episodes and of the last one;
+    by_return: whether the problem has no goal, so that returns are its score. greedy_steps, greedy_last_steps: of the greedy
+    policy without advice, the mean of its measurements along the way and the last one; empty where no table says what it does.
     """
 
     curve: FloatArray

@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import partial
 from math import inf
 from typing import Any
@@ -9,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from lab.learning.batch import run_sessions
-from lab.learning.settings import GateSettings
+from lab.learning.settings import GateSettings, LearnerSettings
 from lab.learning.simulated_advice import Advice, advice_chances
 from lab.studies.findings import Findings, Row, agreement, median_row, those
 from lab.studies.runner import Job
@@ -22,10 +23,12 @@ ABOUT = (
     "{} sessions of 200 episodes in world I, one process on one core, median of five runs; compile time is not counted. "
     "The kernel runs many sessions side by side, so that a few of them leave it half empty; 'c scalar' runs one after the "
     "other, 'c lanes' one in each SIMD lane of the processor, in single precision. Rivals run at most 500 sessions, the "
-    "tutorial loop 5, as their figure is a rate."
+    "tutorial loop 5, as their figure is a rate. 'kernel' and 'kernel gated' learn by the world's own learner, the others by the "
+    "one that they name."
 )
 FEW = {"gymnasium tutorial loop": 5}  # the sessions of a rival so slow that few show its rate
 REPEATS = 5
+LEARNERS = ("q", "sarsa", "q-lambda", "sarsa-lambda", "dyna-q")
 GATES = (GateSettings("ccrl", omega=1), GateSettings("ia"), GateSettings("combined", omega=1))
 
 
@@ -36,10 +39,10 @@ def speed(job: Job, reading: Mapping[str, Any]) -> Findings:
     advice = Advice.of(advice_chances(learned_table(place), 0.1))
     seeds = np.arange(job.seed, job.seed + job.sessions, dtype=np.uint64)
 
-    def learned(*gates: GateSettings) -> Measured:
+    def learned(*gates: GateSettings, how: LearnerSettings = learner) -> Measured:
         began, moves = time.perf_counter(), 0
         for gate in gates:
-            moves += int(run_sessions(mdp, learner, gate, advice, seeds).moves.sum())
+            moves += int(run_sessions(mdp, how, gate, advice, seeds).moves.sum())
         return Measured(moves, time.perf_counter() - began)
 
     def against(name: str) -> Row | str:
@@ -51,6 +54,10 @@ def speed(job: Job, reading: Mapping[str, Any]) -> Findings:
             return f"{name}: not measured: {error}"
 
     rows = [_row("kernel", partial(learned, GateSettings("never"))), _row("kernel gated", partial(learned, *GATES))]
+    alone = GateSettings("never")
+    rows += [_row(f"kernel {name}", partial(learned, alone, how=replace(learner, learner=name))) for name in LEARNERS]
+    greedy = replace(learner, learner="q", selection="epsilon-greedy")
+    rows.append(_row("kernel q epsilon-greedy", partial(learned, alone, how=greedy)))
     measured = job.in_turn([partial(against, name) for name in RIVALS])
     rivals = [result for result in measured if not isinstance(result, str)]
     fastest = max((row["value"] for row in rivals), default=inf)

@@ -1,23 +1,29 @@
 """Sessions run by the batch equal the interactive one, number by number, compiled or not, whatever their company."""
 
+import warnings
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from lab.errors import BadInput
-from lab.learning.batch import Batch, run_sessions
+from lab.learning import batch as batch_module
+from lab.learning.batch import Batch, Uncompiled, run_sessions
 from lab.learning.gates import GATES, Gate, Steps
 from lab.learning.kernels.records import LANES
 from lab.learning.members import Member
+from lab.learning.selection import SELECTIONS
 from lab.learning.session import Session
 from lab.learning.session_result import SessionResult
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.learning.simulated_advice import Advice, TableAdvisor, advice_chances
 from lab.learning.splitmix import stream
-from lab.learning.updates import UPDATES
+from lab.learning.updates import UPDATES, RuleUpdate
 from lab.mdp import TabularMDP, grid, optimal_values
+from lab.testing import check_learner
 
 LEARNERS = tuple(name for name, one in UPDATES.items() if one.compiled is not None)
 SHORT = LearnerSettings("afterstate", episodes=40, max_steps=40, count_start=True)
@@ -131,23 +137,137 @@ def test_a_gate_without_a_compiled_form_is_run_all_the_same(monkeypatch: pytest.
 
 
 def test_a_learner_without_a_compiled_form_is_run_all_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(UPDATES, "another", UPDATES["sarsa"])
+    monkeypatch.setitem(UPDATES, "another", replace(UPDATES["sarsa"], compiled=None))
     mdp, settings = board(), replace(SHORT, learner="another")
     batch = run_sessions(mdp, settings, EAGER, advice(mdp), np.array([1], np.uint64), keep_tables=True)
     assert_same(batch, 0, alone(mdp, replace(SHORT, learner="sarsa"), EAGER, advice(mdp), 1))
 
 
-def test_a_selection_without_a_compiled_form_is_run_all_the_same() -> None:
-    settings = replace(SHORT, selection="epsilon-greedy")
+class Cautious(RuleUpdate):
+    """As q, but a tenth of what comes next is the value of the worst move."""
+
+    @staticmethod
+    def rule(q: Any, settings: Any, s_tm1: int, a_tm1: int, r_t: float, discount_t: float, s_t: int, a_t: int) -> None:
+        best = worst = q[s_t][0]
+        for value in q[s_t]:
+            best, worst = max(best, value), min(worst, value)
+        target = r_t + discount_t * (0.9 * best + 0.1 * worst)
+        q[s_tm1][a_tm1] += settings.alpha * (target - q[s_tm1][a_tm1])
+
+
+class Grown(RuleUpdate):
+    """A rule that numba cannot compile, because it reads an attribute that settings lack there."""
+
+    @staticmethod
+    def rule(q: Any, settings: Any, s_tm1: int, a_tm1: int, r_t: float, discount_t: float, s_t: int, a_t: int) -> None:
+        q[s_tm1][a_tm1] += settings.alpha * len(settings.learner)
+
+
+class Often(RuleUpdate):
+    """A learner that overrides more than its rule."""
+
+    rule = Cautious.rule
+
+    def end(self) -> None:
+        self.q[0][0] += 0.0
+
+
+@pytest.fixture
+def at_any_price(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(batch_module, "WORTH_COMPILING", 0)
+    monkeypatch.setattr(batch_module, "_told", set())
+
+
+@pytest.mark.usefixtures("at_any_price")
+def test_a_rule_of_ones_own_is_compiled_with_the_same_results() -> None:
+    check_learner(Cautious)
+    settings = replace(SHORT, learner=UPDATES.use("cautious", Cautious))
+    for gate in ("ccrl", "uncertainty"):
+        how, seeds = replace(EAGER, gate=gate), np.arange(LANES + 1, dtype=np.uint64)
+        batch = run_sessions(board(), settings, how, advice(board()), seeds, keep_tables=True)
+        for n in (0, LANES):
+            assert_same(batch, n, alone(board(), settings, how, advice(board()), n))
+    assert UPDATES["cautious"].compiled is not None
+    assert Cautious.rule in batch_module._compiled_rules
+
+
+@pytest.mark.usefixtures("at_any_price")
+@pytest.mark.parametrize(("learner", "why"), [(Grown, ": numba cannot compile its rule"), (Often, "")])
+def test_an_uncompiled_learner_is_told_once(learner: type[RuleUpdate], why: str) -> None:
+    settings, seeds = replace(SHORT, learner=UPDATES.use("own", learner)), np.arange(2, dtype=np.uint64)
+    with pytest.warns(Uncompiled, match=f"learner 'own' runs uncompiled, about [0-9]+ times slower.*{why}$") as told:
+        batch = run_sessions(board(), settings, EAGER, None, seeds, keep_tables=True)
+    assert len(told) == 1
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        run_sessions(board(), settings, EAGER, None, seeds)
+    assert_same(batch, 1, alone(board(), settings, EAGER, None, 1))
+
+
+def test_a_selection_without_a_compiled_form_is_run_all_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(SELECTIONS, "another", replace(SELECTIONS["epsilon-greedy"], compiled=None))
+    settings = replace(SHORT, selection="another")
     batch = run_sessions(board(), settings, EAGER, None, np.array([1], np.uint64), keep_tables=True)
     assert_same(batch, 0, alone(board(), settings, EAGER, None, 1))
 
 
-VIEWS = [(gate, view) for gate in GATES for view in ("full", "limited", "nobody")]
-
-
-@pytest.mark.parametrize(("gate", "view"), VIEWS)
+@pytest.mark.parametrize("selection", ["epsilon-greedy", "greedy"])
 @pytest.mark.parametrize("learner", LEARNERS)
+@pytest.mark.parametrize("exploration", [0.3, 2.0])
+def test_they_are_the_same_with_other_selections(learner: str, selection: str, exploration: float) -> None:
+    settings = replace(SHORT, learner=learner, selection=selection, exploration=exploration, beta=0.4)
+    how, seeds = replace(EAGER, gate="random"), np.arange(LANES + 1, dtype=np.uint64)
+    batch = run_sessions(board(), settings, how, advice(board()), seeds, keep_tables=True)
+    for n in (0, LANES):
+        assert_same(batch, n, alone(board(), settings, how, advice(board()), n))
+
+
+@given(
+    learner=st.sampled_from(["q-lambda", "sarsa-lambda"]),
+    trace=st.sampled_from([0.0, 0.01, 0.5, 0.97, 1.0]),
+    discount=st.sampled_from([0.9, 1.0]),
+    replacing=st.booleans(),
+    max_steps=st.integers(2, 90),
+    seed=st.integers(0, 1000),
+)
+@settings(max_examples=40, deadline=None)
+def test_traces_are_the_same(
+    learner: str, trace: float, discount: float, replacing: bool, max_steps: int, seed: int
+) -> None:
+    """The lists of traces are long or short, kept for whole episodes or cut, and moved when they are full."""
+    how = LearnerSettings(
+        learner,
+        alpha=0.3,
+        discount=discount,
+        trace=trace,
+        replacing=replacing,
+        beta=0.3,
+        episodes=8,
+        max_steps=max_steps,
+    )
+    batch = run_sessions(board(), how, GateSettings("never"), None, np.array([seed], np.uint64), keep_tables=True)
+    assert_same(batch, 0, alone(board(), how, GateSettings("never"), None, seed))
+
+
+@pytest.mark.parametrize("planning", [0, 1, 200])
+def test_planning_is_the_same(planning: int) -> None:
+    how, seeds = replace(SHORT, learner="dyna-q", planning=planning, episodes=12), np.arange(2, dtype=np.uint64)
+    batch = run_sessions(board(), how, GateSettings("never"), None, seeds, keep_tables=True)
+    for n in range(2):
+        assert_same(batch, n, alone(board(), how, GateSettings("never"), None, n))
+
+
+CHANGED = ("q", "afterstate")  # learners so slow here that memory shows in each view
+VIEWS = [
+    (learner, gate, view)
+    for learner in LEARNERS
+    for gate in GATES
+    for view in ("full", "limited", "nobody")
+    if learner in CHANGED or view == "limited"
+]
+
+
+@pytest.mark.parametrize(("learner", "gate", "view"), VIEWS)
 def test_they_are_the_same_with_memory(learner: str, gate: str, view: str) -> None:
     mdp, settings = board(), replace(SHORT, learner=learner, beta=0.7)  # so warm that its own last result is often long
     # gates that open again and again, a budget that some sessions use up, advice that leads round and into obstacles
@@ -160,7 +280,8 @@ def test_they_are_the_same_with_memory(learner: str, gate: str, view: str) -> No
         assert_same(batch, n, alone(mdp, settings, how, who, int(seeds[n])))
     assert (batch.helped_steps.sum() > 0) == (gate != "never" and view != "nobody")
     plain = run_sessions(mdp, settings, replace(how, memory=False), who, seeds)
-    assert (plain.steps != batch.steps).any()  # at the latest when the way is practised
+    if learner in CHANGED:
+        assert (plain.steps != batch.steps).any()  # at the latest when the way is practised
 
 
 def test_memory_is_the_same_where_episodes_begin_anywhere() -> None:

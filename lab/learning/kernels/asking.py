@@ -73,7 +73,7 @@ def wants(work: Any, hearing: Any, j: int, state: Any) -> bool:
     if how == rules.WEIGHS_FADING:
         return bool(u < work.asking.fading ** (episode - 1))
     if how == rules.WEIGHS_RELIABILITY:
-        return bool(_explores(episode, len(work.sessions.per_tau), u) and told.said[state] == heard.NOTHING)
+        return bool(_explores(episode, len(work.sessions.warm), u) and told.said[state] == heard.NOTHING)
     if how == rules.WEIGHS_WORTH:
         return bool(_asks_by_worth(told, np.int64(state), u))
     return True
@@ -95,7 +95,7 @@ def takes(work: Any, hearing: Any, j: int, state: Any, own: Any, said: int) -> A
         _fill(work, hearing, j, state)
         action = np.int64(_shaped(told, at, hearing.values[j], lanes.per_tau[j], odds, hearing.u[j]))
     elif how == rules.WEIGHS_RELIABILITY:
-        explores = _explores(lanes.lane[j].episode, len(work.sessions.per_tau), hearing.u[j])
+        explores = _explores(lanes.lane[j].episode, len(work.sessions.warm), hearing.u[j])
         kept = explores and told.said[at] != heard.NOTHING and _reliable(told, actions)
         action = np.int64(told.said[at]) if kept else np.int64(own)
     return np.uint64(action)

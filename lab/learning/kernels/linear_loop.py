@@ -12,14 +12,13 @@ from numpy.typing import NDArray
 from lab.learning import selection, tiles
 from lab.learning.compiled import inlined, inner, without_refcounts
 from lab.learning.kernels.asking import decided, judge, opens
-from lab.learning.kernels.records import draw
+from lab.learning.kernels.records import draw, greedy
 from lab.learning.physics import ACROBOT, MOUNTAIN_CAR, acrobot, cart_pole, mountain_car
 from lab.learning.tiles import TileArray
 from lab.learning.updates.linear import FAINT
 from lab.mdp import FloatArray
 
 TABLE = 0  # the number of a table; `physics` has those of the worlds
-SOFTMAX, EPSILON_GREEDY, GREEDY = range(3)
 
 _exp_of: Any = inlined(selection.exp_of)
 _cell_along: Any = inlined(tiles.cell_along)
@@ -124,21 +123,6 @@ def _look(linear: Any, state: int) -> float:
 
 
 @inlined
-def _greedy(values: Any, best: float, u: float) -> int:
-    """`selection.choose_greedy`."""
-    ties = 0
-    for action in range(len(values)):
-        ties += values[action] == best
-    left = min(int(u * ties), ties - 1)
-    for action in range(len(values)):
-        if values[action] == best:
-            if left == 0:
-                return action
-            left -= 1
-    return 0
-
-
-@inlined
 def _choose(work: Any, linear: Any, state: int) -> None:
     """Writes the learner's own choice in a state to lane 0."""
     lanes, values, actions = work.lanes, linear.values, len(linear.values)
@@ -149,7 +133,7 @@ def _choose(work: Any, linear: Any, state: int) -> None:
     lanes.states[0], lanes.widths[0] = state, best - low
     u = draw(lanes.rng, 0)
     chosen = 0
-    if linear.selection == SOFTMAX:
+    if linear.selection == selection.SOFTMAX:
         per_tau, total = 1.0 / max(selection.COLDEST, warm), 0.0
         for action in range(actions):
             total += _exp_of((values[action] - best) * per_tau)
@@ -157,12 +141,8 @@ def _choose(work: Any, linear: Any, state: int) -> None:
         mark = u * total * selection.BELOW_ONE
         for action in range(actions - 1):
             chosen += values[action] <= mark
-    elif linear.selection == GREEDY:
-        chosen = _greedy(values, best, u)
-    elif u >= warm:
-        chosen = _greedy(values, best, (u - warm) / (1.0 - warm))
     else:
-        chosen = min(int(u / warm * actions), actions - 1)
+        chosen = greedy(values, 0, 1, actions, best, 0.0 if linear.selection == selection.GREEDY else warm, u)
     lanes.chosen[0] = chosen
 
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from lab.learning import selection, splitmix
 from lab.learning.advice_memory import Now
-from lab.learning.compiled import inlined
+from lab.learning.compiled import inlined, inner
 from lab.learning.gates.gate import CompiledGate
 from lab.learning.gates.heard import Heard, HeardNow
 from lab.learning.updates import tabular, update
@@ -29,7 +29,10 @@ class ProblemArrays(NamedTuple):
 
 
 class CompiledLearner(NamedTuple):
-    """The learner's settings, see `LearnerSettings`; actions: A numbers, in a tuple if the compiler is to know their count."""
+    """The learner's settings, see `LearnerSettings`; selection: SOFTMAX, EPSILON_GREEDY or GREEDY.
+
+    actions: A numbers, in a tuple if the compiler is to know their count.
+    """
 
     afterstate: bool
     alpha: float
@@ -37,6 +40,7 @@ class CompiledLearner(NamedTuple):
     max_moves: int
     max_steps: int
     count_start: bool
+    selection: int
     actions: tuple[int, ...] | FloatArray
 
 
@@ -77,13 +81,14 @@ HEARD_NOW = np.dtype([(field.name, np.float64) for field in fields(HeardNow)])
 class KernelSessions(NamedTuple):
     """The inputs and results of N sessions of E episodes; the results are those of `batch.Batch`.
 
-    seeds (N,); per_tau (E,): 1 / temperature; counts (N,) of COUNTS; kept (N, size): the tables, or (0, size) if not wanted.
+    seeds (N,); warm (E,): temperature or epsilon by episode; counts (N,) of COUNTS; kept (N, size): the tables, or (0, size) if
+    not wanted.
     greedy (N, E // every), or (N, 0) if not wanted: after each `every`-th episode, the mean steps of `walks` episodes of the
     greedy policy; walk_rng (1,): the state of their generator. returns (N, E), or (0, E) if not wanted: sums of rewards.
     """
 
     seeds: NDArray[np.uint64]
-    per_tau: FloatArray
+    warm: FloatArray
     steps: NDArray[np.int32]
     guided: NDArray[np.bool_]
     counts: NDArray[np.void]
@@ -97,13 +102,17 @@ class KernelSessions(NamedTuple):
 
 class Lanes(NamedTuple):
     """The running sessions: (LANES,) each, but values (A * LANES,), tables (LANES, size), others (LANES, K, size).
+    warm, per_tau: temperature or epsilon, and 1 / temperature; best, widths: the highest value of the state, and the span of
+    its values.
 
     The caller allocates them, because numba would otherwise have to compile np.zeros.
     """
 
     lane: NDArray[np.void]
     values: FloatArray
+    best: FloatArray
     widths: FloatArray
+    warm: FloatArray
     per_tau: FloatArray
     chosen: NDArray[np.int64]
     moves: NDArray[np.int64]
@@ -170,6 +179,69 @@ class Walks(NamedTuple):
     begun: NDArray[np.int32]
 
 
+class Lookahead(NamedTuple):
+    """The data of learners that need the next action (`Update.lookahead`), with or without traces.
+
+    number, reward (LANES,): the last move, state * A + action, and its reward; it is learned from when the next action is chosen.
+    listed, strength (LANES, M): the moves with a trace, and their eligibilities, from index `first` up to `last` (LANES,).
+    decay: gamma lambda, 0 without traces; on_policy: SARSA's target, otherwise Q-learning's.
+    """
+
+    number: NDArray[np.uint64]
+    reward: FloatArray
+    listed: NDArray[np.uint32]
+    strength: FloatArray
+    first: NDArray[np.uint64]
+    last: NDArray[np.uint64]
+    decay: float
+    growing: bool
+    on_policy: bool
+
+
+class Model(NamedTuple):
+    """The learned model of Dyna-Q, see `updates.tabular.DynaQ`.
+
+    entered, reward (LANES, S * A): the last outcome of each move, -1 if it was never made; moves (LANES, S * A): the known moves
+    in the order in which they were first made; known, turn (LANES,): their number, and the index of the last one replayed.
+    """
+
+    entered: NDArray[np.int32]
+    reward: FloatArray
+    moves: NDArray[np.int32]
+    known: NDArray[np.int64]
+    turn: NDArray[np.int64]
+    planning: int
+
+
+class OwnRule(NamedTuple):
+    """The rule of a `RuleUpdate`, compiled, with the settings that it reads.
+
+    q (LANES, S, A), others (LANES, K, S, A): the tables of `Lanes` in that shape; wrong (1,): the number of values that were not
+    finite when their session ended.
+    """
+
+    rule: Any
+    settings: "NumberSettings"
+    q: FloatArray
+    others: FloatArray
+    wrong: NDArray[np.int64]
+
+
+class NumberSettings(NamedTuple):
+    """The numbers of `LearnerSettings`."""
+
+    alpha: float
+    discount: float
+    trace: float
+    replacing: bool
+    start_value: float
+    planning: int
+    exploration: float
+    beta: float
+    episodes: int
+    max_steps: int
+
+
 # ---- the learners of the kernel -------------------------------------------------------------------------------------
 
 
@@ -221,14 +293,151 @@ def learn(work: Any, table: Any, state: Any, at: Any, entered: Any, reward: floa
 
 
 @inlined
+def learn_following(
+    work: Any, lookahead: Any, table: Any, j: int, number: Any, entered: Any, reward: float, following: Any, best: float
+) -> None:
+    """`Update.learn` of a learner with `lookahead`; number: state * A + action; best: the highest value of `entered`."""
+    learning = work.learning
+    over = work.problem.ends[entered] != 0
+    value = table[entered * np.uint64(len(learning.actions)) + following]
+    after = value if lookahead.on_policy else best
+    step = learning.alpha * (reward + (0.0 if over else learning.discount) * after - table[number])
+    if lookahead.decay == 0.0:
+        table[number] += step
+    else:
+        follow = not over and (lookahead.on_policy or value == best)
+        _spread(lookahead, table, j, number, step, follow)
+
+
+@inlined
+def learn_by_rule(work: Any, own: Any, q: Any, number: Any, entered: Any, reward: float, following: Any) -> None:
+    """`RuleUpdate.learn` of one step in a table (S, A); number: state * A + action."""
+    move, actions = np.int64(number), len(work.learning.actions)
+    discount = 0.0 if work.problem.ends[entered] != 0 else work.learning.discount
+    place = move // actions, move % actions
+    own.rule(q, own.settings, *place, reward, discount, np.int64(entered), np.int64(following))
+
+
+@inlined
+def _spread(lookahead: Any, table: Any, j: int, number: Any, step: float, follow: bool) -> None:
+    """`tabular.Traced._spread` in lane j; step: alpha times the error. Traces decay at the beginning of the next step."""
+    listed, strength, decay = lookahead.listed[j], lookahead.strength[j], lookahead.decay
+    first, last, one = lookahead.first[j], lookahead.last[j], np.uint64(1)
+    i, own = first, 1.0
+    faint: Any = 0
+    while i < last:  # a loop with two exits, which LLVM does not unroll: that is slower for so few traces
+        move = listed[i]
+        if move == number:
+            break
+        eligibility = strength[i] * decay
+        strength[i] = eligibility
+        table[move] += step * eligibility
+        faint += np.int64(eligibility <= tabular.TRACE_FLOOR)
+        i += one
+    at = i
+    if i < last:
+        own += strength[i] * decay if lookahead.growing else 0.0
+        for k in range(i + one, last):
+            eligibility = strength[k] * decay
+            strength[k] = eligibility
+            table[listed[k]] += step * eligibility
+            faint += np.int64(eligibility <= tabular.TRACE_FLOOR)
+    elif i == np.uint64(len(listed)):
+        first, at = np.uint64(0), _kept_traces(listed, strength, first, last)
+        last, faint = at, 0
+    table[number] += step * own
+    listed[at], strength[at] = number, own
+    last = max(last, at + one)
+    oldest = np.int64(strength[first] <= tabular.TRACE_FLOOR)  # usually no other is to be dropped
+    first += np.uint64(oldest)
+    if faint > oldest:
+        first, last = np.uint64(0), _kept_traces(listed, strength, first, last)
+    lookahead.first[j], lookahead.last[j] = (first, last) if follow else (np.uint64(0), np.uint64(0))
+
+
+@inner
+def _kept_traces(listed: Any, strength: Any, first: Any, last: Any) -> Any:
+    """Moves the traces that are not to be dropped to the beginning; returns how many there are."""
+    kept = np.uint64(0)
+    for i in range(first, last):
+        if strength[i] > tabular.TRACE_FLOOR:
+            listed[kept], strength[kept] = listed[i], strength[i]
+            kept += np.uint64(1)
+    return kept
+
+
+@inlined
+def replay(work: Any, model: Any, j: int, number: Any, entered: Any, reward: float) -> None:
+    """Records a step in lane j's model, then learns from known moves (`tabular.DynaQ.learn`)."""
+    if model.entered[j, number] < 0:
+        model.moves[j, model.known[j]] = number
+        model.known[j] += 1
+    model.entered[j, number], model.reward[j, number] = entered, reward
+    known, turn, width = model.known[j], model.turn[j], np.uint64(len(work.learning.actions))
+    for _ in range(min(model.planning, known)):
+        turn = (known if turn == 0 else turn) - 1
+        move = np.uint64(model.moves[j, turn])
+        then = np.uint64(model.entered[j, move])
+        learn(work, work.lanes.tables[j], move // width, move, then, model.reward[j, move])
+    model.turn[j] = turn
+
+
+@inlined
+def greedy(values: Any, first: int, stride: int, actions: int, best: float, epsilon: float, u: float) -> int:
+    """`selection.choose_epsilon_greedy` of the values at first, first + stride ...; best: the highest of them.
+
+    Everything is computed, whether it explores or not, because a branch that cannot be predicted costs more.
+    """
+    explored = np.int64(min(u / max(epsilon, selection.COLDEST) * actions, actions - 1.0))
+    left = (u - epsilon) / (1.0 - min(epsilon, selection.BELOW_ONE))
+    ties: Any = 0
+    for a in range(actions):
+        ties += np.int64(values[first + a * stride] == best)
+    chosen: Any = 0
+    seen: Any = 0
+    tie: Any = min(np.int64(left * ties), ties - 1)
+    for a in range(actions):
+        seen += np.int64(values[first + a * stride] == best)
+        chosen += np.int64(seen <= tie)
+    return int(explored if u < epsilon else chosen)
+
+
+@inlined
 def choose(work: Any) -> None:
-    """`selection.choose_softmax` in every lane at once; writes `chosen`, and the span of the values to `widths`.
+    """The learner's own choice in every lane; writes `chosen`, and the highest value and the span of the values."""
+    if work.learning.selection == selection.SOFTMAX:
+        _choose_softmax(work)
+    else:
+        _choose_greedy(work)
+
+
+@inlined
+def _choose_greedy(work: Any) -> None:
+    """`selection.choose_greedy` or `choose_epsilon_greedy` in every lane."""
+    lanes, learning = work.lanes, work.learning
+    values, actions = lanes.values, len(learning.actions)
+    offset, factor = (work.problem.step_reward, learning.discount) if learning.afterstate else (0.0, 1.0)
+    for j in range(LANES):
+        top, low = -np.inf, np.inf
+        for a in range(actions):
+            value = gauge(work, lanes.tables[j], lanes.states[j], a)
+            top, low = max(top, value), min(low, value)
+            values[a * LANES + j] = offset + factor * value
+        lanes.best[j], lanes.widths[j] = top, top - low
+        epsilon = 0.0 if learning.selection == selection.GREEDY else lanes.warm[j]
+        lanes.chosen[j] = greedy(values, j, LANES, actions, offset + factor * top, epsilon, draw(lanes.rng, j))
+
+
+@inlined
+def _choose_softmax(work: Any) -> None:
+    """`selection.choose_softmax` in every lane at once.
 
     The values (A * LANES,) are overwritten by cumulative weights. The compiler knows the number of actions, so the lanes of one
     action stay in registers.
     """
     lanes, afterstate = work.lanes, work.learning.afterstate
     values, widths, per_tau, chosen, rng = lanes.values, lanes.widths, lanes.per_tau, lanes.chosen, lanes.rng
+    best = lanes.best
     A = len(work.learning.actions)
     offset, factor = (work.problem.step_reward, work.learning.discount) if afterstate else (0.0, 1.0)
     for j in range(LANES):
@@ -240,7 +449,7 @@ def choose(work: Any) -> None:
         top = low = values[j]
         for a in range(1, A):
             top, low = max(top, values[a * LANES + j]), min(low, values[a * LANES + j])
-        widths[j] = top - low
+        best[j], widths[j] = top, top - low
         top = offset + factor * top
         total = 0.0
         for a in range(A):

@@ -14,7 +14,7 @@ from lab.learning import selection
 from lab.learning.compiled import inlined, inner, without_refcounts
 from lab.learning.kernels import asking as hears
 from lab.learning.kernels.asking import decided, judge, judge_moved, knows, opens
-from lab.learning.kernels.records import LANES, begin_walks, choose, draw, learn
+from lab.learning.kernels.records import LANES, begin_walks, choose, draw, learn, learn_by_rule, learn_following, replay
 
 _Memory: Any = memory.Memory
 _Move: Any = memory.RememberedMove
@@ -35,7 +35,7 @@ def _of_lane(m: Any, j: int) -> Any:
 
 
 @inlined
-def _begin_session(work: Any, hearing: Any, walks: Any, j: int, n: int) -> None:
+def _begin_session(work: Any, hearing: Any, walks: Any, model: Any, j: int, n: int) -> None:
     """Clears lane j for session n."""
     lanes = work.lanes
     lane = lanes.lane[j]
@@ -52,6 +52,10 @@ def _begin_session(work: Any, hearing: Any, walks: Any, j: int, n: int) -> None:
     if walks is not None:
         for state in range(walks.fewest.shape[1]):
             walks.fewest[j, state] = np.inf
+    if model is not None:
+        model.known[j], model.turn[j] = 0, 0
+        for i in range(model.entered.shape[1]):
+            model.entered[j, i] = -1
 
 
 @inlined
@@ -63,12 +67,13 @@ def _begin_episode(work: Any, memories: Any, hearing: Any, walks: Any, j: int) -
     lane.episode, lane.asked, lane.helped = lane.episode + 1, 0, 0
     lane.left = asking.budget - count.helped_steps
     lane.is_open = opens(asking, lane, steps, work.learning.max_steps, count.rejected_at_episode > 0)
-    lanes.per_tau[j] = sessions.per_tau[lane.episode - 1]
+    lanes.warm[j] = sessions.warm[lane.episode - 1]
     if memories is not None:
         mine, may = _of_lane(memories, j), lane.is_open == 1
         lane.is_open = _remembers(mine, lane.episode, len(steps), asking.window, may)
         if mine.now.late == 1:
-            lanes.per_tau[j] = 1.0 / selection.COLDEST
+            lanes.warm[j] = selection.COLDEST
+    lanes.per_tau[j] = 1.0 / lanes.warm[j]
     lanes.is_open[j] = lane.is_open
     if len(starts) > 1:
         lanes.states[j] = starts[int(draw(lanes.rng, j) * len(starts))]
@@ -83,7 +88,7 @@ def _begin_episode(work: Any, memories: Any, hearing: Any, walks: Any, j: int) -
 
 
 @inlined
-def _begin(work: Any, memories: Any, hearing: Any, walks: Any, started: int) -> int:
+def _begin(work: Any, memories: Any, hearing: Any, walks: Any, lookahead: Any, model: Any, started: int) -> int:
     """Begins the next episode, or session, in each lane whose last one has ended; returns how many sessions have begun."""
     lanes, seeds = work.lanes, work.sessions.seeds
     for j in range(LANES):
@@ -91,10 +96,12 @@ def _begin(work: Any, memories: Any, hearing: Any, walks: Any, started: int) -> 
             lane = lanes.lane[j]
             lanes.fresh[j], lanes.moves[j], lanes.states[j] = False, 0, work.problem.starts[0]
             lanes.returned[j] = 0.0
-            if lane.episode == len(work.sessions.per_tau):
+            if lookahead is not None:
+                lookahead.first[j] = lookahead.last[j] = 0
+            if lane.episode == len(work.sessions.warm):
                 lane.session = -1  # an idle lane keeps making steps, which are ignored
                 if started < len(seeds):
-                    _begin_session(work, hearing, walks, j, started)
+                    _begin_session(work, hearing, walks, model, j, started)
                     if memories is not None:
                         _clear(_of_lane(memories, j))
                     started += 1
@@ -104,11 +111,62 @@ def _begin(work: Any, memories: Any, hearing: Any, walks: Any, started: int) -> 
 
 
 @inlined
-def _step(work: Any, memories: Any, hearing: Any, chances: Any, walks: Any, j: int) -> bool:
-    """Makes one step of lane j and learns from it; returns whether its episode has ended."""
+def _learn(work: Any, hearing: Any, lookahead: Any, own: Any, j: int, following: Any, best: float) -> None:
+    """Learns from lane j's last move, now that the next action is chosen; best: the highest value of the state entered."""
+    lanes, number, reward = work.lanes, lookahead.number[j], lookahead.reward[j]
+    entered = lanes.states[j]
+    if own is None:
+        learn_following(work, lookahead, lanes.tables[j], j, number, entered, reward, following, best)
+    else:
+        learn_by_rule(work, own, own.q[j], number, entered, reward, following)
+    for k in range(lanes.others.shape[1]):
+        if draw(lanes.rng, j) < 0.5:
+            table = lanes.others[j, k]
+            if own is None:
+                learn_following(work, lookahead, table, j, number, entered, reward, following, best)
+            else:
+                learn_by_rule(work, own, own.others[j, k], number, entered, reward, following)
+    if hearing is not None and lanes.lane[j].session >= 0:
+        over = work.problem.ends[entered] != 0
+        hears.saw(work, hearing, j, number // np.uint64(len(work.learning.actions)), number, entered, reward, over)
+
+
+@inlined
+def _learn_at_once(work: Any, own: Any, j: int, state: Any, number: Any, entered: Any, reward: float) -> None:
+    """Learns from lane j's move without knowing the next action."""
+    lanes = work.lanes
+    if own is None:
+        learn(work, lanes.tables[j], state, number, entered, reward)
+    else:
+        learn_by_rule(work, own, own.q[j], number, entered, reward, 0)
+    for k in range(lanes.others.shape[1]):
+        if draw(lanes.rng, j) < 0.5:
+            if own is None:
+                learn(work, lanes.others[j, k], state, number, entered, reward)
+            else:
+                learn_by_rule(work, own, own.others[j, k], number, entered, reward, 0)
+
+
+@inlined
+def _step(
+    work: Any, memories: Any, hearing: Any, chances: Any, walks: Any, lookahead: Any, model: Any, own: Any, j: int
+) -> bool:
+    """Makes one step of lane j and learns from it; returns whether its episode has ended.
+
+    With `lookahead` it first learns from the step before, because the next action is known now; the last step of a truncated
+    episode is learned from in a call of its own, which makes no step.
+    """
     lanes, problem, learning = work.lanes, work.problem, work.learning
     state = lanes.states[j]
-    action, source = decided(work, memories, hearing, j)
+    truncated = lookahead is not None and lanes.moves[j] == learning.max_moves
+    if truncated:
+        action, source = np.uint64(lanes.chosen[j]), np.int64(memory.OWN)
+    else:
+        action, source = decided(work, memories, hearing, j)
+    if lookahead is not None and lanes.moves[j] > 0:
+        _learn(work, hearing, lookahead, own, j, action, lanes.best[j])
+    if truncated:
+        return True
     number = state * np.uint64(len(learning.actions)) + action
     if chances is None:
         entered, reward = np.uint64(problem.successor[number]), problem.reward[number]
@@ -118,22 +176,27 @@ def _step(work: Any, memories: Any, hearing: Any, chances: Any, walks: Any, j: i
             k += 1
         entered, reward = np.uint64(chances.entered[number, k]), chances.reward[number, k]
     ends = problem.ends[entered]
-    learn(work, lanes.tables[j], state, number, entered, reward)
-    for k in range(lanes.others.shape[1]):
-        if draw(lanes.rng, j) < 0.5:
-            learn(work, lanes.others[j, k], state, number, entered, reward)
+    if lookahead is None:
+        _learn_at_once(work, own, j, state, number, entered, reward)
+    if model is not None:
+        replay(work, model, j, number, entered, reward)
     if memories is not None and lanes.lane[j].session >= 0:
         mine = _of_lane(memories, j)
         _moved(mine, _Move(np.int64(number), source, np.int64(entered), ends != 0, ends == 1))
         if mine.now.trust < 0:
             lanes.is_open[j] = False
-    if hearing is not None and lanes.lane[j].session >= 0:
+    if lookahead is None and hearing is not None and lanes.lane[j].session >= 0:
         hears.saw(work, hearing, j, state, number, entered, reward, ends != 0)
     if walks is not None:
         walks.walk[j, lanes.moves[j]] = state
     lanes.states[j] = entered
     lanes.moves[j] += 1
     lanes.returned[j] += reward
+    if lookahead is not None:
+        lookahead.number[j], lookahead.reward[j] = number, reward
+        if ends != 0:
+            _learn(work, hearing, lookahead, own, j, np.uint64(0), 0.0)
+        return bool(ends != 0)
     return bool(ends != 0 or lanes.moves[j] == learning.max_moves)
 
 
@@ -168,7 +231,7 @@ def _greedy_steps(work: Any, chances: Any, table: Any, seed: Any, number: int) -
 
 
 @inlined
-def _end(work: Any, memories: Any, hearing: Any, chances: Any, walks: Any, j: int) -> int:
+def _end(work: Any, memories: Any, hearing: Any, chances: Any, walks: Any, own: Any, j: int) -> int:
     """Records the last episode of lane j; returns 1 if its session has ended, too."""
     lanes, sessions, learning = work.lanes, work.sessions, work.learning
     lane, moves, won = lanes.lane[j], lanes.moves[j], work.problem.ends[lanes.states[j]] == 1
@@ -198,9 +261,12 @@ def _end(work: Any, memories: Any, hearing: Any, chances: Any, walks: Any, j: in
     if sessions.greedy.shape[1] and episode % sessions.every == 0:
         number = episode // sessions.every
         sessions.greedy[n, number - 1] = _greedy_steps(work, chances, lanes.tables[j], sessions.seeds[n], number)
-    if episode < len(sessions.per_tau):
+    if episode < len(sessions.warm):
         return 0
     lanes.is_open[j] = False
+    if own is not None:
+        for i in range(lanes.tables.shape[1]):
+            own.wrong[0] += np.int64(not np.isfinite(lanes.tables[j, i]))
     if len(sessions.kept):
         for i in range(lanes.tables.shape[1]):
             sessions.kept[n, i] = lanes.tables[j, i]
@@ -208,20 +274,21 @@ def _end(work: Any, memories: Any, hearing: Any, chances: Any, walks: Any, j: in
 
 
 @without_refcounts
-def run(work: Any, memories: Any, hearing: Any, chances: Any, walks: Any) -> None:
+def run(work: Any, memories: Any, hearing: Any, chances: Any, walks: Any, lookahead: Any, model: Any, own: Any) -> None:
     """Runs all sessions; each lane takes the next one when its own has ended.
 
     memories: None without memory; hearing: None if the gate weighs no advice and the advisor answers at once; chances: None for
-    deterministic moves; walks: None if no gate judges, or if all episodes begin in one state.
+    deterministic moves; walks: None if no gate judges, or if all episodes begin in one state; lookahead: None for a learner that
+    does not need the next action; model: None without planning; own: None for a shipped learner.
     """
     started = over = 0
     fresh = True
     while over < len(work.sessions.seeds):
         if fresh:
-            started = _begin(work, memories, hearing, walks, started)
+            started = _begin(work, memories, hearing, walks, lookahead, model, started)
             fresh = False
         choose(work)
         for j in range(LANES):
-            if _step(work, memories, hearing, chances, walks, j):
+            if _step(work, memories, hearing, chances, walks, lookahead, model, own, j):
                 fresh = True
-                over += _end(work, memories, hearing, chances, walks, j)
+                over += _end(work, memories, hearing, chances, walks, own, j)

@@ -11,11 +11,24 @@ from lab.learning.selection import Draw
 from lab.learning.settings import LearnerSettings
 from lab.learning.updates.linear import LINEAR
 from lab.learning.updates.tabular import Afterstate, DynaQ, MonteCarlo, QLearning, Sarsa, SarsaLambda, WatkinsQLambda
-from lab.learning.updates.update import ACTION_VALUES, STATE_VALUES, Row, Table, Update
+from lab.learning.updates.update import (
+    AFTERSTATE,
+    DYNA,
+    OWN_RULE,
+    Q_TRACES,
+    SARSA,
+    SARSA_TRACES,
+    Q,
+    Row,
+    RuleUpdate,
+    Table,
+    Update,
+    is_rule_only,
+)
 from lab.mdp import FloatArray, TabularMDP
 from lab.plugins.family import Family, first_line, takes, takes_generator, wanted
 
-__all__ = ["LINEAR", "UPDATES", "Row", "Table", "Update", "scattered", "update_of"]
+__all__ = ["LINEAR", "UPDATES", "Row", "RuleUpdate", "Table", "Update", "scattered", "update_of"]
 
 Learner = Callable[..., Update]  # made with (q, settings, mdp)
 
@@ -26,20 +39,22 @@ def _adopted(name: str, thing: Any) -> Member[Learner]:
     is_learner = isinstance(thing, type) and issubclass(thing, Update)
     if not (is_learner and (takes(thing, *LEARNER_TAKES) or takes_generator(thing))):
         raise wanted(thing, f"a subclass of lab.Update that is made with {', '.join(LEARNER_TAKES)}, and perhaps rng")
-    return Member(thing, first_line(thing))
+    return Member(thing, first_line(thing), OWN_RULE if is_rule_only(thing) else None)
 
 
 _SHIPPED: dict[str, Member[Learner]] = {
-    "q": Member(QLearning, "Q-learning: the value of a move follows from the best move after it", ACTION_VALUES),
-    "sarsa": Member(Sarsa, "as q, but from the move that is actually made next"),
-    "q-lambda": Member(WatkinsQLambda, "as q, with traces: each step corrects the moves before it, too"),
-    "sarsa-lambda": Member(SarsaLambda, "as sarsa, with traces: each step corrects the moves before it, too"),
+    "q": Member(QLearning, "Q-learning: the value of a move follows from the best move after it", Q),
+    "sarsa": Member(Sarsa, "as q, but from the move that is actually made next", SARSA),
+    "q-lambda": Member(WatkinsQLambda, "as q, with traces: each step corrects the moves before it, too", Q_TRACES),
+    "sarsa-lambda": Member(
+        SarsaLambda, "as sarsa, with traces: each step corrects the moves before it, too", SARSA_TRACES
+    ),
     "dyna-q": Member(
-        DynaQ, "as q, and each step is followed by learning from earlier ones again, out of a model of them"
+        DynaQ, "as q, and each step is followed by learning from earlier ones again, out of a model of them", DYNA
     ),
     "monte-carlo": Member(MonteCarlo, "the value of a move follows from all rewards in the rest of the episode"),
     "afterstate": Member(
-        Afterstate, "learns values of the states that moves lead to, instead of values of moves", STATE_VALUES
+        Afterstate, "learns values of the states that moves lead to, instead of values of moves", AFTERSTATE
     ),
 }
 UPDATES = Family("learners", _SHIPPED, _adopted)

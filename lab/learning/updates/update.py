@@ -5,7 +5,7 @@ A table is a list of rows, one list of action values per state, because plain Py
 
 from abc import abstractmethod
 from collections.abc import Sequence
-from typing import overload
+from typing import Any, ClassVar, overload
 
 import numpy as np
 
@@ -34,7 +34,7 @@ class ComputedRows(Sequence[Row]):
         return self.row(state)
 
 
-ACTION_VALUES, STATE_VALUES = range(2)  # the forms of learners in the kernel: what they keep a value of
+Q, AFTERSTATE, SARSA, Q_TRACES, SARSA_TRACES, DYNA, OWN_RULE = range(7)  # the learners of the kernel
 
 
 def towards(value: float, target: float, alpha: float) -> float:
@@ -99,3 +99,32 @@ class OnTable(Update):
         self.q: list[Row] = q
         self._settings = settings
         self._alpha = settings.alpha
+
+
+class RuleUpdate(OnTable):
+    """The base class of learners whose update is one function, `rule`, which the kernel compiles for many sessions at once.
+
+    rule: a static method, called as rule(q, settings, s_tm1, a_tm1, r_t, discount_t, s_t, a_t), which changes the values
+    q[state][action] in place; settings: the numbers of `LearnerSettings`, by name; the rest is as in `learn`. It is written in
+    the Python that numba compiles, makes no list and no array, and calls nothing but what numba knows.
+    A subclass that overrides another method runs in the session only.
+    """
+
+    rule: ClassVar[Any]
+
+    def learn(self, s_tm1: int, a_tm1: int, r_t: float, discount_t: float, s_t: int, a_t: int) -> None:
+        """Applies the rule to a step."""
+        plain_rule(type(self))(self.q, self._settings, s_tm1, a_tm1, r_t, discount_t, s_t, a_t)
+
+
+def plain_rule(learner: type[RuleUpdate]) -> Any:
+    """The rule of a class as a plain function, also if it is decorated with `numba.njit`."""
+    return getattr(learner.rule, "py_func", learner.rule)
+
+
+def is_rule_only(learner: Any) -> bool:
+    """Whether a class is a `RuleUpdate` that adds nothing but its rule."""
+    if not (isinstance(learner, type) and issubclass(learner, RuleUpdate) and hasattr(learner, "rule")):
+        return False
+    methods = ("__init__", "begin", "learn", "end", "gauge", "table", "scatter")
+    return not learner.chained and all(getattr(learner, name) is getattr(RuleUpdate, name) for name in methods)

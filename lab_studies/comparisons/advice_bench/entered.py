@@ -12,6 +12,7 @@ from lab.advice.advisors import ADVISORS as ADDED
 from lab.advice.advisors import AdvisorName
 from lab.errors import BadInput, check_value, unknown
 from lab.files import code_key
+from lab.learning.batch import tell_uncompiled
 from lab.learning.gates import GATES, Gate
 from lab.plugins.code_file import files_taken, from_file, take
 from lab.studies.compared import FAMILIES
@@ -54,6 +55,8 @@ class Entered:
         rules = [_rule(given, gates) for given in _listed(reading, "methods", RULES)]
         problems = [_problem(given, places) for given in _listed(reading, "problem", (*PROBLEMS, *HELD_OUT))]
         advisors = [_advisor(given, made) for given in _listed(reading, "advisors", ADVISORS)]
+        for rule in rules:
+            tell_uncompiled("q", rule)
         files = {name: file for name, file in files_taken().items() if name in (*rules, *advisors, *problems)}
         once = [tuple(dict.fromkeys(several)) for several in (rules, advisors, problems)]
         drawn_from = reading.get("families_seed", families.SEED)

@@ -8,7 +8,7 @@ from lab.learning.settings import LearnerSettings
 from lab.mdp import TabularMDP
 from lab.studies.runner import Job
 from lab_studies.comparisons import learning_speed as module
-from lab_studies.comparisons.learning_speed import FEW, REPEATS, SESSIONS, speed
+from lab_studies.comparisons.learning_speed import FEW, LEARNERS, REPEATS, SESSIONS, speed
 from lab_studies.comparisons.learning_speed_rivals import C_LANES, RIVALS
 from lab_studies.comparisons.learning_speed_session import Measured, Missing
 from lab_studies.thesis.chapter_9_sessions import world
@@ -36,8 +36,9 @@ def test_the_kernel_beside_rivals(asked: Asked) -> None:
     """The first run compiles and does not count; the other five took 2 to 6 seconds: 3 to 1 million a second, median 1.5."""
     told: list[tuple[int, int]] = []
     found = speed(Job(sessions=10, seed=7, progress=lambda *both: told.append(both)), {})
-    assert [one["name"] for one in found.rows] == ["kernel", "kernel gated", "quick"]
-    kernel, gated, quick = found.rows
+    by_learner = [f"kernel {name}" for name in (*LEARNERS, "q epsilon-greedy")]
+    assert [one["name"] for one in found.rows] == ["kernel", "kernel gated", *by_learner, "quick"]
+    kernel, gated, *_, quick = found.rows
     assert (quick["value"], quick["ci95"]) == (1.5, [1.0, 3.0])
     for one in (kernel, gated):
         assert 0 < one["ci95"][0] <= one["value"] <= one["ci95"][1]
@@ -66,7 +67,7 @@ def test_the_kernel_beside_c_lanes(asked: Asked, monkeypatch: pytest.MonkeyPatch
     quick = vars(module)["RIVALS"]["quick"]
     monkeypatch.setattr(module, "RIVALS", {"first": quick, C_LANES: quick})
     found = speed(Job(sessions=10), {})
-    kernel, _, first, lanes = (one["value"] for one in found.rows)
+    kernel, *_, first, lanes = (one["value"] for one in found.rows)
     assert first > lanes
     assert found.summary["kernel to the fastest rival"] == pytest.approx(kernel / first, abs=0.01)
     assert found.summary["kernel to C lanes"] == pytest.approx(kernel / lanes, abs=0.01)
@@ -76,6 +77,6 @@ def test_without_any_rival(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "RIVALS", {})
     monkeypatch.setattr(module, "REPEATS", 1)
     found = speed(Job(sessions=10), {})
-    assert [one["name"] for one in found.rows] == ["kernel", "kernel gated"]
+    assert [one["name"] for one in found.rows][:2] == ["kernel", "kernel gated"]
     assert found.summary == {"cells": 0, "within": 0, "kernel to the fastest rival": None, "kernel to C lanes": None}
     assert "not measured" not in "".join(found.notes)
