@@ -149,7 +149,7 @@ def run_sessions(
     ensemble = gate.ensemble if asking.gate.asks == ASKS_WHERE_TABLES_DIFFER else 0
     lanes = _lanes(mdp.n_actions, learner.episodes, sessions.kept.shape[1], ensemble)
     memories = _memories(mdp.n_states, mdp.n_actions, learning.max_moves) if gate.memory else None
-    hearing, walks = _hearing(mdp, asking, advice), _walks(mdp, asking, learning, learner.episodes)
+    hearing, walks = _hearing(mdp, asking, advice, learner), _walks(mdp, asking, learning, learner.episodes)
     run(
         records.Work(arrays, learning, asking, *advice_arrays, sessions, lanes),
         memories,
@@ -206,15 +206,20 @@ def _speaks_at_once(advice: Advice) -> bool:
     return not advice.late and advice.speaks == SPEAKS_ALWAYS
 
 
-def _hearing(mdp: TabularMDP, asking: records.Asking, advice: Advice | None) -> records.Hearing | None:
+def _hearing(
+    mdp: TabularMDP, asking: records.Asking, advice: Advice | None, learner: LearnerSettings
+) -> records.Hearing | None:
     """The arrays for gates that weigh advice and for advisors that hold back; None if neither is the case."""
     weighs = asking.gate.weighs != WEIGHS_NOTHING
     if advice is None or (not weighs and _speaks_at_once(advice)):
         return None
     states, actions = mdp.successor.shape if weighs else (1, 1)
-    sizes = (states, states * actions, states * actions, states * actions, states, states)  # as the fields of Heard
-    cells = (np.zeros((LANES, size), np.int32) for size in sizes)
-    told = Heard._make((*cells, np.zeros((LANES, 2 * states)), np.zeros(LANES, records.HEARD_NOW)))
+    moves = learner.max_steps if weighs else 1
+    table = states * actions
+    cells = (np.zeros((LANES, size), np.int32) for size in (states, table, table, table, states, moves, states, states))
+    told = Heard._make(
+        (*cells, np.zeros((LANES, table)), np.zeros((LANES, 2 * states)), np.zeros(LANES, records.HEARD_NOW))
+    )
     chose = np.zeros((LANES, mdp.n_states if advice.speaks == SPEAKS_AS_EXPECTED else 0), np.int32)
     return records.Hearing(
         heard=told,

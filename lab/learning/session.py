@@ -69,7 +69,7 @@ class Session:
         several_starts = bool(mdp.starts) or not (isinstance(environment, TableEnvironment) or cells is not None)
         size = mdp.n_states, mdp.n_actions
         others = partial(scattered, learner, mdp, self.draw)
-        around = Surroundings(self.draw, others, several_starts, self.update.gauge, size, learner)
+        around = Surroundings(self.draw, others, several_starts, self.update.gauge, size, learner, self.update)
         self.gate_name = f"gate '{gate.gate}'"
         make = GATES[gate.gate if self.advised else "never"].make
         self.gate = make(gate, learner.episodes, learner.max_steps, around)

@@ -74,7 +74,7 @@ class Surroundings:
 
     draw: returns uniform numbers; learners: returns as many independent learners as asked for, with random start values;
     several_starts: whether episodes may begin in different states; values: the learner's values of a state (`Update.gauge`);
-    size: (S, A); learner: the learner's settings.
+    size: (S, A); learner: the learner's settings; update: the learner itself.
     """
 
     draw: Draw
@@ -83,6 +83,7 @@ class Surroundings:
     values: Callable[[int], Values] = lambda state: ()
     size: tuple[int, int] = (0, 0)
     learner: LearnerSettings = field(default_factory=LearnerSettings)
+    update: Update = field(default_factory=Update)
 
 
 class Gate:
