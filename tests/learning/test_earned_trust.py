@@ -174,11 +174,11 @@ def test_with_several_starts_it_acts_alone_where_its_path_is_known() -> None:
 
 def test_where_moves_are_left_to_chance_the_answers_are_handed_over() -> None:
     one, table = gate()
-    walk(one, [(0, RIGHT, LEFT, 1), (1, RIGHT, LEFT, 0), (0, None, RIGHT, 2), (2, RIGHT, LEFT, 3)], True)
-    assert one.heard.now.uncertain == 1.0  # right led from 0 to 1, and to 2
+    walk(one, [(5, None, RIGHT, 4), (4, None, RIGHT, 5), (5, None, RIGHT, 0), *SHOWN], True)
+    assert one.heard.now.uncertain == 1.0  # right led from 5 to 4, and to 0
     for state in range(3):
         table[state] = [0.0, -1.0, 0.0]
-    one.opens(2, [4])
+    one.opens(2, [6])
     walk(one, SHOWN, True)
     assert [max(range(3), key=row.__getitem__) for row in table[:3]] == [RIGHT] * 3
     assert table[0][RIGHT] == -1.0  # nothing is learned again
