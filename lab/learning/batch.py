@@ -19,7 +19,7 @@ from lab.learning.advice_memory import Memory, places
 from lab.learning.compiled import NotCompilable, inner, not_kept
 from lab.learning.environment import Environment, Step, TableEnvironment
 from lab.learning.gates import GATES
-from lab.learning.gates.gate import ASKS_WHERE_TABLES_DIFFER, WEIGHS_NOTHING
+from lab.learning.gates.gate import ASKS_WHERE_TABLES_DIFFER, WEIGHS_NOTHING, WEIGHS_TRUST
 from lab.learning.gates.heard import Heard
 from lab.learning.kernels import linear_loop, records
 from lab.learning.kernels.records import LANES
@@ -164,7 +164,7 @@ def run_sessions(
     lanes = _lanes(mdp.n_actions, learner.episodes, sessions.kept.shape[1], ensemble)
     memories = _memories(mdp.n_states, mdp.n_actions, learning.max_moves) if gate.memory else None
     lookahead = _lookahead(mdp, learner, learning.max_moves)
-    hearing, walks = _hearing(mdp, asking, advice), _walks(mdp, asking, learning, learner.episodes)
+    hearing, walks = _hearing(mdp, asking, advice, learner), _walks(mdp, asking, learning, learner.episodes)
     work = records.Work(arrays, learning, asking, *advice_arrays, sessions, lanes)
     optional = memories, hearing, _chances(place), walks, lookahead, _model(mdp, learner)
     if UPDATES[learner.learner].compiled != OWN_RULE:
@@ -280,6 +280,8 @@ def is_compiled(mdp: TabularMDP, learner: LearnerSettings, gate: GateSettings, a
     if isinstance(mdp, CellTable) or learner.start_value:
         return False  # only the kernel for tile coding makes these steps
     form = UPDATES[learner.learner].compiled
+    if form == OWN_RULE and rules.weighs == WEIGHS_TRUST:
+        return False  # the kernel learns again from known steps by the shipped rules only
     in_a_table = form in (Q, AFTERSTATE, SARSA, OWN_RULE)  # several of the others need more than a table each
     side_by_side = in_a_table or rules.asks != ASKS_WHERE_TABLES_DIFFER
     return form is not None and side_by_side and SELECTIONS[learner.selection].compiled is not None
@@ -289,15 +291,20 @@ def _speaks_at_once(advice: Advice) -> bool:
     return not advice.late and advice.speaks == SPEAKS_ALWAYS
 
 
-def _hearing(mdp: TabularMDP, asking: records.Asking, advice: Advice | None) -> records.Hearing | None:
+def _hearing(
+    mdp: TabularMDP, asking: records.Asking, advice: Advice | None, learner: LearnerSettings
+) -> records.Hearing | None:
     """The arrays for gates that weigh advice and for advisors that hold back; None if neither is the case."""
     weighs = asking.gate.weighs != WEIGHS_NOTHING
     if advice is None or (not weighs and _speaks_at_once(advice)):
         return None
     states, actions = mdp.successor.shape if weighs else (1, 1)
-    sizes = (states, states * actions, states * actions, states * actions, states, states)  # as the fields of Heard
-    cells = (np.zeros((LANES, size), np.int32) for size in sizes)
-    told = Heard._make((*cells, np.zeros((LANES, 2 * states)), np.zeros(LANES, records.HEARD_NOW)))
+    moves = learner.max_steps if weighs else 1
+    table = states * actions
+    cells = (np.zeros((LANES, size), np.int32) for size in (states, table, table, table, states, moves, states, states))
+    told = Heard._make(
+        (*cells, np.zeros((LANES, table)), np.zeros((LANES, 2 * states)), np.zeros(LANES, records.HEARD_NOW))
+    )
     chose = np.zeros((LANES, mdp.n_states if advice.speaks == SPEAKS_AS_EXPECTED else 0), np.int32)
     return records.Hearing(
         heard=told,
@@ -524,6 +531,7 @@ def _learning(mdp: TabularMDP, learner: LearnerSettings) -> records.CompiledLear
         "afterstate": _is_afterstate(learner),
         "max_moves": learner.max_steps - learner.count_start,
         "selection": SELECTIONS[learner.selection].compiled,
+        "replays": UPDATES[learner.learner].compiled in (Q, AFTERSTATE, DYNA),
         "actions": (0,) * mdp.n_actions,
     }
     return records.CompiledLearner(**{name: given[name] for name in records.CompiledLearner._fields})

@@ -78,7 +78,14 @@ class Session:
         size = mdp.n_states, mdp.n_actions
         others = partial(scattered, learner, mdp, self.draw)
         around = Surroundings(
-            self.draw, others, several_starts and not by_return, self.update.gauge, size, learner, by_return
+            self.draw,
+            others,
+            several_starts and not by_return,
+            self.update.gauge,
+            size,
+            learner,
+            by_return,
+            self.update,
         )
         self.gate_name = f"gate '{gate.gate}'"
         make = GATES[gate.gate if self.advised else "never"].make

@@ -3,11 +3,10 @@
 from collections.abc import Callable
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lab.learning.gates import GATES, Surroundings, heard, weighing
+from lab.learning.gates import GATES, Surroundings, heard
 from lab.learning.gates.weighing import Weighing
 from lab.learning.selection import exp_of
 from lab.learning.settings import GateSettings, LearnerSettings
@@ -46,7 +45,7 @@ def test_fading_asks_about_fewer_steps_each_episode() -> None:
 
 
 def test_shaping_multiplies_what_was_said_with_the_own_chances() -> None:
-    told = heard.blank(1, 3)
+    told = heard.blank(1, 3, 1)
     for action in (RIGHT, RIGHT, STAY):
         heard.hear(told, 0, action)
     values, odds = [1.0, 0.0, 0.0], 3.0  # weights 1, e**-1 * 9, e**-1 * 3
@@ -58,7 +57,7 @@ def test_shaping_multiplies_what_was_said_with_the_own_chances() -> None:
 
 @given(st.lists(st.floats(-1e6, 1e6), min_size=2, max_size=6), st.floats(0.0, 1.0, exclude_max=True))
 def test_shaping_draws_an_action_whatever_the_values(values: list[float], u: float) -> None:
-    told = heard.blank(1, len(values))
+    told = heard.blank(1, len(values), 1)
     assert 0 <= heard.shaped(told, 0, values, 1e3, 99.0, u) < len(values)
 
 
@@ -92,79 +91,3 @@ def test_two_levels_learn_what_asking_is_worth() -> None:
     assert list(one.heard.worth[:2]) == [-1.0, -0.5]
     assert one.asks(0, [])
     assert not gate("two-levels", u=0.01).asks(0, [])  # one step in twenty tries the other
-
-
-def walk(one: Weighing, moves: list[tuple[int, int | None, int, int]], reached: bool, over: bool = False) -> list[int]:
-    """An episode: in each state what is own, said, and where the move leads; the actions that were taken."""
-    one.begins(moves[0][0])
-    taken = []
-    for number, (state, said, own, entered) in enumerate(moves, start=1):
-        asked = one.asks(state, [])
-        taken.append(one.takes(state, own, said if asked else None))
-        ends = (reached or over) and number == len(moves)
-        one.saw(state, taken[-1], 0.0, 0.0 if ends else 1.0, entered, 0)
-    one.judges([len(moves) if reached else LIMIT + 1], True)
-    return taken
-
-
-def test_trust_remembers_and_asks_no_more_where_it_is_sure() -> None:
-    one = gate("earned-trust")
-    way: list[tuple[int, int | None, int, int]] = [(0, RIGHT, LEFT, 1), (1, RIGHT, LEFT, 2), (2, RIGHT, LEFT, 3)]
-    assert walk(one, way, True) == [RIGHT] * 3
-    assert one.heard.now.rate == 1.0
-    assert one.asks(0, [])  # one answer alone leads by no more than the root of one
-    one.takes(0, LEFT, RIGHT)
-    assert not one.asks(0, [])  # two alike do
-    assert one.takes(0, LEFT, None) == RIGHT  # and it is followed without asking
-
-
-def test_trust_drops_what_leads_round() -> None:
-    one = gate("earned-trust")
-    walk(one, [(0, RIGHT, LEFT, 1), (1, LEFT, RIGHT, 0), (0, RIGHT, LEFT, 1)], False)
-    assert np.flatnonzero(one.heard.blamed).tolist() == [RIGHT]  # back in 0 by advised moves alone
-    assert weighing.favourite(one.heard, 0) == heard.NOTHING
-    own = gate("earned-trust")
-    walk(own, [(0, RIGHT, LEFT, 1), (1, None, LEFT, 0), (0, RIGHT, LEFT, 1)], False)
-    assert not any(own.heard.blamed)  # the learner itself had a hand in it
-
-
-def test_trust_drops_what_ends_in_failure_but_not_where_moves_are_left_to_chance() -> None:
-    one = gate("earned-trust")
-    walk(one, [(0, RIGHT, LEFT, 3)], False, over=True)
-    assert np.flatnonzero(one.heard.blamed).tolist() == [RIGHT]
-    chance = gate("earned-trust")
-    walk(chance, [(0, RIGHT, LEFT, 1), (1, None, LEFT, 0), (0, RIGHT, LEFT, 2)], False)  # right led to 1, and to 2
-    assert chance.heard.now.uncertain == 1.0
-    walk(chance, [(0, RIGHT, LEFT, 3)], False, over=True)
-    assert not any(chance.heard.blamed)
-
-
-def test_trust_goes_alone_once_its_own_way_is_as_short() -> None:
-    values = {0: [0.0, 1.0, 0.0], 1: [0.0, 1.0, 0.0]}
-    one = gate("earned-trust", u=0.0, values=lambda state: values[state])
-    walk(one, [(0, RIGHT, LEFT, 1), (1, RIGHT, LEFT, 2)], True)
-    assert weighing.rehearsed(one.heard, 0) == 2  # its values say right twice, and that was walked
-    one.begins(0)
-    assert one.heard.now.advised == 0.0
-    assert not one.asks(0, [])
-    values[1] = [2.0, 1.0, 0.0]  # left in 1, where nobody went
-    one.saw(1, LEFT, 0.0, 1.0, 1, 0)
-    assert weighing.rehearsed(one.heard, 0) == heard.NOTHING
-    one.begins(0)
-    assert one.heard.now.advised == 1.0
-
-
-@pytest.mark.parametrize(("u", "advised"), [(0.03, 1.0), (0.04, 0.0)])
-def test_trust_seldom_tries_again_what_never_worked(u: float, advised: float) -> None:
-    one = gate("earned-trust", u=u)
-    walk(one, [(0, RIGHT, LEFT, 3)], False, over=True)
-    one.begins(0)  # once in 2**5
-    assert one.heard.now.advised == advised
-
-
-def test_trust_says_why_it_asks() -> None:
-    one = gate("earned-trust")
-    walk(one, [(0, RIGHT, LEFT, 1), (1, RIGHT, LEFT, 3)], True)
-    one.begins(0)
-    one.asks(2, [])
-    assert "100% of the recent advised episodes reached the goal" in str(one.why)

@@ -4,6 +4,7 @@ from typing import Any
 
 from lab.learning.gates import gate as rules
 from lab.learning.gates.ccrl import Ccrl, Combined
+from lab.learning.gates.earned_trust import EarnedTrust
 from lab.learning.gates.gate import (
     CompiledGate,
     Gate,
@@ -17,7 +18,7 @@ from lab.learning.gates.gate import (
     improvement,
 )
 from lab.learning.gates.other_gates import ConstantPerformance, Uncertainty, deviation
-from lab.learning.gates.weighing import Fading, Novelty, Reliability, Shaping, Trust, TwoLevels
+from lab.learning.gates.weighing import Fading, Novelty, Reliability, Shaping, TwoLevels
 from lab.learning.members import Member
 from lab.plugins.family import Family, first_line, takes, wanted
 
@@ -93,7 +94,7 @@ _SHIPPED: dict[str, Member[GateClass]] = {
         _weighing(rules.WEIGHS_WORTH),
     ),
     "earned-trust": Member(
-        Trust,
+        EarnedTrust,
         "remembers advice, follows it while episodes with advice do better than those without, and drops what leads in "
         "circles",
         _weighing(rules.WEIGHS_TRUST),

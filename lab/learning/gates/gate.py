@@ -100,7 +100,7 @@ class Surroundings:
     draw: returns uniform numbers; learners: returns as many independent learners as asked for, with random start values;
     several_starts: whether episodes may begin in different states; values: the learner's values of a state (`Update.gauge`);
     size: (S, A); learner: the learner's settings; by_return: whether the problem has no goal, so that what is given as the
-    steps of an episode is the shortfall of its return.
+    steps of an episode is the shortfall of its return; update: the learner itself.
     """
 
     draw: Draw
@@ -110,6 +110,7 @@ class Surroundings:
     size: tuple[int, int] = (0, 0)
     learner: LearnerSettings = field(default_factory=LearnerSettings)
     by_return: bool = False
+    update: Update = field(default_factory=Update)
 
 
 class Gate:

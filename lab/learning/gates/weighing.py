@@ -1,148 +1,10 @@
-"""Gates that record and weigh advice: the lab's own, "earned-trust" (its functions come first), and published ones."""
-
-from collections.abc import Sequence
+"""Published gates that record and weigh advice, and their base class; the lab's own is in `earned_trust`."""
 
 from lab.learning.gates import heard
 from lab.learning.gates.gate import Gate, Steps, Surroundings, Values
-from lab.learning.gates.heard import GOAL, NOTHING, NOWHERE, Heard, answers, best_of
-from lab.learning.requests import ByChance, Reason, ToldSeldom, Trusted
+from lab.learning.requests import ByChance, ToldSeldom
 from lab.learning.selection import COLDEST, temperature
 from lab.learning.settings import GateSettings
-
-SURE = 1.0  # it asks until the lead of the most frequent answer exceeds this times the root of the number of answers
-ANSWERS = 20  # the most answers that it asks for in a state
-OWN = 3.0  # the fewest episodes without advice by which it judges itself
-RECENT = 0.3  # the weight of the last episode in a running mean
-
-
-def rehearsed(heard: Heard, start: int) -> int:
-    """The length in moves of the greedy path from a state to the goal in the record of moves, NOTHING if it is unknown."""
-    states, actions = len(heard.said), len(heard.led) // len(heard.said)
-    state, moves = start, 0
-    while moves < states:
-        action = heard.greedy[state]
-        if action == NOTHING:
-            return NOTHING
-        moves += 1
-        led = heard.led[state * actions + action]
-        if led == GOAL:
-            return moves
-        if led < 0:
-            return NOTHING
-        state = led
-    return NOTHING
-
-
-def starts(heard: Heard, start: int, u: float) -> None:
-    """Begins an episode in a state, and decides with the uniform number u whether it follows advice."""
-    now = heard.now
-    now.followed = now.moves = now.advised_moves = 0.0
-    now.since = now.clock = now.clock + 1.0
-    chance = 1.0
-    if now.helped > 0.0:
-        moves = rehearsed(heard, start)
-        known = moves != NOTHING and (now.several > 0.0 or moves <= now.steps)
-        better = now.own >= OWN and now.own_rate >= now.rate and now.own_steps <= now.steps
-        if now.won == 0.0:
-            chance = (now.helped + 1.0) ** -5.0
-        elif known or better:
-            chance = 0.0
-        else:
-            chance = now.rate * (0.5 + 0.5 * now.advised_share)
-    now.advised = 1.0 if u < chance else 0.0
-
-
-def favourite(heard: Heard, state: int) -> int:
-    """The most frequent answer in a state that is not blamed, NOTHING if there is none; ties: the lowest index."""
-    actions = len(heard.led) // len(heard.said)
-    best, most = NOTHING, 0
-    for action in range(actions):
-        number = state * actions + action
-        if heard.times[number] > most and heard.blamed[number] == 0:
-            best, most = action, heard.times[number]
-    return best
-
-
-def wants(heard: Heard, state: int) -> bool:
-    """Whether to ask in a state: the episode follows advice and the answers so far do not agree clearly enough."""
-    if heard.now.advised == 0.0:
-        return False
-    given = answers(heard, state)
-    if given >= ANSWERS:
-        return False
-    actions = len(heard.led) // len(heard.said)
-    most = second = 0
-    for number in range(state * actions, (state + 1) * actions):
-        if heard.blamed[number] == 0:
-            times = heard.times[number]
-            if times > most:
-                most, second = times, most
-            elif times > second:
-                second = times
-    return bool(most - second <= SURE * given**0.5)
-
-
-def takes(heard: Heard, state: int, own: int) -> int:
-    """The most frequent answer in this state if the episode follows advice and there is one, otherwise the learner's own."""
-    if heard.now.advised == 0.0:
-        return own
-    said = favourite(heard, state)
-    heard.now.followed = 0.0 if said == NOTHING else 1.0
-    return own if said == NOTHING else said
-
-
-def saw(heard: Heard, number: int, entered: int, over: bool, values: Sequence[float]) -> None:
-    """Records a move; values: (A,), of the state that it left, after the learner has learned from it."""
-    now, led = heard.now, heard.led
-    actions = len(led) // len(heard.said)
-    state = number // actions
-    now.clock += 1.0
-    now.moves += 1.0
-    now.advised_moves += now.followed
-    now.last = number
-    heard.greedy[state] = best_of(values)
-    if over:
-        now.blame = number if now.followed > 0.0 else NOTHING
-        return
-    if led[number] == NOTHING:
-        led[number] = entered
-    elif led[number] != entered:
-        led[number] = NOWHERE
-        now.uncertain = 1.0
-    if now.followed == 0.0:
-        now.since = now.clock
-        return
-    heard.left[state] = int(now.clock)
-    heard.said[state] = number - state * actions
-    if heard.left[entered] > now.since and now.uncertain == 0.0:
-        heard.blamed[entered * actions + heard.said[entered]] = 1
-
-
-def ended(heard: Heard, result: float, reached: bool, over: bool) -> None:
-    """Ends an episode; result: its step count; over: whether it ended in a terminal state."""
-    now = heard.now
-    last = int(now.last)
-    if reached:
-        heard.led[last] = GOAL if heard.led[last] in (NOTHING, GOAL) else NOWHERE
-    elif over:
-        heard.led[last] = NOWHERE
-        if now.blame != NOTHING and now.uncertain == 0.0:
-            heard.blamed[int(now.blame)] = 1
-    won = 1.0 if reached else 0.0
-    if now.advised > 0.0:
-        share = now.advised_moves / max(now.moves, 1.0)
-        now.rate = won if now.helped == 0.0 else now.rate + RECENT * (won - now.rate)
-        now.steps = result if now.helped == 0.0 else now.steps + RECENT * (result - now.steps)
-        now.advised_share = share if now.helped == 0.0 else now.advised_share + RECENT * (share - now.advised_share)
-        now.helped += 1.0
-        now.won += won
-    else:
-        now.own_rate = won if now.own == 0.0 else now.own_rate + RECENT * (won - now.own_rate)
-        now.own_steps = result if now.own == 0.0 else now.own_steps + RECENT * (result - now.own_steps)
-        now.own += 1.0
-
-
-# ---- the gates ------------------------------------------------------------------------------------------------------
 
 
 class Weighing(Gate):
@@ -153,7 +15,7 @@ class Weighing(Gate):
     def __init__(self, settings: GateSettings, episodes: int, max_steps: int, around: Surroundings | None = None):
         super().__init__(settings, episodes, max_steps, around)
         self._around = around or Surroundings(lambda: 0.0, lambda count: [], size=(1, 2))
-        self.heard = heard.blank(*self._around.size)
+        self.heard = heard.blank(*self._around.size, max_steps)
         heard.clear(self.heard, float(self._around.several_starts))
         self.episode = 0
         self._u = 0.0
@@ -176,7 +38,7 @@ class Weighing(Gate):
         """The action that `weighed` decides on, after the answer is recorded."""
         if said is not None:
             heard.hear(self.heard, state, said)
-        self.heard.now.followed = float(said is not None)
+        heard.chose(self.heard, said is not None)
         return self.weighed(state, own, said)
 
     def weighed(self, state: int, own: int, said: int | None) -> int:
@@ -184,9 +46,9 @@ class Weighing(Gate):
         return own if said is None else said
 
     def saw(self, s_tm1: int, a_tm1: int, r_t: float, discount_t: float, s_t: int, a_t: int) -> None:
-        """Passes the step to `learns`; the next step counts as advised only if `takes` says so."""
+        """Passes the step to `learns`."""
+        heard.made_move(self.heard)
         self.learns(s_tm1, a_tm1, r_t, discount_t, s_t)
-        self.heard.now.followed = 0.0
 
     def learns(self, state: int, action: int, reward: float, discount: float, entered: int) -> None:
         """Receives a step; discount: 0 if it ended the episode."""
@@ -265,36 +127,3 @@ class TwoLevels(Weighing):
     def learns(self, state: int, action: int, reward: float, discount: float, entered: int) -> None:
         """Updates the value of the choice that was made."""
         heard.learn_worth(self.heard, state, reward, discount, entered, self._around.learner.alpha)
-
-
-class Trust(Weighing):
-    """Follows advice while advised episodes do better than the others, remembers it, and drops answers that lead into loops."""
-
-    def __init__(self, settings: GateSettings, episodes: int, max_steps: int, around: Surroundings | None = None):
-        super().__init__(settings, episodes, max_steps, around)
-        self._over = False
-
-    def begins(self, state: int) -> None:
-        """Decides whether this episode follows advice."""
-        starts(self.heard, state, self._around.draw())
-
-    def asks(self, state: int, values: Values) -> bool:
-        """Whether this episode follows advice and the answers so far leave it unsure."""
-        now = self.heard.now
-        self.why = Trusted(now.rate) if now.helped else Reason()
-        return wants(self.heard, state)
-
-    def weighed(self, state: int, own: int, said: int | None) -> int:
-        """The most frequent answer in this state if the episode follows advice and there is one, otherwise the learner's own."""
-        return takes(self.heard, state, own)
-
-    def learns(self, state: int, action: int, reward: float, discount: float, entered: int) -> None:
-        """Records the outcome of the move, and blames the answer if it led into a loop."""
-        self._over = discount == 0.0
-        number = state * self._around.size[1] + action
-        saw(self.heard, number, entered, self._over, self._around.values(state))
-
-    def judges(self, steps: Steps, opened: bool) -> None:
-        """Records the result of the episode."""
-        reached = steps[-1] <= self.max_steps
-        ended(self.heard, float(steps[-1]), reached, self._over)

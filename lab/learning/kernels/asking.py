@@ -11,16 +11,18 @@ import numpy as np
 from lab.learning import advice_memory as memory
 from lab.learning import selection
 from lab.learning.compiled import inlined, inner, linked, without_refcounts
+from lab.learning.gates import earned_trust, heard
 from lab.learning.gates import gate as rules
-from lab.learning.gates import heard, weighing
 from lab.learning.gates.heard import NOTHING
-from lab.learning.kernels.records import draw, gauge
+from lab.learning.kernels.records import best_action, draw, gauge, leads, prefer, replay_step
 from lab.learning.simulated_advice import SPEAKS_ALWAYS, SPEAKS_TO_CORRECT
 from lab.learning.updates import update
 
 _Heard: Any = heard.Heard
 _clear: Any = inner(heard.clear)
 _hear: Any = inlined(heard.hear)
+_chose: Any = inlined(heard.chose)
+_made_move: Any = inlined(heard.made_move)
 _answers: Any = inlined(heard.answers)
 _best_of: Any = inlined(heard.best_of)
 _shaped: Any = inner(linked(heard.shaped, exp_of=inlined(selection.exp_of)))
@@ -29,18 +31,27 @@ _reliable: Any = inlined(heard.reliable)
 _borne_out: Any = inlined(linked(heard.borne_out, best_of=_best_of))
 _asks_by_worth: Any = inlined(heard.asks_by_worth)
 _learn_worth: Any = inlined(linked(heard.learn_worth, towards=inlined(update.towards)))
-_starts: Any = inner(linked(weighing.starts, rehearsed=inner(weighing.rehearsed)))
-_wants: Any = inlined(linked(weighing.wants, answers=_answers))
-_takes: Any = inlined(linked(weighing.takes, favourite=inlined(weighing.favourite)))
-_saw: Any = inlined(linked(weighing.saw, best_of=_best_of))
-_ended: Any = inner(weighing.ended)
+_on_table: Any = {"best_action": best_action, "leads": leads, "prefer": prefer, "replay": replay_step}
+_favourite: Any = inlined(earned_trust.favourite)
+_planned: Any = inner(linked(earned_trust.planned, **_on_table))
+_handed: Any = {
+    "hand_over_path": inner(linked(earned_trust.hand_over_path, planned=_planned, **_on_table)),
+    "hand_over_answers": inner(linked(earned_trust.hand_over_answers, favourite=_favourite, **_on_table)),
+}
+_knows: Any = inner(linked(earned_trust.knows, leads=leads))
+_starts: Any = inner(linked(earned_trust.starts, planned=_planned))
+_wants: Any = inlined(linked(earned_trust.wants, answers=_answers))
+_takes: Any = inlined(linked(earned_trust.takes, favourite=_favourite))
+_saw: Any = inlined(earned_trust.saw)
+_ended: Any = inner(linked(earned_trust.ended, knows=_knows, judges=inner(earned_trust.judges), **_handed))
 
 
 # Inlined as source, because a compiled function may not return arrays that are not its arguments.
 @partial(without_refcounts, inline="always")
 def _of_lane(h: Any, j: int) -> Any:
     """The record of advice of one lane."""
-    return _Heard(h.said[j], h.times[j], h.blamed[j], h.led[j], h.greedy[j], h.left[j], h.worth[j], h.now[j])
+    kept = h.said[j], h.times[j], h.blamed[j], h.led[j]
+    return _Heard(*kept, h.left[j], h.walk[j], h.fewest[j], h.way[j], h.paid[j], h.worth[j], h.now[j])
 
 
 @inlined
@@ -57,7 +68,7 @@ def hears_nothing_yet(work: Any, hearing: Any, j: int) -> None:
 def begins(work: Any, hearing: Any, j: int) -> None:
     """`Gate.begins` of lane j's episode."""
     if work.asking.gate.weighs == rules.WEIGHS_TRUST:
-        _starts(_of_lane(hearing.heard, j), np.int64(work.lanes.states[j]), draw(work.lanes.rng, j))
+        _starts(_of_lane(hearing.heard, j), (work, j), np.int64(work.lanes.states[j]), draw(work.lanes.rng, j))
 
 
 @inlined
@@ -86,7 +97,7 @@ def takes(work: Any, hearing: Any, j: int, state: Any, own: Any, said: int) -> A
     at, actions = np.int64(state), len(work.learning.actions)
     if said != heard.NOTHING:
         _hear(told, at, said)
-    told.now.followed = 0.0 if said == heard.NOTHING else 1.0
+    _chose(told, said != heard.NOTHING)
     action = np.int64(own) if said == heard.NOTHING else np.int64(said)
     if how == rules.WEIGHS_TRUST:
         action = np.int64(_takes(told, at, np.int64(own)))
@@ -115,23 +126,23 @@ def saw(work: Any, hearing: Any, j: int, state: Any, number: Any, entered: Any, 
     if how == rules.WEIGHS_NOTHING:
         return
     told = _of_lane(hearing.heard, j)
+    _made_move(told)
     if how == rules.WEIGHS_TRUST:
-        _fill(work, hearing, j, state)
-        _saw(told, np.int64(number), np.int64(entered), over, hearing.values[j])
+        _saw(told, np.int64(number), np.int64(entered), over, reward)
     elif how == rules.WEIGHS_RELIABILITY:
         _fill(work, hearing, j, state)
         _borne_out(told, np.int64(state), hearing.values[j])
     elif how == rules.WEIGHS_WORTH:
         discount = 0.0 if over else work.learning.discount
         _learn_worth(told, np.int64(state), reward, discount, np.int64(entered), work.learning.alpha)
-    told.now.followed = 0.0
 
 
 @inlined
 def ended(work: Any, hearing: Any, j: int, steps: int, won: bool, over: bool) -> None:
     """`Gate.judges` of lane j's episode."""
     if work.asking.gate.weighs == rules.WEIGHS_TRUST:
-        _ended(_of_lane(hearing.heard, j), float(steps), won, over)
+        margin = earned_trust.MARGIN / work.lanes.per_tau[j]
+        _ended(_of_lane(hearing.heard, j), (work, j), float(steps), won, over, margin)
 
 
 @inlined

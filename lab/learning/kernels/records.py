@@ -10,7 +10,7 @@ from lab.learning import selection, splitmix
 from lab.learning.advice_memory import Now
 from lab.learning.compiled import inlined, inner
 from lab.learning.gates.gate import CompiledGate
-from lab.learning.gates.heard import Heard, HeardNow
+from lab.learning.gates.heard import NOTHING, Heard, HeardNow
 from lab.learning.updates import tabular, update
 from lab.mdp import FloatArray
 
@@ -31,6 +31,7 @@ class ProblemArrays(NamedTuple):
 class CompiledLearner(NamedTuple):
     """The learner's settings, see `LearnerSettings`; selection: SOFTMAX, EPSILON_GREEDY or GREEDY.
 
+    replays: whether it learns again from a single known step, see `Update.replay`;
     actions: A numbers, in a tuple if the compiler is to know their count.
     """
 
@@ -41,6 +42,7 @@ class CompiledLearner(NamedTuple):
     max_steps: int
     count_start: bool
     selection: int
+    replays: bool
     actions: tuple[int, ...] | FloatArray
 
 
@@ -400,6 +402,57 @@ def greedy(values: Any, first: int, stride: int, actions: int, best: float, epsi
         seen += np.int64(values[first + a * stride] == best)
         chosen += np.int64(seen <= tie)
     return int(explored if u < epsilon else chosen)
+
+
+@inlined
+def prefer(around: Any, state: int, action: int, margin: float) -> None:
+    """`Update.prefer` in a lane; around: (work, lane)."""
+    work, table = around[0], around[0].lanes.tables[around[1]]
+    A, kept = len(work.learning.actions), np.uint64(action)
+    at = np.uint64(state) * np.uint64(A)
+    if work.learning.afterstate:
+        successor = work.problem.successor
+        most = table[successor[at + kept]] - margin
+        for a in range(A):
+            entered = successor[at + np.uint64(a)]
+            if entered != successor[at + kept]:
+                table[entered] = min(table[entered], most)
+    else:
+        most = table[at + kept] - margin
+        for a in range(A):
+            if a != action:
+                table[at + np.uint64(a)] = min(table[at + np.uint64(a)], most)
+
+
+@inlined
+def leads(told: Any, around: Any, number: Any) -> Any:
+    """`earned_trust.leads` in a lane; around: (work, lane)."""
+    led = told.led[number]
+    if led == NOTHING and around[0].learning.afterstate:
+        return np.int64(around[0].problem.successor[number])
+    return np.int64(led)
+
+
+@inlined
+def replay_step(around: Any, state: int, action: int, reward: float, entered: int) -> None:
+    """`Update.replay` in a lane; around: (work, lane)."""
+    work, table = around[0], around[0].lanes.tables[around[1]]
+    if not work.learning.replays:
+        return
+    number = np.uint64(state) * np.uint64(len(work.learning.actions)) + np.uint64(action)
+    learn(work, table, np.uint64(state), number, np.uint64(entered), reward)
+
+
+@inlined
+def best_action(around: Any, state: int) -> int:
+    """The greedy action in a state of a lane; around: (work, lane)."""
+    work, j = around
+    best, most = 0, gauge(work, work.lanes.tables[j], state, 0)
+    for a in range(1, len(work.learning.actions)):
+        value = gauge(work, work.lanes.tables[j], state, a)
+        if value > most:
+            best, most = a, value
+    return best
 
 
 @inlined

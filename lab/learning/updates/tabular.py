@@ -101,6 +101,10 @@ class DynaQ(QLearning):
             state, action = moves[self._turn]
             learn(state, action, *outcomes[state, action], a_t)
 
+    def replay(self, s_tm1: int, a_tm1: int, r_t: float, discount_t: float, s_t: int) -> None:
+        """Learns again from a known step, and from no other."""
+        super().learn(s_tm1, a_tm1, r_t, discount_t, s_t, 0)
+
 
 # ---- afterstates: values of the states that moves lead to -----------------------------------------------------------
 
@@ -116,22 +120,22 @@ class AfterstateRows(ComputedRows):
     def __init__(self, mdp: TabularMDP, discount: float, values: Row):
         self.values = values
         self._step_reward, self._discount = mdp.step_reward, discount
-        self._successor: list[list[int]] = mdp.successor.tolist()
+        self.successor: list[list[int]] = mdp.successor.tolist()
         self._over: list[bool] = mdp.terminal.tolist()
 
     def __len__(self) -> int:
-        return len(self._successor)
+        return len(self.successor)
 
     def row(self, state: int) -> Row:
         """The action values (A,) of a state."""
         if self._over[state]:
-            return [0.0] * len(self._successor[state])
+            return [0.0] * len(self.successor[state])
         reward, discount, values = self._step_reward, self._discount, self.values
-        return [afterstate_value(reward, discount, values[entered]) for entered in self._successor[state]]
+        return [afterstate_value(reward, discount, values[entered]) for entered in self.successor[state]]
 
     def after(self, state: int) -> Row:
         """The values of the states that the actions lead to."""
-        return [self.values[entered] for entered in self._successor[state]]
+        return [self.values[entered] for entered in self.successor[state]]
 
 
 class Afterstate(Update):
@@ -153,6 +157,18 @@ class Afterstate(Update):
     def gauge(self, state: int) -> Row:
         """The values of the states that the actions lead to, as the listing compares them."""
         return self._rows.after(state)
+
+    def leads_to(self, state: int, action: int) -> int:
+        """The state that a move leads to."""
+        return self._rows.successor[state][action]
+
+    def prefer(self, state: int, action: int, margin: float) -> None:
+        """Lowers the values of the states that other actions lead to."""
+        successor, values = self._rows.successor[state], self._values
+        most = values[successor[action]] - margin
+        for entered in successor:
+            if entered != successor[action]:
+                values[entered] = min(values[entered], most)
 
     def scatter(self, draw: Draw) -> None:
         """Draws every state's value within +-0.5."""

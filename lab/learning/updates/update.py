@@ -82,6 +82,24 @@ class Update:
         """The values (A,) of a state whose span shows how sure the learner is there; gates read them."""
         return self.q[state]
 
+    def replay(self, s_tm1: int, a_tm1: int, r_t: float, discount_t: float, s_t: int) -> None:
+        """Learns again from a known step; by default only where a step can be learned from by itself."""
+        if not (self.lookahead or self.chained):
+            self.learn(s_tm1, a_tm1, r_t, discount_t, s_t, 0)
+
+    def leads_to(self, state: int, action: int) -> int:
+        """The state that a move leads to, if the learner knows that before it is made, otherwise -1."""
+        return -1
+
+    def prefer(self, state: int, action: int, margin: float) -> None:
+        """Lowers the values of the other actions in a state to at most that of `action` minus `margin`.
+
+        Nothing changes in tables whose rows are computed.
+        """
+        row = self.q[state]
+        most = row[action] - margin
+        row[:] = [value if a == action else min(value, most) for a, value in enumerate(row)]
+
     def table(self) -> FloatArray:
         """The action values of all states, (S, A) float64."""
         return np.array(list(self.q), np.float64)
@@ -126,5 +144,5 @@ def is_rule_only(learner: Any) -> bool:
     """Whether a class is a `RuleUpdate` that adds nothing but its rule."""
     if not (isinstance(learner, type) and issubclass(learner, RuleUpdate) and hasattr(learner, "rule")):
         return False
-    methods = ("__init__", "begin", "learn", "end", "gauge", "table", "scatter")
+    methods = ("__init__", "begin", "learn", "end", "gauge", "table", "scatter", "replay", "prefer", "leads_to")
     return not learner.chained and all(getattr(learner, name) is getattr(RuleUpdate, name) for name in methods)
