@@ -167,7 +167,9 @@ class ComparedSessions:
     def from_json(cls, record: Mapping[str, list[float]]) -> "ComparedSessions":
         """The results that `to_json` wrote. Raises KeyError, TypeError or ValueError for anything else."""
         kinds: dict[str, Any] = {"solved": np.bool_, "rejected": np.bool_}
-        arrays = {name: np.array(record[name], kinds.get(name, np.float64)) for name in cls.__dataclass_fields__}
+        arrays: dict[str, Any] = {
+            name: np.array(record[name], kinds.get(name, np.float64)) for name in cls.__dataclass_fields__
+        }
         return cls(**arrays | {"by_return": bool(record["by_return"])})
 
 

@@ -36,7 +36,7 @@ def gate(u: float = 0.5, several: bool = False) -> tuple[Weighing, list[list[flo
     settings = LearnerSettings(alpha=0.5, discount=1.0)
     learner = Table(table, settings, line())
     around = Surroundings(
-        lambda: u, lambda count: [], several, lambda state: table[state], (STATES, 3), settings, learner
+        lambda: u, lambda count: [], several, lambda state: table[state], (STATES, 3), settings, update=learner
     )
     made = GATES["earned-trust"].make(GateSettings("earned-trust"), EPISODES, LIMIT, around)
     assert isinstance(made, Weighing)

@@ -165,7 +165,7 @@ def saw(heard: Heard, number: int, entered: int, over: bool, reward: float) -> N
 
 
 def ended(heard: Heard, around: Any, result: float, reached: bool, over: bool, margin: float) -> None:
-    """Ends an episode; result: its step count; over: whether it ended in a terminal state, as in problems with a goal; margin: see `prefer`."""
+    """Ends an episode; result: its step count; over: whether its last state was terminal; margin: see `prefer`."""
     now, actions = heard.now, len(heard.led) // len(heard.said)
     start, last = heard.walk[0] // actions, heard.walk[int(now.moves) - 1]
     fewest = heard.fewest[start]

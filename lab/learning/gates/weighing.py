@@ -15,7 +15,7 @@ class Weighing(Gate):
     def __init__(self, settings: GateSettings, episodes: int, max_steps: int, around: Surroundings | None = None):
         super().__init__(settings, episodes, max_steps, around)
         self._around = around or Surroundings(lambda: 0.0, lambda count: [], size=(1, 2))
-        self.heard = heard.blank(*self._around.size, max_steps)
+        self.heard = heard.blank(*self._around.size, self._around.learner.max_steps)
         heard.clear(self.heard, float(self._around.several_starts))
         self.episode = 0
         self._u = 0.0
