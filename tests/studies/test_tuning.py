@@ -48,7 +48,9 @@ def test_every_range_lies_in_what_is_allowed_and_holds_the_default() -> None:
 def test_an_unsolved_session_costs_the_limit_as_a_whole() -> None:
     zeros = np.zeros(2)
     solved, five, none = np.array([True, False]), np.full(2, 5.0), np.zeros(2, bool)
-    found = ComparedSessions(zeros, solved, five, zeros, zeros, zeros, zeros, none, *[zeros] * 5, by_return=False)
+    found = ComparedSessions(
+        zeros, solved, five, zeros, zeros, zeros, zeros, none, zeros, zeros, zeros, zeros, zeros, False
+    )
     assert costs(found, 201).tolist() == [5.0, 201.0]
 
 
