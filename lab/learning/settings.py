@@ -109,6 +109,18 @@ class GateSettings:
         Le(1),
         doc("factor by which the share of the steps that fading asks about shrinks in each episode"),
     ] = 0.97
+    reuse: Annotated[
+        float,
+        Ge(0),
+        Le(1),
+        doc(
+            "factor by which the chance to follow an earlier answer shrinks with each use (advice-reuse), each episode "
+            "(advice-imitation, value-reuse) or each step of an episode (policy-reuse)"
+        ),
+    ] = 0.95
+    bonus: Annotated[
+        float, Ge(0), Le(1_000_000), doc("what value-reuse adds to the value of an answer in the first episode")
+    ] = 1.0
     consistency: Annotated[float, Gt(0.5), Lt(1), doc("shaping's probability that an answer is right")] = 0.9
     enough_steps: Annotated[float, Gt(0), Le(1_000_000), doc("mean step count above which cq asks")] = 50.0
     ensemble: Annotated[int, Ge(2), Le(100), doc("number of tables of uncertainty")] = 5
@@ -193,6 +205,8 @@ RANGES: dict[str, Range] = {
     "spread": Span(0.01, 1.0, log=True),
     "rate": Span(0.01, 1.0, log=True),
     "fading": Span(0.8, 0.999),
+    "reuse": Span(0.5, 0.999),
+    "bonus": Span(0.01, 10.0, log=True),
     "consistency": Span(0.55, 0.95),
     "enough_steps": Span(5.0, 200.0, log=True),
     "ensemble": Span(2, 10),

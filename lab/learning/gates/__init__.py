@@ -18,6 +18,7 @@ from lab.learning.gates.gate import (
     improvement,
 )
 from lab.learning.gates.other_gates import ConstantPerformance, Uncertainty, deviation
+from lab.learning.gates.reuse import AdviceImitation, AdviceReuse, PolicyReuse, ValueReuse
 from lab.learning.gates.weighing import Fading, Novelty, Reliability, Shaping, TwoLevels
 from lab.learning.members import Member
 from lab.plugins.family import Family, first_line, takes, wanted
@@ -93,10 +94,30 @@ _SHIPPED: dict[str, Member[GateClass]] = {
         "learns in every state whether asking or acting alone is worth more",
         _weighing(rules.WEIGHS_WORTH),
     ),
+    "advice-reuse": Member(
+        AdviceReuse,
+        "asks once per state, and follows the answer again with a chance that shrinks with each use",
+        _weighing(rules.WEIGHS_REUSE),
+    ),
+    "advice-imitation": Member(
+        AdviceImitation,
+        "asks once per state, and imitates the answers in a share of the episodes that decays",
+        _weighing(rules.WEIGHS_IMITATION),
+    ),
+    "policy-reuse": Member(
+        PolicyReuse,
+        "chooses for each episode between the advisor and itself by their gains (PRQ-learning)",
+        _weighing(rules.WEIGHS_POLICY),
+    ),
+    "value-reuse": Member(
+        ValueReuse,
+        "asks once per state, and adds a bonus to the value of the answer that decays with the episodes",
+        _weighing(rules.WEIGHS_VALUES),
+    ),
     "earned-trust": Member(
         EarnedTrust,
-        "remembers advice, follows it while episodes with advice do better than those without, and drops what leads in "
-        "circles",
+        "follows advice while episodes with advice do better than those without, and hands what it remembers over to the "
+        "learner's table",
         _weighing(rules.WEIGHS_TRUST),
     ),
 }

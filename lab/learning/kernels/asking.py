@@ -11,7 +11,7 @@ import numpy as np
 from lab.learning import advice_memory as memory
 from lab.learning import selection
 from lab.learning.compiled import inlined, inner, linked, without_refcounts
-from lab.learning.gates import earned_trust, heard
+from lab.learning.gates import earned_trust, heard, reuse
 from lab.learning.gates import gate as rules
 from lab.learning.gates.heard import NOTHING
 from lab.learning.kernels.records import best_action, draw, gauge, leads, prefer, replay_step
@@ -21,6 +21,11 @@ from lab.learning.updates import update
 _Heard: Any = heard.Heard
 _clear: Any = inner(heard.clear)
 _hear: Any = inlined(heard.hear)
+_reused: Any = inlined(reuse.reused)
+_begins_reuse: Any = inlined(reuse.begins_reuse)
+_advised_chance: Any = inner(reuse.advised_chance)
+_gained: Any = inlined(reuse.gained)
+_with_bonus: Any = inner(linked(reuse.with_bonus, exp_of=inlined(selection.exp_of)))
 _chose: Any = inlined(heard.chose)
 _made_move: Any = inlined(heard.made_move)
 _answers: Any = inlined(heard.answers)
@@ -67,7 +72,13 @@ def hears_nothing_yet(work: Any, hearing: Any, j: int) -> None:
 @inlined
 def begins(work: Any, hearing: Any, j: int) -> None:
     """`Gate.begins` of lane j's episode."""
-    if work.asking.gate.weighs == rules.WEIGHS_TRUST:
+    how, episode = work.asking.gate.weighs, work.lanes.lane[j].episode
+    if how == rules.WEIGHS_IMITATION:
+        _begins_reuse(_of_lane(hearing.heard, j), work.asking.reuse ** (episode - 1), draw(work.lanes.rng, j))
+    elif how == rules.WEIGHS_POLICY:
+        told = _of_lane(hearing.heard, j)
+        _begins_reuse(told, _advised_chance(told, episode), draw(work.lanes.rng, j))
+    elif how == rules.WEIGHS_TRUST:
         _starts(_of_lane(hearing.heard, j), (work, j), np.int64(work.lanes.states[j]), draw(work.lanes.rng, j))
 
 
@@ -87,6 +98,12 @@ def wants(work: Any, hearing: Any, j: int, state: Any) -> bool:
         return bool(_explores(episode, len(work.sessions.warm), u) and told.said[state] == heard.NOTHING)
     if how == rules.WEIGHS_WORTH:
         return bool(_asks_by_worth(told, np.int64(state), u))
+    if how == rules.WEIGHS_POLICY:
+        share = work.asking.reuse**told.now.moves if told.now.advised > 0.0 else 0.0
+        told.now.moves += 1.0
+        return bool(u < share)
+    if how in (rules.WEIGHS_REUSE, rules.WEIGHS_IMITATION, rules.WEIGHS_VALUES):
+        return bool(told.said[state] == heard.NOTHING)
     return True
 
 
@@ -109,6 +126,17 @@ def takes(work: Any, hearing: Any, j: int, state: Any, own: Any, said: int) -> A
         explores = _explores(lanes.lane[j].episode, len(work.sessions.warm), hearing.u[j])
         kept = explores and told.said[at] != heard.NOTHING and _reliable(told, actions)
         action = np.int64(told.said[at]) if kept else np.int64(own)
+    elif how == rules.WEIGHS_REUSE and told.said[at] != heard.NOTHING:
+        action = np.int64(own)
+        if _reused(told.left, at, work.asking.reuse, hearing.u[j]):
+            told.left[at] += 1
+            action = np.int64(told.said[at])
+    elif how == rules.WEIGHS_IMITATION and told.said[at] != heard.NOTHING and told.now.advised > 0.0:
+        action = np.int64(told.said[at])
+    elif how == rules.WEIGHS_VALUES and told.said[at] != heard.NOTHING:
+        bonus = work.asking.bonus * work.asking.reuse ** (lanes.lane[j].episode - 1)
+        _fill(work, hearing, j, state)
+        action = np.int64(_with_bonus(hearing.values[j], told.said[at], bonus, lanes.per_tau[j], hearing.u[j]))
     return np.uint64(action)
 
 
@@ -140,7 +168,9 @@ def saw(work: Any, hearing: Any, j: int, state: Any, number: Any, entered: Any, 
 @inlined
 def ended(work: Any, hearing: Any, j: int, steps: int, won: bool, over: bool) -> None:
     """`Gate.judges` of lane j's episode."""
-    if work.asking.gate.weighs == rules.WEIGHS_TRUST:
+    if work.asking.gate.weighs == rules.WEIGHS_POLICY:
+        _gained(_of_lane(hearing.heard, j), work.learning.discount**steps if won else 0.0)
+    elif work.asking.gate.weighs == rules.WEIGHS_TRUST:
         margin = earned_trust.MARGIN / work.lanes.per_tau[j]
         _ended(_of_lane(hearing.heard, j), (work, j), float(steps), won, over, margin)
 

@@ -58,6 +58,8 @@ class Asking(NamedTuple):
     spread: float
     rate: float
     fading: float
+    reuse: float
+    bonus: float
     consistency: float
     enough_steps: float
     budget: int

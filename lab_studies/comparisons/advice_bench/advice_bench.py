@@ -62,8 +62,9 @@ RULES_NOTE = (
     "most is at stake; correcting: there only against the move that the learner announces; predictive: there only against the "
     "learner's last move in the state (Torrey and Taylor 2013, who predict with a classifier). importance (learner's): "
     "Clouse's and Amir's. uncertainty: RCMP with five tables. novelty: advice novelty. reliability: CLUE with one advisor. two "
-    "levels: ADMIRAL's successor, with one. shaping: policy shaping with a fixed consistency. fading: confidence decay. Rules "
-    "that the literature gives for deep learners are carried over to tables."
+    "levels: ADMIRAL's successor, with one. shaping: policy shaping with a fixed consistency. fading: confidence decay. advice "
+    "reuse: Zhu et al. 2020. advice imitation: Ilhan et al. 2021. policy reuse: PRQ-learning. value reuse: Q-value reuse, with a "
+    "bonus for the answer instead of another table. Rules that the literature gives for deep learners are carried over to tables."
 )
 CHOSEN = (
     "Chosen on the first twelve problems: the constants of 'earned-trust' (with seed 0, so that its figures there "
