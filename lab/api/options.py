@@ -55,6 +55,8 @@ class Settings(TypedDict, total=False):
     spread: float
     rate: float
     fading: float
+    reuse: float
+    bonus: float
     consistency: float
     enough_steps: float
     ensemble: int

@@ -24,7 +24,7 @@ def test_settings_and_advisors_are_compared(tmp_path: Path) -> None:
     assert steps["right_then_down", "always"]["value"] == 4.0
     assert steps["none", "always"]["value"] == steps["none", "never"]["value"] > 4.0
     assert found.summary["best"] == "advisor right_then_down, gate always, episodes 20"
-    assert len(found.to_dataframe()) == len(found.rows) == 4 * 7
+    assert len(found.to_dataframe()) == len(found.rows) == 4 * 11
     assert "Mean steps of each episode" in found.figures
     assert "right_then_down" in found.report(tmp_path / "report.html").read_text(encoding="utf-8")
 
