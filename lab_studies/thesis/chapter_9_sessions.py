@@ -59,8 +59,10 @@ class AdviceSetting:
     def key(self, sessions: int, seed: int) -> str:
         """The key of this setting's results among all stored ones."""
         place = world(self.world).model_dump(mode="json")
-        for name in ("spare_best", "fading", "consistency"):
+        for name in ("spare_best", "by_evidence", "fading", "reuse", "bonus", "consistency"):
             del place["gate"][name]  # no result depends on it, see `gate_of`
+        if place["deadly"]:  # as all worlds were, when keys did not say it
+            del place["deadly"]
         for name, off in (("tilings", 1), ("start_value", 0.0)):
             if place["learner"][name] == off:
                 del place["learner"][name]

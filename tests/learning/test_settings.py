@@ -37,6 +37,8 @@ def test_the_defaults_are_those_of_the_thesis() -> None:
         "spread": 0.1,
         "rate": 0.1,
         "fading": 0.97,
+        "reuse": 0.95,
+        "bonus": 1.0,
         "consistency": 0.9,
         "enough_steps": 50.0,
         "ensemble": 5,

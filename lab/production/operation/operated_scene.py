@@ -387,7 +387,9 @@ class OperatedScene:
         advising = replace(self.teacher.advising, names=(by,))
         teacher = replace(self.teacher, advising=advising, trial=trial_of(self.prepared))
         self.tell(PhaseBegan("learn", 1))
-        lesson = teacher.teach(self._plan(name))
+        plan = self._plan(name)
+        # a demonstration is dropped as soon as others are shorter, and not only when the evidence against it is strong
+        lesson = teacher.teach(replace(plan, gate=replace(plan.gate, by_evidence=False)))
         self._keep(name, lesson)
         self._outdate_plan()
         self.demonstrations.append(shown.judged(lesson))
