@@ -6,8 +6,6 @@ import sys
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
-from importlib import import_module
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 from urllib.parse import parse_qsl
@@ -19,6 +17,7 @@ from gymnasium.envs.registration import load_env_creator
 from lab.errors import BadInput, unknown
 from lab.gym import symbolic_view
 from lab.gym.our_environments import register
+from lab.optional import optional
 
 PREFIX = "gym:"
 WANTED = "wanted gym:ID, or gym:ID?KEYWORD=VALUE&..., such as gym:FrozenLake-v1?is_slippery=false"
@@ -108,11 +107,8 @@ def make(name: GymName, where: str, render_mode: str | None = None) -> Env:
 
 def _minigrid(name: GymName, where: str, render_mode: str | None) -> Env:
     """A world of MiniGrid by its symbolic view; its keyword `seed`, default 0, draws the layout."""
-    if find_spec("minigrid") is None:
-        raise BadInput(
-            f"environment '{name}' ({where}): it needs minigrid, which is not installed: pip install minigrid"
-        )
-    import_module("minigrid")  # which registers its worlds
+    with optional(f"environment '{name}' ({where})"):
+        import minigrid  # noqa: F401, it registers its worlds
     options = {key: value for key, value in name.options.items() if key != "seed"}
     try:
         with quiet():

@@ -3,6 +3,7 @@
 import re
 import tomllib
 from collections.abc import Callable
+from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
@@ -247,7 +248,7 @@ def test_any_value_anywhere_loads_or_is_bad_input(data: st.DataObject) -> None:
         if data.draw(st.booleans()):
             del inner[key]
         else:
-            inner[key] = data.draw(VALUES)
+            inner[key] = deepcopy(data.draw(VALUES))  # a shape that is in it twice could come to hold itself
         if not raw:
             break
     loads_or_is_bad_input(FMS, raw)
