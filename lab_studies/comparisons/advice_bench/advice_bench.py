@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from lab.errors import counted
 from lab.mdp import FloatArray
 from lab.statistics import interval
 from lab.studies.findings import Findings, Row, row
@@ -67,11 +68,13 @@ RULES_NOTE = (
     "bonus for the answer instead of another table. Rules that the literature gives for deep learners are carried over to tables."
 )
 CHOSEN = (
-    "Chosen on the first twelve problems: the constants of 'earned-trust' (with seed 0, so that its figures there "
-    "flatter it), the rivals' settings (the best mean gain of three to six values each, with seed 7), and the learner's "
-    "settings (the best for learning without advice). The next six, other-worlds to crossing, were held out until their figures "
-    "had been published. Held out are families of drawn instances, one for each of up to 100 sessions, whose learner has the "
-    "common settings; nothing was chosen on them: " + ", ".join(HELD_OUT) + "."
+    "Chosen on the first twelve problems: the constants of 'earned-trust' (also on CliffWalking and Taxi with random moves; so its "
+    "figures there flatter it), the settings of the rivals (the best mean gain of three to six values each, with seed 7; those "
+    "that reuse advice have their defaults), and the learner's settings (the best for learning without advice). The next six, "
+    "other-worlds to crossing, were held out until their figures had been published. Held out are families of 20 drawn instances, "
+    "among which the sessions are shared out, and whose learner has the common settings; nothing was chosen on them: "
+    + ", ".join(HELD_OUT)
+    + "."
 )
 RANKED = (
     "Ranks: the ranks of the points in each cell (problem, advisor, budget), ties shared, averaged within each problem, then "
@@ -229,7 +232,7 @@ def in_short(
     for words, those in groups.items():
         if not those:
             continue
-        where = f"{len(those)} {'held-out problems' if words else 'problems'}"
+        where = counted(len(those), "held-out problem" if words else "problem")
         here = [result for result in advised if result["problem"] in those and result["measure"] == "gain_points"]
         found: dict[str, dict[str, Aggregate]] = {}
         order: list[str] = []

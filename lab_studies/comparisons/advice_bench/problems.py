@@ -22,8 +22,7 @@ from lab_studies.comparisons.advice_bench.common_learner import COMMON
 if TYPE_CHECKING:
     from lab.gym.transition_model import TransitionModel
 
-RANDOM_WORLDS = 100
-OTHERS = 1000  # the number of the first of the other random worlds
+FIRST = {"random-worlds": 0, "other-worlds": 1000}  # the number of the first of the random worlds
 WALKS = 480  # walks of the best policy, of which `par` is the mean
 
 
@@ -135,7 +134,7 @@ PROBLEMS: Mapping[str, Callable[[], Benched]] = {
     "lava": lambda: _table(layouts.minigrid(layouts.LAVA_ROWS), beta=0.7),
     "toast-order": lambda: _table(layouts.toast_order(), max_steps=100),
     # these six were held out until their figures had been published: nothing was chosen on them, but they have been seen
-    "other-worlds": lambda: _named(f"random:10x10x10:0.06:{OTHERS}", learner="afterstate"),
+    "other-worlds": lambda: _named(f"random:10x10x10:0.06:{FIRST['other-worlds']}", learner="afterstate"),
     "place": lambda: _named("place", "toast"),
     "butter": lambda: _named("butter", "toast"),
     "far-door": lambda: _table(layouts.minigrid(layouts.FAR_DOOR_ROWS)),
@@ -143,7 +142,8 @@ PROBLEMS: Mapping[str, Callable[[], Benched]] = {
     "crossing": lambda: _table(layouts.minigrid(layouts.CROSSING_ROWS)),
 }
 HELD_OUT = tuple(families.FAMILIES)  # nothing was chosen on these; their learner is COMMON as it is
-SEVERAL = {"random-worlds": 0, "other-worlds": OTHERS, **dict.fromkeys(HELD_OUT, 0)}  # the number of the first one
+# of those with several instances, how many there are; the sessions are shared out among them
+INSTANCES = {**dict.fromkeys(FIRST, 100), **dict.fromkeys(HELD_OUT, 20)}
 
 
 @lru_cache(maxsize=256)
@@ -154,8 +154,8 @@ def problem(name: str, world: int = 0, families_seed: int = families.SEED) -> Be
     """
     if name in families.FAMILIES:
         made = _instance(name, world, families_seed)
-    elif name in SEVERAL:
-        made = _named(f"random:10x10x10:0.06:{SEVERAL[name] + world}", learner="afterstate")
+    elif name in FIRST:
+        made = _named(f"random:10x10x10:0.06:{FIRST[name] + world}", learner="afterstate")
     else:
         made = PROBLEMS[name]() if name in PROBLEMS else _named(name)
     return replace(made, name=name)

@@ -17,7 +17,7 @@ from lab.learning.simulated_advice import Advice
 from lab.mdp import FloatArray
 from lab_studies.comparisons.advice_bench.bad_advisors import HoldingBack, advice_of, advisor_of, importance
 from lab_studies.comparisons.advice_bench.entered import Entered
-from lab_studies.comparisons.advice_bench.problems import RANDOM_WORLDS, SEVERAL, Benched
+from lab_studies.comparisons.advice_bench.problems import INSTANCES, Benched
 from lab_studies.comparisons.advice_bench.rules import NOBODY, Rule
 
 BUDGETS = {"100": 100, "any": GateSettings.budget}  # answers of a session
@@ -69,7 +69,7 @@ def case_outcomes(case: Case, sessions: int, seed: int, entered: Entered | None 
     """
     entered = entered or Entered()
     entered.load()
-    worlds = min(RANDOM_WORLDS, sessions) if case.problem in SEVERAL else 1
+    worlds = min(INSTANCES.get(case.problem, 1), sessions)
     sessions *= CHANCE_TIMES if entered.place(case.problem).chances is not None else 1
     rng = np.random.default_rng([seed, crc32(case.problem.encode())])
     seeds = rng.integers(2**64, size=sessions, dtype=np.uint64)
