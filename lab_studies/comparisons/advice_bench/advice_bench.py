@@ -69,9 +69,9 @@ RULES_NOTE = (
 )
 CHOSEN = (
     "Chosen on the first twelve problems: the constants of 'earned-trust' (also on CliffWalking and Taxi with random moves; "
-    "its figures there flatter it), the settings of the rivals (the best mean gain of three to six values each, with seed 7; those "
-    "that reuse advice have their defaults), and the learner's settings (the best for learning without advice). The next six, "
-    "other-worlds to crossing, were held out until their figures had been published. Held out are families of 20 drawn "
+    "its figures there flatter it), the settings of the rivals (the best mean gain of three to six values each, with seed 7; "
+    "those that reuse advice have their defaults), and the learner's settings (the best for learning without advice). The next "
+    "six, other-worlds to crossing, were held out until their figures had been published. Held out are families of 20 drawn "
     "instances, among which the sessions are shared out, and whose learner has the common settings; nothing was chosen on them: "
     + ", ".join(HELD_OUT)
     + "."
