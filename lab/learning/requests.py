@@ -124,13 +124,17 @@ class Trusted(Reason):
 
 @dataclass(frozen=True, slots=True)
 class Standing:
-    """The record of the advice so far: helped steps of `budget`, misleads of `omega` tolerated, Lambda."""
+    """The record of the advice so far: helped steps of `budget`, misleads of `omega` tolerated, Lambda.
+
+    by_evidence: whether not the number of misleads, but the evidence in them rejects an advisor, see `GateSettings`.
+    """
 
     helped_steps: int = 0
     budget: int = GateSettings.budget
     misleads: int = 0
     omega: int = 0
     lambda_threshold: float = 0.0
+    by_evidence: bool = False
 
 
 class SupportsPicture(Protocol):

@@ -208,7 +208,9 @@ class Session:
             allowed=self.actions,
             improvement=self.improved,
             reason=gate.why,
-            standing=Standing(helped, limits.budget, gate.misleads, limits.omega, limits.lambda_threshold),
+            standing=Standing(
+                helped, limits.budget, gate.misleads, limits.omega, limits.lambda_threshold, limits.by_evidence
+            ),
             mdp=self.mdp,
             q=self.q,
             temperature=self.tau,

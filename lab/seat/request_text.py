@@ -131,8 +131,10 @@ def standing(request: AdviceRequest, brief: bool = False) -> str:
     allowed = f" of {now.budget}" if now.budget < GateSettings.budget else ""
     said = f"{now.helped_steps}{allowed} moves" if allowed else counted(now.helped_steps, "move")
     if brief:
-        return f"Advised {said}; misled {now.misleads}" + (f" of {now.omega}." if now.omega else ", none allowed.")
-    return f"Advised so far: {said}; episodes misled: {now.misleads}, tolerated: {now.omega}."
+        limit = "" if now.by_evidence else f" of {now.omega}" if now.omega else ", none allowed"
+        return f"Advised {said}; misled {now.misleads}{limit}."
+    limit = "" if now.by_evidence else f", tolerated: {now.omega}"
+    return f"Advised so far: {said}; episodes misled: {now.misleads}{limit}."
 
 
 # ---- axes, goal and hidden cells in words ---------------------------------------------------------------------------
@@ -294,9 +296,12 @@ def _certainty(request: AdviceRequest, marks: Marks) -> str:
 
 
 def _verdict(now: Standing, guided: int) -> str:
+    spent = ", or when what it may use is spent" if now.budget < GateSettings.budget else ""
+    if now.by_evidence:
+        said = misled(now.misleads, guided, "It") if now.misleads else "No episode with advice has misled it so far"
+        return f"{said}; it asks no more when advised episodes are clearly worse than its own{spent}."
     if not now.misleads:
         return f"It tolerates {counted(now.omega, 'episode')} with advice that are no shorter than those before."
-    spent = ", or when what it may use is spent" if now.budget < GateSettings.budget else ""
     return f"{misled(now.misleads, guided, 'It')}; the learner tolerates {now.omega}, and then asks no more{spent}."
 
 

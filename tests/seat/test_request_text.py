@@ -273,3 +273,11 @@ def test_whether_an_episode_with_advice_was_good(
 def test_misled_episodes_of_how_many() -> None:
     assert facts.misled(3, 4) == "Your advice did not help in 3 of 4 episodes"
     assert facts.misled(3, 0) == "Your advice did not help in 3 episodes"  # a session that goes on: not all were seen
+
+
+def test_where_evidence_decides_no_number_is_tolerated() -> None:
+    by_evidence = replace(request(), standing=Standing(12, 150, 3, 7, 0.05, by_evidence=True))
+    for told in (facts.standing(by_evidence), facts.standing(by_evidence, brief=True)):
+        assert "3" in told
+        assert "7" not in told
+    assert "7" in facts.standing(request())

@@ -271,7 +271,7 @@ def _standing(known: PageContent, now_s: float) -> Json:
         "remembered": learning.remembered,
         "budget": budget,
         "misleads": learning.misleads,
-        "omega": None if gate is None else gate.omega,
+        "omega": None if gate is None or gate.by_evidence else gate.omega,
         "verdict": learning.verdict,
     }
 
@@ -311,7 +311,8 @@ def layer_of(known: PageContent, layer: int | None = None) -> Json | None:
 def standing_of(learning: ShownLesson, standing: Standing) -> None:
     """Take over the learner's standing of advice; a message says what has become worse."""
     if standing.misleads > learning.misleads:
-        text = f"The last lesson did not help: {standing.misleads} so far, {standing.omega} are tolerated."
+        text = f"The last lesson did not help: {standing.misleads} so far"
+        text += "." if standing.by_evidence else f", {standing.omega} are tolerated."
         learning.notice(Told(text, "bad"))
     learning.misleads, learning.helped_steps = standing.misleads, standing.helped_steps
 

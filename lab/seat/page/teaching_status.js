@@ -54,6 +54,7 @@ const seatStatus = (() => {
     }
     if (now.remembered) rows.push(["From memory", count(now.remembered, "step")]);
     if (now.omega !== null && lesson.kind === "steps") rows.push(["Did not help", now.misleads > now.omega ? `${now.misleads}, only ${now.omega} tolerated` : now.omega ? `${now.misleads} of ${now.omega} tolerated` : "never; none tolerated", now.misleads > now.omega ? "bad" : ""]);
+    else if (now.misleads && lesson.kind === "steps") rows.push(["Did not help", String(now.misleads), ""]);
     el("standing").replaceChildren(...rows.flatMap(([name, value, kind]) => [make("dt", name), make("dd", value, kind || "")]));
   }
 

@@ -323,7 +323,8 @@ class TeachingPrompt:
             self._guided, self._misleads = min(self._guided, now.misleads), now.misleads
         if now.misleads > self._misleads:
             self._misleads = now.misleads
-            self._say(f"{request_text.misled(now.misleads, self._guided)}; it tolerates {now.omega}.", "yellow")
+            limit = "" if now.by_evidence else f"; it tolerates {now.omega}"
+            self._say(f"{request_text.misled(now.misleads, self._guided)}{limit}.", "yellow")
 
     def _help(self, request: Request) -> None:
         width, way = room(self._console)[0], self._way(request)
