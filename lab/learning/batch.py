@@ -124,7 +124,8 @@ def run_sessions(
 ) -> Batch:
     """The results of N sessions, one per seed.
 
-    problem: a table, or the environment in which steps are made; compiled are tables, `ChanceTable` and the worlds of `physics`.
+    problem: a table, or the environment in which steps are made; compiled are tables, `ChanceTable` and the worlds of `physics`,
+    but no class that makes starts or steps of its own.
     advice: None if there is nobody to ask; seeds: (N,) uint64; keep_tables, keep_returns: whether the results include
     the learned tables, and the returns.
     greedy_every: after each so-manyth episode the greedy policy is measured without advice, in episodes that nobody learns from;
@@ -141,7 +142,7 @@ def run_sessions(
         raise BadInput(f"advice of shape {advice.thresholds.shape}: the problem has {mdp.successor.shape}")
     if greedy_every and not (isinstance(place, TableEnvironment) and learner.tilings == 1):
         raise BadInput(f"greedy_every {greedy_every}: the greedy policy is measured along the way on tables only")
-    steps_known = isinstance(place, TableEnvironment) or isinstance(mdp, CellTable)
+    steps_known = keeps_steps(place) or isinstance(mdp, CellTable)
     by_chance_on_tiles = isinstance(place, ChanceTable) and learner.tilings > 1
     if by_chance_on_tiles or not (steps_known and is_compiled(mdp, learner, gate, advice)):
         tell_uncompiled(learner.learner, gate.gate)
@@ -238,9 +239,17 @@ def _returns(learner: LearnerSettings, seeds: NDArray[np.uint64], keep: bool) ->
     return np.zeros((len(seeds) if keep else 0, learner.episodes))
 
 
+def keeps_steps(place: Environment) -> bool:
+    """Whether an environment begins and steps by the methods of its table, which are the only ones that the kernel knows."""
+    kind = type(place)
+    by_table = isinstance(place, TableEnvironment) and kind.reset is TableEnvironment.reset
+    return by_table and kind.step in (TableEnvironment.step, ChanceTable.step)  # type: ignore[attr-defined]
+
+
 def walks_of(place: Environment) -> int:
-    """How many episodes of a greedy policy measure it: one where all are the same, WALKS where starts or steps are drawn."""
-    return WALKS if isinstance(place, ChanceTable) or place.mdp.starts else 1
+    """How many episodes of a greedy policy measure it: one where all are the same, WALKS where starts or steps may be drawn."""
+    alike = keeps_steps(place) and not isinstance(place, ChanceTable) and not place.mdp.starts
+    return 1 if alike else WALKS
 
 
 def greedy_every(problem: TabularMDP | Environment, learner: LearnerSettings) -> int:

@@ -5,7 +5,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from hashlib import sha256
-from typing import Annotated, Any, Self
+from typing import Annotated, Any
 
 import numpy as np
 from annotated_types import Ge, Gt, Le
@@ -58,8 +58,6 @@ class ArrayEnvironment(ChanceTable):
         self._wins = (
             chances[:, :, mdp.goal].sum(axis=2) * ~mdp.terminal[:, None]
         )  # (S, A) the probability of reaching a goal
-        self._starts = np.flatnonzero(begins)
-        self._below = begins[self._starts].cumsum()[:-1]
         self._known: dict[float, FloatArray] = {}
 
     @classmethod
@@ -71,7 +69,7 @@ class ArrayEnvironment(ChanceTable):
         terminal: ArrayLike,
         goal: ArrayLike,
         action_labels: Sequence[str] | None,
-    ) -> Self:
+    ) -> "ArrayEnvironment":
         """The environment of these arrays, see `lab.Problem.from_arrays`. Raises BadInput if they do not fit together."""
         chances, rewards = _numbers("P", P), _numbers("R", R)
         if chances.ndim != 3 or 0 in chances.shape or chances.shape[0] != chances.shape[2]:
@@ -107,7 +105,7 @@ class ArrayEnvironment(ChanceTable):
             starts=starts if len(starts) > 1 else (),
             arrays=digest,
         )
-        return cls(mdp, chances, rewards, begins)
+        return (DrawnStarts if mdp.starts else ArrayEnvironment)(mdp, chances, rewards, begins)
 
     def check(self) -> None:
         """Raises NoPath if there is a goal, and none can be reached from any start."""
@@ -117,12 +115,6 @@ class ArrayEnvironment(ChanceTable):
             if (further == reached).all():
                 raise NoPath(f"no goal can be reached from {self.mdp.state_label(self.mdp.start)}", (), "goal")
             reached = further
-
-    def reset(self, episode: int, draw: Draw) -> int:
-        """The start; if there are several, one uniform number selects it."""
-        if len(self._starts) == 1:
-            return int(self._starts[0])
-        return int(self._starts[np.searchsorted(self._below, draw(), side="right")])
 
     def values(self, discount: float) -> FloatArray:
         """The optimal action values (S, A) by value iteration. Raises WorkFailed if they do not converge."""
@@ -169,6 +161,15 @@ class ArrayEnvironment(ChanceTable):
         final = round(steps) + learner.count_start if reached > 0.0 and (not best or reached >= 0.5 * best[1]) else None
         fewest = round(best[2]) + learner.count_start if best and best[1] else None
         return Judged(final, fewest, solved and final is not None)
+
+
+class DrawnStarts(ArrayEnvironment):
+    """The environment of a process whose episodes begin in several states, each with its own probability."""
+
+    def reset(self, episode: int, draw: Draw) -> int:
+        """The start that one uniform number selects."""
+        starts = self.mdp.starts
+        return starts[int(np.searchsorted(self.begins[list(starts)].cumsum()[:-1], draw(), side="right"))]
 
 
 def fitting(environment: ArrayEnvironment, discount: float, horizon: int) -> tuple[LearnerSettings, GateSettings]:

@@ -7,9 +7,10 @@ import pytest
 
 from lab.errors import BadInput
 from lab.learning.batch import ChanceTable, Outcome, _one_by_one, greedy_steps, run_sessions
-from lab.learning.environment import TableEnvironment
+from lab.learning.environment import Step, TableEnvironment
 from lab.learning.gates import GATES
 from lab.learning.requests import AdviceRequest
+from lab.learning.selection import Draw
 from lab.learning.session import Session
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.learning.simulated_advice import (
@@ -140,3 +141,34 @@ def test_a_learner_on_tiles_is_not_measured_along_the_way() -> None:
         run_sessions(
             slippery().mdp, replace(LEARNER, tilings=4), EAGER, None, np.arange(2, dtype=np.uint64), greedy_every=5
         )
+
+
+class HeldBack(TableEnvironment):
+    """A corridor in which three of ten draws do not move the learner."""
+
+    def step(self, state: int, action: int, draw: Draw) -> Step:
+        return Step(-0.1, state, False) if draw() < 0.3 else super().step(state, action, draw)
+
+
+class SecondStart(TableEnvironment):
+    """A corridor that begins in its second cell, whatever its table says."""
+
+    def reset(self, episode: int, draw: Draw) -> int:
+        return 1
+
+
+@pytest.mark.parametrize("kind", [HeldBack, SecondStart])
+def test_an_environment_with_steps_or_starts_of_its_own_is_not_run_as_its_table(kind: type[TableEnvironment]) -> None:
+    mdp = grid((1, 5), [[0] * 5], (0, 0), (0, 4))
+    place, learner, seeds = (
+        kind(mdp),
+        LearnerSettings(learner="q", episodes=12, max_steps=30),
+        np.arange(4, dtype=np.uint64),
+    )
+    given = (place, learner, GateSettings("never"), None, seeds)
+    batch, one_by_one = run_sessions(*given, greedy_every=4), _one_by_one(*given, False, 4, False)
+    assert batch.steps.tolist() == one_by_one.steps.tolist()
+    assert batch.steps.tolist() != run_sessions(mdp, *given[1:]).steps.tolist()
+    assert batch.greedy.tolist() == one_by_one.greedy.tolist()
+    if kind is SecondStart:
+        assert batch.greedy.min() >= 3.0  # its shortest path

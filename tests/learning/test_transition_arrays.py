@@ -7,6 +7,8 @@ import pytest
 
 import lab
 from lab.errors import BadInput
+from lab.learning import splitmix
+from lab.learning.batch import run_sessions
 from lab.learning.gates import GATES
 from lab.learning.session import Session
 from lab.learning.settings import GateSettings, LearnerSettings
@@ -151,3 +153,18 @@ def test_arrays_that_do_not_fit_are_refused(given: dict[str, Any], said: str) ->
 def test_settings_that_need_a_goal_or_certain_steps_are_refused(setting: dict[str, Any]) -> None:
     with pytest.raises(BadInput, match=r"memory|afterstate"):
         lab.teach(swim(), **setting)
+
+
+@pytest.mark.parametrize("start", [0, [0.0, 1.0, 0.0], [0.9, 0.1, 0.0]])
+def test_many_sessions_begin_where_one_does(start: Any) -> None:
+    """Three states in a row; in the last of the cases nine of ten episodes begin in the first."""
+    P = np.zeros((3, 2, 3))
+    P[0, 0, 0] = P[1, 0, 0] = P[2, :, 2] = 1.0
+    P[[0, 1], 1, [1, 2]], P[[0, 1], 1, [0, 1]] = 0.75, 0.25
+    place = lab.Problem.from_arrays(P, -np.ones((3, 2)), start=start, terminal=[2], goal=[2]).environment
+    assert place is not None
+    learner, seeds = LearnerSettings(learner="q", episodes=10, max_steps=20), np.arange(5, dtype=np.uint64)
+    batch = run_sessions(place, learner, GateSettings("never"), None, seeds)
+    for seed, steps in enumerate(batch.steps.tolist()):
+        session = Session(place, learner, GateSettings("never"), None, splitmix.stream(seed))
+        assert session.run().steps.tolist() == steps

@@ -10,7 +10,7 @@ import numpy as np
 
 from lab.errors import BadInput, WorkFailed
 from lab.learning.batch import ChanceTable, run_sessions
-from lab.learning.environment import Environment, TableEnvironment, check_solvable
+from lab.learning.environment import Environment, TableEnvironment, check_solvable, highest_reward
 from lab.learning.problem import Problem
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.learning.simulated_advice import Advice, advice_chances
@@ -66,6 +66,8 @@ def _named(name: Teachable, task: str | None = None, **changes: Any) -> Benched:
     learner = replace(COMMON, max_steps=subject.settings.learner.max_steps, **changes)
     if problem.environment is None:
         return Benched(problem.name, problem.mdp, learner, optimal_values(problem.mdp, learner.discount))
+    if highest_reward(problem.environment) is not None:
+        raise BadInput(f"problem '{problem.name}' (--problem): AdviceBench counts steps to a goal, and it has none")
     modules = _modules(problem.environment)
     if isinstance(name, str) and name.startswith(GYM):
         model = getattr(problem.environment, "model", None)

@@ -24,6 +24,7 @@ from lab_studies.comparisons.advice_bench.advice_bench import _later, advice_ben
 from lab_studies.comparisons.advice_bench.aggregates import RETURN, aggregates, table_of
 from lab_studies.comparisons.advice_bench.bad_advisors import ACCURACIES, ADVISORS, advice_of, importance
 from lab_studies.comparisons.advice_bench.problems import Benched, problem
+from lab_studies.comparisons.advice_bench.problems import own_problem as problem_of
 from lab_studies.comparisons.advice_bench.ranks import holm, ranks
 from lab_studies.comparisons.advice_bench.rules import RULES
 from lab_studies.comparisons.advice_bench.sessions import Case, Outcome, Outcomes, case_outcomes
@@ -323,6 +324,18 @@ def _ran(folder: Path, *options: str) -> "subprocess.CompletedProcess[str]":
     few = ["--methods=always", "--advisors=expert", "--sessions=2", *options]
     path = {"PYTHONPATH": str(Path(lab.__file__).parents[1])}
     return subprocess.run([*program, *few], cwd=folder, env=os.environ | path, capture_output=True, text=True)
+
+
+def test_steps_of_ones_own_count_also_with_an_advisor_whose_answers_are_a_table() -> None:
+    """The expert needs three moves, and every third draw holds it back: 4.5 steps on average, which are 100 points."""
+    place = problem_of(lab.Problem("slippery", "walk", Slippery().mdp, Slippery()))
+    assert 4.2 < place.par < 4.8
+
+
+def test_a_problem_without_a_goal_is_refused_in_words() -> None:
+    chain = lab.Problem.from_arrays([[[0.0, 1.0]], [[1.0, 0.0]]], [[0.0], [1.0]], horizon=5)
+    with pytest.raises(BadInput, match=r"'arrays'.*AdviceBench counts steps to a goal, and it has none"):
+        lab.study("advicebench", problem=[chain], methods=["always"], advisors=["expert"], sessions=2)
 
 
 def test_problems_from_a_file_and_from_a_module_are_measured_in_several_processes(tmp_path: Path) -> None:
