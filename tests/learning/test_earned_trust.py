@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from hypothesis import given, reject, settings
+from hypothesis import strategies as st
 
 from lab.learning.gates import GATES, Surroundings, earned_trust
 from lab.learning.gates.weighing import Weighing
@@ -9,7 +11,7 @@ from lab.learning.session import Session
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.learning.simulated_advice import Advice, TableAdvisor, advice_chances
 from lab.learning.updates.update import OnTable
-from lab.mdp import TabularMDP, grid, optimal_values
+from lab.mdp import FloatArray, NoPath, TabularMDP, grid, optimal_values
 
 LEFT, RIGHT, STAY = range(3)
 EPISODES, LIMIT, STATES = 10, 20, 6
@@ -202,3 +204,45 @@ def test_every_learner_ends_with_the_experts_path(learner: str) -> None:
         result = Session(maze, settings, GateSettings("earned-trust"), TableAdvisor(advice, rng.random), rng).run()
         assert result.solved
         assert result.final_steps == 10
+
+
+def walked(q: FloatArray, successor: list[list[int]], start: int, goal: int) -> int | None:
+    """The moves of the greedy policy from start to goal, None if it does not get there; ties go to the lowest action."""
+    state, moves = start, 0
+    while state != goal and moves <= len(successor):
+        state, moves = successor[state][int(q[state].argmax())], moves + 1
+    return moves if state == goal else None
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    st.sets(st.integers(1, 23), max_size=8),
+    st.sampled_from([0.05, 0.5, 2.0]),
+    st.integers(0, 1000),
+    st.sampled_from(["q", "q-lambda", "sarsa", "sarsa-lambda", "dyna-q", "monte-carlo", "afterstate"]),
+)
+def test_the_greedy_policy_is_never_worse_than_what_was_shown(
+    walls: set[int], tau: float, seed: int, learner: str
+) -> None:
+    """In a drawn maze of certain moves, after each episode, by a walk through its table that knows nothing of the gate."""
+    blocked = np.isin(np.arange(25), list(walls)).reshape(5, 5)
+    try:
+        maze = grid((5, 5), blocked, (0, 0), (4, 4))
+    except NoPath:
+        reject()
+    how = LearnerSettings(learner=learner, episodes=40, max_steps=60)
+    advice = Advice.of(advice_chances(optimal_values(maze, how.discount), tau))
+    rng = np.random.default_rng(seed)
+    session = Session(maze, how, GateSettings("earned-trust"), TableAdvisor(advice, rng.random), rng)
+    successor, shown = maze.successor.tolist(), []
+
+    def checked() -> bool:
+        assert isinstance(session.gate, Weighing)
+        if session.gate.heard.now.won:  # an advised episode has reached the goal
+            shown.append(min(session.steps))
+            moves = walked(session.update.table(), successor, maze.start, int(np.flatnonzero(maze.goal)[0]))
+            assert moves is not None
+            assert moves <= shown[-1]
+        return False
+
+    session.run(enough=checked)

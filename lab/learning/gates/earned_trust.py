@@ -7,9 +7,9 @@
 3. Advice ends where acting alone has done as well, where the learner's own greedy path is known to reach the goal, and, if all
    episodes begin in one state, after STALE advised successes in a row without a shorter path.
 4. The shortest known path, from advice or not, is handed over to the learner's table after each episode: its moves are learned
-   from again, the last one first, and where another action still looks better it is valued a little lower. So the greedy policy
-   is never worse than what was shown, and whatever it tries later can correct it. Where moves lead to different states, the
-   answers of a successful advised episode are handed over in the same way.
+   from again, the last one first, and where another action still looks better it is valued a little lower. With one
+   start and certain moves the greedy policy of a table is then never worse than the best episode so far; what is tried later can
+   correct it. Where moves lead to different states, the answers of a successful advised episode are handed over in the same way.
 
 The functions are also compiled by numba: `around` is then (work, lane), and the first four are those of the kernel.
 Source: rule 4 replays backwards as Lin 1992, and lowers other actions as the margin of Hester et al. 2018 (DQfD) does.
