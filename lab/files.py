@@ -1,17 +1,19 @@
 """Files: those that ship, keys of source, bounded reading, atomic writing, drafts and locks, checks of output folders."""
 
 import ast
+import csv
 import hashlib
 import json
 import os
 import re
 import stat
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from errno import EFBIG, EINVAL
 from functools import cache
 from importlib.util import find_spec
+from io import StringIO
 from math import isfinite
 from pathlib import Path
 from secrets import token_hex
@@ -297,3 +299,12 @@ def beside_or_asset(name: str, folder: Path, what: str) -> Path:
             return inside
     known = ", ".join(sorted(path.name for path in assets_folder().glob("*.urdf")))
     raise BadInput(f"{what} '{name}': no such file in {folder}; of its own the lab has {known}")
+
+
+def csv_of(rows: Iterable[Mapping[str, object]], columns: Sequence[str]) -> str:
+    """The rows as the text of a CSV file with these columns. Raises ValueError for a row with another key."""
+    text = StringIO()
+    table = csv.DictWriter(text, columns, lineterminator="\n")
+    table.writeheader()
+    table.writerows(rows)
+    return text.getvalue()

@@ -12,7 +12,7 @@ from annotated_types import Ge, Gt, Le
 from numpy.typing import ArrayLike, NDArray
 
 from lab.errors import BadInput, WorkFailed, check_value, shortened
-from lab.learning.batch import ChanceTable, Outcome
+from lab.learning.chance_table import ChanceTable, Outcome
 from lab.learning.environment import Judged
 from lab.learning.selection import Draw
 from lab.learning.settings import GateSettings, LearnerSettings

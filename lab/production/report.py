@@ -14,14 +14,14 @@ from lab.audit.tracks import FILE as FRAMES
 from lab.audit.tracks import packed, tracks_of
 from lab.errors import LabError, WorkFailed
 from lab.export.program import PROGRAM, TRAJECTORY
-from lab.files import draft, read_limited, write_whole
+from lab.files import csv_of, draft, read_limited, write_whole
 from lab.operating_system import replace
 from lab.production.cyclic_order import measured_period
 from lab.production.order_learning import OrderLearning
 from lab.production.outcome import Outcome
 from lab.production.taught import Taught
 from lab.sequencing.cell.cell import EVERY_PLAN
-from lab.sequencing.cell.schedule import Schedule, csv_of, rows_of
+from lab.sequencing.cell.schedule import COLUMNS, Schedule, rows_of
 from lab.sequencing.cyclic.several import Rhythm
 from lab.sequencing.methods.exact import Optimum
 from lab.sequencing.search import SequenceResult
@@ -305,7 +305,7 @@ def _write_numbers(report: Report, paths: dict[str, Path], predicted: Schedule) 
     cell = report.taught.cell
     _write_json(paths["sequence"], _sequence_document(report, predicted))
     rows = rows_of(predicted, cell, "planned") + rows_of(report.outcome.schedule, cell, "measured")
-    paths["schedule_table"].write_text(csv_of(rows), encoding="utf-8")
+    paths["schedule_table"].write_text(csv_of(rows, COLUMNS), encoding="utf-8")
     _write_json(paths["schedule"], {"schedule": rows})
     audited = report.outcome.audit
     tracks = tracks_of(report.recording) if audited is None else audited.evidence.tracks

@@ -17,9 +17,10 @@ from lab.advice.advisors import ADVISORS
 from lab.errors import BadInput
 from lab.files import code_key
 from lab.lazy import matplotlib
-from lab.learning.batch import Batch, greedy_every, measure_greedy, run_sessions
+from lab.learning.batch import Batch, run_sessions
 from lab.learning.environment import Environment, TableEnvironment, highest_reward
 from lab.learning.gates import GATES
+from lab.learning.greedy import greedy_every, measure_greedy
 from lab.learning.kernels.records import LANES
 from lab.learning.physics.environment import PhysicsEnvironment
 from lab.learning.problem import Problem

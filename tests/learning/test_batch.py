@@ -6,9 +6,12 @@ import numpy as np
 import pytest
 
 from lab.errors import BadInput
-from lab.learning.batch import ChanceTable, Outcome, _one_by_one, greedy_steps, run_sessions
+from lab.learning.batch import _one_by_one, run_sessions
+from lab.learning.chance_table import ChanceTable, Outcome
 from lab.learning.environment import Step, TableEnvironment
 from lab.learning.gates import GATES
+from lab.learning.greedy import greedy_steps
+from lab.learning.kernels.arrays import Kept
 from lab.learning.requests import AdviceRequest
 from lab.learning.selection import Draw
 from lab.learning.session import Session
@@ -105,9 +108,8 @@ def test_the_greedy_policy_is_measured_along_the_way_as_in_the_session(
     plain = run_sessions(place, settings, how, who, seeds)
     np.testing.assert_array_equal(batch.steps, plain.steps)
     assert (batch.greedy.shape, plain.greedy.shape) == ((6, 4), (6, 0))
-    one_by_one = _one_by_one(
-        TableEnvironment(place) if isinstance(place, TabularMDP) else place, settings, how, who, seeds, False, 5, True
-    )
+    table = TableEnvironment(place) if isinstance(place, TabularMDP) else place
+    one_by_one = _one_by_one(table, settings, how, who, seeds, Kept(returns=True, greedy_every=5))
     np.testing.assert_array_equal(batch.greedy, one_by_one.greedy)
     np.testing.assert_array_equal(batch.returns, one_by_one.returns)
     assert (batch.returns.shape, plain.returns.shape) == ((6, 24), (0, 24))
@@ -166,7 +168,7 @@ def test_an_environment_with_steps_or_starts_of_its_own_is_not_run_as_its_table(
         np.arange(4, dtype=np.uint64),
     )
     given = (place, learner, GateSettings("never"), None, seeds)
-    batch, one_by_one = run_sessions(*given, greedy_every=4), _one_by_one(*given, False, 4, False)
+    batch, one_by_one = run_sessions(*given, greedy_every=4), _one_by_one(*given, Kept(greedy_every=4))
     assert batch.steps.tolist() == one_by_one.steps.tolist()
     assert batch.steps.tolist() != run_sessions(mdp, *given[1:]).steps.tolist()
     assert batch.greedy.tolist() == one_by_one.greedy.tolist()

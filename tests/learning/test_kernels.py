@@ -10,11 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lab.errors import BadInput
-from lab.learning import batch as batch_module
-from lab.learning.batch import Batch, Uncompiled, run_sessions
+from lab.learning import own_rules
+from lab.learning.batch import Batch, run_sessions
 from lab.learning.gates import GATES, Gate, Steps
 from lab.learning.kernels.records import LANES
 from lab.learning.members import Member
+from lab.learning.own_rules import Uncompiled
 from lab.learning.selection import SELECTIONS
 from lab.learning.session import Session
 from lab.learning.session_result import SessionResult
@@ -174,8 +175,8 @@ class Often(RuleUpdate):
 
 @pytest.fixture
 def at_any_price(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(batch_module, "WORTH_COMPILING", 0)
-    monkeypatch.setattr(batch_module, "_told", set())
+    monkeypatch.setattr(own_rules, "WORTH_COMPILING", 0)
+    monkeypatch.setattr(own_rules, "_told", set())
 
 
 @pytest.mark.usefixtures("at_any_price")
@@ -188,7 +189,7 @@ def test_a_rule_of_ones_own_is_compiled_with_the_same_results() -> None:
         for n in (0, LANES):
             assert_same(batch, n, alone(board(), settings, how, advice(board()), n))
     assert UPDATES["cautious"].compiled is not None
-    assert Cautious.rule in batch_module._compiled_rules
+    assert Cautious.rule in own_rules._compiled_rules
 
 
 @pytest.mark.usefixtures("at_any_price")

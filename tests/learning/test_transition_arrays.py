@@ -156,15 +156,17 @@ def test_settings_that_need_a_goal_or_certain_steps_are_refused(setting: dict[st
 
 
 @pytest.mark.parametrize("start", [0, [0.0, 1.0, 0.0], [0.9, 0.1, 0.0]])
-def test_many_sessions_begin_where_one_does(start: Any) -> None:
+@pytest.mark.parametrize("goal", [[2], []])
+def test_many_sessions_are_those_of_one(start: Any, goal: list[int]) -> None:
     """Three states in a row; in the last of the cases nine of ten episodes begin in the first."""
     P = np.zeros((3, 2, 3))
     P[0, 0, 0] = P[1, 0, 0] = P[2, :, 2] = 1.0
     P[[0, 1], 1, [1, 2]], P[[0, 1], 1, [0, 1]] = 0.75, 0.25
-    place = lab.Problem.from_arrays(P, -np.ones((3, 2)), start=start, terminal=[2], goal=[2]).environment
+    place = lab.Problem.from_arrays(P, -np.ones((3, 2)), start=start, terminal=[2], goal=goal).environment
     assert place is not None
     learner, seeds = LearnerSettings(learner="q", episodes=10, max_steps=20), np.arange(5, dtype=np.uint64)
-    batch = run_sessions(place, learner, GateSettings("never"), None, seeds)
+    batch = run_sessions(place, learner, GateSettings("never"), None, seeds, keep_returns=True)
     for seed, steps in enumerate(batch.steps.tolist()):
         session = Session(place, learner, GateSettings("never"), None, splitmix.stream(seed))
-        assert session.run().steps.tolist() == steps
+        result = session.run()
+        assert (result.steps.tolist(), result.returns.tolist()) == (steps, batch.returns[seed].tolist())

@@ -558,7 +558,7 @@ def test_the_numbers_are_written_though_a_picture_cannot_be(
 def test_without_room_for_the_numbers_nothing_is_written(
     failed: Report, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def full(rows: object) -> str:
+    def full(rows: object, columns: object) -> str:
         raise OSError(28, "No space left on device")
 
     out = tmp_path / "out"

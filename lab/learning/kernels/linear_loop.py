@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from lab.learning import selection, tiles
 from lab.learning.compiled import inlined, inner, without_refcounts
 from lab.learning.kernels.asking import decided, judge, opens
-from lab.learning.kernels.records import draw, greedy
+from lab.learning.kernels.learners import draw, greedy
 from lab.learning.physics import ACROBOT, MOUNTAIN_CAR, acrobot, cart_pole, mountain_car
 from lab.learning.tiles import TileArray
 from lab.learning.updates.linear import FAINT

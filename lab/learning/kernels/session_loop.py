@@ -12,9 +12,10 @@ import numpy as np
 from lab.learning import advice_memory as memory
 from lab.learning import selection
 from lab.learning.compiled import inlined, inner, without_refcounts
-from lab.learning.kernels import asking as hears
+from lab.learning.kernels import hearing as hears
 from lab.learning.kernels.asking import decided, judge, judge_moved, knows, opens
-from lab.learning.kernels.records import LANES, begin_walks, choose, draw, learn, learn_by_rule, learn_following, replay
+from lab.learning.kernels.learners import begin_walks, choose, draw, learn, learn_by_rule, learn_following, replay
+from lab.learning.kernels.records import LANES
 
 _Memory: Any = memory.Memory
 _Move: Any = memory.RememberedMove

@@ -1,16 +1,14 @@
 """Schedules: timed moves, the activities of robots, machines and parts that follow from them, and their rows in files."""
 
-import csv
 import json
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from io import StringIO
 from pathlib import Path
 from typing import Any, Literal, get_args
 
 from lab.errors import BadInput
-from lab.files import write_whole
+from lab.files import csv_of, write_whole
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.stations import ROBOT
 
@@ -278,15 +276,6 @@ def rows_of(schedule: Schedule, cell: Cell, when: Literal["planned", "measured"]
     return sorted(rows, key=lambda one: (one["start_s"], one["end_s"]))
 
 
-def csv_of(rows: Iterable[dict[str, Any]]) -> str:
-    """The rows as a table with a header."""
-    text = StringIO()
-    table = csv.DictWriter(text, COLUMNS, lineterminator="\n")
-    table.writeheader()
-    table.writerows(rows)
-    return text.getvalue()
-
-
 def check_table(path: Path) -> None:
     """Raises BadInput unless the file's ending is that of a table or of a JSON list, and its folder exists."""
     if path.suffix.lower() not in TABLES:
@@ -298,7 +287,7 @@ def check_table(path: Path) -> None:
 def write_table(rows: Sequence[dict[str, Any]], path: Path) -> None:
     """Writes the rows to a file, whole or not at all; raises BadInput when it cannot be written."""
     check_table(path)
-    text = csv_of(rows) if path.suffix.lower() == ".csv" else json.dumps(list(rows), indent=1) + "\n"
+    text = csv_of(rows, COLUMNS) if path.suffix.lower() == ".csv" else json.dumps(list(rows), indent=1) + "\n"
     try:
         write_whole(path, text.encode())
     except OSError as error:

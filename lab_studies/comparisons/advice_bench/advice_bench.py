@@ -10,18 +10,19 @@ from typing import Any
 import numpy as np
 
 from lab.errors import counted
+from lab.files import csv_of
 from lab.mdp import FloatArray
 from lab.statistics import interval
 from lab.studies.findings import Findings, Row, row
 from lab.studies.leaderboard import scores_file
 from lab.studies.runner import Job
+from lab_studies.comparisons.advice_bench.aggregates import COLUMNS as AGGREGATE_COLUMNS
 from lab_studies.comparisons.advice_bench.aggregates import (
     GREEDY,
     RETURN,
     SCORES,
     Aggregate,
     aggregates,
-    csv_of,
     table_of,
 )
 from lab_studies.comparisons.advice_bench.bad_advisors import ADVISORS
@@ -109,7 +110,7 @@ def advice_bench(job: Job, reading: Mapping[str, Any]) -> Findings:
     if any(name in HELD_OUT for name in entered.problems):
         says = {"families_seed": entered.families_seed} | says
     notes = (MEASURES, RULES_NOTE, CHOSEN, RANKED, AGGREGATED)
-    files = {"aggregates.csv": csv_of(lines)} | score_files(rows, outcomes, entered, job)
+    files = {"aggregates.csv": csv_of(lines, AGGREGATE_COLUMNS)} | score_files(rows, outcomes, entered, job)
     return Findings(rows, says, pictures, notes, files)
 
 

@@ -3,9 +3,7 @@
 Source: Agarwal et al., Deep reinforcement learning at the edge of the statistical precipice, NeurIPS 2021.
 """
 
-import csv
 from collections.abc import Mapping, Sequence
-from io import StringIO
 from typing import NamedTuple
 
 import numpy as np
@@ -42,7 +40,7 @@ def table_of(
 ) -> Table:
     """The scores of a rule in all cells; nobody's sessions stand in each cell of their problem.
 
-    Problems with more sessions than others, as those with random moves, count with their first ones.
+    Of problems with more sessions than others, as those with random moves, as many count, spread evenly over their instances.
     """
     columns: list[FloatArray] = []
     strata = []
@@ -57,7 +55,8 @@ def table_of(
                 columns.append(getattr(outcome, SCORES[score]))
                 strata.append(number)
     runs = min(map(len, columns))
-    return Table(np.array([column[:runs] for column in columns]).T, np.array(strata, np.float64))
+    counted = [column[np.arange(runs) * len(column) // runs] for column in columns]
+    return Table(np.array(counted).T, np.array(strata, np.float64))
 
 
 def aggregates(tables: Mapping[str, Table], ours: str, seed: int) -> dict[str, Aggregate]:
@@ -70,12 +69,3 @@ def aggregates(tables: Mapping[str, Table], ours: str, seed: int) -> dict[str, A
         )
         for rule, table in tables.items()
     }
-
-
-def csv_of(rows: Sequence[Mapping[str, object]]) -> str:
-    """The aggregates as a CSV file with COLUMNS."""
-    text = StringIO()
-    writer = csv.DictWriter(text, COLUMNS, lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
-    return text.getvalue()

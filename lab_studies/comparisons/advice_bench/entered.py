@@ -12,8 +12,8 @@ from lab.advice.advisors import ADVISORS as ADDED
 from lab.advice.advisors import AdvisorName
 from lab.errors import BadInput, check_value, unknown
 from lab.files import code_key
-from lab.learning.batch import tell_uncompiled
 from lab.learning.gates import GATES, Gate
+from lab.learning.own_rules import tell_uncompiled
 from lab.plugins.code_file import files_taken, from_file, take
 from lab.studies.compared import FAMILIES
 from lab_studies.comparisons.advice_bench import families

@@ -12,7 +12,7 @@ from zlib import crc32
 import numpy as np
 
 from lab.gym.transition_model import TransitionModel
-from lab.learning.batch import ChanceTable, Outcome
+from lab.learning.chance_table import ChanceTable, Outcome
 from lab.learning.environment import Judged
 from lab.learning.settings import LearnerSettings
 from lab.mdp import FloatArray, Rewards, TabularMDP

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lab.errors import BadInput, WorkFailed
-from lab.learning.batch import ChanceTable, run_sessions
+from lab.learning.batch import run_sessions
+from lab.learning.chance_table import ChanceTable
 from lab.learning.environment import Environment, TableEnvironment, check_solvable, highest_reward
 from lab.learning.problem import Problem
 from lab.learning.settings import GateSettings, LearnerSettings

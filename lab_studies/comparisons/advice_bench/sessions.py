@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from lab.advice.advisors import AdvisorName
 from lab.learning import splitmix
-from lab.learning.batch import greedy_every, measure_greedy, run_sessions
+from lab.learning.batch import run_sessions
+from lab.learning.greedy import greedy_every, measure_greedy
 from lab.learning.session import Session
 from lab.learning.settings import GateSettings
 from lab.learning.simulated_advice import Advice

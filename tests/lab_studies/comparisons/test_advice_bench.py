@@ -145,6 +145,8 @@ def test_aggregates_by_hand() -> None:
     tables = {rule: table_of(outcomes, rule, RETURN, ["maze", "lake"], ["expert"]) for rule in ("ours", "nobody")}
     assert tables["nobody"].scores.tolist() == [[0.0, 0.0, 50.0, 50.0], [100.0, 100.0, 50.0, 50.0]]
     assert tables["ours"].strata.tolist() == [0, 0, 1, 1]
+    more = {**outcomes, Case("lake", None): {("nobody", "any"): alone._replace(points=np.array([1.0, 2.0, 3.0, 4.0]))}}
+    assert table_of(more, "nobody", RETURN, ["maze", "lake"], ["expert"]).scores[:, 2].tolist() == [1.0, 3.0]  # spread
     found = aggregates(tables, "ours", 0)
     assert found["ours"].iqm[0] == 51.0
     assert found["nobody"].improvement == (0.75 + 1.0) / 2  # of the maze's four pairs three, of the lake's all

@@ -13,8 +13,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lab.errors import BadInput
+from lab.files import csv_of
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.cell.schedule import COLUMNS, Activity, Move, Schedule, csv_of, rows_of, write_table
+from lab.sequencing.cell.schedule import COLUMNS, Activity, Move, Schedule, rows_of, write_table
 from lab.sequencing.cell.stations import Product, Stage, Station, one_robot
 from lab.sequencing.simulate.follow import simulate
 from lab.sequencing.simulate.run import Run
@@ -207,7 +208,7 @@ def test_the_rows_of_one_toast_by_hand(cell: Cell) -> None:
 
 def test_a_spreadsheet_reads_the_table(cell: Cell) -> None:
     rows = rows_of(simulate(cell, [1, 1]), cell, "measured")
-    read = list(csv.DictReader(StringIO(csv_of(rows))))
+    read = list(csv.DictReader(StringIO(csv_of(rows, COLUMNS))))
     assert [{name: "" if value is None else str(value) for name, value in row.items()} for row in rows] == read
     assert float(read[-1]["end_s"]) == 14.0
 
@@ -217,7 +218,7 @@ def test_a_row_without_a_part_has_empty_fields(cell: Cell) -> None:
     rows = rows_of(simulate(two, [1, 1, 2, 2]), two, "planned")
     (empty,) = {(row["part"], row["product"]) for row in rows if row["operation"] == "empty"}
     assert empty == (None, None)
-    assert "\n,,empty,out,in,robot," in csv_of(rows)
+    assert "\n,,empty,out,in,robot," in csv_of(rows, COLUMNS)
 
 
 def test_a_job_shop_of_the_rows_keeps_to_its_machines(cell: Cell) -> None:
@@ -234,7 +235,7 @@ def test_a_job_shop_of_the_rows_keeps_to_its_machines(cell: Cell) -> None:
 def test_a_file_has_the_rows_by_its_ending(cell: Cell, tmp_path: Path) -> None:
     rows = rows_of(simulate(cell, [1, 1]), cell, "planned")
     write_table(rows, tmp_path / "plan.csv")
-    assert (tmp_path / "plan.csv").read_text() == csv_of(rows)
+    assert (tmp_path / "plan.csv").read_text() == csv_of(rows, COLUMNS)
     write_table(rows, tmp_path / "plan.json")
     assert json.loads((tmp_path / "plan.json").read_text()) == rows
     with pytest.raises(BadInput, match=r"wanted a file that ends with \.csv or \.json"):
