@@ -94,6 +94,13 @@ STUDIES: dict[str, Study] = {
         sessions=100,
         least=2,
     ),
+    "advicebench-tuning": Study(
+        "The settings of every rule of AdviceBench, tuned by one procedure on the problems that are not held out",
+        _In("comparisons.advice_bench.tuning", "tuning"),
+        ("methods", "problem", "advisors"),
+        sessions=8,
+        least=1,
+    ),
     "mentor": Study(
         "A mentor for other people's policies: when they should ask, at equal questions",
         _In("comparisons.mentor", "mentor"),

@@ -58,6 +58,14 @@ class Settings(TypedDict, total=False):
     reuse: float
     bonus: float
     consistency: float
+    warming: float
+    exploring: float
+    trust: float
+    wandering: float
+    retry: float
+    strikes: float
+    agreement: float
+    margin: float
     enough_steps: float
     ensemble: int
     budget: int

@@ -122,6 +122,42 @@ class GateSettings:
         float, Ge(0), Le(1_000_000), doc("what value-reuse adds to the value of an answer in the first episode")
     ] = 1.0
     consistency: Annotated[float, Gt(0.5), Lt(1), doc("shaping's probability that an answer is right")] = 0.9
+    warming: Annotated[
+        float,
+        Ge(0),
+        Le(1_000_000),
+        doc("growth, per episode, of policy-reuse's inverse temperature between the policies"),
+    ] = 0.05
+    exploring: Annotated[
+        float, Gt(0), Le(1), doc("share of the episodes in which reliability explores, ever less, and follows answers")
+    ] = 0.8
+    trust: Annotated[
+        float, Ge(0), Le(1), doc("least probability that an answer is right with which reliability follows it")
+    ] = 0.25
+    wandering: Annotated[
+        float,
+        Ge(0),
+        Le(1),
+        doc("share of the steps in which two-levels tries the less valuable of asking and acting alone"),
+    ] = 0.05
+    retry: Annotated[
+        float, Ge(0), Le(100), doc("power by which earned-trust's chance to follow an advisor without success falls")
+    ] = 4.0
+    strikes: Annotated[
+        float,
+        Gt(0),
+        Le(1_000_000),
+        doc("loops on advice after which earned-trust gives an advisor's first episodes up"),
+    ] = 4.0
+    agreement: Annotated[
+        float,
+        Ge(0),
+        Le(100),
+        doc("how clearly, in standard deviations, answers must agree before earned-trust asks no more"),
+    ] = 1.0
+    margin: Annotated[
+        float, Ge(0), Le(100), doc("temperatures by which earned-trust values other actions below what it hands over")
+    ] = 0.3
     enough_steps: Annotated[float, Gt(0), Le(1_000_000), doc("mean step count above which cq asks")] = 50.0
     ensemble: Annotated[int, Ge(2), Le(100), doc("number of tables of uncertainty")] = 5
     budget: Annotated[int, Ge(0), Le(1_000_000_000), doc("number of helped steps that a session may use")] = (
@@ -204,10 +240,18 @@ RANGES: dict[str, Range] = {
     "psi": Span(0.01, 10.0, log=True),
     "spread": Span(0.01, 1.0, log=True),
     "rate": Span(0.01, 1.0, log=True),
-    "fading": Span(0.8, 0.999),
+    "fading": Span(0.5, 0.999),
     "reuse": Span(0.5, 0.999),
     "bonus": Span(0.01, 10.0, log=True),
     "consistency": Span(0.55, 0.95),
+    "warming": Span(0.01, 1.0, log=True),
+    "exploring": Span(0.1, 1.0),
+    "trust": Span(0.0, 0.75),
+    "wandering": Span(0.005, 0.2, log=True),
+    "retry": Span(1.0, 6.0),
+    "strikes": Span(1.0, 10.0),
+    "agreement": Span(0.0, 2.0),
+    "margin": Span(0.03, 3.0, log=True),
     "enough_steps": Span(5.0, 200.0, log=True),
     "ensemble": Span(2, 10),
     "judge_unhelped": (False, True),

@@ -23,6 +23,9 @@ LEARNED_EPISODES, LEARNED_BETA, LEARNED_SEED = 1000, 0.7, 14
 EXAMPLES = 100  # sessions, of which the first successful one is shown
 
 Count = NDArray[np.int64]
+# settings on which no result depends, see `gate_of`: of gates that the thesis does not have
+OTHER_GATES = ("spare_best", "by_evidence", "fading", "reuse", "bonus", "consistency", "warming", "exploring", "trust")
+OTHER_GATES += ("wandering", "retry", "strikes", "agreement", "margin")
 
 
 @dataclass(frozen=True)
@@ -59,8 +62,8 @@ class AdviceSetting:
     def key(self, sessions: int, seed: int) -> str:
         """The key of this setting's results among all stored ones."""
         place = world(self.world).model_dump(mode="json")
-        for name in ("spare_best", "by_evidence", "fading", "reuse", "bonus", "consistency"):
-            del place["gate"][name]  # no result depends on it, see `gate_of`
+        for name in OTHER_GATES:
+            del place["gate"][name]
         if place["deadly"]:  # as all worlds were, when keys did not say it
             del place["deadly"]
         for name, off in (("tilings", 1), ("start_value", 0.0)):

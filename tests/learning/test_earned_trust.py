@@ -86,7 +86,7 @@ def test_it_drops_an_answer_that_led_into_a_loop() -> None:
 def test_it_gives_an_episode_up_after_loops_without_success() -> None:
     one, _ = gate()
     one.begins(0)
-    loops = int(earned_trust.STRIKES)
+    loops = int(GateSettings.strikes)
     for state in range(loops):
         assert one.heard.now.advised == 1.0
         one.takes(state, RIGHT, STAY)
@@ -131,7 +131,7 @@ def test_the_known_path_becomes_the_greedy_one() -> None:
     assert [max(range(3), key=row.__getitem__) for row in table[:3]] == [RIGHT] * 3
     # learned again, the last one first: 1 leads to 2, whose best is -0.5; then 0 to 1, whose best is -1.25
     assert [table[k][RIGHT] for k in range(3)] == [-1.625, -1.25, -0.5]
-    margin = earned_trust.MARGIN  # the temperature of the first episode is 1
+    margin = GateSettings.margin  # the temperature of the first episode is 1
     assert table[0][LEFT] == table[0][STAY] == pytest.approx(-1.625 - margin)
     assert table[4] == [0.0] * 3
 

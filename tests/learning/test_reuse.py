@@ -61,8 +61,8 @@ def test_policy_reuse_asks_less_within_an_episode() -> None:
 def test_policy_reuse_prefers_the_policy_with_the_higher_mean_gain() -> None:
     one = gate("policy-reuse", lambda: 0.3)
     one.heard.now.rate, one.heard.now.own_rate = 0.5, 0.25
-    assert reuse.advised_chance(one.heard, 1) == 0.5
-    assert reuse.advised_chance(one.heard, 101) == pytest.approx(1.0 / (1.0 + exp(5.0 * -0.25)))
+    assert reuse.advised_chance(one.heard, 1, 0.05) == 0.5
+    assert reuse.advised_chance(one.heard, 101, 0.05) == pytest.approx(1.0 / (1.0 + exp(5.0 * -0.25)))
     one.heard.now.advised = 0.0
     one.judges([LIMIT + 1], True)  # a failed episode gains nothing
     assert (one.heard.now.own, one.heard.now.own_rate) == (1.0, 0.0)

@@ -1,9 +1,10 @@
 """The lab's own gate, "earned-trust": it follows advice while that does better than acting alone, and hands it to the table.
 
 1. An episode follows advice or none. The first one does. As long as no advised episode has reached the goal, the n-th one comes
-   with the chance n ** -HOPE; what was said in a failed one is forgotten, and an episode is given up after STRIKES loops.
-2. In an advised episode the most frequent answer in a state is carried out; it asks while no answer leads clearly. An answer that
-   led into a loop or to failure is dropped, where a move always leads to the same state.
+   with the chance n ** -retry; what was said in a failed one is forgotten, and an episode is given up after `strikes` loops.
+2. In an advised episode the most frequent answer in a state is carried out; it asks until the lead of that answer exceeds
+   `agreement` times the root of the number of answers. An answer that led into a loop or to failure is dropped, where a move
+   always leads to the same state.
 3. Advice ends where acting alone has done as well, where the learner's own greedy path is known to reach the goal, and, if all
    episodes begin in one state, after STALE advised successes in a row without a shorter path.
 4. The shortest known path, from advice or not, is handed over to the learner's table after each episode: its moves are learned
@@ -24,18 +25,12 @@ from lab.learning.requests import Reason, Trusted
 from lab.learning.selection import COLDEST, temperature
 from lab.learning.settings import GateSettings
 
-HOPE = 4.0  # the higher, the rarer an advisor without success is followed again
-STRIKES = (
-    4.0  # loops on advice in an episode, less what amends them, after which an advisor without success is not followed
-)
 AMENDS = 0.25  # the part of a loop that an advised move to a new state amends
 CREDIT = 0.25  # the least share of advised moves with which a success is the advisor's
 STALE = 2.0  # advised successes in a row without a shorter path, after which it acts alone
-SURE = 1.0  # it asks until the lead of the most frequent answer exceeds this times the root of the number of answers
 ANSWERS = 20  # the most answers that it asks for in a state
 OWN = 3.0  # the fewest episodes without advice by which it judges itself
 RECENT = 0.3  # the weight of the last episode in a running mean
-MARGIN = 0.3  # temperatures by which other actions are valued lower than what is handed over
 GIVEN_UP = -1.0  # `HeardNow.advised` of an episode that began to follow advice and does so no more
 
 
@@ -78,14 +73,14 @@ def planned(heard: Heard, around: Any, start: int) -> int:
 # ---- an episode -----------------------------------------------------------------------------------------------------
 
 
-def starts(heard: Heard, around: Any, start: int, u: float) -> None:
+def starts(heard: Heard, around: Any, start: int, retry: float, u: float) -> None:
     """Begins an episode in a state, and decides with the uniform number u whether it follows advice (rules 1 and 3)."""
     now = heard.now
     now.moves = now.advised_moves = now.strikes = 0.0
     now.since = now.clock = now.clock + 1.0
     chance = now.rate * (0.5 + 0.5 * now.advised_share)
     if now.won == 0.0:
-        chance = (now.helped + 1.0) ** -HOPE
+        chance = (now.helped + 1.0) ** -retry
     elif now.own >= OWN and now.own_rate >= now.rate and now.own_steps <= now.steps:
         chance = 0.0
     elif now.uncertain == 0.0:
@@ -105,7 +100,7 @@ def favourite(heard: Heard, state: int) -> int:
     return best
 
 
-def wants(heard: Heard, state: int) -> bool:
+def wants(heard: Heard, state: int, agreement: float) -> bool:
     """Whether to ask in a state: the episode follows advice and the answers so far do not agree clearly enough."""
     if heard.now.advised <= 0.0:
         return False
@@ -121,7 +116,7 @@ def wants(heard: Heard, state: int) -> bool:
                 most, second = times, most
             elif times > second:
                 second = times
-    return bool(most - second <= SURE * given**0.5)
+    return bool(most - second <= agreement * given**0.5)
 
 
 def takes(heard: Heard, state: int, own: int) -> int:
@@ -133,8 +128,8 @@ def takes(heard: Heard, state: int, own: int) -> int:
     return own if said == NOTHING else said
 
 
-def saw(heard: Heard, number: int, entered: int, over: bool, reward: float) -> None:
-    """Records a move (rule 2)."""
+def saw(heard: Heard, number: int, entered: int, over: bool, reward: float, strikes: float) -> None:
+    """Records a move (rule 2); strikes: loops on advice, less what amends them, after which an episode is given up."""
     now, led = heard.now, heard.led
     actions = len(led) // len(heard.said)
     state = number // actions
@@ -158,7 +153,7 @@ def saw(heard: Heard, number: int, entered: int, over: bool, reward: float) -> N
     if heard.left[entered] > now.since and now.uncertain == 0.0:
         heard.blamed[entered * actions + heard.said[entered]] = 1
         now.strikes += 1.0
-        if now.won == 0.0 and now.strikes >= STRIKES:
+        if now.won == 0.0 and now.strikes >= strikes:
             now.advised = GIVEN_UP
     else:
         now.strikes = max(0.0, now.strikes - AMENDS)
@@ -269,13 +264,13 @@ class EarnedTrust(Weighing):
 
     def begins(self, state: int) -> None:
         """Decides whether this episode follows advice."""
-        starts(self.heard, self._around, state, self._around.draw())
+        starts(self.heard, self._around, state, self.settings.retry, self._around.draw())
 
     def asks(self, state: int, values: Values) -> bool:
         """Whether this episode follows advice and the answers so far leave it unsure."""
         now = self.heard.now
         self.why = Trusted(now.rate) if now.helped else Reason()
-        return wants(self.heard, state)
+        return wants(self.heard, state, self.settings.agreement)
 
     def weighed(self, state: int, own: int, said: int | None) -> int:
         """The most frequent answer in this state if the episode follows advice and there is one, otherwise the learner's own."""
@@ -284,10 +279,18 @@ class EarnedTrust(Weighing):
     def learns(self, state: int, action: int, reward: float, discount: float, entered: int) -> None:
         """Records the outcome of the move, and blames the answer if it led into a loop."""
         self._over = discount == 0.0
-        saw(self.heard, state * self._around.size[1] + action, entered, self._over, reward)
+        number = state * self._around.size[1] + action
+        saw(self.heard, number, entered, self._over, reward, self.settings.strikes)
 
     def judges(self, steps: Steps, opened: bool) -> None:
         """Records the result of the episode, and hands over what is known."""
         learner = self._around.learner
         tau = max(COLDEST, temperature(self.episode, learner.beta, learner.exploration))
-        ended(self.heard, self._around, float(steps[-1]), steps[-1] <= self.max_steps, self._over, MARGIN * tau)
+        ended(
+            self.heard,
+            self._around,
+            float(steps[-1]),
+            steps[-1] <= self.max_steps,
+            self._over,
+            self.settings.margin * tau,
+        )

@@ -187,20 +187,17 @@ def shaped(heard: Heard, state: int, values: Sequence[float], per_tau: float, od
 
 # ---- reliability, as in CLUE ----------------------------------------------------------------------------------------
 
-EXPLORING = 0.8  # the first share of the episodes, in which it explores
-FOLLOWED_FROM = 0.25  # the least probability that an answer is right
+
+def explores(episode: int, episodes: int, exploring: float, u: float) -> bool:
+    """Whether a step explores: with a probability that falls linearly from 1 to 0 in the share `exploring` of the episodes."""
+    return u < 1.0 - (episode - 1) / (exploring * episodes)
 
 
-def explores(episode: int, episodes: int, u: float) -> bool:
-    """Whether a step explores: with a probability that falls linearly from 1 to 0 in the first 80 % of the episodes."""
-    return u < 1.0 - (episode - 1) / (EXPLORING * episodes)
-
-
-def reliable(heard: Heard, actions: int) -> bool:
-    """Whether the answer is the most probable right action, with a probability of at least FOLLOWED_FROM."""
+def reliable(heard: Heard, actions: int, least: float) -> bool:
+    """Whether the answer is the most probable right action, with a probability of at least `least`."""
     now = heard.now
     trust = now.right / (now.right + now.wrong)
-    return trust >= FOLLOWED_FROM and trust > (1.0 - trust) / (actions - 1)
+    return trust >= least and trust > (1.0 - trust) / (actions - 1)
 
 
 def borne_out(heard: Heard, state: int, values: Sequence[float]) -> None:
@@ -215,13 +212,11 @@ def borne_out(heard: Heard, state: int, values: Sequence[float]) -> None:
 
 # ---- two levels: acting alone or asking, by their values ------------------------------------------------------------
 
-WANDERS = 0.05  # the share of the steps in which it tries the less valuable choice
 
-
-def asks_by_worth(heard: Heard, state: int, u: float) -> bool:
-    """Whether to ask: asking is worth at least as much as acting alone, or else exploration decides."""
+def asks_by_worth(heard: Heard, state: int, wandering: float, u: float) -> bool:
+    """Whether to ask: if that is worth at least as much as acting alone, and the other way round in a share of the steps."""
     asking = heard.worth[2 * state + 1] >= heard.worth[2 * state]
-    return asking if u >= WANDERS else not asking
+    return asking if u >= wandering else not asking
 
 
 def learn_worth(heard: Heard, state: int, reward: float, discount: float, entered: int, alpha: float) -> None:

@@ -13,8 +13,6 @@ from lab.learning.gates.weighing import Weighing
 from lab.learning.requests import ByChance, ToldSeldom
 from lab.learning.selection import COLDEST, exp_of, temperature
 
-WARMER = 0.05  # by which the inverse temperature between policies grows in each episode (PRQ-learning)
-
 
 def reused(uses: Sequence[int], state: int, factor: float, u: float) -> bool:
     """Whether the answer of a state is followed again: with the chance factor ** (how often it was before)."""
@@ -26,9 +24,9 @@ def begins_reuse(told: Heard, chance: float, u: float) -> None:
     told.now.advised, told.now.moves = (1.0 if u < chance else 0.0), 0.0
 
 
-def advised_chance(told: Heard, episode: int) -> float:
+def advised_chance(told: Heard, episode: int, warming: float) -> float:
     """The chance that an episode follows the advisor: softmax over the mean gains of both, ever colder."""
-    colder = WARMER * (episode - 1)
+    colder = warming * (episode - 1)
     return 1.0 / (1.0 + exp(colder * (told.now.own_rate - told.now.rate)))
 
 
@@ -113,7 +111,7 @@ class PolicyReuse(Weighing):
 
     def begins(self, state: int) -> None:
         """Decides whether this episode reuses the advisor's policy."""
-        begins_reuse(self.heard, advised_chance(self.heard, self.episode), self._around.draw())
+        begins_reuse(self.heard, advised_chance(self.heard, self.episode, self.settings.warming), self._around.draw())
 
     def wants(self, state: int, u: float) -> bool:
         """Whether this step of an episode with the advisor asks."""

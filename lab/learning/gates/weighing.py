@@ -100,13 +100,19 @@ class Reliability(Weighing):
 
     def wants(self, state: int, u: float) -> bool:
         """Whether this step explores and there is no answer for this state yet."""
-        return heard.explores(self.episode, self.episodes, u) and self.heard.said[state] == heard.NOTHING
+        return (
+            heard.explores(self.episode, self.episodes, self.settings.exploring, u)
+            and self.heard.said[state] == heard.NOTHING
+        )
 
     def weighed(self, state: int, own: int, said: int | None) -> int:
         """The answer for this state, if the step explores and the advisor is reliable, otherwise the learner's own choice."""
         kept = self.heard.said[state]
-        explores = heard.explores(self.episode, self.episodes, self._u)
-        follows = explores and kept != heard.NOTHING and heard.reliable(self.heard, self._around.size[1])
+        settings = self.settings
+        explores = heard.explores(self.episode, self.episodes, settings.exploring, self._u)
+        follows = (
+            explores and kept != heard.NOTHING and heard.reliable(self.heard, self._around.size[1], settings.trust)
+        )
         return kept if follows else own
 
     def learns(self, state: int, action: int, reward: float, discount: float, entered: int) -> None:
@@ -122,7 +128,7 @@ class TwoLevels(Weighing):
 
     def wants(self, state: int, u: float) -> bool:
         """Whether asking is worth at least as much here, or exploration decides to ask."""
-        return heard.asks_by_worth(self.heard, state, u)
+        return heard.asks_by_worth(self.heard, state, self.settings.wandering, u)
 
     def learns(self, state: int, action: int, reward: float, discount: float, entered: int) -> None:
         """Updates the value of the choice that was made."""

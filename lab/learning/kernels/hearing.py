@@ -72,9 +72,10 @@ def begins(work: Any, hearing: Any, j: int) -> None:
         _begins_reuse(_of_lane(hearing.heard, j), work.asking.reuse ** (episode - 1), draw(work.lanes.rng, j))
     elif how == rules.WEIGHS_POLICY:
         told = _of_lane(hearing.heard, j)
-        _begins_reuse(told, _advised_chance(told, episode), draw(work.lanes.rng, j))
+        _begins_reuse(told, _advised_chance(told, episode, work.asking.warming), draw(work.lanes.rng, j))
     elif how == rules.WEIGHS_TRUST:
-        _starts(_of_lane(hearing.heard, j), (work, j), np.int64(work.lanes.states[j]), draw(work.lanes.rng, j))
+        start, retry = np.int64(work.lanes.states[j]), work.asking.retry
+        _starts(_of_lane(hearing.heard, j), (work, j), start, retry, draw(work.lanes.rng, j))
 
 
 @inlined
@@ -82,7 +83,7 @@ def wants(work: Any, hearing: Any, j: int, state: Any) -> bool:
     """`Gate.asks` of a gate that weighs."""
     how, told, lanes = work.asking.gate.weighs, _of_lane(hearing.heard, j), work.lanes
     if how == rules.WEIGHS_TRUST:
-        return bool(_wants(told, np.int64(state)))
+        return bool(_wants(told, np.int64(state), work.asking.agreement))
     hearing.u[j] = draw(lanes.rng, j)
     u, episode = hearing.u[j], lanes.lane[j].episode
     if how == rules.WEIGHS_NOVELTY:
@@ -90,9 +91,11 @@ def wants(work: Any, hearing: Any, j: int, state: Any) -> bool:
     if how == rules.WEIGHS_FADING:
         return bool(u < work.asking.fading ** (episode - 1))
     if how == rules.WEIGHS_RELIABILITY:
-        return bool(_explores(episode, len(work.sessions.warm), u) and told.said[state] == heard.NOTHING)
+        return bool(
+            _explores(episode, len(work.sessions.warm), work.asking.exploring, u) and told.said[state] == heard.NOTHING
+        )
     if how == rules.WEIGHS_WORTH:
-        return bool(_asks_by_worth(told, np.int64(state), u))
+        return bool(_asks_by_worth(told, np.int64(state), work.asking.wandering, u))
     if how == rules.WEIGHS_POLICY:
         share = work.asking.reuse**told.now.moves if told.now.advised > 0.0 else 0.0
         told.now.moves += 1.0
@@ -118,8 +121,8 @@ def takes(work: Any, hearing: Any, j: int, state: Any, own: Any, said: int) -> A
         _fill(work, hearing, j, state)
         action = np.int64(_shaped(told, at, hearing.values[j], lanes.per_tau[j], odds, hearing.u[j]))
     elif how == rules.WEIGHS_RELIABILITY:
-        explores = _explores(lanes.lane[j].episode, len(work.sessions.warm), hearing.u[j])
-        kept = explores and told.said[at] != heard.NOTHING and _reliable(told, actions)
+        explores = _explores(lanes.lane[j].episode, len(work.sessions.warm), work.asking.exploring, hearing.u[j])
+        kept = explores and told.said[at] != heard.NOTHING and _reliable(told, actions, work.asking.trust)
         action = np.int64(told.said[at]) if kept else np.int64(own)
     elif how == rules.WEIGHS_REUSE and told.said[at] != heard.NOTHING:
         action = np.int64(own)
@@ -151,7 +154,7 @@ def saw(work: Any, hearing: Any, j: int, state: Any, number: Any, entered: Any, 
     told = _of_lane(hearing.heard, j)
     _made_move(told)
     if how == rules.WEIGHS_TRUST:
-        _saw(told, np.int64(number), np.int64(entered), over, reward)
+        _saw(told, np.int64(number), np.int64(entered), over, reward, work.asking.strikes)
     elif how == rules.WEIGHS_RELIABILITY:
         _fill(work, hearing, j, state)
         _borne_out(told, np.int64(state), hearing.values[j])
@@ -166,7 +169,7 @@ def ended(work: Any, hearing: Any, j: int, steps: int, won: bool, over: bool) ->
     if work.asking.gate.weighs == rules.WEIGHS_POLICY:
         _gained(_of_lane(hearing.heard, j), work.learning.discount**steps if won else 0.0)
     elif work.asking.gate.weighs == rules.WEIGHS_TRUST:
-        margin = earned_trust.MARGIN / work.lanes.per_tau[j]
+        margin = work.asking.margin / work.lanes.per_tau[j]
         _ended(_of_lane(hearing.heard, j), (work, j), float(steps), won, over, margin)
 
 

@@ -58,6 +58,14 @@ class Asking(NamedTuple):
     reuse: float
     bonus: float
     consistency: float
+    warming: float
+    exploring: float
+    trust: float
+    wandering: float
+    retry: float
+    strikes: float
+    agreement: float
+    margin: float
     enough_steps: float
     budget: int
     judge_unhelped: bool

@@ -37,9 +37,8 @@ from lab_studies.comparisons.advice_bench.figures import (
 )
 from lab_studies.comparisons.advice_bench.problems import HELD_OUT, Benched
 from lab_studies.comparisons.advice_bench.ranks import Cell, Ranks, ranks
-from lab_studies.comparisons.advice_bench.rules import NOBODY, OURS
+from lab_studies.comparisons.advice_bench.rules import BUDGETS, NOBODY, OURS
 from lab_studies.comparisons.advice_bench.sessions import (
-    BUDGETS,
     Case,
     Outcome,
     Outcomes,

@@ -10,8 +10,8 @@ import numpy as np
 
 from lab.mdp import FloatArray
 from lab.statistics import interquartile_mean, performance_profile, probability_of_improvement, stratified_interval
-from lab_studies.comparisons.advice_bench.rules import NOBODY
-from lab_studies.comparisons.advice_bench.sessions import BUDGETS, Case, Outcome, Outcomes
+from lab_studies.comparisons.advice_bench.rules import BUDGETS, NOBODY
+from lab_studies.comparisons.advice_bench.sessions import Case, Outcome, Outcomes
 
 RETURN, GREEDY = "return while advised", "greedy policy"
 SCORES = {RETURN: "points", GREEDY: "greedy"}  # the field of `Outcome` by headline score

@@ -19,7 +19,7 @@ from lab.studies.compared import FAMILIES
 from lab_studies.comparisons.advice_bench import families
 from lab_studies.comparisons.advice_bench.bad_advisors import ADVISORS, advice_of
 from lab_studies.comparisons.advice_bench.problems import HELD_OUT, PROBLEMS, Benched, own_problem, problem
-from lab_studies.comparisons.advice_bench.rules import NOBODY, RULES, Rule, rule_of
+from lab_studies.comparisons.advice_bench.rules import NOBODY, RULES, Rule, rules_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,9 +76,9 @@ class Entered:
         for gate in self.gates.values():
             GATES.named(gate)
 
-    def own_rules(self) -> dict[str, Rule]:
-        """The rules by name."""
-        return {name: rule_of(name) for name in self.rules}
+    def own_rules(self) -> dict[str, dict[str, Rule]]:
+        """The rules by name and budget."""
+        return {name: rules_of(name) for name in self.rules}
 
     def advisor(self, name: str) -> str | AdvisorName:
         """The name of an advisor of the bench, the parsed one of any other."""

@@ -9,8 +9,7 @@ from lab.studies.findings import Row
 from lab.view.canvas import BLUE, GREY, INK, ORANGE, RED, picture_bytes
 from lab_studies.comparisons.advice_bench.aggregates import THRESHOLDS, Aggregate
 from lab_studies.comparisons.advice_bench.ranks import Ranks
-from lab_studies.comparisons.advice_bench.rules import NOBODY, OURS
-from lab_studies.comparisons.advice_bench.sessions import BUDGETS
+from lab_studies.comparisons.advice_bench.rules import BUDGETS, NOBODY, OURS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -1,5 +1,6 @@
 """The sessions of AdviceBench: every rule of when to ask, with one advisor, in one problem, at each budget."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, NamedTuple
@@ -21,7 +22,6 @@ from lab_studies.comparisons.advice_bench.entered import Entered
 from lab_studies.comparisons.advice_bench.problems import INSTANCES, Benched
 from lab_studies.comparisons.advice_bench.rules import NOBODY, Rule
 
-BUDGETS = {"100": 100, "any": GateSettings.budget}  # answers of a session
 CHANCE_TIMES = 4  # times as many sessions where moves are random, as their points vary more
 LAST = 0.1  # the share of the episodes, at the end, that shows what was learned
 BINS = 40  # of a learning curve
@@ -63,12 +63,19 @@ class Outcome(NamedTuple):
 Outcomes = dict[tuple[str, str], Outcome]  # by rule and budget
 
 
-def case_outcomes(case: Case, sessions: int, seed: int, entered: Entered | None = None) -> Outcomes:
+def case_outcomes(
+    case: Case,
+    sessions: int,
+    seed: int,
+    entered: Entered | None = None,
+    rules: Mapping[str, Mapping[str, Rule]] | None = None,
+) -> Outcomes:
     """The outcomes of every rule at every budget, with the same seeds for each; for nobody the one of ("nobody", "any").
 
-    entered: the members of the run, by default the bench's own.
+    entered: the members of the run, by default the bench's own; rules: by name and budget, by default those of `entered`.
     """
     entered = entered or Entered()
+    rules = entered.own_rules() if rules is None else rules
     entered.load()
     worlds = min(INSTANCES.get(case.problem, 1), sessions)
     sessions *= CHANCE_TIMES if entered.place(case.problem).chances is not None else 1
@@ -79,7 +86,7 @@ def case_outcomes(case: Case, sessions: int, seed: int, entered: Entered | None 
     parts_of: dict[tuple[str, str], list[_Part]] = {}
     for world, own in enumerate(shares):
         place = entered.place(case.problem, world)
-        for key, part in _place_outcomes(place, advisor, entered.own_rules(), own).items():
+        for key, part in _place_outcomes(place, advisor, rules, own).items():
             parts_of.setdefault(key, []).append(part)
     return {key: _joined(parts) for key, parts in parts_of.items()}
 
@@ -93,23 +100,22 @@ class _Part(NamedTuple):
 
 
 def _place_outcomes(
-    place: Benched, advisor: str | AdvisorName | None, rules: dict[str, Rule], seeds: np.ndarray
+    place: Benched, advisor: str | AdvisorName | None, rules: Mapping[str, Mapping[str, Rule]], seeds: np.ndarray
 ) -> dict[tuple[str, str], _Part]:
     if advisor is None:
         return {(NOBODY, "any"): _part(place, GateSettings("never"), None, seeds)}
     advice = advice_of(advisor, place)
     outcomes = {}
-    for name, rule in rules.items():
-        spoken = advice
-        if spoken is not None and rule.important:
-            spoken = replace(spoken, region=spoken.region & importance(place), speaks=rule.speaks)
-        for budget, most in BUDGETS.items():
-            gate = replace(rule.gate, budget=most)
-            if spoken is None:
+    for name, budgets in rules.items():
+        for budget, rule in budgets.items():
+            if advice is None:
                 assert isinstance(advisor, AdvisorName)
-                outcomes[name, budget] = _part_one_by_one(place, gate, advisor, rule, seeds)
+                outcomes[name, budget] = _part_one_by_one(place, advisor, rule, seeds)
             else:
-                outcomes[name, budget] = _part(place, gate, spoken, seeds)
+                region = advice.region & importance(place, rule.share) if rule.holds_back else advice.region
+                outcomes[name, budget] = _part(
+                    place, rule.gate, replace(advice, region=region, speaks=rule.speaks), seeds
+                )
     return outcomes
 
 
@@ -119,7 +125,7 @@ def _part(place: Benched, gate: GateSettings, advice: Advice | None, seeds: np.n
     return _Part(_scored(place, batch.steps), batch.helped_steps, _scored(place, batch.greedy))
 
 
-def _part_one_by_one(place: Benched, gate: GateSettings, name: AdvisorName, rule: Rule, seeds: np.ndarray) -> _Part:
+def _part_one_by_one(place: Benched, name: AdvisorName, rule: Rule, seeds: np.ndarray) -> _Part:
     """What `_part` returns, for an advisor from other code; each session makes its own, with a generator of its seed.
 
     The learner draws the same numbers as in the sessions that nobody advises.
@@ -128,9 +134,9 @@ def _part_one_by_one(place: Benched, gate: GateSettings, name: AdvisorName, rule
     greedy = np.zeros((len(seeds), place.learner.episodes // every if every else 0))
     for seed, measured in zip(seeds.tolist(), greedy, strict=True):
         advisor = advisor_of(name.for_session(), place, np.random.default_rng(seed))
-        if rule.important and advisor is not None:
-            advisor = HoldingBack(advisor, importance(place), rule.speaks)
-        session = Session(place.place, place.learner, gate, advisor, splitmix.stream(seed))
+        if rule.holds_back and advisor is not None:
+            advisor = HoldingBack(advisor, importance(place, rule.share), rule.speaks)
+        session = Session(place.place, place.learner, rule.gate, advisor, splitmix.stream(seed))
         result = session.run(enough=partial(measure_greedy, session, seed, every, measured))
         if result.interrupted:
             raise KeyboardInterrupt

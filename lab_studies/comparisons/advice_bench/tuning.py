@@ -1,0 +1,155 @@
+"""The study that tunes every rule of AdviceBench by one procedure: as many drawn settings each, in the same sessions.
+
+The first trial has the gate's defaults, the others a Latin hypercube over the ranges of the tuned settings (McKay et al. 1979).
+At each budget the settings with the best mean of both headline scores, over the problems that are not held out and all
+advisors, are written to TUNED. The sessions are others than those of the bench.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from math import exp, log
+from typing import TYPE_CHECKING, Any
+from zlib import crc32
+
+import numpy as np
+
+from lab.errors import unknown
+from lab.learning.settings import Range, Span
+from lab.studies.findings import Findings, Row, row
+from lab.studies.runner import Job
+from lab.view.canvas import BLUE, GREY, ORANGE, picture_bytes
+from lab_studies.comparisons.advice_bench.bad_advisors import ADVISORS
+from lab_studies.comparisons.advice_bench.entered import Entered
+from lab_studies.comparisons.advice_bench.problems import PROBLEMS
+from lab_studies.comparisons.advice_bench.rules import BUDGETS, OURS, RULES, TUNED
+from lab_studies.comparisons.advice_bench.sessions import Case, case_outcomes
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+TRIALS = 16
+APART = 1_000_003  # added to the seed, so that no session of the bench is one of these
+MEASURES = (
+    "points: the mean of both headline scores (the return while advised, and the greedy policy along the way) over the problems "
+    "that are not held out and all advisors, at one budget. Every rule has as many trials: its defaults, and a Latin hypercube "
+    "over the ranges of its settings. The best trial at each budget is the rule's entry in tuned.toml. A rule without settings "
+    "has one trial. The published form of a rule keeps everything else."
+)
+Trial = dict[str, Any]  # settings by name; {} for the defaults
+
+
+@dataclass(frozen=True)
+class Place:
+    """A rule in a problem: the unit of work, in which all of its trials are measured."""
+
+    rule: str
+    problem: str
+
+
+def trials_of(rule: str, trials: int, seed: int) -> list[Trial]:
+    """The settings of each trial of a rule, with three significant digits; the first are the defaults."""
+    ranges = RULES[rule].ranges()
+    rng = np.random.default_rng([seed, crc32(rule.encode())])
+    columns = {name: _spread(allowed, rng, trials - 1) for name, allowed in ranges.items()}
+    return [{}] + [{name: column[n] for name, column in columns.items()} for n in range(trials - 1 if ranges else 0)]
+
+
+def _spread(allowed: Range, rng: np.random.Generator, count: int) -> list[Any]:
+    """`count` values, one in each of as many equal parts of a range, in random order."""
+    assert isinstance(allowed, Span)
+    shares = (rng.permutation(count) + rng.random(count)) / count
+    low, high, values = allowed.low, allowed.high, []
+    for share in shares.tolist():
+        if isinstance(low, int) and isinstance(high, int):
+            values.append(min(high, low + int(share * (high - low + 1))))
+        elif allowed.log:
+            values.append(float(f"{exp(log(low) + share * (log(high) - log(low))):.3g}"))
+        else:
+            values.append(float(f"{low + share * (high - low):.3g}"))
+    return values
+
+
+def measured(place: Place, sessions: int, seed: int, trials: int, advisors: Sequence[str]) -> dict[str, list[float]]:
+    """By budget, the mean points of each trial over the advisors."""
+    made = trials_of(place.rule, trials, seed)
+    rules = {
+        str(n): {budget: RULES[place.rule].rule(budget, trial) for budget in BUDGETS} for n, trial in enumerate(made)
+    }
+    points: dict[str, list[list[float]]] = {budget: [[] for _ in made] for budget in BUDGETS}
+    for advisor in advisors:
+        case = Case(place.problem, advisor)
+        for (number, budget), outcome in case_outcomes(case, sessions, seed + APART, Entered(), rules).items():
+            points[budget][int(number)].append(float(outcome.points.mean() + outcome.greedy.mean()) / 2)
+    return {budget: [float(np.mean(values)) for values in several] for budget, several in points.items()}
+
+
+def tuning(job: Job, reading: Mapping[str, Any]) -> Findings:
+    """The trials of each rule, and the file of the best; reading: "methods", "problem" and "advisors" to measure fewer.
+
+    Raises BadInput for a name that the bench does not have, or that is held out.
+    """
+    rules = _named(reading, "methods", RULES)
+    problems, advisors = _named(reading, "problem", PROBLEMS), _named(reading, "advisors", ADVISORS)
+    places = [Place(rule, problem) for problem in problems for rule in rules]
+    work = partial(measured, sessions=job.sessions, seed=job.seed, trials=TRIALS, advisors=advisors)
+    found = job.each(work, places)
+    rows: list[Row] = []
+    best: dict[str, dict[str, Trial]] = {}
+    for rule in rules:
+        made = trials_of(rule, TRIALS, job.seed)
+        for budget in BUDGETS:
+            points = np.mean([found[Place(rule, problem)][budget] for problem in problems], axis=0)
+            for n, trial in enumerate(made):
+                shown = {"rule": rule, "budget": budget, "trial": n, "settings": _in_words(trial)}
+                rows.append(row(shown, "points", float(points[n])))
+            best.setdefault(rule, {})[budget] = made[int(points.argmax())]
+    says = {f"{rule}, budget {budget}": _in_words(trial) for rule, of in best.items() for budget, trial in of.items()}
+    pictures = {
+        "Points of each trial; orange: the rule of the lab; large: the best; cross: the defaults": _drawn(rows, rules)
+    }
+    return Findings(rows, says, pictures, (MEASURES,), {TUNED: toml_of(best)})
+
+
+def toml_of(best: Mapping[str, Mapping[str, Trial]]) -> str:
+    """The settings by rule and budget as TOML; the defaults are left out."""
+    parts = [
+        "\n".join([f'["{rule}".{budget}]', *(f"{name} = {value}" for name, value in trial.items())])
+        for rule, budgets in best.items()
+        for budget, trial in budgets.items()
+        if trial
+    ]
+    return "# written by the study advicebench-tuning\n\n" + "\n\n".join(parts) + "\n"
+
+
+def _named(reading: Mapping[str, Any], option: str, known: Mapping[str, Any]) -> tuple[str, ...]:
+    """The names that an option lists, all known ones by default."""
+    given = reading.get(option, tuple(known))
+    several = (given,) if isinstance(given, str) else tuple(given)
+    for name in several:
+        if name not in known:
+            raise unknown(option, str(name), known, f"--{option}")
+    return several
+
+
+def _in_words(trial: Trial) -> str:
+    return ", ".join(f"{name} {value:g}" for name, value in trial.items()) or "defaults"
+
+
+def _drawn(rows: Sequence[Row], rules: Sequence[str]) -> bytes:
+    """A picture of the points of each trial, by budget."""
+
+    def draw(figure: "Figure") -> None:
+        both = figure.subplots(1, len(BUDGETS), sharey=True)
+        for axes, budget in zip(both, BUDGETS, strict=True):
+            for line, rule in enumerate(rules):
+                points = [one["value"] for one in rows if (one["rule"], one["budget"]) == (rule, budget)]
+                colour = ORANGE if rule == OURS else BLUE
+                axes.plot(points, [line] * len(points), "o", color=colour, markersize=3, alpha=0.5)
+                axes.plot(max(points), line, "o", color=colour, markersize=6)
+                axes.plot(points[0], line, "x", color=GREY, markersize=6)
+            axes.set(xlabel="points, mean of both scores", title=f"budget {budget}", ylim=(len(rules) - 0.5, -0.5))
+            axes.grid(axis="x")
+        both[0].set_yticks(range(len(rules)), rules)
+
+    return picture_bytes(draw, 9.5, 1.0 + 0.24 * len(rules))
