@@ -167,8 +167,8 @@ class HoldingBack:
         return None if action == expected else action
 
 
-def importance(benched: Benched, share: float = 0.5) -> BoolArray:
-    """Whether each state is among the half with the widest range of values, (S,) bool (Torrey and Taylor 2013)."""
+def importance(benched: Benched, share: float) -> BoolArray:
+    """Whether each state is among the given share with the widest range of values, (S,) bool (Torrey and Taylor 2013)."""
     live = ~benched.mdp.terminal
     width: FloatArray = benched.values.max(axis=1) - benched.values.min(axis=1)
     wide: BoolArray = width >= np.quantile(width[live], 1.0 - share)

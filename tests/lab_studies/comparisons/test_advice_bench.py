@@ -79,7 +79,7 @@ def test_bad_advisors_are_bad_in_their_way() -> None:
     drifting = np.diff(ADVISORS["drifting"](place).thresholds, axis=2, prepend=0.0)
     assert drifting[0, live, best[live]].min() > 0.3 > drifting[-1, live].max(axis=1).min() - 1.0
     assert ADVISORS["late"](place).late
-    assert 0.3 < importance(place)[live].mean() < 0.9
+    assert 0.3 < importance(place, 0.5)[live].mean() < 0.9
 
 
 @pytest.mark.parametrize("name", ["lake", "taxi", "toast-order", "place"])
