@@ -2,14 +2,15 @@
 
 The first trial has the gate's defaults, the others a Latin hypercube over the ranges of the tuned settings (McKay et al. 1979).
 At each budget the settings with the best mean of both headline scores, over the problems that are not held out and all
-advisors, are written to TUNED. The sessions are others than those of the bench.
+advisors, are written to TUNED. For the lab's own rule they are the same at all budgets, and those with the least loss: a
+handicap in both scores. The sessions are others than those of the bench.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from math import exp, log
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 from zlib import crc32
 
 import numpy as np
@@ -20,9 +21,8 @@ from lab.studies.findings import Findings, Row, row
 from lab.studies.runner import Job
 from lab.view.canvas import BLUE, GREY, ORANGE, picture_bytes
 from lab_studies.comparisons.advice_bench.bad_advisors import ADVISORS
-from lab_studies.comparisons.advice_bench.entered import Entered
 from lab_studies.comparisons.advice_bench.problems import PROBLEMS
-from lab_studies.comparisons.advice_bench.rules import BUDGETS, OURS, RULES, TUNED
+from lab_studies.comparisons.advice_bench.rules import BUDGETS, NOBODY, OURS, RULES, TUNED
 from lab_studies.comparisons.advice_bench.sessions import Case, case_outcomes
 
 if TYPE_CHECKING:
@@ -32,9 +32,10 @@ TRIALS = 16
 APART = 1_000_003  # added to the seed, so that no session of the bench is one of these
 MEASURES = (
     "points: the mean of both headline scores (the return while advised, and the greedy policy along the way) over the problems "
-    "that are not held out and all advisors, at one budget. Every rule has as many trials: its defaults, and a Latin hypercube "
-    "over the ranges of its settings. The best trial at each budget is the rule's entry in tuned.toml. A rule without settings "
-    "has one trial. The published form of a rule keeps everything else."
+    "that are not held out and all advisors, at one budget. loss: the mean, over the same cells, of what a score lies below "
+    "nobody's. Every rule has as many trials: its defaults, and a Latin hypercube over the ranges of its settings; one without "
+    "settings has one trial. The trial with the most points at a budget is the rule's entry in tuned.toml. The rule of the lab is "
+    "to do no harm whatever the budget: its entry is the trial with the least loss over all budgets."
 )
 Trial = dict[str, Any]  # settings by name; {} for the defaults
 
@@ -70,18 +71,36 @@ def _spread(allowed: Range, rng: np.random.Generator, count: int) -> list[Any]:
     return values
 
 
-def measured(place: Place, sessions: int, seed: int, trials: int, advisors: Sequence[str]) -> dict[str, list[float]]:
-    """By budget, the mean points of each trial over the advisors."""
+class Measured(NamedTuple):
+    """The results of a trial, means over cells: of both scores, and of what they lie below nobody's."""
+
+    points: float
+    loss: float
+
+
+def measured(place: Place, sessions: int, seed: int, trials: int, advisors: Sequence[str]) -> dict[str, list[Measured]]:
+    """By budget, the results of each trial, means over the advisors."""
     made = trials_of(place.rule, trials, seed)
     rules = {
         str(n): {budget: RULES[place.rule].rule(budget, trial) for budget in BUDGETS} for n, trial in enumerate(made)
     }
-    points: dict[str, list[list[float]]] = {budget: [[] for _ in made] for budget in BUDGETS}
+    nobody = case_outcomes(Case(place.problem, None), sessions, seed + APART)[NOBODY, "any"]
+    scores: dict[tuple[str, str], list[tuple[float, float]]] = {}
     for advisor in advisors:
-        case = Case(place.problem, advisor)
-        for (number, budget), outcome in case_outcomes(case, sessions, seed + APART, Entered(), rules).items():
-            points[budget][int(number)].append(float(outcome.points.mean() + outcome.greedy.mean()) / 2)
-    return {budget: [float(np.mean(values)) for values in several] for budget, several in points.items()}
+        found = case_outcomes(Case(place.problem, advisor), sessions, seed + APART, rules=rules)
+        for key, outcome in found.items():
+            scores.setdefault(key, []).append((float(outcome.points.mean()), float(outcome.greedy.mean())))
+    alone = float(nobody.points.mean()), float(nobody.greedy.mean())
+    return {
+        budget: [
+            Measured(
+                float(np.mean(scores[str(n), budget])),
+                float(np.maximum(np.subtract(alone, scores[str(n), budget]), 0.0).mean()),
+            )
+            for n in range(len(made))
+        ]
+        for budget in BUDGETS
+    }
 
 
 def tuning(job: Job, reading: Mapping[str, Any]) -> Findings:
@@ -98,15 +117,20 @@ def tuning(job: Job, reading: Mapping[str, Any]) -> Findings:
     best: dict[str, dict[str, Trial]] = {}
     for rule in rules:
         made = trials_of(rule, TRIALS, job.seed)
-        for budget in BUDGETS:
-            points = np.mean([found[Place(rule, problem)][budget] for problem in problems], axis=0)
+        points, loss = np.zeros((len(Measured._fields), len(BUDGETS), len(made)))
+        for k, budget in enumerate(BUDGETS):
+            results = np.mean([found[Place(rule, problem)][budget] for problem in problems], axis=0)
+            points[k], loss[k] = results.T
             for n, trial in enumerate(made):
                 shown = {"rule": rule, "budget": budget, "trial": n, "settings": _in_words(trial)}
-                rows.append(row(shown, "points", float(points[n])))
-            best.setdefault(rule, {})[budget] = made[int(points.argmax())]
+                rows += [
+                    row(shown, name, float(value)) for name, value in zip(Measured._fields, results[n], strict=True)
+                ]
+        chosen = [loss.sum(axis=0).argmin()] * len(BUDGETS) if rule == OURS else points.argmax(axis=1)
+        best[rule] = {budget: made[int(n)] for budget, n in zip(BUDGETS, chosen, strict=True)}
     says = {f"{rule}, budget {budget}": _in_words(trial) for rule, of in best.items() for budget, trial in of.items()}
     pictures = {
-        "Points of each trial; orange: the rule of the lab; large: the best; cross: the defaults": _drawn(rows, rules)
+        "Points of each trial; orange: the rule of the lab; large: the most; cross: the defaults": _drawn(rows, rules)
     }
     return Findings(rows, says, pictures, (MEASURES,), {TUNED: toml_of(best)})
 
@@ -143,7 +167,8 @@ def _drawn(rows: Sequence[Row], rules: Sequence[str]) -> bytes:
         both = figure.subplots(1, len(BUDGETS), sharey=True)
         for axes, budget in zip(both, BUDGETS, strict=True):
             for line, rule in enumerate(rules):
-                points = [one["value"] for one in rows if (one["rule"], one["budget"]) == (rule, budget)]
+                here = (rule, budget, "points")
+                points = [one["value"] for one in rows if (one["rule"], one["budget"], one["measure"]) == here]
                 colour = ORANGE if rule == OURS else BLUE
                 axes.plot(points, [line] * len(points), "o", color=colour, markersize=3, alpha=0.5)
                 axes.plot(max(points), line, "o", color=colour, markersize=6)

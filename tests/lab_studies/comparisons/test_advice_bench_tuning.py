@@ -36,16 +36,28 @@ def test_each_part_of_a_range_is_drawn_once() -> None:
 
 def test_the_best_trial_at_each_budget_is_written(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tuning, "TRIALS", 3)
-    reading = {"methods": ["random", "always"], "problem": "empty", "advisors": ["expert", "contrary"]}
+    methods = ["random", "earned-trust", "always"]
+    reading = {"methods": methods, "problem": "empty", "advisors": ["expert", "contrary"]}
     found = tuning.tuning(Job(sessions=2), reading)
-    alone = measured(Place("random", "empty"), 2, 0, 3, ("expert", "contrary"))
-    points = {(one["rule"], one["budget"], one["trial"]): one["value"] for one in found.rows}
-    assert len(points) == 2 * (3 + 1)  # always has nothing to tune
+    values = {(one["rule"], one["budget"], one["trial"], one["measure"]): one["value"] for one in found.rows}
+    assert len(values) == 2 * 2 * (3 + 3 + 1)  # always has nothing to tune
     written = tomllib.loads(found.files["tuned.toml"])
-    for budget in BUDGETS:
-        assert [points["random", budget, n] for n in range(3)] == pytest.approx(alone[budget], abs=0.01)
-        best = alone[budget].index(max(alone[budget]))
-        assert written.get("random", {}).get(budget, {}) == trials_of("random", 3, 0)[best]
+    for rule in methods:
+        alone = measured(Place(rule, "empty"), 2, 0, 3, ("expert", "contrary"))
+        for budget in BUDGETS:
+            points, loss = ([getattr(one, name) for one in alone[budget]] for name in ("points", "loss"))
+            assert [values[rule, budget, n, "points"] for n in range(len(points))] == pytest.approx(points, abs=0.01)
+            assert [values[rule, budget, n, "loss"] for n in range(len(points))] == pytest.approx(loss, abs=0.01)
+            if rule != "earned-trust":
+                assert written.get(rule, {}).get(budget, {}) == trials_of(rule, 3, 0)[points.index(max(points))]
+    both = [
+        one.loss + other.loss
+        for one, other in zip(
+            *measured(Place("earned-trust", "empty"), 2, 0, 3, ("expert", "contrary")).values(), strict=True
+        )
+    ]
+    least = trials_of("earned-trust", 3, 0)[both.index(min(both))]
+    assert all(written.get("earned-trust", {}).get(budget, {}) == least for budget in BUDGETS)
     assert "always" not in written
 
 
