@@ -34,8 +34,8 @@ MEASURES = (
     "points: the mean of both headline scores (the return while advised, and the greedy policy along the way) over the problems "
     "that are not held out and all advisors, at one budget. loss: the mean, over the same cells, of what a score lies below "
     "nobody's. Every rule has as many trials: its defaults, and a Latin hypercube over the ranges of its settings; one without "
-    "settings has one trial. The trial with the most points at a budget is the rule's entry in tuned.toml. The rule of the lab is "
-    "to do no harm whatever the budget: its entry is the trial with the least loss over all budgets."
+    "settings has one trial. The trial with the most points at a budget is the rule's entry in tuned.toml. The rule of the lab "
+    "is to do no harm whatever the budget: its entry is the trial with the least loss over all budgets."
 )
 Trial = dict[str, Any]  # settings by name; {} for the defaults
 
