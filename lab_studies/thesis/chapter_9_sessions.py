@@ -24,8 +24,10 @@ EXAMPLES = 100  # sessions, of which the first successful one is shown
 
 Count = NDArray[np.int64]
 # settings on which no result depends, see `gate_of`: of gates that the thesis does not have
-OTHER_GATES = ("spare_best", "by_evidence", "fading", "reuse", "bonus", "consistency", "warming", "exploring", "trust")
-OTHER_GATES += ("wandering", "retry", "strikes", "agreement", "margin")
+OTHER_GATES = (
+    *("spare_best", "by_evidence", "fading", "reuse", "bonus", "consistency", "warming", "exploring", "trust"),
+    *("wandering", "retry", "strikes", "agreement", "margin"),
+)
 
 
 @dataclass(frozen=True)

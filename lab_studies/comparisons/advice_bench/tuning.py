@@ -60,7 +60,8 @@ def _spread(allowed: Range, rng: np.random.Generator, count: int) -> list[Any]:
     """`count` values, one in each of as many equal parts of a range, in random order."""
     assert isinstance(allowed, Span)
     shares = (rng.permutation(count) + rng.random(count)) / count
-    low, high, values = allowed.low, allowed.high, []
+    low, high = allowed.low, allowed.high
+    values: list[Any] = []
     for share in shares.tolist():
         if isinstance(low, int) and isinstance(high, int):
             values.append(min(high, low + int(share * (high - low + 1))))
