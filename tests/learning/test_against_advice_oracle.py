@@ -58,9 +58,15 @@ SETTINGS = {
         replace(IN_WORLD_1, first_episode=20, window=10, lambda_threshold=0.2, judge_unhelped=False),
     ),
     "maze, q, expert": (MAZE, replace(SHORT, omega=3, window=5, psi=0.3, tau=0.01, lambda_threshold=0.05)),
-    "half seen, q-lambda, limited": (HALF_SEEN, replace(SHORT, learner="q-lambda", tau=0.3, omega=5, spare_best=True)),
+    "half seen, q-lambda, limited": (
+        HALF_SEEN,
+        replace(SHORT, learner="q-lambda", tau=0.3, omega=50, window=2, spare_best=True),
+    ),
     "traps, q, novice": (TRAPS, replace(SHORT, tau=1.0, omega=4, first_episode=25)),
-    "cliff, q-lambda, budget": (CLIFF, replace(SHORT, learner="q-lambda", tau=0.03, window=4, budget=45, psi=0.9)),
+    "cliff, q-lambda, budget": (
+        CLIFF,
+        replace(SHORT, learner="q-lambda", max_steps=16, tau=0.03, window=4, budget=45, psi=0.9),
+    ),
 }
 
 
