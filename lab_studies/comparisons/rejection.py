@@ -25,7 +25,7 @@ ADVISORS = ("expert", "novice", WRONG)
 RULES = {"misleads": False, "evidence": True}  # GateSettings.by_evidence
 MEASURES = (
     "A session with the task file's gate, whose advisor is rejected after more than Omega misleads (the thesis's rule) or by "
-    "evidence. It counts until its advice ends: rejected, budget spent, converged, or no more episodes. rejected_percent: sessions "
+    "evidence. It counts until advice ends: rejected, budget spent, converged, or no more episodes. rejected_percent: sessions "
     "that reject before the budget is spent; helped_steps: until then. 'wrong' takes the worst action for the best. A novice "
     "(tau 1) is right in 45 to 50 % of the states; an advisor that draws evenly in 38 to 45 %."
 )

@@ -79,7 +79,7 @@ def optimal_values(world: World, discount: float) -> NDArray[np.float64]:
     leads_to, pays, goes_on = np.array(world.leads_to), np.array(world.pays), ~np.array(world.ends)
     q = np.zeros(pays.shape)
     while True:
-        better = pays + discount * (goes_on * q.max(axis=1))[leads_to]
+        better: NDArray[np.float64] = pays + discount * (goes_on * q.max(axis=1))[leads_to]
         if np.abs(better - q).max() < 1e-12:
             return better
         q = better

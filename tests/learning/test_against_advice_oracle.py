@@ -7,6 +7,7 @@ sets of seeds (120 times 6.3e-5, for normal means). The seeds are fixed.
 
 import ast
 import tomllib
+from collections.abc import Sequence
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
@@ -20,7 +21,7 @@ from lab.learning.simulated_advice import Advice, advice_chances
 from lab.mdp import FloatArray, Rewards, optimal_values
 from lab.tasks.grid_world import GridWorld
 from tests.learning import advice_oracle
-from tests.learning.advice_oracle import Asking, Setting, Told, World, cells_world
+from tests.learning.advice_oracle import Asking, Cell, Setting, Told, World, cells_world
 
 ROOT = Path(__file__).parents[2]
 ORACLE_SESSIONS, LAB_SESSIONS = 80, 1000
@@ -70,7 +71,7 @@ SETTINGS = {
 }
 
 
-def oracle_world(layout: Layout, starts: list[tuple[int, ...]] | None = None) -> World:
+def oracle_world(layout: Layout, starts: Sequence[Cell] | None = None) -> World:
     """A layout as the oracle's world."""
     view = layout.get("view")
     seen = None if view is None else (view["lower"], view["upper"])
@@ -78,12 +79,12 @@ def oracle_world(layout: Layout, starts: list[tuple[int, ...]] | None = None) ->
     return cells_world(*cells, view=seen, deadly=layout["deadly"])
 
 
-def told_by_the_oracle(layout: Layout, setting: Setting, starts: list[tuple[int, ...]] | None = None) -> FloatArray:
+def told_by_the_oracle(layout: Layout, setting: Setting, starts: Sequence[Cell] | None = None) -> FloatArray:
     """The figures (N, 6) of the oracle's sessions."""
     return np.array(advice_oracle.sessions(oracle_world(layout, starts), setting, ORACLE_SESSIONS), np.float64)
 
 
-def told_by_the_lab(layout: Layout, setting: Setting, starts: list[tuple[int, ...]] | None = None) -> FloatArray:
+def told_by_the_lab(layout: Layout, setting: Setting, starts: Sequence[Cell] | None = None) -> FloatArray:
     """The figures (N, 6) of the lab's sessions."""
     world, named = GridWorld(name="layout", rewards=Rewards(), **layout), vars(setting)
     learner = LearnerSettings(**{part.name: named[part.name] for part in fields(LearnerSettings) if part.name in named})
