@@ -85,7 +85,7 @@ STUDIES: dict[str, Study] = {
         "Whom CCRL rejects before a budget is spent, for every sub-task of toast and every learner",
         _In("comparisons.rejection", "rejection"),
         sessions=40,
-        least=1,
+        least=2,
     ),
     "advicebench": Study(
         "AdviceBench: rules of when to ask, whatever the advisor, the budget and the problem",

@@ -67,6 +67,12 @@ def schema_of(kind: str) -> Schema:
             field = tables[name]["properties"][key]
             del field["type"]
             field |= {"anyOf": [{"enum": names}, open_to_others]} if open_to_others else {"enum": names}
+    if "Rewards" in tables:  # `Learned` has other defaults than its records have by themselves
+        tables["GateSettings"]["properties"]["spare_best"]["default"] = True
+        collision = tables["Rewards"]["properties"]["collision"]
+        del collision["default"]
+        collision["description"] += "; left out: the return of the longest walk minus `goal`"
+        collision["examples"] = [-11.5]  # that value, with the defaults of all others
     whole = _plain(raw)
     if "kind" in whole["properties"]:  # a file that does not say its kind is a task
         del whole["properties"]["kind"]["default"]

@@ -9,6 +9,7 @@ import numpy as np
 
 from lab.advice.advisors import SKILL_TAUS
 from lab.learning import splitmix
+from lab.learning.batch import Batch, is_compiled, run_sessions
 from lab.learning.problem import Problem
 from lab.learning.session import Session
 from lab.learning.settings import GateSettings
@@ -24,7 +25,7 @@ ADVISORS = ("expert", "novice", WRONG)
 RULES = {"misleads": False, "evidence": True}  # GateSettings.by_evidence
 MEASURES = (
     "A session with the task file's gate, whose advisor is rejected after more than Omega misleads (the thesis's rule) or by "
-    "evidence. It ends when its advice ends: rejected, budget spent, converged, or no more episodes. rejected_percent: sessions "
+    "evidence. It counts until advice ends: rejected, budget spent, converged, or no more episodes. rejected_percent: sessions "
     "that reject before the budget is spent; helped_steps: until then. 'wrong' takes the worst action for the best. A novice "
     "(tau 1) is right in 45 to 50 % of the states; an advisor that draws evenly in 38 to 45 %."
 )
@@ -55,8 +56,15 @@ def advice_of(mdp: TabularMDP, discount: float, advisor: str) -> Advice:
     return Advice.of(advice_chances(sign * optimal_values(mdp, discount), SKILL_TAUS[skill]))
 
 
+def endings_of(batch: Batch, budget: int) -> list[Ended]:
+    """How the advice of each session of a batch ended: as `ended` has it, because nothing is asked or judged after that."""
+    spent = batch.helped_steps >= budget
+    columns = ((batch.rejected_at_episode > 0) & ~spent, spent, batch.helped_steps)
+    return [Ended(*ending) for ending in zip(*(column.tolist() for column in columns), strict=True)]
+
+
 def ended(session: Session, budget: int) -> Ended:
-    """How the advice of a session ends."""
+    """How the advice of a session ends; the episodes after that are not run."""
     gate = session.gate
     session.run(enough=lambda: gate.rejected or gate.converged or session.helped_steps >= budget)
     spent = session.helped_steps >= budget
@@ -74,9 +82,11 @@ def sessions_of(setting: Setting, sessions: int, seed: int) -> list[Ended]:
     learner = replace(how.learner, learner=setting.learner)
     gate: GateSettings = replace(how.gate, gate="ccrl", by_evidence=RULES[setting.rule])
     advice = advice_of(mdp, learner.discount, setting.advisor)
+    seeds = seeds_of(replace(setting, advisor="", rule=""), sessions, seed)
+    if is_compiled(mdp, learner, gate, advice):
+        return endings_of(run_sessions(mdp, learner, gate, advice, seeds), gate.budget)
     endings = []
-    for own in seeds_of(replace(setting, advisor="", rule=""), sessions, seed):
-        draw = splitmix.stream(int(own))
+    for draw in map(splitmix.stream, seeds.tolist()):
         endings.append(ended(Session(mdp, learner, gate, TableAdvisor(advice, draw), draw), gate.budget))
     return endings
 

@@ -100,6 +100,13 @@ def test_the_page_is_the_one_of_the_records(kind: str) -> None:
     }
 
 
+def test_defaults_of_learning_are_those_of_a_file_that_leaves_them_out() -> None:
+    world = GridWorld(name="bare", shape=(1, 3), start=(0, 0), goal=(0, 2))
+    for table, held in (("LearnerSettings", world.learner), ("GateSettings", world.gate), ("Rewards", world.rewards)):
+        for key, field in schema("world")[TABLES][table]["properties"].items():
+            assert getattr(held, key) in (field.get("default"), *field.get("examples", [])), key
+
+
 def test_examples_and_units_are_read_out_of_a_text() -> None:
     assert examples_of('A size [m], such as `[1.0, 2.0]` or `"a"`; left out: `3`.') == [[1.0, 2.0], "a"]
     assert examples_of("A size [m].") == []
