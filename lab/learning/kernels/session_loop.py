@@ -89,10 +89,12 @@ def _begin_episode(work: Any, memories: Any, hearing: Any, walks: Any, j: int) -
 
 
 @inlined
-def _begin(work: Any, memories: Any, hearing: Any, walks: Any, lookahead: Any, model: Any, started: int) -> int:
+def _begin(
+    work: Any, memories: Any, hearing: Any, walks: Any, lookahead: Any, model: Any, count: int, started: int
+) -> int:
     """Begins the next episode, or session, in each lane whose last one has ended; returns how many sessions have begun."""
     lanes, seeds = work.lanes, work.sessions.seeds
-    for j in range(LANES):
+    for j in range(count):
         if lanes.fresh[j]:
             lane = lanes.lane[j]
             lanes.fresh[j], lanes.moves[j], lanes.states[j] = False, 0, work.problem.starts[0]
@@ -100,7 +102,7 @@ def _begin(work: Any, memories: Any, hearing: Any, walks: Any, lookahead: Any, m
             if lookahead is not None:
                 lookahead.first[j] = lookahead.last[j] = 0
             if lane.episode == len(work.sessions.warm):
-                lane.session = -1  # an idle lane keeps making steps, which are ignored
+                lane.session = -1  # an idle lane makes no steps
                 if started < len(seeds):
                     _begin_session(work, hearing, walks, model, j, started)
                     if memories is not None:
@@ -127,7 +129,7 @@ def _learn(work: Any, hearing: Any, lookahead: Any, own: Any, j: int, following:
                 learn_following(work, lookahead, table, j, number, entered, reward, following, best)
             else:
                 learn_by_rule(work, own, own.others[j, k], number, entered, reward, following)
-    if hearing is not None and lanes.lane[j].session >= 0:
+    if hearing is not None:
         over = work.problem.ends[entered] != 0
         hears.saw(work, hearing, j, number // np.uint64(len(work.learning.actions)), number, entered, reward, over)
 
@@ -181,12 +183,12 @@ def _step(
         _learn_at_once(work, own, j, state, number, entered, reward)
     if model is not None:
         replay(work, model, j, number, entered, reward)
-    if memories is not None and lanes.lane[j].session >= 0:
+    if memories is not None:
         mine = _of_lane(memories, j)
         _moved(mine, _Move(np.int64(number), source, np.int64(entered), ends != 0, ends == 1))
         if mine.now.trust < 0:
             lanes.is_open[j] = False
-    if lookahead is None and hearing is not None and lanes.lane[j].session >= 0:
+    if lookahead is None and hearing is not None:
         hears.saw(work, hearing, j, state, number, entered, reward, ends != 0)
     if walks is not None:
         walks.walk[j, lanes.moves[j]] = state
@@ -237,8 +239,6 @@ def _end(work: Any, memories: Any, hearing: Any, chances: Any, walks: Any, own: 
     lanes, sessions, learning = work.lanes, work.sessions, work.learning
     lane, moves, won = lanes.lane[j], lanes.moves[j], work.problem.ends[lanes.states[j]] == 1
     lanes.fresh[j] = True
-    if lane.session < 0:
-        return 0
     n, episode, count = lane.session, lane.episode, sessions.counts[lane.session]
     sessions.steps[n, episode - 1] = moves + learning.count_start if won else learning.max_steps + 1
     sessions.guided[n, episode - 1] = lane.helped > 0
@@ -283,13 +283,14 @@ def run(work: Any, memories: Any, hearing: Any, chances: Any, walks: Any, lookah
     does not need the next action; model: None without planning; own: None for a shipped learner.
     """
     started = over = 0
-    fresh = True
+    fresh, count = True, min(LANES, len(work.sessions.seeds))
     while over < len(work.sessions.seeds):
         if fresh:
-            started = _begin(work, memories, hearing, walks, lookahead, model, started)
+            started = _begin(work, memories, hearing, walks, lookahead, model, count, started)
             fresh = False
-        choose(work)
-        for j in range(LANES):
-            if _step(work, memories, hearing, chances, walks, lookahead, model, own, j):
+        choose(work, count)
+        for j in range(count):
+            busy = work.lanes.lane[j].session >= 0
+            if busy and _step(work, memories, hearing, chances, walks, lookahead, model, own, j):
                 fresh = True
                 over += _end(work, memories, hearing, chances, walks, own, j)
