@@ -32,6 +32,18 @@ def begin_walks(rng: Any, seed: Any, number: int) -> None:
 
 
 @inlined
+def outcome(chances: Any, number: Any, u: float) -> int:
+    """The index of the outcome of a move that u selects (`ChanceTable.step`).
+
+    All are compared, because a branch that cannot be predicted costs more.
+    """
+    k = 0
+    for i in range(chances.below.shape[1] - 1):
+        k += np.int64(u >= chances.below[number, i])
+    return k
+
+
+@inlined
 def gauge(work: Any, table: Any, state: int, action: int) -> float:
     """`Update.gauge` of one action in a flat table."""
     at = np.uint64(state) * np.uint64(len(work.learning.actions)) + np.uint64(action)

@@ -12,9 +12,10 @@ import numpy as np
 from lab.learning import advice_memory as memory
 from lab.learning import selection
 from lab.learning.compiled import inlined, inner, without_refcounts
+from lab.learning.gates.heard import NOTHING
 from lab.learning.kernels import hearing as hears
 from lab.learning.kernels.asking import decided, judge, judge_moved, knows, opens
-from lab.learning.kernels.learners import begin_walks, choose, draw, learn, learn_by_rule, learn_following, replay
+from lab.learning.kernels.learners import begin_walks, choose, draw, learn, learn_by_rule, learn_following, outcome, replay
 from lab.learning.kernels.records import LANES
 
 _Memory: Any = memory.Memory
@@ -174,9 +175,7 @@ def _step(
     if chances is None:
         entered, reward = np.uint64(problem.successor[number]), problem.reward[number]
     else:
-        u, k = draw(lanes.rng, j), 0
-        while u >= chances.below[number, k]:
-            k += 1
+        k = outcome(chances, number, draw(lanes.rng, j))
         entered, reward = np.uint64(chances.entered[number, k]), chances.reward[number, k]
     ends = problem.ends[entered]
     if lookahead is None:
@@ -210,23 +209,26 @@ def _greedy_steps(work: Any, chances: Any, table: Any, seed: Any, number: int) -
     width, starts, total = np.uint64(len(learning.actions)), problem.starts, 0.0
     offset, factor = (problem.step_reward, learning.discount) if learning.afterstate else (0.0, 1.0)
     begin_walks(sessions.walk_rng, seed, number)
+    known = sessions.walk_moves
+    for place in range(len(problem.ends)):
+        known[place] = NOTHING
     for _ in range(sessions.walks):
         state, moves = np.uint64(starts[0]), 0
         if len(starts) > 1:
             state = np.uint64(starts[int(draw(sessions.walk_rng, 0) * len(starts))])
         while moves < learning.max_moves and problem.ends[state] == 0:
-            best, at = -np.inf, state * width
-            for a in range(len(learning.actions)):
-                move = state * width + np.uint64(a)
-                value = offset + factor * table[np.uint64(problem.successor[move]) if learning.afterstate else move]
-                if value > best:
-                    best, at = value, move
+            if known[state] == NOTHING:
+                best = -np.inf
+                for a in range(len(learning.actions)):
+                    move = state * width + np.uint64(a)
+                    value = offset + factor * table[np.uint64(problem.successor[move]) if learning.afterstate else move]
+                    if value > best:
+                        best, known[state] = value, move
+            at = np.uint64(known[state])
             if chances is None:
                 state = np.uint64(problem.successor[at])
             else:
-                u, k = draw(sessions.walk_rng, 0), 0
-                while u >= chances.below[at, k]:
-                    k += 1
+                k = outcome(chances, at, draw(sessions.walk_rng, 0))
                 state = np.uint64(chances.entered[at, k])
             moves += 1
         total += moves + learning.count_start if problem.ends[state] == 1 else learning.max_steps + 1
