@@ -38,10 +38,10 @@ class Benched:
     chances: Environment | None = None
     modules: tuple[str, ...] = ()  # of the environment's code, see `lab.files.code_key`
 
-    @cached_property
-    def place(self) -> Environment:
-        """The environment of the table, or the one with random moves, in which sessions run."""
-        return TableEnvironment(self.mdp) if self.chances is None else self.chances
+    @property
+    def place(self) -> TabularMDP | Environment:
+        """The table, or the environment with random moves, in which sessions run."""
+        return self.mdp if self.chances is None else self.chances
 
     @cached_property
     def par(self) -> float:
@@ -115,7 +115,7 @@ def own_problem(given: Teachable) -> Benched:
     """
     made = _named(str(given) if isinstance(given, Path) else given)
     made = replace(made, name=str(given) if isinstance(given, str | Path) else made.name)
-    check_solvable(made.place)
+    check_solvable(TableEnvironment(made.place) if isinstance(made.place, TabularMDP) else made.place)
     if made.par > made.learner.max_steps:
         raise BadInput(
             f"problem '{made.name}' (--problem): its best policy needs more than an episode's {made.learner.max_steps} steps"
