@@ -37,10 +37,10 @@ def outcome(chances: Any, number: Any, u: float) -> int:
 
     All are compared, because a branch that cannot be predicted costs more.
     """
-    k = 0
+    k: Any = 0
     for i in range(chances.below.shape[1] - 1):
         k += np.int64(u >= chances.below[number, i])
-    return k
+    return int(k)
 
 
 @inlined
@@ -232,7 +232,10 @@ def best_action(around: Any, state: int) -> int:
 
 @inlined
 def choose(work: Any, count: int) -> None:
-    """The learner's own choice in the first lanes; writes `chosen`, and the highest value and the span of the values."""
+    """The learner's own choice in the first `count` lanes, which are in use.
+
+    Writes `chosen`, and the highest value and the span of the values.
+    """
     if work.learning.selection == selection.SOFTMAX:
         _choose_softmax(work, count)
     else:
@@ -241,7 +244,7 @@ def choose(work: Any, count: int) -> None:
 
 @inlined
 def _choose_greedy(work: Any, count: int) -> None:
-    """`selection.choose_greedy` or `choose_epsilon_greedy` in every lane."""
+    """`selection.choose_greedy` or `choose_epsilon_greedy` in the lanes in use."""
     lanes, learning = work.lanes, work.learning
     values, actions = lanes.values, len(learning.actions)
     offset, factor = (work.problem.step_reward, learning.discount) if learning.afterstate else (0.0, 1.0)
@@ -258,7 +261,7 @@ def _choose_greedy(work: Any, count: int) -> None:
 
 @inlined
 def _choose_softmax(work: Any, count: int) -> None:
-    """`selection.choose_softmax` in every lane at once.
+    """`selection.choose_softmax` in the lanes in use at once.
 
     The values (A * LANES,) are overwritten by cumulative weights. The compiler knows the number of actions, so the lanes of one
     action stay in registers.

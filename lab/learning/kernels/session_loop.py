@@ -15,7 +15,16 @@ from lab.learning.compiled import inlined, inner, without_refcounts
 from lab.learning.gates.heard import NOTHING
 from lab.learning.kernels import hearing as hears
 from lab.learning.kernels.asking import decided, judge, judge_moved, knows, opens
-from lab.learning.kernels.learners import begin_walks, choose, draw, learn, learn_by_rule, learn_following, outcome, replay
+from lab.learning.kernels.learners import (
+    begin_walks,
+    choose,
+    draw,
+    learn,
+    learn_by_rule,
+    learn_following,
+    outcome,
+    replay,
+)
 from lab.learning.kernels.records import LANES
 
 _Memory: Any = memory.Memory
@@ -218,7 +227,7 @@ def _greedy_steps(work: Any, chances: Any, table: Any, seed: Any, number: int) -
             state = np.uint64(starts[int(draw(sessions.walk_rng, 0) * len(starts))])
         while moves < learning.max_moves and problem.ends[state] == 0:
             if known[state] == NOTHING:
-                best = -np.inf
+                best, known[state] = -np.inf, state * width
                 for a in range(len(learning.actions)):
                     move = state * width + np.uint64(a)
                     value = offset + factor * table[np.uint64(problem.successor[move]) if learning.afterstate else move]
