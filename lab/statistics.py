@@ -3,6 +3,7 @@
 import warnings
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import combinations
 from math import hypot, sqrt
 
@@ -48,8 +49,14 @@ def interval(values: ArrayLike) -> tuple[float, float, float]:
     sample = _sample(values, "interval")
     mean = _mean(sample)
     error = sqrt(np.square(sample - mean).sum() / (len(sample) - 1) / len(sample))
-    half = float(scipy.stats.t.isf(TAIL, len(sample) - 1)) * error
+    half = _t_errors(len(sample) - 1) * error
     return mean, mean - half, mean + half
+
+
+@lru_cache
+def _t_errors(degrees: int) -> float:
+    """The standard errors from a mean to an end of its t interval; tables have thousands of intervals with as many values."""
+    return float(scipy.stats.t.isf(TAIL, degrees))
 
 
 def proportion_interval(successes: int, n: int) -> tuple[float, float, float]:

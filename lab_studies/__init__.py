@@ -91,7 +91,7 @@ STUDIES: dict[str, Study] = {
         "AdviceBench: rules of when to ask, whatever the advisor, the budget and the problem",
         _In("comparisons.advice_bench.advice_bench", "advice_bench"),
         ("methods", "problem", "advisors", "families_seed"),
-        sessions=100,
+        sessions=50,
         least=2,
     ),
     "advicebench-tuning": Study(

@@ -3,6 +3,7 @@
 `TableEnvironment` makes one of a `TabularMDP`; Gymnasium's are in lab/gym, continuous worlds in lab/learning/physics.
 """
 
+from functools import cached_property
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -82,10 +83,12 @@ class TableEnvironment:
 
     def __init__(self, mdp: TabularMDP):
         self.mdp = mdp
-        self._successor: list[list[int]] = mdp.successor.tolist()
-        self._reward: list[list[float]] = mdp.reward.tolist()
-        self._terminal: list[bool] = mdp.terminal.tolist()
-        self._goal: list[bool] = mdp.goal.tolist()
+
+    @cached_property
+    def _lists(self) -> tuple[list[list[int]], list[list[float]], list[bool], list[bool]]:
+        """The table as lists, which are faster step by step; made with the first step, as compiled sessions make none here."""
+        mdp = self.mdp
+        return mdp.successor.tolist(), mdp.reward.tolist(), mdp.terminal.tolist(), mdp.goal.tolist()
 
     def check(self) -> None:
         """Raises NoPath if no goal can be reached from the start."""
@@ -98,8 +101,9 @@ class TableEnvironment:
 
     def step(self, state: int, action: int, draw: Draw) -> Step:
         """The outcome that the table holds."""
-        entered = self._successor[state][action]
-        return Step(self._reward[state][action], entered, self._terminal[entered], self._goal[entered])
+        successor, rewards, terminal, goal = self._lists
+        entered = successor[state][action]
+        return Step(rewards[state][action], entered, terminal[entered], goal[entered])
 
     def picture(self, state: int) -> str:
         """An empty string: the table's grid is drawn."""

@@ -51,7 +51,8 @@ def test_shaping_multiplies_what_was_said_with_the_own_chances() -> None:
     values, odds = [1.0, 0.0, 0.0], 3.0  # weights 1, e**-1 * 9, e**-1 * 3
     weights = np.array([1.0, 9.0 * exp_of(-1.0), 3.0 * exp_of(-1.0)])
     ends = np.cumsum(weights) / weights.sum()
-    drawn = [heard.shaped(told, 0, values, 1.0, odds, u) for u in (0.0, ends[0] + 0.01, ends[1] - 0.01, ends[1] + 0.01)]
+    marks = 0.0, ends[0] + 0.01, ends[1] - 0.01, ends[1] + 0.01
+    drawn = [heard.shaped(told, 0, [*values], 1.0, odds, u) for u in marks]
     assert drawn == [LEFT, RIGHT, RIGHT, STAY]
 
 

@@ -165,9 +165,10 @@ def best_of(values: Sequence[float]) -> int:
 # ---- policy shaping -------------------------------------------------------------------------------------------------
 
 
-def shaped(heard: Heard, state: int, values: Sequence[float], per_tau: float, odds: float, u: float) -> int:
+def shaped(heard: Heard, state: int, values: Numbers, per_tau: float, odds: float, u: float) -> int:
     """The action that u selects from softmax probability times odds ** (how often the action was the answer in this state).
 
+    values (A,): overwritten by the cumulative weights.
     Source: Griffith et al. 2013, eq. 3, where an answer counts as a "right" for its action.
     """
     actions, top, most = len(values), values[0], 0
@@ -175,14 +176,14 @@ def shaped(heard: Heard, state: int, values: Sequence[float], per_tau: float, od
         top, most = max(top, values[action]), max(most, heard.times[state * actions + action])
     total = 0.0
     for action in range(actions):
-        total += exp_of((values[action] - top) * per_tau) * odds ** (heard.times[state * actions + action] - most)
-    mark, below, chosen = u * total, 0.0, actions - 1
+        weight, less = exp_of((values[action] - top) * per_tau), heard.times[state * actions + action] - most
+        total += weight * odds**less if less else weight
+        values[action] = total
+    mark = u * total
     for action in range(actions - 1):
-        below += exp_of((values[action] - top) * per_tau) * odds ** (heard.times[state * actions + action] - most)
-        if mark < below:
-            chosen = action
-            break
-    return chosen
+        if mark < values[action]:
+            return action
+    return actions - 1
 
 
 # ---- reliability, as in CLUE ----------------------------------------------------------------------------------------

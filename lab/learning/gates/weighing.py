@@ -89,7 +89,7 @@ class Shaping(Weighing):
         learner = self._around.learner
         per_tau = 1.0 / max(COLDEST, temperature(self.episode, learner.beta, learner.exploration))
         odds = self.settings.consistency / (1.0 - self.settings.consistency)
-        return heard.shaped(self.heard, state, self._around.values(state), per_tau, odds, self._u)
+        return heard.shaped(self.heard, state, [*self._around.values(state)], per_tau, odds, self._u)
 
 
 class Reliability(Weighing):

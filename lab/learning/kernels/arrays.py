@@ -1,5 +1,6 @@
 """The records of the kernel, made for a problem, a learner, a gate and an advisor."""
 
+from functools import lru_cache
 from math import log
 from typing import NamedTuple
 
@@ -121,10 +122,9 @@ class Kept(NamedTuple):
 def sessions_of(learner: LearnerSettings, seeds: NDArray[np.uint64], size: int, kept: Kept) -> records.KernelSessions:
     """The inputs and empty results of sessions with these seeds; size: of a table, flat."""
     shape, every = (len(seeds), learner.episodes), kept.greedy_every
-    warm = [selection.temperature(n, learner.beta, learner.exploration) for n in range(1, learner.episodes + 1)]
     return records.KernelSessions(
         seeds=np.asarray(seeds, np.uint64),
-        warm=np.array(warm),
+        warm=_temperatures(learner.episodes, learner.beta, learner.exploration),
         steps=np.zeros(shape, np.int32),
         guided=np.zeros(shape, np.bool_),
         counts=np.zeros(len(seeds), records.COUNTS),
@@ -133,8 +133,15 @@ def sessions_of(learner: LearnerSettings, seeds: NDArray[np.uint64], size: int, 
         every=max(1, every),
         walks=kept.walks,
         walk_rng=np.zeros(1, np.uint64),
+        walk_moves=np.zeros(size, np.int64),
         returns=np.zeros((len(seeds) if kept.returns else 0, learner.episodes)),
     )
+
+
+@lru_cache
+def _temperatures(episodes: int, beta: float, exploration: float) -> FloatArray:
+    """The temperature, or epsilon, of each episode, (E,); nobody writes to it, as it is made once for many calls."""
+    return np.array([selection.temperature(n, beta, exploration) for n in range(1, episodes + 1)])
 
 
 def lanes_of(actions: int, episodes: int, size: int, ensemble: int) -> records.Lanes:

@@ -32,6 +32,18 @@ def begin_walks(rng: Any, seed: Any, number: int) -> None:
 
 
 @inlined
+def outcome(chances: Any, number: Any, u: float) -> int:
+    """The index of the outcome of a move that u selects (`ChanceTable.step`).
+
+    All are compared, because a branch that cannot be predicted costs more.
+    """
+    k: Any = 0
+    for i in range(chances.below.shape[1] - 1):
+        k += np.int64(u >= chances.below[number, i])
+    return int(k)
+
+
+@inlined
 def gauge(work: Any, table: Any, state: int, action: int) -> float:
     """`Update.gauge` of one action in a flat table."""
     at = np.uint64(state) * np.uint64(len(work.learning.actions)) + np.uint64(action)
@@ -219,21 +231,24 @@ def best_action(around: Any, state: int) -> int:
 
 
 @inlined
-def choose(work: Any) -> None:
-    """The learner's own choice in every lane; writes `chosen`, and the highest value and the span of the values."""
+def choose(work: Any, count: int) -> None:
+    """The learner's own choice in the first `count` lanes, which are in use.
+
+    Writes `chosen`, and the highest value and the span of the values.
+    """
     if work.learning.selection == selection.SOFTMAX:
-        _choose_softmax(work)
+        _choose_softmax(work, count)
     else:
-        _choose_greedy(work)
+        _choose_greedy(work, count)
 
 
 @inlined
-def _choose_greedy(work: Any) -> None:
-    """`selection.choose_greedy` or `choose_epsilon_greedy` in every lane."""
+def _choose_greedy(work: Any, count: int) -> None:
+    """`selection.choose_greedy` or `choose_epsilon_greedy` in the lanes in use."""
     lanes, learning = work.lanes, work.learning
     values, actions = lanes.values, len(learning.actions)
     offset, factor = (work.problem.step_reward, learning.discount) if learning.afterstate else (0.0, 1.0)
-    for j in range(LANES):
+    for j in range(count):
         top, low = -np.inf, np.inf
         for a in range(actions):
             value = gauge(work, lanes.tables[j], lanes.states[j], a)
@@ -245,8 +260,8 @@ def _choose_greedy(work: Any) -> None:
 
 
 @inlined
-def _choose_softmax(work: Any) -> None:
-    """`selection.choose_softmax` in every lane at once.
+def _choose_softmax(work: Any, count: int) -> None:
+    """`selection.choose_softmax` in the lanes in use at once.
 
     The values (A * LANES,) are overwritten by cumulative weights. The compiler knows the number of actions, so the lanes of one
     action stay in registers.
@@ -256,12 +271,12 @@ def _choose_softmax(work: Any) -> None:
     best = lanes.best
     A = len(work.learning.actions)
     offset, factor = (work.problem.step_reward, work.learning.discount) if afterstate else (0.0, 1.0)
-    for j in range(LANES):
+    for j in range(count):
         at = lanes.states[j] * np.uint64(A)
         for a in range(A):
             i = at + np.uint64(a)
             values[a * LANES + j] = lanes.tables[j, np.uint64(work.problem.successor[i]) if afterstate else i]
-    for j in range(LANES):
+    for j in range(count):
         top = low = values[j]
         for a in range(1, A):
             top, low = max(top, values[a * LANES + j]), min(low, values[a * LANES + j])
@@ -271,7 +286,7 @@ def _choose_softmax(work: Any) -> None:
         for a in range(A):
             total += _exp_of((offset + factor * values[a * LANES + j] - top) * per_tau[j])
             values[a * LANES + j] = total
-    for j in range(LANES):
+    for j in range(count):
         rng[j] = _following(rng[j])
         mark = _fraction(_mixed(rng[j])) * values[(A - 1) * LANES + j] * selection.BELOW_ONE
         action = np.int64(0)

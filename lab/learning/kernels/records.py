@@ -93,7 +93,8 @@ class KernelSessions(NamedTuple):
     seeds (N,); warm (E,): temperature or epsilon by episode; counts (N,) of COUNTS; kept (N, size): the tables, or (0, size) if
     not wanted.
     greedy (N, E // every), or (N, 0) if not wanted: after each `every`-th episode, the mean steps of `walks` episodes of the
-    greedy policy; walk_rng (1,): the state of their generator. returns (N, E), or (0, E) if not wanted: sums of rewards.
+    greedy policy; walk_rng (1,): the state of their generator; walk_moves (S,): the policy's move, state * A + action, in each
+    state, -1 where it has not been looked up. returns (N, E), or (0, E) if not wanted: sums of rewards.
     """
 
     seeds: NDArray[np.uint64]
@@ -106,6 +107,7 @@ class KernelSessions(NamedTuple):
     every: int
     walks: int
     walk_rng: NDArray[np.uint64]
+    walk_moves: NDArray[np.int64]
     returns: FloatArray
 
 

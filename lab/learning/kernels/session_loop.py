@@ -12,9 +12,19 @@ import numpy as np
 from lab.learning import advice_memory as memory
 from lab.learning import selection
 from lab.learning.compiled import inlined, inner, without_refcounts
+from lab.learning.gates.heard import NOTHING
 from lab.learning.kernels import hearing as hears
 from lab.learning.kernels.asking import decided, judge, judge_moved, knows, opens
-from lab.learning.kernels.learners import begin_walks, choose, draw, learn, learn_by_rule, learn_following, replay
+from lab.learning.kernels.learners import (
+    begin_walks,
+    choose,
+    draw,
+    learn,
+    learn_by_rule,
+    learn_following,
+    outcome,
+    replay,
+)
 from lab.learning.kernels.records import LANES
 
 _Memory: Any = memory.Memory
@@ -89,10 +99,12 @@ def _begin_episode(work: Any, memories: Any, hearing: Any, walks: Any, j: int) -
 
 
 @inlined
-def _begin(work: Any, memories: Any, hearing: Any, walks: Any, lookahead: Any, model: Any, started: int) -> int:
+def _begin(
+    work: Any, memories: Any, hearing: Any, walks: Any, lookahead: Any, model: Any, count: int, started: int
+) -> int:
     """Begins the next episode, or session, in each lane whose last one has ended; returns how many sessions have begun."""
     lanes, seeds = work.lanes, work.sessions.seeds
-    for j in range(LANES):
+    for j in range(count):
         if lanes.fresh[j]:
             lane = lanes.lane[j]
             lanes.fresh[j], lanes.moves[j], lanes.states[j] = False, 0, work.problem.starts[0]
@@ -100,7 +112,7 @@ def _begin(work: Any, memories: Any, hearing: Any, walks: Any, lookahead: Any, m
             if lookahead is not None:
                 lookahead.first[j] = lookahead.last[j] = 0
             if lane.episode == len(work.sessions.warm):
-                lane.session = -1  # an idle lane keeps making steps, which are ignored
+                lane.session = -1  # an idle lane makes no steps
                 if started < len(seeds):
                     _begin_session(work, hearing, walks, model, j, started)
                     if memories is not None:
@@ -127,7 +139,7 @@ def _learn(work: Any, hearing: Any, lookahead: Any, own: Any, j: int, following:
                 learn_following(work, lookahead, table, j, number, entered, reward, following, best)
             else:
                 learn_by_rule(work, own, own.others[j, k], number, entered, reward, following)
-    if hearing is not None and lanes.lane[j].session >= 0:
+    if hearing is not None:
         over = work.problem.ends[entered] != 0
         hears.saw(work, hearing, j, number // np.uint64(len(work.learning.actions)), number, entered, reward, over)
 
@@ -172,21 +184,19 @@ def _step(
     if chances is None:
         entered, reward = np.uint64(problem.successor[number]), problem.reward[number]
     else:
-        u, k = draw(lanes.rng, j), 0
-        while u >= chances.below[number, k]:
-            k += 1
+        k = outcome(chances, number, draw(lanes.rng, j))
         entered, reward = np.uint64(chances.entered[number, k]), chances.reward[number, k]
     ends = problem.ends[entered]
     if lookahead is None:
         _learn_at_once(work, own, j, state, number, entered, reward)
     if model is not None:
         replay(work, model, j, number, entered, reward)
-    if memories is not None and lanes.lane[j].session >= 0:
+    if memories is not None:
         mine = _of_lane(memories, j)
         _moved(mine, _Move(np.int64(number), source, np.int64(entered), ends != 0, ends == 1))
         if mine.now.trust < 0:
             lanes.is_open[j] = False
-    if lookahead is None and hearing is not None and lanes.lane[j].session >= 0:
+    if lookahead is None and hearing is not None:
         hears.saw(work, hearing, j, state, number, entered, reward, ends != 0)
     if walks is not None:
         walks.walk[j, lanes.moves[j]] = state
@@ -208,23 +218,26 @@ def _greedy_steps(work: Any, chances: Any, table: Any, seed: Any, number: int) -
     width, starts, total = np.uint64(len(learning.actions)), problem.starts, 0.0
     offset, factor = (problem.step_reward, learning.discount) if learning.afterstate else (0.0, 1.0)
     begin_walks(sessions.walk_rng, seed, number)
+    known = sessions.walk_moves
+    for place in range(len(problem.ends)):
+        known[place] = NOTHING
     for _ in range(sessions.walks):
         state, moves = np.uint64(starts[0]), 0
         if len(starts) > 1:
             state = np.uint64(starts[int(draw(sessions.walk_rng, 0) * len(starts))])
         while moves < learning.max_moves and problem.ends[state] == 0:
-            best, at = -np.inf, state * width
-            for a in range(len(learning.actions)):
-                move = state * width + np.uint64(a)
-                value = offset + factor * table[np.uint64(problem.successor[move]) if learning.afterstate else move]
-                if value > best:
-                    best, at = value, move
+            if known[state] == NOTHING:
+                best, known[state] = -np.inf, state * width
+                for a in range(len(learning.actions)):
+                    move = state * width + np.uint64(a)
+                    value = offset + factor * table[np.uint64(problem.successor[move]) if learning.afterstate else move]
+                    if value > best:
+                        best, known[state] = value, move
+            at = np.uint64(known[state])
             if chances is None:
                 state = np.uint64(problem.successor[at])
             else:
-                u, k = draw(sessions.walk_rng, 0), 0
-                while u >= chances.below[at, k]:
-                    k += 1
+                k = outcome(chances, at, draw(sessions.walk_rng, 0))
                 state = np.uint64(chances.entered[at, k])
             moves += 1
         total += moves + learning.count_start if problem.ends[state] == 1 else learning.max_steps + 1
@@ -237,8 +250,6 @@ def _end(work: Any, memories: Any, hearing: Any, chances: Any, walks: Any, own: 
     lanes, sessions, learning = work.lanes, work.sessions, work.learning
     lane, moves, won = lanes.lane[j], lanes.moves[j], work.problem.ends[lanes.states[j]] == 1
     lanes.fresh[j] = True
-    if lane.session < 0:
-        return 0
     n, episode, count = lane.session, lane.episode, sessions.counts[lane.session]
     sessions.steps[n, episode - 1] = moves + learning.count_start if won else learning.max_steps + 1
     sessions.guided[n, episode - 1] = lane.helped > 0
@@ -283,13 +294,14 @@ def run(work: Any, memories: Any, hearing: Any, chances: Any, walks: Any, lookah
     does not need the next action; model: None without planning; own: None for a shipped learner.
     """
     started = over = 0
-    fresh = True
+    fresh, count = True, min(LANES, len(work.sessions.seeds))
     while over < len(work.sessions.seeds):
         if fresh:
-            started = _begin(work, memories, hearing, walks, lookahead, model, started)
+            started = _begin(work, memories, hearing, walks, lookahead, model, count, started)
             fresh = False
-        choose(work)
-        for j in range(LANES):
-            if _step(work, memories, hearing, chances, walks, lookahead, model, own, j):
+        choose(work, count)
+        for j in range(count):
+            busy = work.lanes.lane[j].session >= 0
+            if busy and _step(work, memories, hearing, chances, walks, lookahead, model, own, j):
                 fresh = True
                 over += _end(work, memories, hearing, chances, walks, own, j)
