@@ -119,8 +119,9 @@ def compiled_rule(rule: Function, arguments: tuple[Any, ...]) -> tuple[Function,
     jitted.compile(types_of(arguments))
     jitted.disable_compile()  # what it returns for others is not known
     (signature,) = jitted.nopython_signatures
+    types: Any = numba.types
     made: Function = jitted
-    return made, isinstance(numba.types.unliteral(signature.return_type), numba.types.Boolean)
+    return made, types.unliteral(signature.return_type) == types.boolean
 
 
 def types_of(arguments: tuple[Any, ...]) -> tuple[Any, ...]:

@@ -6,6 +6,7 @@ import numpy as np
 
 from lab.errors import BadInput, shortened
 from lab.learning.gates.gate import ASKS_BY_RULE, OPENS_BY_RULE, CompiledGate, Gate, Steps, Surroundings, Values
+from lab.learning.selection import Draw
 from lab.learning.settings import GateSettings
 
 
@@ -48,7 +49,7 @@ class RuleGate(Gate):
 
     def __init__(self, settings: GateSettings, episodes: int, max_steps: int, around: Surroundings | None = None):
         super().__init__(settings, episodes, max_steps, around)
-        self._draw = (lambda: 0.0) if around is None else around.draw
+        self._draw: Draw = around.draw if around is not None else float  # outside sessions it returns 0.0
         self._episode = self._helped_steps = 0
 
     @staticmethod
