@@ -22,9 +22,7 @@ from lab.learning.updates.update import OWN_RULE, plain_rule
 from lab.mdp import TabularMDP
 
 TIMES_SLOWER = 250  # the session beside the kernel: 275 times with q, 222 with q-lambda, 160 with dyna-q
-WORTH_COMPILING = (
-    20_000  # episodes of one kind with a rule of other code: fewer take less time one by one than compiling
-)
+WORTH_COMPILING = 20_000  # episodes of one kind with a rule of other code: fewer take less time than compiling
 _compiled_rules: dict[Any, Any] = {}  # None: numba cannot compile it
 _episodes: Counter[Any] = Counter()  # that have been asked for, by the types for which the kernel is to be compiled
 _told: set[tuple[str, str]] = set()
