@@ -3,6 +3,7 @@
 import warnings
 from collections import Counter
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cache
 from multiprocessing import current_process
 from typing import Any
@@ -42,22 +43,19 @@ def runs_compiled(
     one if there are too few for what compiling takes, if a rule cannot be compiled, which a notice says, or if it fails: then
     the session shows in which line. Raises BadInput for values that are not finite.
     """
-    on_table, make, decides = learner.tilings == 1, UPDATES[learner.learner], GATES[gate.gate]
-    rules: dict[str, Any] = {}
-    if on_table and make.compiled == OWN_RULE:
-        rules["rule"] = plain_rule(make.make)  # type: ignore[arg-type]
-    if work.asking.gate.opens == OPENS_BY_RULE:
-        rules |= plain_rules(decides.make)  # type: ignore[arg-type]
-    if not rules:
+    on_table = learner.tilings == 1
+    learns = _learner_rule(learner.learner) if on_table else None
+    decides = _gate_rules(gate.gate) if work.asking.gate.opens == OPENS_BY_RULE else ()
+    if learns is None and not decides:
         kernel(work, *others, *((None, None) if on_table else (None,)))
         return True
-    kind = kernel, *rules.items(), *types_of((work, *others))
+    kind = kernel, learns, decides, types_of((work, *others))
     _episodes[kind] += work.sessions.steps.size
     if _episodes[kind] < WORTH_COMPILING:
         return False
     try:
-        own = _own_rule(rules["rule"], work, mdp, learner) if "rule" in rules else None
-        own_gate = _own_gate(rules, work, mdp, learner, gate) if "opens_rule" in rules else None
+        own = None if learns is None else _own_rule(work, mdp, learner)
+        own_gate = _own_gate(work, mdp, learner, gate) if decides else None
         _for_process(kernel)(work, *others, *((own, own_gate) if on_table else (own_gate,)))
     except Exception:  # whatever a rule raises
         return False
@@ -69,36 +67,74 @@ def runs_compiled(
 _for_process = cache(not_kept)
 
 
-def _own_rule(rule: Any, work: records.Work, mdp: TabularMDP, learner: LearnerSettings) -> records.OwnRule:
+def _own_rule(work: records.Work, mdp: TabularMDP, learner: LearnerSettings) -> records.OwnRule:
     shape, others = mdp.successor.shape, work.lanes.others
-    q = work.lanes.tables.reshape(LANES, *shape)
-    settings = records.NumberSettings(**{field: getattr(learner, field) for field in records.NumberSettings._fields})
     return records.OwnRule(
-        rule=_compiled("learner", learner.learner, rule, (q[0], settings, 0, 0, 0.0, 0.0, 0, 0)),
-        settings=settings,
-        q=q,
+        rule=_compiled_learner(learner.learner),
+        settings=_numbers(records.NumberSettings, learner),
+        q=work.lanes.tables.reshape(LANES, *shape),
         others=others.reshape(LANES, -1, *shape) if others.size else np.zeros((LANES, 0, *shape)),
         wrong=np.zeros(1, np.int64),
     )
 
 
-def _own_gate(
-    rules: dict[str, Any], work: records.Work, mdp: TabularMDP, learner: LearnerSettings, gate: GateSettings
-) -> records.OwnGate:
-    settings = records.GateNumbers(**{field: getattr(gate, field) for field in records.GateNumbers._fields})
-    now = GateNow(1, learner.episodes, learner.max_steps, 0, 0.0)
-    steps, values = work.sessions.steps.view(), np.zeros((LANES, mdp.n_actions))
-    shown = values.view()
-    steps.flags.writeable = shown.flags.writeable = False
+def _own_gate(work: records.Work, mdp: TabularMDP, learner: LearnerSettings, gate: GateSettings) -> records.OwnGate:
+    opens, asks = _compiled_gate(gate.gate)
+    values = np.zeros((LANES, mdp.n_actions))
     return records.OwnGate(
-        opens=_compiled("gate", gate.gate, rules["opens_rule"], (1, steps.reshape(-1), now, settings), answers=True),
-        asks=_compiled("gate", gate.gate, rules["asks_rule"], (0, shown[0], now, settings), answers=True),
-        settings=settings,
+        opens=opens,
+        asks=asks,
+        settings=_numbers(records.GateNumbers, gate),
         episodes=learner.episodes,
         max_steps=learner.max_steps,
-        steps=steps,
+        steps=_to_read(work.sessions.steps),
         values=values,
-        shown=shown,
+        shown=_to_read(values),
+    )
+
+
+def _to_read(array: Any) -> Any:
+    """The same memory as an array that cannot be written to."""
+    view = array.view()
+    view.flags.writeable = False
+    return view
+
+
+def _numbers(kind: Any, settings: LearnerSettings | GateSettings) -> Any:
+    """The numbers of settings as a record of that kind."""
+    return kind(**{field: getattr(settings, field) for field in kind._fields})
+
+
+# ---- the rules of members, plain and compiled -------------------------------------------------------------------------
+
+
+def _learner_rule(name: str) -> Any:
+    """The plain rule of a learner; None if it has a form of its own."""
+    row = UPDATES[name]
+    return plain_rule(row.make) if row.compiled == OWN_RULE else None  # type: ignore[arg-type]
+
+
+def _gate_rules(name: str) -> tuple[Any, ...]:
+    """The plain rules of a gate, which say whether it opens and whether it asks; none if it has a form of its own."""
+    form: Any = GATES[name].compiled
+    by_rule = form is not None and form.opens == OPENS_BY_RULE
+    return tuple(plain_rules(GATES[name].make).values()) if by_rule else ()  # type: ignore[arg-type]
+
+
+def _compiled_learner(name: str) -> Any:
+    """The compiled rule of a learner that is one. Raises TypeError if numba cannot compile it."""
+    settings = _numbers(records.NumberSettings, LearnerSettings())
+    return _compiled("learner", name, _learner_rule(name), (np.zeros((1, 1)), settings, 0, 0, 0.0, 0.0, 0, 0))
+
+
+def _compiled_gate(name: str) -> tuple[Any, Any]:
+    """The compiled rules of a gate that has them. Raises TypeError if numba cannot compile them, or they return no bool."""
+    opens, asks = _gate_rules(name)
+    others = GateNow(1, 1, 1, 0, 0.0), _numbers(records.GateNumbers, GateSettings())
+    steps, values = _to_read(np.zeros(1, np.int32)), _to_read(np.zeros(1))
+    return (
+        _compiled("gate", name, opens, (1, steps, *others), answers=True),
+        _compiled("gate", name, asks, (0, values, *others), answers=True),
     )
 
 
@@ -116,16 +152,30 @@ def _compiled(kind: str, name: str, rule: Any, arguments: tuple[Any, ...], answe
     return _compiled_rules[rule]
 
 
+# ---- the notice -------------------------------------------------------------------------------------------------------
+
+
 class Uncompiled(Notice):
     """The notice that an added member runs in the session only."""
 
 
-def tell_uncompiled(learner: str, gate: str) -> None:
-    """Tells once for each added learner and gate without a compiled form that its sessions are slow; not in worker processes."""
-    if UPDATES.is_added(learner) and UPDATES[learner].compiled is None:
-        _tell("learner", learner)
-    if GATES.is_added(gate) and GATES[gate].compiled is None:
-        _tell("gate", gate)
+def tell_uncompiled(learner: str, gate: str, episodes: int = 0) -> None:
+    """Tells once for each added learner and gate without a compiled form that its sessions are slow; not in worker processes.
+
+    episodes: how many worker processes are to run, which do not tell: if they are worth it, rules are compiled to see whether
+    that can be done.
+    """
+    for kind, family, name in (("learner", UPDATES, learner), ("gate", GATES, gate)):
+        if not family.is_added(name):
+            continue
+        if family[name].compiled is None:
+            _tell(kind, name)
+        elif episodes >= WORTH_COMPILING:
+            with suppress(TypeError):
+                _by_rule[kind](name)
+
+
+_by_rule: dict[str, Callable[[str], Any]] = {"learner": _compiled_learner, "gate": _compiled_gate}
 
 
 def _tell(kind: str, name: str, why: str = "") -> None:

@@ -32,15 +32,17 @@ ABOUT = (
     "tutorial loop 5, as their figure is a rate. 'kernel' and 'kernel gated' learn by the world's own learner, the others by the "
     "one that they name. 'kernel q ia' learns by q and asks an advisor of tau 0.1 as the gate ia does; 'session' in its place "
     "says that it is not compiled, and runs 5 sessions. 'own rule' is a gate of other code whose decisions are functions, "
-    "'own gate' one that decides the same in methods."
+    "'own gate' one that decides the same in methods. These rows count processor time, which others on the computer disturb less."
 )
 FEW = {"gymnasium tutorial loop": 5}  # the sessions of a rival so slow that few show its rate
 REPEATS = 5
+Clock = Callable[[], float]  # [s]
 UNCOMPILED = 5  # the sessions of what is not compiled, whose figure is a rate, too
 LEARNERS = ("q", "sarsa", "q-lambda", "sarsa-lambda", "dyna-q", "afterstate")
 GATES = (GateSettings("ccrl", omega=1), GateSettings("ia"), GateSettings("combined", omega=1))
+ALONE = GateSettings("never")
 OTHERS = tuple(GateSettings(name) for name in ("uncertainty", "earned-trust", "advice-reuse"))
-BESIDE = {gate.gate: gate for gate in (*GATES, *OTHERS)}  # the gates that are measured with each learner, by name
+BESIDE = {gate.gate: gate for gate in (ALONE, *GATES, *OTHERS)}  # the gates measured with each learner
 
 
 class OwnRule(RuleGate):
@@ -74,11 +76,13 @@ def speed(job: Job, reading: Mapping[str, Any]) -> Findings:
     advice = Advice.of(advice_chances(learned_table(place), 0.1))
     seeds = np.arange(job.seed, job.seed + job.sessions, dtype=np.uint64)
 
-    def learned(*gates: GateSettings, how: LearnerSettings = learner, most: int = job.sessions) -> Measured:
-        began, moves = time.perf_counter(), 0
+    def learned(
+        *gates: GateSettings, how: LearnerSettings = learner, most: int = job.sessions, clock: Clock = time.perf_counter
+    ) -> Measured:
+        began, moves = clock(), 0
         for gate in gates:
             moves += int(run_sessions(mdp, how, gate, advice, seeds[:most]).moves.sum())
-        return Measured(moves, time.perf_counter() - began)
+        return Measured(moves, clock() - began)
 
     def beside(name: str, gate: GateSettings) -> Row:
         """The row of a learner with a gate."""
@@ -88,7 +92,8 @@ def speed(job: Job, reading: Mapping[str, Any]) -> Findings:
         kind = "kernel" if compiled else "session"
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", Uncompiled)
-            return _row(f"{kind} {name} {gate.gate}", partial(learned, gate, how=how, most=most))
+            run = partial(learned, gate, how=how, most=most, clock=time.process_time)
+            return _row(f"{kind} {name} {gate.gate}", run)
 
     def against(name: str) -> Row | str:
         """The row of a rival, or the reason why there is none."""
@@ -98,11 +103,10 @@ def speed(job: Job, reading: Mapping[str, Any]) -> Findings:
         except Missing as error:
             return f"{name}: not measured: {error}"
 
-    rows = [_row("kernel", partial(learned, GateSettings("never"))), _row("kernel gated", partial(learned, *GATES))]
-    alone = GateSettings("never")
-    rows += [_row(f"kernel {name}", partial(learned, alone, how=replace(learner, learner=name))) for name in LEARNERS]
+    rows = [_row("kernel", partial(learned, ALONE)), _row("kernel gated", partial(learned, *GATES))]
+    rows += [_row(f"kernel {name}", partial(learned, ALONE, how=replace(learner, learner=name))) for name in LEARNERS]
     greedy = replace(learner, learner="q", selection="epsilon-greedy")
-    rows.append(_row("kernel q epsilon-greedy", partial(learned, alone, how=greedy)))
+    rows.append(_row("kernel q epsilon-greedy", partial(learned, ALONE, how=greedy)))
     gates = [*BESIDE.values(), *(GateSettings(FAMILY.use(name, gate)) for name, gate in OWN.items())]
     rows += [beside(name, gate) for name in LEARNERS for gate in gates]
     measured = job.in_turn([partial(against, name) for name in RIVALS])

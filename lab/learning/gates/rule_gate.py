@@ -50,6 +50,7 @@ class RuleGate(Gate):
     def __init__(self, settings: GateSettings, episodes: int, max_steps: int, around: Surroundings | None = None):
         super().__init__(settings, episodes, max_steps, around)
         self._draw: Draw = around.draw if around is not None else float  # outside sessions it returns 0.0
+        self._rules = plain_rules(type(self))
         self._episode = self._helped_steps = 0
 
     @staticmethod
@@ -78,7 +79,7 @@ class RuleGate(Gate):
 
     def _answer(self, name: str, *given: Any) -> bool:
         now = GateNow(self._episode, self.episodes, self.max_steps, self._helped_steps, self._draw())
-        answer = plain_rules(type(self))[name](*given, now, self.settings)
+        answer = self._rules[name](*given, now, self.settings)
         if isinstance(answer, bool | np.bool_):
             return bool(answer)
         raise BadInput(
