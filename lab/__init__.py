@@ -16,10 +16,10 @@ if TYPE_CHECKING:
     from lab.api.scenes import show
     from lab.api.studies import StudyResult, compare, study, tune
     from lab.errors import BadInput, LabError, WorkFailed
-    from lab.learning.gates import Gate, Steps
+    from lab.learning.gates import Gate, RuleGate, Steps
     from lab.learning.problem import Problem
     from lab.learning.requests import AdviceRequest, AdvisorLeft
-    from lab.learning.updates import Update
+    from lab.learning.updates import RuleUpdate, Update
     from lab.mdp import Rewards, TabularMDP, grid
     from lab.sequencing.cell.cell import Cell
     from lab.tasks.grid_world import GridWorld
@@ -39,10 +39,10 @@ _FACE = {
     "lab.teaching.mentor": ("watch",),
     "lab.teaching.subjects": ("world",),
     "lab.errors": ("BadInput", "LabError", "WorkFailed"),
-    "lab.learning.gates": ("Gate", "Steps"),
+    "lab.learning.gates": ("Gate", "RuleGate", "Steps"),
     "lab.learning.problem": ("Problem",),
     "lab.learning.requests": ("AdviceRequest", "AdvisorLeft"),
-    "lab.learning.updates": ("Update",),
+    "lab.learning.updates": ("RuleUpdate", "Update"),
     "lab.mdp": ("Rewards", "TabularMDP", "grid"),
     "lab.sequencing.cell.cell": ("Cell",),
     "lab.tasks.grid_world": ("GridWorld",),
@@ -66,6 +66,8 @@ __all__ = [
     "Policy",
     "Problem",
     "Rewards",
+    "RuleGate",
+    "RuleUpdate",
     "RunResult",
     "Steps",
     "StudyResult",

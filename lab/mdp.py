@@ -4,7 +4,7 @@ import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Annotated, Literal, get_type_hints
+from typing import Annotated, Any, Literal, get_type_hints
 
 import numpy as np
 from annotated_types import Ge, Gt, Le, Lt, doc
@@ -54,6 +54,9 @@ class NoPath(BadInput):
         super().__init__(message)
         self.enclosing = enclosing
         self.around = around
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (str(self), self.enclosing, self.around)  # so that it comes back from a worker process
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,5 +1,6 @@
 """Tables of small problems, redone by hand."""
 
+import pickle
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any
@@ -102,6 +103,8 @@ def test_enclosed_goal_names_its_walls() -> None:
     ) as e:
         grid((4, 4), blocked, (0, 0), (3, 3))
     assert (e.value.enclosing, e.value.around) == (((2, 3), (3, 2)), "goal")
+    again = pickle.loads(pickle.dumps(e.value))  # as from a worker process
+    assert (str(again), vars(again)) == (str(e.value), vars(e.value))
 
 
 def test_enclosed_start_names_its_walls() -> None:

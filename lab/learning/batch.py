@@ -20,7 +20,7 @@ from lab.learning.kernels import arrays as made
 from lab.learning.kernels import linear_loop, records
 from lab.learning.kernels.arrays import Kept
 from lab.learning.kernels.session_loop import run
-from lab.learning.own_rules import runs_by_rule, tell_uncompiled
+from lab.learning.own_rules import runs_compiled, tell_uncompiled
 from lab.learning.physics.cells import CellTable
 from lab.learning.selection import SELECTIONS
 from lab.learning.session import Session
@@ -102,7 +102,10 @@ def run_sessions(
         sessions = made.sessions_of(learner, seeds, size, kept)
         lanes = made.lanes_of(mdp.n_actions, learner.episodes, 0, 0)
         learning = learning._replace(actions=np.zeros(mdp.n_actions))  # of any length: compiled once for all
-        return _on_tiles(mdp, learner, records.Work(arrays, learning, asking, *advice_arrays, sessions, lanes))
+        work, linear = records.Work(arrays, learning, asking, *advice_arrays, sessions, lanes), _linear(mdp, learner)
+        if not runs_compiled(linear_loop.run, work, (linear, _world(mdp)), mdp, learner, gate):
+            return _one_by_one(place, learner, gate, advice, seeds, kept)
+        return _batch(sessions, _values_of_tiles(mdp, learner, sessions.kept))
     size = mdp.n_states * (1 if made.is_afterstate(learner) else mdp.n_actions)
     sessions = made.sessions_of(learner, seeds, size, kept)
     ensemble = gate.ensemble if asking.gate.asks == ASKS_WHERE_TABLES_DIFFER else 0
@@ -115,9 +118,7 @@ def run_sessions(
     )
     work = records.Work(arrays, learning, asking, *advice_arrays, sessions, lanes)
     optional = memories, hearing, made.chances_of(place), walks, lookahead, made.model_of(mdp, learner)
-    if UPDATES[learner.learner].compiled != OWN_RULE:
-        run(work, *optional, None)
-    elif not runs_by_rule(work, optional, mdp, learner):
+    if not runs_compiled(run, work, optional, mdp, learner, gate):
         return _one_by_one(place, learner, gate, advice, seeds, kept)
     tables = made.action_values(mdp, learning, sessions.kept)
     return _batch(sessions, tables)
@@ -171,11 +172,11 @@ def _one_by_one(
     return batch
 
 
-def _on_tiles(mdp: TabularMDP, learner: LearnerSettings, work: records.Work) -> Batch:
-    """The results of sessions of a learner with tile coding."""
+def _linear(mdp: TabularMDP, learner: LearnerSettings) -> linear_loop.Linear:
+    """The arrays of a learner with tile coding."""
     coding, rule = TileCoding(mdp.cells, learner.tilings), LINEAR[learner.learner]
     size, episodes = coding.count * mdp.n_actions, range(1, learner.episodes + 1)
-    linear = linear_loop.Linear(
+    return linear_loop.Linear(
         active=coding.active,
         weights=np.zeros(size),
         listed=np.zeros(size, np.int64),
@@ -192,10 +193,13 @@ def _on_tiles(mdp: TabularMDP, learner: LearnerSettings, work: records.Work) -> 
         lookahead=rule.lookahead,
         selection=SELECTIONS[learner.selection].compiled,
     )
-    linear_loop.run(work, linear, _world(mdp))
-    sessions, tables = work.sessions, work.sessions.kept.reshape(-1, coding.count, mdp.n_actions)
-    q = np.array([coding.values(weights) for weights in tables]).reshape(-1, *mdp.successor.shape)
-    return _batch(sessions, q)
+
+
+def _values_of_tiles(mdp: TabularMDP, learner: LearnerSettings, kept: FloatArray) -> FloatArray:
+    """The action values (N, S, A) of weights (N, size) of tiles."""
+    coding = TileCoding(mdp.cells, learner.tilings)
+    tables = kept.reshape(-1, coding.count, mdp.n_actions)
+    return np.array([coding.values(weights) for weights in tables]).reshape(-1, *mdp.successor.shape)
 
 
 def _world(mdp: TabularMDP) -> linear_loop.LinearWorld:

@@ -5,9 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from lab.errors import BadInput
-from lab.learning.environment import Environment, Step, TableEnvironment, highest_reward
+from lab.learning.environment import Environment, Judged, Step, TableEnvironment, highest_reward
 from lab.learning.selection import Draw
-from lab.mdp import FloatArray, IntArray, TabularMDP
+from lab.learning.settings import LearnerSettings
+from lab.mdp import FloatArray, IntArray, NoPath, TabularMDP
 
 Outcome = tuple[float, int, float]  # chance, state entered, reward
 
@@ -37,6 +38,27 @@ class ChanceTable(TableEnvironment):
             if abs(total - 1.0) > 1e-9:
                 raise BadInput(f"outcomes of move {number}: their chances sum to {total:g}: wanted 1")
             self.below[number, len(row_outcomes) - 1] = 2.0  # the last outcome, even if the sum was rounded down
+
+    def check(self) -> None:
+        """Raises NoPath if no goal can be reached from a start, by whatever outcomes."""
+        mdp, reached = self.mdp, np.zeros(self.mdp.n_states, bool)
+        possible = np.diff(self.below, axis=1, prepend=0.0) > 0.0
+        further = [*mdp.starts] or [mdp.start]
+        while len(further):
+            reached[further] = True
+            if (reached & mdp.goal).any():
+                return
+            moves = np.repeat(reached & ~mdp.terminal, mdp.n_actions)
+            entered = self.entered[moves][possible[moves]]
+            further = np.unique(entered[~reached[entered]]).tolist()
+        raise NoPath(f"no goal can be reached from {mdp.state_label(mdp.start)}", (), "goal")
+
+    def judge(self, q: FloatArray, learner: LearnerSettings) -> Judged:
+        """The judgement by the likeliest outcomes; not solved, of unknown fewest steps, where these reach no goal."""
+        try:
+            return super().judge(q, learner)
+        except NoPath:
+            return Judged(None, None, False)
 
     def step(self, state: int, action: int, draw: Draw) -> Step:
         """The step that one uniform number selects among the move's outcomes."""

@@ -108,6 +108,27 @@ def inner(function: Function, **options: Any) -> Function:
     return jitted
 
 
+def compiled_rule(rule: Function, arguments: tuple[Any, ...]) -> tuple[Function, bool]:
+    """A rule of other code, compiled as `inner` for arguments like these; the second value is whether it returns a bool.
+
+    It raises the errors of Python, as for a division by zero. Raises any exception if it cannot be compiled.
+    """
+    options = _WITHOUT_REFCOUNTS | {"error_model": "python"}
+    jit: Any = numba.njit
+    jitted: Any = jit(nogil=True, no_cpython_wrapper=True, no_cfunc_wrapper=True, boundscheck=True, **options)(rule)
+    jitted.compile(types_of(arguments))
+    jitted.disable_compile()  # what it returns for others is not known
+    (signature,) = jitted.nopython_signatures
+    types: Any = numba.types
+    made: Function = jitted
+    return made, types.unliteral(signature.return_type) == types.boolean
+
+
+def types_of(arguments: tuple[Any, ...]) -> tuple[Any, ...]:
+    """The types as which a compiled function takes these arguments."""
+    return tuple(map(numba.typeof, arguments))
+
+
 def inlined(function: Function) -> Function:
     """The function compiled as `inner` and inlined, for calls in every step: passing records then costs nothing."""
     return inner(function, forceinline=True)

@@ -22,6 +22,7 @@ from lab.learning.environment import Environment, TableEnvironment, highest_rewa
 from lab.learning.gates import GATES
 from lab.learning.greedy import greedy_every, measure_greedy
 from lab.learning.kernels.records import LANES
+from lab.learning.own_rules import tell_uncompiled
 from lab.learning.physics.environment import PhysicsEnvironment
 from lab.learning.problem import Problem
 from lab.learning.requests import Advisor, Ask
@@ -253,6 +254,8 @@ def compared(what: Compared, job: Job) -> Findings:
         lambda entry: (entry["key"], ComparedSessions.from_json(entry)) if entry["key"] in keys else None
     )
     left = [key for key in keys if key not in done]
+    for how in (keys[key].subject().settings for key in left if problem.environment is None):
+        tell_uncompiled(how.learner.learner, how.gate.gate, job.sessions * how.learner.episodes)
     job.progress(len(done), len(keys))
     work = partial(sessions_of, sessions=job.sessions, seed=job.seed)
     for setting, measured in job.computed(work, [keys[key] for key in left], 1):

@@ -25,7 +25,7 @@ from lab.learning.simulated_advice import (
     advice_chances,
 )
 from lab.learning.splitmix import stream
-from lab.mdp import TabularMDP, grid, optimal_values
+from lab.mdp import NoPath, TabularMDP, grid, optimal_values
 
 LEARNER = LearnerSettings("q", alpha=0.5, episodes=25, max_steps=30)
 EAGER = GateSettings(first_episode=4, window=2, omega=1, psi=0.4, spread=0.2, rate=0.3, enough_steps=9.0, budget=50)
@@ -61,6 +61,32 @@ def test_compiled_sessions_are_the_same(gate: str, speaks: int) -> None:
         np.testing.assert_array_equal(batch.steps[n], one.steps)
         np.testing.assert_array_equal(batch.q[n], one.q)
         assert (batch.requests[n], batch.helped_steps[n]) == (one.requests, one.helped_steps)
+
+
+def test_a_goal_that_is_entered_by_unlikely_outcomes_only_can_be_reached() -> None:
+    """Of the three cells in a row the last is the goal; the likeliest outcome of each move is to stay."""
+    mdp = grid((1, 3), np.zeros((1, 3), bool), (0, 0), (0, 2))
+    moves = [(state, int(mdp.successor[state, a]), float(mdp.reward[state, a])) for state in range(3) for a in range(4)]
+    outcomes: list[list[Outcome]] = [[(0.6, state, -1.0), (0.4, led, paid)] for state, led, paid in moves]
+    likeliest = TabularMDP(
+        np.repeat(np.arange(3, dtype=np.int32)[:, None], 4, axis=1),
+        np.where(mdp.terminal[:, None], 0.0, -1.0).repeat(4, axis=1),
+        mdp.terminal,
+        mdp.goal,
+        0,
+        mdp.action_labels,
+    )
+    table = ChanceTable(likeliest, outcomes, optimal_values(mdp, 0.99))
+    draw = stream(9)
+    one = Session(table, LEARNER, GateSettings("never"), None, draw).run()
+    assert (one.optimal_steps, one.final_steps, one.solved) == (None, None, False)
+    assert one.steps.min() >= 2
+    batch = run_sessions(table, LEARNER, GateSettings("never"), None, np.array([9], np.uint64), keep_tables=True)
+    np.testing.assert_array_equal(batch.steps[0], one.steps)
+    np.testing.assert_array_equal(batch.q[0], one.q)
+    never = [[(1.0, state, -1.0)] for state, _, _ in moves]
+    with pytest.raises(NoPath, match="no goal can be reached from"):
+        ChanceTable(likeliest, never, np.zeros((3, 4))).check()
 
 
 def test_outcomes_come_as_often_as_they_should() -> None:

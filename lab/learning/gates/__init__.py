@@ -19,11 +19,12 @@ from lab.learning.gates.gate import (
 )
 from lab.learning.gates.other_gates import ConstantPerformance, Uncertainty, deviation
 from lab.learning.gates.reuse import AdviceImitation, AdviceReuse, PolicyReuse, ValueReuse
+from lab.learning.gates.rule_gate import RuleGate, compiled_form
 from lab.learning.gates.weighing import Fading, Novelty, Reliability, Shaping, TwoLevels
 from lab.learning.members import Member
 from lab.plugins.family import Family, first_line, takes, wanted
 
-__all__ = ["GATES", "Gate", "Steps", "Surroundings", "deviation", "improvement"]
+__all__ = ["GATES", "Gate", "RuleGate", "Steps", "Surroundings", "deviation", "improvement"]
 
 GATE_TAKES = ("settings", "episodes", "max_steps", "around")
 
@@ -31,7 +32,7 @@ GATE_TAKES = ("settings", "episodes", "max_steps", "around")
 def _adopted(name: str, thing: Any) -> Member[GateClass]:
     if not (isinstance(thing, type) and issubclass(thing, Gate) and takes(thing, *GATE_TAKES)):
         raise wanted(thing, f"a subclass of lab.Gate that is made with {', '.join(GATE_TAKES)}")
-    return Member(thing, first_line(thing))
+    return Member(thing, first_line(thing), compiled_form(thing))
 
 
 def _weighing(how: int) -> CompiledGate:

@@ -15,10 +15,10 @@ Steps = Sequence[
     float
 ]  # step counts of the finished episodes; for orders of transfers, their makespans [s]; see `by_return`
 
-OPENS_NEVER, OPENS_ALWAYS, OPENS_FROM_X, OPENS_WHILE_SLOW, OPENS_WHILE_LONG = range(5)
+OPENS_NEVER, OPENS_ALWAYS, OPENS_FROM_X, OPENS_WHILE_SLOW, OPENS_WHILE_LONG, OPENS_BY_RULE = range(6)
 WEIGHS_NOTHING, WEIGHS_NOVELTY, WEIGHS_FADING, WEIGHS_SHAPING, WEIGHS_RELIABILITY, WEIGHS_WORTH, WEIGHS_TRUST = range(7)
 WEIGHS_REUSE, WEIGHS_IMITATION, WEIGHS_POLICY, WEIGHS_VALUES = range(7, 11)
-ASKS_ALWAYS, ASKS_WHERE_ALIKE, ASKS_WHERE_APART, ASKS_BY_CHANCE, ASKS_WHERE_TABLES_DIFFER = range(5)
+ASKS_ALWAYS, ASKS_WHERE_ALIKE, ASKS_WHERE_APART, ASKS_BY_CHANCE, ASKS_WHERE_TABLES_DIFFER, ASKS_BY_RULE = range(6)
 
 TIMES_LONGER = 3.0  # how much longer than its own a learner's episodes are with an advisor that is to be rejected
 ENOUGH_EVIDENCE = log(50.0)  # Wald's bound: a useful advisor is rejected with a chance of about 2 %

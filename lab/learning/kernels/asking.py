@@ -8,9 +8,11 @@ from lab.learning import advice_memory as memory
 from lab.learning.compiled import inlined, inner
 from lab.learning.gates import gate as rules
 from lab.learning.gates.heard import NOTHING
+from lab.learning.gates.rule_gate import GateNow
 from lab.learning.kernels.hearing import answered, takes, wants
 from lab.learning.kernels.learners import draw, gauge
 
+_Now: Any = GateNow
 _window_mean: Any = inner(rules.window_mean)
 _too_slow: Any = inner(rules.too_slow)
 _misled: Any = inner(rules.misled)
@@ -41,6 +43,29 @@ def opens(asking: Any, lane: Any, steps: Any, max_steps: int, rejected: bool) ->
     previous = _window_mean(steps, episode - 1 - window, window)
     slow = _too_slow(current, previous, asking.lambda_threshold)
     return bool(slow and lane.converged == 0 and episode < len(steps))
+
+
+@inlined
+def _now(work: Any, own_gate: Any, j: int) -> Any:
+    """What the rules of lane j's gate read."""
+    lane = work.lanes.lane[j]
+    helped_steps = work.asking.budget - lane.left + lane.helped
+    return _Now(lane.episode, own_gate.episodes, own_gate.max_steps, helped_steps, draw(work.lanes.rng, j))
+
+
+@inlined
+def opens_by_rule(work: Any, own_gate: Any, j: int) -> bool:
+    """`RuleGate.opens` of the episode that begins in lane j."""
+    lane = work.lanes.lane[j]
+    steps = own_gate.steps[lane.session, : lane.episode - 1]
+    return bool(own_gate.opens(lane.episode, steps, _now(work, own_gate, j), own_gate.settings))
+
+
+@inlined
+def show(work: Any, own_gate: Any, j: int) -> None:
+    """Writes `Update.gauge` of lane j's state to `own_gate.values`."""
+    for a in range(len(work.learning.actions)):
+        own_gate.values[j, a] = gauge(work, work.lanes.tables[j], work.lanes.states[j], a)
 
 
 @inner
@@ -155,9 +180,12 @@ def _deviation(work: Any, j: int, state: Any) -> float:
 
 
 @inlined
-def asks(work: Any, j: int, state: Any) -> bool:
-    """`Gate.asks` in a state of lane j's open episode."""
+def asks(work: Any, own_gate: Any, j: int, state: Any) -> bool:
+    """`Gate.asks` in a state of lane j's open episode, whose values `own_gate` shows."""
     asking, lanes = work.asking, work.lanes
+    if own_gate is not None:
+        now = _now(work, own_gate, j)
+        return bool(own_gate.asks(np.int64(state), own_gate.shown[j], now, own_gate.settings))
     rule = asking.gate.asks
     if rule == rules.ASKS_WHERE_ALIKE:
         return bool(_unsure(lanes.widths[j], asking.psi))
@@ -182,7 +210,7 @@ def advised(work: Any, j: int, state: Any) -> Any:
 
 
 @inlined
-def decided(work: Any, memories: Any, hearing: Any, j: int) -> Any:
+def decided(work: Any, memories: Any, hearing: Any, own_gate: Any, j: int) -> Any:
     """The action of lane j's next step and its source: its own choice, practice of the known path, or advice."""
     lanes, state = work.lanes, work.lanes.states[j]
     action, source = np.uint64(lanes.chosen[j]), np.int64(memory.OWN)
@@ -193,7 +221,7 @@ def decided(work: Any, memories: Any, hearing: Any, j: int) -> Any:
     if lanes.is_open[j]:
         lane = lanes.lane[j]
         if hearing is None:
-            if lane.helped < lane.left and asks(work, j, state):
+            if lane.helped < lane.left and asks(work, own_gate, j, state):
                 lane.asked = 1
                 if work.region[state]:
                     lane.helped += 1
@@ -201,7 +229,7 @@ def decided(work: Any, memories: Any, hearing: Any, j: int) -> Any:
         else:
             weighs, said = work.asking.gate.weighs != rules.WEIGHS_NOTHING, NOTHING
             may = lane.helped < lane.left
-            wanted = wants(work, hearing, j, state) if weighs else may and asks(work, j, state)
+            wanted = wants(work, hearing, j, state) if weighs else may and asks(work, own_gate, j, state)
             if wanted and may:
                 lane.asked = 1
                 said = answered(work, hearing, j, state, action)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from lab.learning import selection, tiles
 from lab.learning.compiled import inlined, inner, without_refcounts
-from lab.learning.kernels.asking import decided, judge, opens
+from lab.learning.kernels.asking import decided, judge, opens, opens_by_rule
 from lab.learning.kernels.learners import draw, greedy
 from lab.learning.physics import ACROBOT, MOUNTAIN_CAR, acrobot, cart_pole, mountain_car
 from lab.learning.tiles import TileArray
@@ -123,11 +123,14 @@ def _look(linear: Any, state: int) -> float:
 
 
 @inlined
-def _choose(work: Any, linear: Any, state: int) -> None:
-    """Writes the learner's own choice in a state to lane 0."""
+def _choose(work: Any, linear: Any, own_gate: Any, state: int) -> None:
+    """Writes the learner's own choice in a state to lane 0, and shows its values to the gate's rules."""
     lanes, values, actions = work.lanes, linear.values, len(linear.values)
     warm = linear.warm[lanes.lane[0].episode - 1]
     best, low = _look(linear, state), np.inf
+    if own_gate is not None:
+        for action in range(actions):
+            own_gate.values[0, action] = values[action]
     for action in range(actions):
         low = min(low, values[action])
     lanes.states[0], lanes.widths[0] = state, best - low
@@ -190,7 +193,7 @@ def _begin_session(work: Any, linear: Any, n: int) -> None:
 
 
 @inlined
-def _begin_episode(work: Any, linear: Any) -> None:
+def _begin_episode(work: Any, linear: Any, own_gate: Any) -> None:
     """Begins the next episode: decides whether it may ask, and clears the traces."""
     lanes, sessions, asking = work.lanes, work.sessions, work.asking
     lane = lanes.lane[0]
@@ -198,7 +201,10 @@ def _begin_episode(work: Any, linear: Any) -> None:
     lane.episode, lane.asked, lane.helped = lane.episode + 1, 0, 0
     lane.left = asking.budget - count.helped_steps
     steps = sessions.steps[lane.session]
-    lane.is_open = opens(asking, lane, steps, work.learning.max_steps, count.rejected_at_episode > 0)
+    if own_gate is None:
+        lane.is_open = opens(asking, lane, steps, work.learning.max_steps, count.rejected_at_episode > 0)
+    else:
+        lane.is_open = opens_by_rule(work, own_gate, 0)
     lanes.is_open[0] = lane.is_open
     for i in range(linear.traces[0]):
         linear.place[linear.listed[i]] = -1
@@ -206,13 +212,13 @@ def _begin_episode(work: Any, linear: Any) -> None:
 
 
 @inlined
-def _episode(work: Any, linear: Any, world: Any) -> None:
+def _episode(work: Any, linear: Any, world: Any, own_gate: Any) -> None:
     """`Session._walk`, and the bookkeeping of the episode."""
     lanes, learning, problem, sessions = work.lanes, work.learning, work.problem, work.sessions
     lane = lanes.lane[0]
     state: Any = _start(work, world)
-    _choose(work, linear, state)
-    action: Any = np.int64(decided(work, None, None, 0)[0])
+    _choose(work, linear, own_gate, state)
+    action: Any = np.int64(decided(work, None, None, own_gate, 0)[0])
     moves, over, won, returned = 0, False, False, 0.0
     entered: Any = 0
     following: Any = np.int64(0)
@@ -229,12 +235,12 @@ def _episode(work: Any, linear: Any, world: Any) -> None:
         returned += reward
         last = moves == learning.max_moves
         if linear.lookahead and not over:
-            _choose(work, linear, entered)
-            following = np.int64(lanes.chosen[0]) if last else np.int64(decided(work, None, None, 0)[0])
+            _choose(work, linear, own_gate, entered)
+            following = np.int64(lanes.chosen[0]) if last else np.int64(decided(work, None, None, own_gate, 0)[0])
         _learn(linear, state, action, reward, 0.0 if over else learning.discount, entered, following)
         if not linear.lookahead and not over and not last:
-            _choose(work, linear, entered)
-            following = np.int64(decided(work, None, None, 0)[0])
+            _choose(work, linear, own_gate, entered)
+            following = np.int64(decided(work, None, None, own_gate, 0)[0])
         state, action = entered, following
     n, count = lane.session, sessions.counts[lane.session]
     if world.longer_is_better:
@@ -252,13 +258,13 @@ def _episode(work: Any, linear: Any, world: Any) -> None:
 
 
 @without_refcounts
-def run(work: Any, linear: Any, world: Any) -> None:
-    """Runs all sessions, one after the other."""
+def run(work: Any, linear: Any, world: Any, own_gate: Any) -> None:
+    """Runs all sessions, one after the other; own_gate: None for a shipped gate."""
     for n in range(len(work.sessions.seeds)):
         _begin_session(work, linear, n)
         for _ in range(len(linear.warm)):
-            _begin_episode(work, linear)
-            _episode(work, linear, world)
+            _begin_episode(work, linear, own_gate)
+            _episode(work, linear, world, own_gate)
         if len(work.sessions.kept):
             for i in range(len(linear.weights)):
                 work.sessions.kept[n, i] = linear.weights[i]

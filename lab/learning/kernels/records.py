@@ -238,6 +238,46 @@ class OwnRule(NamedTuple):
     wrong: NDArray[np.int64]
 
 
+class OwnGate(NamedTuple):
+    """The rules of a `RuleGate`, compiled, with what they read.
+
+    episodes, max_steps: of the session; steps (N, E): those of `KernelSessions`; values (LANES, A): of the current states; shown:
+    the same memory, which the rules cannot write to, as they cannot to `steps`.
+    """
+
+    opens: Any
+    asks: Any
+    settings: "GateNumbers"
+    episodes: int
+    max_steps: int
+    steps: NDArray[np.int32]
+    values: FloatArray
+    shown: FloatArray
+
+
+class GateNumbers(NamedTuple):
+    """The numbers of `GateSettings`."""
+
+    lambda_threshold: float
+    omega: int
+    first_episode: int
+    window: int
+    psi: float
+    spread: float
+    rate: float
+    fading: float
+    reuse: float
+    bonus: float
+    consistency: float
+    enough_steps: float
+    ensemble: int
+    budget: int
+    judge_unhelped: bool
+    spare_best: bool
+    by_evidence: bool
+    memory: bool
+
+
 class NumberSettings(NamedTuple):
     """The numbers of `LearnerSettings`."""
 

@@ -14,7 +14,7 @@ from lab.learning import selection
 from lab.learning.compiled import inlined, inner, without_refcounts
 from lab.learning.gates.heard import NOTHING
 from lab.learning.kernels import hearing as hears
-from lab.learning.kernels.asking import decided, judge, judge_moved, knows, opens
+from lab.learning.kernels.asking import decided, judge, judge_moved, knows, opens, opens_by_rule, show
 from lab.learning.kernels.learners import (
     begin_walks,
     choose,
@@ -70,14 +70,17 @@ def _begin_session(work: Any, hearing: Any, walks: Any, model: Any, j: int, n: i
 
 
 @inlined
-def _begin_episode(work: Any, memories: Any, hearing: Any, walks: Any, j: int) -> None:
+def _begin_episode(work: Any, memories: Any, hearing: Any, walks: Any, own_gate: Any, j: int) -> None:
     """Begins the next episode of lane j: decides whether it may ask, sets its temperature and its start."""
     lanes, sessions, asking, starts = work.lanes, work.sessions, work.asking, work.problem.starts
     lane = lanes.lane[j]
     count, steps = sessions.counts[lane.session], sessions.steps[lane.session]
     lane.episode, lane.asked, lane.helped = lane.episode + 1, 0, 0
     lane.left = asking.budget - count.helped_steps
-    lane.is_open = opens(asking, lane, steps, work.learning.max_steps, count.rejected_at_episode > 0)
+    if own_gate is None:
+        lane.is_open = opens(asking, lane, steps, work.learning.max_steps, count.rejected_at_episode > 0)
+    else:
+        lane.is_open = opens_by_rule(work, own_gate, j)
     lanes.warm[j] = sessions.warm[lane.episode - 1]
     if memories is not None:
         mine, may = _of_lane(memories, j), lane.is_open == 1
@@ -100,7 +103,15 @@ def _begin_episode(work: Any, memories: Any, hearing: Any, walks: Any, j: int) -
 
 @inlined
 def _begin(
-    work: Any, memories: Any, hearing: Any, walks: Any, lookahead: Any, model: Any, count: int, started: int
+    work: Any,
+    memories: Any,
+    hearing: Any,
+    walks: Any,
+    lookahead: Any,
+    model: Any,
+    own_gate: Any,
+    count: int,
+    started: int,
 ) -> int:
     """Begins the next episode, or session, in each lane whose last one has ended; returns how many sessions have begun."""
     lanes, seeds = work.lanes, work.sessions.seeds
@@ -119,7 +130,7 @@ def _begin(
                         _clear(_of_lane(memories, j))
                     started += 1
             if lane.session >= 0:
-                _begin_episode(work, memories, hearing, walks, j)
+                _begin_episode(work, memories, hearing, walks, own_gate, j)
     return started
 
 
@@ -162,7 +173,16 @@ def _learn_at_once(work: Any, own: Any, j: int, state: Any, number: Any, entered
 
 @inlined
 def _step(
-    work: Any, memories: Any, hearing: Any, chances: Any, walks: Any, lookahead: Any, model: Any, own: Any, j: int
+    work: Any,
+    memories: Any,
+    hearing: Any,
+    chances: Any,
+    walks: Any,
+    lookahead: Any,
+    model: Any,
+    own: Any,
+    own_gate: Any,
+    j: int,
 ) -> bool:
     """Makes one step of lane j and learns from it; returns whether its episode has ended.
 
@@ -175,7 +195,9 @@ def _step(
     if truncated:
         action, source = np.uint64(lanes.chosen[j]), np.int64(memory.OWN)
     else:
-        action, source = decided(work, memories, hearing, j)
+        if own_gate is not None and lanes.is_open[j]:
+            show(work, own_gate, j)
+        action, source = decided(work, memories, hearing, own_gate, j)
     if lookahead is not None and lanes.moves[j] > 0:
         _learn(work, hearing, lookahead, own, j, action, lanes.best[j])
     if truncated:
@@ -286,22 +308,33 @@ def _end(work: Any, memories: Any, hearing: Any, chances: Any, walks: Any, own: 
 
 
 @without_refcounts
-def run(work: Any, memories: Any, hearing: Any, chances: Any, walks: Any, lookahead: Any, model: Any, own: Any) -> None:
+def run(
+    work: Any,
+    memories: Any,
+    hearing: Any,
+    chances: Any,
+    walks: Any,
+    lookahead: Any,
+    model: Any,
+    own: Any,
+    own_gate: Any,
+) -> None:
     """Runs all sessions; each lane takes the next one when its own has ended.
 
     memories: None without memory; hearing: None if the gate weighs no advice and the advisor answers at once; chances: None for
     deterministic moves; walks: None if no gate judges, or if all episodes begin in one state; lookahead: None for a learner that
-    does not need the next action; model: None without planning; own: None for a shipped learner.
+    does not need the next action; model: None without planning; own, own_gate: None for a shipped learner, and for a
+    shipped gate.
     """
     started = over = 0
     fresh, count = True, min(LANES, len(work.sessions.seeds))
     while over < len(work.sessions.seeds):
         if fresh:
-            started = _begin(work, memories, hearing, walks, lookahead, model, count, started)
+            started = _begin(work, memories, hearing, walks, lookahead, model, own_gate, count, started)
             fresh = False
         choose(work, count)
         for j in range(count):
             busy = work.lanes.lane[j].session >= 0
-            if busy and _step(work, memories, hearing, chances, walks, lookahead, model, own, j):
+            if busy and _step(work, memories, hearing, chances, walks, lookahead, model, own, own_gate, j):
                 fresh = True
                 over += _end(work, memories, hearing, chances, walks, own, j)

@@ -126,6 +126,16 @@ class RuleUpdate(OnTable):
     q[state][action] in place; settings: the numbers of `LearnerSettings`, by name; the rest is as in `learn`. It is written in
     the Python that numba compiles, makes no list and no array, and calls nothing but what numba knows.
     A subclass that overrides another method runs in the session only.
+
+        >>> import lab
+        >>> class Halfway(lab.RuleUpdate):
+        ...     '''As q, by half of the learning rate.'''
+        ...     @staticmethod
+        ...     def rule(q, settings, s_tm1, a_tm1, r_t, discount_t, s_t, a_t):
+        ...         target = r_t + discount_t * max(q[s_t])
+        ...         q[s_tm1][a_tm1] += 0.5 * settings.alpha * (target - q[s_tm1][a_tm1])
+        >>> from lab.testing import check_learner
+        >>> check_learner(Halfway)
     """
 
     rule: ClassVar[Any]

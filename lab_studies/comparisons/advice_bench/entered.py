@@ -13,7 +13,7 @@ from lab.advice.advisors import AdvisorName
 from lab.errors import BadInput, check_value, unknown
 from lab.files import code_key
 from lab.learning.gates import GATES, Gate
-from lab.learning.own_rules import tell_uncompiled
+from lab.learning.own_rules import WORTH_COMPILING, tell_uncompiled
 from lab.plugins.code_file import files_taken, from_file, take
 from lab.studies.compared import FAMILIES
 from lab_studies.comparisons.advice_bench import families
@@ -56,7 +56,7 @@ class Entered:
         problems = [_problem(given, places) for given in _listed(reading, "problem", (*PROBLEMS, *HELD_OUT))]
         advisors = [_advisor(given, made) for given in _listed(reading, "advisors", ADVISORS)]
         for rule in rules:
-            tell_uncompiled("q", rule)
+            tell_uncompiled("q", rule, WORTH_COMPILING)
         files = {name: file for name, file in files_taken().items() if name in (*rules, *advisors, *problems)}
         once = [tuple(dict.fromkeys(several)) for several in (rules, advisors, problems)]
         drawn_from = reading.get("families_seed", families.SEED)

@@ -1,14 +1,18 @@
 """The speed study: the kernel beside rivals that took a known time. What the kernel itself takes is not judged here."""
 
+import warnings
 from typing import Any
 
 import pytest
 
-from lab.learning.settings import LearnerSettings
+from lab.learning.gates import GATES
+from lab.learning.gates.gate import Introspection
+from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import TabularMDP
 from lab.studies.runner import Job
+from lab.testing import check_gate
 from lab_studies.comparisons import learning_speed as module
-from lab_studies.comparisons.learning_speed import FEW, LEARNERS, REPEATS, SESSIONS, speed
+from lab_studies.comparisons.learning_speed import FEW, LEARNERS, REPEATS, SESSIONS, OwnGate, OwnRule, speed
 from lab_studies.comparisons.learning_speed_rivals import C_LANES, RIVALS
 from lab_studies.comparisons.learning_speed_session import Measured, Missing
 from lab_studies.thesis.chapter_9_sessions import world
@@ -30,6 +34,40 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> Asked:
 
     monkeypatch.setattr(module, "RIVALS", {"quick": quick, "gone": missing})
     return calls
+
+
+@pytest.fixture(autouse=True)
+def alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No learner beside every gate, which takes minutes."""
+    monkeypatch.setattr(module, "BESIDE", {})
+    monkeypatch.setattr(module, "OWN", {})
+
+
+def test_every_learner_beside_every_gate(asked: Asked, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is not compiled is named a session and runs few of them: there several learners do not fit side by side."""
+    monkeypatch.setattr(module, "RIVALS", {})
+    monkeypatch.setattr(module, "REPEATS", 1)
+    monkeypatch.setattr(module, "UNCOMPILED", 1)
+    monkeypatch.setattr(module, "LEARNERS", ("q", "dyna-q"))
+    monkeypatch.setattr(module, "BESIDE", {"uncertainty": GateSettings("uncertainty", ensemble=2)})
+    monkeypatch.setattr(module, "OWN", {"own gate": OwnGate})
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        rows = speed(Job(sessions=10), {}).rows
+    uncertainty = ["kernel q uncertainty", "session dyna-q uncertainty"]
+    own = ["session q own gate", "session dyna-q own gate"]
+    assert [one["name"] for one in rows][5:] == [uncertainty[0], own[0], uncertainty[1], own[1]]
+    assert all(one["value"] > 0 for one in rows)
+
+
+def test_the_rules_are_those_of_ia() -> None:
+    assert GATES[GATES.use("own rule", OwnRule)].compiled is not None
+    assert GATES[GATES.use("own gate", OwnGate)].compiled is None
+    for gate in (OwnRule, OwnGate):
+        check_gate(gate)
+    for values, width in (((0.0, 0.5), 0.5), ((0.0, 2.0), 2.0)):
+        own, ia = (kind(GateSettings(), 9, 9) for kind in (OwnRule, Introspection))
+        assert own.asks(0, values) == ia.asks(0, values) == (width <= GateSettings.psi)
 
 
 def test_the_kernel_beside_rivals(asked: Asked) -> None:
