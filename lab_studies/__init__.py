@@ -94,6 +94,12 @@ STUDIES: dict[str, Study] = {
         sessions=100,
         least=2,
     ),
+    "deep-student": Study(
+        "A deep student: the same gates and advisors with a DQN, in MiniGrid and CartPole; it needs PyTorch",
+        _In("comparisons.deep_student.deep_student", "deep_student"),
+        sessions=10,
+        least=2,
+    ),
     "mentor": Study(
         "A mentor for other people's policies: when they should ask, at equal questions",
         _In("comparisons.mentor", "mentor"),
