@@ -46,7 +46,7 @@ RULES: Mapping[str, GateSettings] = {
 SHOWN = (NOBODY, "always", "early", "ccrl", "fading", "advice-reuse", "earned-trust")  # the curves of the picture
 COLOURS = dict(zip(SHOWN, (INK, ORANGE, SKY, BLUE, GREEN, PURPLE, RED), strict=True))
 MEASURES = (
-    "A session has {episodes} episodes; the rules have the settings that AdviceBench chose for tables (psi is apart) and the same "
+    "A session has {episodes} episodes; the rules have the settings that AdviceBench chose for tables, but for psi, and the same "
     f"seeds. early: always, with {EARLY_BUDGET} answers. points: 100 for an episode as good as the best policy's, 0 for one that "
     "fails, the mean over all episodes of the session (the return while advised); greedy_points: the same of the greedy policy "
     f"without the advisor, the mean of the measurements after every {GREEDY_EVERY}th episode; greedy_last: the last one. "

@@ -64,7 +64,8 @@ class DeepStudent(Update):
         torch.set_num_threads(1)  # the sums of a product depend on how many threads share it
         torch.use_deterministic_algorithms(True)
         self.rng = rng
-        self.q = Outputs((mdp.n_states, mdp.n_actions), self._values)
+        self._shape = mdp.n_states, mdp.n_actions
+        self.q = Outputs(self._shape, self._values)
         self._net = [self._layer(*ends) for ends in pairwise((self.sight.width, *HIDDEN, mdp.n_actions))]
         self._copy()
         self._adam = torch.optim.Adam([array for layer in self._net for array in layer], RATE, fused=True)
@@ -113,7 +114,7 @@ class DeepStudent(Update):
 
     def table(self) -> FloatArray:
         """Zeros (S, A): a network has no table, and its greedy policy is measured where it acts."""
-        return np.zeros(self.q.shape)
+        return np.zeros(self._shape)
 
     def _remember(self, left: FloatArray, action: int, reward: float, discount: float, entered: FloatArray) -> None:
         self._memory[self._kept % CAPACITY] = (*left, action, reward, discount, *entered)
