@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 NOBODY = bench.NOBODY
-EARLY_BUDGET = 500  # answers
+EARLY_BUDGET = 200  # answers
 WALKS = 5  # episodes that measure the greedy policy of CartPole, whose starts are drawn
 BY_ADVISOR = ("expert", "limited", "novice", "contrary")
 RULES: Mapping[str, GateSettings] = {
