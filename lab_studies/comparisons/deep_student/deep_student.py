@@ -119,7 +119,7 @@ def setting_outcome(setting: Setting, *, sessions: int, seed: int) -> Outcome:
     """The outcome of `sessions` sessions of a setting; every rule and advisor of a problem has the same seeds."""
     seeds = seeds_of(Setting(setting.problem), sessions, seed).tolist()
     parts = zip(*(session_outcome(setting, own) for own in seeds), strict=True)
-    return Outcome(*(np.round(np.array(values, np.float64), 2) for values in parts))
+    return Outcome.from_json([np.round(np.array(values, np.float64), 2) for values in parts])
 
 
 def session_outcome(setting: Setting, seed: int) -> tuple[FloatArray, list[float], int]:

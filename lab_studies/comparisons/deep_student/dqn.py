@@ -53,8 +53,9 @@ class DeepStudent(Update):
     """Double DQN: two hidden layers, a replay memory, a target network, and Huber's loss; the session explores.
 
     `seeing` makes the class for a world. q: only its shape counts; rng: draws the first weights and what is replayed.
-    A preferred action (`prefer`, as earned-trust hands it over) is kept by state, and each gradient step also raises its value
-    above the others' by the margin, as a network has no entry to lower. Raises BadInput if PyTorch is not installed.
+    A network has no entry to lower: a preferred action (`prefer`, as earned-trust hands it over) is kept by state, and each
+    later gradient step also raises its value above the others' by the margin.
+    Raises BadInput if PyTorch is not installed.
     """
 
     sight: ClassVar[Sight]
@@ -109,7 +110,7 @@ class DeepStudent(Update):
         self._remember(self.sight.now(s_tm1), a_tm1, r_t, discount_t, self.sight.now(s_t))
 
     def prefer(self, state: int, action: int, margin: float) -> None:
-        """Keeps an action to be valued above the others."""
+        """Keeps an action of a state to be valued above the others, until another one is preferred there."""
         self._shown[state] = self.sight.now(state), action, margin
 
     def table(self) -> FloatArray:
@@ -139,7 +140,9 @@ class DeepStudent(Update):
     def _shortfall(self) -> Any:
         """The mean of what some preferred actions lack to be valued above all others by their margins."""
         shown = list(self._shown.values())
-        seen, actions, margins = zip(*(shown[n] for n in self.rng.integers(len(shown), size=SHOWN_BATCH)), strict=True)
+        seen, actions, margins, _ = zip(
+            *(shown[n] for n in self.rng.integers(len(shown), size=SHOWN_BATCH)), strict=True
+        )
         chosen, margin = torch.tensor(actions)[:, None], torch.tensor(margins, dtype=torch.float32)[:, None]
         values = _outputs(self._net, torch.from_numpy(np.array(seen, np.float32)))
         own = values.gather(1, chosen)

@@ -15,8 +15,8 @@ from lab.studies.runner import Job
 from lab_studies.comparisons.advice_bench.problems import Benched
 from lab_studies.comparisons.deep_student import deep_student as study
 from lab_studies.comparisons.deep_student.deep_student import NOBODY, Outcome, Setting, rows_of
-from lab_studies.comparisons.deep_student.dqn import seeing
-from lab_studies.comparisons.deep_student.places import LEARNER, POLE_STEPS, Place, PoleEnvironment, Sight, place
+from lab_studies.comparisons.deep_student.dqn import Sight, seeing
+from lab_studies.comparisons.deep_student.places import LEARNER, POLE_STEPS, Place, PoleEnvironment, place
 
 
 def test_the_rows_of_a_rule_by_hand() -> None:
