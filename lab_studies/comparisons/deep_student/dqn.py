@@ -140,9 +140,7 @@ class DeepStudent(Update):
     def _shortfall(self) -> Any:
         """The mean of what some preferred actions lack to be valued above all others by their margins."""
         shown = list(self._shown.values())
-        seen, actions, margins, _ = zip(
-            *(shown[n] for n in self.rng.integers(len(shown), size=SHOWN_BATCH)), strict=True
-        )
+        seen, actions, margins = zip(*(shown[n] for n in self.rng.integers(len(shown), size=SHOWN_BATCH)), strict=True)
         chosen, margin = torch.tensor(actions)[:, None], torch.tensor(margins, dtype=torch.float32)[:, None]
         values = _outputs(self._net, torch.from_numpy(np.array(seen, np.float32)))
         own = values.gather(1, chosen)
