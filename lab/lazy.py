@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     import tensorboard.compat.proto.event_pb2
     import tensorboard.compat.proto.summary_pb2
     import tensorboard.summary.writer.event_file_writer
+    import torch
     import trimesh.voxel.ops
     import yaml
 
@@ -93,6 +94,7 @@ LIBRARIES: Mapping[str, Sequence[str]] = {
         "tensorboard.compat.proto.summary_pb2",
         "tensorboard.summary.writer.event_file_writer",
     ),
+    "torch": ("torch",),
     "trimesh": ("trimesh.voxel.ops",),
     "yaml": ("yaml",),
 }

@@ -10,6 +10,7 @@ from lab.lazy import load
 EXTRAS = {  # extra in pyproject.toml -> the optional libraries that it installs, by their import names
     "dask": ("distributed",),
     "data": ("h5py", "minari", "pandas", "tensorboard"),
+    "deep": ("torch",),
     "remote": ("fsspec", "s3fs"),
     "tune": ("optuna",),
 }

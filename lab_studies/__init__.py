@@ -98,8 +98,14 @@ STUDIES: dict[str, Study] = {
         "The settings of every rule of AdviceBench, tuned by one procedure on the problems that are not held out",
         _In("comparisons.advice_bench.tuning", "tuning"),
         ("methods", "problem", "advisors"),
-        sessions=8,
+        sessions=4,
         least=1,
+    ),
+    "deep-student": Study(
+        "A deep student: the same gates and advisors with a DQN, in MiniGrid and CartPole; it needs PyTorch",
+        _In("comparisons.deep_student.deep_student", "deep_student"),
+        sessions=10,
+        least=2,
     ),
     "mentor": Study(
         "A mentor for other people's policies: when they should ask, at equal questions",

@@ -109,6 +109,7 @@ TABLE = "import lab; lab.teach('world-1', advisor=None, episodes=2).{}"
     [
         ("optuna", ("tune", "world-1", "--trials", "2", "--sessions", "2"), "tuning: {} '.[tune]' {}"),
         ("distributed", ("study", "run", "table-9.2", "--dask", "127.0.0.1:9"), "--dask 127.0.0.1:9: {} '.[dask]' {}"),
+        ("torch", ("study", "run", "deep-student"), "study deep-student: {} '.[deep]' {}"),
         ("fsspec", ("toolbox", "list", "--toolbox", "s3://lab/box"), "toolbox s3://lab/box: {} '.[remote]' {}"),
         ("s3fs", ("toolbox", "list", "--toolbox", "s3://lab/box"), "toolbox s3://lab/box: {} '.[remote]' {}"),
         ("botocore", ("toolbox", "list", "--toolbox", "s3://lab/box"), "toolbox s3://lab/box: {} botocore"),
@@ -178,7 +179,8 @@ def test_too_little_memory_is_not_taken_for_a_missing_library() -> None:
 def test_without_all_that_is_not_plain_toast_is_made_and_its_times_are_kept(without: Without) -> None:
     """The second run learns nothing and times nothing."""
     hidden = not_plain()
-    assert {library for libraries in EXTRAS.values() for library in libraries} - {"pandas"} <= hidden
+    # PyTorch is in no extra of the tests; pandas comes with others
+    assert {library for libraries in EXTRAS.values() for library in libraries} - {"pandas", "torch"} <= hidden
     documents = []
     for _ in range(2):
         ran = without(hidden, "run", "toast", "--toasts", "1", "--json")

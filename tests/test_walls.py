@@ -50,6 +50,7 @@ ALONE: dict[str, set[str]] = (
         "fsspec": {"lab.toolbox.remote_place"},
         "s3fs": set(),  # fsspec's
         "optuna": {"lab.studies.tuning"},
+        "torch": {f"lab_studies.comparisons.deep_student.{name}" for name in ("dqn", "deep_student")},
         "joblib": {"lab.studies.runner"},  # to work in several processes; its files are pickles, and nobody reads those
         "psutil": {"lab.studies.runner"},
     }
