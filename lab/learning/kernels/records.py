@@ -269,6 +269,14 @@ class GateNumbers(NamedTuple):
     reuse: float
     bonus: float
     consistency: float
+    warming: float
+    exploring: float
+    trust: float
+    wandering: float
+    retry: float
+    strikes: float
+    agreement: float
+    margin: float
     enough_steps: float
     ensemble: int
     budget: int

@@ -6,6 +6,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from lab.files import read_limited
 from lab.learning.settings import RANGES, GateSettings, Range, Span
 from lab.learning.simulated_advice import SPEAKS_ALWAYS, SPEAKS_AS_EXPECTED, SPEAKS_TO_CORRECT
 
@@ -97,4 +98,4 @@ def rules_of(name: str) -> dict[str, Rule]:
 @cache
 def tuned_settings() -> dict[str, dict[str, dict[str, Any]]]:
     """The tuned settings by rule and budget."""
-    return tomllib.loads(Path(__file__).with_name(TUNED).read_text("utf-8"))
+    return tomllib.loads(read_limited(Path(__file__).with_name(TUNED)).decode())

@@ -33,15 +33,10 @@ NOBODY = bench.NOBODY
 EARLY_BUDGET = 200  # answers
 WALKS = 5  # episodes that measure the greedy policy of CartPole, whose starts are drawn
 BY_ADVISOR = ("expert", "limited", "novice", "contrary")
-RULES: Mapping[str, GateSettings] = {
-    "early": replace(bench.RULES["always"].gate, budget=EARLY_BUDGET),
-    "always": bench.RULES["always"].gate,
-    "ccrl": bench.RULES["ccrl"].gate,
-    "ia": bench.RULES["introspection"].gate,
-    "importance": bench.RULES["importance (learner's)"].gate,
-    "fading": bench.RULES["fading"].gate,
-    "advice-reuse": bench.RULES["advice reuse"].gate,
-    "earned-trust": bench.RULES["earned-trust"].gate,
+NAMES = {"ia": "introspection", "importance": "importance (learner's)", "advice-reuse": "advice reuse"}  # of the bench
+RULES: Mapping[str, GateSettings] = {"early": replace(bench.rules_of("always")["any"].gate, budget=EARLY_BUDGET)} | {
+    name: bench.rules_of(NAMES.get(name, name))["any"].gate
+    for name in ("always", "ccrl", "ia", "importance", "fading", "advice-reuse", "earned-trust")
 }
 SHOWN = (NOBODY, "always", "early", "ccrl", "fading", "advice-reuse", "earned-trust")  # the curves of the picture
 COLOURS = dict(zip(SHOWN, (INK, ORANGE, SKY, BLUE, GREEN, PURPLE, RED), strict=True))
