@@ -26,9 +26,10 @@ def _with_settings(function: Callable[..., None]) -> Callable[..., None]:
     for name, setting in SETTINGS.items():
         family = FAMILIES.get(name)
         which = f": {{{family}}}" if family else f" ({setting.allowed})"
+        meaning = f"{setting.meaning[:1].upper()}{setting.meaning[1:]}"
         option = typer.Option(
             f"--{name.replace('_', '-')}",
-            help=f"{setting.meaning[:1].upper()}{setting.meaning[1:]}{which}; default: the problem's.",
+            help=f"{meaning}{which}; several separated by commas; default: the problem's.",
             autocompletion=offers(family) if family else None,
             callback=from_files(family) if family else None,
         )

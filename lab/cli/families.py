@@ -6,6 +6,7 @@ are filled in when the help of that command is requested, so that `lab --help` l
 
 import re
 from collections.abc import Callable, Mapping, Sequence
+from itertools import pairwise
 from typing import Any, cast
 
 import typer
@@ -13,6 +14,7 @@ from typer.core import TyperCommand
 
 from lab.cli import deferred
 from lab.cli.output import complain
+from lab.errors import BadInput
 
 TERMS = {
     "gate": "the rule by which a learner decides when to ask",
@@ -112,7 +114,24 @@ def from_files(*families: str) -> Callable[[Any, Any], Any]:
 
 
 class CommandOfFamilies(TyperCommand):
-    """A command whose help lists the members of families."""
+    """A command whose help lists the members of families, and which refuses an option that would replace an earlier one."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """The arguments that are left. Raises BadInput for an option of one value that is given twice with different values."""
+        options: list[Any] = [param for param in self.params if not (param.multiple or getattr(param, "is_flag", True))]
+        named = {name: option for option in options for name in option.opts}
+        seen: dict[Any, str] = {}
+        for word, following in pairwise([*args, ""]):
+            name, equals, value = word.partition("=")
+            if word == "--":
+                break
+            if name in named:
+                option, now = named[name], value if equals else following
+                before = seen.setdefault(option, now)
+                if before != now:
+                    allowed = "several are separated by commas" if "commas" in option.help else "it takes one value"
+                    raise BadInput(f"{name} is given twice, '{before}' and '{now}': {allowed}")
+        return super().parse_args(ctx, args)
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
         """Print the help with the members filled in."""

@@ -54,6 +54,8 @@ ADVISORS, LEARNERS, GATES = (
             "unknown sub-task 'inser' (SUBTASK): did you mean 'insert'? known: cover, grasp, insert, place,",
         ),
         ("teach insert --save ", "policy name '' (--save): wanted 1 to 100 printable characters"),
+        ("teach insert --gate ccrl --gate=ia", "--gate is given twice, 'ccrl' and 'ia': it takes one value"),
+        ("study compare insert --omega 1 --omega 2", "--omega is given twice, '1' and '2': several are separated by"),
         ("teach insert --episodes 0", "invalid value for '--episodes': '0'"),
         ("sequence toast --method srrl", f"unknown method 'srrl' (--method): did you mean 'srl'? {METHODS}"),
         ("sequence toast --plot no/x.png", "picture 'no/x.png': there is no folder 'no'"),
