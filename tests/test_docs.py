@@ -30,6 +30,7 @@ exec {shlex.quote(sys.executable)} -c "import sys; from lab.cli import main; sys
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("page", RUN, ids=lambda page: page.stem)
 def test_the_examples_of_a_page_run(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Python on every page, commands in lessons and quick starts; the pictures that a page shows are there afterwards."""

@@ -7,6 +7,7 @@ import pytest
 import lab
 
 
+@pytest.mark.slow
 def test_a_toast_is_made_and_its_folder_goes_on(tmp_path: Path) -> None:
     run = lab.run("toast", toasts=1, out=tmp_path / "run", toolbox=tmp_path / "box", seed=1)
     assert run.success

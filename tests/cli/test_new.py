@@ -68,6 +68,7 @@ def test_a_machine_with_batches(lab: Lab, folder: Path) -> None:
     assert load("pins.toml").station("oven").batch
 
 
+@pytest.mark.slow
 def test_a_refusal_says_the_mass_that_would_do(lab: Lab, folder: Path) -> None:
     words = "new x --part pin=cylinder:0.03x0.08:1 --friction pin=0.15"
     refused = lab(*words.split(), "--mass", "pin=2").err.strip()

@@ -52,6 +52,7 @@ def test_what_a_part_looks_like_is_a_closed_solid_as_narrow_as_asked(form: str) 
     assert mesh.extents[1] <= 0.03 + 1e-9
 
 
+@pytest.mark.slow
 def test_new_cells_are_task_files_and_have_each_arm_form_and_feature(tmp_path: Path) -> None:
     seen: set[str] = set()
     for seed in range(60):

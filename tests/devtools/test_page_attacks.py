@@ -14,6 +14,7 @@ from devtools.page_attacks import LessonResult, fault_of
 QUIET = LessonResult(0, "as the quiet one", "page: http://", 0.01, 1.0, 100.0)
 
 
+@pytest.mark.slow
 def test_a_lesson_does_not_notice_requests_without_a_right(tmp_path: Path, root: Path) -> None:
     command = [
         sys.executable,

@@ -35,6 +35,7 @@ def carried_out(program: Program) -> list[np.ndarray]:
     return [np.column_stack([places[way], np.degrees(np.unwrap(yaw[way]))]) for way in ways]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("task", TASKS)
 def test_few_moves_lead_within_1_mm_and_1_degree_of_what_physics_carried_out(
     lab: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, task: str

@@ -113,6 +113,7 @@ def taught_by(task: Task, folder: Path, person: Says, hear: Callable[[Event], No
     return advice
 
 
+@pytest.mark.slow
 def test_what_a_person_said_before_the_break_still_counts(task: Task, tmp_path: Path) -> None:
     """Their lessons are not held again, and what each was worth is as if the run had not been broken off."""
     whole, first, second = Says(), Says(), Says()
@@ -128,6 +129,7 @@ def test_what_a_person_said_before_the_break_still_counts(task: Task, tmp_path: 
     assert {name: one["receipt"] for name, one in again.receipts(nothing)["skills"].items()} == worth
 
 
+@pytest.mark.slow
 def test_broken_off_while_it_learned_and_again_while_it_moved(whole: Path, carry_on: Begin, tmp_path: Path) -> None:
     folder = tmp_path / "broken"
     with pytest.raises(KeyboardInterrupt):

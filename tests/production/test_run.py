@@ -107,6 +107,7 @@ def warm(cold: Ran, root: Path) -> Ran:
     return run_toast(cold.folder, root)
 
 
+@pytest.mark.slow
 def test_a_robot_that_is_slower_than_believed_is_known_by_its_second_run(
     warm: Ran, lab: Lab, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -461,6 +462,7 @@ def test_only_one_skill_can_be_prepared() -> None:
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", [name for name in SEQUENCERS if name != "earliest-due"])
 def test_methods_of_sequencing(prepared: Prepared, toolbox: Toolbox, method: str) -> None:
     cell = teach_all(prepared, Teacher(toolbox)).cell

@@ -27,6 +27,7 @@ def test_parts_may_be_brought_from_one_place_to_another_only(tmp_path: Path) -> 
     assert [station.name for station in task.stations] == ["input", "output"]
 
 
+@pytest.mark.slow
 def test_parts_that_the_fingers_open_wide_for_have_more_room(tmp_path: Path) -> None:
     _, task = new_cell(new_task("t", "panda", ("cup=cylinder:0.06x0.08:3",), (), False), tmp_path / "t.toml")
     assert task.robot.opening_m == 0.076  # of the panda's 0.08 m

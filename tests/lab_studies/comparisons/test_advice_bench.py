@@ -115,6 +115,7 @@ def test_ranks_by_hand() -> None:
     assert holm({"a": 0.01, "b": 0.04, "c": 0.03}) == pytest.approx({"a": 0.03, "c": 0.06, "b": 0.06})
 
 
+@pytest.mark.slow
 def test_every_rule_runs_and_nobody_is_the_same_whatever_the_advisor() -> None:
     found = case_outcomes(Case("empty", "expert"), 3, 0)
     assert {rule for rule, _ in found} == {*RULES}
@@ -192,6 +193,7 @@ def test_what_cannot_be_benched_is_refused() -> None:
         advice_bench(job, {"problem": ["no-such-maze"]})
 
 
+@pytest.mark.slow
 def test_a_file_of_ones_own_and_any_advisor_that_always_answers_alike(tmp_path: Path) -> None:
     maze = tmp_path / "maze.txt"
     maze.write_text("S..\n.#.\n..G\n")
@@ -232,6 +234,7 @@ def first(request: lab.AdviceRequest) -> int:
     return 0
 
 
+@pytest.mark.slow
 def test_members_made_in_python_are_measured_alike_in_several_processes() -> None:
     maze = lab.world("S..\n.#.\n..G", name="maze")
     reading: dict[str, Any] = {
@@ -340,6 +343,7 @@ def test_a_problem_without_a_goal_is_refused_in_words() -> None:
         lab.study("advicebench", problem=[chain], methods=["always"], advisors=["expert"], sessions=2)
 
 
+@pytest.mark.slow
 def test_problems_from_a_file_and_from_a_module_are_measured_in_several_processes(tmp_path: Path) -> None:
     (tmp_path / "mine.py").write_text(
         "import gymnasium\nimport lab\nfrom gymnasium.envs.toy_text.frozen_lake import FrozenLakeEnv\n"

@@ -83,6 +83,7 @@ def test_every_gate_and_advisor_is_measured_with_and_without_memory() -> None:
     }
 
 
+@pytest.mark.slow
 def test_each_cell_has_its_measures_with_intervals(found: Findings) -> None:
     cells = [one for one in found.rows if "against" not in one]
     assert len(cells) == 3 * CELLS

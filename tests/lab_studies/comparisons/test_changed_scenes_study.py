@@ -92,6 +92,7 @@ def few(monkeypatch: pytest.MonkeyPatch) -> None:
     study.original_scene.cache_clear()
 
 
+@pytest.mark.slow
 def test_one_scene_of_few_skills_from_end_to_end(few: None) -> None:
     found = changed_scenes(Job(2), {})
     assert {one["kind"] for one in found.rows} == {"all", "cubes moved", "station moved"}

@@ -22,6 +22,7 @@ RAN = RunOutcome(
 )
 
 
+@pytest.mark.slow
 def test_a_run_with_drawn_faults_is_the_same_again() -> None:
     """Two toasts in physics with the faults of seed 4, twice."""
     one, two = run_outcome(Setting("toast", 4)), run_outcome(Setting("toast", 4))

@@ -52,6 +52,7 @@ def test_what_a_rule_saves() -> None:
     }
 
 
+@pytest.mark.slow
 def test_the_study_has_all_rules_and_says_what_differs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(study, "EPISODES", 10)
     job = Job(sessions=2)
@@ -65,6 +66,7 @@ def test_the_study_has_all_rules_and_says_what_differs(tmp_path: Path, monkeypat
     assert any("Torrey and Taylor" in note for note in document["notes"])
 
 
+@pytest.mark.slow
 def test_speeds_are_of_all_ways_to_make_a_step(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(speeds, "EPISODES", 20)
     monkeypatch.setattr(speeds, "READABLE_EPISODES", 2)

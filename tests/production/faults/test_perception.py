@@ -88,6 +88,7 @@ def test_what_the_gripper_holds_is_not_missed(after: Any, two_toasts: Any, spots
     assert seen(floor, two_toasts[0], spots)[0].startswith("slice 1 is not at 'plate'")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "fault",
     [

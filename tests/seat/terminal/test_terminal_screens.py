@@ -15,7 +15,7 @@ import pytest
 
 CODE = "import sys; from lab.cli import main; sys.argv[0] = 'lab'; main()"
 QUESTION = "Which way?"
-LONGEST_WAIT_S = 20  # for the next output; only a hanging program takes it
+LONGEST_WAIT_S = 60  # for the next output; only a hanging program takes it
 Started = tuple[Any, Callable[[], str]]
 _numbers = count()
 

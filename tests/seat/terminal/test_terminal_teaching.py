@@ -21,7 +21,7 @@ INSERT = ("teach", "insert", "--advisor", "terminal")
 MAZE = "S....\n.##..\n...#G\n"
 WALK = ("teach", "maze.txt", "--advisor", "terminal", "--gate", "always")
 QUESTION = "Which way?"
-LONGEST_WAIT_S = 20  # for the next output; only a hanging program takes it
+LONGEST_WAIT_S = 60  # for the next output; only a hanging program takes it
 COLOUR = re.compile(r"\x1b\[(?:[0-9;]*;)?(?:3[1-7]|38;5;[0-9]+)[;m]")
 CODES = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]|\x1b[=>]")
 

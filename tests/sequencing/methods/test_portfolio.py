@@ -52,6 +52,7 @@ def test_two_parts_by_hand(job_shop: CellMaker, workers: int) -> None:
     assert found.bound_by == "CP-SAT"
 
 
+@pytest.mark.slow
 def test_who_proves_what(job_shop: CellMaker, toast_cell: CellMaker) -> None:
     """One robot that does all: A*; a job shop with one vehicle: its tours, 1 + 10 + 4 s here, too."""
     toasts = best_known(toast_cell("I", 2))
@@ -60,6 +61,7 @@ def test_who_proves_what(job_shop: CellMaker, toast_cell: CellMaker) -> None:
     assert (found.found_by, found.bound_by, found.cost) == ("search of tours", "search of tours", 15.0)
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None)
 @given(data=st.data(), objective=st.sampled_from(sorted(OBJECTIVES)), workers=st.sampled_from([1, 2]))
 def test_no_list_of_decisions_is_better(
@@ -147,6 +149,7 @@ def test_what_one_finds_the_other_goes_on_from(ex11: Callable[[int], Cell]) -> N
     assert shared.over.is_set()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("objective", ["makespan", "mean-tardiness"])
 def test_too_large_for_a_model_there_is_a_bound_still(job_shop: CellMaker, objective: str) -> None:
     """70 jobs of four operations by two robots that are not alike; every part alone takes 4 s and more, and is due at 1 s."""
