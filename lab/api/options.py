@@ -14,6 +14,8 @@ from lab.learning.gates import Gate
 from lab.learning.requests import Advisor, Ask
 from lab.learning.updates import Update
 from lab.optional import require
+from lab.seat.language_model import LanguageModel, language_models
+from lab.teaching.events import Tell, told_to
 from lab.toolbox.registry import Toolbox
 
 
@@ -126,8 +128,13 @@ def several(advisors: Advisors) -> list[OneAdvisor]:
 
 def advising_of(advisors: Advisors, toolbox: ToolboxOrPlace) -> Advising:
     """The advisors of a session; the toolbox (None: the user's own) holds the policies that advise."""
-    box = None if toolbox is None else toolbox_of(toolbox, "")
-    return replace(Advising.of(several(advisors)), toolbox=box)
+    box, names = None if toolbox is None else toolbox_of(toolbox, ""), several(advisors)
+    return replace(Advising.of(names, language_models(names)), toolbox=box)
+
+
+def heard_by(advising: Advising, tell: Tell) -> Tell:
+    """A listener to a lesson's events that passes them to the language models, too, which ask in the words of the lesson."""
+    return told_to(*(ask.hear for ask in advising.people.values() if isinstance(ask, LanguageModel)), tell)
 
 
 def toolbox_of(given: ToolboxOrPlace, nowhere: str) -> Toolbox:
