@@ -26,9 +26,9 @@ EXPERT = AdvisorName.of("expert")
 class Advising:
     """The advisors of a session.
 
-    names: the advisors; people: the functions that ask people and language models, by name; panel: how several advisors are asked
-    and combined; region: (S,) bool, the states in which advice counts, None for all; toolbox: holds the policies that advise, None
-    for the user's own.
+    names: the advisors; people: the functions that ask people and language models, by name; panel: how several advisors are
+    asked and combined; region: (S,) bool, the states in which advice counts, None for all; toolbox: holds the policies that
+    advise, None for the user's own.
     """
 
     names: tuple[AdvisorName, ...] = (EXPERT,)

@@ -14,7 +14,7 @@ from http.client import HTTPConnection, HTTPException, HTTPSConnection
 from threading import Thread
 from typing import Any
 
-from lab.advice.advisors import MODEL, AdvisorName
+from lab.advice.advisors import AdvisorName
 from lab.advice.model_address import KEY, UNENCRYPTED, ModelAddress
 from lab.errors import BadInput, Notice, counted, shortened
 from lab.files import json_of
@@ -100,7 +100,8 @@ class _Exchange(Thread):
     def __init__(self, address: ModelAddress, body: bytes, headers: Mapping[str, str]) -> None:
         super().__init__(daemon=True)
         kind = HTTPSConnection if address.scheme == "https" else HTTPConnection
-        self._connection = kind(address.host, address.port, timeout=address.timeout_s)
+        # no thread is left behind for long; how long the learner waits is decided by who joins this one
+        self._connection = kind(address.host, address.port, timeout=2.0 * address.timeout_s)
         self._socket: socket.socket | None = None
         self._path, self._body, self._headers = address.path, body, dict(headers)
         self.content, self.fault, self.connected = b"", "", False
@@ -119,10 +120,8 @@ class _Exchange(Thread):
             self.content = response.read(MOST_BYTES + 1)
             if len(self.content) > MOST_BYTES:
                 self.fault = f"its reply is longer than {MOST_BYTES} bytes"
-        except TimeoutError:
-            self.fault = "no answer in time"
         except OSError as error:
-            self.fault = f"no connection: {error.strerror or type(error).__name__}"
+            self.fault = f"connection failed: {error.strerror or type(error).__name__}"
         except (HTTPException, ValueError) as error:
             self.fault = f"no reply in HTTP: {type(error).__name__}"
         finally:
@@ -148,9 +147,11 @@ def content_of(document: bytes) -> str | None:
 
 
 class LanguageModel:
-    """A function that asks a language model (it is an `Ask`): its answer to a request, None for "skip" and for no allowed answer.
+    """A function that asks a language model (it is an `Ask`): its answer to a request, None for "skip" and a failed call.
 
-    An answer is asked for once in a state, and repeated there; a call that failed is made again. name: with a `model`; key: for the server, "" for none.
+    An answer is asked for once in a state, and repeated there; a call that failed is made again.
+
+    name: with a `model`; key: for the server, "" for none.
     asked, repeated, unusable: counts of calls, of repeated answers, and of calls without an allowed answer.
     Raises AdvisorLeft if there is no server at the first call, after MOST_IN_A_ROW calls in a row without an allowed answer, and
     when all allowed calls were made; BadInput if the key would be sent unencrypted.
@@ -229,12 +230,11 @@ class LanguageModel:
             in_time = not exchange.is_alive()
         finally:
             exchange.stop()
-        if not in_time:
-            return "", f"no answer within {at.timeout_s:g} s"
+        fault = exchange.fault if in_time else f"no answer within {at.timeout_s:g} s"
         if not exchange.connected and self.asked == 1:
-            self._leave(f"{at.server}: {exchange.fault}")
-        reply = None if exchange.fault else content_of(exchange.content)
-        return reply or "", exchange.fault or ("its reply is no chat completion" if reply is None else "")
+            self._leave(f"{at.server}: {fault}")
+        reply = None if fault else content_of(exchange.content)
+        return reply or "", fault or ("its reply is no chat completion" if reply is None else "")
 
     def _shown(self, reply: str) -> str:
         return shortened(reply.replace(self._key, "***") if self._key else reply, SHOWN)
@@ -257,7 +257,6 @@ class LanguageModel:
         return f"{self.name}: {counts}, {counted(self.unusable, 'call')} without an allowed answer"
 
 
-def language_models(names: Sequence[object]) -> dict[str, LanguageModel]:
-    """The language models among these advisors by name, with the key in the environment. Raises BadInput as they do."""
-    texts = [name for name in names if isinstance(name, str) and name.startswith(MODEL)]
-    return {text: LanguageModel(AdvisorName.of(text, "--advisor"), os.environ.get(KEY, "")) for text in texts}
+def language_models(names: Sequence[str]) -> dict[str, LanguageModel]:
+    """The language models of these names, with the key in the environment. Raises BadInput as they do."""
+    return {name: LanguageModel(AdvisorName.of(name, "--advisor"), os.environ.get(KEY, "")) for name in names}

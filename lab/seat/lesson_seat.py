@@ -13,7 +13,6 @@ from lab.learning.requests import AdviceRequest, Ask, Request
 from lab.learning.session_events import EpisodeEnded
 from lab.mdp import FloatArray
 from lab.seat.grid_text import skill_of
-from lab.seat.language_model import LanguageModel
 from lab.seat.replay_pace import ReplayPace
 from lab.seat.run_progress import RunProgress
 from lab.seat.terminal.prompt import TeachingPrompt
@@ -21,6 +20,7 @@ from lab.teaching.events import AdvisorGathered, Event, LessonBegan, LessonEvent
 from lab.teaching.kept_session import known_values, receipt_of
 
 if TYPE_CHECKING:
+    from lab.seat.language_model import LanguageModel
     from lab.seat.lesson_scene import LessonScene
     from lab.seat.page.teaching_page import SeatPage
 
@@ -41,7 +41,7 @@ class LessonSeat:
         progress: RunProgress,
         prompt: TeachingPrompt | None,
         page: "SeatPage | None",
-        models: Mapping[str, LanguageModel] = MappingProxyType({}),
+        models: "Mapping[str, LanguageModel]" = MappingProxyType({}),
     ) -> None:
         self.progress, self._prompt, self.page, self.models = progress, prompt, page, models
         self._scene: LessonScene | None = None
