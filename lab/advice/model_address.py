@@ -1,7 +1,7 @@
 """The address of a language model: a server that speaks the chat-completions form, the model's name, and limits."""
 
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from ipaddress import ip_address
 from math import isfinite
 from urllib.parse import urlsplit
@@ -78,9 +78,7 @@ class ModelAddress:
                     f"'{shortened(word)}' after the model's name: wanted timeout=SECONDS (up to {LONGEST_S:g}), "
                     f"calls=NUMBER (at least 1) or {UNENCRYPTED}"
                 )
-        return ModelAddress(
-            self.scheme, self.host, self.port, self.path, self.model, timeout_s, most_calls, unencrypted
-        )
+        return replace(self, timeout_s=timeout_s, most_calls=most_calls, unencrypted=unencrypted)
 
     @property
     def is_local(self) -> bool:
