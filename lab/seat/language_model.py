@@ -170,10 +170,8 @@ class LanguageModel:
             )
         self.asked = self.repeated = self.unusable = self._in_a_row = 0
         self._left = ""  # why it advises no more
-        self._known: dict[
-            tuple[int, tuple[int, ...]], int | None
-        ] = {}  # answers by state and allowed ones, about `_subject`
-        self._subject: object = None
+        self._subject: object = None  # what `_known` is about: a table or a cell
+        self._known: dict[tuple[int, tuple[int, ...]], int | None] = {}  # answers by state and allowed ones
         self._place: Any = None
         self._words: StateWords | None = None
 

@@ -243,8 +243,8 @@ def check_named(given: Any, options: SessionOptions, nothing: SessionOptions, fo
         return given
     if [*map(recorded_whole, given.advisor_names)] != [*map(recorded_whole, options.advisor_names)]:
         raise BadInput(
-            f"the session in {folder} asks a language model, which has to be named again (--resume {quote(str(folder))}"
-            f"{named_with(options.advisor_names)}): no file decides where questions are sent"
+            f"--resume {folder}: a language model is asked there, which has to be named again, because no file decides where "
+            f"questions are sent: add{named_with(options.advisor_names)}"
         )
     return replace(given, **{given.advisor_field: getattr(nothing, given.advisor_field)})
 
