@@ -112,7 +112,7 @@ def replying(reply: Callable[[str], object]) -> Behaves:
 def best(text: str) -> str:
     """The best move, read from a table by the place that the question names; it has to be allowed."""
     row, column = map(int, re.findall(r"(?:row|column) (\d+)", text)[:2])
-    label = MDP.action_labels[BEST[np.ravel_multi_index((row, column), MDP.shape)]]
+    label: str = MDP.action_labels[BEST[np.ravel_multi_index((row, column), MDP.shape)]]
     assert f" or {label}" in text.splitlines()[-1]
     return label
 
@@ -528,7 +528,7 @@ ORDER = ("sequence", "toast-case-1", "--toasts", "3", "--method", "srl", "--gate
 
 def test_the_order_is_advised_kept_and_shown_again_without_the_server(lab: Lab, tmp_path: Path) -> None:
     def first(text: str) -> str:
-        return re.findall(r"^Move (\d+)", text, re.MULTILINE)[-1]
+        return str(re.findall(r"^Move (\d+)", text, re.MULTILINE)[-1])
 
     with serving(replying(first)) as server:
         kept = lab(*ORDER, "--advisor", server.advisor, "--json")
