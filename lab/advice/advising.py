@@ -1,18 +1,18 @@
-"""The advisors of a session: one or several, simulated, recorded, learned or people, combined into one `Advisor`."""
+"""The advisors of a session, combined into one `Advisor`: simulated, recorded or learned ones, people, language models."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from lab.advice.advisors import ADVISORS, PEOPLE, AdvisorName, RecordedAdvisor, make_advisor
+from lab.advice.advisors import ADVISORS, AdvisorName, RecordedAdvisor, is_external, make_advisor
 from lab.advice.entries import Read, read_journal
 from lab.advice.journal import Journal
 from lab.advice.panel import Panel, PanelSettings, members_of
 from lab.advice.table_level import PolicyAdvisor, TableLevel
 from lab.errors import BadInput
 from lab.learning.environment import Environment
-from lab.learning.requests import Advisor, Ask
+from lab.learning.requests import Advisor, Ask, Request
 from lab.learning.selection import uniforms
 from lab.learning.session_events import Event
 from lab.learning.settings import LearnerSettings
@@ -26,8 +26,8 @@ EXPERT = AdvisorName.of("expert")
 class Advising:
     """The advisors of a session.
 
-    names: the advisors; people: the functions that ask the people behind names such as "terminal"; panel: how several advisors
-    are asked and combined; region: (S,) bool, the states in which advice counts, None for all; toolbox: holds the policies that
+    names: the advisors; people: the functions that ask people and language models, by name; panel: how several advisors are
+    asked and combined; region: (S,) bool, the states in which advice counts, None for all; toolbox: holds the policies that
     advise, None for the user's own.
     """
 
@@ -54,7 +54,7 @@ class Advising:
         )
         if "none" in names and len(names) > 1:
             raise BadInput(f"advisor 'none' (--advisor) beside {len(names) - 1} more: it is nobody or somebody")
-        for name in PEOPLE:
+        for name in dict.fromkeys(name for name in names if isinstance(name, str) and is_external(name)):
             if names.count(name) > 1:
                 raise BadInput(f"advisor '{name}' (--advisor) is named {names.count(name)} times: once is enough")
         return cls(advisors, people or {}, PanelSettings(asked, decide))
@@ -118,9 +118,23 @@ class Advising:
 
 
 def through(journal: Journal | None, people: Mapping[str, Ask]) -> dict[str, Ask]:
-    """Functions that ask the same people through a journal, which records their answers, or answers for them in a replay."""
+    """Functions that ask the same people through a journal, which records their answers, or answers for them in a replay.
+
+    An `ask` with a method `remember` is told what the journal answered for it.
+    """
 
     def asked(by: str, ask: Ask) -> Ask:
-        return ask if journal is None else lambda request: journal.answer(by, request, ask)
+        if journal is None:
+            return ask
+        remember = getattr(ask, "remember", None)
+
+        def answered(request: Request) -> int | None:
+            is_known = journal.folding
+            action = journal.answer(by, request, ask)
+            if is_known and remember is not None:
+                remember(request, action)
+            return action
+
+        return answered
 
     return {name: asked(name, ask) for name, ask in people.items()}

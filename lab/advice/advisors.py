@@ -1,4 +1,4 @@
-"""The advisors by name: simulated ones, people, recorded advice, learned policies, or none.
+"""The advisors by name: simulated ones, people, language models, recorded advice, learned policies, or none.
 
 A name is parsed once, into an `AdvisorName`. Its row in ADVISORS makes the advisor for a `Level`: for the steps of a table, or
 for the order of transfers.
@@ -14,7 +14,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from lab.advice.entries import Read, read_journal
-from lab.errors import BadInput, unknown
+from lab.advice.model_address import WANTED as MODEL_WANTED
+from lab.advice.model_address import ModelAddress
+from lab.errors import BadInput, shortened, unknown
 from lab.plugins.code_file import from_file
 from lab.plugins.family import Family, checked_action, first_line, takes, takes_generator, wanted
 
@@ -29,7 +31,7 @@ class Level(Protocol):
 
     @property
     def people(self) -> "Mapping[str, Ask]":
-        """The functions that ask people, by advisor name."""
+        """The functions that ask people and language models, by advisor name."""
 
     @property
     def rng(self) -> "np.random.Generator":
@@ -58,7 +60,7 @@ class Level(Protocol):
 class AdvisorName:
     """A parsed advisor name.
 
-    text: as it was typed; row: the key in ADVISORS; taus, folder, policy, answers, accuracy: the parameters in the name.
+    text: as it was typed; row: the key in ADVISORS; taus, folder, policy, answers, accuracy, model: the parameters in the name.
     itself: an advisor made in Python, or its class, which is in no table.
     """
 
@@ -70,6 +72,7 @@ class AdvisorName:
     answers: Path | None = None
     itself: "Advisor | Ask | type[Advisor] | None" = None
     accuracy: float = 0.0
+    model: ModelAddress | None = None
 
     @classmethod
     def made(cls, advisor: "Advisor | Ask | type[Advisor]") -> "AdvisorName":
@@ -109,7 +112,10 @@ class AdvisorName:
             row, field, make, wanted = PREFIXED[kind]
             if not Path(rest).name.strip():
                 raise BadInput(f"advisor '{text}' ({where}): it names {wanted}")
-            return cls(text, row, **{field: make(rest)})
+            try:
+                return cls(text, row, **{field: make(rest)})
+            except BadInput as error:
+                raise BadInput(f"advisor '{kind}:...' ({where}): {error}") from None
         if text.startswith("accuracy="):
             return cls(text, "accuracy=X", accuracy=_share(text, where))
         if not text.startswith("tau="):
@@ -146,7 +152,7 @@ class AdvisorKind(NamedTuple):
 
 
 class Person:
-    """An advisor that calls a function of a request, such as one that asks a person (see lab/seat)."""
+    """An advisor that calls a function of a request, such as one that asks a person or a language model (see lab/seat)."""
 
     def __init__(self, ask: "Ask"):
         self._ask = ask
@@ -185,6 +191,20 @@ def _person(name: AdvisorName, level: Level) -> "Advisor":
     return Person(level.people[name.text])
 
 
+def _language_model(name: AdvisorName, level: Level) -> "Advisor":
+    if name.text not in level.people:
+        raise not_called(name.text)
+    return Person(level.people[name.text])
+
+
+def not_called(name: str) -> BadInput:
+    """The error for a language model in a command of many sessions, each of which would call its server."""
+    return BadInput(
+        f"advisor '{shortened(name)}': only lab teach, run and sequence ask a language model, and not sessions by the "
+        "thousand: record one lesson with it, then name recorded:DIR"
+    )
+
+
 def _recorded(name: AdvisorName, level: Level) -> "Advisor":
     assert name.folder is not None
     journal = read_journal(name.folder, "--advisor")
@@ -218,9 +238,12 @@ PREFIXED: dict[str, tuple[str, str, Callable[[str], Any], str]] = {
     "recorded": ("recorded:DIR", "folder", Path, "no file: wanted recorded:DIR, the folder of a session"),
     "answers": ("answers:FILE", "answers", Path, "no file: wanted answers:FILE, see docs/teaching.md"),
     "policy": ("policy:NAME", "policy", str, "no policy: wanted policy:NAME; see lab toolbox list"),
+    "llm": ("llm:URL", "model", ModelAddress.of, f"no server: wanted {MODEL_WANTED}"),
 }
 PYTHON = "python"  # the row of an advisor that is in no table
 PEOPLE = {"terminal": "prompt", "web": "page"}
+MODEL = "llm:"  # begins the name of a language model
+EXTERNAL = (*PEOPLE, "llm:URL")  # the rows of those whose answers nothing can compute again: a journal holds them
 SKILL_TAUS = {"expert": 0.01, "moderate": 0.1, "limited": 0.3, "novice": 1.0}
 
 
@@ -266,8 +289,14 @@ _SHIPPED: dict[str, AdvisorKind] = {
     "recorded:DIR": AdvisorKind(_recorded, "a session's folder"),
     "answers:FILE": AdvisorKind(_answers, 'answers kept as JSON, {"state": "action"}'),
     "policy:NAME": AdvisorKind(_learned, "a policy in the toolbox, or its file"),
+    "llm:URL": AdvisorKind(_language_model, "a language model behind a server with chat completions"),
 }
 ADVISORS = Family("advisors", _SHIPPED, _adopted)
+
+
+def is_external(name: str) -> bool:
+    """Whether an advisor of this name is one of EXTERNAL: a person or a language model."""
+    return name in PEOPLE or name.startswith(MODEL)
 
 
 def named() -> list[str]:

@@ -53,7 +53,7 @@ class SessionEntry:
 
 @dataclass(frozen=True)
 class Answer:
-    """A person's answer: an action, None for "skip"; left: the person stopped advising, and why."""
+    """The answer of a person or a language model: an action, None for "skip"; left: it advises no more, and why."""
 
     by: str
     episode: int

@@ -6,6 +6,7 @@ from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
+from lab.advice.advisors import MODEL
 from lab.advice.entries import Answer, Entry
 from lab.advice.trust import Difference, Pair, SkillEstimate, differences, skill_of, worse
 from lab.errors import counted
@@ -155,10 +156,16 @@ def receipt(
         skill=None if values is None else skill_of(there, values),
         voices=voices if len(voices) > 1 else (),
         notices=tuple(_notices(entries)),
-        yours=any(isinstance(entry, Answer) for entry in entries) and all(voice.whole for voice in voices),
+        yours=_is_yours(entries) and all(voice.whole for voice in voices),
         **_episodes([entry for entry in entries if isinstance(entry, EpisodeEnded)], window),
     )
     return replace(counted, hints=tuple(_hints(counted, entries, window)))
+
+
+def _is_yours(entries: Sequence[Entry]) -> bool:
+    """Whether people were asked, and no language model."""
+    said_by = {entry.by for entry in entries if isinstance(entry, Answer)}
+    return bool(said_by) and not any(name.startswith(MODEL) for name in said_by)
 
 
 def _questions(entries: Iterable[Entry]) -> Iterator[_Question]:
@@ -266,6 +273,8 @@ def _notices(entries: Sequence[Entry]) -> Iterator[str]:
             yield f"episode {entry.episode}: advice rejected ({why}); alone for the {counted(left, 'episode')} after it"
         elif isinstance(entry, AdviceEnded):
             yield f"episode {entry.episode}: no more advice: {entry.reason}"
+        elif isinstance(entry, Answer) and entry.left and entry.by.startswith(MODEL):
+            yield f"episode {entry.episode}: {entry.by} left: {entry.why}"
         elif isinstance(entry, AdvisorDropped | AdvisorReadmitted):
             what = "dropped" if isinstance(entry, AdvisorDropped) else "heard again"
             yield f"episode {entry.episode}: {entry.advisor} {what}: {entry.why}"

@@ -9,7 +9,16 @@ from typing import Annotated, Any, Unpack
 
 from annotated_types import Ge, Lt
 
-from lab.api.options import Advisors, Settings, ToolboxOrPlace, advising_of, check_common, data_frame, toolbox_of
+from lab.api.options import (
+    Advisors,
+    Settings,
+    ToolboxOrPlace,
+    advising_of,
+    check_common,
+    data_frame,
+    heard_by,
+    toolbox_of,
+)
 from lab.api.pictures import Picture
 from lab.errors import BadInput, check_value
 from lab.lazy import pandas
@@ -144,8 +153,8 @@ def teach(
     """The result of one teaching session; the same problem, settings and seed give the same table.
 
     problem: a name as for `lab teach` (a sub-task of `task`, a world, "gym:ID"), a `GridWorld`, a `TabularMDP` or a `Problem`.
-    advisor: a name ("expert", "tau=0.2", "accuracy=0.8", "none"), a function of an `AdviceRequest` that returns an action or
-    None, an object with `advise`, or a list of these.
+    advisor: a name ("expert", "tau=0.2", "accuracy=0.8", "llm:URL", "none"), a function of an `AdviceRequest` that returns an
+    action or None, an object with `advise`, or a list of these.
     seed: of all randomness.
     toolbox: saves the policy, and provides an unfinished one to continue; None (default): nothing is saved, see
     `LessonResult.keep`.
@@ -167,8 +176,9 @@ def teach(
     subject.settings = subject.settings.changed("", **settings)
     with TemporaryDirectory() as nowhere:
         steps = StepRecord() if record else None
-        tell = unheard if steps is None else steps.hear
-        teacher = Teacher(toolbox_of(toolbox, nowhere), advising_of(advisor, toolbox), seed, tell)
+        advising = advising_of(advisor, toolbox)
+        tell = heard_by(advising, unheard if steps is None else steps.hear)
+        teacher = Teacher(toolbox_of(toolbox, nowhere), advising, seed, tell)
         teacher, plan = planned(subject, teacher)
         lesson = teacher.teach(plan)
     document = document_of(plan.problem, lesson, teacher) | subject.facts()

@@ -8,12 +8,14 @@ from typing import Annotated, Any, TypedDict, get_type_hints
 from annotated_types import Ge, Le
 
 from lab.advice.advising import Advising
+from lab.advice.advisors import MODEL
 from lab.errors import check_value, unknown
 from lab.lazy import pandas
 from lab.learning.gates import Gate
 from lab.learning.requests import Advisor, Ask
 from lab.learning.updates import Update
 from lab.optional import require
+from lab.teaching.events import Tell, told_to, unheard
 from lab.toolbox.registry import Toolbox
 
 
@@ -126,8 +128,18 @@ def several(advisors: Advisors) -> list[OneAdvisor]:
 
 def advising_of(advisors: Advisors, toolbox: ToolboxOrPlace) -> Advising:
     """The advisors of a session; the toolbox (None: the user's own) holds the policies that advise."""
-    box = None if toolbox is None else toolbox_of(toolbox, "")
-    return replace(Advising.of(several(advisors)), toolbox=box)
+    box, names = None if toolbox is None else toolbox_of(toolbox, ""), several(advisors)
+    people: Mapping[str, Ask] = {}
+    if models := [name for name in names if isinstance(name, str) and name.startswith(MODEL)]:
+        from lab.seat.language_model import language_models
+
+        people = language_models(models)
+    return replace(Advising.of(names, people), toolbox=box)
+
+
+def heard_by(advising: Advising, tell: Tell) -> Tell:
+    """A listener to a lesson's events that passes them to the language models, too, which ask in the words of the lesson."""
+    return told_to(*(getattr(ask, "hear", unheard) for ask in advising.people.values()), tell)
 
 
 def toolbox_of(given: ToolboxOrPlace, nowhere: str) -> Toolbox:

@@ -17,6 +17,7 @@ from lab.api.options import (
     check_common,
     checked,
     data_frame,
+    heard_by,
     several,
     toolbox_of,
 )
@@ -34,6 +35,7 @@ from lab.sequencing.cell.schedule import rows_of
 from lab.sequencing.simulate.follow import simulate
 from lab.skills.prepared_scene import prepare
 from lab.tasks.task_file import load
+from lab.teaching.events import unheard
 from lab.teaching.teacher import Teacher
 from lab.view.gantt import gantt
 from lab.workers import Workers
@@ -155,7 +157,7 @@ def run(
         check_out(folder)
         journal = RunJournal() if out is None else begun(words, loaded, folder)
         stack.callback(journal.close)
-        teacher = Teacher(toolbox_of(toolbox, f"{nowhere}/toolbox"), advising, seed)
+        teacher = Teacher(toolbox_of(toolbox, f"{nowhere}/toolbox"), advising, seed, heard_by(advising, unheard))
         advice = RunAdvice(
             *(teacher.toolbox, words.lessons(), journal, words.order or ""),
             cyclic=words.cyclic,

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 from lab.lazy import loader
 
 if TYPE_CHECKING:
-    from lab.advice.advisors import ADVISORS, PEOPLE, AdvisorName
+    from lab.advice.advisors import ADVISORS, MODEL, AdvisorName
     from lab.advice.entries import Read, read_journal
     from lab.advice.panel import ASKED, DECISIONS
     from lab.api.scenes import SceneRequest as SceneAsked
@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from lab.production.run_options import RunOptions, begun, kept_task
     from lab.production.run_options import gone_on as run_gone_on
     from lab.production.sequencing_job import SequencingOptions, sequence_named
+    from lab.seat.language_model import language_models
     from lab.seat.lesson_seat import LessonSeat
     from lab.seat.page.teaching_page import SeatPage
     from lab.seat.run_progress import RunProgress
@@ -79,7 +80,7 @@ if TYPE_CHECKING:
     from lab.teaching.events import told_to, unheard
     from lab.teaching.kept_order import OrderSession, OrderSessionOptions, kept_order
     from lab.teaching.kept_order import gone_on as order_gone_on
-    from lab.teaching.kept_session import KeptSession, check_new
+    from lab.teaching.kept_session import KeptSession, check_new, named_with
     from lab.teaching.lesson import replay as replay_session
     from lab.teaching.lesson import teach as teach_session
     from lab.teaching.lesson_options import DEFAULT_ADVISORS, LessonOptions
@@ -128,7 +129,7 @@ if TYPE_CHECKING:
     from lab.workers import Workers
 
 TABLE = {
-    "lab.advice.advisors": ("AdvisorName", "ADVISORS", "PEOPLE"),
+    "lab.advice.advisors": ("AdvisorName", "ADVISORS", "MODEL"),
     "lab.advice.entries": ("Read", "read_journal"),
     "lab.advice.panel": ("ASKED", "DECISIONS"),
     "lab.api.scenes": ("SceneRequest as SceneAsked", "seen"),
@@ -160,6 +161,7 @@ TABLE = {
     "lab.production.run_journal": ("is_run", "replayed_run", "RunEnded", "RunJournal"),
     "lab.production.run_options": ("begun", "kept_task", "gone_on as run_gone_on", "RunOptions"),
     "lab.production.sequencing_job": ("sequence_named", "SequencingOptions"),
+    "lab.seat.language_model": ("language_models",),
     "lab.seat.lesson_seat": ("LessonSeat",),
     "lab.seat.page.teaching_page": ("SeatPage",),
     "lab.seat.run_progress": ("RunProgress",),
@@ -196,7 +198,7 @@ TABLE = {
     "lab.tasks.task_file": ("describe", "is_path", "load", "load_any", "load_cell_beside", "shipped"),
     "lab.teaching.events": ("told_to", "unheard"),
     "lab.teaching.kept_order": ("kept_order", "gone_on as order_gone_on", "OrderSessionOptions", "OrderSession"),
-    "lab.teaching.kept_session": ("check_new", "KeptSession"),
+    "lab.teaching.kept_session": ("check_new", "KeptSession", "named_with"),
     "lab.teaching.lesson": ("replay as replay_session", "teach as teach_session"),
     "lab.teaching.lesson_options": ("DEFAULT_ADVISORS", "LessonOptions"),
     "lab.teaching.named_problems": ("PROBLEMS",),

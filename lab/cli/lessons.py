@@ -16,8 +16,9 @@ from lab.files import is_file
 def lesson_seat(
     names: Sequence[str], *, page: bool = False, port: int = 0, wait_s: float | None = None, plain: bool = False
 ) -> Iterator["deferred.LessonSeat"]:
-    """The seat of a command's lessons: the progress lines, and on request the prompt and the page."""
-    progress = deferred.RunProgress(console())
+    """The seat of a command's lessons: the progress lines, and on request the prompt, the page and language models."""
+    progress, asked = deferred.RunProgress(console()), [name for name in names if name.startswith(deferred.MODEL)]
+    models = deferred.language_models(asked) if asked else {}
     with ExitStack() as stack:
         shown = None
         if page or "web" in names:
@@ -26,10 +27,12 @@ def lesson_seat(
             if not {"web", "terminal"} & {*names}:
                 shown.asks_nobody()
         prompt = deferred.TeachingPrompt(progress.console, plain=plain) if "terminal" in names else None
-        seat = deferred.LessonSeat(progress, prompt, shown)
+        seat = deferred.LessonSeat(progress, prompt, shown, models)
         stack.callback(seat.clear_scene)
         try:
             yield seat
+            for model in models.values():
+                progress.console.print(str(model), soft_wrap=True)
         except LabError as error:
             if shown is not None:
                 shown.finished(str(error))

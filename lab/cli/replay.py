@@ -145,7 +145,7 @@ def _replayed(kept: "deferred.OrderSession", seat: "deferred.LessonSeat", toolbo
         raise KeyboardInterrupt
 
     try:
-        stopped = sequenced(kept, dict.fromkeys(deferred.PEOPLE, nobody), seat, toolbox, files={})["interrupted"]
+        stopped = sequenced(kept, dict.fromkeys(kept.options.advisors, nobody), seat, toolbox, files={})["interrupted"]
     except KeyboardInterrupt:  # no order was found before
         stopped = True
     if stopped and (kept.journal is None or kept.journal.folding):  # stopped by Ctrl-C, not by the end of the journal

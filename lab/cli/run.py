@@ -94,6 +94,7 @@ def run(
             options, loaded = deferred.run_gone_on(given, resume, out)
         wanted, folder = options.by_method(loaded), resume or out or Path(f"{loaded.name}-run")
         deferred.check_out(folder)
+        again = f"go on with: lab run --resume {quote(str(folder))}{deferred.named_with(options.advisors)}"
         watched = page or "web" in options.advisors
         controls = deferred.Controls(deferred.pace(speed or ("4" if watched else "max")))
         lessons = options.lessons()
@@ -125,13 +126,13 @@ def run(
             raise
         except KeyboardInterrupt as stopped:
             why = str(stopped) or "stopped by Ctrl-C; what was learned is kept"
-            raise KeyboardInterrupt(f"{why}; go on with: lab run --resume {quote(str(folder))}") from None
+            raise KeyboardInterrupt(f"{why}; {again}") from None
         finally:
             journal.close()
     document = report.to_json()
     show(document, as_json, deferred.run_summary)
     if report.outcome.interrupted:
-        raise KeyboardInterrupt(f"stopped by Ctrl-C; go on with: lab run --resume {quote(str(folder))}")
+        raise KeyboardInterrupt(f"stopped by Ctrl-C; {again}")
     if not report.success:
         end(report.outcome.failure or deferred.delivered_in_words(document["delivered"], document["parts"]), 1)
     if report.lost:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from lab.advice.advising import through
-from lab.advice.advisors import PEOPLE, AdvisorName, make_advisor
+from lab.advice.advisors import EXTERNAL, PEOPLE, AdvisorName, is_external, make_advisor
 from lab.advice.entries import Closed
 from lab.advice.journal import Again, Journal
 from lab.advice.order_level import OrderLevel, signature_of
@@ -126,8 +126,9 @@ class OrderAdvice:
 
 
 def person_of(names: Sequence[str]) -> AdvisorName:
-    """Who of a run's advisors is asked about the order, too: the first person; nobody where there is none."""
-    return next((AdvisorName.of(name) for name in names if name in PEOPLE), NOBODY)
+    """Who of a run's advisors is asked about the order, too: the first person, or else language model; or else nobody."""
+    asked = [name for name in names if name in PEOPLE] + [name for name in names if is_external(name)]
+    return AdvisorName.of(asked[0]) if asked else NOBODY
 
 
 @dataclass(frozen=True)
@@ -227,8 +228,8 @@ def _with_advice(
     cell: Cell, search: Search, advice: OrderAdvice, seed: int, known: Reference, tell: Tell
 ) -> "tuple[deferred.AdvisedResult, dict[str, Any]]":
     """SRL's order with advice, and its receipt; it begins again each time an answer is taken back."""
-    is_person = advice.advisor.row in PEOPLE
-    journal = advice.keep(cell, search.objective) if is_person else Journal()
+    is_kept = advice.advisor.row in EXTERNAL
+    journal = advice.keep(cell, search.objective) if is_kept else Journal()
     try:
         while True:
             tell(SequencingBegan(search.episodes, known, GateSettings(advice.gate, spare_best=True), "srl"))

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from lab.advice.advisors import PEOPLE
+from lab.advice.advisors import is_external
 from lab.advice.journal import Journal
 from lab.learning.requests import Ask
 from lab.production.order import OrderAdvice, Ordered, person_of
@@ -21,7 +21,7 @@ from lab.toolbox.registry import Toolbox
 
 @dataclass
 class RunAdvice:
-    """Who is asked in a run; where people are, what they say is kept in the toolbox's sessions, each named in the run's journal.
+    """Who is asked in a run; what people and language models say is kept in sessions, each named in the run's journal.
 
     given: the words of an order that is not to be looked for, "" for none; gate: when SRL asks about the order;
     cyclic: the order is to repeat the shortest cycle, of at most parts_per_cycle parts. Of a run that is resumed, the
@@ -38,16 +38,16 @@ class RunAdvice:
     sessions: dict[str, SessionInFolder] = field(default_factory=dict)
 
     @property
-    def asks_people(self) -> bool:
-        """Whether a person is among the advisors."""
-        return any(name in PEOPLE for name in self.options.advisors)
+    def keeps_answers(self) -> bool:
+        """Whether a person or a language model is among the advisors."""
+        return any(map(is_external, self.options.advisors))
 
     # ---- the lessons
 
     def keep(self, plan: LessonPlan) -> Journal:
         """The journal of a lesson: the one that a resumed run has begun, or a new one."""
         name = plan.problem.name
-        if not self.asks_people:
+        if not self.keeps_answers:
             return Journal()
         made = self.again(plan)
         if made is not None:

@@ -15,7 +15,7 @@ from lab.production.run_journal import RunBegan, RunJournal, read_run
 from lab.sequencing import SEQUENCERS, check_method
 from lab.tasks.task import Task
 from lab.tasks.task_file import load
-from lab.teaching.kept_session import check_alone
+from lab.teaching.kept_session import check_alone, check_named
 from lab.teaching.lesson_options import LessonOptions, SessionOptions, recorded_whole, whole_path
 
 
@@ -108,7 +108,8 @@ def gone_on(given: RunOptions, folder: Path, out: Path | None, command: str = "r
         )
     if given.method == options.method:  # one's own has to be named again: no file says which code runs
         given = replace(given, method=None)
-    check_alone(given, RunOptions(task=""), folder)
+    nothing = RunOptions(task="")
+    check_alone(check_named(given, options, nothing, folder), nothing, folder)
     return options, task
 
 

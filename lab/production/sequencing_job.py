@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from lab.advice.advisors import PEOPLE, AdvisorName
+from lab.advice.advisors import EXTERNAL, AdvisorName
 from lab.advice.entries import Closed
 from lab.advice.journal import Again, Journal
 from lab.errors import BadInput, unknown
@@ -194,7 +194,7 @@ def sequence_cell(
     search = replace(search, policy=None if wanted.policy is None else read_policy(wanted.policy))
     check_objective(search.objective, cell)
     tell(PhaseBegan("sequence", wanted.sessions))
-    journal = wanted.keep(cell, search.objective) if wanted.advisor.row in PEOPLE else None
+    journal = wanted.keep(cell, search.objective) if wanted.advisor.row in EXTERNAL else None
     plan = SearchPlan(method, search, wanted.sessions, Limits.of(wanted.seconds, wanted.gap))
     find: MethodSession = partial(find_sequence, cell, method, seed=wanted.seed)
     if wanted.advisor.row != "none":

@@ -3,7 +3,7 @@
 import re
 from dataclasses import dataclass, replace
 from itertools import chain
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -259,6 +259,13 @@ class StateWords(Protocol):
 
     def in_words(self, state: int) -> str: ...
     def moves_in_words(self) -> tuple[str, ...]: ...
+
+
+def skill_of(place: Any, name: str) -> StateWords | None:
+    """The skill of this name in a prepared task, which describes its states in words; None if the place has none."""
+    skillset = getattr(place, "skillset", None)
+    skill: StateWords | None = None if skillset is None else skillset.skills.get(name)
+    return skill
 
 
 class GridAxes(NamedTuple):

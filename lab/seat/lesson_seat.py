@@ -3,6 +3,7 @@
 import time
 from collections.abc import Mapping
 from contextlib import suppress
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from lab.advice.entries import Answer
@@ -11,6 +12,7 @@ from lab.learning.problem import Problem
 from lab.learning.requests import AdviceRequest, Ask, Request
 from lab.learning.session_events import EpisodeEnded
 from lab.mdp import FloatArray
+from lab.seat.grid_text import skill_of
 from lab.seat.replay_pace import ReplayPace
 from lab.seat.run_progress import RunProgress
 from lab.seat.terminal.prompt import TeachingPrompt
@@ -18,9 +20,9 @@ from lab.teaching.events import AdvisorGathered, Event, LessonBegan, LessonEvent
 from lab.teaching.kept_session import known_values, receipt_of
 
 if TYPE_CHECKING:
+    from lab.seat.language_model import LanguageModel
     from lab.seat.lesson_scene import LessonScene
     from lab.seat.page.teaching_page import SeatPage
-    from lab.skills import Skill
 
 WORTH_S = 2.0  # least time between two receipts of one lesson
 PAGE_S = 30.0  # time that a replay waits for a browser
@@ -31,10 +33,17 @@ class LessonSeat:
     """Passes events to progress, prompt and page, and asks the person at one of them.
 
     The page also shows the scene, with the robot in the state of the question. `prompt`, `page`: None for a seat without.
+    models: the language models that are asked, by the name of the advisor.
     """
 
-    def __init__(self, progress: RunProgress, prompt: TeachingPrompt | None, page: "SeatPage | None") -> None:
-        self.progress, self._prompt, self.page = progress, prompt, page
+    def __init__(
+        self,
+        progress: RunProgress,
+        prompt: TeachingPrompt | None,
+        page: "SeatPage | None",
+        models: "Mapping[str, LanguageModel]" = MappingProxyType({}),
+    ) -> None:
+        self.progress, self._prompt, self.page, self.models = progress, prompt, page, models
         self._scene: LessonScene | None = None
         self._scene_of: Problem | None = None
         self._place: Any = None  # the prepared task or the world of the lessons
@@ -52,6 +61,8 @@ class LessonSeat:
         """Pass an event to progress, prompt and page; repeated events go to the page only, except in a replay."""
         if self.page is not None and not isinstance(event, QuestionAnswered):
             self.page.hear(event)
+        for model in self.models.values():
+            model.hear(event)
         match event:
             case LessonEvent():
                 self._hear_session(event)
@@ -72,8 +83,7 @@ class LessonSeat:
         """Take over the problem being learned: questions use the words of its skill, and another problem's scene is removed."""
         if self._scene_of not in (None, problem):
             self.clear_scene()
-        skillset = getattr(self._place, "skillset", None)
-        skill: Skill | None = None if skillset is None else skillset.skills.get(problem.name)
+        skill = skill_of(self._place, problem.name)
         if self._prompt is not None:
             self._prompt.about(skill)
         if self.page is not None:
@@ -135,8 +145,8 @@ class LessonSeat:
     # ---- questions
 
     def people(self) -> Mapping[str, Ask]:
-        """The functions that ask people, by the name of the advisor."""
-        people: dict[str, Ask] = {}
+        """The functions that ask people and language models, by the name of the advisor."""
+        people: dict[str, Ask] = {**self.models}
         if self._prompt is not None:
             people["terminal"] = self._ask_terminal
         if self.page is not None:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.advice.advising import Advising
-from lab.advice.advisors import ADVISORS
+from lab.advice.advisors import ADVISORS, MODEL, not_called
 from lab.errors import BadInput
 from lab.files import code_key
 from lab.lazy import matplotlib
@@ -209,6 +209,8 @@ class Compared:
                 raise BadInput(f"{name}: nothing to compare: wanted one value or several")
             classes = {one.__name__: one for one in several if isinstance(one, type)}
             for one in several:
+                if name == "advisor" and isinstance(one, str) and one.startswith(MODEL):
+                    raise not_called(one)
                 if isinstance(one, type) and classes[one.__name__] is not one:
                     raise BadInput(f"{name}: two classes are called {one.__name__}: give one of them another name")
 

@@ -32,6 +32,7 @@ class OrderSessionOptions(SessionOptions):
     command = "sequence"
     wanted = "it is no advice on an order: lab teach --resume goes on with it"
     typed: ClassVar[Mapping[str, str]] = {"task": "TASK"}
+    advisor_field = "advisor"
 
     task: str = ""
     case: str | None = None
@@ -139,5 +140,5 @@ def kept_order(folder: Path, where: str, toolbox: Toolbox, *, read_only: bool = 
 def gone_on(given: OrderSessionOptions, folder: Path, toolbox: Toolbox) -> OrderSession:
     """The session that --resume names. Raises BadInput if it has ended, and for further options."""
     read, options = read_session(folder, "--resume", OrderSessionOptions)
-    check_same(given, read)
+    check_same(given, options, read)
     return OrderSession(options, toolbox, read)

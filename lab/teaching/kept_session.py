@@ -4,12 +4,13 @@ import json
 import os
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from itertools import count
 from pathlib import Path
 from shlex import quote
 from typing import Any, TypeVar
 
+from lab.advice.advisors import MODEL
 from lab.advice.entries import FILE, Read, SessionEntry, is_unbegun, line_of, read_journal
 from lab.advice.journal import Journal
 from lab.advice.receipt import Receipt, receipt
@@ -18,7 +19,7 @@ from lab.learning.environment import TableEnvironment
 from lab.learning.problem import Problem
 from lab.mdp import FloatArray
 from lab.tasks.record import write_whole
-from lab.teaching.lesson_options import LessonOptions, SessionOptions
+from lab.teaching.lesson_options import LessonOptions, SessionOptions, recorded_whole
 from lab.teaching.lesson_plan import LessonPlan
 from lab.toolbox.folder_place import FolderPlace
 from lab.toolbox.names import BEGUN, SESSIONS, SUFFIX, default_address, slug
@@ -68,7 +69,8 @@ class SessionInFolder:
         if self.folder is None or self.journal is None:
             return ""
         box = "" if toolbox.address == default_address() else f" --toolbox {quote(toolbox.address)}"
-        return f"; go on with: lab {self.options.command} --resume {quote(str(self.folder))}{box}"
+        advisors = named_with(self.options.advisor_names)
+        return f"; go on with: lab {self.options.command} --resume {quote(str(self.folder))}{advisors}{box}"
 
     def replayed(self) -> dict[str, Any]:
         """The document of `lab replay --json`."""
@@ -203,7 +205,7 @@ class KeptSession(SessionInFolder):
 
     def same(self, given: LessonOptions) -> LessonOptions:
         """The options of the session. Raises BadInput if the command names others, or if the session has ended."""
-        check_same(given, self.read)
+        check_same(given, self.options, self.read)
         return self.options
 
     def begun(self, problem: Problem) -> Policy | None:
@@ -221,10 +223,37 @@ class KeptSession(SessionInFolder):
         raise BadInput(f"session '{self.folder}': the policy that it went on from is not in '{BEGUN}' any more")
 
 
-def check_same(given: Any, read: Read) -> None:
-    """Raises BadInput if a command that resumes a session also names options, or if the session has ended."""
-    check_alone(given, type(given)(), read.path.parent)
+def check_same(given: Any, options: SessionOptions, read: Read) -> None:
+    """Raises BadInput if a command that resumes a session also names options, or if the session has ended.
+
+    Where a language model advises, the advisors have to be named again, see `check_named`.
+    """
+    nothing = type(given)()
+    check_alone(check_named(given, options, nothing, read.path.parent), nothing, read.path.parent)
     read.check_goes_on()
+
+
+def check_named(given: Any, options: SessionOptions, nothing: SessionOptions, folder: Path) -> Any:
+    """The given options, without their advisors where these had to be named again: where a language model is among them.
+
+    A journal may come from somebody else, and no file decides where questions and a key are sent. options: those of the journal;
+    nothing: the options at their defaults. Raises BadInput if other advisors were named, or none.
+    """
+    if not any(name.startswith(MODEL) for name in options.advisor_names):
+        return given
+    if [*map(recorded_whole, given.advisor_names)] != [*map(recorded_whole, options.advisor_names)]:
+        raise BadInput(
+            f"--resume {folder}: a language model is asked there, which has to be named again, because no file decides where "
+            f"questions are sent: add{named_with(options.advisor_names)}"
+        )
+    return replace(given, **{given.advisor_field: getattr(nothing, given.advisor_field)})
+
+
+def named_with(advisors: Sequence[str]) -> str:
+    """The advisors as options of a command that resumes their session: all if a language model is among them, else ""."""
+    if not any(name.startswith(MODEL) for name in advisors):
+        return ""
+    return "".join(f" --advisor {quote(name)}" for name in advisors)
 
 
 def check_alone(given: Any, nothing: Any, folder: Path) -> None:

@@ -24,12 +24,20 @@ class SessionOptions:
     """The base class of the options of commands that store a session; a journal holds them by name.
 
     command: the command; wanted: the error text for a session of another command; typed: option by field, where names differ.
+    advisor_field: the field that holds the advisor, or all of them.
     """
 
     command: ClassVar[str]
     wanted: ClassVar[str]
     typed: ClassVar[Mapping[str, str]]
+    advisor_field: ClassVar[str] = "advisors"
     seed: int
+
+    @property
+    def advisor_names(self) -> tuple[str, ...]:
+        """The names of all advisors."""
+        given: str | tuple[str, ...] = getattr(self, self.advisor_field)
+        return (given,) if isinstance(given, str) else given
 
     @classmethod
     def from_json(cls, record: dict[str, Any], where: str) -> Self:

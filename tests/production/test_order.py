@@ -134,6 +134,8 @@ def test_an_order_that_no_move_was_advised_to_is_no_advised_one() -> None:
 
 def test_the_first_person_of_a_run_is_asked_about_the_order() -> None:
     assert str(person_of(("expert", "web", "terminal"))) == "web"
+    assert str(person_of(("llm:http://h", "expert", "terminal"))) == "terminal"
+    assert str(person_of(("expert", "llm:http://h"))) == "llm:http://h"
     assert person_of(("expert", "none")).row == "none"
 
 

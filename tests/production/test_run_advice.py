@@ -55,6 +55,13 @@ def test_each_lesson_of_a_skill_goes_on_in_its_own_session(tmp_path: Path) -> No
     again.close()
 
 
+def test_what_a_language_model_says_is_kept(tmp_path: Path) -> None:
+    journal = RunJournal.begin(tmp_path / "run", RunBegan({}, "toast", "0"))
+    kept = advice_of(tmp_path, journal, "expert", "llm:http://127.0.0.1").keep(plan(4))
+    assert folder_of(kept).parent == tmp_path / "toolbox" / "sessions"
+    journal.close()
+
+
 def test_where_nobody_is_asked_nothing_is_kept(tmp_path: Path) -> None:
     journal = RunJournal.begin(tmp_path / "run", RunBegan({}, "toast", "0"))
     kept = advice_of(tmp_path, journal, "expert").keep(plan(4))

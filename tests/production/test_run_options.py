@@ -32,6 +32,16 @@ def test_a_run_goes_on_with_its_method(tmp_path: Path) -> None:
         gone_on(RunOptions("", method="exact"), tmp_path, None)
 
 
+def test_a_language_model_has_to_be_named_again(tmp_path: Path) -> None:
+    """No file decides where questions are sent."""
+    model = "llm:http://127.0.0.1:8080/v1#m"
+    begun(RunOptions("toast", advisors=(model, "expert")), load("toast"), tmp_path).close()
+    for advisors in ((), (model,), ("expert", model), ("llm:http://127.0.0.1:9/v1#m", "expert")):
+        with pytest.raises(BadInput, match=f"named again, .*: add --advisor '{model}' --advisor expert$"):
+            gone_on(RunOptions("", advisors=advisors), tmp_path, None)
+    assert gone_on(RunOptions("", advisors=(model, "expert")), tmp_path, None)[0].advisors == (model, "expert")
+
+
 def test_a_journal_from_before_there_were_methods(tmp_path: Path) -> None:
     begun(RunOptions("toast"), load("toast"), tmp_path).close()
     journal = next(path for path in tmp_path.iterdir() if '"method"' in path.read_text(encoding="utf-8"))

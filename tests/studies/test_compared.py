@@ -127,6 +127,7 @@ def test_names_say_what_differs() -> None:
     [
         ({"values": {"gate": []}}, "gate: nothing to compare"),
         ({"advisors": ()}, "advisor: nothing to compare"),
+        ({"advisors": ("expert", "llm:http://h")}, "advisor 'llm:http://h': only lab teach, run and sequence ask"),
     ],
 )
 def test_what_cannot_be_compared(what: dict[str, Any], fault: str) -> None:
