@@ -34,7 +34,7 @@ TASK = (
     f"one of the allowed answers, alone on the first line. Reply {SKIP} if you do not know."
 )
 _FENCE = "```"
-_MARKS = " \t\r\n\"'`"
+_MARKS = " \t\r\n\"'`*.!"  # around an answer they count for nothing
 
 
 # ---- the question, and the reply to it --------------------------------------------------------------------------------
@@ -66,8 +66,7 @@ def names_of(request: Request) -> dict[str, int]:
 def understood(reply: str, names: Mapping[str, int]) -> int | str | None:
     """The answer in a reply: an allowed one, SKIP, or None for anything else.
 
-    The first line has to be the name or number of an answer and nothing more; capitals do not count, quotes around it are
-    ignored. It may stand in a code fence, and the reply may be JSON such as {"action": "left"}.
+    The first line has to be the name or number of an answer and nothing more but _MARKS around it; capitals do not count. It may stand in a code fence, and the reply may be JSON such as {"action": "left"}.
     """
     text = reply.strip()
     if text.startswith(_FENCE) and text.endswith(_FENCE):

@@ -155,6 +155,8 @@ NAMES = {"0": 0, "1": 1, "up": 0, "Down": 1}
         ('{"action": 1, "why": "..."}', 1),
         ('```json\n{"action": "up"}\n```', 0),
         ("```\nup\n```", 0),
+        ("Down.", 1),
+        ("**up**!\nBecause the goal is there.", 0),
         ("skip", SKIP),
         ("Skip", SKIP),
         ("", None),
