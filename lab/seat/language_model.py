@@ -66,7 +66,8 @@ def names_of(request: Request) -> dict[str, int]:
 def understood(reply: str, names: Mapping[str, int]) -> int | str | None:
     """The answer in a reply: an allowed one, SKIP, or None for anything else.
 
-    The first line has to be the name or number of an answer and nothing more but _MARKS around it; capitals do not count. It may stand in a code fence, and the reply may be JSON such as {"action": "left"}.
+    The first line has to be the name or number of an answer and nothing more but _MARKS around it; capitals do not count. It may
+    stand in a code fence, and the reply may be JSON such as {"action": "left"}.
     """
     text = reply.strip()
     if text.startswith(_FENCE) and text.endswith(_FENCE):
