@@ -123,7 +123,7 @@ class RuleUpdate(OnTable):
     """The base class of learners whose update is one function, `rule`, which the kernel compiles for many sessions at once.
 
     rule: a static method, called as rule(q, settings, s_tm1, a_tm1, r_t, discount_t, s_t, a_t), which changes the values
-    q[state][action] in place; settings: the numbers of `LearnerSettings`, by name; the rest is as in `learn`. It is written in
+    `q[state][action]` in place; settings: the numbers of `LearnerSettings`, by name; the rest is as in `learn`. It is written in
     the Python that numba compiles, makes no list and no array, and calls nothing but what numba knows.
     A subclass that overrides another method runs in the session only.
 
