@@ -102,9 +102,8 @@ def inner(function: Function, **options: Any) -> Function:
     Python cannot call it and it is not cached by itself; leaving out the wrapper for Python saves a third of the compile time.
     """
     jit: Any = numba.njit
-    jitted: Function = jit(nogil=True, no_cpython_wrapper=True, no_cfunc_wrapper=True, **_WITHOUT_REFCOUNTS, **options)(
-        function
-    )
+    given = _WITHOUT_REFCOUNTS | options
+    jitted: Function = jit(nogil=True, no_cpython_wrapper=True, no_cfunc_wrapper=True, **given)(function)
     return jitted
 
 
@@ -113,9 +112,7 @@ def compiled_rule(rule: Function, arguments: tuple[Any, ...]) -> tuple[Function,
 
     It raises the errors of Python, as for a division by zero. Raises any exception if it cannot be compiled.
     """
-    options = _WITHOUT_REFCOUNTS | {"error_model": "python"}
-    jit: Any = numba.njit
-    jitted: Any = jit(nogil=True, no_cpython_wrapper=True, no_cfunc_wrapper=True, boundscheck=True, **options)(rule)
+    jitted: Any = inner(rule, boundscheck=True, error_model="python")
     jitted.compile(types_of(arguments))
     jitted.disable_compile()  # what it returns for others is not known
     (signature,) = jitted.nopython_signatures

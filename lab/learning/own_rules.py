@@ -16,6 +16,7 @@ from lab.learning.gates import GATES
 from lab.learning.gates.gate import OPENS_BY_RULE
 from lab.learning.gates.rule_gate import GateNow, plain_rules
 from lab.learning.kernels import records
+from lab.learning.kernels.arrays import numbers_of
 from lab.learning.kernels.records import LANES
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.learning.updates import UPDATES
@@ -55,7 +56,7 @@ def runs_compiled(
         return False
     try:
         own = None if learns is None else _own_rule(work, mdp, learner)
-        own_gate = _own_gate(work, mdp, learner, gate) if decides else None
+        own_gate = _own_gate(work, mdp, gate) if decides else None
         _for_process(kernel)(work, *others, *((own, own_gate) if on_table else (own_gate,)))
     except Exception:  # whatever a rule raises
         return False
@@ -71,22 +72,19 @@ def _own_rule(work: records.Work, mdp: TabularMDP, learner: LearnerSettings) -> 
     shape, others = mdp.successor.shape, work.lanes.others
     return records.OwnRule(
         rule=_compiled_learner(learner.learner),
-        settings=_numbers(records.NumberSettings, learner),
+        settings=numbers_of(records.NumberSettings, learner),
         q=work.lanes.tables.reshape(LANES, *shape),
         others=others.reshape(LANES, -1, *shape) if others.size else np.zeros((LANES, 0, *shape)),
         wrong=np.zeros(1, np.int64),
     )
 
 
-def _own_gate(work: records.Work, mdp: TabularMDP, learner: LearnerSettings, gate: GateSettings) -> records.OwnGate:
+def _own_gate(work: records.Work, mdp: TabularMDP, gate: GateSettings) -> records.OwnGate:
     opens, asks = _compiled_gate(gate.gate)
     values = np.zeros((LANES, mdp.n_actions))
     return records.OwnGate(
         opens=opens,
         asks=asks,
-        settings=_numbers(records.GateNumbers, gate),
-        episodes=learner.episodes,
-        max_steps=learner.max_steps,
         steps=_to_read(work.sessions.steps),
         values=values,
         shown=_to_read(values),
@@ -98,11 +96,6 @@ def _to_read(array: Any) -> Any:
     view = array.view()
     view.flags.writeable = False
     return view
-
-
-def _numbers(kind: Any, settings: LearnerSettings | GateSettings) -> Any:
-    """The numbers of settings as a record of that kind."""
-    return kind(**{field: getattr(settings, field) for field in kind._fields})
 
 
 # ---- the rules of members, plain and compiled -------------------------------------------------------------------------
@@ -123,14 +116,14 @@ def _gate_rules(name: str) -> tuple[Any, ...]:
 
 def _compiled_learner(name: str) -> Any:
     """The compiled rule of a learner that is one. Raises TypeError if numba cannot compile it."""
-    settings = _numbers(records.NumberSettings, LearnerSettings())
+    settings = numbers_of(records.NumberSettings, LearnerSettings())
     return _compiled("learner", name, _learner_rule(name), (np.zeros((1, 1)), settings, 0, 0, 0.0, 0.0, 0, 0))
 
 
 def _compiled_gate(name: str) -> tuple[Any, Any]:
     """The compiled rules of a gate that has them. Raises TypeError if numba cannot compile them, or they return no bool."""
     opens, asks = _gate_rules(name)
-    others = GateNow(1, 1, 1, 0, 0.0), _numbers(records.GateNumbers, GateSettings())
+    others = GateNow(1, 1, 1, 0, 0.0), numbers_of(records.GateNumbers, GateSettings())
     steps, values = _to_read(np.zeros(1, np.int32)), _to_read(np.zeros(1))
     return (
         _compiled("gate", name, opens, (1, steps, *others), answers=True),

@@ -2,7 +2,7 @@
 
 from functools import lru_cache
 from math import log
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -196,13 +196,14 @@ def learning_of(mdp: TabularMDP, learner: LearnerSettings) -> records.CompiledLe
 
 
 def asking_of(gate: GateSettings, somebody: bool, max_steps: int) -> records.Asking:
-    rules = GATES[gate.gate if somebody else "never"].compiled
-    given = vars(gate) | {
-        "gate": rules,
-        "judge_unhelped": gate.judge_unhelped and not (gate.memory or gate.by_evidence),
-    }
-    given["max_steps"] = max_steps
-    return records.Asking(**{name: given[name] for name in records.Asking._fields})
+    rules: Any = GATES[gate.gate if somebody else "never"].compiled
+    judges_unhelped = gate.judge_unhelped and not (gate.memory or gate.by_evidence)
+    return records.Asking(rules, numbers_of(records.GateNumbers, gate), judges_unhelped, max_steps)
+
+
+def numbers_of(kind: Any, settings: LearnerSettings | GateSettings) -> Any:
+    """The numbers of settings as a record of that kind."""
+    return kind(**{field: getattr(settings, field) for field in kind._fields})
 
 
 def action_values(mdp: TabularMDP, learning: records.CompiledLearner, tables: FloatArray) -> FloatArray:

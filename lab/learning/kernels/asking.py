@@ -21,15 +21,15 @@ _unsure: Any = inlined(rules.unsure)
 
 
 @inner
-def opens(asking: Any, lane: Any, steps: Any, max_steps: int, rejected: bool) -> bool:
-    """`Gate.opens`: whether the episode that begins in a lane may ask; steps (E,) are those of its session."""
-    rule, episode, window = asking.gate.opens, lane.episode, asking.window
+def _opens(asking: Any, lane: Any, steps: Any, max_steps: int, rejected: bool) -> bool:
+    """`Gate.opens` of a shipped gate; steps (E,) are those of the lane's session."""
+    rule, episode, window = asking.gate.opens, lane.episode, asking.settings.window
     if rule not in (rules.OPENS_FROM_X, rules.OPENS_WHILE_LONG, rules.OPENS_WHILE_SLOW):
         return bool(rule == rules.OPENS_ALWAYS)
-    if episode < asking.first_episode:
+    if episode < asking.settings.first_episode:
         return False
     if rule == rules.OPENS_WHILE_LONG:
-        return bool(episode > window and _window_mean(steps, episode - 1, window) > asking.enough_steps)
+        return bool(episode > window and _window_mean(steps, episode - 1, window) > asking.settings.enough_steps)
     if rule == rules.OPENS_FROM_X or rejected or episode <= 2 * window:
         return bool(rule == rules.OPENS_FROM_X)
     result = steps[episode - 2]
@@ -41,7 +41,7 @@ def opens(asking: Any, lane: Any, steps: Any, max_steps: int, rejected: bool) ->
         lane.last_result, lane.equal_results = result, 0
     current = _window_mean(steps, episode - 1, window)
     previous = _window_mean(steps, episode - 1 - window, window)
-    slow = _too_slow(current, previous, asking.lambda_threshold)
+    slow = _too_slow(current, previous, asking.settings.lambda_threshold)
     return bool(slow and lane.converged == 0 and episode < len(steps))
 
 
@@ -49,34 +49,30 @@ def opens(asking: Any, lane: Any, steps: Any, max_steps: int, rejected: bool) ->
 def _now(work: Any, own_gate: Any, j: int) -> Any:
     """What the rules of lane j's gate read."""
     lane = work.lanes.lane[j]
-    helped_steps = work.asking.budget - lane.left + lane.helped
-    return _Now(lane.episode, own_gate.episodes, own_gate.max_steps, helped_steps, draw(work.lanes.rng, j))
+    helped_steps = work.asking.settings.budget - lane.left + lane.helped
+    return _Now(lane.episode, len(work.sessions.warm), work.asking.max_steps, helped_steps, draw(work.lanes.rng, j))
 
 
 @inlined
-def opens_by_rule(work: Any, own_gate: Any, j: int) -> bool:
-    """`RuleGate.opens` of the episode that begins in lane j."""
-    lane = work.lanes.lane[j]
+def opens(work: Any, own_gate: Any, j: int) -> bool:
+    """`Gate.opens`: whether the episode that begins in lane j may ask."""
+    lane, sessions = work.lanes.lane[j], work.sessions
+    if own_gate is None:
+        rejected = sessions.counts[lane.session].rejected_at_episode > 0
+        return bool(_opens(work.asking, lane, sessions.steps[lane.session], work.learning.max_steps, rejected))
     steps = own_gate.steps[lane.session, : lane.episode - 1]
-    return bool(own_gate.opens(lane.episode, steps, _now(work, own_gate, j), own_gate.settings))
-
-
-@inlined
-def show(work: Any, own_gate: Any, j: int) -> None:
-    """Writes `Update.gauge` of lane j's state to `own_gate.values`."""
-    for a in range(len(work.learning.actions)):
-        own_gate.values[j, a] = gauge(work, work.lanes.tables[j], work.lanes.states[j], a)
+    return bool(own_gate.opens(lane.episode, steps, _now(work, own_gate, j), work.asking.settings))
 
 
 @inner
 def judge(asking: Any, lane: Any, told: Any, count: Any, moves: int) -> None:
     """`Ccrl.judges` if all episodes begin in the same state; told: steps (E,) and guided (E,) of the lane's session."""
-    episode, window = lane.episode, asking.window
+    episode, window = lane.episode, asking.settings.window
     if not _judged(asking, lane, count):
         return
     steps, guided = told
     result = steps[episode - 1]
-    if asking.by_evidence:
+    if asking.settings.by_evidence:
         own, reached, found, i = 0.0, 0, 0, episode - 2
         while i >= 0 and found < window:
             if not guided[i]:
@@ -87,7 +83,7 @@ def judge(asking: Any, lane: Any, told: Any, count: Any, moves: int) -> None:
         return
     if _misled(result, _window_mean(steps, episode - 1, window)):
         # With one start the fewest known steps are those of the best episode.
-        best = bool(asking.spare_best and result <= asking.max_steps)
+        best = bool(asking.settings.spare_best and result <= asking.max_steps)
         if best:
             for i in range(episode - 1):
                 best = best and result <= steps[i]
@@ -108,13 +104,13 @@ def knows(lane: Any, steps: Any, walked: int, fewest: Any, walk: Any, max_steps:
 @inner
 def judge_moved(asking: Any, lane: Any, told: Any, count: Any, moves: int, fewest: Any, begun: Any) -> None:
     """`Ccrl.judges` if episodes begin in different states: earlier step counts are corrected by their starts."""
-    episode, window = lane.episode, asking.window
+    episode, window = lane.episode, asking.settings.window
     if not _judged(asking, lane, count):
         return
     steps, guided = told
     result, now = steps[episode - 1], begun[episode - 1]
     here, total = fewest[now], 0.0
-    if asking.by_evidence:
+    if asking.settings.by_evidence:
         reached, found, i = 0, 0, episode - 2
         while i >= 0 and found < window:
             if not guided[i]:
@@ -131,7 +127,7 @@ def judge_moved(asking: Any, lane: Any, told: Any, count: Any, moves: int, fewes
         if begun[i] != now and here < np.inf and steps[i] <= asking.max_steps:
             value += here - fewest[begun[i]]
         total += value
-    best = asking.spare_best and result <= min(here, asking.max_steps)
+    best = asking.settings.spare_best and result <= min(here, asking.max_steps)
     if result >= total / window and not best:
         _misleads(asking, episode, count)
 
@@ -139,8 +135,8 @@ def judge_moved(asking: Any, lane: Any, told: Any, count: Any, moves: int, fewes
 @inlined
 def _judged(asking: Any, lane: Any, count: Any) -> bool:
     """Whether the last episode is compared with those before it."""
-    may = asking.judge_unhelped or lane.helped > 0
-    return bool(may and count.rejected_at_episode == 0 and lane.episode > asking.window)
+    may = asking.judges_unhelped or lane.helped > 0
+    return bool(may and count.rejected_at_episode == 0 and lane.episode > asking.settings.window)
 
 
 @inlined
@@ -157,7 +153,7 @@ def _weighs(asking: Any, lane: Any, count: Any, result: Any, own: float, reached
 def _misleads(asking: Any, episode: int, count: Any) -> None:
     """Counts a mislead, and rejects the advisor after more than Omega."""
     count.misleads += 1
-    if count.misleads > asking.omega:
+    if count.misleads > asking.settings.omega:
         count.rejected_at_episode = episode
 
 
@@ -185,16 +181,16 @@ def asks(work: Any, own_gate: Any, j: int, state: Any) -> bool:
     asking, lanes = work.asking, work.lanes
     if own_gate is not None:
         now = _now(work, own_gate, j)
-        return bool(own_gate.asks(np.int64(state), own_gate.shown[j], now, own_gate.settings))
+        return bool(own_gate.asks(np.int64(state), own_gate.shown[j], now, work.asking.settings))
     rule = asking.gate.asks
     if rule == rules.ASKS_WHERE_ALIKE:
-        return bool(_unsure(lanes.widths[j], asking.psi))
+        return bool(_unsure(lanes.widths[j], asking.settings.psi))
     if rule == rules.ASKS_WHERE_APART:
-        return bool(lanes.widths[j] >= asking.psi)
+        return bool(lanes.widths[j] >= asking.settings.psi)
     if rule == rules.ASKS_BY_CHANCE:
-        return bool(draw(lanes.rng, j) < asking.rate)
+        return bool(draw(lanes.rng, j) < asking.settings.rate)
     if rule == rules.ASKS_WHERE_TABLES_DIFFER:
-        return bool(_deviation(work, j, state) >= asking.spread)
+        return bool(_deviation(work, j, state) >= asking.settings.spread)
     return True
 
 

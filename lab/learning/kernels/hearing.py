@@ -9,7 +9,7 @@ from lab.learning import selection
 from lab.learning.compiled import inlined, inner, linked, without_refcounts
 from lab.learning.gates import earned_trust, heard, reuse
 from lab.learning.gates import gate as rules
-from lab.learning.kernels.learners import best_action, draw, gauge, leads, prefer, replay_step
+from lab.learning.kernels.learners import best_action, draw, fill, leads, prefer, replay_step
 from lab.learning.simulated_advice import SPEAKS_ALWAYS, SPEAKS_TO_CORRECT
 from lab.learning.updates import update
 
@@ -69,12 +69,12 @@ def begins(work: Any, hearing: Any, j: int) -> None:
     """`Gate.begins` of lane j's episode."""
     how, episode = work.asking.gate.weighs, work.lanes.lane[j].episode
     if how == rules.WEIGHS_IMITATION:
-        _begins_reuse(_of_lane(hearing.heard, j), work.asking.reuse ** (episode - 1), draw(work.lanes.rng, j))
+        _begins_reuse(_of_lane(hearing.heard, j), work.asking.settings.reuse ** (episode - 1), draw(work.lanes.rng, j))
     elif how == rules.WEIGHS_POLICY:
         told = _of_lane(hearing.heard, j)
-        _begins_reuse(told, _advised_chance(told, episode, work.asking.warming), draw(work.lanes.rng, j))
+        _begins_reuse(told, _advised_chance(told, episode, work.asking.settings.warming), draw(work.lanes.rng, j))
     elif how == rules.WEIGHS_TRUST:
-        start, retry = np.int64(work.lanes.states[j]), work.asking.retry
+        start, retry = np.int64(work.lanes.states[j]), work.asking.settings.retry
         _starts(_of_lane(hearing.heard, j), (work, j), start, retry, draw(work.lanes.rng, j))
 
 
@@ -83,21 +83,22 @@ def wants(work: Any, hearing: Any, j: int, state: Any) -> bool:
     """`Gate.asks` of a gate that weighs."""
     how, told, lanes = work.asking.gate.weighs, _of_lane(hearing.heard, j), work.lanes
     if how == rules.WEIGHS_TRUST:
-        return bool(_wants(told, np.int64(state), work.asking.agreement))
+        return bool(_wants(told, np.int64(state), work.asking.settings.agreement))
     hearing.u[j] = draw(lanes.rng, j)
     u, episode = hearing.u[j], lanes.lane[j].episode
     if how == rules.WEIGHS_NOVELTY:
         return bool(_answers(told, np.int64(state)) == 0)
     if how == rules.WEIGHS_FADING:
-        return bool(u < work.asking.fading ** (episode - 1))
+        return bool(u < work.asking.settings.fading ** (episode - 1))
     if how == rules.WEIGHS_RELIABILITY:
         return bool(
-            _explores(episode, len(work.sessions.warm), work.asking.exploring, u) and told.said[state] == heard.NOTHING
+            _explores(episode, len(work.sessions.warm), work.asking.settings.exploring, u)
+            and told.said[state] == heard.NOTHING
         )
     if how == rules.WEIGHS_WORTH:
-        return bool(_asks_by_worth(told, np.int64(state), work.asking.wandering, u))
+        return bool(_asks_by_worth(told, np.int64(state), work.asking.settings.wandering, u))
     if how == rules.WEIGHS_POLICY:
-        share = work.asking.reuse**told.now.moves if told.now.advised > 0.0 else 0.0
+        share = work.asking.settings.reuse**told.now.moves if told.now.advised > 0.0 else 0.0
         told.now.moves += 1.0
         return bool(u < share)
     if how in (rules.WEIGHS_REUSE, rules.WEIGHS_IMITATION, rules.WEIGHS_VALUES):
@@ -117,32 +118,27 @@ def takes(work: Any, hearing: Any, j: int, state: Any, own: Any, said: int) -> A
     if how == rules.WEIGHS_TRUST:
         action = np.int64(_takes(told, at, np.int64(own)))
     elif how == rules.WEIGHS_SHAPING:
-        odds = work.asking.consistency / (1.0 - work.asking.consistency)
-        _fill(work, hearing, j, state)
+        odds = work.asking.settings.consistency / (1.0 - work.asking.settings.consistency)
+        fill(work, hearing.values, j, state)
         action = np.int64(_shaped(told, at, hearing.values[j], lanes.per_tau[j], odds, hearing.u[j]))
     elif how == rules.WEIGHS_RELIABILITY:
-        explores = _explores(lanes.lane[j].episode, len(work.sessions.warm), work.asking.exploring, hearing.u[j])
-        kept = explores and told.said[at] != heard.NOTHING and _reliable(told, actions, work.asking.trust)
+        explores = _explores(
+            lanes.lane[j].episode, len(work.sessions.warm), work.asking.settings.exploring, hearing.u[j]
+        )
+        kept = explores and told.said[at] != heard.NOTHING and _reliable(told, actions, work.asking.settings.trust)
         action = np.int64(told.said[at]) if kept else np.int64(own)
     elif how == rules.WEIGHS_REUSE and told.said[at] != heard.NOTHING:
         action = np.int64(own)
-        if _reused(told.left, at, work.asking.reuse, hearing.u[j]):
+        if _reused(told.left, at, work.asking.settings.reuse, hearing.u[j]):
             told.left[at] += 1
             action = np.int64(told.said[at])
     elif how == rules.WEIGHS_IMITATION and told.said[at] != heard.NOTHING and told.now.advised > 0.0:
         action = np.int64(told.said[at])
     elif how == rules.WEIGHS_VALUES and told.said[at] != heard.NOTHING:
-        bonus = work.asking.bonus * work.asking.reuse ** (lanes.lane[j].episode - 1)
-        _fill(work, hearing, j, state)
+        bonus = work.asking.settings.bonus * work.asking.settings.reuse ** (lanes.lane[j].episode - 1)
+        fill(work, hearing.values, j, state)
         action = np.int64(_with_bonus(hearing.values[j], told.said[at], bonus, lanes.per_tau[j], hearing.u[j]))
     return np.uint64(action)
-
-
-@inlined
-def _fill(work: Any, hearing: Any, j: int, state: Any) -> None:
-    """Writes `Update.gauge` of a state in lane j to `hearing.values`."""
-    for a in range(len(work.learning.actions)):
-        hearing.values[j, a] = gauge(work, work.lanes.tables[j], state, a)
 
 
 @inlined
@@ -154,9 +150,9 @@ def saw(work: Any, hearing: Any, j: int, state: Any, number: Any, entered: Any, 
     told = _of_lane(hearing.heard, j)
     _made_move(told)
     if how == rules.WEIGHS_TRUST:
-        _saw(told, np.int64(number), np.int64(entered), over, reward, work.asking.strikes)
+        _saw(told, np.int64(number), np.int64(entered), over, reward, work.asking.settings.strikes)
     elif how == rules.WEIGHS_RELIABILITY:
-        _fill(work, hearing, j, state)
+        fill(work, hearing.values, j, state)
         _borne_out(told, np.int64(state), hearing.values[j])
     elif how == rules.WEIGHS_WORTH:
         discount = 0.0 if over else work.learning.discount
@@ -169,7 +165,7 @@ def ended(work: Any, hearing: Any, j: int, steps: int, won: bool, over: bool) ->
     if work.asking.gate.weighs == rules.WEIGHS_POLICY:
         _gained(_of_lane(hearing.heard, j), work.learning.discount**steps if won else 0.0)
     elif work.asking.gate.weighs == rules.WEIGHS_TRUST:
-        margin = work.asking.margin / work.lanes.per_tau[j]
+        margin = work.asking.settings.margin / work.lanes.per_tau[j]
         _ended(_of_lane(hearing.heard, j), (work, j), float(steps), won, over, margin)
 
 

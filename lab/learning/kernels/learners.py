@@ -51,6 +51,13 @@ def gauge(work: Any, table: Any, state: int, action: int) -> float:
 
 
 @inlined
+def fill(work: Any, values: Any, j: int, state: Any) -> None:
+    """Writes `Update.gauge` of the actions in a state to values (LANES, A), by lane j's table."""
+    for a in range(len(work.learning.actions)):
+        values[j, a] = gauge(work, work.lanes.tables[j], state, a)
+
+
+@inlined
 def learn(work: Any, table: Any, state: Any, at: Any, entered: Any, reward: float) -> None:
     """`Update.learn` of one step in a flat table; at: state * A + action."""
     problem, learning = work.problem, work.learning

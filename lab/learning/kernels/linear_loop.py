@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from lab.learning import selection, tiles
 from lab.learning.compiled import inlined, inner, without_refcounts
-from lab.learning.kernels.asking import decided, judge, opens, opens_by_rule
+from lab.learning.kernels.asking import decided, judge, opens
 from lab.learning.kernels.learners import draw, greedy
 from lab.learning.physics import ACROBOT, MOUNTAIN_CAR, acrobot, cart_pole, mountain_car
 from lab.learning.tiles import TileArray
@@ -195,16 +195,10 @@ def _begin_session(work: Any, linear: Any, n: int) -> None:
 @inlined
 def _begin_episode(work: Any, linear: Any, own_gate: Any) -> None:
     """Begins the next episode: decides whether it may ask, and clears the traces."""
-    lanes, sessions, asking = work.lanes, work.sessions, work.asking
-    lane = lanes.lane[0]
-    count = sessions.counts[lane.session]
+    lanes, lane = work.lanes, work.lanes.lane[0]
     lane.episode, lane.asked, lane.helped = lane.episode + 1, 0, 0
-    lane.left = asking.budget - count.helped_steps
-    steps = sessions.steps[lane.session]
-    if own_gate is None:
-        lane.is_open = opens(asking, lane, steps, work.learning.max_steps, count.rejected_at_episode > 0)
-    else:
-        lane.is_open = opens_by_rule(work, own_gate, 0)
+    lane.left = work.asking.settings.budget - work.sessions.counts[lane.session].helped_steps
+    lane.is_open = opens(work, own_gate, 0)
     lanes.is_open[0] = lane.is_open
     for i in range(linear.traces[0]):
         linear.place[linear.listed[i]] = -1

@@ -43,10 +43,9 @@ class CompiledLearner(NamedTuple):
     actions: tuple[int, ...] | FloatArray
 
 
-class Asking(NamedTuple):
-    """The gate's rules and settings, see `GateSettings`."""
+class GateNumbers(NamedTuple):
+    """The numbers of `GateSettings`."""
 
-    gate: CompiledGate
     lambda_threshold: float
     omega: int
     first_episode: int
@@ -67,10 +66,23 @@ class Asking(NamedTuple):
     agreement: float
     margin: float
     enough_steps: float
+    ensemble: int
     budget: int
     judge_unhelped: bool
     spare_best: bool
     by_evidence: bool
+    memory: bool
+
+
+class Asking(NamedTuple):
+    """The gate's rules and settings; max_steps: of the learner.
+
+    judges_unhelped: whether an episode that was open for advice and got none is judged, too.
+    """
+
+    gate: CompiledGate
+    settings: GateNumbers
+    judges_unhelped: bool
     max_steps: int
 
 
@@ -241,49 +253,15 @@ class OwnRule(NamedTuple):
 class OwnGate(NamedTuple):
     """The rules of a `RuleGate`, compiled, with what they read.
 
-    episodes, max_steps: of the session; steps (N, E): those of `KernelSessions`; values (LANES, A): of the current states; shown:
-    the same memory, which the rules cannot write to, as they cannot to `steps`.
+    steps (N, E): those of `KernelSessions`; values (LANES, A): of the current states; shown: the same memory, which the rules
+    cannot write to, as they cannot to `steps`.
     """
 
     opens: Any
     asks: Any
-    settings: "GateNumbers"
-    episodes: int
-    max_steps: int
     steps: NDArray[np.int32]
     values: FloatArray
     shown: FloatArray
-
-
-class GateNumbers(NamedTuple):
-    """The numbers of `GateSettings`."""
-
-    lambda_threshold: float
-    omega: int
-    first_episode: int
-    window: int
-    psi: float
-    spread: float
-    rate: float
-    fading: float
-    reuse: float
-    bonus: float
-    consistency: float
-    warming: float
-    exploring: float
-    trust: float
-    wandering: float
-    retry: float
-    strikes: float
-    agreement: float
-    margin: float
-    enough_steps: float
-    ensemble: int
-    budget: int
-    judge_unhelped: bool
-    spare_best: bool
-    by_evidence: bool
-    memory: bool
 
 
 class NumberSettings(NamedTuple):

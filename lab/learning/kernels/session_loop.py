@@ -14,11 +14,12 @@ from lab.learning import selection
 from lab.learning.compiled import inlined, inner, without_refcounts
 from lab.learning.gates.heard import NOTHING
 from lab.learning.kernels import hearing as hears
-from lab.learning.kernels.asking import decided, judge, judge_moved, knows, opens, opens_by_rule, show
+from lab.learning.kernels.asking import decided, judge, judge_moved, knows, opens
 from lab.learning.kernels.learners import (
     begin_walks,
     choose,
     draw,
+    fill,
     learn,
     learn_by_rule,
     learn_following,
@@ -76,15 +77,12 @@ def _begin_episode(work: Any, memories: Any, hearing: Any, walks: Any, own_gate:
     lane = lanes.lane[j]
     count, steps = sessions.counts[lane.session], sessions.steps[lane.session]
     lane.episode, lane.asked, lane.helped = lane.episode + 1, 0, 0
-    lane.left = asking.budget - count.helped_steps
-    if own_gate is None:
-        lane.is_open = opens(asking, lane, steps, work.learning.max_steps, count.rejected_at_episode > 0)
-    else:
-        lane.is_open = opens_by_rule(work, own_gate, j)
+    lane.left = asking.settings.budget - count.helped_steps
+    lane.is_open = opens(work, own_gate, j)
     lanes.warm[j] = sessions.warm[lane.episode - 1]
     if memories is not None:
         mine, may = _of_lane(memories, j), lane.is_open == 1
-        lane.is_open = _remembers(mine, lane.episode, len(steps), asking.window, may)
+        lane.is_open = _remembers(mine, lane.episode, len(steps), asking.settings.window, may)
         if mine.now.late == 1:
             lanes.warm[j] = selection.COLDEST
     lanes.per_tau[j] = 1.0 / lanes.warm[j]
@@ -196,7 +194,7 @@ def _step(
         action, source = np.uint64(lanes.chosen[j]), np.int64(memory.OWN)
     else:
         if own_gate is not None and lanes.is_open[j]:
-            show(work, own_gate, j)
+            fill(work, own_gate.values, j, lanes.states[j])
         action, source = decided(work, memories, hearing, own_gate, j)
     if lookahead is not None and lanes.moves[j] > 0:
         _learn(work, hearing, lookahead, own, j, action, lanes.best[j])

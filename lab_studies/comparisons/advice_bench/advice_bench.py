@@ -59,13 +59,14 @@ MEASURES = (
     "inventory, queues) there are four times as many sessions."
 )
 RULES_NOTE = (
-    "always with a budget is early advising. importance (teacher's): the advisor speaks only in the half of the states where "
-    "most is at stake; correcting: there only against the move that the learner announces; predictive: there only against the "
-    "learner's last move in the state (Torrey and Taylor 2013, who predict with a classifier). importance (learner's): "
-    "Clouse's and Amir's. uncertainty: RCMP with five tables. novelty: advice novelty. reliability: CLUE with one advisor. two "
-    "levels: ADMIRAL's successor, with one. shaping: policy shaping with a fixed consistency. fading: confidence decay. advice "
-    "reuse: Zhu et al. 2020. advice imitation: Ilhan et al. 2021. policy reuse: PRQ-learning. value reuse: Q-value reuse, with a "
-    "bonus for the answer instead of another table. Rules that the literature gives for deep learners are carried over to tables."
+    "always with a budget is early advising. importance (teacher's): the advisor speaks only where most is at stake, in a share "
+    "of the states that was tuned; correcting: there only against the move that the learner announces; predictive: there only "
+    "against the learner's last move in the state (Torrey and Taylor 2013, who predict with a classifier). importance "
+    "(learner's): Clouse's and Amir's. uncertainty: RCMP with tables. novelty: advice novelty. reliability: CLUE with one "
+    "advisor. two levels: ADMIRAL's successor, with one. shaping: policy shaping with a fixed consistency. fading: confidence "
+    "decay. advice reuse: Zhu et al. 2020. advice imitation: Ilhan et al. 2021. policy reuse: PRQ-learning. value reuse: Q-value "
+    "reuse, with a bonus for the answer instead of another table. Rules that the literature gives for deep learners are carried "
+    "over to tables."
 )
 CHOSEN = (
     "Chosen on the 18 problems that are not held out: the settings of every rule, by one procedure with 16 trials at each budget "
