@@ -52,9 +52,9 @@ class Entered:
         gates: dict[str, type[Gate]] = {}
         made: dict[str, AdvisorName] = {}
         places: dict[str, Benched] = {}
-        rules = [_rule(given, gates) for given in _listed(reading, "methods", RULES)]
-        problems = [_problem(given, places) for given in _listed(reading, "problem", (*PROBLEMS, *HELD_OUT))]
-        advisors = [_advisor(given, made) for given in _listed(reading, "advisors", ADVISORS)]
+        rules = [_rule(given, gates) for given in listed(reading, "methods", RULES)]
+        problems = [_problem(given, places) for given in listed(reading, "problem", (*PROBLEMS, *HELD_OUT))]
+        advisors = [_advisor(given, made) for given in listed(reading, "advisors", ADVISORS)]
         for rule in rules:
             tell_uncompiled("q", rule, WORTH_COMPILING)
         files = {name: file for name, file in files_taken().items() if name in (*rules, *advisors, *problems)}
@@ -113,7 +113,7 @@ class Entered:
         return sha256(json.dumps([code_key(*sorted(modules)), *tables]).encode()).hexdigest()[:16]
 
 
-def _listed(reading: Mapping[str, Any], name: str, default: Iterable[str]) -> list[Any]:
+def listed(reading: Mapping[str, Any], name: str, default: Iterable[str]) -> list[Any]:
     """The values of an option. Raises BadInput for an empty list."""
     given = reading.get(name, default)
     several = [given] if isinstance(given, str) or not isinstance(given, Iterable) else list(given)

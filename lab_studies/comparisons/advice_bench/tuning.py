@@ -21,6 +21,7 @@ from lab.studies.findings import Findings, Row, row
 from lab.studies.runner import Job
 from lab.view.canvas import BLUE, GREY, ORANGE, picture_bytes
 from lab_studies.comparisons.advice_bench.bad_advisors import ADVISORS
+from lab_studies.comparisons.advice_bench.entered import listed
 from lab_studies.comparisons.advice_bench.problems import PROBLEMS
 from lab_studies.comparisons.advice_bench.rules import BUDGETS, NOBODY, OURS, RULES, TUNED
 from lab_studies.comparisons.advice_bench.sessions import Case, case_outcomes
@@ -109,8 +110,11 @@ def tuning(job: Job, reading: Mapping[str, Any]) -> Findings:
 
     Raises BadInput for a name that the bench does not have, or that is held out.
     """
-    rules = _named(reading, "methods", RULES)
-    problems, advisors = _named(reading, "problem", PROBLEMS), _named(reading, "advisors", ADVISORS)
+    rules = _named(reading, "methods", "rule", RULES)
+    problems, advisors = (
+        _named(reading, "problem", "problem", PROBLEMS),
+        _named(reading, "advisors", "advisor", ADVISORS),
+    )
     places = [Place(rule, problem) for problem in problems for rule in rules]
     work = partial(measured, sessions=job.sessions, seed=job.seed, trials=TRIALS, advisors=advisors)
     found = job.each(work, places)
@@ -147,14 +151,13 @@ def toml_of(best: Mapping[str, Mapping[str, Trial]]) -> str:
     return "# written by the study advicebench-tuning\n\n" + "\n\n".join(parts) + "\n"
 
 
-def _named(reading: Mapping[str, Any], option: str, known: Mapping[str, Any]) -> tuple[str, ...]:
-    """The names that an option lists, all known ones by default."""
-    given = reading.get(option, tuple(known))
-    several = (given,) if isinstance(given, str) else tuple(given)
+def _named(reading: Mapping[str, Any], option: str, noun: str, known: Mapping[str, Any]) -> tuple[str, ...]:
+    """The names that an option lists, all known ones by default; noun: for one of them."""
+    several = listed(reading, option, known)
     for name in several:
         if name not in known:
-            raise unknown(option, str(name), known, f"--{option}")
-    return several
+            raise unknown(noun, str(name), known, f"--{option}")
+    return tuple(several)
 
 
 def _in_words(trial: Trial) -> str:
