@@ -61,6 +61,12 @@ def lock(file: int, *, wait: bool = True) -> None:
         os.lseek(file, before, os.SEEK_SET)
 
 
+def own_session() -> None:
+    """Makes this process independent of the terminal's Ctrl-C, where the system can (not on Windows)."""
+    if not WINDOWS:
+        os.setsid()
+
+
 @contextmanager
 def lock_file(path: Path, *, wait: bool = True) -> Iterator[None]:
     """Holds the lock of a file that is created for it and removed afterwards. Raises what `lock` raises."""

@@ -70,7 +70,7 @@ class Command(NamedTuple):
 
     function: (
         str | Callable[..., None]
-    )  # or the module of `lab.cli` with the function, which is named after the command
+    )  # or the module of `lab.cli` with the function, which is named after the command, or "module:function"
     help: str  # the first paragraph of its docstring
     example: str
     more: str = ""  # text of the help below the example (see `lab.cli.families`)
@@ -92,6 +92,11 @@ COMMANDS = {  # words after `lab` -> the command
         "One teaching session: learn one sub-task, a world or a Gymnasium environment with an advisor, and keep the policy.",
         "lab teach insert --advisor terminal",
         more="{words of teaching}",
+    ),
+    "class": Command(
+        "classroom:hold_class",
+        "A class in browsers: each pupil teaches a learner of their own, and the teacher looks on and helps.",
+        "lab class world-1 insert --gate ccrl --out monday",
     ),
     "tune": Command(
         "tune",
@@ -301,7 +306,8 @@ def loaded(words: str) -> Any:
     row = COMMANDS[words]
     function = row.function
     if isinstance(function, str):
-        function = getattr(import_module(f"lab.cli.{function}"), words.replace(" ", "_"))
+        module, _, name = function.partition(":")
+        function = getattr(import_module(f"lab.cli.{module}"), name or words.replace(" ", "_"))
     app = typer.Typer(add_completion=False)
     epilog = "\n\n".join(filter(None, [f"Example: {row.example}", row.more]))
     app.command(words.rpartition(" ")[2], cls=CommandOfFamilies, epilog=epilog)(guarded(function))

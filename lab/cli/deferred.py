@@ -11,6 +11,10 @@ if TYPE_CHECKING:
     from lab.api.scenes import SceneRequest as SceneAsked
     from lab.api.scenes import seen
     from lab.audit.audit import audit, kept_evidence
+    from lab.classroom.class_server import ClassServer
+    from lab.classroom.code_picture import code_text
+    from lab.classroom.holding import attend, begun_words, closing, place_of
+    from lab.classroom.roster import Roster
     from lab.export import FORMATS
     from lab.export.commands import Path as Lines
     from lab.export.play import deviation
@@ -134,6 +138,10 @@ TABLE = {
     "lab.advice.panel": ("ASKED", "DECISIONS"),
     "lab.api.scenes": ("SceneRequest as SceneAsked", "seen"),
     "lab.audit.audit": ("audit", "kept_evidence"),
+    "lab.classroom.class_server": ("ClassServer",),
+    "lab.classroom.code_picture": ("code_text",),
+    "lab.classroom.holding": ("attend", "begun_words", "closing", "place_of"),
+    "lab.classroom.roster": ("Roster",),
     "lab.export": ("FORMATS",),
     "lab.export.commands": ("Path as Lines",),
     "lab.export.program": ("Options", "POSITIONS", "Program"),

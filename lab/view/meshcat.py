@@ -68,22 +68,8 @@ class LiveView:
         self.close()
 
     def _files(self) -> "dict[str, deferred.File]":
-        """The page and the files that it loads, by their addresses, which contain the token."""
         brought = () if self._panel is None else self._panel.files
-        styles = [HERE / "page.css", *(path for path in brought if path.suffix == ".css")]
-        scripts = [viewer_script(), *(path for path in brought if path.suffix == ".js"), HERE / "page.js"]
-        ask = f"?token={self._token}"
-        page = _page(
-            self._title,
-            {},
-            styles="\n".join(f'<link rel="stylesheet" href="{path.name}{ask}">' for path in styles),
-            scripts="\n".join(f'<script src="{path.name}{ask}"></script>' for path in scripts),
-            panel="".join(path.read_text(encoding="utf-8") for path in brought if path.suffix == ".html"),
-        )
-        served = {"": deferred.File(page.encode(), "text/html", SERVED)}
-        for kind, paths in (("text/css", styles), ("text/javascript", scripts)):
-            served |= {path.name: deferred.File(path.read_bytes(), kind) for path in paths}
-        return served
+        return page_files(self._title, brought, f"?token={self._token}")
 
     @property
     def port(self) -> int:
@@ -94,6 +80,11 @@ class LiveView:
     def url(self) -> str:
         """The page's address on this computer, including the token."""
         return f"http://127.0.0.1:{self.port}/?token={self._token}"
+
+    @property
+    def token(self) -> str:
+        """The token that every request has to contain."""
+        return self._token
 
     @property
     def hint(self) -> str:
@@ -144,6 +135,26 @@ class LiveView:
         if self._server is None:
             raise WorkFailed("live view: not running (use it as a context manager: with LiveView() as view)")
         return self._server
+
+
+def page_files(title: str, brought: Sequence[Path], asked: str = "") -> "dict[str, deferred.File]":
+    """The live page ("") and the files that it loads, by name.
+
+    brought: HTML, style sheets and scripts of the panel; asked: what the addresses of the page's files end with.
+    """
+    styles = [HERE / "page.css", *(path for path in brought if path.suffix == ".css")]
+    scripts = [viewer_script(), *(path for path in brought if path.suffix == ".js"), HERE / "page.js"]
+    page = _page(
+        title,
+        {},
+        styles="\n".join(f'<link rel="stylesheet" href="{path.name}{asked}">' for path in styles),
+        scripts="\n".join(f'<script src="{path.name}{asked}"></script>' for path in scripts),
+        panel="".join(path.read_text(encoding="utf-8") for path in brought if path.suffix == ".html"),
+    )
+    served = {"": deferred.File(page.encode(), "text/html", SERVED)}
+    for kind, paths in (("text/css", styles), ("text/javascript", scripts)):
+        served |= {path.name: deferred.File(path.read_bytes(), kind) for path in paths}
+    return served
 
 
 def replay_html(

@@ -7,6 +7,7 @@ const THREE = MeshCat.THREE;
 const LAB = "lab";
 const panel = typeof seat === "undefined" ? null : seat; // teaching_question.js, on pages with a teaching seat
 var viewer; // a global by this name, as on meshcat's own pages
+const LOAD_AGAIN = 4001, ELSEWHERE = 4002; // codes with which a class closes a page
 const SLOW_MS = 40; // a picture that takes longer is simplified
 const PLAINER = [
   () => {
@@ -199,7 +200,7 @@ function follow(pause = 300) {
     if (panel) panel.connected((message) => socket.send(JSON.stringify(message)));
   };
   socket.onmessage = (event) => {
-    const { scene, frame, seat: parts, refusal } = JSON.parse(event.data);
+    const { scene, frame, seat: parts, refusal, class: told } = JSON.parse(event.data);
     if (scene && viewer) showScene(scene);
     if (frame && viewer) showFrame(frame);
     if (panel && viewer && !timed && !floorPending) {
@@ -211,6 +212,7 @@ function follow(pause = 300) {
     if (panel && scene) panel.hasScene();
     if (panel && parts) panel.update(parts);
     if (panel && refusal) panel.refused(refusal);
+    if (told) classBar.show(told); // class_bar.js, on the pages of a class
   };
   socket.onclose = ({ code, reason }) => {
     if (code === 1001 && reason) {
@@ -218,8 +220,10 @@ function follow(pause = 300) {
       if (panel) panel.over();
       return;
     }
-    note("connection lost: trying again");
+    if (code === LOAD_AGAIN) location.reload();
+    note(code === ELSEWHERE ? "open in another window: load this one again to go on here" : "connection lost: trying again");
     if (panel) panel.lost();
+    if (code === ELSEWHERE) return;
     setTimeout(follow, pause, Math.min(2 * pause, 3000));
   };
 }

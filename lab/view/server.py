@@ -69,7 +69,7 @@ class Server:
     """
 
     def __init__(self, port: int, files: Mapping[str, File], token: str, panel: ScenePanel | None = None) -> None:
-        self._socket = _listen(port)
+        self._socket = listening(port)
         self.port: int = self._socket.getsockname()[1]
         self.connected = threading.Event()
         self._files, self._token, self._panel = files, token, panel
@@ -122,7 +122,7 @@ class Server:
     async def _serve(self) -> None:
         self._loop, self._stopped = asyncio.get_running_loop(), asyncio.Event()
         self._loop.set_exception_handler(quiet_when_full)
-        server = Uvicorn(self._config())
+        server = Uvicorn(config_of(self._application()))
         serving = asyncio.create_task(server.serve(sockets=[self._socket]))
         polling = asyncio.create_task(self._poll())
         self._ready.set()
@@ -138,26 +138,6 @@ class Server:
         for connection in list(server.server_state.connections):  # cut off a connection that does not answer
             connection.transport.abort()
         await asyncio.sleep(0)
-
-    def _config(self) -> Config:
-        return Config(
-            self._application(),
-            loop="asyncio",
-            http=LimitedConnection,
-            ws=LimitedSocket,
-            backlog=BACKLOG,
-            ws_max_size=MAX_MESSAGE,
-            ws_per_message_deflate=False,
-            lifespan="off",
-            log_config=None,
-            log_level="critical",
-            access_log=False,
-            proxy_headers=False,
-            server_header=False,
-            date_header=False,
-            headers=[*HEADERS.items()],
-            timeout_graceful_shutdown=GRACE_S,
-        )
 
     def _application(self) -> Starlette:
         guards = [
@@ -190,7 +170,7 @@ class Server:
         page = PageQueue(self._opened, socket, self._panel)
         page.offer(self._known)
         if self._panel is not None:
-            self._panel.joined(page.number)
+            self._panel.joined(page.number, "watch" in socket.query_params)
         self._pages.add(page)
         page.sending = asyncio.create_task(page.send())
         self.connected.set()
@@ -240,16 +220,44 @@ def _from_here(asked: HTTPConnection) -> bool:
     return origin is None or urlsplit(origin)[:2] == ("http", asked.headers.get("host", ""))
 
 
-def _listen(port: int) -> socket.socket:
+def config_of(application: Any, **more: Any) -> Config:
+    """The configuration of a server with the lab's limits and headers; more: of uvicorn, such as a certificate."""
+    return Config(
+        application,
+        loop="asyncio",
+        http=LimitedConnection,
+        ws=LimitedSocket,
+        backlog=BACKLOG,
+        ws_max_size=MAX_MESSAGE,
+        ws_per_message_deflate=False,
+        lifespan="off",
+        log_config=None,
+        log_level="critical",
+        access_log=False,
+        proxy_headers=False,
+        server_header=False,
+        date_header=False,
+        headers=[*HEADERS.items()],
+        timeout_graceful_shutdown=GRACE_S,
+        **more,
+    )
+
+
+def listening(port: int, address: str = ADDRESS, what: str = "the live view") -> socket.socket:
+    """A socket that listens, by default on this computer alone; port 0 takes a free one.
+
+    what: who wants it, for messages. Raises BadInput for a port that is taken or not allowed, and a wrong address.
+    """
     own = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
     try:
         keep_port(own)
         own.setblocking(False)
-        own.bind((ADDRESS, port))
+        own.bind((address, port))
         own.listen(16)
     except (OSError, OverflowError) as reason:
         own.close()
         text = getattr(reason, "strerror", None) or "no such port"
         allowed = "choose a free one within 1024..65535, or 0 for any"
-        raise BadInput(f"port {port} for the live view: {text}: {allowed}") from None
+        where = "" if address == ADDRESS else f" of {address}"
+        raise BadInput(f"port {port}{where} for {what}: {text}: {allowed}") from None
     return own

@@ -131,8 +131,8 @@ class ScenePanel(Protocol):
 
     files: Sequence[Path]
 
-    def joined(self, page: int) -> None:
-        """A browser has opened a page; each page has its own number."""
+    def joined(self, page: int, watches: bool = False) -> None:
+        """A browser has opened a page; each page has its own number. watches: it asked for no more than to look."""
 
     def left(self, page: int) -> None:
         """A browser has left."""

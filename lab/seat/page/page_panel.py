@@ -124,11 +124,12 @@ class SeatPanel:
 
     # ---- called by the server's thread
 
-    def joined(self, page: int) -> None:
-        """A browser has opened the page."""
+    def joined(self, page: int, watches: bool = False) -> None:
+        """A browser has opened the page; one that only watches neither counts nor gets the seat by itself."""
         with self.lock:
             self._pages[page] = _Seen()
-            self.chair.joined(page)
+            if not watches:
+                self.chair.joined(page)
             self._count()
 
     def left(self, page: int) -> None:

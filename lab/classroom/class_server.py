@@ -1,0 +1,411 @@
+"""The class's server: pupils join with a code and get their desk's page; the teacher's page shows and steers the class.
+
+It passes messages between a pupil's browser and the desk's own page on the loopback, and looks into none of a pupil's.
+"""
+
+import asyncio
+import json
+import secrets
+import threading
+import time
+from collections import deque
+from collections.abc import Awaitable, Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+from starlette.applications import Starlette
+from starlette.middleware import Middleware
+from starlette.middleware.trustedhost import TrustedHostMiddleware
+from starlette.requests import HTTPConnection, Request
+from starlette.responses import JSONResponse, PlainTextResponse, Response
+from starlette.routing import Route, WebSocketRoute
+from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
+from uvicorn import Server as Uvicorn
+from websockets.exceptions import ConnectionClosed
+
+from lab.classroom.code_picture import code_svg
+from lab.classroom.room import PupilPage, Room
+from lab.classroom.roster import Full, Roster
+from lab.classroom.tile import COLUMNS
+from lab.errors import BadInput, WorkFailed
+from lab.files import csv_of
+from lab.seat.page.page_panel import SeatPanel
+from lab.view.meshcat import SERVED, page_files
+from lab.view.server import File, config_of, listening
+from lab.view.server_page import quiet_when_full
+
+HERE = Path(__file__).parent
+START_S, STOP_S = 10.0, 30.0
+READ_S = 0.005  # least interval between two messages from a page
+TILES_EVERY_S = 0.25
+MOST_TEACHERS = 8  # open pages of the teacher
+MOST_LOOKERS = 64  # pages that look over a shoulder
+WRONG, WRONG_S = 20, 60.0  # wrong codes that an address may try in so many seconds
+MOST_ADDRESSES = 1000
+MOST_BODY = 2048  # bytes of a request to join
+POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src data:; connect-src 'self' {sockets}; "
+    "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where the class is found: the address that is bound, the host names in pupils' addresses, and the certificate's files."""
+
+    address: str = "127.0.0.1"
+    hosts: tuple[str, ...] = ("127.0.0.1", "localhost")
+    certificate: Path | None = None
+    key: Path | None = None
+
+    @property
+    def scheme(self) -> str:
+        """Of the class's addresses."""
+        return "http" if self.certificate is None else "https"
+
+
+class ClassServer:
+    """Serves a class until `stop`; a context manager. Entering raises BadInput for a port that is taken, WorkFailed.
+
+    `join_url` is for pupils, `teacher_url` for the teacher alone. The event loop runs in a thread of its own.
+    """
+
+    def __init__(self, roster: Roster, place: Place, port: int = 0) -> None:
+        self.roster, self._place = roster, place
+        self._socket = listening(port, place.address, "the class")
+        self.port: int = self._socket.getsockname()[1]
+        self._token = secrets.token_urlsafe(16)
+        self.room: Room
+        self.ended = threading.Event()  # the teacher's page has ended the class
+        self._loop: asyncio.AbstractEventLoop
+        self._stopped: asyncio.Event
+        self._ready = threading.Event()
+        self._thread = threading.Thread(target=lambda: asyncio.run(self._serve()), name="class", daemon=True)
+        self._teachers: dict[WebSocket, asyncio.Event] = {}
+        self._lookers = 0
+        self._wrong: dict[str, deque[float]] = {}
+        base = f"{place.hosts[0]}:{self.port}"
+        self.join_url = f"{place.scheme}://{base}/?code={roster.code}"
+        self.teacher_url = f"{place.scheme}://{base}/teacher/?token={self._token}"
+        self._files = self._pages()
+
+    def __enter__(self) -> "ClassServer":
+        self._thread.start()
+        if not self._ready.wait(START_S):
+            raise WorkFailed(f"class: the server on port {self.port} did not start within {START_S} s")
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.stop()
+
+    def stop(self) -> None:
+        """End the class: all lessons are kept, and pages are closed. Safe to call again."""
+        if self._thread.is_alive():
+            with suppress(RuntimeError):
+                self._loop.call_soon_threadsafe(self._stopped.set)
+            self._thread.join(STOP_S)
+
+    def call(self, function: Callable[[], Any]) -> Any:
+        """The result of a function of the room, called in the server's event loop from another thread."""
+
+        async def called() -> Any:
+            return function()
+
+        return asyncio.run_coroutine_threadsafe(called(), self._loop).result(START_S)
+
+    async def _serve(self) -> None:
+        self._loop, self._stopped = asyncio.get_running_loop(), asyncio.Event()
+        self._loop.set_exception_handler(quiet_when_full)
+        self.room = Room(self.roster)
+        self.room.on_news = self._stir
+        secured = (
+            {}
+            if self._place.certificate is None
+            else {
+                "ssl_certfile": str(self._place.certificate),
+                "ssl_keyfile": str(self._place.key),
+            }
+        )
+        server = Uvicorn(config_of(self._application(), **secured))
+        serving = asyncio.create_task(server.serve(sockets=[self._socket]))
+        self.room.begin()
+        self._ready.set()
+        await self._stopped.wait()
+        await self.room.end()
+        server.should_exit = True
+        await serving
+        for connection in list(server.server_state.connections):
+            connection.transport.abort()
+
+    # ---- what is served
+
+    def _pages(self) -> dict[str, dict[str, File]]:
+        """The files by the first part of their address."""
+        sockets = " ".join(f"{scheme}://{host}:{self.port}" for host in self._place.hosts for scheme in ("ws", "wss"))
+        policy = POLICY.format(sockets=sockets)
+        own = {
+            name: File(
+                (HERE / name).read_bytes(), {"js": "text/javascript", "css": "text/css"}[name.rpartition(".")[2]]
+            )
+            for name in ("class.css", "join.js", "teacher.js", "teacher_tile.js")
+        }
+        panel = [*SeatPanel.files, HERE / "class_bar.html", HERE / "class_bar.css", HERE / "class_bar.js"]
+        desk = page_files("Teaching lab", panel)
+        desk[""] = File(desk[""].content, desk[""].kind, SERVED.replace("ws://127.0.0.1:* ws://localhost:*", sockets))
+        page = {name: File((HERE / f"{name}.html").read_bytes(), "text/html", policy) for name in ("join", "teacher")}
+        return {"": own | {"": page["join"]}, "desk": desk, "teacher": own | {"": page["teacher"]}}
+
+    def _application(self) -> Starlette:
+        guards = [Middleware(TrustedHostMiddleware, allowed_hosts=self._place.hosts, www_redirect=False)]
+        routes = [
+            Route("/join", self._join, methods=["POST"]),
+            Route("/teacher/class.csv", self._table),
+            WebSocketRoute("/teacher/frames", self._teach),
+            WebSocketRoute("/desk/frames", self._sit),
+            Route("/{room}/", self._file),
+            Route("/{room}/{name}", self._file),
+            Route("/", self._file),
+            Route("/{name}", self._file),
+        ]
+        return Starlette(routes=routes, middleware=guards)
+
+    async def _file(self, request: Request) -> Response:
+        """A page or file of the class; none of them holds anything of the class itself."""
+        files = self._files.get(request.path_params.get("room", ""), {})
+        file = files.get(request.path_params.get("name", ""))
+        if file is None:
+            return PlainTextResponse("There is no such page.\n", 404)
+        return Response(file.content, headers={"Content-Security-Policy": file.policy}, media_type=file.kind)
+
+    async def _table(self, request: Request) -> Response:
+        if not self._is_teacher(request):
+            return PlainTextResponse("This page needs the token of the teacher's address.\n", 403)
+        return Response(csv_of(self.room.rows(), COLUMNS), media_type="text/csv")
+
+    # ---- who may
+
+    def _is_teacher(self, asked: HTTPConnection) -> bool:
+        return secrets.compare_digest(asked.query_params.get("token", "").encode(), self._token.encode())
+
+    def _from_here(self, asked: HTTPConnection) -> bool:
+        """Whether a page of this server asks, or a program that is no browser."""
+        origin = asked.headers.get("origin")
+        return origin is None or urlsplit(origin)[:2] == (self._place.scheme, asked.headers.get("host", ""))
+
+    async def _join(self, request: Request) -> Response:
+        """A new pupil's address, for the right code; an address that tries many codes has to wait."""
+        if not self._from_here(request):
+            return PlainTextResponse("Another site's page may not join.\n", 403)
+        tried = self._tries(request.client.host if request.client else "")
+        if len(tried) >= WRONG:
+            return JSONResponse({"error": "Too many wrong codes: wait a minute."}, 429)
+        body = b""
+        async for part in request.stream():
+            body += part
+            if len(body) > MOST_BODY:
+                return JSONResponse({"error": "That is no request to join."}, 413)
+        try:
+            said = json.loads(body)
+            code, name = str(said["code"]), str(said.get("name", ""))
+        except (ValueError, RecursionError, TypeError, KeyError, AttributeError):
+            return JSONResponse({"error": "That is no request to join."}, 400)
+        try:
+            joined = self.roster.join(code, name)
+        except Full as reason:
+            return JSONResponse({"error": str(reason)}, 409)
+        except OSError as error:
+            return JSONResponse({"error": f"The class cannot be written: {error.strerror}"}, 500)
+        if joined is None:
+            tried.append(time.monotonic())
+            return JSONResponse({"error": "There is no class with this code: look at the board again."}, 403)
+        pupil, key = joined
+        self.room.seat(pupil)
+        return JSONResponse({"name": pupil.name, "page": f"/desk/?token={key}"})
+
+    def _tries(self, address: str) -> deque[float]:
+        """The times of the wrong codes from an address in the last WRONG_S."""
+        if len(self._wrong) > MOST_ADDRESSES:
+            self._wrong.clear()
+        tried = self._wrong.setdefault(address, deque(maxlen=WRONG))
+        while tried and tried[0] < time.monotonic() - WRONG_S:
+            tried.popleft()
+        return tried
+
+    # ---- a pupil's page, and one that looks over a shoulder
+
+    async def _sit(self, browser: WebSocket) -> None:
+        pupil = self.roster.of_key(browser.query_params.get("token", ""))
+        if not self._from_here(browser) or (pupil is None and not self._is_teacher(browser)):
+            await browser.send_denial_response(PlainTextResponse("This page needs the whole link.\n", 403))
+            return
+        if pupil is None:
+            await self._look(browser)
+            return
+        await browser.accept()
+        page = PupilPage(pupil.number, sender(browser), closer(browser))
+        self.room.arrived(page)
+        try:
+            await self._pass_on(browser, page, sits=True)
+        finally:
+            self.room.left(page)
+
+    async def _look(self, browser: WebSocket) -> None:
+        """A page of the teacher at a pupil's desk: it watches, and answers while it helps."""
+        asked = browser.query_params.get("pupil", "")
+        number = int(asked) if asked.isdecimal() and len(asked) < 4 else 0
+        if number not in self.room.desks or self._lookers >= MOST_LOOKERS:
+            await browser.send_denial_response(PlainTextResponse("There is no such pupil, or too many look on.\n", 404))
+            return
+        await browser.accept()
+        self._lookers += 1
+        page = PupilPage(number, sender(browser), closer(browser))
+        try:
+            await self._pass_on(browser, page, sits=False)
+        finally:
+            self._lookers -= 1
+
+    async def _pass_on(self, browser: WebSocket, page: PupilPage, sits: bool) -> None:
+        """Pass messages between a browser and its desk, until one of them leaves."""
+        desk = self.room.desks[page.number]
+        try:
+            upstream = await desk.page(watches=not sits)
+        except OSError:
+            shown = desk.parts | {"you": {"seat": False, "free": False, "pages": 1}}
+            if desk.state != "over":
+                shown |= {
+                    "ended": f"This desk is closed: {desk.text or desk.state}. Ask your teacher to open it again."
+                }
+            await page.send(json.dumps({"seat": shown}))
+            with suppress(WebSocketDisconnect):
+                while True:
+                    await browser.receive_text()
+            return
+        async with upstream:
+
+            async def say(message: Any) -> None:
+                with suppress(ConnectionClosed):
+                    await upstream.send(json.dumps(message))
+
+            page.say = say
+            down = asyncio.create_task(self._down(upstream, page))
+            up = asyncio.create_task(self._up(browser, upstream, page, sits))
+            await asyncio.wait([down, up], return_when=asyncio.FIRST_COMPLETED)
+            for task in (down, up):
+                task.cancel()
+
+    async def _down(self, upstream: Any, page: PupilPage) -> None:
+        with suppress(ConnectionClosed):
+            async for message in upstream:
+                await page.send(message)
+
+    async def _up(self, browser: WebSocket, upstream: Any, page: PupilPage, sits: bool) -> None:
+        with suppress(WebSocketDisconnect, ConnectionClosed):
+            while True:
+                message = await browser.receive_text()
+                if sits and (refusal := self.room.refusal(page.number)):
+                    await page.send(json.dumps({"refusal": refusal}))
+                else:
+                    await upstream.send(message)
+                await asyncio.sleep(READ_S)
+
+    # ---- the teacher's page
+
+    async def _teach(self, browser: WebSocket) -> None:
+        if not (self._from_here(browser) and self._is_teacher(browser)) or len(self._teachers) >= MOST_TEACHERS:
+            await browser.send_denial_response(PlainTextResponse("This page needs the teacher's whole link.\n", 403))
+            return
+        await browser.accept()
+        stirred = self._teachers[browser] = asyncio.Event()
+        telling = asyncio.create_task(self._tell(browser, stirred))
+        try:
+            with suppress(WebSocketDisconnect):
+                while True:
+                    await self._do(await browser.receive_text(), browser)
+                    await asyncio.sleep(READ_S)
+        finally:
+            telling.cancel()
+            del self._teachers[browser]
+
+    def _stir(self) -> None:
+        for stirred in self._teachers.values():
+            stirred.set()
+
+    async def _tell(self, browser: WebSocket, stirred: asyncio.Event) -> None:
+        """Send the tiles and rows that have changed, a few times a second."""
+        send, seen, told = sender(browser), dict[int, str](), ""
+        while True:
+            stirred.clear()
+            tiles = {number: json.dumps(tile) for number, tile in self.room.tiles().items()}
+            changed = {number: json.loads(text) for number, text in tiles.items() if seen.get(number) != text}
+            seen = tiles
+            known = {"class": self._known(), "rows": self.room.rows()}
+            if (text := json.dumps(known)) == told:
+                known = {}
+            else:
+                told = text
+            if changed or known:
+                await send(json.dumps(known | {"tiles": [*changed.values()]}))
+            await asyncio.sleep(TILES_EVERY_S)
+            with suppress(TimeoutError):  # the time that questions have waited changes by itself
+                await asyncio.wait_for(stirred.wait(), 1.0)
+
+    def _known(self) -> dict[str, Any]:
+        lessons = [
+            f"{options.subtask}{f' of {options.task}' if options.task else ''}" for options in self.roster.lessons
+        ]
+        return {
+            "code": self.roster.code,
+            "join": self.join_url,
+            "picture": code_svg(self.join_url),
+            "lessons": lessons,
+            "paused": self.room.paused,
+            "most": self.roster.most,
+        }
+
+    async def _do(self, message: str, browser: WebSocket) -> None:
+        """Carry out what the teacher's page wants; a wrong message is answered with why."""
+        room = self.room
+        try:
+            match json.loads(message):
+                case {"do": "pause", "on": bool(paused)}:
+                    room.pause(paused)
+                case {"do": "hint", "pupil": int(number), "text": str(text)}:
+                    room.hint(number, text)
+                case {"do": "help", "pupil": int(number), "on": bool(begins)}:
+                    room.help(number, begins)
+                case {"do": "next", "pupil": int() | None as number}:
+                    await room.go_on(number)
+                case {"do": "lesson", "pupil": int() | None as number, "lesson": int(lesson)}:
+                    await room.go_on(number, lesson - 1)
+                case {"do": "open", "pupil": int(number)}:
+                    room.open_again(number)
+                case {"do": "end"}:
+                    self.ended.set()
+                case _:
+                    raise BadInput("that was no message of this page")
+        except (BadInput, ValueError, RecursionError) as error:
+            await sender(browser)(json.dumps({"refusal": str(error)}))
+
+
+def sender(browser: WebSocket) -> Callable[[str | bytes], Awaitable[None]]:
+    """A function that sends text to a browser, and does nothing once that has left."""
+
+    async def send(text: str | bytes) -> None:
+        with suppress(WebSocketDisconnect, RuntimeError):
+            await browser.send_text(text if isinstance(text, str) else text.decode())
+
+    return send
+
+
+def closer(browser: WebSocket) -> Callable[[int], Awaitable[None]]:
+    """A function that closes a browser's connection with a code."""
+
+    async def close(code: int) -> None:
+        with suppress(WebSocketDisconnect, RuntimeError):
+            if browser.application_state is WebSocketState.CONNECTED:
+                await browser.close(code)
+
+    return close

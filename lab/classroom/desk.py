@@ -1,0 +1,124 @@
+"""A pupil's desk as the class's server sees it: the process with the lesson, and what its page shows.
+
+The server is one of the pages of the desk's process: it only watches, and knows all parts of the document.
+"""
+
+import asyncio
+import json
+import threading
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from multiprocessing import get_all_start_methods, get_context
+from multiprocessing.connection import Connection
+from typing import Any, Literal
+
+from websockets.asyncio.client import ClientConnection, connect
+from websockets.exceptions import ConnectionClosed
+
+from lab.classroom.desk_process import DeskOrder, sit
+
+Json = dict[str, Any]
+State = Literal["opening", "open", "over", "failed", "stopped", "lost"]
+KEPT = ("lesson", "place", "robot", "question", "curve", "standing", "notices", "members", "receipt", "ended")
+MOST_MESSAGE = 1 << 24  # bytes of the desk's messages
+PRELOADED = ["lab.classroom.desk_process", "lab.skills.prepared_scene", "lab.learning.kernels"]
+
+
+def processes() -> Any:
+    """The way in which desks are started: copies of one process that has loaded the lab, where the system has that."""
+    if "forkserver" not in get_all_start_methods():
+        return get_context("spawn")
+    context = get_context("forkserver")
+    context.set_forkserver_preload(PRELOADED)
+    return context
+
+
+class Desk:
+    """The process of one lesson, and its state; all methods are called in the server's event loop.
+
+    on_news: called when the shown document or the state has changed.
+    parts: the newest parts of the page's document. result: the lesson's document, once it is over. text: why it failed.
+    """
+
+    def __init__(self, order: DeskOrder, on_news: Callable[[], None]) -> None:
+        self.order, self._on_news = order, on_news
+        self.state: State = "opening"
+        self.parts: Json = {}
+        self.result: Mapping[str, Any] | None = None
+        self.text = ""
+        self.ready = asyncio.Event()  # the page answers, or never will
+        self._address = ""
+        self._loop = asyncio.get_running_loop()
+        self._pipe: Connection | None = None
+        self._process: Any = None
+        self._watching: asyncio.Task[None] | None = None
+
+    def open(self, context: Any) -> None:
+        """Start the process."""
+        self._pipe, other = context.Pipe()
+        self._process = context.Process(target=sit, args=[self.order, other], daemon=True)
+        self._process.start()
+        other.close()
+        threading.Thread(target=self._listen, args=[self._pipe], daemon=True).start()
+
+    async def close(self) -> None:
+        """End the process: the lesson is interrupted, and its journal holds every answer. Safe to call again."""
+        if self._watching is not None:
+            self._watching.cancel()
+        pipe, self._pipe = self._pipe, None
+        if pipe is not None:
+            with suppress(OSError):
+                pipe.send("close")
+        if self._process is not None:
+            await asyncio.to_thread(self._process.join)
+        self.ready.set()
+
+    async def page(self, watches: bool = False) -> ClientConnection:
+        """A further page of the process; watches: it never gets the seat by itself. Raises OSError if the process has ended."""
+        await self.ready.wait()
+        if not self._address:
+            raise OSError("the desk's process has ended")
+        address = f"{self._address}&watch" if watches else self._address
+        return await connect(address, max_size=MOST_MESSAGE, compression=None, proxy=None)
+
+    # ---- what the process says
+
+    def _listen(self, pipe: Connection) -> None:
+        """Pass on what comes through the pipe; in a thread of its own."""
+        with suppress(RuntimeError):  # the event loop has ended
+            try:
+                while True:
+                    self._loop.call_soon_threadsafe(self._hear, pipe.recv())
+            except (EOFError, OSError):
+                self._loop.call_soon_threadsafe(self._ended)
+
+    def _hear(self, said: tuple[Any, ...]) -> None:
+        match said:
+            case ("page", int(port), str(token)):
+                self._address = f"ws://127.0.0.1:{port}/frames?token={token}"
+                self.state = "open"
+                self.ready.set()
+                self._watching = asyncio.create_task(self._watch())
+            case ("over", document):
+                self.state, self.result = "over", document
+            case ("failed" | "stopped" as how, str(text)):
+                self.state, self.text = how, text
+        self._on_news()
+
+    def _ended(self) -> None:
+        """The process has ended; if nobody asked it to, it was killed."""
+        if self.state in ("opening", "open"):
+            self.state, self.text = "lost", "its process has ended"
+        self._address = ""
+        self.ready.set()
+        self._on_news()
+
+    async def _watch(self) -> None:
+        """Take over the parts of the document as they change."""
+        with suppress(OSError, ConnectionClosed):
+            async with await self.page(watches=True) as page:
+                async for message in page:
+                    parts = json.loads(message).get("seat", {})
+                    if new := {part: parts[part] for part in KEPT if part in parts}:
+                        self.parts |= new
+                        self._on_news()

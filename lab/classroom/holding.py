@@ -1,0 +1,100 @@
+"""A class from its beginning to its end: where it is found, what is said meanwhile, and what is written at the end."""
+
+import datetime
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from ipaddress import ip_address
+from pathlib import Path
+from typing import Any
+
+from lab.classroom.certificate import fingerprint, made_certificate
+from lab.classroom.class_server import ClassServer, Place
+from lab.classroom.roster import Roster
+from lab.classroom.tile import COLUMNS
+from lab.errors import BadInput
+from lab.files import csv_of, is_file, write_whole
+
+TABLE = "class.csv"
+LOOK_S = 0.5  # interval at which joined pupils and finished lessons are told
+Json = dict[str, Any]
+
+
+def place_of(
+    roster: Roster,
+    address: str | None,
+    names: Sequence[str] = (),
+    certificate: Path | None = None,
+    key: Path | None = None,
+) -> Place:
+    """Where a class is found: on this computer alone, or at an address of it in a network, then over TLS.
+
+    names: further host names under which pupils find that address. certificate, key: PEM files; None: made for the class.
+    Raises BadInput for an address that is none, and files that are missing or given alone.
+    """
+    if (certificate is None) != (key is None):
+        raise BadInput("--certificate and --key belong together: give both, or none for a certificate made on the spot")
+    if address is None:
+        if certificate is not None or names:
+            raise BadInput("--certificate, --key and --name are for a class in a network: add --lan ADDRESS")
+        return Place()
+    with suppress(ValueError):
+        if ip_address(address).is_unspecified:
+            raise BadInput(
+                f"--lan {address}: that is every address of this computer: name the one in the class's network"
+            )
+    hosts = tuple(dict.fromkeys([*names, address]))
+    for file in (certificate, key):
+        if file is not None and not is_file(file):
+            raise BadInput(f"certificate: there is no file '{file}'")
+    if certificate is None or key is None:
+        certificate, key = made_certificate(roster.folder, hosts, datetime.datetime.now(datetime.UTC))
+    return Place(address, hosts, certificate, key)
+
+
+def begun_words(server: ClassServer, place: Place) -> list[str]:
+    """The lines for the teacher when the class begins."""
+    lines = [
+        f"pupils: {server.join_url}",
+        f"code: {server.roster.code}",
+        f"your own page, for nobody else: {server.teacher_url}",
+    ]
+    if place.certificate is not None:
+        lines.append(f"certificate, SHA-256: {fingerprint(place.certificate)}")
+    return lines
+
+
+def attend(server: ClassServer, tell: Callable[[str], None]) -> None:
+    """Wait until the teacher's page ends the class, and tell who has joined and whose lesson is over. Ctrl-C raises."""
+    known = dict[int, Json]()
+    while not server.ended.is_set():
+        tiles = server.call(server.room.tiles)
+        for number, tile in tiles.items():
+            before = known.get(number)
+            if before is None:
+                tell(f"{tile['name']} ({number}) has a desk: lesson {tile['lesson']}")
+            elif (before["lesson"], before["state"]) != (tile["lesson"], tile["state"]) and tile["state"] != "opening":
+                why = f": {tile['text']}" if tile["text"] else ""
+                tell(f"{tile['name']} ({number}), lesson {tile['lesson']}: {tile['state']}{why}")
+        known = tiles
+        server.ended.wait(LOOK_S)
+
+
+def closing(server: ClassServer) -> Json:
+    """The document of the class so far; its table is written into the class's folder. Raises BadInput."""
+    rows = server.call(server.room.rows)
+    table = server.roster.folder / TABLE
+    try:
+        write_whole(table, csv_of(rows, COLUMNS).encode())
+    except OSError as error:
+        raise BadInput(f"table of the class '{table}': {error.strerror or error}") from None
+    pupils = server.call(server.room.tiles)
+    return {
+        "class": str(server.roster.folder),
+        "lessons": [options.subtask for options in server.roster.lessons],
+        "seed": server.roster.seed,
+        "pupils": [
+            {name: tile[name] for name in ("number", "name", "lesson", "state", "text")} for tile in pupils.values()
+        ],
+        "rows": rows,
+        "files": {"table": str(table)},
+    }

@@ -1,0 +1,262 @@
+"""A class at work: its desks, who is there, and what the teacher does. All of it runs in the server's event loop."""
+
+import asyncio
+import json
+import time
+from collections import Counter
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from lab.classroom.desk import Desk, processes
+from lab.classroom.desk_process import DeskOrder
+from lab.classroom.roster import Pupil, Roster
+from lab.classroom.tile import best_first, row_of, tile_of
+from lab.errors import BadInput, LabError
+from lab.files import is_file, json_of, read_limited, write_whole
+
+Json = dict[str, Any]
+KEPT = "lesson.json"  # beside the journal of a finished lesson: its document, and the last state of its page
+MOST_BYTES = 1 << 24
+MOST_HINT = 200  # characters
+RELOAD, REPLACED = (
+    4001,
+    4002,
+)  # codes with which a pupil's page is closed: load again; another page of the pupil is open
+MOST_LOST = 3  # times that a killed process of one lesson is started again by itself
+AT_ONCE = 2  # desks that are started at the same time
+
+
+@dataclass(eq=False)
+class PupilPage:
+    """An open page of a pupil: functions that send it text, close it, and give its desk a message as if it had sent it."""
+
+    number: int
+    send: Callable[[str], Any]
+    close: Callable[[int], Any]
+    say: Callable[[Json], Any] = field(default=lambda message: None)
+
+
+class Room:
+    """The class: opened in an event loop, with all pupils of the roster.
+
+    on_news: called when anything that the teacher sees has changed.
+    """
+
+    def __init__(self, roster: Roster) -> None:
+        self.roster = roster
+        self.paused = False
+        self.on_news: Callable[[], None] = lambda: None
+        self.ended = asyncio.Event()
+        self.desks: dict[int, Desk] = {}
+        self.pages: dict[int, PupilPage] = {}
+        self._hints: dict[int, str] = {}
+        self._helped: set[int] = set()
+        self._lost: Counter[tuple[int, int]] = Counter()  # (pupil, lesson) -> how often its process was killed
+        self._asked: dict[int, tuple[int, float]] = {}  # pupil -> the pending question's number, and when it came
+        self._context = processes()
+        self._starting = asyncio.Semaphore(AT_ONCE)
+        self._tasks: set[asyncio.Task[None]] = set()
+
+    def begin(self) -> None:
+        """Open the desks of the roster's pupils."""
+        for pupil in self.roster.pupils:
+            self.seat(pupil)
+
+    async def end(self) -> None:
+        """Close all desks: lessons that are not over can be resumed."""
+        self.ended.set()
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*(desk.close() for desk in self.desks.values()))
+
+    # ---- desks
+
+    def folder(self, pupil: Pupil, lesson: int) -> Path:
+        """The folder of a pupil's lesson (from 0)."""
+        return self.roster.folder / pupil.folder / f"lesson-{lesson + 1}"
+
+    def seat(self, pupil: Pupil) -> None:
+        """Open the desk of a pupil at the pupil's lesson: the lesson begins, goes on, or is shown if it is over."""
+        options = replace(self.roster.lessons[pupil.lesson], seed=self.roster.seed)
+        order = DeskOrder(options, self.folder(pupil, pupil.lesson), self.roster.folder / pupil.folder / "toolbox")
+        desk = self.desks[pupil.number] = Desk(order, lambda: self._stirred(pupil.number))
+        kept = self._kept(order.folder)
+        if kept is not None:
+            desk.state, desk.result, desk.parts = "over", kept["document"], kept["page"]
+            desk.ready.set()
+        else:
+            self._start(self._opened(desk))
+        self.on_news()
+
+    async def _opened(self, desk: Desk) -> None:
+        async with self._starting:
+            await asyncio.to_thread(desk.open, self._context)
+            await desk.ready.wait()
+
+    def _start(self, work: Any) -> None:
+        task = asyncio.ensure_future(work)
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+
+    def _stirred(self, number: int) -> None:
+        """Something of a desk has changed: keep a finished lesson, note when a question came."""
+        desk = self.desks[number]
+        question = desk.parts.get("question")
+        if not question:
+            self._asked.pop(number, None)
+        elif self._asked.get(number, (0, 0.0))[0] != question["number"]:
+            self._asked[number] = (question["number"], time.monotonic())
+        if desk.state == "over" and desk.parts.get("ended") and not is_file(desk.order.folder / KEPT):
+            kept = {"document": desk.result, "page": desk.parts}
+            with suppress(OSError):  # a full disk: the journal has been written, and the lesson is over anyway
+                write_whole(desk.order.folder / KEPT, json.dumps(kept).encode())
+        if desk.state == "lost" and not self.ended.is_set():
+            lesson = (number, self.roster.pupils[number - 1].lesson)
+            self._lost[lesson] += 1
+            if self._lost[lesson] <= MOST_LOST:
+                self.open_again(number)
+        self.on_news()
+
+    def _kept(self, folder: Path) -> Json | None:
+        path = folder / KEPT
+        if not is_file(path):
+            return None
+        with suppress(LabError, ValueError, KeyError, TypeError):
+            kept = json_of(read_limited(path, MOST_BYTES))
+            if isinstance(kept["document"], dict) and isinstance(kept["page"], dict):
+                return dict(kept)
+        return None
+
+    # ---- pupils' pages
+
+    def arrived(self, page: PupilPage) -> None:
+        """A pupil's page is open; an older one of the same pupil, perhaps behind a closed lid, is closed."""
+        before = self.pages.pop(page.number, None)
+        if before is not None:
+            self._start(before.close(REPLACED))
+        self.pages[page.number] = page
+        self._show(page.number)
+        self.on_news()
+
+    def left(self, page: PupilPage) -> None:
+        """A pupil's page was closed."""
+        if self.pages.get(page.number) is page:
+            del self.pages[page.number]
+        self.on_news()
+
+    def refusal(self, number: int) -> str:
+        """Why a pupil's messages do not count now; "" if they do."""
+        if self.paused:
+            return "Your teacher has paused the class."
+        return "Your teacher answers for you now." if number in self._helped else ""
+
+    def _show(self, number: int) -> None:
+        """Tell a pupil's page what the class says: lesson, pause, hint, help."""
+        page, pupil = self.pages.get(number), self.roster.pupils[number - 1]
+        if page is None:
+            return
+        told = {
+            "name": pupil.name,
+            "lesson": pupil.lesson + 1,
+            "lessons": len(self.roster.lessons),
+            "paused": self.paused,
+            "hint": self._hints.get(number, ""),
+            "helped": number in self._helped,
+        }
+        self._start(page.send(json.dumps({"class": told})))
+
+    # ---- what the teacher does
+
+    def pause(self, paused: bool) -> None:
+        """Pause all pupils, or let them go on; learners that ask nobody go on meanwhile."""
+        self.paused = paused
+        self._show_all()
+
+    def hint(self, number: int, text: str) -> None:
+        """Show a pupil a hint, "" for none. Raises BadInput for a pupil that is not there, and for too long a hint."""
+        self._pupil(number)
+        if len(text) > MOST_HINT:
+            raise BadInput(f"hint of {len(text)} characters: at most {MOST_HINT} are shown")
+        self._hints[number] = text
+        self._show_all(number)
+
+    def help(self, number: int, begins: bool) -> None:
+        """Let the teacher's page answer for a pupil, or give the seat back. Raises BadInput for a pupil that is not there."""
+        self._pupil(number)
+        (self._helped.add if begins else self._helped.discard)(number)
+        page = self.pages.get(number)
+        if page is not None:
+            self._start(page.say({"seat": "give" if begins else "take"}))
+        self._show_all(number)
+
+    async def go_on(self, number: int | None, lesson: int | None = None) -> None:
+        """The next lesson, or the lesson with a number from 0, of a pupil, or of all if `number` is None.
+
+        Raises BadInput for a pupil or lesson that there is not.
+        """
+        pupils = [*self.roster.pupils] if number is None else [self._pupil(number)]
+        for pupil in pupils:
+            wanted = pupil.lesson + 1 if lesson is None else lesson
+            if number is None and wanted >= len(self.roster.lessons):
+                continue
+            moved = self.roster.move(pupil.number, wanted)
+            self._hints.pop(pupil.number, None)
+            self._helped.discard(pupil.number)
+            before = self.desks[pupil.number]
+            self._start(before.close())
+            self.seat(moved)
+            if page := self.pages.get(pupil.number):
+                self._start(page.close(RELOAD))
+
+    def open_again(self, number: int) -> None:
+        """Open a desk again whose process has ended or failed. Raises BadInput if it has not."""
+        pupil = self._pupil(number)
+        if self.desks[number].state in ("opening", "open", "over"):
+            raise BadInput(f"desk {number} is {self.desks[number].state}: nothing is to be mended")
+        self.seat(pupil)
+        if page := self.pages.get(number):
+            self._start(page.close(RELOAD))
+
+    def _pupil(self, number: int) -> Pupil:
+        if not 1 <= number <= len(self.roster.pupils):
+            raise BadInput(f"pupil {number}: the class has {len(self.roster.pupils)}")
+        return self.roster.pupils[number - 1]
+
+    def _show_all(self, number: int | None = None) -> None:
+        for one in self.pages if number is None else [number]:
+            self._show(one)
+        self.on_news()
+
+    # ---- what the teacher sees
+
+    def tiles(self) -> dict[int, Json]:
+        """The tile of each pupil, by number."""
+        now_s = time.monotonic()
+        return {
+            pupil.number: tile_of(
+                pupil,
+                self.desks[pupil.number],
+                pupil.number in self.pages,
+                now_s - self._asked[pupil.number][1] if pupil.number in self._asked else None,
+            )
+            | {"hint": self._hints.get(pupil.number, ""), "helped": pupil.number in self._helped}
+            for pupil in self.roster.pupils
+        }
+
+    def rows(self) -> list[Json]:
+        """The rows of all finished lessons: lesson by lesson, best teacher first."""
+        rows: list[Json] = []
+        for lesson in range(len(self.roster.lessons)):
+            finished = [(pupil, self._document(pupil, lesson)) for pupil in self.roster.pupils]
+            rows += best_first([row_of(pupil, lesson, document) for pupil, document in finished if document])
+        return rows
+
+    def _document(self, pupil: Pupil, lesson: int) -> Json | None:
+        desk = self.desks.get(pupil.number)
+        if desk is not None and lesson == pupil.lesson:
+            return None if desk.result is None else dict(desk.result)
+        kept = self._kept(self.folder(pupil, lesson))
+        return None if kept is None else dict(kept["document"])

@@ -1,0 +1,98 @@
+// The teacher's page: a tile for each pupil, what the teacher does for all, and the table of what was taught.
+"use strict";
+
+const el = (id) => document.getElementById(id), { make } = classTile;
+const boxes = new Map(), SURE_MS = 3000;
+let socket = null, paused = false, wall = false, sure = 0;
+
+const say = (message) => socket && socket.readyState === WebSocket.OPEN && socket.send(JSON.stringify(message));
+const act = {
+  help: (tile) => {
+    say({ do: "help", pupil: tile.number, on: !tile.helped });
+    if (!tile.helped) window.open(`/desk/${location.search}&pupil=${tile.number}`, "_blank", "noopener");
+  },
+  hint: (tile, text) => say({ do: "hint", pupil: tile.number, text }),
+  next: (tile) => say({ do: "next", pupil: tile.number }),
+  open: (tile) => say({ do: "open", pupil: tile.number }),
+};
+
+function showClass(now) {
+  paused = now.paused;
+  el("pause").textContent = paused ? "Go on" : "Pause all";
+  el("pause").setAttribute("aria-pressed", String(paused));
+  el("picture").src = now.picture;
+  el("address").textContent = now.join.replace(/\?.*/, "");
+  el("code").textContent = now.code;
+  const chosen = el("lesson").value;
+  el("lesson").replaceChildren(...now.lessons.map((lesson, k) => {
+    const made = make("option", `${k + 1}: ${lesson}`);
+    made.value = k + 1;
+    return made;
+  }));
+  if (chosen) el("lesson").value = chosen;
+}
+
+function showTiles(tiles) {
+  for (const tile of tiles) {
+    if (!boxes.has(tile.number)) {
+      boxes.set(tile.number, make("article"));
+      el("tiles").append(boxes.get(tile.number));
+    }
+    classTile.draw(boxes.get(tile.number), tile, act);
+  }
+  const here = document.querySelectorAll("#tiles small.here").length;
+  el("how").textContent = boxes.size ? `${here} of ${boxes.size} pupils are here` : "Nobody has joined yet.";
+}
+
+const HEADS = [
+  ["lesson", "Lesson"], ["name", "Pupil"], ["solved", "Goal reached"], ["final_steps", "Steps at the end"], ["optimal_steps", "Fewest possible"], ["episodes", "Episodes"],
+  ["answers", "Answers"], ["own_choice_too", "Its own choice, too"], ["not_best", "Not the best"], ["misleads", "Did not help"], ["believed", "Believed to the end"], ["tau", "Skill (tau)"],
+];
+const shown = (value) => (value === null ? "" : value === true ? "yes" : value === false ? "no" : typeof value === "number" && !Number.isInteger(value) ? value.toFixed(2) : String(value));
+
+function showRows(rows) {
+  el("report").hidden = !rows.length;
+  const line = (cells, kind) => {
+    const made = make("tr");
+    made.append(...cells.map((text) => make(kind, text)));
+    return made;
+  };
+  el("report").querySelector("thead").replaceChildren(line(HEADS.map(([, head]) => head), "th"));
+  el("report").querySelector("tbody").replaceChildren(...rows.map((row, k) => {
+    const made = line(HEADS.map(([name]) => shown(row[name])), "td");
+    if (row.solved && (k === 0 || rows[k - 1].lesson !== row.lesson)) made.className = "first";
+    return made;
+  }));
+}
+
+function follow(pause = 300) {
+  socket = new WebSocket(new URL(`frames${location.search}`, location.href.replace(/^http/, "ws")));
+  socket.onopen = () => { pause = 300; };
+  socket.onmessage = (event) => {
+    const { class: now, rows, tiles, refusal } = JSON.parse(event.data);
+    el("told").textContent = refusal || "";
+    if (now) showClass(now);
+    if (rows) showRows(rows);
+    if (tiles) showTiles(tiles);
+  };
+  socket.onclose = () => {
+    el("how").textContent = "connection lost: trying again";
+    setTimeout(follow, pause, Math.min(2 * pause, 3000));
+  };
+}
+
+el("pause").onclick = () => say({ do: "pause", on: !paused });
+el("all").onclick = () => say({ do: "lesson", pupil: null, lesson: Number(el("lesson").value) });
+el("board").onclick = () => {
+  wall = !wall;
+  document.body.classList.toggle("wall", wall);
+  el("board").setAttribute("aria-pressed", String(wall));
+};
+el("end").onclick = () => {
+  if (performance.now() < sure) say({ do: "end" });
+  sure = performance.now() + SURE_MS;
+  el("end").textContent = "Once more: end it";
+  setTimeout(() => { el("end").textContent = "End the class"; }, SURE_MS);
+};
+el("csv").href = `class.csv${location.search}`;
+follow();

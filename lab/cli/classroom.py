@@ -1,0 +1,117 @@
+"""`lab class`: many pupils teach in their browsers, and one teacher looks on and helps."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from lab.cli import deferred
+from lab.cli.families import from_files, offers
+from lab.cli.options import GateName, Json, LearnerName, Port, Seed
+from lab.cli.output import console, show
+from lab.errors import BadInput, counted
+from lab.lazy import rich
+
+
+def hold_class(
+    lessons: Annotated[
+        list[str] | None,
+        typer.Argument(
+            help="The lessons, in their order: whatever lab teach takes as SUBTASK: {skills}, a world, gym:ID, "
+            "./mine.py:Problem, {problems}.",
+            metavar="LESSON...",
+            autocompletion=offers("skills", "problems"),
+            callback=from_files("problems"),
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Folder for the class: each pupil's sessions, and the table.")
+    ] = None,
+    resume: Annotated[
+        Path | None,
+        typer.Option("--resume", help="Go on with the class in this folder: all lessons go on where they stopped."),
+    ] = None,
+    pupils: Annotated[int, typer.Option("--pupils", min=1, max=60, help="The number of seats.")] = 30,
+    typed_names: Annotated[
+        bool, typer.Option("--typed-names", help="Pupils type their names; by default each is given a pseudonym.")
+    ] = False,
+    task: Annotated[str | None, typer.Option("--task", help="The task that sub-tasks are of; default: toast.")] = None,
+    learner: LearnerName = None,
+    gate: GateName = None,
+    episodes: Annotated[
+        int | None, typer.Option("--episodes", min=1, help="Session length; default: the task's.")
+    ] = None,
+    lan: Annotated[
+        str | None,
+        typer.Option(
+            "--lan",
+            metavar="ADDRESS",
+            help="This computer's address in the class's network, over TLS; default: this computer alone.",
+        ),
+    ] = None,
+    name: Annotated[
+        list[str] | None, typer.Option("--name", help="A host name under which pupils find that address.")
+    ] = None,
+    certificate: Annotated[
+        Path | None, typer.Option("--certificate", help="Certificate (PEM); default: made on the spot.")
+    ] = None,
+    key: Annotated[Path | None, typer.Option("--key", help="The key of the certificate (PEM).")] = None,
+    port: Port = 0,
+    seed: Seed = 0,
+    as_json: Json = False,
+) -> None:
+    """A class in browsers: each pupil teaches a learner of their own, and the teacher looks on and helps.
+
+    Pupils open the printed address and type the code. Their learners go on where they stopped: after a closed lid, a killed
+    server, and with --resume.
+    """
+    if resume is not None:
+        if lessons or out is not None:
+            raise BadInput(
+                f"--resume {resume} beside lessons or --out: a class goes on with its own lessons in its own folder"
+            )
+        roster = deferred.Roster.read(resume)
+    else:
+        roster = _new(lessons or [], out, pupils, typed_names, seed, (task, learner, gate, episodes))
+    place = deferred.place_of(roster, lan, name or (), certificate, key)
+    said = console()
+    with deferred.ClassServer(roster, place, port or roster.port) as server:
+        roster.port = server.port
+        roster.write()
+        for line in deferred.begun_words(server, place):
+            said.print(line, soft_wrap=True, highlight=False)
+        if said.is_terminal:
+            said.print(rich.text.Text(deferred.code_text(server.join_url)))
+        try:
+            deferred.attend(server, lambda line: said.print(line, soft_wrap=True, highlight=False))
+        except KeyboardInterrupt:
+            said.print("the class ends: every lesson is kept")
+        document = deferred.closing(server)
+    show(document, as_json, _summary)
+
+
+def _new(
+    lessons: list[str], out: Path | None, pupils: int, typed_names: bool, seed: int, options: tuple[Any, ...]
+) -> "deferred.Roster":
+    if not lessons:
+        raise BadInput("no lesson (LESSON...): name what is taught, such as lab class world-1 insert --out monday")
+    if out is None:
+        raise BadInput("--out is missing: the folder in which the class is kept, such as --out monday")
+    task, learner, gate, episodes = options
+    wanted = []
+    for lesson in lessons:
+        is_skill = lesson in deferred.SKILLS
+        of = deferred.LessonOptions(
+            lesson, task if is_skill else None, None, learner, gate, None, ("web",), episodes=episodes, seed=seed
+        )
+        deferred.subject_of(of)  # every lesson is checked before anybody joins
+        wanted.append(of)
+    return deferred.Roster.new(out, wanted, seed, pupils, typed_names)
+
+
+def _summary(document: dict[str, Any]) -> Any:
+    over = len(document["rows"])
+    return (
+        f"{counted(len(document['pupils']), 'pupil')}, {counted(over, 'lesson')} taught; table: {document['files']['table']}; "
+        f"go on with: lab class --resume {document['class']}"
+    )
