@@ -28,7 +28,7 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("lab.teaching",),
     ("lab.production",),
     ("lab.studies", "lab.seat"),
-    ("lab.api", "lab.testing"),
+    ("lab.api", "lab.classroom", "lab.testing"),
     ("lab.cli",),
     ("lab_studies",),  # a package of its own, which the lab never imports
 )
@@ -43,9 +43,11 @@ ALONE: dict[str, set[str]] = (
         "PIL": {"lab.view.movie"},
         "numba": {"lab.learning.compiled"},  # what is kept of it is kept in one place
         "ortools": {"lab.sequencing.methods.cp_sat_solver"},  # without pandas
-        "starlette": {"lab.view.server", "lab.view.server_page"},
-        "uvicorn": {"lab.view.server", "lab.view.server_page"},
-        "websockets": set(),  # uvicorn's
+        "starlette": {"lab.view.server", "lab.view.server_page", "lab.classroom.class_server"},
+        "uvicorn": {"lab.view.server", "lab.view.server_page", "lab.classroom.class_server"},
+        "websockets": {"lab.classroom.class_server", "lab.classroom.desk"},
+        "segno": {"lab.classroom.code_picture"},
+        "cryptography": {"lab.classroom.certificate"},
         "jinja2": {"lab.studies.report"},
         "fsspec": {"lab.toolbox.remote_place"},
         "s3fs": set(),  # fsspec's
@@ -75,7 +77,14 @@ HEAVY = (
     *("ortools", "starlette", "uvicorn", "gymnasium", "jinja2", "fsspec"),
 )
 READS_ITS_OWN = (  # what ships with the lab, or what it has just written: nothing that a stranger may have made
-    *("lab.view.meshcat", "lab.view.server_page", "lab.studies.report", "lab.cli.export", "lab.toolbox.remote_place"),
+    *(
+        "lab.classroom.class_server",
+        "lab.view.meshcat",
+        "lab.view.server_page",
+        "lab.studies.report",
+        "lab.cli.export",
+        "lab.toolbox.remote_place",
+    ),
     *("lab.api.lessons", "lab.api.pictures", "lab.api.runs", "lab.api.scenes"),
 )
 BY_TABLE = ("lab", "lab.lazy", "lab.cli.app", "lab.tasks.instances", "lab_studies")  # what these load stands in a table
@@ -314,7 +323,7 @@ def faults(module: str, source: str) -> list[str]:
         ("lab.view.plots", "from meshcat.geometry import Box", "allowed in ['lab.view.meshcat']"),
         ("lab.skills.insert", "import cv2.gapi", "allowed in ['lab.vision.calibration'"),
         ("lab.skills.insert", "from lab.lazy import cv2, loader", "lab.skills.insert:1 imports cv2: allowed in"),
-        ("lab.view.plots", "import websockets", "allowed in no module"),
+        ("lab.view.plots", "import s3fs", "allowed in no module"),
         (
             "lab.sequencing.methods.exact",
             "from ortools.sat.python import cp_model",

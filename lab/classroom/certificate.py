@@ -12,10 +12,11 @@ from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import NameOID
 
 from lab.errors import BadInput
-from lab.files import is_file, write_whole
+from lab.files import is_file, read_limited, write_whole
 
 CERTIFICATE, KEY = "certificate.pem", "key.pem"
 DAYS = 365
+MOST_BYTES = 1 << 20
 
 
 def made_certificate(folder: Path, hosts: Sequence[str], now: datetime.datetime) -> tuple[Path, Path]:
@@ -58,7 +59,7 @@ def made_certificate(folder: Path, hosts: Sequence[str], now: datetime.datetime)
 def fingerprint(certificate: Path) -> str:
     """The SHA-256 of a certificate, as browsers show it. Raises BadInput for a file that is none."""
     try:
-        read = x509.load_pem_x509_certificate(certificate.read_bytes())
+        read = x509.load_pem_x509_certificate(read_limited(certificate, MOST_BYTES))
     except OSError as error:
         raise BadInput(f"certificate '{certificate}' (--certificate): {error.strerror or error}") from None
     except ValueError:

@@ -4,8 +4,10 @@ It passes messages between a pupil's browser and the desk's own page on the loop
 """
 
 import asyncio
+import datetime
 import json
 import secrets
+import ssl
 import threading
 import time
 from collections import deque
@@ -26,8 +28,9 @@ from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
 from uvicorn import Server as Uvicorn
 from websockets.exceptions import ConnectionClosed
 
+from lab.classroom.certificate import fingerprint, made_certificate
 from lab.classroom.code_picture import code_svg
-from lab.classroom.room import PupilPage, Room
+from lab.classroom.room import OVER, RELOAD, PupilPage, Room
 from lab.classroom.roster import Full, Roster
 from lab.classroom.tile import COLUMNS
 from lab.errors import BadInput, WorkFailed
@@ -39,6 +42,7 @@ from lab.view.server_page import quiet_when_full
 
 HERE = Path(__file__).parent
 START_S, STOP_S = 10.0, 30.0
+AGAIN_S = 0.5  # after which a page whose desk was killed is told to load again
 READ_S = 0.005  # least interval between two messages from a page
 TILES_EVERY_S = 0.25
 MOST_TEACHERS = 8  # open pages of the teacher
@@ -46,6 +50,7 @@ MOST_LOOKERS = 64  # pages that look over a shoulder
 WRONG, WRONG_S = 20, 60.0  # wrong codes that an address may try in so many seconds
 MOST_ADDRESSES = 1000
 MOST_BODY = 2048  # bytes of a request to join
+FREE = '"free": true'  # in a message about the seat
 POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src data:; connect-src 'self' {sockets}; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
@@ -54,23 +59,28 @@ POLICY = (
 
 @dataclass(frozen=True)
 class Place:
-    """Where the class is found: the address that is bound, the host names in pupils' addresses, and the certificate's files."""
+    """Where a class is found: the address that is bound, and the host names in pupils' addresses.
+
+    secured: whether over TLS, with `certificate` and `key` (PEM files), or with ones that are made for the class.
+    """
 
     address: str = "127.0.0.1"
     hosts: tuple[str, ...] = ("127.0.0.1", "localhost")
+    secured: bool = False
     certificate: Path | None = None
     key: Path | None = None
 
     @property
     def scheme(self) -> str:
         """Of the class's addresses."""
-        return "http" if self.certificate is None else "https"
+        return "https" if self.secured else "http"
 
 
 class ClassServer:
-    """Serves a class until `stop`; a context manager. Entering raises BadInput for a port that is taken, WorkFailed.
+    """Serves a class until `stop`; a context manager. The event loop runs in a thread of its own.
 
-    `join_url` is for pupils, `teacher_url` for the teacher alone. The event loop runs in a thread of its own.
+    `join_url` is for pupils, `teacher_url` for the teacher alone. Raises BadInput for a port or address that is taken or not
+    allowed, before anything is written; entering writes the roster and raises BadInput if it cannot, and WorkFailed.
     """
 
     def __init__(self, roster: Roster, place: Place, port: int = 0) -> None:
@@ -79,13 +89,14 @@ class ClassServer:
         self.port: int = self._socket.getsockname()[1]
         self._token = secrets.token_urlsafe(16)
         self.room: Room
+        self.fingerprint = ""  # of the certificate
+        self._secured: dict[str, str] = {}  # uvicorn's names of its files
         self.ended = threading.Event()  # the teacher's page has ended the class
         self._loop: asyncio.AbstractEventLoop
         self._stopped: asyncio.Event
         self._ready = threading.Event()
         self._thread = threading.Thread(target=lambda: asyncio.run(self._serve()), name="class", daemon=True)
         self._teachers: dict[WebSocket, asyncio.Event] = {}
-        self._lookers = 0
         self._wrong: dict[str, deque[float]] = {}
         base = f"{place.hosts[0]}:{self.port}"
         self.join_url = f"{place.scheme}://{base}/?code={roster.code}"
@@ -93,10 +104,28 @@ class ClassServer:
         self._files = self._pages()
 
     def __enter__(self) -> "ClassServer":
+        self.roster.port = self.port
+        try:
+            self.roster.write()
+        except OSError as error:
+            raise BadInput(f"folder of the class '{self.roster.folder}': {error.strerror or error}") from None
+        if self._place.secured:
+            self._secure(self._place.certificate, self._place.key)
         self._thread.start()
         if not self._ready.wait(START_S):
             raise WorkFailed(f"class: the server on port {self.port} did not start within {START_S} s")
         return self
+
+    def _secure(self, certificate: Path | None, key: Path | None) -> None:
+        if certificate is None or key is None:
+            now = datetime.datetime.now(datetime.UTC)
+            certificate, key = made_certificate(self.roster.folder, self._place.hosts, now)
+        self.fingerprint = fingerprint(certificate)
+        self._secured = {"ssl_certfile": str(certificate), "ssl_keyfile": str(key)}
+        try:
+            ssl.create_default_context(ssl.Purpose.CLIENT_AUTH).load_cert_chain(certificate, key)
+        except (OSError, ssl.SSLError) as error:
+            raise BadInput(f"certificate '{certificate}' and key '{key}': {error}") from None
 
     def __exit__(self, *error: object) -> None:
         self.stop()
@@ -121,15 +150,7 @@ class ClassServer:
         self._loop.set_exception_handler(quiet_when_full)
         self.room = Room(self.roster)
         self.room.on_news = self._stir
-        secured = (
-            {}
-            if self._place.certificate is None
-            else {
-                "ssl_certfile": str(self._place.certificate),
-                "ssl_keyfile": str(self._place.key),
-            }
-        )
-        server = Uvicorn(config_of(self._application(), **secured))
+        server = Uvicorn(config_of(self._application(), **self._secured))
         serving = asyncio.create_task(server.serve(sockets=[self._socket]))
         self.room.begin()
         self._ready.set()
@@ -139,6 +160,8 @@ class ClassServer:
         await serving
         for connection in list(server.server_state.connections):
             connection.transport.abort()
+        self._socket.close()
+        await asyncio.sleep(0)
 
     # ---- what is served
 
@@ -256,16 +279,16 @@ class ClassServer:
         """A page of the teacher at a pupil's desk: it watches, and answers while it helps."""
         asked = browser.query_params.get("pupil", "")
         number = int(asked) if asked.isdecimal() and len(asked) < 4 else 0
-        if number not in self.room.desks or self._lookers >= MOST_LOOKERS:
+        if number not in self.room.desks or len(self.room.shoulders) >= MOST_LOOKERS:
             await browser.send_denial_response(PlainTextResponse("There is no such pupil, or too many look on.\n", 404))
             return
         await browser.accept()
-        self._lookers += 1
         page = PupilPage(number, sender(browser), closer(browser))
+        self.room.shoulders.add(page)
         try:
             await self._pass_on(browser, page, sits=False)
         finally:
-            self._lookers -= 1
+            self.room.shoulders.discard(page)
 
     async def _pass_on(self, browser: WebSocket, page: PupilPage, sits: bool) -> None:
         """Pass messages between a browser and its desk, until one of them leaves."""
@@ -273,15 +296,11 @@ class ClassServer:
         try:
             upstream = await desk.page(watches=not sits)
         except OSError:
-            shown = desk.parts | {"you": {"seat": False, "free": False, "pages": 1}}
-            if desk.state != "over":
-                shown |= {
-                    "ended": f"This desk is closed: {desk.text or desk.state}. Ask your teacher to open it again."
-                }
-            await page.send(json.dumps({"seat": shown}))
-            with suppress(WebSocketDisconnect):
-                while True:
-                    await browser.receive_text()
+            if desk.state in ("over", "failed", "stopped"):
+                await self._show_last(browser, page)
+            else:  # it was killed, and is started again
+                await asyncio.sleep(AGAIN_S)
+                await page.close(RELOAD)
             return
         async with upstream:
 
@@ -290,16 +309,33 @@ class ClassServer:
                     await upstream.send(json.dumps(message))
 
             page.say = say
-            down = asyncio.create_task(self._down(upstream, page))
+            down = asyncio.create_task(self._down(upstream, page, sits))
             up = asyncio.create_task(self._up(browser, upstream, page, sits))
-            await asyncio.wait([down, up], return_when=asyncio.FIRST_COMPLETED)
-            for task in (down, up):
-                task.cancel()
+            try:
+                await asyncio.wait([down, up], return_when=asyncio.FIRST_COMPLETED)
+            finally:
+                down.cancel()
+                up.cancel()
+                await asyncio.gather(down, up, return_exceptions=True)
+        await page.close(OVER if self.room.ended.is_set() else RELOAD)
 
-    async def _down(self, upstream: Any, page: PupilPage) -> None:
+    async def _show_last(self, browser: WebSocket, page: PupilPage) -> None:
+        """Show how a lesson ended whose process is not there any more, until the browser leaves."""
+        desk = self.room.desks[page.number]
+        shown = desk.parts | {"you": {"seat": False, "free": False, "pages": 1}}
+        if desk.state != "over":
+            shown |= {"ended": f"This desk is closed: {desk.text or desk.state}. Ask your teacher to open it again."}
+        await page.send(json.dumps({"seat": shown}))
+        with suppress(WebSocketDisconnect):
+            while True:
+                await browser.receive_text()
+
+    async def _down(self, upstream: Any, page: PupilPage, sits: bool) -> None:
         with suppress(ConnectionClosed):
             async for message in upstream:
                 await page.send(message)
+                if sits and FREE in message and self.room.takes_free_seat(page.number):
+                    await page.say({"seat": "take"})
 
     async def _up(self, browser: WebSocket, upstream: Any, page: PupilPage, sits: bool) -> None:
         with suppress(WebSocketDisconnect, ConnectionClosed):
@@ -406,6 +442,6 @@ def closer(browser: WebSocket) -> Callable[[int], Awaitable[None]]:
     async def close(code: int) -> None:
         with suppress(WebSocketDisconnect, RuntimeError):
             if browser.application_state is WebSocketState.CONNECTED:
-                await browser.close(code)
+                await browser.close(code, "the class has ended" if code == OVER else None)
 
     return close

@@ -13,7 +13,7 @@ from multiprocessing.connection import Connection
 from typing import Any, Literal
 
 from websockets.asyncio.client import ClientConnection, connect
-from websockets.exceptions import ConnectionClosed
+from websockets.exceptions import ConnectionClosed, WebSocketException
 
 from lab.classroom.desk_process import DeskOrder, sit
 
@@ -52,9 +52,15 @@ class Desk:
         self._pipe: Connection | None = None
         self._process: Any = None
         self._watching: asyncio.Task[None] | None = None
+        self._turn, self._closed = asyncio.Lock(), False
 
-    def open(self, context: Any) -> None:
-        """Start the process."""
+    async def open(self, context: Any) -> None:
+        """Start the process, unless the desk was closed meanwhile."""
+        async with self._turn:
+            if not self._closed:
+                await asyncio.to_thread(self._start, context)
+
+    def _start(self, context: Any) -> None:
         self._pipe, other = context.Pipe()
         self._process = context.Process(target=sit, args=[self.order, other], daemon=True)
         self._process.start()
@@ -63,14 +69,17 @@ class Desk:
 
     async def close(self) -> None:
         """End the process: the lesson is interrupted, and its journal holds every answer. Safe to call again."""
-        if self._watching is not None:
-            self._watching.cancel()
-        pipe, self._pipe = self._pipe, None
-        if pipe is not None:
-            with suppress(OSError):
-                pipe.send("close")
-        if self._process is not None:
-            await asyncio.to_thread(self._process.join)
+        self._closed = True
+        async with self._turn:
+            if self._watching is not None:
+                self._watching.cancel()
+                await asyncio.gather(self._watching, return_exceptions=True)
+            pipe, self._pipe = self._pipe, None
+            if pipe is not None:
+                with suppress(OSError):
+                    pipe.send("close")
+            if self._process is not None:
+                await asyncio.to_thread(self._process.join)
         self.ready.set()
 
     async def page(self, watches: bool = False) -> ClientConnection:
@@ -79,13 +88,16 @@ class Desk:
         if not self._address:
             raise OSError("the desk's process has ended")
         address = f"{self._address}&watch" if watches else self._address
-        return await connect(address, max_size=MOST_MESSAGE, compression=None, proxy=None)
+        try:
+            return await connect(address, max_size=MOST_MESSAGE, compression=None, proxy=None)
+        except (WebSocketException, EOFError) as error:  # killed while it answered
+            raise OSError(str(error)) from None
 
     # ---- what the process says
 
     def _listen(self, pipe: Connection) -> None:
         """Pass on what comes through the pipe; in a thread of its own."""
-        with suppress(RuntimeError):  # the event loop has ended
+        with pipe, suppress(RuntimeError):  # the event loop has ended
             try:
                 while True:
                     self._loop.call_soon_threadsafe(self._hear, pipe.recv())

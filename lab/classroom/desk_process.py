@@ -29,7 +29,6 @@ from lab.teaching.teacher import Teacher
 from lab.toolbox.registry import Toolbox
 from lab.view.progress import EscapingConsole
 
-
 LAST_S = 10.0  # time for a lesson to end after its pipe has closed
 
 
@@ -53,11 +52,12 @@ def sit(order: DeskOrder, pipe: Connection) -> None:
     try:
         with SeatPage() as page:
             pipe.send(("page", page.port, page.token))
-            threading.Thread(target=_until_closed, args=[pipe], daemon=True).start()
+            closed = threading.Event()
+            threading.Thread(target=_until_closed, args=[pipe, closed], daemon=True).start()
             said = _taught(order, page)
             with suppress(OSError):
                 pipe.send(said)
-            threading.Event().wait()  # the page goes on showing how it ended, until the class closes the desk
+            closed.wait()  # the page goes on showing how it ended, until the class closes the desk
     except KeyboardInterrupt:
         pass
     except LabError as error:
@@ -94,10 +94,11 @@ def _lesson(order: DeskOrder, page: SeatPage) -> Mapping[str, Any]:
     return document
 
 
-def _until_closed(pipe: Connection) -> None:
+def _until_closed(pipe: Connection, closed: threading.Event) -> None:
     """Interrupt the lesson when the pipe closes; if it does not end within a few seconds, end the process."""
     with suppress(EOFError, OSError):
         pipe.recv()
+    closed.set()
     interrupt_main()
     threading.Event().wait(LAST_S)
     os._exit(1)

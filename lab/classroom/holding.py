@@ -1,15 +1,12 @@
 """A class from its beginning to its end: where it is found, what is said meanwhile, and what is written at the end."""
 
-import datetime
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from ipaddress import ip_address
 from pathlib import Path
 from typing import Any
 
-from lab.classroom.certificate import fingerprint, made_certificate
 from lab.classroom.class_server import ClassServer, Place
-from lab.classroom.roster import Roster
 from lab.classroom.tile import COLUMNS
 from lab.errors import BadInput
 from lab.files import csv_of, is_file, write_whole
@@ -20,16 +17,12 @@ Json = dict[str, Any]
 
 
 def place_of(
-    roster: Roster,
-    address: str | None,
-    names: Sequence[str] = (),
-    certificate: Path | None = None,
-    key: Path | None = None,
+    address: str | None, names: Sequence[str] = (), certificate: Path | None = None, key: Path | None = None
 ) -> Place:
     """Where a class is found: on this computer alone, or at an address of it in a network, then over TLS.
 
     names: further host names under which pupils find that address. certificate, key: PEM files; None: made for the class.
-    Raises BadInput for an address that is none, and files that are missing or given alone.
+    Raises BadInput for an address that is none of one computer, and for files that are missing or given alone.
     """
     if (certificate is None) != (key is None):
         raise BadInput("--certificate and --key belong together: give both, or none for a certificate made on the spot")
@@ -42,25 +35,20 @@ def place_of(
             raise BadInput(
                 f"--lan {address}: that is every address of this computer: name the one in the class's network"
             )
-    hosts = tuple(dict.fromkeys([*names, address]))
     for file in (certificate, key):
         if file is not None and not is_file(file):
             raise BadInput(f"certificate: there is no file '{file}'")
-    if certificate is None or key is None:
-        certificate, key = made_certificate(roster.folder, hosts, datetime.datetime.now(datetime.UTC))
-    return Place(address, hosts, certificate, key)
+    return Place(address, tuple(dict.fromkeys([*names, address])), True, certificate, key)
 
 
-def begun_words(server: ClassServer, place: Place) -> list[str]:
+def begun_words(server: ClassServer) -> list[str]:
     """The lines for the teacher when the class begins."""
     lines = [
         f"pupils: {server.join_url}",
         f"code: {server.roster.code}",
         f"your own page, for nobody else: {server.teacher_url}",
     ]
-    if place.certificate is not None:
-        lines.append(f"certificate, SHA-256: {fingerprint(place.certificate)}")
-    return lines
+    return lines + [f"certificate, SHA-256: {server.fingerprint}"] * bool(server.fingerprint)
 
 
 def attend(server: ClassServer, tell: Callable[[str], None]) -> None:

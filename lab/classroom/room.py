@@ -21,10 +21,8 @@ Json = dict[str, Any]
 KEPT = "lesson.json"  # beside the journal of a finished lesson: its document, and the last state of its page
 MOST_BYTES = 1 << 24
 MOST_HINT = 200  # characters
-RELOAD, REPLACED = (
-    4001,
-    4002,
-)  # codes with which a pupil's page is closed: load again; another page of the pupil is open
+# codes with which a page is closed: the class has ended; load again; another page of the pupil is open
+OVER, RELOAD, REPLACED = 1001, 4001, 4002
 MOST_LOST = 3  # times that a killed process of one lesson is started again by itself
 AT_ONCE = 2  # desks that are started at the same time
 
@@ -52,6 +50,7 @@ class Room:
         self.ended = asyncio.Event()
         self.desks: dict[int, Desk] = {}
         self.pages: dict[int, PupilPage] = {}
+        self.shoulders: set[PupilPage] = set()  # the teacher's pages at pupils' desks
         self._hints: dict[int, str] = {}
         self._helped: set[int] = set()
         self._lost: Counter[tuple[int, int]] = Counter()  # (pupil, lesson) -> how often its process was killed
@@ -68,9 +67,8 @@ class Room:
     async def end(self) -> None:
         """Close all desks: lessons that are not over can be resumed."""
         self.ended.set()
-        for task in self._tasks:
-            task.cancel()
         await asyncio.gather(*(desk.close() for desk in self.desks.values()))
+        await asyncio.gather(*self._tasks, return_exceptions=True)
 
     # ---- desks
 
@@ -93,7 +91,7 @@ class Room:
 
     async def _opened(self, desk: Desk) -> None:
         async with self._starting:
-            await asyncio.to_thread(desk.open, self._context)
+            await desk.open(self._context)
             await desk.ready.wait()
 
     def _start(self, work: Any) -> None:
@@ -187,10 +185,15 @@ class Room:
         """Let the teacher's page answer for a pupil, or give the seat back. Raises BadInput for a pupil that is not there."""
         self._pupil(number)
         (self._helped.add if begins else self._helped.discard)(number)
-        page = self.pages.get(number)
-        if page is not None:
-            self._start(page.say({"seat": "give" if begins else "take"}))
+        gives = [self.pages.get(number)] if begins else [page for page in self.shoulders if page.number == number]
+        for page in gives:
+            if page is not None:
+                self._start(page.say({"seat": "give"}))
         self._show_all(number)
+
+    def takes_free_seat(self, number: int) -> bool:
+        """Whether a pupil's page takes the seat when it is free: always, unless the teacher answers."""
+        return number not in self._helped
 
     async def go_on(self, number: int | None, lesson: int | None = None) -> None:
         """The next lesson, or the lesson with a number from 0, of a pupil, or of all if `number` is None.

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from lab.errors import BadInput, unknown
+from lab.errors import BadInput
 from lab.files import is_file, json_of, read_limited, write_whole
 from lab.teaching.lesson_options import LessonOptions
 
@@ -25,6 +25,7 @@ MOST_PUPILS = 60
 NAME_LENGTH = 24
 LETTERS = "23456789abcdefghjkmnpqrstuvwxyz"  # without those that look alike
 CODE_LENGTH = 6
+NAMES = 37  # part of the seed of pseudonyms
 COLOURS = (
     *("amber", "azure", "black", "blue", "bronze", "brown", "copper", "coral", "golden", "green", "grey", "indigo"),
     *("ivory", "jade", "lilac", "olive", "orange", "pink", "purple", "red", "silver", "teal", "violet", "white"),
@@ -73,20 +74,13 @@ class Roster:
 
     @classmethod
     def new(cls, folder: Path, lessons: Sequence[LessonOptions], seed: int, most: int, typed_names: bool) -> "Roster":
-        """The roster of a new class, which is written. Raises BadInput for a folder that cannot be written or holds a class."""
+        """The roster of a new class, which is not written yet. Raises BadInput for a folder that holds a class."""
         if is_file(folder / FILE):
             raise BadInput(
                 f"'{folder}' (--out) holds a class: go on with it (lab class --resume), or choose another folder"
             )
-        made = cls(
-            folder, "".join(choice(LETTERS) for _ in range(CODE_LENGTH)), tuple(lessons), seed, most, typed_names
-        )
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            made.write()
-        except OSError as error:
-            raise BadInput(f"folder of the class '{folder}' (--out): {error.strerror or error}") from None
-        return made
+        code = "".join(choice(LETTERS) for _ in range(CODE_LENGTH))
+        return cls(folder, code, tuple(lessons), seed, most, typed_names)
 
     @classmethod
     def read(cls, folder: Path) -> "Roster":
@@ -116,7 +110,8 @@ class Roster:
         return cls(folder, lessons=lessons, pupils=pupils, **plain)
 
     def write(self) -> None:
-        """Write the roster. Raises OSError."""
+        """Write the roster, whose folder is made if it is missing. Raises OSError."""
+        self.folder.mkdir(parents=True, exist_ok=True)
         kept = {name: getattr(self, name) for name in ("code", "seed", "most", "typed_names", "port")}
         kept |= {"lessons": [options.to_json() for options in self.lessons]}
         kept |= {"pupils": [asdict(pupil) for pupil in self.pupils]}
@@ -148,7 +143,7 @@ class Roster:
     def move(self, number: int, lesson: int) -> Pupil:
         """The pupil with this number, who goes on with a lesson. Raises BadInput for a wrong number of either."""
         if not 1 <= number <= len(self.pupils):
-            raise unknown("pupil", str(number), [str(pupil.number) for pupil in self.pupils])
+            raise BadInput(f"pupil {number}: the class has {len(self.pupils)}")
         if not 0 <= lesson < len(self.lessons):
             raise BadInput(f"lesson {lesson + 1}: the class has {len(self.lessons)}")
         moved = self.pupils[number - 1] = replace(self.pupils[number - 1], lesson=lesson)
@@ -157,7 +152,8 @@ class Roster:
 
     def _pseudonym(self) -> str:
         """A name that depends on the class's seed and the pupil's number alone."""
-        drawn = np.random.default_rng([self.seed, 37]).permutation(len(COLOURS) * len(ANIMALS))
+        rng = np.random.default_rng([self.seed, NAMES])
+        drawn = rng.permutation(len(COLOURS) * len(ANIMALS))
         colour, animal = divmod(int(drawn[len(self.pupils) % len(drawn)]), len(ANIMALS))
         return f"{COLOURS[colour]} {ANIMALS[animal]}"
 

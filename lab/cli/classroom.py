@@ -73,12 +73,10 @@ def hold_class(
         roster = deferred.Roster.read(resume)
     else:
         roster = _new(lessons or [], out, pupils, typed_names, seed, (task, learner, gate, episodes))
-    place = deferred.place_of(roster, lan, name or (), certificate, key)
+    place = deferred.place_of(lan, name or (), certificate, key)
     said = console()
     with deferred.ClassServer(roster, place, port or roster.port) as server:
-        roster.port = server.port
-        roster.write()
-        for line in deferred.begun_words(server, place):
+        for line in deferred.begun_words(server):
             said.print(line, soft_wrap=True, highlight=False)
         if said.is_terminal:
             said.print(rich.text.Text(deferred.code_text(server.join_url)))

@@ -1,0 +1,38 @@
+"""`lab class` at the command line: what is refused before anybody can join."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+Lab = Callable[..., Any]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ([], "LESSON"),
+        (["world-1"], "--out"),
+        (["world-9", "--out", "x"], "world-9"),
+        (["world-1", "nothing", "--out", "x"], "nothing"),
+        (["world-1", "--out", "x", "--resume", "y"], "--resume y"),
+        (["--resume", "y"], "holds no class"),
+        (["world-1", "--out", "x", "--pupils", "0"], "--pupils"),
+        (["world-1", "--out", "x", "--gate", "ccr"], "ccr"),
+        (["world-1", "--out", "x", "--lan", "0.0.0.0"], "every address"),
+        (["world-1", "--out", "x", "--name", "lab.example"], "--lan"),
+        (["world-1", "--out", "x", "--lan", "127.0.0.1", "--certificate", "c.pem"], "--key"),
+        (["world-1", "--out", "x", "--lan", "127.0.0.1", "--certificate", "c.pem", "--key", "k.pem"], "c.pem"),
+        (["world-1", "--out", "x", "--lan", "192.0.2.1"], "192.0.2.1"),
+    ],
+)
+def test_what_is_refused(
+    lab: Lab, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: list[str], said: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    ran = lab("class", *words)
+    assert (ran.code, ran.out) == (2, "")
+    assert said in ran.err
+    assert ran.err.count("\n") == 1
+    assert not [*tmp_path.iterdir()]
