@@ -35,10 +35,10 @@ function showClass(now) {
 function showTiles(tiles) {
   for (const tile of tiles) {
     if (!boxes.has(tile.number)) {
-      boxes.set(tile.number, make("article"));
-      el("tiles").append(boxes.get(tile.number));
+      boxes.set(tile.number, classTile.create(act));
+      el("tiles").append(boxes.get(tile.number).box);
     }
-    classTile.draw(boxes.get(tile.number), tile, act);
+    classTile.draw(boxes.get(tile.number), tile);
   }
   const here = document.querySelectorAll("#tiles small.here").length;
   el("how").textContent = boxes.size ? `${here} of ${boxes.size} pupils are here` : "Nobody has joined yet.";

@@ -48,39 +48,51 @@ const classTile = (() => {
     return [VERDICTS[tile.verdict] || "works alone", tile.verdict === "rejected" ? "dropped" : ""];
   }
 
-  // A tile; act: what its buttons do, by name
-  function draw(box, tile, act) {
-    const open = box.querySelector("input") && document.activeElement === box.querySelector("input");
-    if (open) return; // a hint is being typed
-    const [says, kind] = status(tile), head = make("h2");
-    head.append(make("span", tile.name), make("small", tile.here ? "here" : "away", tile.here ? "here" : "away"));
-    const answers = `${tile.taken} answered${tile.skipped ? `, ${tile.skipped} left to it` : ""}${tile.misleads ? `, ${tile.misleads} did not help` : ""}`;
-    const facts = make("p", `${tile.title || "no lesson yet"}: episode ${tile.episode}${tile.episodes ? ` of ${tile.episodes}` : ""}; ${answers}`);
-    const row = make("p", undefined, "row"), look = make("a", "Look");
-    look.href = `/desk/${location.search}&pupil=${tile.number}`;
+  // An empty tile, whose buttons stay the same while what it says changes; act: what they do, by name
+  function create(act) {
+    const box = make("article", undefined, "tile"), head = make("h2"), says = make("p", "", "says"), facts = make("p"), hint = make("p", "", "hint"), row = make("p", undefined, "row");
+    const name = make("span"), here = make("small"), look = make("a", "Look"), form = make("form", undefined, "row"), field = make("input");
+    const parts = { box, name, here, says, facts, hint, look, picture: curve({ curve: [], guided: [] }), tile: null };
     look.target = "_blank";
     look.title = "over the shoulder, live; while you help you answer there";
-    row.append(look, button(tile.helped ? "Give back" : "Help", "answer for this pupil", () => act.help(tile)));
-    row.append(button("Hint", "a line on this pupil's page", () => hint(box, tile, act)), button("Next", "to the next lesson", () => act.next(tile)));
-    if (["failed", "stopped", "lost"].includes(tile.state)) row.append(button("Open again", "go on where it stopped", () => act.open(tile)));
-    box.className = `tile ${kind}`;
-    box.replaceChildren(head, curve(tile), make("p", says, "says"), facts, ...(tile.hint ? [make("p", `Hint: ${tile.hint}`, "hint")] : []), row);
-  }
-
-  function hint(box, tile, act) {
-    const form = make("form", undefined, "row"), field = make("input");
     field.maxLength = 200;
-    field.value = tile.hint;
-    field.setAttribute("aria-label", `hint for ${tile.name}`);
+    form.hidden = true;
     form.append(field, make("button", "Show"));
     form.onsubmit = (event) => {
       event.preventDefault();
-      field.blur();
-      act.hint(tile, field.value);
+      form.hidden = true;
+      act.hint(parts.tile, field.value);
     };
-    box.append(form);
-    field.focus();
+    parts.help = button("Help", "answer for this pupil", () => act.help(parts.tile));
+    parts.open = button("Open again", "go on where it stopped", () => act.open(parts.tile));
+    const ask = button("Hint", "a line on this pupil's page", () => {
+      form.hidden = false;
+      field.value = parts.tile.hint;
+      field.setAttribute("aria-label", `hint for ${parts.tile.name}`);
+      field.focus();
+    });
+    head.append(name, here);
+    row.append(look, parts.help, ask, button("Next", "to the next lesson", () => act.next(parts.tile)), parts.open);
+    box.append(head, parts.picture, says, facts, hint, row, form);
+    return parts;
   }
 
-  return { draw, make };
+  function draw(parts, tile) {
+    const [says, kind] = status(tile), picture = curve(tile);
+    parts.tile = tile;
+    parts.box.className = `tile ${kind}`;
+    parts.picture.replaceWith(picture);
+    parts.picture = picture;
+    parts.name.textContent = tile.name;
+    parts.here.textContent = parts.here.className = tile.here ? "here" : "away";
+    parts.says.textContent = says;
+    const answers = `${tile.taken} answered${tile.skipped ? `, ${tile.skipped} left to it` : ""}${tile.misleads ? `, ${tile.misleads} did not help` : ""}`;
+    parts.facts.textContent = `${tile.title || "no lesson yet"}: episode ${tile.episode}${tile.episodes ? ` of ${tile.episodes}` : ""}; ${answers}`;
+    parts.hint.textContent = tile.hint ? `Hint: ${tile.hint}` : "";
+    parts.look.href = `/desk/${location.search}&pupil=${tile.number}`;
+    parts.help.textContent = tile.helped ? "Give back" : "Help";
+    parts.open.hidden = !["failed", "stopped", "lost"].includes(tile.state);
+  }
+
+  return { create, draw, make };
 })();
