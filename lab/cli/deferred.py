@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 from lab.lazy import loader
 
 if TYPE_CHECKING:
-    from lab.advice.advisors import ADVISORS, MODEL, AdvisorName
+    from lab.advice.advisors import ADVISORS, MODEL, AdvisorName, split_praise
     from lab.advice.entries import Read, read_journal
     from lab.advice.panel import ASKED, DECISIONS
     from lab.api.scenes import SceneRequest as SceneAsked
@@ -129,7 +129,7 @@ if TYPE_CHECKING:
     from lab.workers import Workers
 
 TABLE = {
-    "lab.advice.advisors": ("AdvisorName", "ADVISORS", "MODEL"),
+    "lab.advice.advisors": ("AdvisorName", "ADVISORS", "MODEL", "split_praise"),
     "lab.advice.entries": ("Read", "read_journal"),
     "lab.advice.panel": ("ASKED", "DECISIONS"),
     "lab.api.scenes": ("SceneRequest as SceneAsked", "seen"),

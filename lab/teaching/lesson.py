@@ -7,6 +7,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Protocol
 
+from lab.advice.advisors import split_praise
 from lab.errors import BadInput, LabError
 from lab.learning.problem import Problem
 from lab.learning.requests import AdviceRequest, AdvisorLeft
@@ -125,7 +126,8 @@ def replay(kept: KeptSession, subject: Subject, tell: Tell) -> dict[str, Any]:
     tell: receives the events. Raises KeyboardInterrupt on Ctrl-C.
     """
     options = kept.options
-    advising = options.advising(dict.fromkeys(options.advisors, _nobody))  # the journal answers for people
+    people = [split_praise(name)[0] for name in options.advisors]
+    advising = options.advising(dict.fromkeys(people, _nobody))  # the journal answers for people
     with TemporaryDirectory() as folder:
         teacher = Teacher(Toolbox(folder), advising, options.seed, tell, keep=kept.keep, begun=kept.begun)
         try:

@@ -11,8 +11,9 @@ from lab.advice.advising import Advising
 from lab.advice.journal import Journal
 from lab.learning import session_events as session
 from lab.learning.environment import TableEnvironment
+from lab.learning.praise import Judging
 from lab.learning.problem import Problem
-from lab.learning.requests import Advisor, Request, Walked
+from lab.learning.requests import Advisor, Reply, Request, Walked
 from lab.learning.session import Session
 from lab.learning.session_events import AdviceEnded, AdviceRejected
 from lab.learning.session_result import SessionResult
@@ -131,8 +132,9 @@ class TellingAdvisor:
     def __init__(self, advisor: Advisor, tell: Tell):
         self._advisor, self._tell = advisor, tell
         self.followed: Callable[[Walked], None] | None = getattr(advisor, "followed", None)
+        self.judging: Judging | None = getattr(advisor, "judging", None)
 
-    def advise(self, request: Request) -> int | None:
+    def advise(self, request: Request) -> Reply:
         """The advisor's answer."""
         action = self._advisor.advise(request)
         self._tell(QuestionAnswered(request, action))

@@ -14,7 +14,7 @@ import pytest
 from lab.advice.advisors import Person
 from lab.advice.journal import Undo
 from lab.learning.problem import Problem
-from lab.learning.requests import AdviceRequest
+from lab.learning.requests import AdviceRequest, Reply
 from lab.learning.session import Session
 from lab.learning.session_events import AdviceEnded, Event
 from lab.learning.session_result import SessionResult
@@ -68,7 +68,7 @@ class Teaching:
         self.page.finished("The lesson is over.")
         return result
 
-    def _ask(self, request: AdviceRequest) -> int | None:
+    def _ask(self, request: AdviceRequest) -> Reply:
         row, column = self.mdp.state_cell(request.state)
         self.page.update(Frame(0.0, {"robot": (float(column), float(-row), 0.0, 0.0, 0.0, 0.0, 1.0)}))
         try:

@@ -12,7 +12,7 @@ from prompt_toolkit.input import create_pipe_input
 from prompt_toolkit.output import DummyOutput
 from rich.console import Console
 
-from lab.learning.requests import AdviceRequest, AdvisorLeft, Standing, TooSlow
+from lab.learning.requests import AdviceRequest, AdvisorLeft, Reply, Standing, TooSlow
 from lab.learning.session_events import (
     AdviceEnded,
     AdviceGiven,
@@ -80,7 +80,7 @@ def prompted(lines: str, shown: Console | None = None, plain: bool = False) -> t
     return TeachingPrompt(shown, PlainReader(shown, StringIO(lines)), plain), shown
 
 
-def ask(lines: str, asked: AdviceRequest | None = None, encoding: str = "utf-8") -> tuple[int | None, str]:
+def ask(lines: str, asked: AdviceRequest | None = None, encoding: str = "utf-8") -> tuple[Reply, str]:
     """The answer of a person who types these lines, and what was shown."""
     prompt, shown = prompted(lines, console(encoding))
     return prompt(asked or request()), said(shown)
