@@ -81,6 +81,12 @@ STUDIES: dict[str, Study] = {
         "What an advisor's help is worth over nobody's, for every skill of toast",
         _In("comparisons.advice_worth", "advice_worth"),
     ),
+    "attention": Study(
+        "What costs a person least for the same result: moves, ways, praise and blame, or a demonstration",
+        _In("comparisons.attention", "attention"),
+        sessions=40,
+        least=2,
+    ),
     "rejection": Study(
         "Whom CCRL rejects before a budget is spent, for every sub-task of toast and every learner",
         _In("comparisons.rejection", "rejection"),

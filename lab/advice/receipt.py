@@ -205,7 +205,7 @@ def _judged_only(entries: Iterable[Entry]) -> int:
     """The number of questions that were answered with a judgement and nothing else."""
     told = [entry for entry in entries if isinstance(entry, MoveJudged | AdviceGiven | EpisodeEnded)]
     asked = [(entry.episode, 0 if isinstance(entry, EpisodeEnded) else entry.step) for entry in told]
-    followed = zip(told, asked, [*asked[1:], None], strict=True)
+    followed = zip(told, asked, [*asked, None][1:], strict=True)
     return sum(isinstance(entry, MoveJudged) and step != after for entry, step, after in followed)
 
 

@@ -62,8 +62,8 @@ class Judging:
 class ActionBiasing:
     """The rule "biasing", and the base class of the others: predicted judgements H(s, a) are added to the action values.
 
-    H(s_i, a_i) += RATE (h - sum_j c_j H(s_j, a_j)) for the moves i of a judgement h, a step of normalised least mean squares; the
-    learner then selects its action from Q(s, a) + weight BIAS H(s, a) max(tau, max_b Q(s, b) - min_b Q(s, b)).
+    H(s_i, a_i) += RATE c_i (h - sum_j c_j H(s_j, a_j)) for the moves i of a judgement h, as TAMER learns; the learner selects its
+    action from Q(s, a) + weight BIAS H(s, a) max(tau, max_b Q(s, b) - min_b Q(s, b)).
 
     actions: A; selection: the name of the learner's rule. weight: in the present open episode, from 1 down.
     """
@@ -82,7 +82,7 @@ class ActionBiasing:
         """Learns from a judgement of moves; values_of: gives the learner's action values of a state; tau: its temperature."""
         error = value - sum(self.told(state)[action] for state, action in moves) / len(moves)
         for state, action in moves:
-            self.told(state)[action] += RATE * error
+            self.told(state)[action] += RATE * error / len(moves)
 
     def biased(self, state: int, values: Values, tau: float) -> Values:
         """The learner's action values (A,) of a state, shifted by what was told there."""

@@ -79,3 +79,43 @@ def test_a_picture_that_cannot_be_drawn_loses_nothing_else(lab: Lab, folder: Pat
     assert (ran.code, ran.json["solved"]) == (1, True)
     assert "is kept, but picture 'lesson/learning-curve.png': it is a folder" in ran.err.splitlines()[-1]
     assert lab("toolbox", "list", "--json").json["policies"]
+
+
+# ---- judgements -----------------------------------------------------------------------------------------------------
+
+
+def test_praise_from_a_pipe_is_kept_replayed_and_gone_on_with(lab: Lab, folder: Path) -> None:
+    (folder / "w.txt").write_text("S..\n.#.\n..G\n")
+    typed = ["+", "-", "--", "-3", "left", "", "good", "bad 2", "+"]
+    words = ("teach", "w.txt", "--advisor", "praise:terminal", "--gate", "always", "--episodes", "9", "--out", "lesson")
+    ran = lab(*words, stdin="\n".join(typed))
+    assert ran.code == 0
+    assert "this question is about the move that it makes" in ran.err
+    assert "Noted: clearly bad." in ran.err
+    assert "  judged: 3 times good, 4 times bad" in ran.out
+    journal = folder / "lesson" / "events.jsonl"
+    whole = journal.read_bytes()
+    assert (whole.count(b'"kind": "praise"'), whole.count(b'"kind": "judged"')) == (7, 7)
+    replayed = lab("replay", "lesson", "--json").json
+    assert replayed["receipt"]["judged"]["praised"] == 3
+    assert "Answer: bad, of the last 3 moves" in lab("replay", "lesson", "--pause", "0").err
+    lines = whole.splitlines(keepends=True)
+    cut = next(n for n, line in enumerate(lines) if b'"value": -2' in line and b'"praise"' in line) + 1
+    journal.write_bytes(b"".join(lines[:cut]))
+    assert lab("teach", "--resume", "lesson", stdin="\n".join(typed[3:])).code == 0
+    assert journal.read_bytes() == whole
+
+
+def test_who_judges_is_named_alone(lab: Lab) -> None:
+    ran = lab("teach", "world-1", "--advisor", "praise:expert", "--advisor", "wrong")
+    assert (ran.code, ran.out) == (2, "")
+    assert (
+        ran.err
+        == "lab: advisor 'praise:expert' (--advisor) beside 1 more: it judges moves that others choose: name it alone\n"
+    )
+
+
+def test_orders_are_not_judged(lab: Lab) -> None:
+    ran = lab("sequence", "toast-case-1", "--method", "srl", "--advisor", "praise:expert")
+    assert (ran.code, ran.out) == (2, "")
+    assert "advisor 'praise:expert': it judges the steps of a sub-task, not the order" in ran.err

@@ -160,7 +160,8 @@ class TableQuestion:
 
     def understood(self, line: str, request: AdviceRequest) -> Understood | Judgement:
         """The meaning of a line; see `judged` and `understand`."""
-        if request.judgement != "no" and (said := judged(line, request.mdp)) is not None:
+        typed = () if request.judgement == "only" else request.mdp.action_labels
+        if request.judgement != "no" and (said := judged(line, typed)) is not None:
             return said
         meant = understand(line, request.mdp)
         if request.judgement != "only":

@@ -1,6 +1,7 @@
 """The parser of answers typed at the teaching prompt: a move, a whole path, or a command word."""
 
 import re
+from collections.abc import Sequence
 from difflib import get_close_matches
 
 from lab.learning.praise import MOST_MOVES as MOST_JUDGED
@@ -34,14 +35,14 @@ _PIECE = re.compile(r"([0-9]*)\s*([^\W\d_]+|[^\s\d,;])|([0-9]+)")
 _JUDGED = re.compile(rf"(\+{{1,{MOST_VALUE}}}|-{{1,{MOST_VALUE}}}|good|bad)\s*([0-9]{{0,3}})")
 
 
-def judged(line: str, mdp: TabularMDP) -> Judgement | None:
+def judged(line: str, labels: Sequence[str] = ()) -> Judgement | None:
     """The judgement in a typed line, such as "+", "--" (clearly bad), "bad" or "-3" (of the last 3 moves); None for none.
 
-    The label of a move comes first.
+    labels: of the moves that may be typed as well; what begins one of them is that move.
     """
     word = line.strip(" \t\r\n").lower()
-    found = None if word in [label.lower() for label in mdp.action_labels] else _JUDGED.fullmatch(word)
-    if found is None or int(found[2] or 0) > MOST_JUDGED:
+    found = _JUDGED.fullmatch(word)
+    if found is None or int(found[2] or 0) > MOST_JUDGED or any(label.lower().startswith(word) for label in labels):
         return None
     signs = {"good": "+", "bad": "-"}.get(found[1], found[1])
     return Judgement(len(signs) if signs[0] == "+" else -len(signs), int(found[2] or 0))
