@@ -155,9 +155,9 @@ def _share(text: str, where: str) -> float:
 
 
 def split_praise(text: str) -> tuple[str, str]:
-    """(who, options): the parts of a name such as "praise:expert,late=2", which are "expert" and ",late=2"; else (text, "")."""
-    named = re.fullmatch(rf"{PRAISE}:(.*?)((?:,(?:late|rule)=[^,]*)*)", text, re.DOTALL)
-    return (text, "") if named is None else (named[1], named[2])
+    """(who, options): the parts of a name such as "praise:late=2:expert", "expert" and "late=2:"; (text, "") for any other."""
+    named = re.fullmatch(rf"{PRAISE}:((?:(?:late|rule)=[^:]*:)*)(.*)", text, re.DOTALL)
+    return (text, "") if named is None else (named[2], named[1])
 
 
 def _judging(kind: type[AdvisorName], text: str, where: str) -> AdvisorName:
@@ -169,7 +169,7 @@ def _judging(kind: type[AdvisorName], text: str, where: str) -> AdvisorName:
         inner = kind.of(who, where)
         if inner.row in NO_EVALUATORS:
             raise BadInput(f"'{shortened(who)}' judges no moves: wanted {PRAISED}")
-        given = dict(option.split("=", 1) for option in options.split(",")[1:])
+        given = dict(option.split("=", 1) for option in options.split(":")[:-1])
         late = given.get("late", "0")
         if not (late.isascii() and late.isdigit() and len(late) < 4 and int(late) < MOST_MOVES):
             raise BadInput(f"late={late}: allowed are 0 to {MOST_MOVES - 1} moves")
@@ -291,7 +291,7 @@ PREFIXED: dict[str, tuple[str, str, Callable[[str], Any], str]] = {
     "llm": ("llm:URL", "model", ModelAddress.of, f"no server: wanted {MODEL_WANTED}"),
 }
 PRAISE, PRAISE_ROW = "praise", "praise:WHO"
-PRAISED = "praise:WHO, with an advisor who names moves or a person, and perhaps ,late=MOVES"
+PRAISED = "praise:WHO, an advisor who names moves or a person, such as praise:expert or praise:late=2:terminal"
 NO_EVALUATORS = ("none", "llm:URL", PRAISE_ROW)  # the rows of those who cannot judge
 PYTHON = "python"  # the row of an advisor that is in no table
 PEOPLE = {"terminal": "prompt", "web": "page"}

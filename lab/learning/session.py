@@ -64,6 +64,7 @@ class Session:
         self.advisor, self.advised = advisor, advisor is not None
         self.followed: Callable[[Walked], None] | None = getattr(advisor, "followed", None)
         self.judging: Judging | None = getattr(advisor, "judging", None)
+        self.only_judges = self.judging is not None and self.judging.only
         self.praise: ActionBiasing | None = None  # what was learned from judgements, once there was one
         self.shown: list[Move] = []  # the moves of this episode that the advisor saw and may judge
         self.tell: OnEvent = lambda event: None
@@ -198,8 +199,7 @@ class Session:
         if (advisor is None and not gate.weighs) or (recall is not None and not recall.trusts):
             return own
         gate_asks = gate.asks(state, self.update.gauge(state))
-        asks = gate_asks and advisor is not None
-        answer = self._ask(advisor, state, step, own) if asks and advisor is not None else None
+        answer = self._ask(advisor, state, step, own) if gate_asks and advisor is not None else None
         if isinstance(answer, Judgement):
             answer = own if answer.value > 0 else None  # praise of a move is an answer that names it
         elif answer is not None:
@@ -207,7 +207,7 @@ class Session:
             if recall is not None:
                 recall.asked()
         action = checked_action(gate.takes(state, own, answer), self.actions, self.gate_name)
-        if asks and self.judging is not None and not self.judging.only:
+        if gate_asks and self.judging is not None and not self.only_judges:
             self.shown.append((state, action))
         return action
 
@@ -220,8 +220,7 @@ class Session:
             self.asked_now = True
             self.tell(events.AdviceRequested.of(self.episode, self.improved))
         gate, limits, helped = self.gate, self.gate_settings, self.helped_steps + self.helped_now
-        only = self.judging is not None and self.judging.only
-        if only:
+        if self.only_judges:
             self.shown.append((state, own))
         request = AdviceRequest(
             episode=self.episode,
@@ -239,14 +238,14 @@ class Session:
             temperature=self.tau,
             selection=self.settings.selection,
             environment=self.environment,
-            judgement="only" if only else "also" if self.judging is not None and self.shown else "no",
+            judgement="only" if self.only_judges else "also" if self.judging is not None and self.shown else "no",
             praise=self.praise,
         )
         try:
             action = advisor.advise(request)
             while isinstance(action, Judgement):
                 self._hears(action, step)
-                if only:
+                if self.only_judges:
                     return action
                 action = advisor.advise(request)
         except AdvisorLeft:
@@ -296,7 +295,8 @@ class Session:
         if gate.rejected and self.rejected_at is None:
             self.rejected_at = episode
             self.tell(events.AdviceRejected(episode, gate.misleads, limits.omega, score, mean_before))
-        for event in self.recall.ended(moves, helped) if self.recall is not None else ():
+        shown = 0 if self.only_judges else helped  # who judges shows nothing that could be remembered
+        for event in self.recall.ended(moves, shown) if self.recall is not None else ():
             self.tell(event)
 
     def result(self, interrupted: bool) -> SessionResult:

@@ -60,7 +60,7 @@ def whole_path(name: str | None) -> str | None:
 def recorded_whole(advisor: str) -> str:
     """An advisor's name, in which the path of a record or of a policy's file is absolute."""
     if (judge := split_praise(advisor)) != (advisor, ""):
-        return f"{PRAISE}:{recorded_whole(judge[0])}{judge[1]}"
+        return f"{PRAISE}:{judge[1]}{recorded_whole(judge[0])}"
     kind, _, path = advisor.partition(":")
     is_path = path and (kind == "recorded" or (kind == "policy" and is_file(path)))
     return f"{kind}:{Path(path).absolute()}" if is_path else advisor

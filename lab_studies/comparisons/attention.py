@@ -17,7 +17,7 @@ import numpy as np
 
 from lab.advice.advisors import RecordedAdvisor
 from lab.learning import splitmix
-from lab.learning.praise import Judgement, Judging
+from lab.learning.praise import PRAISE_RULES, Judgement, Judging
 from lab.learning.requests import AdviceRequest, Advisor, Reply
 from lab.learning.selection import Draw
 from lab.learning.session import Session
@@ -35,10 +35,18 @@ SKILLS = {"insert": "insert at toaster", "transfer": "transfer plate to insert w
 PROBLEMS = tuple(SKILLS)
 NOBODY, ACTIONS, WAYS, DEMONSTRATION = "nobody", "actions", "ways", "demonstration"
 PRAISE, LATE_PRAISE, CONTRARY_PRAISE = "praise", "late praise", "contrary praise"
-KINDS = (NOBODY, ACTIONS, WAYS, PRAISE, LATE_PRAISE, DEMONSTRATION, CONTRARY_PRAISE)
+LATE = 2  # moves, of late praise
+JUDGING = {  # by kind: how a person judges; all rules by which the learner may act on it, the default without its name
+    LATE_PRAISE: Judging(only=True, late=LATE),
+    **{
+        kind if rule == Judging().rule else f"{kind}, {rule}": Judging(only=True, rule=rule)
+        for rule in PRAISE_RULES
+        for kind in (PRAISE, CONTRARY_PRAISE)
+    },
+}
+KINDS = (NOBODY, ACTIONS, WAYS, DEMONSTRATION, *JUDGING)
 HELPED = (ACTIONS, WAYS, PRAISE, LATE_PRAISE, DEMONSTRATION)
 GATE = GateSettings("ccrl", first_episode=10, by_evidence=True, spare_best=True)
-LATE = 2  # moves, of late praise
 WITHIN = 0.1  # of the fewest moves: the result
 KEY_S, MENTAL_S = 0.28, 1.35  # operators K, of an average typist who is no secretary, and M
 SHIFTED = "+"  # characters of a US keyboard that take a second key
@@ -55,7 +63,11 @@ MEASURES = (
     "demonstration: `lead`, jogs and `lead end` at the console of lab operate, once, before the session. Sentences are not in "
     "the table, because this version of the lab does not read them."
 )
-CONTRARY = "contrary praise: + where the person would move to the worst place, - elsewhere; the whole session counts."
+CONTRARY = (
+    "contrary praise: + of the worst moves, - of the others. final_moves and late_steps are those of the whole session: the "
+    "greedy policy in the end (the step limit and 1 if it misses the goal), and the mean of the last tenth of the episodes. "
+    "praise, sharing and praise, coach: the other rules of lab.learning.praise."
+)
 
 
 def seconds_of(line: str, parts: int = 1) -> float:
@@ -88,8 +100,7 @@ class Typist:
         self._kind, self._mdp, self._values, self._draw = kind, mdp, values, draw
         self._path, self._episode, self._verdicts = PathAhead(), 0, list[str]()
         self.seconds = 0.0
-        if kind in (PRAISE, LATE_PRAISE, CONTRARY_PRAISE):
-            self.judging = Judging(only=True, late=LATE if kind == LATE_PRAISE else 0)
+        self.judging = JUDGING.get(kind)
 
     def advise(self, request: AdviceRequest) -> Reply:
         """The answer that the prompt reads from what is typed."""
@@ -111,7 +122,8 @@ class Typist:
         return moves[0]
 
     def _judgement(self, request: AdviceRequest) -> Judgement | None:
-        row, contrary = self._values[request.state], self._kind == CONTRARY_PRAISE
+        assert self.judging is not None
+        row, contrary = self._values[request.state], self._kind.startswith(CONTRARY_PRAISE)
         is_good = abs(row[request.own] - (row.min() if contrary else row.max())) <= SAME
         if request.episode != self._episode:
             self._episode, self._verdicts = request.episode, []
@@ -158,20 +170,23 @@ def attended(setting: Setting, seed: int) -> Attended:
         states, moves, _ = greedy_path(place.values, mdp, mdp.n_states)
         advisor = RecordedAdvisor(dict(zip(states, moves, strict=False)))
         person.seconds = sum(map(seconds_of, demonstrated(mdp, SKILLS[setting.problem], moves)))
-    session, fewest, until = Session(mdp, place.learner, GATE, advisor, draw), shortest_steps(mdp), list[Any]()
+    session, fewest = Session(mdp, place.learner, GATE, advisor, draw), shortest_steps(mdp)
+    until: list[tuple[int, int, float]] = []
+
+    def spent() -> tuple[int, int, float]:
+        return session.episode, session.helped_steps, person.seconds
 
     def watched() -> bool:
         if not until:
             _, moves, reached = greedy_path(session.update.table(), mdp, most)
             if reached and len(moves) <= (1.0 + WITHIN) * fewest:
-                until.extend((session.episode, session.helped_steps, person.seconds))
+                until.append(spent())
         return False
 
     result = session.run(enough=watched)
-    spent = until or [session.episode, session.helped_steps, person.seconds]
     final = most + 1 if result.final_steps is None else result.final_steps
     tenth = float(result.steps[-len(result.steps) // 10 :].mean())
-    return Attended(bool(until), *spent, result.rejected_at_episode is not None, final, tenth)
+    return Attended(bool(until), *(until or [spent()])[0], result.rejected_at_episode is not None, final, tenth)
 
 
 def sessions_of(setting: Setting, sessions: int, seed: int) -> list[Attended]:

@@ -60,7 +60,7 @@ def test_the_accuracy_is_that_with_which_it_praises_the_best() -> None:
 
 def test_answers_in_a_file_judge_where_they_are(tmp_path: Path) -> None:
     (tmp_path / "mine.json").write_text('{"(0, 0)": "down"}')
-    name = f"praise:answers:{tmp_path / 'mine.json'},late=0"
+    name = f"praise:late=0:answers:{tmp_path / 'mine.json'}"
     assert verdicts(name, 1, 3) == {GOOD: 3}
     assert verdicts(name, 3, 3) == {BAD: 3}  # as good, but not what was said
     assert verdicts(name, 3, 3, state=4) == {None: 3}
@@ -87,7 +87,7 @@ def test_late_judgements_by_hand() -> None:
 
 def test_a_person_judges_himself() -> None:
     level = TableLevel(board(), 0.99, np.random.default_rng(0), {"terminal": lambda asked: Judgement(-2, 3)})
-    advisor = level.advisor(AdvisorName.of("praise:terminal,late=4"))
+    advisor = level.advisor(AdvisorName.of("praise:late=4:terminal"))
     assert isinstance(advisor, Evaluator)
     assert advisor.judging == Judging(True, 4)
     assert advisor.advise(request(1)) == Judgement(-2, 3)
@@ -106,20 +106,20 @@ def test_in_a_region_only() -> None:
 
 
 def test_a_name_has_the_parameters_of_whom_it_names() -> None:
-    name = AdvisorName.of("praise:tau=0.2,late=3,rule=coach")
-    assert (str(name), name.row, name.taus) == ("praise:tau=0.2,late=3,rule=coach", "praise:WHO", (0.2,))
+    name = AdvisorName.of("praise:late=3:rule=coach:tau=0.2")
+    assert (str(name), name.row, name.taus) == ("praise:late=3:rule=coach:tau=0.2", "praise:WHO", (0.2,))
     assert name.inner == AdvisorName.of("tau=0.2")
     assert name.judging == Judging(True, 3, "coach")
     assert Advising.of(["praise:recorded:here"]).records
 
 
 def test_the_parts_of_a_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert split_praise("praise:terminal,late=2") == ("terminal", ",late=2")
+    assert split_praise("praise:late=2:terminal") == ("terminal", "late=2:")
     assert split_praise("terminal") == ("terminal", "")
     assert is_external("praise:web")
     assert not is_external("praise:expert")
     monkeypatch.chdir(tmp_path)
-    assert recorded_whole("praise:recorded:a,b,late=1") == f"praise:recorded:{tmp_path / 'a,b'},late=1"
+    assert recorded_whole("praise:late=1:recorded:a,b") == f"praise:late=1:recorded:{tmp_path / 'a,b'}"
     assert recorded_whole("praise:expert") == "praise:expert"
 
 
@@ -131,9 +131,9 @@ def test_the_parts_of_a_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
         ("praise:praise:expert", "'praise:expert' judges no moves"),
         ("praise:llm:http://127.0.0.1/v1#m", "judges no moves"),
         ("praise:exprt", "unknown advisor 'exprt'"),
-        ("praise:expert,late=x", "late=x: allowed are 0 to 99 moves"),
-        ("praise:expert,late=100", "late=100: allowed are 0 to 99 moves"),
-        ("praise:expert,lat=1", "unknown advisor 'expert,lat=1'"),
+        ("praise:late=x:expert", "late=x: allowed are 0 to 99 moves"),
+        ("praise:late=100:expert", "late=100: allowed are 0 to 99 moves"),
+        ("praise:lat=1:expert", "unknown advisor 'lat=1:expert'"),
     ],
 )
 def test_bad_names(name: str, message: str) -> None:
@@ -150,6 +150,6 @@ def test_an_evaluator_is_named_alone() -> None:
 
 
 def test_an_order_is_not_judged() -> None:
-    level = OrderLevel(load_cell("toast-case-1"), np.random.default_rng(0), {"terminal": lambda asked: None})
+    level = OrderLevel(load_cell("toast-case-1").cell(1), np.random.default_rng(0), {"terminal": lambda asked: None})
     with pytest.raises(BadInput, match="'praise:terminal': it judges the steps of a sub-task, not the order"):
         make_advisor(AdvisorName.of("praise:terminal"), level)

@@ -2,6 +2,7 @@
 
 from collections import deque
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -152,13 +153,14 @@ def test_no_judgement_changes_what_moves_are_worth() -> None:
     """The table is that of Q-learning from the moves that were made, whatever was said of them."""
     mdp, person, q = board(), Watching(), np.zeros((25, 4))
     session, learned = Session(mdp, LEARNER, ALWAYS, person, np.random.default_rng(2)), []
-    learn = session.update.learn
+    update: Any = session.update
+    learn = update.learn
 
     def seen(state: int, action: int, reward: float, discount: float, entered: int, following: int) -> None:
         learned.append((state, action, reward, discount, entered))
         learn(state, action, reward, discount, entered, following)
 
-    session.update.learn = seen  # type: ignore[method-assign]
+    update.learn = seen
     result = session.run()
     for state, action, reward, discount, entered in learned:
         q[state, action] += LEARNER.alpha * (reward + discount * q[entered].max() - q[state, action])
@@ -196,7 +198,7 @@ class Contrary:
 @pytest.mark.parametrize("rule", PRAISE_RULES)
 def test_an_expert_who_judges_is_as_good_as_one_who_shows(rule: str) -> None:
     gate = GateSettings(first_episode=4, window=2, by_evidence=True, lambda_threshold=1.0)
-    name = f"praise:expert,rule={rule}"
+    name = f"praise:rule={rule}:expert"
     alone, judged = ran("none", gate, board())[0], ran(name, gate, board())[0]
     assert judged.helped_steps > 0
     assert judged.solved
@@ -261,4 +263,12 @@ def test_an_unknown_rule() -> None:
     with pytest.raises(
         BadInput, match=r"^advisor 'praise:...' \(advisor\): unknown rule 'coahc' .*: did you mean 'coach'\?"
     ):
-        AdvisorName.of("praise:expert,rule=coahc")
+        AdvisorName.of("praise:rule=coahc:expert")
+
+
+def test_what_was_judged_is_no_demonstration() -> None:
+    """With a memory a learner that was shown a path asks no more; one that was judged goes on asking."""
+    gate = GateSettings(first_episode=4, window=2, lambda_threshold=1.0, memory=True)
+    shown, judged = ran("expert", gate, board())[0], ran("praise:expert", gate, board())[0]
+    assert shown.guided.sum() == 1
+    assert judged.guided.sum() > 1
