@@ -190,15 +190,14 @@ def _is_yours(entries: Sequence[Entry]) -> bool:
 
 def _judgements(entries: Iterable[Entry], mdp: TabularMDP | None, values: Values) -> Judgements | None:
     said = [entry for entry in entries if isinstance(entry, MoveJudged)]
+    if not said:
+        return None
+    praised, blamed = sum(one.value > 0 for one in said), sum(one.value < 0 for one in said)
     single = [one for one in said if one.moves == 1 and _existing([(one.state, one.action)], mdp)]
     against = None
     if values is not None:
         against = sum((one.value > 0) == bool(worse([(one.state, one.action)], values)) for one in single)
-    return (
-        Judgements(sum(one.value > 0 for one in said), sum(one.value < 0 for one in said), len(single), against)
-        if said
-        else None
-    )
+    return Judgements(praised, blamed, len(single), against)
 
 
 def _judged_only(entries: Iterable[Entry]) -> int:
@@ -363,11 +362,10 @@ def _lines(of: Receipt) -> Iterator[str]:
         helped = helped if of.taken or of.judged is None else ""
         yield f"advice: it asked in {counted(of.requests, 'episode')}{about}{helped}"
     if of.judged is not None:
-        wrong = of.judged.against_best
-        against = (
-            f"; {wrong} of {of.judged.single} against what was best" if wrong is not None and of.judged.single else ""
-        )
-        yield f"  judged: {of.judged.praised} times good, {of.judged.blamed} times bad{against}"
+        wrong, single = of.judged.against_best, of.judged.single
+        against = f"; {wrong} of {single} against what was best" if wrong is not None and single else ""
+        good, bad = counted(of.judged.praised, "time"), counted(of.judged.blamed, "time")
+        yield f"  judged: {good} good, {bad} bad{against}"
     if of.refused:
         yield "  not followed: " + ", ".join(f"{count} ({reason})" for reason, count in of.refused.items())
     if of.guided:
