@@ -4,8 +4,9 @@ A judgement h is about moves i = 1..k that were shown last. Whoever judges may b
 moves, so each of them has the credit c_i = 1 / k: TAMER's credit window, with an even delay.
 
 In the episodes that the gate opens, the learner acts by its action values and by what it was told; in all others, and in the
-greedy policy that is judged in the end, by its action values alone. No judgement changes these, so in the end none decides
-which policy is the best. In the n-th open episode after the first judgement what was told has the weight FADING ** (n - 1).
+greedy policy that is judged in the end, by its action values alone. A judgement is no reward: these values are learned from the
+moves that are made, and the best policy stays the best whatever was praised. In the n-th open episode after the first judgement
+what was told has the weight FADING ** (n - 1).
 
 Sources: Knox and Stone, Interactively shaping agents via human reinforcement: the TAMER framework, K-CAP 2009, and
 Reinforcement learning from simultaneous human and MDP reward, AAMAS 2012 (action biasing and control sharing); MacGlashan et
