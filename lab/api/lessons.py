@@ -7,7 +7,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Annotated, Any, Unpack
 
-from annotated_types import Ge, Lt
+from annotated_types import Ge, Le, Lt
 
 from lab.api.options import (
     Advisors,
@@ -28,6 +28,8 @@ from lab.mdp import FloatArray
 from lab.teaching.events import unheard
 from lab.teaching.lesson import Subject, document_of, planned
 from lab.teaching.lesson_plan import Lesson
+from lab.teaching.peer_lesson import PeerLesson, check_alone
+from lab.teaching.peers import FEWEST, MOST, PeerResult
 from lab.teaching.step_record import StepRecord
 from lab.teaching.subjects import Teachable, subject_from
 from lab.teaching.teacher import Teacher
@@ -41,7 +43,8 @@ class LessonResult:
     """The result of a lesson, which notebooks display.
 
     problem: the problem, with its table `problem.mdp`; lesson: the policy and the session's counts; document: the dict that
-    `lab teach --json` prints.
+    `lab teach --json` prints; peers: the results of all peers if there were several, otherwise (). Policy and session are then
+    those of the best peer.
 
         >>> import lab
         >>> lesson = lab.teach(lab.world("S.#\\n..G"), gate="never", advisor=None)
@@ -54,6 +57,7 @@ class LessonResult:
     document: dict[str, Any]
     _subject: Subject
     _record: StepRecord | None = None
+    peers: tuple[PeerResult, ...] = ()
 
     @property
     def policy(self) -> Policy:
@@ -148,6 +152,7 @@ def teach(
     task: str | None = None,
     sight: str | None = None,
     record: bool = False,
+    peers: int | None = None,
     **settings: Unpack[Settings],
 ) -> LessonResult:
     """The result of one teaching session; the same problem, settings and seed give the same table.
@@ -161,6 +166,7 @@ def teach(
     task: the task that a sub-task belongs to, default "toast".
     sight: "limited" restricts advice to the region in a world's file; default "full".
     record: whether all steps are recorded, see `LessonResult.steps`.
+    peers: 2 to 16 learners of the problem at once, each of which asks the others by its gate; `advisor` is then left out.
     settings: of learner and gate, by the names in docs/settings.md; `learner` and `gate` may also be classes.
 
     Raises BadInput for an unknown name, a value out of range, and what does not fit together; WorkFailed if the toolbox cannot
@@ -172,6 +178,7 @@ def teach(
         (True, True)
     """
     check_common("lab.teach", seed=seed, task=task, record=record)
+    together = None if peers is None else _together(peers, advisor=advisor, sight=sight, record=record)
     subject = subject_from(problem, task, sight)
     subject.settings = subject.settings.changed("", **settings)
     with TemporaryDirectory() as nowhere:
@@ -179,7 +186,19 @@ def teach(
         advising = advising_of(advisor, toolbox)
         tell = heard_by(advising, unheard if steps is None else steps.hear)
         teacher = Teacher(toolbox_of(toolbox, nowhere), advising, seed, tell)
+        if together is not None:
+            teacher = together.teacher(teacher)
         teacher, plan = planned(subject, teacher)
         lesson = teacher.teach(plan)
     document = document_of(plan.problem, lesson, teacher) | subject.facts()
-    return LessonResult(plan.problem, lesson, document, subject, steps)
+    if together is None:
+        return LessonResult(plan.problem, lesson, document, subject, steps)
+    document |= together.group.to_json()
+    return LessonResult(plan.problem, lesson, document, subject, steps, together.group.peers)
+
+
+def _together(peers: int, *, advisor: Advisors, sight: str | None, record: bool) -> PeerLesson:
+    """The lesson of so many peers. Raises BadInput for another number, and for what cannot be combined with them."""
+    check_value("peers", peers, Annotated[int, Ge(FEWEST), Le(MOST)], "lab.teach")
+    check_alone({"advisor": advisor not in (None, "expert", "none"), "sight": sight, "record": record})
+    return PeerLesson(peers)

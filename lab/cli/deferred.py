@@ -83,6 +83,8 @@ if TYPE_CHECKING:
     from lab.teaching.kept_session import KeptSession, check_new, named_with
     from lab.teaching.lesson import replay as replay_session
     from lab.teaching.lesson import teach as teach_session
+    from lab.teaching.peer_lesson import check_alone as check_peers_alone
+    from lab.teaching.peer_lesson import teach_peers
     from lab.teaching.lesson_options import DEFAULT_ADVISORS, LessonOptions
     from lab.teaching.named_problems import PROBLEMS
     from lab.teaching.session_list import session_rows
@@ -200,6 +202,7 @@ TABLE = {
     "lab.teaching.kept_order": ("kept_order", "gone_on as order_gone_on", "OrderSessionOptions", "OrderSession"),
     "lab.teaching.kept_session": ("check_new", "KeptSession", "named_with"),
     "lab.teaching.lesson": ("replay as replay_session", "teach as teach_session"),
+    "lab.teaching.peer_lesson": ("check_alone as check_peers_alone", "teach_peers"),
     "lab.teaching.lesson_options": ("DEFAULT_ADVISORS", "LessonOptions"),
     "lab.teaching.named_problems": ("PROBLEMS",),
     "lab.teaching.session_list": ("session_rows",),

@@ -53,6 +53,15 @@ def teach(
     advisor: AdvisorNames = None,
     asked: Asked = "together",
     decide: Decide = "trust-weighted",
+    peers: Annotated[
+        int | None,
+        typer.Option(
+            "--peers",
+            min=2,
+            max=16,
+            help="So many learners of the problem at once, each of which asks the others; the best policy is kept.",
+        ),
+    ] = None,
     episodes: Annotated[
         int | None, typer.Option("--episodes", min=1, help="Session length; default: the task's.")
     ] = None,
@@ -84,6 +93,19 @@ def teach(
 
     Each session keeps a journal: --resume continues an interrupted session, lab replay shows it again.
     """
+    if peers is not None:
+        deferred.check_peers_alone(
+            {
+                "--advisor": advisor,
+                "--sight": sight,
+                "--resume": resume,
+                "--trust-module": trust_module,
+                "--page": page,
+                "--port": port,
+                "--wait": wait,
+                "--plain": plain,
+            }
+        )
     who = (tuple(advisor or ()), asked, decide)
     given = deferred.LessonOptions(subtask or "", task, sight, learner, gate, memory, *who, episodes, seed, save)
     kept = None if resume is None else deferred.KeptSession(resume, "--resume", trusted=trust_module or ())
@@ -102,8 +124,11 @@ def teach(
     with lesson_seat(options.advisors, page=page, port=port, wait_s=wait, plain=plain) as seat:
         teacher = teacher_of(toolbox, options, seat)
         teacher.toolbox.check()
-        document = deferred.teach_session(subject, options, teacher, folder, kept)
-        seat.lesson_over(document)
+        if peers is not None:
+            document = deferred.teach_peers(subject, teacher, peers, save, out)
+        else:
+            document = deferred.teach_session(subject, options, teacher, folder, kept)
+            seat.lesson_over(document)
     show(document, as_json, deferred.lesson_summary)
     if document["failure"] is not None:
         end(document["failure"], 1)
