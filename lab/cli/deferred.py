@@ -83,10 +83,10 @@ if TYPE_CHECKING:
     from lab.teaching.kept_session import KeptSession, check_new, named_with
     from lab.teaching.lesson import replay as replay_session
     from lab.teaching.lesson import teach as teach_session
-    from lab.teaching.peer_lesson import check_alone as check_peers_alone
-    from lab.teaching.peer_lesson import teach_peers
     from lab.teaching.lesson_options import DEFAULT_ADVISORS, LessonOptions
     from lab.teaching.named_problems import PROBLEMS
+    from lab.teaching.peer_lesson import check_alone as check_peers_alone
+    from lab.teaching.peer_lesson import teach_peers
     from lab.teaching.session_list import session_rows
     from lab.teaching.step_record import StepRecord, check_libraries
     from lab.teaching.subjects import subject_of

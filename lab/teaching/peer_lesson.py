@@ -76,4 +76,6 @@ def check_alone(given: Mapping[str, object]) -> None:
     """Raises BadInput for the first option, by name, that has a value and cannot be combined with --peers."""
     for option, value in given.items():
         if value:
-            raise BadInput(f"{option} beside peers: they are advised by each other alone, and nothing is recorded: remove {option}")
+            raise BadInput(
+                f"{option} beside peers: they are advised by each other alone, and nothing is recorded: remove {option}"
+            )

@@ -147,7 +147,9 @@ class Peer:
         if role is None:
             return _Learned(self, asker)
         if role in PEOPLE:
-            raise BadInput(f"role '{role}' of peer {self.number}: only advisors that are no people can answer for a peer")
+            raise BadInput(
+                f"role '{role}' of peer {self.number}: only advisors that are no people can answer for a peer"
+            )
         learner, environment = asker.plan.learner, asker.environment
         rng = np.random.default_rng([self.seed, _ROLES, self.number, asker.number])
         level = TableLevel(environment.mdp, learner.discount, rng, {}, None, learner.episodes, environment.values)
@@ -217,7 +219,7 @@ class _Learned:
 
 
 class PeerGroup:
-    """Peers that learn at once, deterministic for a seed; those of a group whose gate is "never" learn alone, from the same seeds.
+    """Peers that learn at once, deterministic for a seed. With the gate "never" they learn alone, from the same random numbers.
 
     plans: FEWEST to MOST peers; seed: of all randomness, each peer has a stream of its own; panel: how each combines the others;
     tell: receives (number of a peer, event); make_panel: a class with the interface of `Panel`.
@@ -242,9 +244,7 @@ class PeerGroup:
             others = [other for other in self.peers if other is not peer]
             peer.meet(others, panel or PanelSettings(), make_panel)
 
-    def run(
-        self, after_episode: Callable[[Peer], None] = lambda peer: None, most_moves: float = inf
-    ) -> "GroupResult":
+    def run(self, after_episode: Callable[[Peer], None] = lambda peer: None, most_moves: float = inf) -> "GroupResult":
         """The results after all rounds, or after Ctrl-C.
 
         after_episode: called with each peer after each of its episodes; most_moves: a peer that has made so many plays no more.

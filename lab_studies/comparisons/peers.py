@@ -24,7 +24,10 @@ if TYPE_CHECKING:
 
 PEERS = 4
 PROBLEMS = {"world-1": 6_000, "insert": 6_000, "four-rooms": 8_000}  # the moves of each learner, in every company
-FIRST_EPISODES = {"ccrl": 30, "ccrl early": 10}  # X of the gate ccrl, by the name of the setting: the first that may ask
+FIRST_EPISODES = {
+    "ccrl": 30,
+    "ccrl early": 10,
+}  # X of the gate ccrl, by the name of the setting: the first that may ask
 ALONE, TOGETHER, WRONG, UNJUDGED = "alone", "together", "one wrong", "one wrong, not judged"
 COMPANIES = (ALONE, TOGETHER, WRONG, UNJUDGED)
 EPISODES = 1_000  # more than anybody plays
@@ -32,11 +35,11 @@ NO_REJECTION = 1_000_000  # omega: the gate tolerates every mislead
 NEVER = "never"
 
 MEASURES = (
-    f"{PEERS} learners, as many moves for each in every company, in rounds of an episode each. Each value of a session is the mean of "
-    "its learners. Goal: the greedy path first reaches the goal; solved: it is first a shortest one; both in episodes and in moves "
-    "of the learner itself, all that it made if that never happens. Greedy points: 100 x the fewest steps over those of the greedy "
-    "path, 0 if that misses the goal, averaged over the moves; return points: the same of the episodes that it walked. Gain: the "
-    "difference to the same learners alone, paired by seed, positive if the company is better."
+    f"{PEERS} learners, as many moves for each in every company, in rounds of an episode each. Each value of a session is the "
+    "mean of its learners. Goal: the greedy path first reaches the goal; solved: it is first a shortest one; both in episodes "
+    "and in moves of the learner itself, all that it made if that never happens. Greedy points: 100 x the fewest steps over "
+    "those of the greedy path, 0 if that misses the goal, averaged over the moves; return points: the same of the episodes that "
+    "it walked. Gain: the difference to the same learners alone, paired by seed, positive if the company is better."
 )
 COMPANIES_NOTE = (
     "One wrong: peer 4 answers with the worst action by the optimal values, always and everywhere; the other three are compared "
@@ -179,7 +182,9 @@ def mean_of(values: FloatArray, learners: int) -> Outcome:
 def peers(job: Job, reading: Mapping[str, Any]) -> Findings:
     """The results of every problem, gate and company; the reading has no effect."""
     settings = [Setting(name, NEVER, ALONE) for name in PROBLEMS]
-    settings += [Setting(name, gate, company) for name in PROBLEMS for gate in FIRST_EPISODES for company in COMPANIES[1:]]
+    settings += [
+        Setting(name, gate, company) for name in PROBLEMS for gate in FIRST_EPISODES for company in COMPANIES[1:]
+    ]
     values = job.each(partial(outcome, sessions=job.sessions, seed=job.seed), settings)
     rows = [row for setting in settings for row in rows_of(setting, values)]
     pictures = {
@@ -212,7 +217,7 @@ def in_short(rows: Sequence[Row]) -> Row:
     says: Row = {}
     for company in COMPANIES[1:]:
         for gate in FIRST_EPISODES:
-            for measure in ("solved_moves", "greedy_points"):
+            for measure in ("goal_moves", "solved_moves", *POINTS):
                 gains = those(rows, company=company, gate=gate, measure=f"gain_{measure}")
                 above = [row["problem"] for row in gains if row["ci95"][0] > 0.0]
                 below = [row["problem"] for row in gains if row["ci95"][1] < 0.0]
@@ -226,7 +231,7 @@ def _picture(rows: Sequence[Row], measure: str) -> bytes:
     colours = dict(zip(COMPANIES[1:], (GREEN, BLUE, RED), strict=True))
 
     def draw(figure: "Figure") -> None:
-        plots = figure.subplots(1, len(FIRST_EPISODES), sharex=True, sharey=True)
+        plots = figure.subplots(1, len(FIRST_EPISODES), sharex=True, sharey=True, squeeze=False)[0]
         for axes, gate in zip(plots, FIRST_EPISODES, strict=True):
             axes.axvline(0.0, color=INK, linewidth=0.8)
             for shift, (company, colour) in zip((0.2, 0.0, -0.2), colours.items(), strict=True):
