@@ -10,7 +10,7 @@ AAMAS 2017, 1100-1108 (learners that ask and answer at once, by visit counts and
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from math import inf
 from typing import Any
 
@@ -55,7 +55,8 @@ class PeerStanding:
     """What one peer asked another one.
 
     peer: the number of the other one, from 1; asked, answered: the numbers of questions and of answers; trust: the expected share
-    of good answers, with its 95 % interval low to high; dropped: whether it is no longer followed.
+    of good answers, with its 95 % interval low to high, from the answers since it was last dropped or readmitted; dropped:
+    whether it is no longer followed.
     """
 
     peer: int
@@ -92,7 +93,7 @@ class PeerResult:
             "helped_steps": session.helped_steps,
             "misleads": session.misleads,
             "rejected_at_episode": session.rejected_at_episode,
-            "others": [vars(standing) | {} for standing in self.others],
+            "others": [asdict(standing) for standing in self.others],
         }
 
 

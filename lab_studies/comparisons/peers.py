@@ -244,6 +244,7 @@ def _picture(rows: Sequence[Row], measure: str) -> bytes:
             axes.set_title(f"gate {gate}", fontsize=10)
             axes.set_yticks(range(len(PROBLEMS)), labels=list(reversed([*PROBLEMS])))
             axes.set_xlabel({"greedy_points": "gain [points]", "solved_moves": "moves saved"}[measure])
+            axes.locator_params(axis="x", nbins=5)
             axes.grid(axis="x")
         legend_below(figure)
 
