@@ -130,6 +130,12 @@ STUDIES: dict[str, Study] = {
         sessions=20,
         least=2,
     ),
+    "peers-of-two-arms": Study(
+        "Two arms that learn the same toast and advise each other, beside each of them alone",
+        _In("comparisons.peers_of_two_arms", "peers_of_two_arms"),
+        sessions=20,
+        least=2,
+    ),
     "mountain-car": Study(
         "Mountain Car: when a teacher should speak, at equal budgets",
         _In("comparisons.mountain_car", "mountain_car"),

@@ -56,7 +56,7 @@ def advice_of(policy: Policy, mdp: TabularMDP) -> IntArray:
     If the problem is not the policy's own, grid cells are matched by their indices (both grids need the same number of axes) and
     actions by their labels. Raises BadInput if nothing matches, or if no matching state was visited.
     """
-    own_state = matched_states(policy, mdp)
+    own_state = np.arange(mdp.n_states, dtype=np.int32) if policy.signature == mdp.signature else _places(policy, mdp)
     visited = policy.visits.max(axis=1) > 0
     if policy.ends is not None:
         visited &= policy.ends == ON
@@ -69,14 +69,8 @@ def advice_of(policy: Policy, mdp: TabularMDP) -> IntArray:
     return said
 
 
-def matched_states(policy: Policy | TabularMDP, mdp: TabularMDP) -> IntArray:
-    """The state of a policy or of another problem for each state of a problem, (S,) int32, -1 for none.
-
-    They are the same in the same problem; otherwise the cells of grids are matched by their indices. Raises BadInput if the
-    problems cannot be matched.
-    """
-    if policy.signature == mdp.signature:
-        return np.arange(mdp.n_states, dtype=np.int32)
+def _places(policy: Policy, mdp: TabularMDP) -> IntArray:
+    """The policy's state for each state of a problem, (S,), -1 for none. Raises BadInput if the problems cannot be matched."""
     if not (policy.shape and mdp.shape) or mdp.coverage_shape:
         raise BadInput("it learned in another problem, and only the cells of grids can be matched")
     if len(policy.shape) != len(mdp.shape):

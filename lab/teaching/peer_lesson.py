@@ -1,75 +1,99 @@
-"""A lesson of peers, `lab teach --peers`: several learners of one problem advise each other; the best policy is saved."""
+"""Lessons of peers, `lab teach --peers`: several learners of a sub-task advise each other; the best policy is saved.
 
-from collections.abc import Mapping
-from dataclasses import replace
+With several tasks, such as one with another arm, the learners of all of them are one group, and each task's best policy is saved.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from lab.advice.advising import Advising
 from lab.advice.advisors import AdvisorName
-from lab.advice.journal import Journal
 from lab.errors import BadInput
 from lab.learning.session_events import Event
 from lab.learning.session_result import SessionResult
-from lab.teaching.events import LessonEvent, Tell
-from lab.teaching.lesson import Subject, one_lesson
+from lab.teaching.events import LessonEvent
+from lab.teaching.lesson import Subject, carried_out, planned
 from lab.teaching.lesson_plan import LessonPlan
-from lab.teaching.peers import GroupResult, PeerGroup, PeerPlan, check_peers
+from lab.teaching.peers import GroupResult, PeerGroup, PeerPlan, PeerResult, check_peers
 from lab.teaching.teacher import Teacher
 
 NOBODY = AdvisorName.of("none")
 
 
-class PeerLesson:
-    """The sessions of a lesson in which `count` peers learn the problem; made once, called by the teacher as `Sessions` is.
+class PeerLessons:
+    """The lessons of `count` peers for each subject, planned now; the first lesson that is taught runs all peers.
 
-    group: the results of all peers, once they have run; the lesson's result is the best peer's, see `GroupResult.best`.
+    planned: the subject, teacher and plan of each lesson. Raises BadInput for a group that is too small or too large, and for a
+    problem without a goal.
     """
 
-    def __init__(self, count: int):
-        check_peers(count)
-        self.count = count
-        self._group: GroupResult | None = None
-
-    @property
-    def group(self) -> GroupResult:
-        """The results of the peers."""
-        assert self._group is not None
-        return self._group
-
-    def __call__(self, plan: LessonPlan, advising: Advising, seed: int, journal: Journal, tell: Tell) -> "PeerLesson":
-        """The lesson with its peers, which have not run yet. Raises BadInput for a problem without a goal."""
+    def __init__(self, subjects: Sequence[Subject], teacher: Teacher, count: int, name: str | None = None):
+        check_peers(count * len(subjects))
+        advisor = replace(NOBODY, text=f"{count * len(subjects)} peers")
+        advising = replace(teacher.advising, names=(advisor,))
+        teacher = replace(teacher, advising=advising, begun=lambda problem: None)  # each lesson begins anew
+        self.planned: list[tuple[Subject, Teacher, LessonPlan]] = []
+        plans: list[PeerPlan] = []
+        for number, subject in enumerate(subjects):
+            own, plan = planned(subject, teacher, name)
+            best = _Best(self, number)
+            self.planned.append((subject, replace(own, sessions=lambda *_, best=best: best), plan))
+            plans += [PeerPlan(plan.problem, plan.learner, plan.gate, reach=subject.reach())] * count
 
         def hear(number: int, event: Event) -> None:
-            tell(LessonEvent(f"{plan.problem.name}, peer {number}", event))
+            teacher.tell(LessonEvent(f"{plans[number - 1].problem.name}, peer {number}", event))
 
-        plans = [PeerPlan(plan.problem, plan.learner, plan.gate)] * self.count
-        self._peers = PeerGroup(plans, seed, panel=advising.panel, tell=hear)
-        return self
+        self._count, self._group = count, PeerGroup(plans, teacher.seed, panel=advising.panel, tell=hear)
+        self._peers: tuple[PeerResult, ...] = ()
+
+    @property
+    def peers(self) -> tuple[PeerResult, ...]:
+        """The results of all peers, in the order of the subjects."""
+        if not self._peers:
+            self._peers = self._group.run().peers
+        return self._peers
+
+    def best(self, number: int) -> PeerResult:
+        """The best peer of a subject, from 0."""
+        first = number * self._count
+        return GroupResult(self.peers[first : first + self._count]).best
+
+
+@dataclass(frozen=True)
+class _Best:
+    """The sessions of a lesson, as a teacher runs them: those of the subject's best peer."""
+
+    lessons: PeerLessons
+    number: int
 
     def run(self) -> SessionResult:
-        """The result of the best peer."""
-        self._group = self._peers.run()
-        return self._group.best.session
-
-    def teacher(self, teacher: Teacher) -> Teacher:
-        """The teacher of this lesson: it begins anew, and its policy says that peers advised."""
-        name = replace(NOBODY, text=f"{self.count} peers")
-        advising = replace(teacher.advising, names=(name,))
-        return replace(teacher, advising=advising, sessions=self, begun=lambda problem: None)
+        return self.lessons.best(self.number).session
 
 
 def teach_peers(
-    subject: Subject, teacher: Teacher, count: int, name: str | None = None, out: Path | None = None
+    subjects: Sequence[Subject], teacher: Teacher, count: int, name: str | None = None, out: Path | None = None
 ) -> dict[str, Any]:
-    """The document of `lab teach --peers --json` after a lesson of `count` peers, whose best policy is saved.
+    """The document of `lab teach --peers --json`: that of the first subject, with all peers, and those of the other subjects.
 
-    Pictures are written to `out`; no journal is kept, because the same seed gives the same lesson. Raises BadInput for bad
-    options, and Interrupted on Ctrl-C, when the best policy so far has been saved.
+    count: of the learners of each subject. Pictures are written to `out`; no journal is kept, because the same seed gives the
+    same lessons. Raises BadInput for bad options, and Interrupted on Ctrl-C, when the best policies so far have been saved.
     """
-    lesson = PeerLesson(count)
-    document = one_lesson(subject, lesson.teacher(teacher), name, out)
-    return document | lesson.group.to_json()
+    lessons, documents = PeerLessons(subjects, teacher, count, name), list[dict[str, Any]]()
+    stopped: KeyboardInterrupt | None = None
+    for number, (subject, own, plan) in enumerate(lessons.planned):
+        folder = out if out is None or len(subjects) == 1 else out / f"{number + 1}-{subject.name}"
+        try:
+            document = carried_out(subject, own, plan, folder)
+        except KeyboardInterrupt as interrupted:  # the policies of the others are saved as well
+            stopped = stopped or interrupted
+        else:
+            documents.append(document | {"best_peer": lessons.best(number).number})
+    if stopped is not None:
+        raise stopped
+    first, *others = documents
+    first["peers"] = [peer.to_json() for peer in lessons.peers]
+    return first | ({"others": others} if others else {})
 
 
 def check_alone(given: Mapping[str, object]) -> None:

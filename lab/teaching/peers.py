@@ -4,6 +4,8 @@ Peers play in rounds: each plays one episode, in order. A peer answers in a stat
 that lead nearer to the goal along the moves that it has made itself, it names the one with the highest value in its own table. A
 peer that knows nothing says nothing, and its silence is no mislead. The answers are combined by a panel (see `lab.advice.panel`),
 which drops peers whose answers mislead; the gate judges the panel as it judges any advisor.
+Peers may learn different problems, such as the same sub-task with different arms: the cells of grids then match by their place
+relative to the goal, and an answer that leads where the asker's arm cannot reach is not followed.
 
 Sources: Tan, Proc. ICML 1993, 330-337 (cooperating learners that share episodes or policies); da Silva, Glatt and Costa, Proc.
 AAMAS 2017, 1100-1108 (learners that ask and answer at once, by visit counts and budgets); thesis, section 10.2.4 iii.
@@ -18,7 +20,7 @@ import numpy as np
 
 from lab.advice.advisors import PEOPLE, AdvisorName
 from lab.advice.panel import Panel, PanelSettings
-from lab.advice.table_level import SILENT, TableLevel, matched_states
+from lab.advice.table_level import SILENT, TableLevel
 from lab.advice.trust import Ways, bounds, trust
 from lab.errors import BadInput
 from lab.learning import splitmix
@@ -29,6 +31,7 @@ from lab.learning.session import Session
 from lab.learning.session_events import Event
 from lab.learning.session_result import SessionResult
 from lab.learning.settings import GateSettings, LearnerSettings
+from lab.mdp import BoolArray, TabularMDP
 
 FEWEST, MOST = 2, 16  # peers in a group
 _SESSIONS, _PANELS, _ROLES = 1_000_001, 1_000_002, 1_000_003  # purposes of streams, see `splitmix.apart`
@@ -41,13 +44,14 @@ class PeerPlan:
     """What one peer learns, and how.
 
     gate: decides when it asks; role: None if it answers what it has learned, otherwise the name of an advisor that answers in
-    its place, such as "wrong" (see `lab.advice.advisors`).
+    its place, such as "wrong" (see `lab.advice.advisors`); reach: (S,) bool, the states that its arm can reach, None for all.
     """
 
     problem: Problem
     learner: LearnerSettings
     gate: GateSettings
     role: str | None = None
+    reach: BoolArray | None = None
 
 
 @dataclass(frozen=True)
@@ -70,10 +74,11 @@ class PeerStanding:
 
 @dataclass(frozen=True)
 class PeerResult:
-    """The result of one peer: its number, from 1, its problem's name, its session, its moves, and its standing of the others."""
+    """The result of one peer: its number, from 1, its problem's name and arm ("" for none), its session, moves and standings."""
 
     number: int
     problem: str
+    arm: str
     session: SessionResult
     moves: int
     others: tuple[PeerStanding, ...]
@@ -84,6 +89,7 @@ class PeerResult:
         return {
             "peer": self.number,
             "problem": self.problem,
+            "arm": self.arm,
             "solved": session.solved,
             "final_steps": session.final_steps,
             "optimal_steps": session.optimal_steps,
@@ -189,7 +195,8 @@ class Peer:
             dropped = member is None or member.dropped
             judged = trust(good, bad), *bounds(good, bad), dropped
             others.append(PeerStanding(number, answers.asked, answers.answered, *judged))
-        return PeerResult(self.number, self.plan.problem.name, session, self.moves, tuple(others))
+        problem = self.plan.problem
+        return PeerResult(self.number, problem.name, problem.arm, session, self.moves, tuple(others))
 
 
 class _Silent:
@@ -203,20 +210,37 @@ class _Learned:
     """The advisor that answers what a peer has learned, in its own problem or in another one whose states match."""
 
     def __init__(self, peer: Peer, asker: Peer):
+        own, theirs, reach = peer.environment.mdp, asker.environment.mdp, asker.plan.reach
         self._peer = peer
-        own, theirs = peer.environment.mdp, asker.environment.mdp
-        try:
-            self._states = matched_states(own, theirs).tolist()
-        except BadInput:  # the problems have nothing in common
-            self._states = [SILENT] * theirs.n_states
+        self._states = matched_states(own, theirs)
         labels = {label: action for action, label in enumerate(theirs.action_labels)}
         self._actions = [labels.get(label) for label in own.action_labels]
+        self._feasible = None if reach is None else reach[theirs.successor].tolist()
 
     def advise(self, request: AdviceRequest) -> int | None:
-        """What the peer knows in the state that matches."""
+        """What the peer knows in the state that matches, None if the asker's arm cannot do it."""
         state = self._states[request.state]
-        action = None if state < 0 else self._peer.knows(state)
-        return None if action is None else self._actions[action]
+        known = None if state == SILENT else self._peer.knows(state)
+        action = None if known is None else self._actions[known]
+        return action if action is None or self._feasible is None or self._feasible[request.state][action] else None
+
+
+def matched_states(own: TabularMDP, theirs: TabularMDP) -> list[int]:
+    """The state of a problem for each state of another one, SILENT where none matches.
+
+    They are the same in the same problem. Otherwise the cells of grids match by their place relative to the first goal, and
+    nothing matches where the problems are no grids or have different numbers of axes.
+    """
+    if own.signature == theirs.signature:
+        return [*range(theirs.n_states)]
+    matched = np.full(theirs.n_states, SILENT)
+    if own.shape and len(own.shape) == len(theirs.shape) and not (own.coverage_shape or theirs.coverage_shape):
+        goal, their_goal = (mdp.state_cell(int(mdp.goal.argmax())) for mdp in (own, theirs))
+        cells = np.indices(theirs.shape).reshape(len(theirs.shape), -1).T + np.subtract(goal, their_goal)
+        inside = ((cells >= 0) & (cells < own.shape)).all(axis=1)
+        matched[inside] = np.ravel_multi_index(tuple(cells[inside].T), own.shape)
+    states: list[int] = matched.tolist()
+    return states
 
 
 class PeerGroup:
@@ -277,10 +301,6 @@ class GroupResult:
             return not peer.session.solved, inf if steps is None else steps, peer.moves
 
         return min(self.peers, key=merit)
-
-    def to_json(self) -> dict[str, Any]:
-        """The further items of the document of `lab teach --peers`."""
-        return {"best_peer": self.best.number, "peers": [peer.to_json() for peer in self.peers]}
 
 
 def check_peers(count: int) -> None:

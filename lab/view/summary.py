@@ -111,8 +111,16 @@ def lesson_summary(lesson: Mapping[str, Any]) -> RenderableType:
         f"saved as '{lesson['saved_as']}' (seed {lesson['seed']})",
         *([] if "peers" in lesson else [f"its journal: {lesson['session']} (lab replay shows it again)"]),
         *lesson["files"].values(),
+        *(line for other in lesson.get("others", ()) for line in _other_task(other)),
     ]
     return Group(*map(Text, lines))
+
+
+def _other_task(lesson: Mapping[str, Any]) -> Iterator[str]:
+    """The lines of the lesson of another task, which peers learned at the same time."""
+    yield f"in task '{lesson['task']}', peer {lesson['best_peer']}: learned path: {_way(lesson)}: {_verdict(lesson)}"
+    yield f"saved as '{lesson['saved_as']}' (seed {lesson['seed']})"
+    yield from lesson["files"].values()
 
 
 def _peers(lesson: Mapping[str, Any]) -> Iterator[str]:
@@ -125,7 +133,8 @@ def _peers(lesson: Mapping[str, Any]) -> Iterator[str]:
             f"{', dropped' if other['dropped'] else ''})"
             for other in peer["others"]
         )
-        yield f"peer {peer['peer']}: {path}, {counted(peer['moves'], 'move')}, {peer['helped_steps']} helped; asked {others}"
+        arm = f" with the arm {peer['arm']}" if peer["arm"] else ""
+        yield f"peer {peer['peer']}{arm}: {path}, {counted(peer['moves'], 'move')}, {peer['helped_steps']} helped; asked {others}"
 
 
 def replay_summary(replay: Mapping[str, Any]) -> RenderableType:

@@ -28,8 +28,8 @@ def subject(episodes: int = 30) -> TableSubject:
 def test_the_best_policy_is_saved_and_the_toolbox_changes_nothing(tmp_path: Path) -> None:
     heard: list[Event] = []
     teacher = Teacher(Toolbox(tmp_path), seed=3, tell=heard.append)
-    document = teach_peers(subject(), teacher, 3)
-    assert teach_peers(subject(), teacher, 3) == document
+    document = teach_peers([subject()], teacher, 3)
+    assert teach_peers([subject()], teacher, 3) == document
     best = document["peers"][document["best_peer"] - 1]
     assert (document["advisor"], document["solved"], document["final_steps"]) == ("3 peers", True, 3)
     assert (best["final_steps"], best["helped_steps"]) == (3, document["helped_steps"])
@@ -49,7 +49,7 @@ def test_ctrl_c_saves_the_best_so_far(tmp_path: Path) -> None:
 
     teacher = Teacher(Toolbox(tmp_path), tell=stop)
     with pytest.raises(Interrupted, match="what was learned is kept"):
-        teach_peers(subject(), teacher, 2)
+        teach_peers([subject()], teacher, 2)
     (row,) = teacher.toolbox.list()
     assert row["advisor"] == "2 peers"
 
