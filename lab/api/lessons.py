@@ -29,7 +29,7 @@ from lab.mdp import FloatArray
 from lab.teaching.events import unheard
 from lab.teaching.lesson import Subject, document_of, planned
 from lab.teaching.lesson_plan import Lesson
-from lab.teaching.peer_lesson import PeerLessons, check_alone
+from lab.teaching.peer_lesson import PeerLessons, check_alone, of_tasks
 from lab.teaching.peers import FEWEST, MOST, PeerResult
 from lab.teaching.step_record import StepRecord
 from lab.teaching.subjects import Teachable, subject_from
@@ -184,8 +184,9 @@ def teach(
     check_common("lab.teach", seed=seed, task=task, record=record)
     if peers is not None or peer_tasks:
         _check_peers(peers, peer_tasks, advisor=advisor, sight=sight, record=record)
-    subject, *others = (subject_from(problem, name, sight) for name in (task, *peer_tasks))
-    for one in (subject, *others):
+    subject = subject_from(problem, task, sight)
+    subjects = of_tasks(subject, peer_tasks, lambda other: subject_from(problem, other))
+    for one in subjects:
         one.settings = one.settings.changed("", **settings)
     with TemporaryDirectory() as nowhere:
         steps = StepRecord() if record else None
@@ -193,14 +194,13 @@ def teach(
         tell = heard_by(advising, unheard if steps is None else steps.hear)
         teacher = Teacher(toolbox_of(toolbox, nowhere), advising, seed, tell)
         together = None
-        if peers is not None or others:
-            together = PeerLessons([subject, *others], teacher, peers or 1)
-            _, teacher, plan = together.planned[0]
+        if peers is not None or peer_tasks:
+            together = PeerLessons(subjects, teacher, peers or 1)
+            taught = together.each(lambda number, subject, own, plan: (own, plan, own.teach(plan)))
+            teacher, plan, lesson = taught[0]
         else:
             teacher, plan = planned(subject, teacher)
-        lesson = teacher.teach(plan)
-        for _, own, other in () if together is None else together.planned[1:]:
-            own.teach(other)
+            lesson = teacher.teach(plan)
     document = document_of(plan.problem, lesson, teacher) | subject.facts()
     if together is None:
         return LessonResult(plan.problem, lesson, document, subject, steps)
@@ -214,5 +214,6 @@ def _check_peers(
     """Raises BadInput for another number of peers, for tasks that are no names, and for what cannot be combined with them."""
     if peers is not None:
         check_value("peers", peers, Annotated[int, Ge(FEWEST), Le(MOST)], "lab.teach")
-    check_value("peer_tasks", list(peer_tasks), list[str], "lab.teach")
+    if isinstance(peer_tasks, str) or not all(isinstance(name, str) for name in peer_tasks):
+        raise BadInput(f"peer_tasks {peer_tasks!r} (lab.teach): wanted a list of the names of tasks")
     check_alone({"advisor": advisor not in (None, "expert", "none"), "sight": sight, "record": record})

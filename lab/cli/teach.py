@@ -113,7 +113,6 @@ def teach(
                 "--port": port,
                 "--wait": wait,
                 "--plain": plain,
-                "--save": save if peer_tasks else None,
             }
         )
     who = (tuple(advisor or ()), asked, decide)
@@ -128,15 +127,17 @@ def teach(
     if out is not None:
         deferred.check_new(out)
     subject = deferred.subject_of(options, kept)
-    others = [deferred.subject_of(replace(options, task=other)) for other in peer_tasks or ()]
+    subjects = deferred.peer_subjects(
+        subject, peer_tasks or (), lambda other: deferred.subject_of(replace(options, task=other))
+    )
     folder = out if kept is None else kept.folder
     if folder is not None:
         deferred.check_out(folder)
     with lesson_seat(options.advisors, page=page, port=port, wait_s=wait, plain=plain) as seat:
         teacher = teacher_of(toolbox, options, seat)
         teacher.toolbox.check()
-        if peers is not None or others:
-            document = deferred.teach_peers([subject, *others], teacher, peers or 1, save, out)
+        if peers is not None or peer_tasks:
+            document = deferred.teach_peers(subjects, teacher, peers or 1, save, out)
         else:
             document = deferred.teach_session(subject, options, teacher, folder, kept)
             seat.lesson_over(document)

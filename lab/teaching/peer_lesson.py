@@ -3,10 +3,10 @@
 With several tasks, such as one with another arm, the learners of all of them are one group, and each task's best policy is saved.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from lab.advice.advisors import AdvisorName
 from lab.errors import BadInput
@@ -16,29 +16,35 @@ from lab.teaching.events import LessonEvent
 from lab.teaching.lesson import Subject, carried_out, planned
 from lab.teaching.lesson_plan import LessonPlan
 from lab.teaching.peers import GroupResult, PeerGroup, PeerPlan, PeerResult, check_peers
+from lab.teaching.skill_subject import SkillSubject
 from lab.teaching.teacher import Teacher
 
 NOBODY = AdvisorName.of("none")
+Taught = TypeVar("Taught")
 
 
 class PeerLessons:
-    """The lessons of `count` peers for each subject, planned now; the first lesson that is taught runs all peers.
+    """The lessons of `count` peers for each subject, planned now; `each` teaches them, and the first one runs all peers.
 
-    planned: the subject, teacher and plan of each lesson. Raises BadInput for a group that is too small or too large, and for a
-    problem without a goal.
+    name: of the saved policy. Raises BadInput for a group that is too small or too large, for a problem
+    without a goal, and for one name for several policies.
     """
 
     def __init__(self, subjects: Sequence[Subject], teacher: Teacher, count: int, name: str | None = None):
         check_peers(count * len(subjects))
+        if name is not None and len(subjects) > 1:
+            raise BadInput(
+                f"--save {name} beside --peer-task: the policy of each task has a name of its own: remove --save"
+            )
         advisor = replace(NOBODY, text=f"{count * len(subjects)} peers")
         advising = replace(teacher.advising, names=(advisor,))
         teacher = replace(teacher, advising=advising, begun=lambda problem: None)  # each lesson begins anew
-        self.planned: list[tuple[Subject, Teacher, LessonPlan]] = []
+        self._lessons: list[tuple[int, Subject, Teacher, LessonPlan]] = []
         plans: list[PeerPlan] = []
         for number, subject in enumerate(subjects):
             own, plan = planned(subject, teacher, name)
             best = _Best(self, number)
-            self.planned.append((subject, replace(own, sessions=lambda *_, best=best: best), plan))
+            self._lessons.append((number, subject, replace(own, sessions=lambda *_, best=best: best), plan))
             plans += [PeerPlan(plan.problem, plan.learner, plan.gate, reach=subject.reach())] * count
 
         def hear(number: int, event: Event) -> None:
@@ -53,6 +59,21 @@ class PeerLessons:
         if not self._peers:
             self._peers = self._group.run().peers
         return self._peers
+
+    def each(self, teach: Callable[[int, Subject, Teacher, LessonPlan], Taught]) -> list[Taught]:
+        """What `teach` returns for each subject, numbered from 0.
+
+        After Ctrl-C the lessons that are left save their policies, too; then it is raised.
+        """
+        results, stopped = list[Taught](), list[KeyboardInterrupt]()
+        for lesson in self._lessons:
+            try:
+                results.append(teach(*lesson))
+            except KeyboardInterrupt as interrupted:
+                stopped.append(interrupted)
+        if stopped:
+            raise stopped[0]
+        return results
 
     def best(self, number: int) -> PeerResult:
         """The best peer of a subject, from 0."""
@@ -79,21 +100,24 @@ def teach_peers(
     count: of the learners of each subject. Pictures are written to `out`; no journal is kept, because the same seed gives the
     same lessons. Raises BadInput for bad options, and Interrupted on Ctrl-C, when the best policies so far have been saved.
     """
-    lessons, documents = PeerLessons(subjects, teacher, count, name), list[dict[str, Any]]()
-    stopped: KeyboardInterrupt | None = None
-    for number, (subject, own, plan) in enumerate(lessons.planned):
+    lessons = PeerLessons(subjects, teacher, count, name)
+
+    def teach(number: int, subject: Subject, own: Teacher, plan: LessonPlan) -> dict[str, Any]:
         folder = out if out is None or len(subjects) == 1 else out / f"{number + 1}-{subject.name}"
-        try:
-            document = carried_out(subject, own, plan, folder)
-        except KeyboardInterrupt as interrupted:  # the policies of the others are saved as well
-            stopped = stopped or interrupted
-        else:
-            documents.append(document | {"best_peer": lessons.best(number).number})
-    if stopped is not None:
-        raise stopped
-    first, *others = documents
+        return carried_out(subject, own, plan, folder) | {"best_peer": lessons.best(number).number}
+
+    first, *others = lessons.each(teach)
     first["peers"] = [peer.to_json() for peer in lessons.peers]
     return first | ({"others": others} if others else {})
+
+
+def of_tasks(subject: Subject, tasks: Sequence[str], make: Callable[[str], Subject]) -> list[Subject]:
+    """The subject, and those that `make` returns for further tasks. Raises BadInput if the subject is no sub-task of a task."""
+    if tasks and not isinstance(subject, SkillSubject):
+        raise BadInput(
+            f"task '{tasks[0]}' (--peer-task): '{subject.name}' is no sub-task of a task: remove --peer-task"
+        )
+    return [subject, *map(make, tasks)]
 
 
 def check_alone(given: Mapping[str, object]) -> None:

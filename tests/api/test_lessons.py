@@ -42,6 +42,16 @@ def test_peers_learn_what_the_command_lets_them_learn(request: pytest.FixtureReq
         lab.teach("world-1", peers=2, record=True)
     with pytest.raises(lab.BadInput, match="peers"):
         lab.teach("world-1", peers=1)
+    with pytest.raises(lab.BadInput, match=r"peer_tasks 'toast-panda'.*: wanted a list"):
+        lab.teach("insert", peer_tasks="toast-panda")
+
+
+def test_two_arms_learn_a_sub_task_as_peers(tmp_path: Path) -> None:
+    lesson = lab.teach("insert", peer_tasks=["toast-panda"], episodes=40, seed=1, toolbox=tmp_path)
+    assert [peer.arm for peer in lesson.peers] == ["up6", "panda"]
+    assert [len(peer.session.steps) for peer in lesson.peers] == [40, 40]
+    assert lesson.policy.arm == "up6"
+    assert {row["arm"] for row in lab.Toolbox(tmp_path).list()} == {"up6", "panda"}
 
 
 def test_an_advisor_is_a_function() -> None:

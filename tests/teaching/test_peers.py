@@ -6,13 +6,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+from lab.advice.table_level import SILENT
 from lab.errors import BadInput
 from lab.learning.problem import Problem
 from lab.learning.session import Session
 from lab.learning.session_events import AdviceGiven, AdvisorDropped, Event
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import grid
-from lab.teaching.peers import MOST, GroupResult, Peer, PeerGroup, PeerPlan
+from lab.teaching.peers import MOST, GroupResult, Peer, PeerGroup, PeerPlan, matched_states
 
 LEFT, RIGHT = 0, 1
 LEARNER = LearnerSettings(episodes=6, max_steps=200)
@@ -116,6 +117,26 @@ def test_an_expert_may_answer_for_a_peer_and_a_person_may_not() -> None:
     assert group((None, "none")).run().peers[0].session.helped_steps == 0
     with pytest.raises(BadInput, match="role 'terminal' of peer 2"):
         group((None, "terminal"))
+
+
+def test_cells_match_by_their_place_relative_to_the_goal() -> None:
+    short, four, long = (corridor(length).mdp for length in (3, 4, 5))
+    assert matched_states(four, short) == [1, 2, 3]
+    assert matched_states(four, long) == [SILENT, 0, 1, 2, 3]
+    assert matched_states(four, four) == [0, 1, 2, 3]
+    assert matched_states(four, corridor(axes=2).mdp) == [SILENT] * 3
+
+
+def test_an_answer_that_leads_out_of_reach_is_not_followed() -> None:
+    reach = np.array([True, False, True])
+    asker = PeerPlan(corridor(), LEARNER, ALWAYS, reach=reach)
+    first, second = PeerGroup([PeerPlan(corridor(), LEARNER, ALWAYS), asker], 0).peers
+    first.session.play(1)
+    heard: list[tuple[int, int | None]] = []
+    tell = lambda event: heard.append((event.state, event.action)) if isinstance(event, AdviceGiven) else None  # noqa: E731
+    second.session.tell = tell
+    second.session.play(1)
+    assert {*heard} == {(0, None), (1, RIGHT)}
 
 
 def test_other_problems_are_matched_by_their_cells_or_not_at_all() -> None:
