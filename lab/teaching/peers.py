@@ -5,13 +5,13 @@ that lead nearer to the goal along the moves that it has made itself, it names t
 peer that knows nothing says nothing, and its silence is no mislead. The answers are combined by a panel (see `lab.advice.panel`),
 which drops peers whose answers mislead; the gate judges the panel as it judges any advisor.
 Peers may learn different problems, such as the same sub-task with different arms: the cells of grids then match by their place
-relative to the goal, and an answer that leads where the asker's arm cannot reach is not followed.
+relative to the goal, and an answer counts only where the asker's arm can reach all of the peer's known path to the goal.
 
 Sources: Tan, Proc. ICML 1993, 330-337 (cooperating learners that share episodes or policies); da Silva, Glatt and Costa, Proc.
 AAMAS 2017, 1100-1108 (learners that ask and answer at once, by visit counts and budgets); thesis, section 10.2.4 iii.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from math import inf
 from typing import Any
@@ -184,6 +184,12 @@ class Peer:
         values = self.session.q[state]
         return max(nearer, key=lambda action: values[action])
 
+    def path(self, state: int) -> Iterator[int]:
+        """The states after `state` on the path to the goal that it knows; none if it knows nothing there."""
+        while (action := self.knows(state)) is not None:
+            state = self._ways.entered(state, action)
+            yield state
+
     def result(self, interrupted: bool) -> PeerResult:
         """The result so far."""
         session = self.session.result(interrupted)
@@ -215,14 +221,23 @@ class _Learned:
         self._states = matched_states(own, theirs)
         labels = {label: action for action, label in enumerate(theirs.action_labels)}
         self._actions = [labels.get(label) for label in own.action_labels]
-        self._feasible = None if reach is None else reach[theirs.successor].tolist()
+        self._within: list[bool] | None = (
+            None  # by state of the peer: whether the asker's arm reaches the cell that matches
+        )
+        if reach is not None:
+            self._within = [state != SILENT and bool(reach[state]) for state in matched_states(theirs, own)]
 
     def advise(self, request: AdviceRequest) -> int | None:
-        """What the peer knows in the state that matches, None if the asker's arm cannot do it."""
+        """What the peer knows in the state that matches, None if the asker's arm cannot reach all of the path from there."""
         state = self._states[request.state]
         known = None if state == SILENT else self._peer.knows(state)
-        action = None if known is None else self._actions[known]
-        return action if action is None or self._feasible is None or self._feasible[request.state][action] else None
+        if known is None or not self._is_feasible(state):
+            return None
+        return self._actions[known]
+
+    def _is_feasible(self, state: int) -> bool:
+        """Whether the asker's arm can reach the peer's known path from a state to the goal."""
+        return self._within is None or all(self._within[passed] for passed in self._peer.path(state))
 
 
 def matched_states(own: TabularMDP, theirs: TabularMDP) -> list[int]:

@@ -25,8 +25,8 @@ MEASURES = (
     "Two peers, one with each arm, in rounds of an episode each, with the learner, the gate and the number of episodes of the "
     "task files. Goal: the episodes until the greedy path from the first start reaches the goal; solved: until it is a shortest "
     "one; all episodes if that never happens. Moves: of all episodes. Saved: how many fewer than the same learner alone, paired "
-    "by seed. A sub-task's value is the mean of its skills, in each session. Reach not judged: answers that lead where the "
-    "asker's arm cannot reach are followed as any others."
+    "by seed. A sub-task's value is the mean of its skills, in each session. Reach not judged: a peer is also followed "
+    "where the asker's arm cannot reach all of its path."
 )
 SCENE = (
     f"Tasks {' and '.join(TASKS)}, {TOASTS} toasts, the scenes of seed {SCENE_SEED}; skills whose problems are the same count "

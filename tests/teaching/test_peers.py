@@ -50,6 +50,7 @@ def test_who_knows_nothing_says_nothing_and_who_has_been_there_says_it() -> None
     assert [first.knows(state) for state in range(3)] == [None, None, None]
     first.session.play(1)
     assert [first.knows(state) for state in range(3)] == [RIGHT, RIGHT, None]  # the goal is over
+    assert [[*first.path(state)] for state in range(3)] == [[1, 2], [2], []]
     assert [event.action for _, event in told if isinstance(event, AdviceGiven)] == [None] * first.moves
     told.clear()
     second.session.play(1)
@@ -127,8 +128,8 @@ def test_cells_match_by_their_place_relative_to_the_goal() -> None:
     assert matched_states(four, corridor(axes=2).mdp) == [SILENT] * 3
 
 
-def test_an_answer_that_leads_out_of_reach_is_not_followed() -> None:
-    reach = np.array([True, False, True])
+def test_a_peer_whose_path_is_out_of_reach_says_nothing() -> None:
+    reach = np.array([True, False, True])  # from state 0 its path leads through 1, from 1 to the goal
     asker = PeerPlan(corridor(), LEARNER, ALWAYS, reach=reach)
     first, second = PeerGroup([PeerPlan(corridor(), LEARNER, ALWAYS), asker], 0).peers
     first.session.play(1)
