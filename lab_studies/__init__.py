@@ -124,6 +124,18 @@ STUDIES: dict[str, Study] = {
         _In("comparisons.several_advisors", "advisors"),
         ADVISED,
     ),
+    "peers": Study(
+        "Learners who advise each other, beside the same alone at equal moves; and one wrong among them",
+        _In("comparisons.peers", "peers"),
+        sessions=20,
+        least=2,
+    ),
+    "peers-of-two-arms": Study(
+        "Two arms that learn the same toast and advise each other, beside each of them alone",
+        _In("comparisons.peers_of_two_arms", "peers_of_two_arms"),
+        sessions=20,
+        least=2,
+    ),
     "mountain-car": Study(
         "Mountain Car: when a teacher should speak, at equal budgets",
         _In("comparisons.mountain_car", "mountain_car"),

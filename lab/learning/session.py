@@ -42,7 +42,7 @@ class Session:
     problem: a table, or the environment in which steps are made; advisor: None if there is nobody to ask; rng: a generator, or a
     function that returns uniform numbers; q0: (S, A), the start values, default the learner's start value.
     An advised action is carried out and learned from like the learner's own choice. If the advisor has a method `followed`, it is
-    called with the `Walked` record after each open episode.
+    called with the `Walked` record after each open episode, or after every episode if its attribute `follows_all` is true.
     Raises BadInput for an unknown learner, selection or gate, an unfit q0 and an answer that is no action, and NoPath.
     """
 
@@ -61,6 +61,7 @@ class Session:
         self.environment, self.mdp, self.settings, self.gate_settings = environment, environment.mdp, learner, gate
         self.advisor, self.advised = advisor, advisor is not None
         self.followed: Callable[[Walked], None] | None = getattr(advisor, "followed", None)
+        self.follows_all = bool(getattr(advisor, "follows_all", False))
         self.tell: OnEvent = lambda event: None
         mdp, cells = self.mdp, self.mdp if isinstance(self.mdp, CellTable) else None
         self.draw = uniforms(rng) if isinstance(rng, np.random.Generator) else rng
@@ -112,26 +113,30 @@ class Session:
         far is returned.
         """
         self.tell = on_event or self.tell
-        settings, gate, recall, interrupted = self.settings, self.gate, self.recall, False
         try:
-            for episode in range(1, settings.episodes + 1):
-                self.episode, self.asked_now, self.helped_now = episode, False, 0
-                self.tau = temperature(episode, settings.beta, settings.exploration)  # eq. 9.2
-                was_converged = gate.converged
-                is_open = gate.opens(episode, self.scores) and self.advisor is not None  # eqs. 6.1 and 6.2
-                is_open = is_open if recall is None else recall.opens(episode, is_open)
-                if gate.converged and not was_converged and self.advisor is not None:
-                    self.tell(events.AdviceEnded(episode, "converged"))
-                self.trail = [] if is_open and self.followed is not None else None
-                alone = self._own_choice
-                if recall is not None and recall.late:
-                    self.tau, alone = COLDEST, self._practised_choice
-                self._judge(is_open, self._walk(self._advised_choice if is_open else alone))
+            for episode in range(1, self.settings.episodes + 1):
+                self.play(episode)
                 if enough():
                     break
         except KeyboardInterrupt:
-            interrupted = True
-        return self.result(interrupted)
+            return self.result(interrupted=True)
+        return self.result(interrupted=False)
+
+    def play(self, episode: int) -> None:
+        """Plays one episode and judges it; `run` plays all, numbered from 1."""
+        settings, gate, recall = self.settings, self.gate, self.recall
+        self.episode, self.asked_now, self.helped_now = episode, False, 0
+        self.tau = temperature(episode, settings.beta, settings.exploration)  # eq. 9.2
+        was_converged = gate.converged
+        is_open = gate.opens(episode, self.scores) and self.advisor is not None  # eqs. 6.1 and 6.2
+        is_open = is_open if recall is None else recall.opens(episode, is_open)
+        if gate.converged and not was_converged and self.advisor is not None:
+            self.tell(events.AdviceEnded(episode, "converged"))
+        self.trail = [] if (is_open or self.follows_all) and self.followed is not None else None
+        alone = self._own_choice
+        if recall is not None and recall.late:
+            self.tau, alone = COLDEST, self._practised_choice
+        self._judge(is_open, self._walk(self._advised_choice if is_open else alone))
 
     def _walk(self, choose: Callable[[int, int], int]) -> int | None:
         """The number of moves to the goal, None if it was not reached; each move is chosen, made and learned from.
