@@ -1,7 +1,7 @@
 """SRL with a function approximator beside its table and every rival, at equal numbers of schedules, in cells held out."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import lru_cache, partial
 from time import process_time
 from typing import Any
@@ -19,13 +19,13 @@ from lab.sequencing.methods.srl_linear import srl_linear
 from lab.sequencing.search import SAME, Search
 from lab.studies.charts import bars
 from lab.studies.findings import Findings, Row, mean_row, median_row, row, share_row, those, varying_row
-from lab.studies.runner import Job
+from lab.studies.runner import Job, record_of
 from lab.tasks.sequencing import write_policy
 from lab_studies.comparisons.carried_over_families import FMS, SHOP, SMALL, TOAST, manufacturing, shop, toasts
 from lab_studies.comparisons.linear_updates import UPDATES
 
 DRAWN: Mapping[str, Callable[[np.random.Generator, int, int], Cell]] = {SHOP: shop, TOAST: toasts, FMS: manufacturing}
-SIZES: Mapping[str, Sequence[int]] = {TOAST: (3, 6, 12, 30), FMS: (3, 6, 12, 24), SHOP: (3, 5, 10)}
+SIZES: Mapping[str, Sequence[int]] = {TOAST: (3, 6, 12, 20), FMS: (3, 6, 12, 16), SHOP: (3, 5, 8)}
 SCHEDULES = 200  # of every method that searches
 PRACTICE, LESSONS = 16, 1200  # small cells in which a family's policy is learned, and the episodes of it
 REFERENCE_S = 5.0  # of CP-SAT, where A* proves nothing
@@ -80,7 +80,7 @@ class CellOutcome:
 
     reference: float
     proven: bool
-    tried: Mapping[str, Tried]
+    tried: dict[str, Tried]
 
     @property
     def best(self) -> float:
@@ -92,7 +92,7 @@ def srl_linear_study(job: Job, reading: Mapping[str, Any]) -> Findings:
     """The results of every method in `job.sessions` cells of each size; the reading has no effect."""
     policies = {family: family_policy(family, job.seed) for family in SIZES}
     cells = [DrawnCell(*group, number) for group in groups() for number in range(job.sessions)]
-    outcomes = job.each(partial(cell_outcome, seed=job.seed), cells)
+    outcomes = _outcomes(job, cells)
     rows: list[Row] = []
     for family, parts in groups():
         rows += rows_of(
@@ -109,6 +109,19 @@ def srl_linear_study(job: Job, reading: Mapping[str, Any]) -> Findings:
         UPDATES_NOTE,
     )
     return Findings(rows, in_short(rows), {"Mean gap by family and size": picture(rows)}, notes)
+
+
+def _outcomes(job: Job, cells: Sequence[DrawnCell]) -> dict[DrawnCell, CellOutcome]:
+    """The outcome of each cell; the job's folder keeps them."""
+    keys = {f"{cell}, {SCHEDULES} schedules, seed {job.seed}": cell for cell in cells}
+    done = job.kept_as(lambda kept: (keys[kept["key"]], record_of(CellOutcome, kept["found"])))
+    names = {cell: key for key, cell in keys.items()}
+    job.progress(len(done), len(cells))
+    for cell, outcome in job.computed(partial(cell_outcome, seed=job.seed), [one for one in cells if one not in done]):
+        done[cell] = outcome
+        job.keep({"key": names[cell], "found": asdict(outcome)})
+        job.progress(len(done), len(cells))
+    return done
 
 
 def groups() -> list[tuple[str, int]]:
@@ -145,7 +158,7 @@ def cell_outcome(drawn: DrawnCell, seed: int) -> CellOutcome:
     for name, update in UPDATES.items():
         tried[name] = _tried(cell, partial(update, cell, SCHEDULES, drawn.number))
     known = best_known(cell, MAKESPAN, REFERENCE_S)
-    return CellOutcome(known.cost, known.proven, tried)
+    return CellOutcome(float(known.cost), bool(known.proven), tried)
 
 
 def _tried(cell: Cell, find: Callable[[], Any]) -> Tried:
@@ -154,7 +167,8 @@ def _tried(cell: Cell, find: Callable[[], Any]) -> Tried:
         found = find()
     except WorkFailed:
         return Tried(stuck_cost(cell, MAKESPAN), None, process_time() - began)
-    return Tried(found.cost, getattr(found, "final_cost", None), process_time() - began)
+    final = getattr(found, "final_cost", None)
+    return Tried(float(found.cost), None if final is None else float(final), process_time() - began)
 
 
 def rows_of(outcomes: Sequence[CellOutcome], family: str, parts: int) -> list[Row]:
