@@ -52,7 +52,7 @@ FIELDS = (
     *("mean_best_cost", "best_s", "best_cost", "best_by", "best_sequence", "best_moves", "schedule", "srl_s", "proven"),
     *("robots", "advisor", "advice", "advised", "stochastic", "files", "stopped_by", "interrupted"),
 )
-LEARNERS = ("srl", "srl-time", "srl-improved", "mc")
+LEARNERS = ("srl", "srl-time", "srl-improved", "srl-linear", "mc")
 AT_ONCE = {"fifo", "exact", "cp-sat", "portfolio", "carried", *RULES}
 UNDUE = sorted(set(SEQUENCERS) - {"earliest-due"})  # those that need no due times
 
