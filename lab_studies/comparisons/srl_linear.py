@@ -25,7 +25,7 @@ from lab_studies.comparisons.carried_over_families import FMS, SHOP, SMALL, TOAS
 from lab_studies.comparisons.linear_updates import UPDATES
 
 DRAWN: Mapping[str, Callable[[np.random.Generator, int, int], Cell]] = {SHOP: shop, TOAST: toasts, FMS: manufacturing}
-SIZES: Mapping[str, Sequence[int]] = {TOAST: (3, 6, 12, 20), FMS: (3, 6, 12, 16), SHOP: (3, 5, 8)}
+SIZES: Mapping[str, Sequence[int]] = {TOAST: (3, 6, 12, 20), FMS: (3, 6, 12), SHOP: (3, 5, 8)}
 SCHEDULES = 200  # of every method that searches
 PRACTICE, LESSONS = 16, 1200  # small cells in which a family's policy is learned, and the episodes of it
 REFERENCE_S = 5.0  # of CP-SAT, where A* proves nothing
