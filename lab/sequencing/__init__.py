@@ -107,7 +107,7 @@ _SHIPPED: dict[str, Sequencer] = {
     ),
     "srl-linear": Sequencer(
         lambda: deferred.srl_linear,
-        "srl with values that are linear in features: learns weights, which --keep keeps as a policy",
+        "srl with values that are linear in features: learns weights, which --keep-policy keeps",
     ),
     "mc": Sequencer(lambda: deferred.monte_carlo, "Monte Carlo: averages the returns of the episodes", drawn=True),
     "random": Sequencer(lambda: deferred.random_search, "the best of so many sequences drawn evenly", drawn=True),
