@@ -190,6 +190,12 @@ STUDIES: dict[str, Study] = {
         _In("comparisons.carried_over", "carried_over"),
         sessions=240,
     ),
+    "srl-linear": Study(
+        "SRL with linear values instead of a table, and policies that it keeps, beside every rival in cells held out",
+        _In("comparisons.srl_linear", "srl_linear_study"),
+        sessions=20,
+        least=1,
+    ),
     "reacting": Study(
         "Drawn times, breakdowns, late parts: a list, policies that react, hindsight",
         _In("comparisons.reacting", "reacting"),

@@ -297,6 +297,10 @@ def sequence_summary(document: Mapping[str, Any]) -> RenderableType:
         lines.append(text if episode is None else f"{text}; rejected its advisor in episode {episode}")
     if document["stochastic"] is not None:
         lines += _drawn(document["stochastic"], unit)
+    if document.get("policy_kept") is not None:
+        lines.append(f"the learned policy is kept in {document['policy_kept']}")
+    elif document.get("policy", ()) is None:
+        lines.append("the search was stopped before a policy was learned")
     return Group(*map(Text, [*lines, *document["files"].values()]))
 
 
