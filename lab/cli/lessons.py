@@ -83,6 +83,8 @@ def sequenced(
         policy=None if options.policy is None else Path(options.policy),
         seconds=options.seconds,
         gap=options.gap,
+        practice=options.practice,
+        keep_policy=options.keep_policy,
     )
     teacher = teacher_of(toolbox, deferred.LessonOptions(advisors=deferred.DEFAULT_ADVISORS, seed=options.seed), seat)
     return deferred.sequence_named(options.task, options.case, options.toasts, wanted, teacher=teacher, files=files)

@@ -43,8 +43,8 @@ class Session:
     problem: a table, or the environment in which steps are made; advisor: None if there is nobody to ask; rng: a generator, or a
     function that returns uniform numbers; q0: (S, A), the start values, default the learner's start value.
     An advised action is carried out and learned from like the learner's own choice. If the advisor has a method `followed`, it is
-    called with the `Walked` record after each open episode. If it has an attribute `judging`, see `Judging`, it may judge moves
-    that it was shown; see `lab.learning.praise` for what a judgement does.
+    called with the `Walked` record after each open episode, or after every episode if its attribute `follows_all` is true.
+    If it has an attribute `judging`, see `Judging`, it may judge moves that it was shown: see `lab.learning.praise`.
     Raises BadInput for an unknown learner, selection or gate, an unfit q0 and an answer that is no action, and NoPath.
     """
 
@@ -67,6 +67,7 @@ class Session:
         self.only_judges = self.judging is not None and self.judging.only
         self.praise: ActionBiasing | None = None  # what was learned from judgements, once there was one
         self.shown: list[Move] = []  # the moves of this episode that the advisor saw and may judge
+        self.follows_all = bool(getattr(advisor, "follows_all", False))
         self.tell: OnEvent = lambda event: None
         mdp, cells = self.mdp, self.mdp if isinstance(self.mdp, CellTable) else None
         self.draw = uniforms(rng) if isinstance(rng, np.random.Generator) else rng
@@ -118,27 +119,31 @@ class Session:
         far is returned.
         """
         self.tell = on_event or self.tell
-        settings, gate, recall, interrupted = self.settings, self.gate, self.recall, False
         try:
-            for episode in range(1, settings.episodes + 1):
-                self.episode, self.asked_now, self.helped_now = episode, False, 0
-                self.tau = temperature(episode, settings.beta, settings.exploration)  # eq. 9.2
-                was_converged = gate.converged
-                is_helped = self.advisor is not None or self.praise is not None
-                is_open = gate.opens(episode, self.scores) and is_helped  # eqs. 6.1 and 6.2
-                is_open = is_open if recall is None else recall.opens(episode, is_open)
-                if gate.converged and not was_converged and self.advisor is not None:
-                    self.tell(events.AdviceEnded(episode, "converged"))
-                self.trail = [] if is_open and self.followed is not None else None
-                alone = self._own_choice
-                if recall is not None and recall.late:
-                    self.tau, alone = COLDEST, self._practised_choice
-                self._judge(is_open, self._walk(self._advised_choice if is_open else alone))
+            for episode in range(1, self.settings.episodes + 1):
+                self.play(episode)
                 if enough():
                     break
         except KeyboardInterrupt:
-            interrupted = True
-        return self.result(interrupted)
+            return self.result(interrupted=True)
+        return self.result(interrupted=False)
+
+    def play(self, episode: int) -> None:
+        """Plays one episode and judges it; `run` plays all, numbered from 1."""
+        settings, gate, recall = self.settings, self.gate, self.recall
+        self.episode, self.asked_now, self.helped_now = episode, False, 0
+        self.tau = temperature(episode, settings.beta, settings.exploration)  # eq. 9.2
+        was_converged = gate.converged
+        is_helped = self.advisor is not None or self.praise is not None
+        is_open = gate.opens(episode, self.scores) and is_helped  # eqs. 6.1 and 6.2
+        is_open = is_open if recall is None else recall.opens(episode, is_open)
+        if gate.converged and not was_converged and self.advisor is not None:
+            self.tell(events.AdviceEnded(episode, "converged"))
+        self.trail = [] if (is_open or self.follows_all) and self.followed is not None else None
+        alone = self._own_choice
+        if recall is not None and recall.late:
+            self.tau, alone = COLDEST, self._practised_choice
+        self._judge(is_open, self._walk(self._advised_choice if is_open else alone))
 
     def _walk(self, choose: Callable[[int, int], int]) -> int | None:
         """The number of moves to the goal, None if it was not reached; each move is chosen, made and learned from.

@@ -43,6 +43,10 @@ class Subject(Protocol):
         """Tries the policy in physics; returns why it failed, None if it did not, or if there is no simulation."""
         return None
 
+    def reach(self) -> BoolArray | None:
+        """The states of the prepared problem that the arm can reach, (S,) bool; None for all, or if there is no arm."""
+        return None
+
     def draw(self, policy: Policy, out: Path) -> dict[str, str]:
         """Draws pictures other than the learning curve into the folder `out`; returns their files by name."""
         return {}
@@ -93,6 +97,11 @@ def one_lesson(
     sessions: those of the run that the lesson belongs to. Raises BadInput if the policy called `name` is of another problem.
     """
     teacher, plan = planned(subject, teacher, name, sessions)
+    return carried_out(subject, teacher, plan, out)
+
+
+def carried_out(subject: Subject, teacher: Teacher, plan: LessonPlan, out: Path | None) -> dict[str, Any]:
+    """The document of `one_lesson` after the planned lesson."""
     problem, lesson = plan.problem, teacher.teach(plan)
     document = document_of(problem, lesson, teacher) | subject.facts()
     if out is None:

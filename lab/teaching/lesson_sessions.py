@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 from math import inf
+from typing import Protocol
 from zlib import crc32
 
 import numpy as np
@@ -28,6 +29,13 @@ from lab.toolbox.policy import Policy
 MORE_SESSIONS = 8  # the limit on sessions for a shorter path, once the goal is reached
 WARM_EPISODES = 29  # of a session that begins from what was learned elsewhere
 WARM_EXPLORATION = 0.1  # of the usual exploration, so that what was learned elsewhere is tried, not forgotten
+
+
+class RunsSessions(Protocol):
+    """What a teacher runs: the sessions of a lesson, such as `Sessions`."""
+
+    def run(self) -> SessionResult:
+        """The result of all sessions."""
 
 
 class Sessions:
