@@ -118,6 +118,8 @@ def test_an_expert_may_answer_for_a_peer_and_a_person_may_not() -> None:
     assert group((None, "none")).run().peers[0].session.helped_steps == 0
     with pytest.raises(BadInput, match="role 'terminal' of peer 2"):
         group((None, "terminal"))
+    with pytest.raises(BadInput, match="role 'praise:expert' of peer 2: it judges moves"):
+        group((None, "praise:expert"))
 
 
 def test_cells_match_by_their_place_relative_to_the_goal() -> None:
