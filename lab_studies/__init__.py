@@ -81,6 +81,12 @@ STUDIES: dict[str, Study] = {
         "What an advisor's help is worth over nobody's, for every skill of toast",
         _In("comparisons.advice_worth", "advice_worth"),
     ),
+    "attention": Study(
+        "What costs a person least for the same result: moves, ways, praise and blame, or a demonstration",
+        _In("comparisons.attention", "attention"),
+        sessions=40,
+        least=2,
+    ),
     "rejection": Study(
         "Whom CCRL rejects before a budget is spent, for every sub-task of toast and every learner",
         _In("comparisons.rejection", "rejection"),
@@ -123,6 +129,18 @@ STUDIES: dict[str, Study] = {
         "Several advisors at once, beside the best and the worst of them alone",
         _In("comparisons.several_advisors", "advisors"),
         ADVISED,
+    ),
+    "peers": Study(
+        "Learners who advise each other, beside the same alone at equal moves; and one wrong among them",
+        _In("comparisons.peers", "peers"),
+        sessions=20,
+        least=2,
+    ),
+    "peers-of-two-arms": Study(
+        "Two arms that learn the same toast and advise each other, beside each of them alone",
+        _In("comparisons.peers_of_two_arms", "peers_of_two_arms"),
+        sessions=20,
+        least=2,
     ),
     "mountain-car": Study(
         "Mountain Car: when a teacher should speak, at equal budgets",
@@ -177,6 +195,12 @@ STUDIES: dict[str, Study] = {
         "A policy learned on small cells orders larger ones, beside every dispatching rule",
         _In("comparisons.carried_over", "carried_over"),
         sessions=240,
+    ),
+    "srl-linear": Study(
+        "SRL with linear values instead of a table, and policies that it keeps, beside every rival in cells held out",
+        _In("comparisons.srl_linear", "srl_linear_study"),
+        sessions=20,
+        least=1,
     ),
     "reacting": Study(
         "Drawn times, breakdowns, late parts: a list, policies that react, hindsight",

@@ -12,7 +12,7 @@ from lab.advice.panel import Panel, PanelSettings, members_of
 from lab.advice.table_level import PolicyAdvisor, TableLevel
 from lab.errors import BadInput
 from lab.learning.environment import Environment
-from lab.learning.requests import Advisor, Ask, Request
+from lab.learning.requests import Advisor, Ask, Reply, Request
 from lab.learning.selection import uniforms
 from lab.learning.session_events import Event
 from lab.learning.settings import LearnerSettings
@@ -52,6 +52,12 @@ class Advising:
         advisors = tuple(
             AdvisorName.of(name, "--advisor") if isinstance(name, str) else AdvisorName.made(name) for name in names
         )
+        for one in advisors:
+            if one.judging is not None and len(names) > 1:
+                others = f"beside {len(names) - 1} more"
+                raise BadInput(
+                    f"advisor '{one}' (--advisor) {others}: it judges moves that others choose: name it alone"
+                )
         if "none" in names and len(names) > 1:
             raise BadInput(f"advisor 'none' (--advisor) beside {len(names) - 1} more: it is nobody or somebody")
         for name in dict.fromkeys(name for name in names if isinstance(name, str) and is_external(name)):
@@ -88,7 +94,7 @@ class Advising:
 
     def modules(self) -> list[str]:
         """The modules of added advisors' code, see `Family.modules_of`."""
-        return [module for name in self.names for module in ADVISORS.modules_of(name.row)]
+        return [module for name in self.names for module in ADVISORS.modules_of((name.inner or name).row)]
 
     def gather(
         self,
@@ -128,7 +134,7 @@ def through(journal: Journal | None, people: Mapping[str, Ask]) -> dict[str, Ask
             return ask
         remember = getattr(ask, "remember", None)
 
-        def answered(request: Request) -> int | None:
+        def answered(request: Request) -> Reply:
             is_known = journal.folding
             action = journal.answer(by, request, ask)
             if is_known and remember is not None:

@@ -4,6 +4,7 @@ A name is parsed once, into an `AdvisorName`. Its row in ADVISORS makes the advi
 for the order of transfers.
 """
 
+import re
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from copy import deepcopy
@@ -17,13 +18,14 @@ from lab.advice.entries import Read, read_journal
 from lab.advice.model_address import WANTED as MODEL_WANTED
 from lab.advice.model_address import ModelAddress
 from lab.errors import BadInput, shortened, unknown
+from lab.learning.praise import MOST_MOVES, PRAISE_RULES, Judging
 from lab.plugins.code_file import from_file
 from lab.plugins.family import Family, checked_action, first_line, takes, takes_generator, wanted
 
 if TYPE_CHECKING:
     import numpy as np
 
-    from lab.learning.requests import Advisor, Ask, Request
+    from lab.learning.requests import Advisor, Ask, Reply, Request
 
 
 class Level(Protocol):
@@ -55,6 +57,9 @@ class Level(Protocol):
     def answered(self, path: Path) -> "Mapping[int, int]":
         """The answers by state that a file holds. Raises BadInput if they do not fit."""
 
+    def evaluator(self, advisor: "Advisor", judging: Judging) -> "Advisor":
+        """An advisor that judges moves by what another one would have said. Raises BadInput if there is nothing to judge."""
+
 
 @dataclass(frozen=True)
 class AdvisorName:
@@ -62,6 +67,7 @@ class AdvisorName:
 
     text: as it was typed; row: the key in ADVISORS; taus, folder, policy, answers, accuracy, model: the parameters in the name.
     itself: an advisor made in Python, or its class, which is in no table.
+    inner, judging: by whom and how moves are judged, of a name such as "praise:expert", which has the parameters of `inner`, too.
     """
 
     text: str
@@ -73,6 +79,8 @@ class AdvisorName:
     itself: "Advisor | Ask | type[Advisor] | None" = None
     accuracy: float = 0.0
     model: ModelAddress | None = None
+    inner: "AdvisorName | None" = None
+    judging: Judging | None = None
 
     @classmethod
     def made(cls, advisor: "Advisor | Ask | type[Advisor]") -> "AdvisorName":
@@ -108,6 +116,8 @@ class AdvisorName:
     def of(cls, text: str, where: str = "advisor") -> "AdvisorName":
         """The parsed name: "expert", "tau=0.2", "accuracy=0.8", "recorded:DIR", "policy:NAME"... Raises BadInput."""
         kind, colon, rest = text.partition(":")
+        if colon and kind == PRAISE:
+            return _judging(cls, text, where)
         if colon and kind in PREFIXED:
             row, field, make, wanted = PREFIXED[kind]
             if not Path(rest).name.strip():
@@ -144,6 +154,32 @@ def _share(text: str, where: str) -> float:
     )
 
 
+def split_praise(text: str) -> tuple[str, str]:
+    """(who, options): the parts of a name such as "praise:late=2:expert", "expert" and "late=2:"; (text, "") for any other."""
+    named = re.fullmatch(rf"{PRAISE}:((?:(?:late|rule)=[^:]*:)*)(.*)", text, re.DOTALL)
+    return (text, "") if named is None else (named[2], named[1])
+
+
+def _judging(kind: type[AdvisorName], text: str, where: str) -> AdvisorName:
+    """The name of an evaluator. Raises BadInput."""
+    who, options = split_praise(text)
+    try:
+        if not who:
+            raise BadInput(f"it names nobody who judges: wanted {PRAISED}")
+        inner = kind.of(who, where)
+        if inner.row in NO_EVALUATORS:
+            raise BadInput(f"'{shortened(who)}' judges no moves: wanted {PRAISED}")
+        given = dict(option.split("=", 1) for option in options.split(":")[:-1])
+        late = given.get("late", "0")
+        if not (late.isascii() and late.isdigit() and len(late) < 4 and int(late) < MOST_MOVES):
+            raise BadInput(f"late={late}: allowed are 0 to {MOST_MOVES - 1} moves")
+        if (rule := given.get("rule", Judging().rule)) not in PRAISE_RULES:
+            raise unknown("rule", rule, PRAISE_RULES, where)
+    except BadInput as error:
+        raise BadInput(f"advisor '{PRAISE}:...' ({where}): {error}") from None
+    return replace(inner, text=text, row=PRAISE_ROW, inner=inner, judging=Judging(True, int(late), rule))
+
+
 class AdvisorKind(NamedTuple):
     """A row of ADVISORS: the function that makes the advisor for a level (None: no advisor), and a few words for the help."""
 
@@ -152,12 +188,15 @@ class AdvisorKind(NamedTuple):
 
 
 class Person:
-    """An advisor that calls a function of a request, such as one that asks a person or a language model (see lab/seat)."""
+    """An advisor that calls a function of a request, such as one that asks a person or a language model (see lab/seat).
 
-    def __init__(self, ask: "Ask"):
-        self._ask = ask
+    judging: whether and how it may judge moves as well; None: not.
+    """
 
-    def advise(self, request: "Request") -> int | None:
+    def __init__(self, ask: "Ask", judging: Judging | None = None):
+        self._ask, self.judging = ask, judging
+
+    def advise(self, request: "Request") -> "Reply":
         """The function's answer."""
         return self._ask(request)
 
@@ -188,7 +227,7 @@ def _of_accuracy(name: AdvisorName, level: Level) -> "Advisor":
 def _person(name: AdvisorName, level: Level) -> "Advisor":
     if name.text not in level.people:
         raise BadInput(f"advisor '{name}': this command has no {PEOPLE[name.text]} to ask a person through")
-    return Person(level.people[name.text])
+    return Person(level.people[name.text], Judging())
 
 
 def _language_model(name: AdvisorName, level: Level) -> "Advisor":
@@ -226,6 +265,17 @@ def _answers(name: AdvisorName, level: Level) -> "Advisor":
         raise BadInput(f"advisor '{name}': {error}") from None
 
 
+def _evaluator(name: AdvisorName, level: Level) -> "Advisor":
+    assert name.inner is not None
+    assert name.judging is not None
+    judged_by = ADVISORS[name.inner.row].make(name.inner, level)
+    assert judged_by is not None
+    try:
+        return level.evaluator(judged_by, name.judging)
+    except BadInput as error:
+        raise BadInput(f"advisor '{name}': {error}") from None
+
+
 def _learned(name: AdvisorName, level: Level) -> "Advisor":
     try:
         return level.learned(name.policy)
@@ -240,6 +290,9 @@ PREFIXED: dict[str, tuple[str, str, Callable[[str], Any], str]] = {
     "policy": ("policy:NAME", "policy", str, "no policy: wanted policy:NAME; see lab toolbox list"),
     "llm": ("llm:URL", "model", ModelAddress.of, f"no server: wanted {MODEL_WANTED}"),
 }
+PRAISE, PRAISE_ROW = "praise", "praise:WHO"
+PRAISED = "praise:WHO, an advisor who names moves or a person, such as praise:expert or praise:late=2:terminal"
+NO_EVALUATORS = ("none", "llm:URL", PRAISE_ROW)  # the rows of those who cannot judge
 PYTHON = "python"  # the row of an advisor that is in no table
 PEOPLE = {"terminal": "prompt", "web": "page"}
 MODEL = "llm:"  # begins the name of a language model
@@ -290,13 +343,14 @@ _SHIPPED: dict[str, AdvisorKind] = {
     "answers:FILE": AdvisorKind(_answers, 'answers kept as JSON, {"state": "action"}'),
     "policy:NAME": AdvisorKind(_learned, "a policy in the toolbox, or its file"),
     "llm:URL": AdvisorKind(_language_model, "a language model behind a server with chat completions"),
+    PRAISE_ROW: AdvisorKind(_evaluator, "praises and blames moves as one of these would, WHO, or a person"),
 }
 ADVISORS = Family("advisors", _SHIPPED, _adopted)
 
 
 def is_external(name: str) -> bool:
-    """Whether an advisor of this name is one of EXTERNAL: a person or a language model."""
-    return name in PEOPLE or name.startswith(MODEL)
+    """Whether an advisor of this name asks one of EXTERNAL: a person, also one who only judges, or a language model."""
+    return split_praise(name)[0] in PEOPLE or name.startswith(MODEL)
 
 
 def named() -> list[str]:

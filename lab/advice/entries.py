@@ -6,11 +6,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any
 
-from annotated_types import MaxLen, Predicate
+from annotated_types import Ge, Le, MaxLen, Predicate
 
 from lab.advice.json_lines import EntryKinds, is_unwritten
 from lab.errors import BadInput
 from lab.files import read_limited
+from lab.learning.praise import MOST_MOVES, MOST_VALUE
 from lab.learning.session_events import (
     AdviceEnded,
     AdviceGiven,
@@ -22,6 +23,7 @@ from lab.learning.session_events import (
     AdvisorsDisagreed,
     EpisodeEnded,
     Event,
+    MoveJudged,
 )
 from lab.toolbox.names import JOURNAL
 
@@ -65,6 +67,18 @@ class Answer:
 
 
 @dataclass(frozen=True)
+class Praise:
+    """A person's judgement in answer to a question, see `lab.learning.praise.Judgement`."""
+
+    by: str
+    episode: int
+    step: int
+    state: int
+    value: Annotated[int, Ge(-MOST_VALUE), Le(MOST_VALUE)]
+    moves: Annotated[int, Ge(0), Le(MOST_MOVES)]
+
+
+@dataclass(frozen=True)
 class Undone:
     """A person took the last answer back; the entries since then do not count."""
 
@@ -83,13 +97,15 @@ class Closed:
     saved_as: str
 
 
-Entry = SessionEntry | Answer | Undone | Closed | Event
+Entry = SessionEntry | Answer | Praise | Undone | Closed | Event
 
 KINDS: dict[str, type[Any]] = {
     "session": SessionEntry,
     "request": AdviceRequested,
     "answer": Answer,
     "advice": AdviceGiven,
+    "praise": Praise,
+    "judged": MoveJudged,
     "remembered": AdviceRemembered,
     "undo": Undone,
     "episode": EpisodeEnded,
@@ -154,11 +170,13 @@ class Read:
 
 
 def undoable(entries: Sequence[Entry], by: str) -> int | None:
-    """The index of the answer that a person may take back, the last one in the current episode; None if there is none."""
+    """The index of the answer or judgement that a person may take back, the last one in the current episode; None for none."""
     for place in range(len(entries) - 1, -1, -1):
         entry = entries[place]
         if isinstance(entry, EpisodeEnded):
             return None
+        if isinstance(entry, Praise) and entry.by == by:
+            return place
         if isinstance(entry, Answer) and entry.by == by and not entry.left:
             return place
     return None

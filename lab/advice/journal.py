@@ -13,6 +13,7 @@ from lab.advice.entries import (
     Answer,
     Closed,
     Entry,
+    Praise,
     Read,
     SessionEntry,
     Undone,
@@ -23,7 +24,8 @@ from lab.advice.entries import (
 )
 from lab.advice.json_lines import AppendedFile, differing
 from lab.errors import BadInput, WorkFailed
-from lab.learning.requests import AdvisorLeft, Ask, Request
+from lab.learning.praise import Judgement
+from lab.learning.requests import AdvisorLeft, Ask, Reply, Request
 from lab.learning.session_events import EpisodeEnded
 from lab.plugins.family import allowed_words
 
@@ -140,32 +142,36 @@ class Journal:
         if not self.read_only and not self.folding:
             self._append(closed)
 
-    def answer(self, by: str, request: Request, ask: Ask) -> int | None:
+    def answer(self, by: str, request: Request, ask: Ask) -> Reply:
         """A person's answer to a request: the recorded one, or one asked for now and written before it is used.
 
         Raises AdvisorLeft, and Again if the person took the last answer of the episode back.
         """
         if self.folding:
             before = self.entries[self._at]
+            if isinstance(before, Praise) and request.judgement != "no":
+                self.tell(replace(before, by=by, episode=request.episode, step=request.step, state=request.state))
+                return _answered(before)
             known = before if isinstance(before, Answer) else Answer(by, 0, 0, 0, None)
             if known.action is not None and known.action not in request.allowed:
                 allowed = "allowed " + allowed_words(request.allowed)
                 raise BadInput(f"{self._which}: {line_of(known)}: action {known.action}: {allowed}: it was edited")
             self.tell(replace(known, by=by, episode=request.episode, step=request.step, state=request.state))
-            return _answered_action(known)
+            return _answered(known)
         given = self._asked(by, request, ask)
         self._append(given)
         self._unsafe = True
-        return _answered_action(given)
+        return _answered(given)
 
-    def _asked(self, by: str, request: Request, ask: Ask) -> Answer:
+    def _asked(self, by: str, request: Request, ask: Ask) -> Answer | Praise:
         if self.read_only:
             raise KeyboardInterrupt  # the replay is over
         last = undoable(self.entries, by)
         while True:
             try:
-                action = ask(replace(request, undoable=last is not None))
-                return Answer(by, request.episode, request.step, request.state, action)
+                said = ask(replace(request, undoable=last is not None))
+                asked = by, request.episode, request.step, request.state
+                return Praise(*asked, said.value, said.moves) if isinstance(said, Judgement) else Answer(*asked, said)
             except AdvisorLeft as left:
                 return Answer(by, request.episode, request.step, request.state, None, True, str(left))
             except Undo:
@@ -195,7 +201,9 @@ class Journal:
             self._file = None
 
 
-def _answered_action(given: Answer) -> int | None:
+def _answered(given: Answer | Praise) -> Reply:
+    if isinstance(given, Praise):
+        return Judgement(given.value, given.moves)
     if given.left:
         raise AdvisorLeft(given.why)
     return given.action

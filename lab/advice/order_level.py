@@ -10,6 +10,7 @@ import numpy as np
 from lab.advice.advisors import recorded_fault
 from lab.advice.entries import Read
 from lab.errors import BadInput
+from lab.learning.praise import Judging
 from lab.learning.requests import Advisor, Ask
 from lab.learning.selection import softmax
 from lab.learning.simulated_advice import decisive, tau_of_accuracy, tau_schedule
@@ -72,6 +73,10 @@ class OrderLevel:
     def answered(self, path: Path) -> Mapping[int, int]:
         """Raises BadInput, because such files are about the states of a table."""
         raise BadInput("a file of answers is about the steps of a sub-task, not the order: wanted another advisor")
+
+    def evaluator(self, advisor: Advisor, judging: Judging) -> Advisor:
+        """Raises BadInput, because praise and blame are about the steps of a table."""
+        raise BadInput("it judges the steps of a sub-task, not the order: wanted another advisor")
 
     def learned(self, name: str) -> Advisor:
         """Raises BadInput, because policies are about the steps of a sub-task."""

@@ -8,6 +8,7 @@ from math import fsum, log
 
 from lab.advice.trust import Pair, Trail, Ways, bounds, circles, is_bad, is_good, trust, trust_there
 from lab.errors import BadInput, unknown
+from lab.learning.praise import Judgement
 from lab.learning.requests import AdviceRequest, Advisor, AdvisorLeft, Walked
 from lab.learning.selection import Draw
 from lab.learning.session_events import AdvisorDropped, AdvisorReadmitted, AdvisorsDisagreed, Event
@@ -104,6 +105,7 @@ class _Member:
     def ask(self, request: AdviceRequest) -> int | None:
         """The answer, recorded for later judgement. Raises AdvisorLeft."""
         action = self.advisor.advise(request)
+        assert not isinstance(action, Judgement)  # no request to a panel allows one
         if action is not None:
             self._now[request.step] = request.state, action
         return action

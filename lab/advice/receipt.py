@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from lab.advice.advisors import MODEL
-from lab.advice.entries import Answer, Entry
+from lab.advice.entries import Answer, Entry, Praise
 from lab.advice.trust import Difference, Pair, SkillEstimate, differences, skill_of, worse
 from lab.errors import counted
 from lab.learning.session_events import (
@@ -20,6 +20,7 @@ from lab.learning.session_events import (
     AdvisorReadmitted,
     AdvisorsDisagreed,
     EpisodeEnded,
+    MoveJudged,
 )
 from lab.learning.settings import GateSettings
 from lab.mdp import FloatArray, TabularMDP
@@ -51,6 +52,20 @@ class Voice:
 
 
 @dataclass(frozen=True)
+class Judgements:
+    """The count of judgements.
+
+    praised, blamed: their numbers; single: those of one move; against_best: of the single ones those that praise a move that was
+    not the best or blame a best one, None if the optimal values are unknown.
+    """
+
+    praised: int
+    blamed: int
+    single: int
+    against_best: int | None
+
+
+@dataclass(frozen=True)
 class Receipt:
     """What the advice of a session was worth.
 
@@ -68,6 +83,7 @@ class Receipt:
     against_best: taken steps that were not the best; differences: the LISTED most frequent of them; None and () if the optimal
     values are unknown. skill: estimated from the taken steps; voices: by advisor, if there are several.
     score: what the means are of, "steps", or "shortfall of the return" without a goal.
+    judged: the count of judgements, None if there were none; then it is not in the JSON document.
     notices: rejections and the like; hints: for better advice next time; yours: whether people gave all of the advice.
     """
 
@@ -96,10 +112,13 @@ class Receipt:
     yours: bool = False
     hints: tuple[str, ...] = ()
     score: str = "steps"
+    judged: Judgements | None = None
 
     def to_json(self) -> dict[str, Any]:
         """The receipt as JSON values."""
         document: dict[str, Any] = json.loads(json.dumps(asdict(self), allow_nan=False))
+        if self.judged is None:
+            del document["judged"]
         return document
 
     def lines(self) -> list[str]:
@@ -143,7 +162,7 @@ def receipt(
     counted = Receipt(
         score="shortfall of the return" if by_return else "steps",
         requests=sum(isinstance(entry, AdviceRequested) for entry in entries),
-        questions=len(questions),
+        questions=len(questions) + _judged_only(entries),
         taken=len(taken),
         refused=_refused(questions, voices),
         remembered=sum(entry.steps for entry in entries if isinstance(entry, AdviceRemembered)),
@@ -157,6 +176,7 @@ def receipt(
         voices=voices if len(voices) > 1 else (),
         notices=tuple(_notices(entries)),
         yours=_is_yours(entries) and all(voice.whole for voice in voices),
+        judged=_judgements(entries, mdp, values),
         **_episodes([entry for entry in entries if isinstance(entry, EpisodeEnded)], window),
     )
     return replace(counted, hints=tuple(_hints(counted, entries, window)))
@@ -164,8 +184,28 @@ def receipt(
 
 def _is_yours(entries: Sequence[Entry]) -> bool:
     """Whether people were asked, and no language model."""
-    said_by = {entry.by for entry in entries if isinstance(entry, Answer)}
+    said_by = {entry.by for entry in entries if isinstance(entry, Answer | Praise)}
     return bool(said_by) and not any(name.startswith(MODEL) for name in said_by)
+
+
+def _judgements(entries: Iterable[Entry], mdp: TabularMDP | None, values: Values) -> Judgements | None:
+    said = [entry for entry in entries if isinstance(entry, MoveJudged)]
+    if not said:
+        return None
+    praised, blamed = sum(one.value > 0 for one in said), sum(one.value < 0 for one in said)
+    single = [one for one in said if one.moves == 1 and _existing([(one.state, one.action)], mdp)]
+    against = None
+    if values is not None:
+        against = sum((one.value > 0) == bool(worse([(one.state, one.action)], values)) for one in single)
+    return Judgements(praised, blamed, len(single), against)
+
+
+def _judged_only(entries: Iterable[Entry]) -> int:
+    """The number of questions that were answered with a judgement and nothing else."""
+    told = [entry for entry in entries if isinstance(entry, MoveJudged | AdviceGiven | EpisodeEnded)]
+    asked = [(entry.episode, 0 if isinstance(entry, EpisodeEnded) else entry.step) for entry in told]
+    followed = zip(told, asked, [*asked, None][1:], strict=True)
+    return sum(isinstance(entry, MoveJudged) and step != after for entry, step, after in followed)
 
 
 def _questions(entries: Iterable[Entry]) -> Iterator[_Question]:
@@ -284,7 +324,7 @@ def _hints(of: Receipt, entries: Sequence[Entry], window: int) -> Iterator[str]:
     """Suggestions for better advice, each based on a count."""
     ended = [entry for entry in entries if isinstance(entry, EpisodeEnded)]
     if not of.taken:
-        if of.questions:
+        if of.questions and of.judged is None:
             yield f"it asked about {counted(of.questions, 'step')} and was never advised: an answer would show it a path at once"
         return
     if 2 * of.agreed > of.taken:
@@ -319,7 +359,13 @@ def _lines(of: Receipt) -> Iterator[str]:
     else:
         about = f" about {counted(of.questions, 'step')}" if of.questions else ", but about no step"
         helped = f"; {of.taken} of them with {'your help' if of.yours else 'advice'}" if of.questions else ""
+        helped = helped if of.taken or of.judged is None else ""
         yield f"advice: it asked in {counted(of.requests, 'episode')}{about}{helped}"
+    if of.judged is not None:
+        wrong, single = of.judged.against_best, of.judged.single
+        against = f"; {wrong} of {single} against what was best" if wrong is not None and single else ""
+        good, bad = counted(of.judged.praised, "time"), counted(of.judged.blamed, "time")
+        yield f"  judged: {good} good, {bad} bad{against}"
     if of.refused:
         yield "  not followed: " + ", ".join(f"{count} ({reason})" for reason, count in of.refused.items())
     if of.guided:

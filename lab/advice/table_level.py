@@ -8,9 +8,11 @@ import numpy as np
 
 from lab.advice.advisors import AdvisorName, make_advisor, recorded_fault
 from lab.advice.entries import Read
+from lab.advice.evaluator import Evaluator
 from lab.errors import BadInput, counted, unknown
 from lab.files import is_file, json_of, read_limited
-from lab.learning.requests import AdviceRequest, Advisor, Ask, Request
+from lab.learning.praise import Judging
+from lab.learning.requests import AdviceRequest, Advisor, Ask, Reply, Request
 from lab.learning.selection import uniforms
 from lab.learning.simulated_advice import (
     Advice,
@@ -195,13 +197,19 @@ class TableLevel:
             return made
         return LimitedView(made, self.region)
 
+    def evaluator(self, advisor: Advisor, judging: Judging) -> Advisor:
+        """An evaluator; moves of the same optimal value are the same to it if it judges by a simulated advisor."""
+        values = self._known() if isinstance(advisor, TableAdvisor) else None
+        return Evaluator(advisor, judging, uniforms(self.rng), values)
+
 
 class LimitedView:
     """An advisor that is asked only in the states of a region, (S,) bool."""
 
     def __init__(self, advisor: Advisor, region: BoolArray):
         self._advisor, self._region = advisor, region
+        self.judging: Judging | None = getattr(advisor, "judging", None)
 
-    def advise(self, request: AdviceRequest) -> int | None:
+    def advise(self, request: AdviceRequest) -> Reply:
         """The advisor's answer, None outside the region."""
         return self._advisor.advise(request) if self._region[request.state] else None

@@ -78,6 +78,10 @@ class Ways:
             return None
         return self._moves[entered] < self._moves[state]  # inf, without a known path from there, is no nearer
 
+    def entered(self, state: int, action: int) -> int:
+        """The state to which an action that was tried in a state led the last time."""
+        return self._entered[state][action]
+
     def tally(self, said: Said, circled: Collection[Pair] = ()) -> tuple[int, int]:
         """(good, bad): the numbers of good and bad answers; answers in `circled` are bad if there is no other verdict."""
         counts: Counter[bool | None] = Counter()

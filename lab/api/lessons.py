@@ -1,5 +1,6 @@
 """`lab.teach`: one lesson and its result."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from html import escape
@@ -7,7 +8,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Annotated, Any, Unpack
 
-from annotated_types import Ge, Lt
+from annotated_types import Ge, Le, Lt
 
 from lab.api.options import (
     Advisors,
@@ -28,6 +29,8 @@ from lab.mdp import FloatArray
 from lab.teaching.events import unheard
 from lab.teaching.lesson import Subject, document_of, planned
 from lab.teaching.lesson_plan import Lesson
+from lab.teaching.peer_lesson import PeerLessons, check_alone, of_tasks
+from lab.teaching.peers import FEWEST, MOST, PeerResult
 from lab.teaching.step_record import StepRecord
 from lab.teaching.subjects import Teachable, subject_from
 from lab.teaching.teacher import Teacher
@@ -41,7 +44,8 @@ class LessonResult:
     """The result of a lesson, which notebooks display.
 
     problem: the problem, with its table `problem.mdp`; lesson: the policy and the session's counts; document: the dict that
-    `lab teach --json` prints.
+    `lab teach --json` prints, without the items of other tasks' lessons; peers: the results of all peers if there were several,
+    otherwise (). Policy and session are then those of the best peer of the problem.
 
         >>> import lab
         >>> lesson = lab.teach(lab.world("S.#\\n..G"), gate="never", advisor=None)
@@ -54,6 +58,7 @@ class LessonResult:
     document: dict[str, Any]
     _subject: Subject
     _record: StepRecord | None = None
+    peers: tuple[PeerResult, ...] = ()
 
     @property
     def policy(self) -> Policy:
@@ -148,6 +153,8 @@ def teach(
     task: str | None = None,
     sight: str | None = None,
     record: bool = False,
+    peers: int | None = None,
+    peer_tasks: Sequence[str] = (),
     **settings: Unpack[Settings],
 ) -> LessonResult:
     """The result of one teaching session; the same problem, settings and seed give the same table.
@@ -161,6 +168,9 @@ def teach(
     task: the task that a sub-task belongs to, default "toast".
     sight: "limited" restricts advice to the region in a world's file; default "full".
     record: whether all steps are recorded, see `LessonResult.steps`.
+    peers: 2 to 16 learners of the problem at once, each of which asks the others by its gate; `advisor` is then left out.
+    peer_tasks: further tasks whose sub-task of that name is learned at the same time, such as with another arm; by one learner
+    each, or by `peers` learners each. Their best policies go to the toolbox.
     settings: of learner and gate, by the names in docs/settings.md; `learner` and `gate` may also be classes.
 
     Raises BadInput for an unknown name, a value out of range, and what does not fit together; WorkFailed if the toolbox cannot
@@ -172,14 +182,38 @@ def teach(
         (True, True)
     """
     check_common("lab.teach", seed=seed, task=task, record=record)
+    if peers is not None or peer_tasks:
+        _check_peers(peers, peer_tasks, advisor=advisor, sight=sight, record=record)
     subject = subject_from(problem, task, sight)
-    subject.settings = subject.settings.changed("", **settings)
+    subjects = of_tasks(subject, peer_tasks, lambda other: subject_from(problem, other))
+    for one in subjects:
+        one.settings = one.settings.changed("", **settings)
     with TemporaryDirectory() as nowhere:
         steps = StepRecord() if record else None
         advising = advising_of(advisor, toolbox)
         tell = heard_by(advising, unheard if steps is None else steps.hear)
         teacher = Teacher(toolbox_of(toolbox, nowhere), advising, seed, tell)
-        teacher, plan = planned(subject, teacher)
-        lesson = teacher.teach(plan)
+        together = None
+        if peers is not None or peer_tasks:
+            together = PeerLessons(subjects, teacher, peers or 1)
+            taught = together.each(lambda number, subject, own, plan: (own, plan, own.teach(plan)))
+            teacher, plan, lesson = taught[0]
+        else:
+            teacher, plan = planned(subject, teacher)
+            lesson = teacher.teach(plan)
     document = document_of(plan.problem, lesson, teacher) | subject.facts()
-    return LessonResult(plan.problem, lesson, document, subject, steps)
+    if together is None:
+        return LessonResult(plan.problem, lesson, document, subject, steps)
+    document |= {"best_peer": together.best(0).number, "peers": [peer.to_json() for peer in together.peers]}
+    return LessonResult(plan.problem, lesson, document, subject, steps, together.peers)
+
+
+def _check_peers(
+    peers: int | None, peer_tasks: Sequence[str], *, advisor: Advisors, sight: str | None, record: bool
+) -> None:
+    """Raises BadInput for another number of peers, for tasks that are no names, and for what cannot be combined with them."""
+    if peers is not None:
+        check_value("peers", peers, Annotated[int, Ge(FEWEST), Le(MOST)], "lab.teach")
+    if isinstance(peer_tasks, str) or not all(isinstance(name, str) for name in peer_tasks):
+        raise BadInput(f"peer_tasks {peer_tasks!r} (lab.teach): wanted a list of the names of tasks")
+    check_alone({"advisor": advisor not in (None, "expert", "none"), "sight": sight, "record": record})

@@ -20,6 +20,7 @@ from lab.sequencing.search import SequenceResult
 from lab.sequencing.simulate.follow import simulate
 from lab.tasks.sequencing import Sequencing
 from lab.teaching.teacher import Teacher
+from lab.toolbox.names import default_address
 from lab.view.gantt import gantt
 
 
@@ -28,7 +29,10 @@ class OrderOptions(TypedDict, total=False):
 
     case: an order by name; toasts: the number of parts; parts: of each kind, such as "slice=2,cup=1".
     layout, robots: the travel times and the number of robots beside an instance file.
-    method, objective: by name; policy: the file of the method "carried"; episodes: of a session; sessions: how many.
+    method, objective: by name; episodes: of a session; sessions: how many.
+    policy: the file or name of the policy of the method "carried", or of the one that "srl-linear" begins with.
+    practice: further cells that "srl-linear" learns in, separated by commas; keep_policy: the file or name under which its policy
+    is kept, so that the method "policy:NAME" decides by it.
     stochastic: whether times are drawn; seconds: the search ends after so many [s]; gap: it ends when the cost is at most this
     fraction above the bound.
     """
@@ -46,6 +50,8 @@ class OrderOptions(TypedDict, total=False):
     stochastic: bool
     seconds: float
     gap: float
+    practice: str
+    keep_policy: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +129,8 @@ def sequence(
 
     cell: a name as for `lab sequence` (a cell, an instance file, or a task, whose moves are timed in simulation), or a `Cell`.
     seed: of all randomness.
-    toolbox: provides and saves a task's skills; None (default): nothing is saved.
+    toolbox: provides and saves a task's skills, and the policies of sequencing by name; None (default): no skill is saved, and
+    such policies are in the user's own toolbox.
     options: those of `lab sequence`, such as method, objective, episodes, seconds [s], gap (a fraction).
 
     Raises BadInput for an unknown name, a value out of range, and what does not fit together.
@@ -136,14 +143,15 @@ def sequence(
     check_common("lab.sequence", seed=seed)
     given = checked(options, OrderOptions, "lab.sequence")
     case, toasts = given.pop("case", None), given.pop("toasts", None)
-    wanted = SequencingOptions(seed=seed, **given)
+    wanted = SequencingOptions(seed=seed, **given).by_policy()
+    box = toolbox_of(toolbox, default_address())
     if isinstance(cell, Cell):
         if case is not None or toasts is not None:
             raise BadInput(f"case {case}, toasts {toasts} beside a Cell: its order is its own: leave them away")
-        document, found = sequence_cell(cell, Sequencing(), wanted, NO_CHANCE)
+        document, found = sequence_cell(cell, Sequencing(), wanted, NO_CHANCE, toolbox=box)
         return OrderResult(cell, found, document)
     with TemporaryDirectory() as nowhere:
         teacher = Teacher(toolbox_of(toolbox, nowhere), seed=seed)
-        named = named_cell(str(cell), case, toasts, wanted, teacher)
-    document, found = sequence_cell(named.cell, named.settings, wanted, named.chance)
+        named = named_cell(str(cell), case, toasts, wanted, teacher, box)
+    document, found = sequence_cell(named.cell, named.settings, wanted, named.chance, toolbox=box)
     return OrderResult(named.cell, found, {"task": named.name} | document)

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 from lab.lazy import loader
 
 if TYPE_CHECKING:
-    from lab.advice.advisors import ADVISORS, MODEL, AdvisorName
+    from lab.advice.advisors import ADVISORS, MODEL, AdvisorName, split_praise
     from lab.advice.entries import Read, read_journal
     from lab.advice.panel import ASKED, DECISIONS
     from lab.api.scenes import SceneRequest as SceneAsked
@@ -89,6 +89,9 @@ if TYPE_CHECKING:
     from lab.teaching.lesson import teach as teach_session
     from lab.teaching.lesson_options import DEFAULT_ADVISORS, LessonOptions
     from lab.teaching.named_problems import PROBLEMS
+    from lab.teaching.peer_lesson import check_alone as check_peers_alone
+    from lab.teaching.peer_lesson import of_tasks as peer_subjects
+    from lab.teaching.peer_lesson import teach_peers
     from lab.teaching.session_list import session_rows
     from lab.teaching.step_record import StepRecord, check_libraries
     from lab.teaching.subjects import subject_of
@@ -133,7 +136,7 @@ if TYPE_CHECKING:
     from lab.workers import Workers
 
 TABLE = {
-    "lab.advice.advisors": ("AdvisorName", "ADVISORS", "MODEL"),
+    "lab.advice.advisors": ("AdvisorName", "ADVISORS", "MODEL", "split_praise"),
     "lab.advice.entries": ("Read", "read_journal"),
     "lab.advice.panel": ("ASKED", "DECISIONS"),
     "lab.api.scenes": ("SceneRequest as SceneAsked", "seen"),
@@ -210,6 +213,7 @@ TABLE = {
     "lab.teaching.lesson": ("replay as replay_session", "teach as teach_session"),
     "lab.teaching.lesson_options": ("DEFAULT_ADVISORS", "LessonOptions"),
     "lab.teaching.named_problems": ("PROBLEMS",),
+    "lab.teaching.peer_lesson": ("check_alone as check_peers_alone", "of_tasks as peer_subjects", "teach_peers"),
     "lab.teaching.session_list": ("session_rows",),
     "lab.teaching.step_record": ("check_libraries", "StepRecord"),
     "lab.teaching.subjects": ("subject_of",),

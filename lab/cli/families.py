@@ -28,6 +28,7 @@ TERMS = {
     "trust": "the share of an advisor's answers that led nearer to the goal, by the learner's estimate",
     "tau": "the skill of a simulated advisor, the smaller the better: .01 an expert, .1 moderate, .3 limited, 1 a novice",
     "accuracy": "the share of optimal answers of a simulated advisor, over the states in which an action is worse than another",
+    "praise": "the judgement that a move was good, and blame that it was bad: they act in the episodes in which the learner asks",
     "sight": "where in a world a simulated advisor sees the robot and can advise: everywhere, or in a region",
 }
 TEXTS = {  # name of the text below a command's options -> its headings, each with a family

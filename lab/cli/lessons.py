@@ -17,6 +17,7 @@ def lesson_seat(
     names: Sequence[str], *, page: bool = False, port: int = 0, wait_s: float | None = None, plain: bool = False
 ) -> Iterator["deferred.LessonSeat"]:
     """The seat of a command's lessons: the progress lines, and on request the prompt, the page and language models."""
+    names = [deferred.split_praise(name)[0] for name in names]
     progress, asked = deferred.RunProgress(console()), [name for name in names if name.startswith(deferred.MODEL)]
     models = deferred.language_models(asked) if asked else {}
     with ExitStack() as stack:
@@ -82,6 +83,8 @@ def sequenced(
         policy=None if options.policy is None else Path(options.policy),
         seconds=options.seconds,
         gap=options.gap,
+        practice=options.practice,
+        keep_policy=options.keep_policy,
     )
     teacher = teacher_of(toolbox, deferred.LessonOptions(advisors=deferred.DEFAULT_ADVISORS, seed=options.seed), seat)
     return deferred.sequence_named(options.task, options.case, options.toasts, wanted, teacher=teacher, files=files)

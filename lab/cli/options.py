@@ -61,7 +61,7 @@ AdvisorNames = Annotated[
         "--advisor",
         help="Who advises: {advisors} (X..Y: changing over the episodes; accuracy: the share of optimal answers; "
         "DIR: a session's folder; FILE: answers as JSON; NAME: a policy in the toolbox, also of another world; URL: a language "
-        "model's server, such as http://127.0.0.1:8080/v1#MODEL); "
+        "model's server, such as http://127.0.0.1:8080/v1#MODEL; WHO: an advisor who judges the learner's moves); "
         "several times for several advisors.",
         autocompletion=offers("advisors"),
         callback=from_files("advisors"),

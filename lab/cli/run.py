@@ -95,7 +95,7 @@ def run(
         wanted, folder = options.by_method(loaded), resume or out or Path(f"{loaded.name}-run")
         deferred.check_out(folder)
         again = f"go on with: lab run --resume {quote(str(folder))}{deferred.named_with(options.advisors)}"
-        watched = page or "web" in options.advisors
+        watched = page or "web" in [deferred.split_praise(name)[0] for name in options.advisors]
         controls = deferred.Controls(deferred.pace(speed or ("4" if watched else "max")))
         lessons = options.lessons()
         lessons.advising()

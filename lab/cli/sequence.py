@@ -34,9 +34,9 @@ def cyclic_found(
     none = asdict(deferred.OrderSessionOptions())
     for name, value in asdict(given).items():
         if name not in OF_A_CYCLE and value != none[name]:
-            said = "" if value is True else f" {value}"
+            said = f"--{name.replace('_', '-')}" + ("" if value is True else f" {value}")
             raise BadInput(
-                f"--cyclic beside --{name}{said}: the shortest cycle of its parts is found and proven, by its period alone"
+                f"--cyclic beside {said}: the shortest cycle of its parts is found and proven, by its period alone"
             )
     if "plot" in files:
         raise BadInput(f"--cyclic beside --plot {files['plot']}: a cycle has no episodes; --gantt draws it")
@@ -90,7 +90,22 @@ def sequence(
     method: MethodName = None,
     policy: Annotated[
         Path | None,
-        typer.Option("--policy", help="The policy of --method carried: a file from lab study run carried-over."),
+        typer.Option(
+            "--policy",
+            help="The policy of --method carried, or the one that srl-linear begins with: a file, or a name in the toolbox.",
+        ),
+    ] = None,
+    practice: Annotated[
+        str | None,
+        typer.Option("--practice", help="Further cells that srl-linear learns in, separated by commas."),
+    ] = None,
+    keep_policy: Annotated[
+        str | None,
+        typer.Option(
+            "--keep-policy",
+            help="Keep the policy that srl-linear learned, under a name in the toolbox or in a .json file; --method policy:NAME "
+            "decides by it, in any cell.",
+        ),
     ] = None,
     objective: Annotated[
         str | None,
@@ -178,6 +193,8 @@ def sequence(
         policy=None if policy is None else str(policy),
         seconds=seconds,
         gap=gap,
+        practice=practice,
+        keep_policy=keep_policy,
     )
     asked = {"plot": plot, "gantt": gantt, "schedule": schedule}
     files = {name: path for name, path in asked.items() if path is not None}

@@ -1,7 +1,8 @@
 """`lab teach`: one teaching session."""
 
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -53,6 +54,23 @@ def teach(
     advisor: AdvisorNames = None,
     asked: Asked = "together",
     decide: Decide = "trust-weighted",
+    peers: Annotated[
+        int | None,
+        typer.Option(
+            "--peers",
+            min=2,
+            max=16,
+            help="So many learners of the problem at once, each of which asks the others; the best policy is kept.",
+        ),
+    ] = None,
+    peer_tasks: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--peer-task",
+            help="A further task, as for --task, whose sub-task is learned at the same time, such as with another arm: by one "
+            "peer, or by so many as --peers says. It may be repeated.",
+        ),
+    ] = None,
     episodes: Annotated[
         int | None, typer.Option("--episodes", min=1, help="Session length; default: the task's.")
     ] = None,
@@ -84,6 +102,19 @@ def teach(
 
     Each session keeps a journal: --resume continues an interrupted session, lab replay shows it again.
     """
+    if peers is not None or peer_tasks:
+        deferred.check_peers_alone(
+            {
+                "--advisor": advisor,
+                "--sight": sight,
+                "--resume": resume,
+                "--trust-module": trust_module,
+                "--page": page,
+                "--port": port,
+                "--wait": wait,
+                "--plain": plain,
+            }
+        )
     who = (tuple(advisor or ()), asked, decide)
     given = deferred.LessonOptions(subtask or "", task, sight, learner, gate, memory, *who, episodes, seed, save)
     kept = None if resume is None else deferred.KeptSession(resume, "--resume", trusted=trust_module or ())
@@ -96,15 +127,27 @@ def teach(
     if out is not None:
         deferred.check_new(out)
     subject = deferred.subject_of(options, kept)
+    subjects = deferred.peer_subjects(
+        subject, peer_tasks or (), lambda other: deferred.subject_of(replace(options, task=other))
+    )
     folder = out if kept is None else kept.folder
     if folder is not None:
         deferred.check_out(folder)
     with lesson_seat(options.advisors, page=page, port=port, wait_s=wait, plain=plain) as seat:
         teacher = teacher_of(toolbox, options, seat)
         teacher.toolbox.check()
-        document = deferred.teach_session(subject, options, teacher, folder, kept)
-        seat.lesson_over(document)
+        if peers is not None or peer_tasks:
+            document = deferred.teach_peers(subjects, teacher, peers or 1, save, out)
+        else:
+            document = deferred.teach_session(subject, options, teacher, folder, kept)
+            seat.lesson_over(document)
     show(document, as_json, deferred.lesson_summary)
+    for one in (document, *document.get("others", ())):
+        _end_unless_learned(one)
+
+
+def _end_unless_learned(document: dict[str, Any]) -> None:
+    """Ends the command with an error if the skill failed in physics, misses its goal, or lacks a picture."""
     if document["failure"] is not None:
         end(document["failure"], 1)
     if document["final_steps"] is None and "final_return" not in document:

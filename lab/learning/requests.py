@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+from lab.learning.praise import ActionBiasing, Judgeable, Judgement
 from lab.learning.selection import chances
 from lab.learning.session_events import Improvement
 from lab.learning.settings import GateSettings
@@ -155,6 +156,8 @@ class Request:
     reason: why the gate asks.
     standing: the record of the advice so far.
     undoable: whether the last answer of this episode can be taken back.
+    judgement: whether the answer may be a `Judgement` of the moves that were shown ("also"), or has to be one, of the learner's
+    own choice, which it makes now, and of those before it ("only").
     """
 
     episode: int
@@ -166,6 +169,7 @@ class Request:
     reason: Reason | None = None
     standing: Standing = Standing()
     undoable: bool = False
+    judgement: Judgeable = "no"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -181,8 +185,9 @@ class AdviceRequest(Request):
     q: the learner's current action values, `q[state][action]`; they must not be changed.
     temperature, selection: how the learner chooses at present; temperature is epsilon for "epsilon-greedy".
     environment: draws the state; None if the table's grid is all there is.
-    improvement, reason, standing, undoable: how the learner improves, why it asks, and what came of the advice so far, see
-    `Request`.
+    praise: what the learner was told about its moves, None if nothing.
+    improvement, reason, standing, undoable, judgement: how the learner improves, why it asks, what came of the advice so far, and
+    what the answer may be, see `Request`.
 
         >>> import lab
         >>> def advise(request: lab.AdviceRequest) -> int | None:
@@ -197,10 +202,13 @@ class AdviceRequest(Request):
     temperature: float = 1.0
     selection: str = "softmax"
     environment: SupportsPicture | None = None
+    praise: ActionBiasing | None = None
 
     @property
     def chances(self) -> list[float]:
-        """The probability of each action, (A,), if the learner chose by itself."""
+        """The probability of each action, (A,), if the learner chose by itself, and by what it was told was good or bad."""
+        if self.praise is not None:
+            return self.praise.chances(self.state, self.q[self.state], self.temperature)
         return chances(self.selection, self.q[self.state], self.temperature)
 
     @property
@@ -245,11 +253,15 @@ class AdvisorLeft(Exception):
     """
 
 
-Ask = Callable[[Any], int | None]  # a function of a `Request`
+Reply = int | Judgement | None  # to a request: an action, a judgement where that is allowed, or nothing
+Ask = Callable[[Any], Reply]  # a function of a `Request`
 
 
 class Advisor(Protocol):
     """The interface of an advisor."""
 
-    def advise(self, request: Any) -> int | None:
-        """The answer: one of `request.allowed`, or None for the learner's own choice. Raises AdvisorLeft to stop advising."""
+    def advise(self, request: Any) -> Reply:
+        """The answer: one of `request.allowed`, or None for the learner's own choice. Raises AdvisorLeft to stop advising.
+
+        Where `request.judgement` allows it, the answer may be a `Judgement`.
+        """

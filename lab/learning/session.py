@@ -24,7 +24,8 @@ from lab.learning.advice_memory import Recall
 from lab.learning.environment import Environment, TableEnvironment, check_solvable, highest_reward
 from lab.learning.gates import GATES, Surroundings, improvement
 from lab.learning.physics.cells import CellTable
-from lab.learning.requests import AdviceRequest, Advisor, AdvisorLeft, Standing, Walked
+from lab.learning.praise import PRAISE_RULES, ActionBiasing, Judgement, Judging, Move
+from lab.learning.requests import AdviceRequest, Advisor, AdvisorLeft, Reply, Standing, Walked
 from lab.learning.selection import COLDEST, SELECTIONS, Draw, temperature, uniforms
 from lab.learning.session_result import SessionResult, check_members, start_values
 from lab.learning.settings import GateSettings, LearnerSettings
@@ -42,7 +43,8 @@ class Session:
     problem: a table, or the environment in which steps are made; advisor: None if there is nobody to ask; rng: a generator, or a
     function that returns uniform numbers; q0: (S, A), the start values, default the learner's start value.
     An advised action is carried out and learned from like the learner's own choice. If the advisor has a method `followed`, it is
-    called with the `Walked` record after each open episode.
+    called with the `Walked` record after each open episode, or after every episode if its attribute `follows_all` is true.
+    If it has an attribute `judging`, see `Judging`, it may judge moves that it was shown: see `lab.learning.praise`.
     Raises BadInput for an unknown learner, selection or gate, an unfit q0 and an answer that is no action, and NoPath.
     """
 
@@ -61,6 +63,11 @@ class Session:
         self.environment, self.mdp, self.settings, self.gate_settings = environment, environment.mdp, learner, gate
         self.advisor, self.advised = advisor, advisor is not None
         self.followed: Callable[[Walked], None] | None = getattr(advisor, "followed", None)
+        self.judging: Judging | None = getattr(advisor, "judging", None)
+        self.only_judges = self.judging is not None and self.judging.only
+        self.praise: ActionBiasing | None = None  # what was learned from judgements, once there was one
+        self.shown: list[Move] = []  # the moves of this episode that the advisor saw and may judge
+        self.follows_all = bool(getattr(advisor, "follows_all", False))
         self.tell: OnEvent = lambda event: None
         mdp, cells = self.mdp, self.mdp if isinstance(self.mdp, CellTable) else None
         self.draw = uniforms(rng) if isinstance(rng, np.random.Generator) else rng
@@ -112,26 +119,31 @@ class Session:
         far is returned.
         """
         self.tell = on_event or self.tell
-        settings, gate, recall, interrupted = self.settings, self.gate, self.recall, False
         try:
-            for episode in range(1, settings.episodes + 1):
-                self.episode, self.asked_now, self.helped_now = episode, False, 0
-                self.tau = temperature(episode, settings.beta, settings.exploration)  # eq. 9.2
-                was_converged = gate.converged
-                is_open = gate.opens(episode, self.scores) and self.advisor is not None  # eqs. 6.1 and 6.2
-                is_open = is_open if recall is None else recall.opens(episode, is_open)
-                if gate.converged and not was_converged and self.advisor is not None:
-                    self.tell(events.AdviceEnded(episode, "converged"))
-                self.trail = [] if is_open and self.followed is not None else None
-                alone = self._own_choice
-                if recall is not None and recall.late:
-                    self.tau, alone = COLDEST, self._practised_choice
-                self._judge(is_open, self._walk(self._advised_choice if is_open else alone))
+            for episode in range(1, self.settings.episodes + 1):
+                self.play(episode)
                 if enough():
                     break
         except KeyboardInterrupt:
-            interrupted = True
-        return self.result(interrupted)
+            return self.result(interrupted=True)
+        return self.result(interrupted=False)
+
+    def play(self, episode: int) -> None:
+        """Plays one episode and judges it; `run` plays all, numbered from 1."""
+        settings, gate, recall = self.settings, self.gate, self.recall
+        self.episode, self.asked_now, self.helped_now = episode, False, 0
+        self.tau = temperature(episode, settings.beta, settings.exploration)  # eq. 9.2
+        was_converged = gate.converged
+        is_helped = self.advisor is not None or self.praise is not None
+        is_open = gate.opens(episode, self.scores) and is_helped  # eqs. 6.1 and 6.2
+        is_open = is_open if recall is None else recall.opens(episode, is_open)
+        if gate.converged and not was_converged and self.advisor is not None:
+            self.tell(events.AdviceEnded(episode, "converged"))
+        self.trail = [] if (is_open or self.follows_all) and self.followed is not None else None
+        alone = self._own_choice
+        if recall is not None and recall.late:
+            self.tau, alone = COLDEST, self._practised_choice
+        self._judge(is_open, self._walk(self._advised_choice if is_open else alone))
 
     def _walk(self, choose: Callable[[int, int], int]) -> int | None:
         """The number of moves to the goal, None if it was not reached; each move is chosen, made and learned from.
@@ -181,25 +193,40 @@ class Session:
         return own if self.recall is None else self.recall.chosen(state, own)
 
     def _advised_choice(self, state: int, step: int) -> int:
-        """The advisor's action if the gate asks and the advisor answers, otherwise the learner's own."""
-        own, recall, gate = self._own_choice(state, step), self.recall, self.gate
+        """The advisor's action if the gate asks and the advisor answers, otherwise the learner's own, biased by praise."""
+        recall, gate, praise = self.recall, self.gate, self.praise
+        own = (
+            self._own_choice(state, step)
+            if praise is None
+            else praise.choice(state, self.q[state], self.tau, self.draw)
+        )
         advisor = self.advisor if self.helped_steps + self.helped_now < self.gate_settings.budget else None
         if (advisor is None and not gate.weighs) or (recall is not None and not recall.trusts):
             return own
         gate_asks = gate.asks(state, self.update.gauge(state))
         answer = self._ask(advisor, state, step, own) if gate_asks and advisor is not None else None
-        if answer is not None:
+        if isinstance(answer, Judgement):
+            answer = own if answer.value > 0 else None  # praise of a move is an answer that names it
+        elif answer is not None:
             self.helped_now += 1
             if recall is not None:
                 recall.asked()
-        return checked_action(gate.takes(state, own, answer), self.actions, self.gate_name)
+        action = checked_action(gate.takes(state, own, answer), self.actions, self.gate_name)
+        if gate_asks and self.judging is not None and not self.only_judges:
+            self.shown.append((state, action))
+        return action
 
-    def _ask(self, advisor: Advisor, state: int, step: int, own: int) -> int | None:
-        """The advisor's answer, None if it gives none. Raises BadInput if the answer is no action."""
+    def _ask(self, advisor: Advisor, state: int, step: int, own: int) -> Reply:
+        """The advisor's answer, None if it gives none. Raises BadInput if the answer is no action.
+
+        Who only judges answers with a judgement of the learner's own move; who may judge as well is asked again after it.
+        """
         if not self.asked_now:
             self.asked_now = True
             self.tell(events.AdviceRequested.of(self.episode, self.improved))
         gate, limits, helped = self.gate, self.gate_settings, self.helped_steps + self.helped_now
+        if self.only_judges:
+            self.shown.append((state, own))
         request = AdviceRequest(
             episode=self.episode,
             step=step,
@@ -216,15 +243,32 @@ class Session:
             temperature=self.tau,
             selection=self.settings.selection,
             environment=self.environment,
+            judgement="only" if self.only_judges else "also" if self.judging is not None and self.shown else "no",
+            praise=self.praise,
         )
         try:
             action = advisor.advise(request)
+            while isinstance(action, Judgement):
+                self._hears(action, step)
+                if self.only_judges:
+                    return action
+                action = advisor.advise(request)
         except AdvisorLeft:
             self.advisor = None
             self.tell(events.AdviceEnded(self.episode, "advisor left"))
             return None
         self.tell(events.AdviceGiven(self.episode, step, state, action, own))
         return None if action is None else checked_action(action, self.actions, "the advisor")
+
+    def _hears(self, said: Judgement, step: int) -> None:
+        """Learns from a judgement of the last moves that were shown."""
+        assert self.judging is not None
+        if self.praise is None:
+            self.praise = PRAISE_RULES[self.judging.rule].make(self.mdp.n_actions, self.settings.selection)
+        moves = self.shown[-(said.moves or self.judging.late + 1) :]
+        self.praise.hears(moves, said.value, self.q.__getitem__, self.tau)
+        self.helped_now += 1
+        self.tell(events.MoveJudged(self.episode, step, *moves[-1], said.value, len(moves)))
 
     def _judge(self, is_open: bool, moves: int | None) -> None:
         """Records the episode, lets the gate judge it (eqs. 6.3 and 6.4), and reports its events."""
@@ -243,7 +287,10 @@ class Session:
             self.scores.append(score)
         self.guided.append(helped > 0)
         self.improved = improvement(self.scores, limits.window)
-        gate.judges(self.scores, is_open and (helped > 0 or self.judge_unhelped))
+        gate.judges(self.scores, is_open and (helped > 0 or self.praise is not None or self.judge_unhelped))
+        if is_open and self.praise is not None:
+            self.praise.fades()
+        self.shown.clear()
         if self.trail is not None and self.followed is not None:
             self.followed(Walked(episode, self.trail, moves is not None, score, mean_before))
         rate = self.improved.rate if self.improved else None
@@ -253,7 +300,8 @@ class Session:
         if gate.rejected and self.rejected_at is None:
             self.rejected_at = episode
             self.tell(events.AdviceRejected(episode, gate.misleads, limits.omega, score, mean_before))
-        for event in self.recall.ended(moves, helped) if self.recall is not None else ():
+        shown = 0 if self.only_judges else helped  # who judges shows nothing that could be remembered
+        for event in self.recall.ended(moves, shown) if self.recall is not None else ():
             self.tell(event)
 
     def result(self, interrupted: bool) -> SessionResult:

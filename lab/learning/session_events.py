@@ -83,6 +83,21 @@ class AdviceGiven:
 
 
 @dataclass(frozen=True)
+class MoveJudged:
+    """A judgement of moves: praise if `value` is above 0, blame if it is below.
+
+    episode, step: of the question; state, action: of the last of the judged moves; moves: their number.
+    """
+
+    episode: int
+    step: int
+    state: int
+    action: int
+    value: int
+    moves: int
+
+
+@dataclass(frozen=True)
 class AdviceRemembered:
     """In the episode that has ended, this many steps were practice of a path from memory, without asking."""
 
@@ -125,6 +140,7 @@ Event = (
     | AdviceRejected
     | AdviceEnded
     | AdviceGiven
+    | MoveJudged
     | AdviceRemembered
     | AdvisorsDisagreed
     | AdvisorDropped

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from lab.advice.advising import through
-from lab.advice.advisors import EXTERNAL, PEOPLE, AdvisorName, is_external, make_advisor
+from lab.advice.advisors import EXTERNAL, MODEL, PEOPLE, AdvisorName, make_advisor
 from lab.advice.entries import Closed
 from lab.advice.journal import Again, Journal
 from lab.advice.order_level import OrderLevel, signature_of
@@ -127,7 +127,7 @@ class OrderAdvice:
 
 def person_of(names: Sequence[str]) -> AdvisorName:
     """Who of a run's advisors is asked about the order, too: the first person, or else language model; or else nobody."""
-    asked = [name for name in names if name in PEOPLE] + [name for name in names if is_external(name)]
+    asked = [name for name in names if name in PEOPLE] + [name for name in names if name.startswith(MODEL)]
     return AdvisorName.of(asked[0]) if asked else NOBODY
 
 

@@ -18,6 +18,16 @@ from lab.learning.settings import GateSettings
 from lab.production import deferred
 from lab.production.any_time import CTRL_C, MethodSession, SearchPlan, SearchResults, looked_for
 from lab.production.order import NOBODY, KeepOrder, OrderAdvice, advised_session
+from lab.production.order_policy import (
+    DECIDES,
+    LEARNS,
+    PREFIX,
+    check_keeping,
+    kept_policy,
+    learned_policy,
+    policy_named,
+    practice_cells,
+)
 from lab.sequencing import SEQUENCERS, carried_reaction, check_method, find_sequence
 from lab.sequencing import deferred as methods
 from lab.sequencing.cell.cell import EVERY_PLAN, Cell
@@ -31,6 +41,7 @@ from lab.sequencing.cell.objectives import (
     stuck_cost,
 )
 from lab.sequencing.cell.schedule import check_table, rows_of, write_table
+from lab.sequencing.methods.carried_over_policy import CarriedPolicy
 from lab.sequencing.methods.shared import NO_LIMITS, Limits
 from lab.sequencing.search import SAME, LearnedSequence, Reference, Search, SequenceResult
 from lab.sequencing.simulate.follow import follow, simulate, steps
@@ -39,11 +50,12 @@ from lab.statistics import interval
 from lab.tasks.cell_file import CellFile, order_from_word, toast_case
 from lab.tasks.grid_world import GridWorld
 from lab.tasks.instances import InstanceRequest
-from lab.tasks.sequencing import Sequencing, read_policy, search_for
+from lab.tasks.sequencing import Sequencing, policy_record, search_for
 from lab.tasks.task import Task
 from lab.tasks.task_file import load_beside
 from lab.teaching.events import Event, PhaseBegan, SequenceFound, Tell, unheard
 from lab.teaching.teacher import Teacher
+from lab.toolbox.registry import Toolbox
 from lab.view.canvas import check_picture
 from lab.view.gantt import gantt
 from lab.view.sequencing_plots import sequence_plot
@@ -60,7 +72,11 @@ class SequencingOptions:
 
     keep: gives the journal of what people say, by default one that is not written. durations: those of a task's moves
     (`Durations.to_json`), None: they are measured. layout, robots: beside an instance file (see `InstanceRequest`).
-    policy: the file that the method `carried` decides by; None: what ships. seconds, gap: when to end early (see `Limits.of`).
+    policy: the file, or the name in the toolbox, of the policy that the method `carried` decides by (None: what ships), or that
+    `srl-linear` begins with; policy_from: the option that names it. seconds, gap: when to end early (see `Limits.of`).
+    practice: names of further cells in which `srl-linear` learns, separated by commas; keep_policy: the name or file under which
+    its policy is kept.
+    A method "policy:NAME" stands for `carried` by the policy NAME (see `by_policy`).
     """
 
     method: str | None = None
@@ -80,6 +96,21 @@ class SequencingOptions:
     policy: Path | None = None
     seconds: float | None = None
     gap: float | None = None
+    practice: str | None = None
+    keep_policy: str | None = None
+    policy_from: str = "--policy"
+
+    def by_policy(self) -> "SequencingOptions":
+        """The options with a method "policy:NAME" as `carried` and its policy. Raises BadInput beside another policy."""
+        if self.method is None or not self.method.startswith(PREFIX):
+            return self
+        if not (name := self.method.removeprefix(PREFIX)):
+            raise BadInput(
+                f"--method {PREFIX}: no policy: wanted {PREFIX}NAME, a name that --keep-policy kept, or its .json file"
+            )
+        if self.policy is not None:
+            raise BadInput(f"--policy {self.policy} beside --method {self.method}: the method names its policy")
+        return replace(self, method=DECIDES, policy=Path(name), policy_from="--method")
 
 
 def sequence_named(
@@ -97,8 +128,8 @@ def sequence_named(
     """
     for kind, path in files.items():
         check_table(path) if kind == "schedule" else check_picture(path)
-    named = named_cell(name, case, toasts, wanted, teacher)
-    document, found = sequence_cell(named.cell, named.settings, wanted, named.chance, tell=teacher.tell)
+    named, box = named_cell(name, case, toasts, wanted, teacher), teacher.toolbox
+    document, found = sequence_cell(named.cell, named.settings, wanted, named.chance, tell=teacher.tell, toolbox=box)
     if files:
         draw(named.cell, document, found, files)
     return {"task": named.name} | document
@@ -114,15 +145,24 @@ class NamedCell(NamedTuple):
 
 
 def named_cell(
-    name: str, case: str | None, toasts: int | None, wanted: SequencingOptions, teacher: Teacher
+    name: str,
+    case: str | None,
+    toasts: int | None,
+    wanted: SequencingOptions,
+    teacher: Teacher,
+    toolbox: Toolbox | None = None,
 ) -> NamedCell:
-    """The cell of that name; a task's skills are learned first. Raises BadInput for a world and what does not fit its file."""
+    """The cell of that name; a task's skills are learned first. toolbox: of the policies of sequencing, None: the teacher's.
+
+    Raises BadInput for a world and what does not fit its file.
+    """
+    wanted = wanted.by_policy()
     if case is not None and name == "toast":
         name, case = toast_case(case), None
     loaded, case = load_beside(name, InstanceRequest(wanted.layout, wanted.robots, case))
     if isinstance(loaded, GridWorld):
         raise BadInput(f"{name}: it is a world, there is nothing to sequence: learn it with lab teach {name}")
-    _check_names(wanted, loaded.sequencing)
+    _check_names(wanted, loaded.sequencing, toolbox or teacher.toolbox)
     if isinstance(loaded, CellFile):
         if wanted.parts is not None:
             raise BadInput(f"--parts {wanted.parts}: '{loaded.name}' is a cell: give its order with --case or --toasts")
@@ -136,7 +176,7 @@ def named_cell(
     return NamedCell(loaded.name, cell, loaded.sequencing, chance)
 
 
-def _check_names(wanted: SequencingOptions, settings: Sequencing) -> None:
+def _check_names(wanted: SequencingOptions, settings: Sequencing, toolbox: Toolbox) -> None:
     """Raise BadInput, before any work, for an unknown name, and for advice to a method that asks for none."""
     method, objective = wanted.method or settings.method, wanted.objective or settings.objective
     check_method(method)
@@ -145,9 +185,16 @@ def _check_names(wanted: SequencingOptions, settings: Sequencing) -> None:
     if wanted.advisor.row != "none" or wanted.gate != SequencingOptions.gate:
         methods.check_gate(wanted.gate)
     if wanted.policy is not None:
-        if method != "carried":
-            raise BadInput(f"--policy {wanted.policy} with --method {method}: only carried decides by one")
-        read_policy(wanted.policy)
+        if method not in (DECIDES, LEARNS):
+            who = f"only {DECIDES} decides by one, and {LEARNS} begins with one"
+            raise BadInput(f"--policy {wanted.policy} with --method {method}: {who}")
+        policy_named(str(wanted.policy), toolbox, wanted.policy_from)
+    for option, word in (("--practice", wanted.practice), ("--keep-policy", wanted.keep_policy)):
+        if word is not None and method != LEARNS:
+            raise BadInput(f"{option} {word} with --method {method}: only {LEARNS} learns a policy")
+    practice_cells(wanted.practice)
+    if wanted.keep_policy is not None:
+        check_keeping(wanted.keep_policy, toolbox)
     if wanted.advisor.row != "none" and method != "srl":
         raise BadInput(f"--advisor {wanted.advisor} with --method {method}: only srl asks for advice")
     if Limits.of(wanted.seconds, wanted.gap) != NO_LIMITS and wanted.advisor.row != "none":
@@ -176,22 +223,30 @@ def measured_cell(task: Task, toasts: int | None, wanted: SequencingOptions, tea
 
 
 def sequence_cell(
-    cell: Cell, settings: Sequencing, wanted: SequencingOptions, chance: Chance, *, tell: Tell = unheard
+    cell: Cell,
+    settings: Sequencing,
+    wanted: SequencingOptions,
+    chance: Chance,
+    *,
+    tell: Tell = unheard,
+    toolbox: Toolbox | None = None,
 ) -> tuple[dict[str, Any], list[SequenceResult]]:
     """The document of `lab sequence`, and the results of the method's sessions on a cell, beside a lower bound or a proof.
 
-    The sessions are run from their beginning each time an answer is taken back. Raises BadInput for an unknown method or
-    objective, and for an objective that the cell has no times for.
+    The sessions are run from their beginning each time an answer is taken back. toolbox: of the policies of sequencing, None: the
+    user's own. Raises BadInput for an unknown method or objective, and for an objective that the cell has no times for.
     """
+    wanted, box = wanted.by_policy(), Toolbox() if toolbox is None else toolbox
+    _check_names(wanted, settings, box)
     method = wanted.method or settings.method
-    check_method(method)
     search = search_for(
         settings,
         episodes=wanted.episodes,
         objective=wanted.objective,
         chance=chance if wanted.stochastic and SEQUENCERS[method].drawn else NO_CHANCE,
     )
-    search = replace(search, policy=None if wanted.policy is None else read_policy(wanted.policy))
+    begun = None if wanted.policy is None else policy_named(str(wanted.policy), box, wanted.policy_from)
+    search = replace(search, policy=begun, practice=practice_cells(wanted.practice))
     check_objective(search.objective, cell)
     tell(PhaseBegan("sequence", wanted.sessions))
     journal = wanted.keep(cell, search.objective) if wanted.advisor.row in EXTERNAL else None
@@ -218,6 +273,8 @@ def sequence_cell(
                 journal.rewind()
         found, interrupted = looked.sessions, looked.stopped_by == CTRL_C
         document = _document(cell, search, looked, wanted)
+        if method == LEARNS:
+            document |= _policy(learned_policy(cell, search, found, wanted.seed), wanted.keep_policy, box)
         if wanted.stochastic and not interrupted:
             best = min(found, key=lambda one: one.cost)
             document["stochastic"] = stochastic(cell, method, search, best, chance, wanted.seed)
@@ -230,6 +287,16 @@ def sequence_cell(
         if journal is not None:
             journal.close()
     return document, found
+
+
+@uninterrupted
+def _policy(learned: CarriedPolicy | None, keep: str | None, toolbox: Toolbox) -> dict[str, Any]:
+    """What a document says of a learned policy, None where the search was stopped before, once it is kept as it is asked for."""
+    kept = kept_policy(keep, learned, toolbox) if keep is not None and learned is not None else None
+    return {
+        "policy": None if learned is None else policy_record(learned),
+        "policy_kept": None if kept is None else str(kept),
+    }
 
 
 @uninterrupted
@@ -358,8 +425,9 @@ def stochastic(
 
     fixed = _planned(cell, method, search, found, seed)
     reaction = SEQUENCERS[method].react(cell, search.objective, seed, fixed)
-    if search.policy is not None:
-        reaction = carried_reaction(search.policy)
+    policy = getattr(found, "policy", None) or search.policy
+    if policy is not None:
+        reaction = carried_reaction(policy)
     episodes = max(FEWEST, min(REPLICATIONS, PLANNED // cell.parts**2)) if reaction.replans else REPLICATIONS
     costs = [replicate(cell, how, chance, episodes, seed, search.objective) for how in (fixed, reaction.policy)]
     difference = costs[0] - costs[1]

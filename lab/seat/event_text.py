@@ -8,12 +8,14 @@ from typing import Literal
 from lab.errors import counted
 from lab.learning.session_events import (
     AdviceEnded,
+    AdviceGiven,
     AdviceRejected,
     AdviceRequested,
     AdvisorDropped,
     AdvisorReadmitted,
     AdvisorsDisagreed,
     EpisodeEnded,
+    MoveJudged,
 )
 from lab.learning.session_events import Event as SessionEvent
 from lab.mdp import TabularMDP
@@ -82,6 +84,7 @@ class SessionText:
     named: Callable[[TabularMDP, int], str] = _label
     kind: str = "steps"
     _mean_before: float | None = None
+    _help: str = "advised"  # what was done with the moves that were helped
 
     def told(self, event: SessionEvent, mdp: TabularMDP | None = None, skill: str = "") -> Told | None:
         """The text for an event of this problem, None for none; skill: the name of the skill, if the text has to contain it."""
@@ -90,6 +93,10 @@ class SessionText:
                 self._mean_before = event.current_mean
                 about = f" about '{skill}'" if skill else ""
                 return Told(f"Episode {event.episode}: the learner asks for advice{about}.", "ask")
+            case MoveJudged():
+                self._help = "judged"
+            case AdviceGiven(action=int()):
+                self._help = "advised"
             case EpisodeEnded(guided=True):
                 return self._episode(event)
             case AdviceRejected():
@@ -119,7 +126,7 @@ class SessionText:
             outcome = self._counted(event.steps)
         text = f"Episode {event.episode} {outcome}{judged and f', {judged}'}"
         tone: Tone = "" if good is None else "good" if good else "bad"
-        return Told(f"{text}; moves advised: {event.helped_steps}.", tone)
+        return Told(f"{text}; moves {self._help}: {event.helped_steps}.", tone)
 
     def _counted(self, steps: int | float) -> str:
         if self.kind == "order":

@@ -6,10 +6,10 @@ from contextlib import suppress
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from lab.advice.entries import Answer
+from lab.advice.entries import Answer, Praise
 from lab.advice.panel import Panel
 from lab.learning.problem import Problem
-from lab.learning.requests import AdviceRequest, Ask, Request
+from lab.learning.requests import AdviceRequest, Ask, Reply, Request
 from lab.learning.session_events import EpisodeEnded
 from lab.mdp import FloatArray
 from lab.seat.grid_text import skill_of
@@ -105,7 +105,7 @@ class LessonSeat:
         lesson = self._lesson
         if lesson is None or time.monotonic() - self._worth_s < WORTH_S:
             return
-        if not any(isinstance(entry, Answer) for entry in lesson.journal.entries):
+        if not any(isinstance(entry, Answer | Praise) for entry in lesson.journal.entries):
             return
         if self._values[0] is not lesson.plan.problem:
             self._values = (lesson.plan.problem, known_values(lesson.plan))
@@ -113,7 +113,7 @@ class LessonSeat:
         self._worth_s = time.monotonic()
         page.receipt(worth.to_json() | {"lines": worth.lines()})
 
-    def _show_answer(self, request: Request, action: int | None) -> None:
+    def _show_answer(self, request: Request, action: Reply) -> None:
         """Show on the page a question that goes to somebody else, at most every SEEN_S; in a replay, show all."""
         asked_here, self._asked_here = self._asked_here, False
         if self._pace is not None:
@@ -125,7 +125,7 @@ class LessonSeat:
                 self._show_state(request)
                 self.page.look(request)
 
-    def _replay(self, request: Request, action: int | None, pace: ReplayPace) -> None:
+    def _replay(self, request: Request, action: Reply, pace: ReplayPace) -> None:
         """Show a question with its answer, until the next one is due."""
         if self.page is not None:
             self._set_scene(request)
@@ -153,7 +153,7 @@ class LessonSeat:
             people["web"] = self._ask_page
         return people
 
-    def _ask_terminal(self, request: Request) -> int | None:
+    def _ask_terminal(self, request: Request) -> Reply:
         """The answer from the terminal; a page shows the question as well, and can answer it."""
         assert self._prompt is not None
         self._asked_here = True
@@ -168,7 +168,7 @@ class LessonSeat:
             if self.page is not None:
                 self.page.withdraw()
 
-    def _ask_page(self, request: Request) -> int | None:
+    def _ask_page(self, request: Request) -> Reply:
         assert self.page is not None
         self._asked_here = True
         self._set_scene(request)

@@ -65,7 +65,8 @@ def choice(request: AdviceRequest, marks: Marks, brief: bool = False) -> str:
     where = leads(request, own)
     if brief:
         return f"{marks.named(request.mdp, own)} {where}." if where else ""
-    said = f"Alone the learner would now go {marks.named(request.mdp, own)}"
+    does = "The learner now goes" if request.judgement == "only" else "Alone the learner would now go"
+    said = f"{does} {marks.named(request.mdp, own)}"
     where = f"; that {where}" if where else ""
     if max(chances) - min(chances) < ALIKE and len(chances) > 1:
         return f"{said}, drawn at random: all moves are alike to it here ({percent(chances[own])} each){where}."
@@ -130,11 +131,12 @@ def standing(request: AdviceRequest, brief: bool = False) -> str:
     now = request.standing
     allowed = f" of {now.budget}" if now.budget < GateSettings.budget else ""
     said = f"{now.helped_steps}{allowed} moves" if allowed else counted(now.helped_steps, "move")
+    done = "Judged" if request.judgement == "only" else "Advised"
     if brief:
         limit = "" if now.by_evidence else f" of {now.omega}" if now.omega else ", none allowed"
-        return f"Advised {said}; misled {now.misleads}{limit}."
+        return f"{done} {said}; misled {now.misleads}{limit}."
     limit = "" if now.by_evidence else f", tolerated: {now.omega}"
-    return f"Advised so far: {said}; episodes misled: {now.misleads}{limit}."
+    return f"{done} so far: {said}; episodes misled: {now.misleads}{limit}."
 
 
 # ---- axes, goal and hidden cells in words ---------------------------------------------------------------------------

@@ -105,6 +105,10 @@ _SHIPPED: dict[str, Sequencer] = {
     "srl-improved": Sequencer(
         lambda: deferred.srl_improved, "our own: learns where in the order moves belong, from episodes that it improves"
     ),
+    "srl-linear": Sequencer(
+        lambda: deferred.srl_linear,
+        "srl with values that are linear in features: learns weights, which --keep-policy keeps",
+    ),
     "mc": Sequencer(lambda: deferred.monte_carlo, "Monte Carlo: averages the returns of the episodes", drawn=True),
     "random": Sequencer(lambda: deferred.random_search, "the best of so many sequences drawn evenly", drawn=True),
     "fifo": Sequencer(lambda: deferred.fifo, "first in, first out: a queue of tasks", react=_queued, alone=True),

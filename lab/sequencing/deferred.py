@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from lab.sequencing.methods.srl import srl
     from lab.sequencing.methods.srl_advised import AdvisedResult, advised_srl, check_gate
     from lab.sequencing.methods.srl_improved import srl_improved
+    from lab.sequencing.methods.srl_linear import srl_linear
     from lab.sequencing.methods.srl_time import reacting, srl_time
 
 TABLE = {
@@ -40,6 +41,7 @@ TABLE = {
     "lab.sequencing.methods.srl": ("srl",),
     "lab.sequencing.methods.srl_advised": ("AdvisedResult", "advised_srl", "check_gate"),
     "lab.sequencing.methods.srl_improved": ("srl_improved",),
+    "lab.sequencing.methods.srl_linear": ("srl_linear",),
     "lab.sequencing.methods.srl_time": ("reacting", "srl_time"),
     "numpy.random": ("default_rng",),
 }

@@ -114,8 +114,9 @@ class Search:
     """The request to a sequencer: episodes, objective, chance, settings, and the listener. Raises BadInput for episodes below 1.
 
     chance: the distributions of processing times and arrivals while it learns. settings: those of SRL and Monte Carlo; other
-    methods have none. policy: of the method `carried`; None: the policy that ships. shared: where a method without episodes
-    reports incumbents and bounds and checks whether to go on.
+    methods have none. policy: of the method `carried` (None: the policy that ships), or the one that `srl-linear` begins with.
+    practice: further cells in which `srl-linear` learns. shared: where a method without episodes reports incumbents and bounds
+    and checks whether to go on.
     """
 
     episodes: int = 400
@@ -124,6 +125,7 @@ class Search:
     settings: SrlSettings = field(default_factory=SrlSettings)
     on_episode: OnEpisode | None = None
     policy: "CarriedPolicy | None" = None
+    practice: tuple[Cell, ...] = ()
     shared: WatchedSearch | None = None
 
     def __post_init__(self) -> None:

@@ -11,7 +11,9 @@ import numpy as np
 
 from lab.errors import BadInput, LabError, counted
 from lab.learning.problem import Problem
+from lab.mdp import BoolArray
 from lab.sequencing.cell.precedence import Precedence, RouteStep
+from lab.sim.arms.arm_models import arm_of
 from lab.sim.parts.kinds import Spot
 from lab.sim.scene.places import Layout, Places
 from lab.sim.scene.scene_check import check_apart, check_scene, places_of
@@ -130,6 +132,17 @@ class Prepared:
     def words(self) -> str:
         """The order in words, such as "3 slices"."""
         return in_words(self.order)
+
+    def reach(self, name: str) -> BoolArray:
+        """The states of a skill's problem that the arm can reach, whatever is in the way, (S,) bool; all if no arm moves."""
+        skill, arm = self.skillset.skills[name], arm_of(self.task.robot, self.task.folder)
+        states = range(self.problems[name].mdp.n_states)
+        if not skill.moves_arm:
+            return np.ones(len(states), bool)
+        poses = np.array([[pose.x, pose.y, pose.z, pose.yaw] for pose in map(skill.pose, states)])
+        reached: BoolArray = np.hypot(poses[:, 0], poses[:, 1]) >= arm.nearest_m
+        reached &= ~np.isnan(arm.inverse_each(poses)[:, 0])
+        return reached
 
 
 def lay_out(task: Task, order: Order, seed: int) -> Layout:

@@ -3,7 +3,7 @@
 import json
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, ValidationError
 
@@ -27,27 +27,35 @@ class _Held(Record):
     learned_on: str = ""
 
 
+def policy_record(policy: CarriedPolicy) -> dict[str, Any]:
+    """The JSON form of a policy."""
+    held = _Held(format=FORMAT, weights=dict(policy.weights), objective=policy.objective, learned_on=policy.learned_on)
+    return held.model_dump()
+
+
 def write_policy(path: Path, policy: CarriedPolicy) -> None:
     """Writes a policy to a file, whole or not at all, equal policies with equal bytes; raises BadInput when it cannot."""
-    held = _Held(format=FORMAT, weights=dict(policy.weights), objective=policy.objective, learned_on=policy.learned_on)
-    write_whole(path, json.dumps(held.model_dump(), indent=1) + "\n")
+    write_whole(path, json.dumps(policy_record(policy), indent=1) + "\n")
 
 
 def read_policy(path: Path, where: str = "--policy") -> CarriedPolicy:
     """The policy in a file; raises BadInput, in one line that names the file, when it cannot be read or is damaged."""
-    text = read_text(path)
+    return policy_of(read_text(path), f"policy {path} ({where})")
+
+
+def policy_of(text: str, whose: str) -> CarriedPolicy:
+    """The policy in a JSON text; raises BadInput, in one line that begins with `whose`, when it holds none."""
     try:
         held = _Held.model_validate_json(text)
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         at = ".".join(str(part) for part in first["loc"])[:60]
-        raise BadInput(
-            f"policy {path} ({where}): {f'{at}: ' if at else ''}{first['msg']}; wanted what lab study run carried-over writes"
-        ) from None
+        wanted = "wanted what lab study run carried-over or --keep-policy writes"
+        raise BadInput(f"{whose}: {f'{at}: ' if at else ''}{first['msg']}; {wanted}") from None
     try:
         return CarriedPolicy(held.weights, held.objective, held.learned_on)
     except BadInput as error:
-        raise BadInput(f"policy {path} ({where}): {error}") from None
+        raise BadInput(f"{whose}: {error}") from None
 
 
 # ---- The settings of sequencing ---------------------------------------------------------------------------------------

@@ -8,7 +8,7 @@ from lab.advice.journal import Journal
 from lab.advice.table_level import PolicyAdvisor
 from lab.learning import session_events as session
 from lab.learning.problem import Problem
-from lab.learning.requests import Advisor, Request
+from lab.learning.requests import Advisor, Reply, Request
 from lab.learning.session import Session
 from lab.learning.settings import GateSettings
 from lab.sequencing.cell.cell import MAX_PARTS
@@ -72,10 +72,10 @@ class LessonEvent:
 
 @dataclass(frozen=True)
 class QuestionAnswered:
-    """An advisor answered a request; action: None if the step was left to the learner."""
+    """An advisor answered a request; action: None if the step was left to the learner; it may be a judgement."""
 
     request: Request
-    action: int | None
+    action: Reply
 
 
 @dataclass(frozen=True)

@@ -51,6 +51,8 @@ class OrderSessionOptions(SessionOptions):
     policy: str | None = None
     seconds: float | None = None
     gap: float | None = None
+    practice: str | None = None
+    keep_policy: str | None = None
 
     def complete(self) -> "OrderSessionOptions":
         """The options themselves. Raises BadInput if they name nothing to sequence."""
@@ -72,7 +74,11 @@ class OrderSessionOptions(SessionOptions):
         """A plain dict with absolute paths, which are valid from any folder."""
         beside = {"layout": self.layout, "policy": self.policy}
         whole = {name: None if path is None else str(Path(path).absolute()) for name, path in beside.items()}
-        return asdict(self) | {"task": whole_path(self.task)} | whole
+        later = {
+            name for name in ("practice", "keep_policy") if getattr(self, name) is None
+        }  # older journals lack them
+        given = {name: value for name, value in asdict(self).items() if name not in later}
+        return given | {"task": whole_path(self.task)} | whole
 
     @property
     def beside(self) -> InstanceRequest:

@@ -7,6 +7,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Protocol
 
+from lab.advice.advisors import split_praise
 from lab.errors import BadInput, LabError
 from lab.learning.problem import Problem
 from lab.learning.requests import AdviceRequest, AdvisorLeft
@@ -40,6 +41,10 @@ class Subject(Protocol):
 
     def tried(self, problem: Problem, policy: Policy) -> str | None:
         """Tries the policy in physics; returns why it failed, None if it did not, or if there is no simulation."""
+        return None
+
+    def reach(self) -> BoolArray | None:
+        """The states of the prepared problem that the arm can reach, (S,) bool; None for all, or if there is no arm."""
         return None
 
     def draw(self, policy: Policy, out: Path) -> dict[str, str]:
@@ -92,6 +97,11 @@ def one_lesson(
     sessions: those of the run that the lesson belongs to. Raises BadInput if the policy called `name` is of another problem.
     """
     teacher, plan = planned(subject, teacher, name, sessions)
+    return carried_out(subject, teacher, plan, out)
+
+
+def carried_out(subject: Subject, teacher: Teacher, plan: LessonPlan, out: Path | None) -> dict[str, Any]:
+    """The document of `one_lesson` after the planned lesson."""
     problem, lesson = plan.problem, teacher.teach(plan)
     document = document_of(problem, lesson, teacher) | subject.facts()
     if out is None:
@@ -125,7 +135,8 @@ def replay(kept: KeptSession, subject: Subject, tell: Tell) -> dict[str, Any]:
     tell: receives the events. Raises KeyboardInterrupt on Ctrl-C.
     """
     options = kept.options
-    advising = options.advising(dict.fromkeys(options.advisors, _nobody))  # the journal answers for people
+    people = [split_praise(name)[0] for name in options.advisors]
+    advising = options.advising(dict.fromkeys(people, _nobody))  # the journal answers for people
     with TemporaryDirectory() as folder:
         teacher = Teacher(Toolbox(folder), advising, options.seed, tell, keep=kept.keep, begun=kept.begun)
         try:

@@ -9,6 +9,7 @@ from annotated_types import Ge, Le
 from pydantic import TypeAdapter, ValidationError
 
 from lab.advice.advising import Advising
+from lab.advice.advisors import PRAISE, split_praise
 from lab.errors import BadInput
 from lab.files import is_file
 from lab.learning.requests import Ask
@@ -58,6 +59,8 @@ def whole_path(name: str | None) -> str | None:
 
 def recorded_whole(advisor: str) -> str:
     """An advisor's name, in which the path of a record or of a policy's file is absolute."""
+    if (judge := split_praise(advisor)) != (advisor, ""):
+        return f"{PRAISE}:{judge[1]}{recorded_whole(judge[0])}"
     kind, _, path = advisor.partition(":")
     is_path = path and (kind == "recorded" or (kind == "policy" and is_file(path)))
     return f"{kind}:{Path(path).absolute()}" if is_path else advisor

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 from math import inf
+from typing import Protocol
 from zlib import crc32
 
 import numpy as np
@@ -11,8 +12,9 @@ from lab.advice.advising import Advising
 from lab.advice.journal import Journal
 from lab.learning import session_events as session
 from lab.learning.environment import TableEnvironment
+from lab.learning.praise import Judging
 from lab.learning.problem import Problem
-from lab.learning.requests import Advisor, Request, Walked
+from lab.learning.requests import Advisor, Reply, Request, Walked
 from lab.learning.session import Session
 from lab.learning.session_events import AdviceEnded, AdviceRejected
 from lab.learning.session_result import SessionResult
@@ -27,6 +29,13 @@ from lab.toolbox.policy import Policy
 MORE_SESSIONS = 8  # the limit on sessions for a shorter path, once the goal is reached
 WARM_EPISODES = 29  # of a session that begins from what was learned elsewhere
 WARM_EXPLORATION = 0.1  # of the usual exploration, so that what was learned elsewhere is tried, not forgotten
+
+
+class RunsSessions(Protocol):
+    """What a teacher runs: the sessions of a lesson, such as `Sessions`."""
+
+    def run(self) -> SessionResult:
+        """The result of all sessions."""
 
 
 class Sessions:
@@ -131,8 +140,9 @@ class TellingAdvisor:
     def __init__(self, advisor: Advisor, tell: Tell):
         self._advisor, self._tell = advisor, tell
         self.followed: Callable[[Walked], None] | None = getattr(advisor, "followed", None)
+        self.judging: Judging | None = getattr(advisor, "judging", None)
 
-    def advise(self, request: Request) -> int | None:
+    def advise(self, request: Request) -> Reply:
         """The advisor's answer."""
         action = self._advisor.advise(request)
         self._tell(QuestionAnswered(request, action))

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from lab.errors import BadInput
 from lab.learning.problem import Problem
+from lab.mdp import BoolArray
 from lab.skills import Skill
 from lab.skills.prepared_scene import Prepared, prepare
 from lab.skills.skillset import SkillSet
@@ -53,6 +54,11 @@ class SkillSubject(Subject):
         """Why the skill failed in physics, None if it did not."""
         assert self.scene is not None
         return trial_of(self.scene)(problem, policy)
+
+    def reach(self) -> BoolArray:
+        """The states that the arm can reach."""
+        assert self.scene is not None
+        return self.scene.reach(self.skill)
 
     def draw(self, policy: Policy, out: Path) -> dict[str, str]:
         """Draws the values over the picture that the problem was read from, if there is one."""

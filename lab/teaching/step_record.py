@@ -49,7 +49,7 @@ class StepRecord:
         elif isinstance(event, SessionBegan):
             event.session.environment = _recorded(event.session.environment, self)
         elif isinstance(event, QuestionAnswered):
-            self._advised = event.action is not None
+            self._advised = isinstance(event.action, int)
         elif isinstance(event, LessonEvent) and isinstance(event.event, EpisodeEnded) and self._now is not None:
             steps = event.event.steps  # a float only for a score that is no number of steps
             self._now.steps = steps if isinstance(steps, int) else len(self._now.actions)

@@ -13,7 +13,7 @@ from lab.learning.session_result import SessionResult
 from lab.mdp import TabularMDP
 from lab.teaching.events import KeptBeside, LessonBegan, LessonContinued, PolicyAdvises, RecordSkipped, Tell, unheard
 from lab.teaching.lesson_plan import Interrupted, Keep, Lesson, LessonPlan, Source, Trial
-from lab.teaching.lesson_sessions import Sessions, fits, joined
+from lab.teaching.lesson_sessions import RunsSessions, Sessions, fits, joined
 from lab.toolbox.fitness import Fitness, best_fit, reference
 from lab.toolbox.index import KnownPolicies
 from lab.toolbox.policy import MAX_NAME_LENGTH, Origin, Policy, is_name
@@ -30,7 +30,7 @@ class Teacher:
 
     keep: returns the journal of a lesson, by default one that is not written; begun: for a resumed lesson, returns the policy
     that it continued or was warm-started from; trial: tries a learned policy in physics before it is saved, and a found one
-    before it is used.
+    before it is used; sessions: makes the sessions of a lesson, with the arguments of `Sessions` and its method `run`.
     """
 
     toolbox: Toolbox
@@ -40,6 +40,7 @@ class Teacher:
     keep: Keep = lambda plan: Journal()
     begun: Callable[[Problem], Policy | None] | None = None
     trial: Trial | None = None
+    sessions: Callable[..., RunsSessions] = Sessions
 
     def find_or_teach(self, plan: LessonPlan, known: KnownPolicies) -> Lesson:
         """A policy that reaches the goal of this problem: found in `known`, or learned now.
@@ -167,7 +168,7 @@ class Teacher:
             while result is None:
                 self.tell(LessonBegan(plan, journal))
                 try:
-                    result = Sessions(plan, self.advising, self.seed, journal, self.tell).run()
+                    result = self.sessions(plan, self.advising, self.seed, journal, self.tell).run()
                 except Again:  # an answer was taken back
                     journal.rewind()
             name = plan.name or self._free_name(problem, result.solved)

@@ -51,6 +51,15 @@ def load(place: FilePlace, kind: str, key: str) -> dict[str, Any] | None:
     return record if (whole["kind"], whole["key"]) == (kind, key) else None
 
 
+def keys(place: FilePlace, kind: str) -> list[str]:
+    """The keys of the sound records of a kind, sorted."""
+    folder, found = f"{FOLDER}/{slug(kind)}", list[str]()
+    for name in place.names(folder):
+        with suppress(BadInput):
+            found.append(str(_read(place, f"{folder}/{name}")["key"]))
+    return sorted(found)
+
+
 def faults(place: FilePlace) -> dict[str, str]:
     """The fault of each record's file by name, "" for sound ones."""
     faulty = {}
@@ -324,6 +333,10 @@ class Toolbox:
     def load_record(self, kind: str, key: str) -> dict[str, Any] | None:
         """The record of that kind and key, None if there is none. Raises BadInput if its file is damaged or was edited."""
         return load(self.place, kind, key)
+
+    def record_keys(self, kind: str) -> Words:
+        """The keys of the sound records of a kind, sorted."""
+        return keys(self.place, kind)
 
     def _content(self, file: str) -> bytes:
         try:

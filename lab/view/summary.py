@@ -107,12 +107,34 @@ def lesson_summary(lesson: Mapping[str, Any]) -> RenderableType:
         f"learned path: {_way(lesson)}: {_verdict(lesson)}",
         *([_advice(lesson)] if lesson["requests"] else []),  # otherwise the receipt says that nobody was asked
         *(["it went on from what was left unfinished"] if lesson["source"] == "continued" else []),
-        *lesson["receipt"]["lines"],
+        *(_peers(lesson) if "peers" in lesson else lesson["receipt"]["lines"]),
         f"saved as '{lesson['saved_as']}' (seed {lesson['seed']})",
-        f"its journal: {lesson['session']} (lab replay shows it again)",
+        *([] if "peers" in lesson else [f"its journal: {lesson['session']} (lab replay shows it again)"]),
         *lesson["files"].values(),
+        *(line for other in lesson.get("others", ()) for line in _other_task(other)),
     ]
     return Group(*map(Text, lines))
+
+
+def _other_task(lesson: Mapping[str, Any]) -> Iterator[str]:
+    """The lines of the lesson of another task, which peers learned at the same time."""
+    yield f"in task '{lesson['task']}', peer {lesson['best_peer']}: learned path: {_way(lesson)}: {_verdict(lesson)}"
+    yield f"saved as '{lesson['saved_as']}' (seed {lesson['seed']})"
+    yield from lesson["files"].values()
+
+
+def _peers(lesson: Mapping[str, Any]) -> Iterator[str]:
+    """A line for each peer: its path, its moves, how often the others answered it, and what it trusts them."""
+    yield f"this is peer {lesson['best_peer']}: solved, then the shortest path, then the fewest moves"
+    for peer in lesson["peers"]:
+        path = "misses the goal" if peer["final_steps"] is None else counted(peer["final_steps"], "step")
+        others = ", ".join(
+            f"{other['peer']}: {other['answered']} of {other['asked']} (trust {other['trust']:.2f}"
+            f"{', dropped' if other['dropped'] else ''})"
+            for other in peer["others"]
+        )
+        arm = f" with the arm {peer['arm']}" if peer["arm"] else ""
+        yield f"peer {peer['peer']}{arm}: {path}, {counted(peer['moves'], 'move')}, {peer['helped_steps']} helped; asked {others}"
 
 
 def replay_summary(replay: Mapping[str, Any]) -> RenderableType:
@@ -275,6 +297,10 @@ def sequence_summary(document: Mapping[str, Any]) -> RenderableType:
         lines.append(text if episode is None else f"{text}; rejected its advisor in episode {episode}")
     if document["stochastic"] is not None:
         lines += _drawn(document["stochastic"], unit)
+    if document.get("policy_kept") is not None:
+        lines.append(f"the learned policy is kept in {document['policy_kept']}")
+    elif document.get("policy", ()) is None:
+        lines.append("the search was stopped before a policy was learned")
     return Group(*map(Text, [*lines, *document["files"].values()]))
 
 

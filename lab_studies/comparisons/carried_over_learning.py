@@ -8,13 +8,12 @@ import numpy as np
 from lab.errors import BadInput
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import MAKESPAN, check_built_in, check_objective, cost
-from lab.sequencing.methods.carried_over import Decider
+from lab.sequencing.methods.carried_over import Decider, without_idle
 from lab.sequencing.methods.carried_over_policy import FEATURES, CarriedPolicy
+from lab.sequencing.methods.evolution import Evolution
 from lab.sequencing.methods.rules import dispatch, usable
-from lab.sequencing.search import SAME
 from lab.sequencing.simulate.cell_arrays import Floats
 from lab.sequencing.simulate.run import Run
-from lab_studies.comparisons.evolution import Evolution
 
 WORST = 3.0  # times the best rule's cost; a run that costs more, such as a deadlock, counts as this
 
@@ -73,38 +72,24 @@ def learn_policy(
         heard(number, float(costs.mean()))
         if number > settings.generations * 3 // 4:
             late.append(evolution.mean / np.linalg.norm(evolution.mean))
-    weights = school.without_idle(np.mean(late, axis=0))
+    weights = without_idle(np.mean(late, axis=0), school.deciders)
     kept = {name: round(float(weight), 4) for name, weight in zip(FEATURES, weights, strict=True) if weight}
     return CarriedPolicy(kept, objective, learned_on)
 
 
 class _School:
-    """The training cells, and the best rule's cost of each."""
+    """The training cells, by their `deciders`, and the best rule's cost of each."""
 
     def __init__(self, cells: Sequence[Cell], objective: str) -> None:
-        self._deciders = [Decider(cell, objective) for cell in cells]
+        self.deciders = [Decider(cell, objective) for cell in cells]
         self._scales = [_best_rule(cell, objective) for cell in cells]
 
     def costs(self, candidates: Floats, chosen: Sequence[int] | np.ndarray) -> Floats:
         """The mean ratio (N,) of the costs of candidates (N, F) to the best rule's in the chosen cells."""
         total = np.zeros(len(candidates))
         for number in chosen:
-            total += np.minimum(WORST, self._deciders[number].costs(candidates) / self._scales[number])
+            total += np.minimum(WORST, self.deciders[number].costs(candidates) / self._scales[number])
         return total / len(chosen)
-
-    def without_idle(self, weights: Floats) -> Floats:
-        """The weights after setting to 0, one after another, those that make no difference in any cell."""
-        costs = self._each(weights)
-        for number in np.argsort(np.abs(weights)):
-            without = weights.copy()
-            without[number] = 0.0
-            if (np.abs(self._each(without) - costs) <= SAME).all():
-                weights = without
-        return weights
-
-    def _each(self, weights: Floats) -> Floats:
-        """The costs (cells,) of the runs by these weights."""
-        return np.array([decider.costs(weights[None])[0] for decider in self._deciders])
 
 
 def _best_rule(cell: Cell, objective: str) -> float:

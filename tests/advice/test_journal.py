@@ -20,6 +20,7 @@ from lab.advice.entries import (
     Answer,
     Closed,
     Entry,
+    Praise,
     SessionEntry,
     Undone,
     entry_of,
@@ -33,8 +34,9 @@ from lab.advice.table_level import TableLevel
 from lab.errors import BadInput, WorkFailed
 from lab.learning import session as learning
 from lab.learning.environment import TableEnvironment
-from lab.learning.requests import AdviceRequest, AdvisorLeft, Ask
-from lab.learning.session_events import AdviceGiven, Ending, EpisodeEnded, Event, Verdict
+from lab.learning.praise import MOST_MOVES, MOST_VALUE, Judgement
+from lab.learning.requests import AdviceRequest, AdvisorLeft, Ask, Reply
+from lab.learning.session_events import AdviceGiven, Ending, EpisodeEnded, Event, MoveJudged, Verdict
 from lab.learning.session_result import SessionResult
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import TabularMDP, grid
@@ -308,6 +310,10 @@ def entries() -> st.SearchStrategy[Entry]:
         fields = {name: BY_FIELD.get(name, whole_numbers) for name in kind.__dataclass_fields__}
         if kind is EpisodeEnded:
             fields["steps"] = numbers  # of an order: its cost
+        if kind is MoveJudged:
+            fields["action"] = whole_numbers
+        if kind is Praise:
+            fields |= {"value": st.integers(-MOST_VALUE, MOST_VALUE), "moves": st.integers(0, MOST_MOVES)}
         return st.builds(kind, **fields)
 
     return st.one_of(*map(of, KINDS.values()))
@@ -430,3 +436,50 @@ def test_what_is_no_journal_stays(tmp_path: Path) -> None:
     with pytest.raises(BadInput, match="holds a session already"):
         Journal.begin(tmp_path, HEAD)
     assert (tmp_path / "events.jsonl").read_bytes() == b'{"kind": "mine"'
+
+
+# ---- judgements -----------------------------------------------------------------------------------------------------
+
+
+def judges(request: AdviceRequest) -> Reply:
+    """Blames every second move, praises every third other one, and says nothing of the rest."""
+    return Judgement(-2, 3) if request.step % 2 else Judgement(1) if request.step % 3 else None
+
+
+def judged_lesson(journal: Journal, ask: Ask) -> tuple[SessionResult, list[Event]]:
+    place, told, rng = TableEnvironment(board()), list[Event](), np.random.default_rng(5)
+
+    def tell(event: Event) -> None:
+        journal.tell(event)
+        told.append(event)
+
+    advisor = Advising.of(("praise:terminal",), {"terminal": ask}).gather(place, LEARNER, rng, journal=journal)
+    return learning.Session(place.mdp, LEARNER, GATE, advisor, rng).run(tell), told
+
+
+def test_judgements_are_kept_and_answer_when_the_session_is_run_again() -> None:
+    journal = Journal()
+    result, told = judged_lesson(journal, judges)
+    given = [entry for entry in journal.entries if isinstance(entry, Praise)]
+    assert {(entry.by, entry.value, entry.moves) for entry in given} == {("terminal", -2, 3), ("terminal", 1, 0)}
+    assert len(given) == result.helped_steps > 10
+    journal.rewind()
+    again, told_again = judged_lesson(journal, lambda request: pytest.fail("the journal answers"))
+    assert told_again == told
+    assert (again.q == result.q).all()
+
+
+def test_a_judgement_may_be_taken_back() -> None:
+    given: list[Entry] = [Praise("terminal", 4, 1, 0, 1, 0), Answer("terminal", 4, 2, 0, None)]
+    assert undoable(given, "terminal") == 1
+    assert undoable(given[:1], "terminal") == 0
+    assert undoable(given[:1], "web") is None
+
+
+def test_a_judgement_where_an_action_is_wanted_was_edited() -> None:
+    """Replayed with an advisor of another kind, the session differs."""
+    journal = Journal()
+    judged_lesson(journal, judges)
+    journal.rewind()
+    with pytest.raises(WorkFailed, match="cannot be run again"):
+        lesson(journal, person)

@@ -13,7 +13,7 @@ from lab.advice.advisors import AdvisorName, Person
 from lab.advice.entries import Answer, Closed, Entry
 from lab.advice.journal import Journal
 from lab.advice.panel import Panel, PanelSettings, members_of
-from lab.advice.receipt import OVERRULED, SILENT, UNHEARD, WIDTH, Receipt, receipt
+from lab.advice.receipt import OVERRULED, SILENT, UNHEARD, WIDTH, Judgements, Receipt, receipt
 from lab.advice.table_level import TableLevel
 from lab.learning.requests import AdviceRequest, AdvisorLeft
 from lab.learning.session import Session
@@ -29,6 +29,7 @@ from lab.learning.session_events import (
     Ending,
     EpisodeEnded,
     Event,
+    MoveJudged,
     Verdict,
 )
 from lab.learning.settings import GateSettings, LearnerSettings
@@ -326,6 +327,7 @@ ENTRIES = st.one_of(
     st.builds(AdviceRejected, small, small, small, small, numbers),
     st.builds(AdviceEnded, small, st.sampled_from(get_args(Ending))),
     st.builds(AdviceRemembered, small, small),
+    st.builds(MoveJudged, small, small, small, small, small, small),
     st.builds(AdvisorsDisagreed, small, small, small, st.lists(st.tuples(names, small), max_size=3).map(tuple), small),
     st.builds(AdvisorDropped, small, names, numbers, names),
     st.builds(AdvisorReadmitted, small, names, numbers, names),
@@ -336,7 +338,8 @@ ENTRIES = st.one_of(
 @given(st.lists(ENTRIES, max_size=40), st.booleans(), st.integers(1, 4))
 def test_any_journal_has_a_receipt(entries: list[Entry], known: bool, window: int) -> None:
     found = receipt(entries, corridor(), VALUES if known else None, window)
-    assert found.questions == found.taken + found.refused.get(SILENT, 0)
+    judged = sum(isinstance(entry, MoveJudged) for entry in entries)
+    assert 0 <= found.questions - found.taken - found.refused.get(SILENT, 0) <= judged
     assert found.guided <= found.episodes
     assert 0 <= found.better <= found.guided
     assert 0 <= found.agreed <= found.taken
@@ -353,3 +356,37 @@ def test_any_journal_has_a_receipt(entries: list[Entry], known: bool, window: in
     assert max(map(len, lines)) <= WIDTH
     assert all(line.isprintable() for line in lines)
     json.dumps(found.to_json(), allow_nan=False)
+
+
+# ---- judgements -----------------------------------------------------------------------------------------------------
+
+
+def test_judgements_by_hand() -> None:
+    """Three of single moves: right praised, left praised (wrong), right blamed (wrong); one of two moves; one question open."""
+    journal: list[Entry] = [
+        ended(1, 10),
+        asked(2),
+        MoveJudged(2, 1, 0, RIGHT, 1, 1),
+        MoveJudged(2, 2, 1, LEFT, 2, 1),
+        MoveJudged(2, 3, 0, RIGHT, -1, 1),
+        MoveJudged(2, 4, 1, RIGHT, -1, 2),
+        AdviceGiven(2, 5, 2, None, RIGHT),
+        ended(2, 5, 4),
+    ]
+    found = receipt(journal, corridor(), VALUES)
+    assert found.judged == Judgements(praised=2, blamed=2, single=3, against_best=2)
+    assert (found.questions, found.taken, found.helped_steps, found.refused) == (5, 0, 4, {SILENT: 1})
+    assert "  judged: 2 times good, 2 times bad; 2 of 3 against what was best" in found.lines()
+    assert not found.hints
+    unknown = receipt(journal, corridor(), None)
+    assert unknown.judged == Judgements(2, 2, 3, None)
+    assert unknown.to_json()["judged"] == {"praised": 2, "blamed": 2, "single": 3, "against_best": None}
+
+
+def test_a_judgement_beside_an_action_is_the_same_question() -> None:
+    journal: list[Entry] = [MoveJudged(1, 2, 0, RIGHT, 1, 1), AdviceGiven(1, 2, 1, RIGHT, LEFT), ended(1, 3, 2)]
+    assert receipt(journal, corridor(), VALUES).questions == 1
+
+
+def test_a_receipt_without_judgements_does_not_mention_them() -> None:
+    assert "judged" not in receipt(LESSON, corridor(), VALUES).to_json()

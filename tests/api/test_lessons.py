@@ -32,6 +32,28 @@ def test_it_learns_what_the_command_learns(request: pytest.FixtureRequest, tmp_p
     assert lesson.session.steps.tolist() == command["steps_per_episode"]
 
 
+def test_peers_learn_what_the_command_lets_them_learn(request: pytest.FixtureRequest, tmp_path: Path) -> None:
+    words = ("teach", "world-1", "--peers", "2", "--episodes", "12", "--toolbox", str(tmp_path), "--json")
+    command = json.loads(request.getfixturevalue("lab")(*words).out)
+    lesson = lab.teach("world-1", peers=2, episodes=12)
+    assert lesson.document == {name: command[name] for name in lesson.document}
+    assert [len(peer.session.steps) for peer in lesson.peers] == [12, 12]
+    with pytest.raises(lab.BadInput, match="record beside peers"):
+        lab.teach("world-1", peers=2, record=True)
+    with pytest.raises(lab.BadInput, match="peers"):
+        lab.teach("world-1", peers=1)
+    with pytest.raises(lab.BadInput, match=r"peer_tasks 'toast-panda'.*: wanted a list"):
+        lab.teach("insert", peer_tasks="toast-panda")
+
+
+def test_two_arms_learn_a_sub_task_as_peers(tmp_path: Path) -> None:
+    lesson = lab.teach("insert", peer_tasks=["toast-panda"], episodes=40, seed=1, toolbox=tmp_path)
+    assert [peer.arm for peer in lesson.peers] == ["up6", "panda"]
+    assert [len(peer.session.steps) for peer in lesson.peers] == [40, 40]
+    assert lesson.policy.arm == "up6"
+    assert {row["arm"] for row in lab.Toolbox(tmp_path).list()} == {"up6", "panda"}
+
+
 def test_an_advisor_is_a_function() -> None:
     lesson = lab.teach(lab.world(ROWS), advisor=right_then_down, gate="always", episodes=5, seed=0)
     assert lesson.session.steps.tolist() == [4] * 5  # right, right, down, down

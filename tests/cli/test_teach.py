@@ -46,6 +46,11 @@ def test_a_session_goes_on_from_another_folder(lab: Lab, folder: Path, monkeypat
         ),
         ("teach world-1 --advisor none --advisor expert", "advisor 'none' (--advisor) beside 1 more"),
         ("teach world-1 --advisor web --advisor web", "advisor 'web' (--advisor) is named 2 times: once is enough"),
+        ("teach world-1 --peers 4 --advisor terminal", "--advisor beside peers: they are advised by each other alone"),
+        ("teach world-1 --peers 4 --resume lesson", "--resume beside peers"),
+        ("teach world-1 --peers 17", "invalid value for '--peers': '17'"),
+        ("teach world-1 --peer-task toast", "task 'toast' (--peer-task): 'world-1' is no sub-task of a task"),
+        ("teach insert --peer-task toast-panda --advisor expert", "--advisor beside peers"),
         ("teach world-1 --wait 0", "invalid value for '--wait': '0'"),
         ("teach gym:FrozenLak-v1", "FrozenLake-v1"),
         ("teach gym:Pendulum-v1", "its action space is Box"),
@@ -79,3 +84,63 @@ def test_a_picture_that_cannot_be_drawn_loses_nothing_else(lab: Lab, folder: Pat
     assert (ran.code, ran.json["solved"]) == (1, True)
     assert "is kept, but picture 'lesson/learning-curve.png': it is a folder" in ran.err.splitlines()[-1]
     assert lab("toolbox", "list", "--json").json["policies"]
+
+
+# ---- judgements -----------------------------------------------------------------------------------------------------
+
+
+def test_praise_from_a_pipe_is_kept_replayed_and_gone_on_with(lab: Lab, folder: Path) -> None:
+    (folder / "w.txt").write_text("S..\n.#.\n..G\n")
+    typed = ["+", "-", "--", "-3", "left", "", "good", "bad 2", "+"]
+    words = ("teach", "w.txt", "--advisor", "praise:terminal", "--gate", "always", "--episodes", "9", "--out", "lesson")
+    ran = lab(*words, stdin="\n".join(typed))
+    assert ran.code == 0
+    assert "this question is about the move that it makes" in ran.err
+    assert "Noted: clearly bad." in ran.err
+    assert "  judged: 3 times good, 4 times bad" in ran.out
+    journal = folder / "lesson" / "events.jsonl"
+    whole = journal.read_bytes()
+    assert (whole.count(b'"kind": "praise"'), whole.count(b'"kind": "judged"')) == (7, 7)
+    replayed = lab("replay", "lesson", "--json").json
+    assert replayed["receipt"]["judged"]["praised"] == 3
+    assert "Answer: bad, of the last 3 moves" in lab("replay", "lesson", "--pause", "0").err
+    lines = whole.splitlines(keepends=True)
+    cut = next(n for n, line in enumerate(lines) if b'"value": -2' in line and b'"praise"' in line) + 1
+    journal.write_bytes(b"".join(lines[:cut]))
+    assert lab("teach", "--resume", "lesson", stdin="\n".join(typed[3:])).code == 0
+    assert journal.read_bytes() == whole
+
+
+def test_who_judges_is_named_alone(lab: Lab) -> None:
+    ran = lab("teach", "world-1", "--advisor", "praise:expert", "--advisor", "wrong")
+    assert (ran.code, ran.out) == (2, "")
+    assert (
+        ran.err
+        == "lab: advisor 'praise:expert' (--advisor) beside 1 more: it judges moves that others choose: name it alone\n"
+    )
+
+
+def test_orders_are_not_judged(lab: Lab) -> None:
+    ran = lab("sequence", "toast-case-1", "--method", "srl", "--advisor", "praise:expert")
+    assert (ran.code, ran.out) == (2, "")
+    assert "advisor 'praise:expert': it judges the steps of a sub-task, not the order" in ran.err
+
+
+def test_peers_are_told_one_by_one(lab: Lab, folder: Path, tree: Tree) -> None:
+    (folder / "w.txt").write_text("S..\n.#.\n..G\n")
+    words = ("teach", "w.txt", "--peers", "2", "--gate", "always", "--seed", "1", "--out", "pictures")
+    told, document = lab(*words), lab(*words, "--json").json
+    assert (told.code, document["solved"], len(document["peers"])) == (0, True, 2)
+    assert f"this is peer {document['best_peer']}: solved, then the shortest path" in told.out
+    assert "peer 2: 4 steps, " in told.out
+    assert "learning-curve.png" in "".join(tree(folder / "pictures"))
+    assert "session" not in document
+
+
+def test_the_peers_of_two_arms_are_told_by_task(lab: Lab, folder: Path, tree: Tree) -> None:
+    words = ("teach", "insert", "--peer-task", "toast-panda", "--episodes", "60", "--seed", "1", "--out", "pictures")
+    told, document = lab(*words), lab(*words[:-2], "--json").json
+    assert (told.code, document["task"], document["others"][0]["task"]) == (0, "toast", "toast-panda")
+    assert "peer 2 with the arm panda: " in told.out
+    assert "in task 'toast-panda', peer 2: learned path: " in told.out
+    assert {"1-toast/learning-curve.png", "2-toast-panda/learning-curve.png"} <= {*tree(folder / "pictures")}

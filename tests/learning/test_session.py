@@ -1,7 +1,7 @@
 """The one session: what every learner must do, what is reported, and how it ends early."""
 
 from dataclasses import replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ from lab.advice.table_level import TableLevel
 from lab.errors import BadInput
 from lab.learning.environment import Judged, Step, TableEnvironment
 from lab.learning.gates import GATES, Gate
-from lab.learning.requests import AdviceRequest, AdvisorLeft
+from lab.learning.requests import AdviceRequest, AdvisorLeft, Walked
 from lab.learning.selection import SELECTIONS, Draw
 from lab.learning.session import Session
 from lab.learning.session_events import (
@@ -422,3 +422,20 @@ class AtRandom:
 
 def test_an_advisor_that_takes_a_generator_is_held_to_its_contract() -> None:
     check_advisor(AtRandom)
+
+
+def test_episodes_may_be_played_one_by_one_and_all_of_them_followed() -> None:
+    class Follower(Scripted):
+        follows_all = True
+        walked: ClassVar[list[int]] = []
+
+        def followed(self, walked: Walked) -> None:
+            self.walked.append(walked.episode)
+
+    settings = LearnerSettings(episodes=4, max_steps=9), GateSettings("never")
+    whole = Session(corridor(4), *settings, None, np.random.default_rng(1)).run()
+    session = Session(corridor(4), *settings, Follower(lambda request: None), np.random.default_rng(1))
+    for episode in range(1, 5):
+        session.play(episode)
+    assert session.result(interrupted=False).steps.tolist() == whole.steps.tolist()
+    assert Follower.walked == [1, 2, 3, 4]

@@ -51,7 +51,10 @@ KNOWN = ", ".join(sorted(SEQUENCERS))
         ("oven.toml --gantt no/g.svg", "picture 'no/g.svg': there is no folder 'no'"),
         ("fms --method carried --policy no.json", "no.json: cannot be read: "),
         ("fms --method carried --policy oven.toml", "policy oven.toml (--policy): Invalid JSON: "),
-        ("fms --method srl --policy no.json", "--policy no.json with --method srl: only carried decides by one"),
+        (
+            "fms --method srl --policy no.json",
+            "--policy no.json with --method srl: only carried decides by one, and srl-linear begins",
+        ),
         ("fms --cyclic --policy no.json", "--cyclic beside --policy no.json: "),
         ("toast --method srrl", f"unknown method 'srrl' (--method): did you mean 'srl'? known: {KNOWN}"),
     ],

@@ -37,6 +37,7 @@ def test_the_table() -> None:
         "srl",
         "srl-time",
         "srl-improved",
+        "srl-linear",
         "mc",
         "random",
         "fifo",

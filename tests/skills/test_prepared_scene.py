@@ -6,7 +6,8 @@ import pytest
 
 from lab.errors import BadInput
 from lab.sequencing.cell.precedence import Precedence, RouteStep
-from lab.skills.prepared_scene import precedences
+from lab.sim.scene.blocked_cells import OUT_OF_REACH
+from lab.skills.prepared_scene import precedences, prepare
 from lab.tasks.task import Task
 from lab.tasks.task_file import load
 
@@ -110,3 +111,11 @@ def test_what_cannot_wait_is_refused(wrong: dict[str, str], said: str) -> None:
     with pytest.raises((ValueError, BadInput), match="after 1") as refused:
         with_after(**wrong)
     assert said in str(refused.value)
+
+
+def test_an_arm_reaches_every_cell_that_its_survey_does_not_call_out_of_reach() -> None:
+    task, transfer = load("toast-panda"), "transfer toaster to plate"
+    scene = prepare(task, task.order(2), 0, transfer)
+    causes, reach = scene.surveys.workspace("").causes.ravel(), scene.reach(transfer)
+    assert reach[causes != OUT_OF_REACH].all()
+    assert 0 < (~reach).sum() <= (causes == OUT_OF_REACH).sum()  # fewer, as nothing is out of reach behind an arm

@@ -37,6 +37,17 @@ def test_records(toolbox: Toolbox) -> None:
             toolbox.save_record("transfer", "1 -> 3", bad)
 
 
+def test_the_keys_of_a_kind(toolbox: Toolbox) -> None:
+    """Sorted, as they were given; a damaged record has none."""
+    assert toolbox.record_keys("transfer") == []
+    for key in ("b c", "a"):
+        toolbox.save_record("transfer", key, {})
+    toolbox.save_record("butter", "d", {})
+    assert toolbox.record_keys("transfer") == ["a", "b c"]
+    toolbox.save_record("transfer", "e", {}).write_bytes(b"{")
+    assert toolbox.record_keys("transfer") == ["a", "b c"]
+
+
 def test_an_edited_record_is_known_as_such(toolbox: Toolbox) -> None:
     """However well it reads; one that is only laid out anew is sound."""
     path = toolbox.save_record("transfer", "1 -> 3", {"plate > oven": 4.25, "oven > plate": 3.0})

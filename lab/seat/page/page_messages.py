@@ -8,7 +8,7 @@ from lab.seat.replay_pace import WORDS as REPLAY_WORDS
 
 MAX_CHARS = 4096
 MOST_MOVES = 1000  # of one path
-WORDS = ("skip", "auto", "undo", "quit")
+WORDS = ("skip", "auto", "undo", "quit", "+", "-")
 
 
 class Refused(Exception):

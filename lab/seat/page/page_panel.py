@@ -227,6 +227,10 @@ class SeatPanel:
             raise Refused("This session is only shown: it takes no answers.")
         if answer.word == "undo" and "undo" not in pending.words:
             raise Refused("Nothing of this episode can be taken back.")
+        if answer.word in ("+", "-") and answer.word not in pending.words:
+            raise Refused("Nothing was done yet that could be good or bad.")
+        if pending.request.judgement == "only" and not answer.word:
+            raise Refused("This question is about the move that it makes: press + or -, or skip.")
         if len(answer.path) > 1 and not isinstance(pending.request, AdviceRequest):
             raise Refused("Which part moves next is said move by move.")
         if not answer.word and not {answer.action, *answer.path} <= {*pending.moves}:

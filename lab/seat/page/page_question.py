@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.lazy import rich
-from lab.learning.requests import AdviceRequest, Request
+from lab.learning.praise import Judgement
+from lab.learning.requests import AdviceRequest, Reply, Request
 from lab.learning.selection import chances
 from lab.learning.updates import Table
 from lab.mdp import TabularMDP
@@ -107,13 +108,18 @@ def question_of(request: Request, known: StateWords | None = None) -> Json:
         assert isinstance(request, SequenceRequest)
         shown = order_of(request)
     lately = request.improvement
-    return shown | {
-        "own": request.own,
-        "why": str(request.reason or ""),
-        "rate": None if lately is None else lately.rate,
-        "current": None if lately is None else lately.current_mean,
-        "previous": None if lately is None else lately.previous_mean,
-    }
+    judges = {} if request.judgement == "no" else {"judges": request.judgement}
+    return (
+        shown
+        | judges
+        | {
+            "own": request.own,
+            "why": str(request.reason or ""),
+            "rate": None if lately is None else lately.rate,
+            "current": None if lately is None else lately.current_mean,
+            "previous": None if lately is None else lately.previous_mean,
+        }
+    )
 
 
 def step_of(request: AdviceRequest, known: StateWords | None = None) -> Json:
@@ -134,8 +140,10 @@ def step_of(request: AdviceRequest, known: StateWords | None = None) -> Json:
     }
 
 
-def said_of(request: Request, action: int | None) -> str:
+def said_of(request: Request, action: Reply) -> str:
     """The answer to a request in words, and its outcome if that is unusual; None: the step was left to the learner."""
+    if isinstance(action, Judgement):
+        return f"The answer was {action}."
     if isinstance(request, AdviceRequest):
         marks, done = Marks(), request.own if action is None else action
         where = leads(request, done)

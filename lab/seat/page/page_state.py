@@ -21,6 +21,7 @@ from lab.learning.session_events import (
     AdviceRequested,
     EpisodeEnded,
     Event,
+    MoveJudged,
 )
 from lab.learning.settings import GateSettings
 from lab.learning.updates import Table
@@ -100,12 +101,13 @@ class Pending:
     @property
     def words(self) -> tuple[str, ...]:
         """The accepted words besides the moves."""
-        return ("skip", "auto", "quit", *["undo"] * self.request.undoable)
+        judgements = () if self.request.judgement == "no" else ("+", "-")
+        return ("skip", "auto", "quit", *["undo"] * self.request.undoable, *judgements)
 
     @property
     def moves(self) -> Sequence[int]:
         """The accepted moves."""
-        return self.request.allowed
+        return () if self.request.judgement == "only" else self.request.allowed
 
 
 @dataclass
@@ -327,7 +329,7 @@ EPISODE = ("standing", "curve", "slice", "notices")
 def hear(learning: ShownLesson, event: Event) -> tuple[str, ...]:
     """Take an event over; returns the changed parts of the document. Called for every answer, so it must be fast."""
     kind = type(event)
-    if kind is AdviceGiven:
+    if kind is AdviceGiven or kind is MoveJudged:
         return _given(learning, event)  # type: ignore[arg-type]
     if kind is EpisodeEnded:
         return _episode(learning, event)  # type: ignore[arg-type]
@@ -349,7 +351,7 @@ def hear(learning: ShownLesson, event: Event) -> tuple[str, ...]:
     return ("standing", "notices")
 
 
-def _given(learning: ShownLesson, event: AdviceGiven) -> tuple[str, ...]:
+def _given(learning: ShownLesson, event: AdviceGiven | MoveJudged) -> tuple[str, ...]:
     if event.action is None:
         learning.skipped += 1
     else:

@@ -13,7 +13,8 @@ from typing import Any
 
 from lab.advice.journal import Undo
 from lab.errors import BadInput, counted
-from lab.learning.requests import AdviceRequest, AdvisorLeft, Request
+from lab.learning.praise import Judgement
+from lab.learning.requests import AdviceRequest, AdvisorLeft, Reply, Request
 from lab.mdp import NoPath, shortest_steps
 from lab.seat.event_text import Told
 from lab.seat.grid_text import StateWords
@@ -57,7 +58,7 @@ class SeatPage(LiveView):
 
     # ---- questions
 
-    def ask(self, request: Request) -> int | None:
+    def ask(self, request: Request) -> Reply:
         """The answer of the page's advisor: one of `allowed`, None for "skip". Waits for it, at most `wait_s`.
 
         Raises AdvisorLeft for "auto", after the time limit and when the page is closed, Undo when an answer is taken back,
@@ -133,11 +134,12 @@ class SeatPage(LiveView):
             self._panel.known.asks = False
             self._panel.known.changed("lesson")
 
-    def replayed(self, request: Request, action: int | None) -> None:
+    def replayed(self, request: Request, action: Reply) -> None:
         """Show a question of a replay with its answer; None: the step was left to the learner."""
         known = self._panel.known
         with self._panel.lock:
-            known.replay = {**(known.replay or {}), "action": action, "said": said_of(request, action)}
+            done = None if isinstance(action, Judgement) else action
+            known.replay = {**(known.replay or {}), "action": done, "said": said_of(request, action)}
             known.changed("replay")
         self.offer(request)
 
@@ -235,8 +237,8 @@ class SeatPage(LiveView):
             self._server.wake()
 
 
-def _said(pending: Pending, answer: PageAnswer | None) -> int | None:
-    """The action of an answer; raises AdvisorLeft, Undo or KeyboardInterrupt, see `SeatPage.ask`."""
+def _said(pending: Pending, answer: PageAnswer | None) -> Reply:
+    """The action or judgement of an answer; raises AdvisorLeft, Undo or KeyboardInterrupt, see `SeatPage.ask`."""
     if answer is None:
         raise AdvisorLeft(f"no answer within {pending.wait_s:g} s")
     if answer.word == "auto":
@@ -247,6 +249,8 @@ def _said(pending: Pending, answer: PageAnswer | None) -> int | None:
         raise Undo
     if answer.word == "quit":
         raise KeyboardInterrupt
+    if answer.word in ("+", "-"):
+        return Judgement(1 if answer.word == "+" else -1)
     return answer.action
 
 

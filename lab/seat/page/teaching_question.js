@@ -4,7 +4,7 @@
 const seat = (() => {
   const ARROWS = ["↑", "↓", "←", "→", "▾", "▴"], ARROW_KEYS = ["ArrowUp", "ArrowDown", "ArrowLeft", "ArrowRight", "PageDown", "PageUp"];
   const PLACES = ["1 / 2", "3 / 2", "2 / 1", "2 / 3", "3 / 5", "1 / 5"]; // row and column of each direction's button
-  const LETTERS = { y: "own", Enter: "own", s: "skip", u: "undo", w: "why", a: "auto", q: "quit" };
+  const LETTERS = { "+": "+", "=": "+", "-": "-", y: "own", Enter: "own", s: "skip", u: "undo", w: "why", a: "auto", q: "quit" };
   const PACES = { " ": "pause", n: "step", "-": "slower", "+": "faster", "=": "faster" };
   const SURE_MS = 3000, REFUSAL_MS = 6000, SLOW_PAUSE_MS = 600, URGENT = new Set(["question", "you", "ended", "held"]);
   const el = (id) => document.getElementById(id);
@@ -84,7 +84,9 @@ const seat = (() => {
     return `${episode}: ${why || `it works alone, and asks ${lesson.asks ? "" : "its advisor "}when it stops improving`}.`;
   }
 
-  const detail = () => `${shown.would}${shown.why ? ` It asks because ${shown.why}.` : ""}${shown.offered && !state.replay ? " The terminal asks, too." : ""}`;
+  const judges = (word) => word === "+" || word === "-";
+  const asked = () => (shown.judges === "only" ? " How is that: good (+) or bad (-)?" : "");
+  const detail = () => `${shown.would}${asked()}${shown.why ? ` It asks because ${shown.why}.` : ""}${shown.offered && !state.replay ? " The terminal asks, too." : ""}`;
 
   function countDown() {
     const left = until === null || !shown ? null : Math.max(0, Math.ceil((until - performance.now()) / 1000));
@@ -171,11 +173,11 @@ const seat = (() => {
 
   function enable() {
     const can = canAnswer();
-    for (const button of moveButtons.values()) button.disabled = !can;
+    for (const button of moveButtons.values()) button.disabled = !can || Boolean(shown && shown.judges === "only");
     for (const button of el("words").querySelectorAll("button")) {
       const word = button.dataset.word;
       button.disabled = word === "why" ? !shown : !can || (word === "undo" && !shown.words.includes("undo"));
-      button.hidden = word === "undo" && Boolean(shown) && shown.kind === "order";
+      button.hidden = Boolean(shown) && ((word === "undo" && shown.kind === "order") || (judges(word) && !shown.words.includes(word)) || (word === "own" && shown.judges === "only"));
     }
   }
 
@@ -216,7 +218,7 @@ const seat = (() => {
       el("because").hidden = !whyOpen;
       el("words").querySelector("[data-word=why]").setAttribute("aria-expanded", String(whyOpen));
       if (whyOpen) el("because").scrollIntoView({ block: "nearest" });
-    } else if (word === "own") choose(shown.own, event);
+    } else if (word === "own") shown.judges === "only" ? answer({ word: "skip" }, event) : choose(shown.own, event);
     else if (word === "auto" || word === "quit") {
       if (canAnswer() && armed !== word) arm(word);
       else {
@@ -224,7 +226,7 @@ const seat = (() => {
         answer({ word }, event);
       }
     } else if (shown.words.includes(word)) answer({ word }, event);
-    else refused("Nothing of this episode can be taken back.");
+    else refused(judges(word) ? "Nothing was done yet that could be good or bad." : "Nothing of this episode can be taken back.");
   }
 
   // An action that cannot be undone needs a second press

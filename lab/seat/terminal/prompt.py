@@ -11,7 +11,8 @@ from rich.text import Text
 
 from lab.advice.journal import Undo
 from lab.errors import counted, printable
-from lab.learning.requests import AdviceRequest, AdvisorLeft, Request
+from lab.learning.praise import Judgement
+from lab.learning.requests import AdviceRequest, AdvisorLeft, Reply, Request
 from lab.learning.session_events import EpisodeEnded
 from lab.seat import order_text, request_text
 from lab.seat.event_text import SessionText
@@ -19,7 +20,17 @@ from lab.seat.grid_text import Marks, StateWords
 from lab.seat.request_text import PathAhead
 from lab.seat.terminal.line_reader import Outside, ReadLine, default_reader
 from lab.seat.terminal.screen import folded, question, room, screen
-from lab.seat.terminal.typed_answer import COMMANDS, Understood, explained, explained_words, understand
+from lab.seat.terminal.typed_answer import (
+    ANSWERS,
+    COMMANDS,
+    JUDGE_HINT,
+    PRAISES,
+    Understood,
+    explained,
+    explained_words,
+    judged,
+    understand,
+)
 from lab.sequencing.search import SequenceRequest
 from lab.teaching.events import ORDER, Event, LessonEvent
 
@@ -120,6 +131,10 @@ class TableQuestion:
         "own. When episodes with your advice are no shorter than those before, it counts that, and after a few of them, or when "
         "it has had all the help that it may have, it asks no more. You can type:"
     )
+    judging = (
+        "The learner is stuck, shows you each move that it makes, and asks how it is. While it is stuck it repeats what was good "
+        "and avoids what was bad; what it learns that its moves are worth stays its own. You can type:"
+    )
 
     def __init__(self, console: Console, plain: bool) -> None:
         self._console, self._plain = console, plain
@@ -143,9 +158,15 @@ class TableQuestion:
         left = height - len(gap) - 1 - len(self.asked(request)) // width
         return [*gap, *screen(request, self.marks, width, left, self.known)]
 
-    def understood(self, line: str, request: AdviceRequest) -> Understood:
-        """The meaning of a line; see `understand`."""
-        return understand(line, request.mdp)
+    def understood(self, line: str, request: AdviceRequest) -> Understood | Judgement:
+        """The meaning of a line; see `judged` and `understand`."""
+        typed = () if request.judgement == "only" else request.mdp.action_labels
+        if request.judgement != "no" and (said := judged(line, typed)) is not None:
+            return said
+        meant = understand(line, request.mdp)
+        if request.judgement != "only":
+            return meant
+        return "skip" if meant == "own" else meant if meant in ANSWERS else JUDGE_HINT
 
     def warned(self, request: AdviceRequest, action: int) -> str:
         """The warning about an action that leads nowhere, "" for any other."""
@@ -163,7 +184,9 @@ class TableQuestion:
 
     def explained(self, request: AdviceRequest) -> list[tuple[str, str]]:
         """The possible inputs and their effects."""
-        return explained(request.mdp)
+        if request.judgement == "only":
+            return [*PRAISES, ("enter", "no judgement"), *explained_words()[1:]]
+        return explained(request.mdp) + ([*PRAISES] if request.judgement == "also" else [])
 
     def named(self, request: AdviceRequest, action: int) -> str:
         """An action in words."""
@@ -206,7 +229,7 @@ class TeachingPrompt:
         self._text, self._order_text = SessionText(self._table.marks.named), SessionText(kind="order")
         self._guided = self._misleads = 0
 
-    def __call__(self, request: Request) -> int | None:
+    def __call__(self, request: Request) -> Reply:
         """The person's answer, after showing the learner's state."""
         if self._done:
             raise AdvisorLeft
@@ -233,8 +256,11 @@ class TeachingPrompt:
         self._last = request
         self._print(self._way(request).shown(request))
 
-    def told(self, request: Request, action: int | None) -> None:
+    def told(self, request: Request, action: Reply) -> None:
         """Show the answer to a request, such as "Answer: right"; None: the step was left to the learner."""
+        if isinstance(action, Judgement):
+            self._say(f"Answer: {action}", "bold")
+            return
         self._say(f"Answer: {'skip' if action is None else self._way(request).named(request, action)}", "bold")
 
     def _way(self, request: Request | None) -> Any:
@@ -243,7 +269,7 @@ class TeachingPrompt:
 
     # ---- answers ------------------------------------------------------------------------------------------------------
 
-    def _answer(self, request: Request, read_line: ReadLine) -> int | None:
+    def _answer(self, request: Request, read_line: ReadLine) -> Reply:
         way = self._way(request)
         asked = way.asked(request)
         while True:
@@ -253,6 +279,9 @@ class TeachingPrompt:
                 self._say("No more answers: the learner goes on alone.")
                 raise AdvisorLeft from None
             match answer:
+                case Judgement():
+                    self._say(f"Noted: {answer}.", "dim")
+                    return answer
                 case int():
                     return self._give(request, answer)
                 case tuple() if isinstance(request, AdviceRequest):
@@ -328,15 +357,14 @@ class TeachingPrompt:
 
     def _help(self, request: Request) -> None:
         width, way = room(self._console)[0], self._way(request)
+        introduction = way.judging if request.judgement == "only" else way.introduction
         if self._plain:
-            self._print(
-                folded([way.introduction, *(f"{word}: {does}." for word, does in way.explained(request))], width)
-            )
+            self._print(folded([introduction, *(f"{word}: {does}." for word, does in way.explained(request))], width))
             return
         rows = Table.grid(padding=(0, 2))
         for word, does in way.explained(request):
             rows.add_row(Text(f"  {word}", "bold"), Text(does))
-        self._print(folded([way.introduction], width))
+        self._print(folded([introduction], width))
         self._console.print(rows, width=width)
 
     # ---- events of the session ----------------------------------------------------------------------------------------

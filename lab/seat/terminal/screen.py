@@ -51,6 +51,12 @@ def question(request: AdviceRequest, marks: Marks, width: int) -> str:
     """The prompt before the cursor, the longest one that leaves room to type."""
     own = marks.named(request.mdp, request.own)
     forms = (f"Which way? [enter = {own}, ? explains] ", f"Which way? [enter = {own}] ", f"Which way? [{own}] ")
+    if request.judgement == "only":
+        forms = (
+            f"It goes {own}. How is that? [+ good, - bad, ? explains] ",
+            f"It goes {own}: good? [+, -] ",
+            f"{own}: [+, -] ",
+        )
     return next((form for form in forms if len(form) + 12 <= width), "Which way? ")
 
 
@@ -102,6 +108,7 @@ def _beside_views(
         [request_text.choice(request, marks), *request_text.progress(request), request_text.standing(request)], width
     )
     typed = f"Type a letter, an arrow key or a word, or several moves at once, such as {example(request.mdp)}."
+    typed = "" if request.judgement == "only" else typed
     notes = folded(filter(None, [views.legend, ranges, typed]), width, "dim")
     if max(move.cell_len for move in moves) > panel:
         return [*views.lines, *notes, *moves, *said]

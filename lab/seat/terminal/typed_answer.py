@@ -1,8 +1,11 @@
 """The parser of answers typed at the teaching prompt: a move, a whole path, or a command word."""
 
 import re
+from collections.abc import Sequence
 from difflib import get_close_matches
 
+from lab.learning.praise import MOST_MOVES as MOST_JUDGED
+from lab.learning.praise import MOST_VALUE, Judgement
 from lab.mdp import TabularMDP
 from lab.seat.grid_text import ARROWS, ASCII_ARROWS, DIRECTIONS, NAMES, direction_of
 
@@ -27,6 +30,29 @@ ANSWERS = frozenset(called for called, _ in COMMANDS.values()) - {"path"}
 MOST_MOVES = 1000  # of one path
 _TYPED_ARROWS = {f"\x1b{bracket}{key}": arrow for bracket in "[O" for key, arrow in zip("ABDC", ARROWS, strict=True)}
 _PIECE = re.compile(r"([0-9]*)\s*([^\W\d_]+|[^\s\d,;])|([0-9]+)")
+
+
+_JUDGED = re.compile(rf"(\+{{1,{MOST_VALUE}}}|-{{1,{MOST_VALUE}}}|good|bad)\s*([0-9]{{0,3}})")
+
+
+def judged(line: str, labels: Sequence[str] = ()) -> Judgement | None:
+    """The judgement in a typed line, such as "+", "--" (clearly bad), "bad" or "-3" (of the last 3 moves); None for none.
+
+    labels: of the moves that may be typed as well; what begins one of them is that move.
+    """
+    word = line.strip(" \t\r\n").lower()
+    found = _JUDGED.fullmatch(word)
+    if found is None or int(found[2] or 0) > MOST_JUDGED or any(label.lower().startswith(word) for label in labels):
+        return None
+    signs = {"good": "+", "bad": "-"}.get(found[1], found[1])
+    return Judgement(len(signs) if signs[0] == "+" else -len(signs), int(found[2] or 0))
+
+
+PRAISES = (
+    ("+, -", "what it did last was good or bad; ++ or -- is said more clearly; -3 is about any of the last 3 moves"),
+    ("good, bad", "the same in words"),
+)
+JUDGE_HINT = "this question is about the move that it makes: type + or -, enter for no judgement, or ?"
 
 
 def understand(line: str, mdp: TabularMDP) -> Understood:

@@ -1,5 +1,7 @@
 """A policy learned on small cells and applied to larger ones: it takes the decision of highest value and does not search."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from lab.sequencing.cell.cell import Cell
@@ -52,6 +54,21 @@ class Decider:
         costs = np.zeros(len(candidates))
         self._kernels.costs_of(self._cell, self._run, self._known, self._work, candidates, costs)
         return costs
+
+
+def without_idle(weights: Floats, deciders: Sequence[Decider]) -> Floats:
+    """The weights (F,) after setting to 0, the smallest first, those that change the cost of no decider's run."""
+
+    def each(tried: Floats) -> Floats:
+        return np.array([decider.costs(tried[None])[0] for decider in deciders])
+
+    costs = each(weights)
+    for number in np.argsort(np.abs(weights)):
+        without = weights.copy()
+        without[number] = 0.0
+        if (np.abs(each(without) - costs) <= SAME).all():
+            weights = without
+    return weights
 
 
 def carried(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceResult:

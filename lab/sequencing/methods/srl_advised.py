@@ -7,6 +7,7 @@ import numpy as np
 
 from lab.errors import BadInput, unknown
 from lab.learning.gates import GATES, Gate, improvement
+from lab.learning.praise import Judgement
 from lab.learning.requests import Advisor, AdvisorLeft, Standing
 from lab.learning.session_events import AdviceEnded, AdviceGiven, AdviceRejected, AdviceRequested, EpisodeEnded, Event
 from lab.learning.settings import GateSettings
@@ -132,6 +133,7 @@ class _Advised(Guide):
             self._advisor = None
             self._tell(AdviceEnded(number, "advisor left"))
             return None
+        assert not isinstance(said, Judgement)  # no request about an order allows one
         self._tell(AdviceGiven(number, request.step, request.state, said, own))
         return None if said is None else checked_action(said, allowed, "the advisor")
 

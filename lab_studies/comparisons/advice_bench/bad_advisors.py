@@ -8,7 +8,7 @@ import numpy as np
 
 from lab.advice.advisors import AdvisorName, RecordedAdvisor
 from lab.advice.table_level import PolicyAdvisor, TableLevel
-from lab.learning.requests import AdviceRequest, Advisor
+from lab.learning.requests import AdviceRequest, Advisor, Reply
 from lab.learning.simulated_advice import (
     SPEAKS_AS_EXPECTED,
     SPEAKS_TO_CORRECT,
@@ -154,7 +154,7 @@ class HoldingBack:
         self._chose: dict[int, int] = {}  # what the learner would have chosen in a state when it last asked there
         self.followed = getattr(advisor, "followed", None)
 
-    def advise(self, request: AdviceRequest) -> int | None:
+    def advise(self, request: AdviceRequest) -> Reply:
         """The advisor's answer, None outside the region and for the action that is expected."""
         if not self._region[request.state]:
             return None

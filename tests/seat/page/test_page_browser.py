@@ -13,10 +13,11 @@ import pytest
 
 from lab.advice.advisors import Person
 from lab.advice.journal import Undo
+from lab.learning.praise import Judging
 from lab.learning.problem import Problem
-from lab.learning.requests import AdviceRequest
+from lab.learning.requests import AdviceRequest, Reply
 from lab.learning.session import Session
-from lab.learning.session_events import AdviceEnded, Event
+from lab.learning.session_events import AdviceEnded, Event, MoveJudged
 from lab.learning.session_result import SessionResult
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import TabularMDP, grid
@@ -45,6 +46,7 @@ class Teaching:
     episodes: int = 2
     events: list[Event] = field(default_factory=list)
     undone: threading.Event = field(default_factory=threading.Event)
+    judging: Judging | None = None
 
     def __post_init__(self) -> None:
         blocked = np.array([[0, 0, 0], [1, 0, 0]], bool)
@@ -64,11 +66,11 @@ class Teaching:
             self.page.hear(LessonEvent("board", event))
 
         rng = np.random.default_rng(0)
-        result = Session(self.mdp, self.learner, self.gate, Person(self._ask), rng).run(hear)
+        result = Session(self.mdp, self.learner, self.gate, Person(self._ask, self.judging), rng).run(hear)
         self.page.finished("The lesson is over.")
         return result
 
-    def _ask(self, request: AdviceRequest) -> int | None:
+    def _ask(self, request: AdviceRequest) -> Reply:
         row, column = self.mdp.state_cell(request.state)
         self.page.update(Frame(0.0, {"robot": (float(column), float(-row), 0.0, 0.0, 0.0, 0.0, 1.0)}))
         try:
@@ -145,6 +147,32 @@ def test_a_whole_session_by_clicks(tab: "Page", page: SeatPage, until: Until) ->
     until(tab, OVER)
     assert session.result(20).interrupted
     assert not any(isinstance(event, AdviceEnded) for event in teaching.events)
+
+
+def test_moves_are_judged(tab: "Page", page: SeatPage, until: Until) -> None:
+    """By a key, by a click, and Enter says nothing; the moves themselves cannot be chosen."""
+    teaching = Teaching(page, judging=Judging(only=True))
+    session = teaching.start()
+    can = "document.querySelector('#words button[data-word=\"-\"]:enabled')"
+    until(tab, can)
+    assert "How is that: good (+) or bad (-)?" in tab.inner_text("#detail")
+    assert tab.is_hidden("#words [data-word=own]")
+    assert tab.locator("#moves button:enabled").count() == 0
+    tab.keyboard.press("+")
+    until(tab, "document.getElementById('standing').textContent.includes('Moves helped1')")
+    until(tab, can)
+    tab.click("text=That was bad")
+    until(tab, "document.getElementById('standing').textContent.includes('Moves helped2')")
+    until(tab, can)
+    tab.keyboard.press("Enter")
+    until(tab, "document.getElementById('standing').textContent.includes('1 left to it')")
+    until(tab, can)
+    tab.keyboard.press("q")
+    until(tab, "document.querySelector('[data-word=quit]').classList.contains('armed')")
+    tab.keyboard.press("q")
+    until(tab, OVER)
+    assert session.result(20).interrupted
+    assert [event.value for event in teaching.events if isinstance(event, MoveJudged)] == [1, -1]
 
 
 def test_a_click_in_the_map_is_the_move_there(tab: "Page", page: SeatPage, until: Until) -> None:

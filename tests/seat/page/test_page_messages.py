@@ -27,6 +27,7 @@ from lab.seat.page.page_messages import (
         ({"answer": {"question": 3, "action": 0}}, PageAnswer(3, 0)),
         ({"answer": {"question": 3, "word": "skip"}}, PageAnswer(3, None, "skip")),
         ({"answer": {"question": 3, "word": "undo"}}, PageAnswer(3, None, "undo")),
+        ({"answer": {"question": 3, "word": "+"}}, PageAnswer(3, None, "+")),
         ({"answer": {"question": 3, "path": [3, 1, 3]}}, PageAnswer(3, 3, path=(3, 1, 3))),
         ({"answer": {"question": 3, "path": [0] * MOST_MOVES}}, PageAnswer(3, 0, path=(0,) * MOST_MOVES)),
         ({"replay": "step"}, Pace("step")),

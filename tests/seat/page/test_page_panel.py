@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from lab.learning.praise import Judgeable
 from lab.learning.requests import AdviceRequest
 from lab.learning.session_events import EpisodeEnded
 from lab.mdp import TabularMDP, grid
@@ -237,3 +238,31 @@ def test_pages_that_come_and_go_are_who_attends(panel: SeatPanel, desk: RunDesk)
     panel.left(1)
     panel.left(2)
     assert not desk.controls.attended
+
+
+# ---- judgements -----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("judgement", "answer", "refusal"),
+    [
+        ("only", {"word": "+"}, ""),
+        ("only", {"action": 3}, "This question is about the move that it makes: press + or -, or skip."),
+        ("only", {"word": "skip"}, ""),
+        ("also", {"word": "-"}, ""),
+        ("also", {"action": 3}, ""),
+        ("no", {"word": "+"}, "Nothing was done yet that could be good or bad."),
+    ],
+)
+def test_what_may_be_answered(
+    panel: SeatPanel, mdp: TabularMDP, judgement: Judgeable, answer: dict[str, object], refusal: str
+) -> None:
+    asked = AdviceRequest(
+        mdp=mdp, q=[[0.0] * 4] * 3, state=0, episode=1, step=1, own=3, allowed=range(4), judgement=judgement
+    )
+    number = panel.pose(Pending(asked)).number
+    shown = told(panel)["seat"]["question"]
+    assert shown.get("judges", "no") == judgement
+    assert ({"+", "-"} <= {*shown["words"]}) == (judgement != "no")
+    panel.said(1, json.dumps({"answer": {"question": number, **answer}}))
+    assert told(panel).get("refusal", "") == refusal

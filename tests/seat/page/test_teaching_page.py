@@ -14,6 +14,7 @@ import pytest
 from lab.advice.advisors import Person
 from lab.advice.journal import Undo
 from lab.errors import BadInput, WorkFailed
+from lab.learning.praise import Judgement
 from lab.learning.problem import Problem
 from lab.learning.requests import AdviceRequest, AdvisorLeft, Reason, TooSlow
 from lab.learning.session import Session
@@ -136,6 +137,14 @@ def test_words(
         else:
             assert isinstance(asked.exception(20), outcome)
         assert browser.hear_until(lambda seat: not seat["question"])["question"] is None
+
+
+@pytest.mark.parametrize(("word", "value"), [("+", 1), ("-", -1)])
+def test_a_judgement(page: SeatPage, request_1: AdviceRequest, opens: "Opens", word: str, value: int) -> None:
+    with opens(page) as browser:
+        asked = meanwhile(page.ask, replace(request_1, judgement="only"))
+        answer(browser, word=word)
+        assert asked.result(20) == Judgement(value)
 
 
 def test_auto_says_so(page: SeatPage, request_1: AdviceRequest, opens: "Opens") -> None:

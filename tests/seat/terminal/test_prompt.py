@@ -12,7 +12,8 @@ from prompt_toolkit.input import create_pipe_input
 from prompt_toolkit.output import DummyOutput
 from rich.console import Console
 
-from lab.learning.requests import AdviceRequest, AdvisorLeft, Standing, TooSlow
+from lab.learning.praise import Judgement
+from lab.learning.requests import AdviceRequest, AdvisorLeft, Reply, Standing, TooSlow
 from lab.learning.session_events import (
     AdviceEnded,
     AdviceGiven,
@@ -80,7 +81,7 @@ def prompted(lines: str, shown: Console | None = None, plain: bool = False) -> t
     return TeachingPrompt(shown, PlainReader(shown, StringIO(lines)), plain), shown
 
 
-def ask(lines: str, asked: AdviceRequest | None = None, encoding: str = "utf-8") -> tuple[int | None, str]:
+def ask(lines: str, asked: AdviceRequest | None = None, encoding: str = "utf-8") -> tuple[Reply, str]:
     """The answer of a person who types these lines, and what was shown."""
     prompt, shown = prompted(lines, console(encoding))
     return prompt(asked or request()), said(shown)
@@ -394,3 +395,37 @@ def test_plain_sentences_for_a_screen_reader() -> None:
     assert "skip: leave this step to the learner." in lines
     assert "A path of 3 moves: right right down" in lines
     assert said(shown).isascii()
+
+
+# ---- judgements -----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("line", "answer"),
+    [("+", Judgement(1)), ("-3", Judgement(-1, 3)), ("", None), ("skip", None), ("good", Judgement(1))],
+)
+def test_a_question_about_the_move_it_makes(line: str, answer: Reply) -> None:
+    given, shown = ask(f"{line}\n", replace(request(), judgement="only"))
+    assert given == answer
+    assert "It goes → right. How is that? [+ good, - bad, ? explains]" in shown
+    assert "The learner now goes → right" in shown
+    assert "Judged so far: 0 moves" in shown
+
+
+def test_a_move_is_no_judgement() -> None:
+    given, shown = ask("left\nll\n?\n-\n", replace(request(), judgement="only"))
+    assert given == Judgement(-1)
+    assert shown.count("this question is about the move that it makes") == 2
+    assert "asks how it is" in shown
+
+
+def test_a_judgement_beside_moves() -> None:
+    assert ask("-2\n", replace(request(), judgement="also"))[0] == Judgement(-1, 2)
+    assert ask("left\n", replace(request(), judgement="also"))[0] == 2
+    assert ask("-\nleft\n")[0] == 2  # nothing was done yet
+
+
+def test_a_replay_shows_judgements() -> None:
+    prompt, shown = prompted("")
+    prompt.told(request(), Judgement(-2, 3))
+    assert "Answer: clearly bad, of the last 3 moves" in said(shown)

@@ -13,7 +13,7 @@ from rich.console import Console
 from lab.advice.advisors import AdvisorName
 from lab.advice.journal import Again, Journal, Undo
 from lab.advice.table_level import TableLevel
-from lab.learning.requests import AdviceRequest
+from lab.learning.requests import AdviceRequest, Ask
 from lab.learning.session import Session
 from lab.learning.session_events import EpisodeEnded, Event, Improvement
 from lab.learning.session_result import SessionResult
@@ -176,7 +176,7 @@ def test_a_letter_that_is_no_move_gets_the_letters() -> None:
 # ---- whole sessions -------------------------------------------------------------------------------------------------
 
 
-def teach(ask: Callable[[AdviceRequest], int | None], on_event: Callable[..., None]) -> SessionResult:
+def teach(ask: Ask, on_event: Callable[..., None]) -> SessionResult:
     rng = np.random.default_rng(0)
     advisor = TableLevel(BOARD, 0.99, rng, {"terminal": ask}).advisor(AdvisorName.of("terminal"))
     gate = GateSettings(first_episode=4, window=1, omega=0, lambda_threshold=1.0)

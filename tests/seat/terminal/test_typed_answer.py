@@ -5,8 +5,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from lab.learning.praise import Judgement
 from lab.mdp import TabularMDP, grid
-from lab.seat.terminal.typed_answer import ANSWERS, COMMANDS, MOST_MOVES, example, explained, letters, understand
+from lab.seat.terminal.typed_answer import (
+    ANSWERS,
+    COMMANDS,
+    MOST_MOVES,
+    example,
+    explained,
+    judged,
+    letters,
+    understand,
+)
 
 WORDS = ("up", "down", "left", "right")
 CUBE = ("left", "right", "backward", "forward", "down", "up")
@@ -160,3 +170,30 @@ def test_arrows_lead_left_and_right_where_the_states_are_no_grid() -> None:
     )
     assert [understand(word, car) for word in ("←", "→", "c", "\x1b[C")] == [0, 2, 1, 2]
     assert understand("↑", car) == "'↑' is no path: '↑' is no move; letters: l left, c coast, r right"
+
+
+@pytest.mark.parametrize(
+    ("line", "judgement"),
+    [
+        ("+\n", Judgement(1)),
+        (" - ", Judgement(-1)),
+        ("--", Judgement(-2)),
+        ("+++4", Judgement(3, 4)),
+        ("-3", Judgement(-1, 3)),
+        ("Bad 2", Judgement(-1, 2)),
+        ("good", Judgement(1)),
+        ("+-", None),
+        ("+" * 10, None),
+        ("-101", None),
+        ("goodness", None),
+        ("", None),
+    ],
+)
+def test_judgements(line: str, judgement: Judgement | None) -> None:
+    assert judged(line) == judgement
+    assert judged(line, WORDS) == judgement
+
+
+def test_the_beginning_of_a_label_is_that_move() -> None:
+    assert judged("+", ("-x", "+x")) is None
+    assert judged("good", ("-x", "+x")) == Judgement(1)

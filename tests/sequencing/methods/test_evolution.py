@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from lab.sequencing.methods.evolution import LONGEST, Evolution
 from lab.sequencing.simulate.cell_arrays import Floats
-from lab_studies.comparisons.evolution import LONGEST, Evolution
 
 WANTED = np.array([3.0, -4.0, 0.0, 1.0]) / np.sqrt(26.0)
 
