@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     import matplotlib.ticker
     import minari.data_collector
     import minari.storage
+    import networkx  # type: ignore[import-untyped]
     import optuna
     import pandas
     import prompt_toolkit.application
@@ -75,6 +76,7 @@ LIBRARIES: Mapping[str, Sequence[str]] = {
         "matplotlib.ticker",
     ),
     "minari": ("minari.data_collector", "minari.storage"),
+    "networkx": ("networkx",),
     "optuna": ("optuna",),
     "pandas": ("pandas",),
     "prompt_toolkit": (

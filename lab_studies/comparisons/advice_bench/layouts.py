@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from lab.mdp import Rewards, TabularMDP
+from lab.mdp import IntArray, Rewards, TabularMDP
 
 AHEAD = ((0, 1), (1, 0), (0, -1), (-1, 0))  # right, down, left, up: row and column
 LEFT, RIGHT, FORWARD, PICK_UP, TOGGLE = range(5)
@@ -34,24 +34,28 @@ class At(NamedTuple):
 
 def explored(start: Any, actions: Sequence[str], leads: Leads) -> TabularMDP:
     """The decision problem of all states that can be reached from `start`, numbered as they are met, with the lab's rewards."""
-    rewards, queue = Rewards(), [start]
+    rewards = Rewards()
+    numbers, successor = numbered(start, len(actions), leads)
+    goal, lost = (np.array([state == end for state in numbers]) for end in (WON, LOST))
+    reward = np.where(goal[successor], rewards.goal, np.where(lost[successor], rewards.collision, rewards.step))
+    reward[goal | lost] = 0.0
+    return TabularMDP(successor, reward, goal | lost, goal, 0, tuple(actions))
+
+
+def numbered(start: Any, n_actions: int, leads: Leads) -> tuple[dict[Any, int], IntArray]:
+    """The number of each state that can be reached from `start`, as they are met, and the number that each action leads to."""
+    queue, rows = [start], []
     numbers: dict[Any, int] = {start: 0}
-    rows: list[list[int]] = []
     for state in queue:
-        ends = state in (WON, LOST)
         row = []
-        for action in range(len(actions)):
-            entered = state if ends else leads(state, action)
+        for action in range(n_actions):
+            entered = state if state in (WON, LOST) else leads(state, action)
             if entered not in numbers:
                 numbers[entered] = len(numbers)
                 queue.append(entered)
             row.append(numbers[entered])
         rows.append(row)
-    successor = np.array(rows, np.int32)
-    goal, lost = (np.array([state == end for state in numbers]) for end in (WON, LOST))
-    reward = np.where(goal[successor], rewards.goal, np.where(lost[successor], rewards.collision, rewards.step))
-    reward[goal | lost] = 0.0
-    return TabularMDP(successor, reward, goal | lost, goal, 0, tuple(actions))
+    return numbers, np.array(rows, np.int32)
 
 
 def minigrid(rows: Sequence[str]) -> TabularMDP:
@@ -61,6 +65,11 @@ def minigrid(rows: Sequence[str]) -> TabularMDP:
     episode. A key blocks its cell until it is picked up; toggling from the front with the key opens the door. Source: the
     rules of Chevalier-Boisvert et al. 2023; rewards are the lab's, as MiniGrid's depend on the time.
     """
+    return explored(*minigrid_moves(rows))
+
+
+def minigrid_moves(rows: Sequence[str]) -> tuple[At, tuple[str, ...], Leads]:
+    """The start, the actions and the moves of a layout, see `minigrid`."""
     cells = {(r, c): mark for r, row in enumerate(rows) for c, mark in enumerate(row)}
     (start,) = (cell for cell, mark in cells.items() if mark == "S")
     doors = "D" in cells.values()
@@ -80,7 +89,7 @@ def minigrid(rows: Sequence[str]) -> TabularMDP:
         shut = mark == "#" or (mark == "k" and not at.has_key) or (mark == "D" and not at.is_open)
         return at if shut else at._replace(row=ahead[0], column=ahead[1])
 
-    return explored(At(*start), TURNS if doors else TURNS[:3], leads)
+    return At(*start), TURNS if doors else TURNS[:3], leads
 
 
 TOASTS, TOASTING, BUTTERING, SLOTS = 3, 4, 2, 2  # times in steps of 10 s
