@@ -76,11 +76,14 @@ class Experience:
 
 
 class RecordedTable(TableEnvironment):
-    """The environment of a table, which records each move in an `Experience`."""
+    """The environment of a table, which records each move in an `Experience`.
 
-    def __init__(self, mdp: TabularMDP, experience: Experience) -> None:
+    walled: (S, A) bool, the moves that the table only stands in for, which are not recorded; None: none.
+    """
+
+    def __init__(self, mdp: TabularMDP, experience: Experience, walled: BoolArray | None = None) -> None:
         super().__init__(mdp)
-        self.experience = experience
+        self.experience, self.walled = experience, walled
 
     def reset(self, episode: int, draw: Draw) -> int:
         """The state in which the episode begins."""
@@ -91,7 +94,8 @@ class RecordedTable(TableEnvironment):
     def step(self, state: int, action: int, draw: Draw) -> Step:
         """The outcome that the table holds."""
         step = super().step(state, action, draw)
-        self.experience.moved(state, action, step)
+        if self.walled is None or not self.walled[state, action]:
+            self.experience.moved(state, action, step)
         return step
 
 
