@@ -178,6 +178,12 @@ STUDIES: dict[str, Study] = {
         "One flat problem, or two levels: the toast task on a small grid",
         _In("comparisons.two_levels.flat_or_two_levels", "flat"),
     ),
+    "found-subtasks": Study(
+        "Sub-tasks that are found: doorways from a learner's moves, beside those given by hand and a flat learner",
+        _In("comparisons.found_subtasks", "found_subtasks"),
+        sessions=40,
+        least=2,
+    ),
     "changed-scenes": Study(
         "Skills in changed scenes: used as they are, adapted or learned, beside learning all anew",
         _In("comparisons.changed_scenes_study", "changed_scenes"),

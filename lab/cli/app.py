@@ -98,6 +98,11 @@ COMMANDS = {  # words after `lab` -> the command
         "A class in browsers: each pupil teaches a learner of their own, and the teacher looks on and helps.",
         "lab class world-1 insert --gate ccrl --out monday",
     ),
+    "find": Command(
+        "find",
+        "Find sub-tasks, such as the doorways between rooms, in a learner's own moves; learn the ways to them, and keep them.",
+        "lab find four-rooms",
+    ),
     "tune": Command(
         "tune",
         "Tune settings to a problem with Optuna, and measure the gain over the problem's own on seeds that no trial used.",

@@ -55,6 +55,7 @@ if TYPE_CHECKING:
     from lab.seat.terminal.prompt import TeachingPrompt
     from lab.seat.terminal.replay_keys import HELP as KEYS_HELP
     from lab.seat.terminal.replay_keys import replay_keys
+    from lab.seat.terminal.subtask_questions import accepted_by
     from lab.sequencing import SEQUENCERS
     from lab.sequencing.cell.objectives import OBJECTIVES
     from lab.sequencing.methods.srl_advised import FITTING
@@ -82,6 +83,7 @@ if TYPE_CHECKING:
     from lab.tasks.task import Task
     from lab.tasks.task_file import describe, is_path, load, load_any, load_cell_beside, shipped
     from lab.teaching.events import told_to, unheard
+    from lab.teaching.found_subtasks import found, learned
     from lab.teaching.kept_order import OrderSession, OrderSessionOptions, kept_order
     from lab.teaching.kept_order import gone_on as order_gone_on
     from lab.teaching.kept_session import KeptSession, check_new, named_with
@@ -108,6 +110,7 @@ if TYPE_CHECKING:
     from lab.view.movie import write_movie
     from lab.view.progress import EscapingConsole, counting
     from lab.view.schedule_scene import scene_of
+    from lab.view.subtask_summary import map_of, proposals_text, subtask_summary
     from lab.view.summary import (
         audit_summary,
         delivered_in_words,
@@ -182,6 +185,7 @@ TABLE = {
     "lab.seat.terminal.new_task_questions": ("ask",),
     "lab.seat.terminal.prompt": ("TeachingPrompt",),
     "lab.seat.terminal.replay_keys": ("HELP as KEYS_HELP", "replay_keys"),
+    "lab.seat.terminal.subtask_questions": ("accepted_by",),
     "lab.sequencing": ("SEQUENCERS",),
     "lab.sequencing.cell.objectives": ("OBJECTIVES",),
     "lab.sequencing.methods.srl_advised": ("FITTING",),
@@ -208,6 +212,7 @@ TABLE = {
     "lab.tasks.task": ("Task",),
     "lab.tasks.task_file": ("describe", "is_path", "load", "load_any", "load_cell_beside", "shipped"),
     "lab.teaching.events": ("told_to", "unheard"),
+    "lab.teaching.found_subtasks": ("found", "learned"),
     "lab.teaching.kept_order": ("kept_order", "gone_on as order_gone_on", "OrderSessionOptions", "OrderSession"),
     "lab.teaching.kept_session": ("check_new", "KeptSession", "named_with"),
     "lab.teaching.lesson": ("replay as replay_session", "teach as teach_session"),
@@ -230,6 +235,7 @@ TABLE = {
     "lab.view.meshcat": ("LiveView", "replay_html"),
     "lab.view.movie": ("write_movie",),
     "lab.view.schedule_scene": ("scene_of",),
+    "lab.view.subtask_summary": ("map_of", "proposals_text", "subtask_summary"),
     "lab.view.summary": (
         "audit_summary",
         "delivered_in_words",

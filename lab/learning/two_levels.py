@@ -4,7 +4,7 @@ The lower level is learned by the lab's own learners, in sub-problems with a goa
 1999). The upper level is a shortest path through a small graph, whose edges are as long as the learned ways.
 """
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from heapq import heappop, heappush
 from itertools import count
@@ -48,8 +48,10 @@ class TwoLevels:
     """The hierarchy over these bottlenecks of a problem.
 
     mdp: the problem; near: which states are one move apart, as far as is known; groups: the bottlenecks.
-    experience: receives the moves of all lessons. learner: the settings of each lesson; remembers: whether a lesson begins with
-    the values of the moves that are already known, so that it only learns what they leave open.
+    experience: receives the moves of all lessons. learner: the settings of each lesson, whose start values are optimistic
+    (`optimistic`); remembers: whether a lesson begins with the values of the moves that are already known, so that it only learns
+    what they leave open. ways: the learned ways, see `learn_ways`. before: ways learned before, by the signature of their problem,
+    which are used again.
     """
 
     mdp: TabularMDP
@@ -59,6 +61,7 @@ class TwoLevels:
     learner: LearnerSettings
     remembers: bool = False
     ways: dict[Way, Learned] = field(default_factory=dict)
+    before: Mapping[str, Learned] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.regions = regions(self.mdp.n_states, self.near, self.groups)
@@ -73,8 +76,8 @@ class TwoLevels:
         starts: where its episodes begin; default: all of these states. States from which the known moves do not lead to the goal
         are left out. A move into another region is like one against a wall.
         """
-        inside = (self.regions == region) | (self.regions == UNSEEN)
-        around = np.flatnonzero(self.regions == region).tolist()
+        inside = self.regions == region
+        around = np.flatnonzero(inside).tolist()
         for number in self.borders[region]:
             inside[list(self.groups[number])] = True
             around += self.groups[number]
@@ -84,16 +87,25 @@ class TwoLevels:
             raise BadInput(f"sub-task: no known move leads to the states {sorted(goal)} from region {region}")
         return sub_problem(self.mdp, inside, goal, begins)
 
-    def learn_ways(self, draw: Draw) -> int:
-        """The number of ways learned: from each region to each bottleneck around it. `ways` receives them."""
+    def learn_ways(self, draw: Draw) -> tuple[int, int]:
+        """The episodes and the moves in which the ways are learned: from each region to each bottleneck around it."""
+        episodes = moves = 0
         for region, numbers in enumerate(self.borders):
             for number in numbers:
                 try:
                     sub = self.problem(region, self.groups[number])
                 except BadInput:
                     continue  # nobody has gone there from here, as through a door that lets people out only
-                self.ways[region, number] = self._learned(sub, draw)
-        return len(self.ways)
+                way = self.before.get(sub.mdp.signature)
+                if way is None:
+                    way = self._learned(sub, draw)
+                    episodes, moves = episodes + way.episodes, moves + way.moves
+                self.ways[region, number] = way
+        return episodes, moves
+
+    def by_signature(self) -> dict[str, Learned]:
+        """The ways by the signature of their problem, for the `before` of a later hierarchy."""
+        return {**self.before, **{way.problem.signature: way for way in self.ways.values()}}
 
     def solve(self, start: int, goal: Collection[int], draw: Draw) -> tuple[list[int], Learned | None]:
         """(states, last): the path to a goal by the ways learned and a last one, which is learned now; [] if there is none.
@@ -113,8 +125,8 @@ class TwoLevels:
                 sub = self.problem(region, goal, entries)
             except BadInput:
                 continue
-            last = self._learned(sub, draw, {state: len(reached[state]) - 1 for state in sub.mdp.starts})
-            for entry in sub.mdp.starts:
+            last = self._learned(sub, draw, {state: len(reached[state]) - 1 for state in starts_of(sub.mdp)})
+            for entry in starts_of(sub.mdp):
                 states, _, is_there = greedy_path(last.q, last.problem, self.learner.max_steps, entry)
                 whole = reached[entry] + states[1:]
                 if is_there and (not best[0] or len(whole) < len(best[0])):
@@ -141,7 +153,7 @@ class TwoLevels:
     def _learned(self, sub: "SubProblem", draw: Draw, approach: dict[int, int] | None = None) -> Learned:
         """The policy of a sub-problem, learned until it is good from all starts; approach: moves to each, which count."""
         q0 = practised(sub, self.experience, self.learner.discount) if self.remembers else None
-        return lesson(sub, self.learner, self.experience, draw, q0, approach)
+        return lesson(sub, optimistic(self.learner), self.experience, draw, q0, approach)
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,10 +200,15 @@ def sub_problem(mdp: TabularMDP, inside: BoolArray, goal: Collection[int], start
     return SubProblem(table, walled)
 
 
+def optimistic(learner: LearnerSettings) -> LearnerSettings:
+    """The settings with the highest reward as start value: from many starts, a learner otherwise keeps to detours that it knows."""
+    return replace(learner, start_value=Rewards().goal)
+
+
 def practised(sub: SubProblem, experience: Experience, discount: float) -> FloatArray:
-    """The action values (S, A) of a sub-problem by the moves already made; those of all others are 0, which is optimistic."""
+    """The action values (S, A) of a sub-problem by the moves already made; others have the highest reward."""
     known = (experience.entered >= 0) | sub.mdp.terminal[:, None]
-    return known_values(sub.mdp, known, np.zeros(sub.mdp.successor.shape), discount)
+    return known_values(sub.mdp, known, np.full(sub.mdp.successor.shape, Rewards().goal), discount)
 
 
 def lesson(
@@ -208,7 +225,7 @@ def lesson(
     approach: the moves to each start, which each episode that begins there costs, too; default: none.
     """
     mdp = sub.mdp
-    starts = np.array(mdp.starts or (mdp.start,))
+    starts = np.array(starts_of(mdp))
     most = np.floor(ROOM * fewest_moves(mdp)[starts])
 
     def good(q: FloatArray) -> bool:
@@ -216,7 +233,7 @@ def lesson(
 
     whole = frozenset(starts.tolist())
     if q0 is not None and good(q0):
-        return Learned(replace(mdp, starts=tuple(starts.tolist())), q0, whole)
+        return Learned(mdp, q0, whole)
     place = _Placed(mdp, experience, sub.walled, approach or {})
     session = Session(place, learner, GateSettings(gate="never"), None, draw, q0)
     every = 1 if len(starts) == 1 else LOOKED
@@ -224,8 +241,7 @@ def lesson(
     if result.interrupted:
         raise KeyboardInterrupt
     moves = int(result.visits.sum()) + place.approached
-    problem = replace(mdp, starts=tuple(starts.tolist()))
-    return Learned(problem, result.q, whole, len(result.steps), moves, result)
+    return Learned(mdp, result.q, whole, len(result.steps), moves, result)
 
 
 class _Placed(RecordedTable):
@@ -239,6 +255,11 @@ class _Placed(RecordedTable):
         state = super().reset(episode, draw)
         self.approached += self.approach.get(state, 0)
         return state
+
+
+def starts_of(mdp: TabularMDP) -> tuple[int, ...]:
+    """The states in which episodes may begin."""
+    return mdp.starts or (mdp.start,)
 
 
 def _leading(near: Neighbours, mdp: TabularMDP, among: Collection[int], goal: Collection[int]) -> set[int]:

@@ -193,10 +193,10 @@ def true_neighbours(floor: Floor) -> dict[int, set[int]]:
 
 # ---- a session -------------------------------------------------------------------------------------------------------
 
-FLAT, HAND, RANDOM = "flat", "hand-made", "random"
-HOWS = (FLAT, HAND, *(f"found by {name}" for name in METHODS), RANDOM)
+FLAT, HAND, FOUND, RANDOM = "flat", "hand-made", "found", "random"
 REMEMBERS = " with memory"
-WAYS_OF_LEARNING = (*HOWS, f"{FLAT}{REMEMBERS}", f"{HAND}{REMEMBERS}", f"found by spectral{REMEMBERS}")
+HOWS = (FLAT, HAND, FOUND, RANDOM, *(f"{how}{REMEMBERS}" for how in (FLAT, HAND, FOUND)))
+METHOD = "spectral"  # that finds them in a series
 
 
 def session_of(floor: Floor, how: str, seed: int) -> Cost:
@@ -207,10 +207,10 @@ def session_of(floor: Floor, how: str, seed: int) -> Cost:
     episodes = moves = solved = later_episodes = later_moves = 0
     ratios = []
     for number, task in enumerate(tasks):
-        before = episodes, moves
+        until = episodes, moves
         if how == HAND and levels is None:
             levels = TwoLevels(floor.mdp, true_neighbours(floor), floor.doors, experience, LEARNER, remembers)
-            episodes, moves = _ways_cost(levels, draw)
+            episodes, moves = levels.learn_ways(draw)
         path, last = ([], None) if levels is None else levels.solve(task.start, task.goal, draw)
         if last is not None:
             episodes, moves = episodes + last.episodes, moves + last.moves
@@ -222,30 +222,24 @@ def session_of(floor: Floor, how: str, seed: int) -> Cost:
             episodes, moves = episodes + flat.episodes, moves + flat.moves
             length = flat.walk(task.start)
             if how not in (FLAT, HAND):
-                levels = TwoLevels(
-                    floor.mdp, experience.neighbours(), _found(how, experience, seed), experience, LEARNER, remembers
-                )
-                more = _ways_cost(levels, draw)
+                groups, before = _found(how, experience, seed), {} if levels is None else levels.by_signature()
+                near = experience.neighbours()
+                levels = TwoLevels(floor.mdp, near, groups, experience, LEARNER, remembers, before=before)
+                more = levels.learn_ways(draw)
                 episodes, moves = episodes + more[0], moves + more[1]
         solved += length < np.inf
         ratios.append(length / shortest(floor, task))
         if number >= TASKS // 2:
-            later_episodes, later_moves = later_episodes + episodes - before[0], later_moves + moves - before[1]
+            later_episodes, later_moves = later_episodes + episodes - until[0], later_moves + moves - until[1]
     reached = [ratio for ratio in ratios if ratio < np.inf]
     return Cost(episodes, moves, solved, float(np.mean(reached)), later_episodes, later_moves)
 
 
-def _ways_cost(levels: TwoLevels, draw: Draw) -> tuple[int, int]:
-    """The episodes and moves in which the ways of a hierarchy are learned, which is done now."""
-    levels.learn_ways(draw)
-    return tuple(sum(getattr(way, what) for way in levels.ways.values()) for what in ("episodes", "moves"))
-
-
 def _found(how: str, experience: Experience, seed: int) -> list[Bottleneck]:
     if how != RANDOM:
-        return bottlenecks(experience, how.removeprefix("found by "))
+        return bottlenecks(experience, METHOD)
     known = sorted(experience.neighbours())
-    number = min(len(bottlenecks(experience, "spectral")), len(known))
+    number = min(len(bottlenecks(experience, METHOD)), len(known))
     return [(known[n],) for n in sorted(np.random.default_rng(seed).choice(len(known), number, replace=False).tolist())]
 
 
@@ -291,7 +285,7 @@ def _beside(near: Mapping[int, set[int]], door: Bottleneck, group: Bottleneck) -
 
 def found_subtasks(job: Job, reading: Mapping[str, Any]) -> Findings:
     """The results of every floor and every way of learning; the reading has no effect."""
-    settings = [Setting(floor, how) for floor in FLOORS for how in WAYS_OF_LEARNING]
+    settings = [Setting(floor, how) for floor in FLOORS for how in HOWS]
     costs = job.each(partial(costs_of, sessions=job.sessions, seed=job.seed), settings)
     rows = [row for setting in settings for row in rows_of(setting, costs)]
     names = [*FLOORS, EMPTY]
@@ -345,7 +339,7 @@ def looking_rows(name: str, looks: Sequence[Sequence[Looked]]) -> list[Row]:
 def in_short(rows: Sequence[Row]) -> Row:
     """The summary: for each way of learning, how many times the flat and the hand-made moves and episodes, by geometric mean."""
     summary: Row = {}
-    for how in WAYS_OF_LEARNING:
+    for how in HOWS:
         told = []
         for other in (FLAT, HAND):
             for measure in ("episodes", "moves"):
@@ -360,6 +354,6 @@ def picture(rows: Sequence[Row]) -> bytes:
     """The moves of a series, by floor, without memory."""
     lines = {
         how: [those(rows, problem=floor, how=how, measure="moves")[0] for floor in FLOORS]
-        for how in (FLAT, HAND, "found by spectral", RANDOM)
+        for how in (FLAT, HAND, FOUND, RANDOM)
     }
     return bars(list(FLOORS), lines, f"moves of {TASKS} tasks")
