@@ -16,7 +16,8 @@ def find(
         str, typer.Option("--method", help="How bottlenecks are looked for: spectral, betweenness or paths.")
     ] = "spectral",
     episodes: Annotated[
-        int, typer.Option("--episodes", min=1, max=1_000_000, help="Episodes in whose moves bottlenecks are looked for.")
+        int,
+        typer.Option("--episodes", min=1, max=1_000_000, help="Episodes in whose moves bottlenecks are looked for."),
     ] = 20,
     yes: Annotated[bool, typer.Option("--yes", help="Ask nothing and accept every proposed sub-task.")] = False,
     seed: Seed = 0,

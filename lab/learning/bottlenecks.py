@@ -10,7 +10,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 
 import numpy as np
 
-from lab.errors import BadInput, unknown
+from lab.errors import unknown
 from lab.lazy import networkx, scipy
 from lab.learning.environment import Step, TableEnvironment
 from lab.learning.selection import Draw

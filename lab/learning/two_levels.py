@@ -48,10 +48,9 @@ class TwoLevels:
     """The hierarchy over these bottlenecks of a problem.
 
     mdp: the problem; near: which states are one move apart, as far as is known; groups: the bottlenecks.
-    experience: receives the moves of all lessons. learner: the settings of each lesson, whose start values are optimistic
-    (`optimistic`); remembers: whether a lesson begins with the values of the moves that are already known, so that it only learns
-    what they leave open. ways: the learned ways, see `learn_ways`. before: ways learned before, by the signature of their problem,
-    which are used again.
+    experience: receives the moves of all lessons. learner: the settings of each lesson, whose start values are `optimistic`.
+    remembers: whether a lesson begins with the values of the moves that are already known, so that it only learns what they leave
+    open. ways: the learned ways, see `learn_ways`; before: ways learned before, by the signature of their problem, to use again.
     """
 
     mdp: TabularMDP
@@ -201,7 +200,7 @@ def sub_problem(mdp: TabularMDP, inside: BoolArray, goal: Collection[int], start
 
 
 def optimistic(learner: LearnerSettings) -> LearnerSettings:
-    """The settings with the highest reward as start value: from many starts, a learner otherwise keeps to detours that it knows."""
+    """The settings with the highest reward as start value; from many starts, a learner would otherwise keep to detours."""
     return replace(learner, start_value=Rewards().goal)
 
 

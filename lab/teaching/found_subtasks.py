@@ -21,7 +21,9 @@ from lab.teaching.teacher import plain_name
 from lab.toolbox.policy import Origin, Policy, is_name
 from lab.toolbox.registry import Toolbox
 
-LEARNER = LearnerSettings(learner="q", alpha=0.95, beta=1.0, episodes=400)  # of ways and of the moves in which they are found
+LEARNER = LearnerSettings(
+    learner="q", alpha=0.95, beta=1.0, episodes=400
+)  # of ways and of the moves in which they are found
 ALONE = GateSettings(gate="never")
 TASKS = 10  # drawn tasks on which the gain is measured
 FAR_APART = 5  # least moves from the start of such a task to its goal
@@ -56,7 +58,9 @@ def found(problem: Problem, method: str, episodes: int, seed: int, max_steps: in
     if method not in METHODS:
         raise unknown("method", method, METHODS, "--method")
     if problem.environment is not None and type(problem.environment) is not TableEnvironment:
-        raise BadInput(f"problem '{problem.name}': sub-tasks are found where steps are certain and in a table: wanted a world")
+        raise BadInput(
+            f"problem '{problem.name}': sub-tasks are found where steps are certain and in a table: wanted a world"
+        )
     mdp, learner = problem.mdp, replace(LEARNER, max_steps=max_steps)
     experience = Experience(mdp.n_states, mdp.n_actions)
     place = RecordedTable(mdp, experience)
@@ -88,7 +92,9 @@ def learned(finding: Finding, accepted: Mapping[Bottleneck, str], toolbox: Toolb
     toolbox.check()
     problem, experience, draw = finding.problem, finding.experience, splitmix.stream(splitmix.apart(finding.seed, 1))
     found_moves = experience.moves
-    levels = TwoLevels(problem.mdp, experience.neighbours(), list(accepted), experience, finding.learner, remembers=True)
+    levels = TwoLevels(
+        problem.mdp, experience.neighbours(), list(accepted), experience, finding.learner, remembers=True
+    )
     levels.learn_ways(draw)
     kept = []
     for (region, number), way in levels.ways.items():
@@ -96,7 +102,9 @@ def learned(finding: Finding, accepted: Mapping[Bottleneck, str], toolbox: Toolb
         policy = _policy(name, way, finding)
         toolbox.put(policy)
         cost = {"episodes": way.episodes, "moves": way.moves, "longest": _longest(way)}
-        kept.append({"to": accepted[levels.groups[number]], "from": f"room {region + 1}"} | cost | {"saved_as": policy.name})
+        kept.append(
+            {"to": accepted[levels.groups[number]], "from": f"room {region + 1}"} | cost | {"saved_as": policy.name}
+        )
     return {
         "problem": problem.name,
         "method": finding.method,
@@ -127,7 +135,15 @@ def gain(finding: Finding, levels: TwoLevels) -> dict[str, Any] | None:
     tasks = _tasks(mdp, sorted(levels.near), rng)
     if len(tasks) < TASKS:
         return None
-    counts = {"tasks": TASKS, "moves": 0, "episodes": 0, "solved": 0, "flat_moves": 0, "flat_episodes": 0, "flat_solved": 0}
+    counts = {
+        "tasks": TASKS,
+        "moves": 0,
+        "episodes": 0,
+        "solved": 0,
+        "flat_moves": 0,
+        "flat_episodes": 0,
+        "flat_solved": 0,
+    }
     levels = replace(levels, remembers=False)
     draw, flat_draw = (splitmix.stream(splitmix.apart(finding.seed, number)) for number in (2, 3))
     unused = Experience(mdp.n_states, mdp.n_actions)

@@ -9,13 +9,12 @@ import numpy as np
 
 from lab.learning import splitmix
 from lab.learning.bottlenecks import METHODS, Bottleneck, Experience, bottlenecks
-from lab.learning.selection import Draw
 from lab.learning.settings import LearnerSettings
-from lab.learning.two_levels import ROOM, TwoLevels, lesson, practised, sub_problem
+from lab.learning.two_levels import ROOM, SubProblem, TwoLevels, lesson, optimistic, practised, sub_problem
 from lab.learning.values import fewest_moves
 from lab.mdp import Rewards, TabularMDP
 from lab.studies.charts import bars
-from lab.studies.findings import Findings, Row, share_row, those, varying_row
+from lab.studies.findings import Findings, Row, those, varying_row
 from lab.studies.runner import Job, seeds_of
 from lab_studies.comparisons.advice_bench.common_learner import COMMON
 from lab_studies.comparisons.advice_bench.families import STEPS, rooms
@@ -39,19 +38,20 @@ LOOKING_SESSIONS = 10  # at most
 BESIDE = 1  # moves between a door and what counts as that door
 
 MEASURES = (
-    f"A session is a series of {TASKS} tasks in the same rooms, each from a drawn state to a drawn cell at least {FAR_APART} moves "
-    f"away. A lesson ends when its path has at most {ROOM} times the fewest moves, or after {LEARNER.episodes} episodes. Episodes and "
-    "moves are all that were made in the session: a found hierarchy learns its first task as the flat learner does, finds "
-    "bottlenecks in just those moves, and then learns the ways to them; the hand-made one is given the doors and learns the "
-    "ways first. Where no known way leads to a goal, the task is learned flat, and bottlenecks are looked for again. A lesson of a "
-    "way begins each episode anywhere in its region, as a lesson in a prepared scene does; that of a task's last way begins at the "
-    "task's start. 'memory': each lesson begins with the values of all moves made so far. 'random': as many states as spectral cuts "
-    "find, drawn."
+    f"A session is a series of {TASKS} tasks in the same rooms, each from a drawn state to a drawn cell at least {FAR_APART} "
+    f"moves away. A lesson ends when its path has at most {ROOM} times the fewest moves, or after {LEARNER.episodes} episodes. "
+    "Episodes and moves are all that were made in the session: 'found' learns its first task as the flat learner does, finds "
+    "bottlenecks in just those moves, and learns the ways to them; 'hand-made' is given the doors, and learns the ways first. "
+    "Where no known way leads to a goal, the task is learned flat, and bottlenecks are looked for again. A way's lesson begins "
+    "each episode anywhere in its region, as in a prepared scene; that of a task's last way begins at the task's start. "
+    "'with memory': each lesson begins with the values of all moves made so far. 'optimistic': the flat learner with the start "
+    "values that ways have. 'random': as many states as spectral cuts find, drawn. later: in the second half of the tasks. "
+    "times_flat, times_hand-made: geometric means of the ratios, session by session."
 )
 LOOKING = (
-    f"doors_percent: the doors that a method finds (at most {BESIDE} move beside), false: its other proposals, after so many moves of "
-    f"a flat learner, in at most {LOOKING_SESSIONS} sessions. 'far-door' has a key to pick up and a door to open, "
-    "which count as doors."
+    f"doors_percent: the doors that a method finds (at most {BESIDE} move beside), false: its other proposals, after so many "
+    f"moves of a flat learner, in at most {LOOKING_SESSIONS} sessions. 'far-door' has a key to pick up and a door to open, which "
+    "count as doors."
 )
 
 
@@ -168,13 +168,15 @@ def tasks_of(floor: Floor, rng: np.random.Generator, n: int = TASKS) -> list[Tas
     """Drawn tasks whose goal can be reached from the start in at least FAR_APART moves."""
     tasks: list[Task] = []
     while len(tasks) < n:
-        task = Task(floor.starts[int(rng.integers(len(floor.starts)))], floor.cells[int(rng.integers(len(floor.cells)))])
+        task = Task(
+            floor.starts[int(rng.integers(len(floor.starts)))], floor.cells[int(rng.integers(len(floor.cells)))]
+        )
         if FAR_APART <= shortest(floor, task) < np.inf:
             tasks.append(task)
     return tasks
 
 
-def flat_problem(floor: Floor, task: Task) -> Any:
+def flat_problem(floor: Floor, task: Task) -> SubProblem:
     """The whole floor as the problem of one task."""
     return sub_problem(floor.mdp, np.ones(floor.mdp.n_states, np.bool_), task.goal, [task.start])
 
@@ -193,9 +195,9 @@ def true_neighbours(floor: Floor) -> dict[int, set[int]]:
 
 # ---- a session -------------------------------------------------------------------------------------------------------
 
-FLAT, HAND, FOUND, RANDOM = "flat", "hand-made", "found", "random"
+FLAT, OPTIMISTIC, HAND, FOUND, RANDOM = "flat", "flat, optimistic", "hand-made", "found", "random"
 REMEMBERS = " with memory"
-HOWS = (FLAT, HAND, FOUND, RANDOM, *(f"{how}{REMEMBERS}" for how in (FLAT, HAND, FOUND)))
+HOWS = (FLAT, OPTIMISTIC, HAND, FOUND, RANDOM, *(f"{how}{REMEMBERS}" for how in (FLAT, HAND, FOUND)))
 METHOD = "spectral"  # that finds them in a series
 
 
@@ -218,10 +220,10 @@ def session_of(floor: Floor, how: str, seed: int) -> Cost:
         if not path:
             sub = flat_problem(floor, task)
             q0 = practised(sub, experience, LEARNER.discount) if remembers else None
-            flat = lesson(sub, LEARNER, experience, draw, q0)
+            flat = lesson(sub, optimistic(LEARNER) if how == OPTIMISTIC else LEARNER, experience, draw, q0)
             episodes, moves = episodes + flat.episodes, moves + flat.moves
             length = flat.walk(task.start)
-            if how not in (FLAT, HAND):
+            if how in (FOUND, RANDOM):
                 groups, before = _found(how, experience, seed), {} if levels is None else levels.by_signature()
                 near = experience.neighbours()
                 levels = TwoLevels(floor.mdp, near, groups, experience, LEARNER, remembers, before=before)
@@ -311,7 +313,13 @@ def rows_of(setting: Setting, costs: Mapping[Setting, list[Cost]]) -> list[Row]:
     own = np.array(costs[setting])
     rows = [
         varying_row(named, measure, own[:, column])
-        for measure, column in (("episodes", 0), ("moves", 1), ("later_episodes", 4), ("later_moves", 5), ("path_ratio", 3))
+        for measure, column in (
+            ("episodes", 0),
+            ("moves", 1),
+            ("later_episodes", 4),
+            ("later_moves", 5),
+            ("path_ratio", 3),
+        )
     ]
     rows.append(varying_row(named, "solved_percent", 100.0 * own[:, 2] / TASKS))
     for other in (FLAT, HAND):
