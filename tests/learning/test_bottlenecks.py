@@ -61,7 +61,7 @@ def test_nothing_is_found_before_the_first_move() -> None:
 
 
 def test_an_unknown_method_is_named() -> None:
-    with pytest.raises(BadInput, match="unknown method 'hexq'.*known: betweenness, paths, spectral"):
+    with pytest.raises(BadInput, match=r"unknown method 'hexq'.*known: betweenness, paths, spectral"):
         bottlenecks(Experience(4, 2), "hexq")
 
 
