@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
+from lab.learning.bottlenecks import METHODS
 from lab.studies.findings import those
 from lab_studies.comparisons import found_subtasks
 from lab_studies.comparisons.advice_bench.layouts import DOOR_KEY_ROWS, At, minigrid_moves, numbered
 from lab_studies.comparisons.found_subtasks import (
     FLAT,
     HOWS,
-    METHODS,
     Setting,
     compass_floor,
     costs_of,
