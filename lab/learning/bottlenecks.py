@@ -217,7 +217,7 @@ def _cheaper_side(part: Sequence[int], near: Neighbours) -> set[int]:
     if size <= DENSE:
         vector = scipy.linalg.eigh(laplacian.toarray(), subset_by_index=[1, 1])[1][:, 0]
     else:
-        first = np.random.default_rng(0).random(size)
+        first = np.sin(1.0 + np.arange(size))  # any vector that is none of the others
         vector = scipy.sparse.linalg.eigsh(laplacian, 2, sigma=-1e-3, v0=first)[1][:, 1]
     vector = np.round(vector / degree, 9)
     vector *= np.sign(vector[np.flatnonzero(vector)[0]]) if vector.any() else 1.0

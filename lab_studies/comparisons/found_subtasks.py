@@ -204,7 +204,8 @@ METHOD = "spectral"  # that finds them in a series
 def session_of(floor: Floor, how: str, seed: int) -> Cost:
     """The cost of a session; all ways of learning have the same tasks for the same seed."""
     how, remembers = how.removesuffix(REMEMBERS), how.endswith(REMEMBERS)
-    tasks, draw = tasks_of(floor, np.random.default_rng(seed)), splitmix.stream(seed)
+    rng, draw = np.random.default_rng(seed), splitmix.stream(seed)
+    tasks = tasks_of(floor, rng)
     experience, levels = Experience(floor.mdp.n_states, floor.mdp.n_actions), None
     episodes = moves = solved = later_episodes = later_moves = 0
     ratios = []
@@ -224,7 +225,7 @@ def session_of(floor: Floor, how: str, seed: int) -> Cost:
             episodes, moves = episodes + flat.episodes, moves + flat.moves
             length = flat.walk(task.start)
             if how in (FOUND, RANDOM):
-                groups, before = _found(how, experience, seed), {} if levels is None else levels.by_signature()
+                groups, before = _found(how, experience, rng), {} if levels is None else levels.by_signature()
                 near = experience.neighbours()
                 levels = TwoLevels(floor.mdp, near, groups, experience, LEARNER, remembers, before=before)
                 more = levels.learn_ways(draw)
@@ -237,12 +238,12 @@ def session_of(floor: Floor, how: str, seed: int) -> Cost:
     return Cost(episodes, moves, solved, float(np.mean(reached)), later_episodes, later_moves)
 
 
-def _found(how: str, experience: Experience, seed: int) -> list[Bottleneck]:
+def _found(how: str, experience: Experience, rng: np.random.Generator) -> list[Bottleneck]:
     if how != RANDOM:
         return bottlenecks(experience, METHOD)
     known = sorted(experience.neighbours())
     number = min(len(bottlenecks(experience, METHOD)), len(known))
-    return [(known[n],) for n in sorted(np.random.default_rng(seed).choice(len(known), number, replace=False).tolist())]
+    return [(known[n],) for n in sorted(rng.choice(len(known), number, replace=False).tolist())]
 
 
 # ---- looking for doors -----------------------------------------------------------------------------------------------
