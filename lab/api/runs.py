@@ -47,7 +47,7 @@ class TaskOptions(TypedDict, total=False):
     toasts: the number of parts of the first kind, 1 to 50; parts: of each kind, such as "slice=2,cup=1".
     override: of the arm's speed [%]; faults: the seed with which faults are drawn, default none.
     order: of the moves by part numbers, such as "1,2,1,1,2,2"; cyclic: the shortest cycle is repeated; parts_per_cycle: its
-    most parts; method: the name of the method that finds the order.
+    most parts; method: the name of the method that finds the order; ways: "learned" (default), or "composed" of shorter ones.
     """
 
     toasts: int
@@ -58,6 +58,7 @@ class TaskOptions(TypedDict, total=False):
     cyclic: bool
     method: str
     parts_per_cycle: Annotated[int, Ge(1)]
+    ways: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,7 +149,7 @@ def run(
         raise BadInput(f"out '{out}' with the advisor {advising}: a journal can only name advisors that have a name")
     words = RunOptions(task=str(task), advisors=tuple(map(str, advising.names)), seed=seed, **given)
     loaded = load(words.task)
-    wanted = words.by_method(loaded)
+    wanted, composes = words.by_method(loaded), words.composes
     with ExitStack() as stack:
         worker_pool = stack.enter_context(Workers(workers))
         prepared = prepare(wanted, words.ordered(loaded), seed, workers=worker_pool)
@@ -157,7 +158,9 @@ def run(
         check_out(folder)
         journal = RunJournal() if out is None else begun(words, loaded, folder)
         stack.callback(journal.close)
-        teacher = Teacher(toolbox_of(toolbox, f"{nowhere}/toolbox"), advising, seed, heard_by(advising, unheard))
+        teacher = Teacher(
+            *(toolbox_of(toolbox, f"{nowhere}/toolbox"), advising, seed, heard_by(advising, unheard)), composes=composes
+        )
         advice = RunAdvice(
             *(teacher.toolbox, words.lessons(), journal, words.order or ""),
             cyclic=words.cyclic,

@@ -61,6 +61,12 @@ def run(
         bool, typer.Option("--cyclic", help="Repeat the robot's shortest cycle, and measure its period.")
     ] = False,
     parts_per_cycle: PartsPerCycle = None,
+    ways: Annotated[
+        str,
+        typer.Option(
+            "--ways", help="How ways become known: learned, or composed of shorter ones where that is possible."
+        ),
+    ] = "learned",
     seed: Seed = 0,
     workers: Annotated[
         int | None,
@@ -86,12 +92,14 @@ def run(
             *(task or "", toasts, parts, tuple(advisor or ()), asked, decide, override, seed, faults, order, cyclic),
             method=method,
             parts_per_cycle=parts_per_cycle,
+            ways=ways,
         )
         if resume is None:
             options = replace(given, task=task or "toast", advisors=given.advisors or deferred.DEFAULT_ADVISORS)
             loaded = deferred.load(options.task)
         else:
             options, loaded = deferred.run_gone_on(given, resume, out)
+        composes = options.composes
         wanted, folder = options.by_method(loaded), resume or out or Path(f"{loaded.name}-run")
         deferred.check_out(folder)
         again = f"go on with: lab run --resume {quote(str(folder))}{deferred.named_with(options.advisors)}"
@@ -109,7 +117,7 @@ def run(
                     cyclic=options.cyclic,
                     parts_per_cycle=options.parts_per_cycle,
                 )
-                teacher = replace(teacher, keep=advice.keep)
+                teacher = replace(teacher, keep=advice.keep, composes=composes)
                 share = options.override / 100
                 conditions = deferred.Conditions(
                     share, seat.page, controls, journal, fault_seed=options.faults, advice=advice

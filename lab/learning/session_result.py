@@ -1,11 +1,13 @@
 """The result of a session; checks of its settings and of its start values."""
 
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lab.errors import BadInput, unknown
+from lab.learning.environment import Judged
 from lab.learning.gates import GATES
 from lab.learning.selection import SELECTIONS
 from lab.learning.settings import GateSettings, LearnerSettings
@@ -47,6 +49,26 @@ class SessionResult:
     returns: FloatArray
     final_return: float | None = None
     best_return: float | None = None
+
+    @classmethod
+    def of_table(cls, q: FloatArray, visits: CountArray, judged: Judged) -> Self:
+        """The result of no episode at all: a table that was made otherwise, and is judged."""
+        nothing = np.zeros(0, np.int64)
+        return cls(
+            q=q,
+            visits=visits,
+            steps=nothing,
+            guided=nothing.astype(np.bool_),
+            requests=0,
+            helped_steps=0,
+            misleads=0,
+            rejected_at_episode=None,
+            optimal_steps=judged.optimal_steps,
+            final_steps=judged.final_steps,
+            solved=judged.solved,
+            interrupted=False,
+            returns=nothing.astype(np.float64),
+        )
 
     @property
     def by_return(self) -> bool:

@@ -8,7 +8,7 @@ from typing import Annotated, Any, ClassVar
 
 from annotated_types import Ge, Le
 
-from lab.errors import BadInput
+from lab.errors import BadInput, unknown
 from lab.production import deferred
 from lab.production.cyclic_order import check_parts, mix_of
 from lab.production.run_journal import RunBegan, RunJournal, read_run
@@ -18,12 +18,17 @@ from lab.tasks.task_file import load
 from lab.teaching.kept_session import check_alone, check_named
 from lab.teaching.lesson_options import LessonOptions, SessionOptions, recorded_whole, whole_path
 
+WAYS = (
+    "learned",
+    "composed",
+)  # what becomes of a way that is not known: learned, or put together out of shorter ones first
+
 
 @dataclass(frozen=True)
 class RunOptions(SessionOptions):
     """What a run depends on, by name; None or empty: not given.
 
-    override: of the arm's speed [%]; faults: their seed; method: who finds the order, None: whom the task says.
+    override: of the arm's speed [%]; faults: their seed; method: who finds the order, None: whom the task says; ways: WAYS.
     """
 
     command = "run"
@@ -48,6 +53,7 @@ class RunOptions(SessionOptions):
     cyclic: bool = False
     method: str | None = None
     parts_per_cycle: int | None = None
+    ways: str = WAYS[0]
 
     def by_method(self, task: Task) -> Task:
         """The task, its order found as these options say. BadInput for an unknown method."""
@@ -70,6 +76,13 @@ class RunOptions(SessionOptions):
         if self.order is not None or self.cyclic:
             deferred.check_order(deferred.untimed(task, order), self.order, mix_of(order) if self.cyclic else ())
         return order
+
+    @property
+    def composes(self) -> bool:
+        """Whether ways are put together out of shorter ones. Raises BadInput for ways that are neither of WAYS."""
+        if self.ways not in WAYS:
+            raise unknown("ways", self.ways, WAYS, "--ways")
+        return self.ways == "composed"
 
     def lessons(self) -> LessonOptions:
         """The options of the lessons in the run."""

@@ -163,7 +163,9 @@ def lesson_parts(lesson: Lesson, first_asked: int | None = None, rejected: Advic
         if rejected is not None:
             misleads = counted(rejected.misleads, "mislead")
             parts.append(f"rejected its advisor in episode {rejected.episode} after {misleads}")
-    if lesson.fitness is not None:
+    if lesson.source == "composed":
+        parts.append(lesson.reason)
+    elif lesson.fitness is not None or lesson.parent is not None:
         parts.append(f"{_FOUND.get(lesson.source, 'refused')} {lesson.reason}")
     saved = saved_text(*lesson.saved)
     return [*parts, saved] if saved else parts

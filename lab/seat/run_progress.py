@@ -124,11 +124,11 @@ class RunProgress:
         self._stands = ""
 
     def _lesson(self, name: str, lesson: Lesson) -> None:
-        if lesson.result is None:
+        if lesson.source == "reused":
             self._reused.append((name, lesson))
             return
         steps, *rest = lesson_parts(lesson, self._first_asked.get(name), self._rejected.get(name))
-        curve = sparkline(lesson.result.steps.tolist(), bars=self._bars)
+        curve = sparkline([] if lesson.result is None else lesson.result.steps.tolist(), bars=self._bars)
         head = Text.assemble("  ", (f"{lesson.source:9}", "cyan"), f" {name:{_NAME}}")
         self._pack([head, *map(Text, [f"{curve} {steps:>11}", *rest])])
 

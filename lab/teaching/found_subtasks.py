@@ -185,23 +185,8 @@ def _policy(name: str, way: Learned, finding: Finding) -> Policy:
     """A way as a policy; one that needed no episode of its own has an empty learning curve."""
     mdp, result = way.problem, way.result
     if result is None:
-        none = np.zeros(0)
-        judged = TableEnvironment(mdp).judge(way.q, finding.learner)
-        result = SessionResult(
-            q=way.q,
-            visits=np.where(mdp.terminal[:, None], 0, finding.experience.counts),
-            steps=none.astype(np.int64),
-            guided=none.astype(np.bool_),
-            requests=0,
-            helped_steps=0,
-            misleads=0,
-            rejected_at_episode=None,
-            optimal_steps=judged.optimal_steps,
-            final_steps=judged.final_steps,
-            solved=judged.solved,
-            interrupted=False,
-            returns=none,
-        )
+        visits = np.where(mdp.terminal[:, None], 0, finding.experience.counts)
+        result = SessionResult.of_table(way.q, visits, TableEnvironment(mdp).judge(way.q, finding.learner))
     kept_as = plain_name(Problem(name, "way", mdp))
     origin = Origin(kept_as, "way", finding.problem.name, "nobody", finding.seed)
     return Policy.of(result, mdp, optimistic(finding.learner), ALONE, origin)

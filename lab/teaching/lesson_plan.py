@@ -11,7 +11,7 @@ from lab.learning.settings import GateSettings, LearnerSettings
 from lab.toolbox.fitness import Fitness
 from lab.toolbox.policy import Policy
 
-Source = Literal["learned", "reused", "continued", "adapted"]
+Source = Literal["learned", "reused", "continued", "adapted", "composed"]
 MAX_SESSIONS = 20  # the limit on sessions for reaching the goal; each continues the table of the one before
 
 
@@ -21,7 +21,7 @@ class LessonPlan:
 
     problem, learner, gate: what is learned, and how; task: the name of the task, world or environment, which the policy is saved
     under; unfinished: a policy of exactly this problem to continue; warm: a policy of another problem to warm-start from; name:
-    of the saved policy, None for a free name; sessions: the limit.
+    of the saved policy, None for a free name; sessions: the limit; composed: whether `warm` was put together for this lesson.
     """
 
     problem: Problem
@@ -32,6 +32,7 @@ class LessonPlan:
     warm: Policy | None = None
     name: str | None = None
     sessions: int = MAX_SESSIONS
+    composed: bool = False
 
     @property
     def begins_from(self) -> Policy | None:
@@ -45,10 +46,10 @@ class Lesson:
 
     policy: with its whole history; source: where it came from; result: of the sessions now, None if it was reused.
     failure: why it failed in physics, None if it did not or was not tried.
-    In the lessons of a run also: reason: why the policy is reused, adapted or learned; parent: the policy that an adapted one was
-    warm-started from; fitness: of that parent, of a reused policy of another problem, or of the best refused one; saved: how many
-    fewer episodes and helped steps this took than the found policy, or than a session from nothing if that is more; other_arm:
-    the arm that the found policy was learned with, "" if it is this task's.
+    In the lessons of a run also: reason: why the policy is reused, adapted, composed or learned; parent: the policy that an
+    adapted one was warm-started from; fitness: of that parent, of a reused policy of another problem, or of the best refused one;
+    saved: how many fewer episodes and helped steps this took than the found policy, or than a session from nothing if that is
+    more; other_arm: the arm that the found policy was learned with, "" if it is this task's.
     """
 
     policy: Policy

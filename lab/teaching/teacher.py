@@ -8,12 +8,14 @@ from lab.advice.advising import Advising
 from lab.advice.entries import Closed
 from lab.advice.journal import Again, Journal
 from lab.errors import BadInput, LabError, WorkFailed, counted
+from lab.learning.environment import TableEnvironment
 from lab.learning.problem import Problem
 from lab.learning.session_result import SessionResult
 from lab.mdp import TabularMDP
 from lab.teaching.events import KeptBeside, LessonBegan, LessonContinued, PolicyAdvises, RecordSkipped, Tell, unheard
 from lab.teaching.lesson_plan import Interrupted, Keep, Lesson, LessonPlan, Source, Trial
 from lab.teaching.lesson_sessions import RunsSessions, Sessions, fits, joined
+from lab.toolbox.composition import composed
 from lab.toolbox.fitness import Fitness, best_fit, reference
 from lab.toolbox.index import KnownPolicies
 from lab.toolbox.policy import MAX_NAME_LENGTH, Origin, Policy, is_name
@@ -30,7 +32,8 @@ class Teacher:
 
     keep: returns the journal of a lesson, by default one that is not written; begun: for a resumed lesson, returns the policy
     that it continued or was warm-started from; trial: tries a learned policy in physics before it is saved, and a found one
-    before it is used; sessions: makes the sessions of a lesson, with the arguments of `Sessions` and its method `run`.
+    before it is used; sessions: makes the sessions of a lesson, with the arguments of `Sessions` and its method `run`; composes:
+    whether ways are put together out of shorter ones, see `find_or_teach`.
     """
 
     toolbox: Toolbox
@@ -41,14 +44,16 @@ class Teacher:
     begun: Callable[[Problem], Policy | None] | None = None
     trial: Trial | None = None
     sessions: Callable[..., RunsSessions] = Sessions
+    composes: bool = False
 
     def find_or_teach(self, plan: LessonPlan, known: KnownPolicies) -> Lesson:
         """A policy that reaches the goal of this problem: found in `known`, or learned now.
 
         In this order: a solved policy of exactly this problem is reused; one of another problem that fits (see
         `lab.toolbox.fitness`) is reused, and not saved again; an unsolved one of this problem is continued; one of another
-        problem is adapted; otherwise the lesson begins anew. Raises WorkFailed if no session reaches the goal, Interrupted on
-        Ctrl-C.
+        problem is adapted; otherwise the lesson begins anew. A teacher that composes does not adapt one policy: it puts
+        the moves of all together (see `lab.toolbox.composition`), uses that if it makes a shortest path, and otherwise begins the
+        lesson from it. Raises WorkFailed if no session reaches the goal, Interrupted on Ctrl-C.
         """
         problem = plan.problem
         ready, found, fitting = self._looked_up(plan, known)
@@ -57,6 +62,8 @@ class Teacher:
         if found is not None:
             lesson = self.teach(replace(plan, unfinished=found))
             return _explained(lesson, f"'{found.name}' was left unfinished", found, problem)
+        if self.composes and (lesson := self._composed(plan, known)) is not None:
+            return lesson
         if fitting is None:
             return replace(self.teach(plan), reason="nothing in the toolbox has its states and moves")
         policy, fitness = fitting
@@ -92,6 +99,26 @@ class Teacher:
                 return _reused(plan, policy, _reason(policy, fitness, plan), fitness), found, fitting
             fitting = policy, replace(fitness, verdict="refuse", reason=f"in physics, {failure}")
         return None, found, fitting
+
+    def _composed(self, plan: LessonPlan, known: KnownPolicies) -> Lesson | None:
+        """The lesson of a policy that is put together from the moves of others, or begun from it; None if none of them count."""
+        problem = plan.problem
+        made = None
+        if problem.environment is None:
+            made = composed(candidates(known, problem), problem.mdp, plan.learner.discount)
+        if made is None:
+            return None
+        judged = TableEnvironment(problem.mdp).judge(made.q, plan.learner)
+        origin = Origin(plain_name(problem), problem.subtask, plan.task, "nobody", self.seed)
+        result = SessionResult.of_table(made.q, made.visits, judged)
+        policy = Policy.of(result, problem.mdp, plan.learner, plan.gate, origin)
+        policy = replace(policy, scene=problem.scene, arm=problem.arm)
+        if policy.solved and (self.trial is None or self.trial(problem, policy) is None):
+            self.toolbox.check()
+            self.toolbox.put(policy)
+            return Lesson(policy, "composed", reason=made.reason, saved=_saved(plan, policy))
+        lesson = self.teach(replace(plan, warm=policy, composed=True))
+        return replace(lesson, reason=made.reason, parent=policy, saved=_saved(plan, policy, lesson.result))
 
     def _candidates(self, known: KnownPolicies, problem: Problem) -> Iterator[Policy]:
         """The `candidates`, beginning with the one that was used for this problem before, so that runs repeat."""
@@ -267,7 +294,7 @@ def _saved(plan: LessonPlan, found: Policy, now: SessionResult | None = None) ->
 def _parent(plan: LessonPlan) -> str:
     """The reference to the policy that this one was warm-started from, in this lesson or before; "" for none."""
     if plan.warm is not None:
-        return reference(plan.warm)
+        return "" if plan.composed else reference(plan.warm)
     return "" if plan.unfinished is None else plan.unfinished.parent
 
 

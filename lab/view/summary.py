@@ -204,7 +204,7 @@ def _event_text(event: Mapping[str, Any]) -> str:
 def _found(skills: Sequence[Mapping[str, Any]], task: str) -> str:
     """The numbers of skills that are reused, adapted and learned, and of those that come from other tasks."""
     lines = []
-    for kind in ("reused", "adapted"):
+    for kind in ("reused", "composed", "adapted"):
         rows = [row for row in skills if row["source"] == kind]
         from_tasks = Counter(row["from_task"] for row in rows if row["from_task"] != task)
         notes = [f"{count} from {name}" for name, count in from_tasks.most_common()]
