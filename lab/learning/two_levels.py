@@ -22,6 +22,7 @@ from lab.mdp import BoolArray, FloatArray, IntArray, Rewards, TabularMDP, greedy
 
 ROOM = 1.1  # a way counts as learned if it is at most so many times as long as the shortest one
 LOOKED = 5  # episodes between two looks at whether a way is learned from all of its starts
+NEVER = -1e3  # value of a move whose outcome is not known, below that of any path
 UNSEEN, APART = -1, -2  # labels of states that are in no region: never entered; a bottleneck, or an end of episodes
 
 Way = tuple[int, int]  # the numbers of the region that it leads through, and of the bottleneck that it leads to
@@ -50,7 +51,9 @@ class TwoLevels:
     mdp: the problem; near: which states are one move apart, as far as is known; groups: the bottlenecks.
     experience: receives the moves of all lessons. learner: the settings of each lesson, whose start values are `optimistic`.
     remembers: whether a lesson begins with the values of the moves that are already known, so that it only learns what they leave
-    open. ways: the learned ways, see `learn_ways`; before: ways learned before, by the signature of their problem, to use again.
+    open. off_policy: whether ways have no lessons of their own, but are learned from all moves that were made, whatever for
+    (intra-option learning: Sutton, Precup and Singh 1998, with replay). ways: the learned ways, see `learn_ways`; before: ways
+    learned before, by the signature of their problem, to use again.
     """
 
     mdp: TabularMDP
@@ -59,6 +62,7 @@ class TwoLevels:
     experience: Experience
     learner: LearnerSettings
     remembers: bool = False
+    off_policy: bool = False
     ways: dict[Way, Learned] = field(default_factory=dict)
     before: Mapping[str, Learned] = field(default_factory=dict)
 
@@ -87,7 +91,10 @@ class TwoLevels:
         return sub_problem(self.mdp, inside, goal, begins)
 
     def learn_ways(self, draw: Draw) -> tuple[int, int]:
-        """The episodes and the moves in which the ways are learned: from each region to each bottleneck around it."""
+        """The episodes and the moves in which the ways are learned: from each region to each bottleneck around it.
+
+        Off-policy these are none, and a way starts in the states from which the moves made so far lead to its bottleneck.
+        """
         episodes = moves = 0
         for region, numbers in enumerate(self.borders):
             for number in numbers:
@@ -95,7 +102,7 @@ class TwoLevels:
                     sub = self.problem(region, self.groups[number])
                 except BadInput:
                     continue  # nobody has gone there from here, as through a door that lets people out only
-                way = self.before.get(sub.mdp.signature)
+                way = self._off_policy(sub) if self.off_policy else self.before.get(sub.mdp.signature)
                 if way is None:
                     way = self._learned(sub, draw)
                     episodes, moves = episodes + way.episodes, moves + way.moves
@@ -111,7 +118,11 @@ class TwoLevels:
 
         Each episode of the last way begins at `start`: the moves to its region count, too. `last` is None without a region.
         """
+        if self.off_policy:
+            self.learn_ways(draw)  # from what was moved since
         reached = self._reached(start)
+        flat = sub_problem(self.mdp, np.ones(self.mdp.n_states, np.bool_), goal, [start]).mdp
+        enough = float(np.floor(ROOM * fewest_moves(flat)[start]))
         target = {int(self.regions[state]) for state in goal} - {UNSEEN, APART}
         in_groups = [n for n, group in enumerate(self.groups) if set(goal) & set(group)]
         target |= {r for r, numbers in enumerate(self.borders) if set(numbers) & set(in_groups)}
@@ -124,7 +135,7 @@ class TwoLevels:
                 sub = self.problem(region, goal, entries)
             except BadInput:
                 continue
-            last = self._learned(sub, draw, {state: len(reached[state]) - 1 for state in starts_of(sub.mdp)})
+            last = self._learned(sub, draw, {state: len(reached[state]) - 1 for state in starts_of(sub.mdp)}, enough)
             for entry in starts_of(sub.mdp):
                 states, _, is_there = greedy_path(last.q, last.problem, self.learner.max_steps, entry)
                 whole = reached[entry] + states[1:]
@@ -149,10 +160,20 @@ class TwoLevels:
                         heappush(queue, (len(path) + len(states) - 2, next(tie), path + states[1:]))
         return paths
 
-    def _learned(self, sub: "SubProblem", draw: Draw, approach: dict[int, int] | None = None) -> Learned:
-        """The policy of a sub-problem, learned until it is good from all starts; approach: moves to each, which count."""
+    def _off_policy(self, sub: "SubProblem") -> Learned:
+        """The policy of a sub-problem by the moves made so far; it starts where they alone lead to the goal."""
+        q = practised(sub, self.experience, self.learner.discount, unknown=NEVER)
+        own = np.arange(sub.mdp.n_states)[:, None]
+        made = np.where(self.experience.entered >= 0, sub.mdp.successor, own)
+        walks = greedy_moves(q, replace(sub.mdp, successor=made.astype(np.int32)))
+        return Learned(sub.mdp, q, frozenset(state for state in starts_of(sub.mdp) if np.isfinite(walks[state])))
+
+    def _learned(
+        self, sub: "SubProblem", draw: Draw, approach: dict[int, int] | None = None, enough: float = 0.0
+    ) -> Learned:
+        """The policy of a sub-problem, learned until it is good; approach, enough: see `lesson`."""
         q0 = practised(sub, self.experience, self.learner.discount) if self.remembers else None
-        return lesson(sub, optimistic(self.learner), self.experience, draw, q0, approach)
+        return lesson(sub, optimistic(self.learner), self.experience, draw, q0, approach, enough)
 
 
 @dataclass(frozen=True, eq=False)
@@ -204,10 +225,10 @@ def optimistic(learner: LearnerSettings) -> LearnerSettings:
     return replace(learner, start_value=Rewards().goal)
 
 
-def practised(sub: SubProblem, experience: Experience, discount: float) -> FloatArray:
-    """The action values (S, A) of a sub-problem by the moves already made; others have the highest reward."""
-    known = (experience.entered >= 0) | sub.mdp.terminal[:, None]
-    return known_values(sub.mdp, known, np.full(sub.mdp.successor.shape, Rewards().goal), discount)
+def practised(sub: SubProblem, experience: Experience, discount: float, unknown: float = Rewards().goal) -> FloatArray:
+    """The action values (S, A) of a sub-problem by the moves already made; unknown: of others, by default the highest reward."""
+    known = (experience.entered >= 0) | sub.walled | sub.mdp.terminal[:, None]
+    return known_values(sub.mdp, known, np.full(sub.mdp.successor.shape, unknown), discount)
 
 
 def lesson(
@@ -217,30 +238,34 @@ def lesson(
     draw: Draw,
     q0: FloatArray | None = None,
     approach: dict[int, int] | None = None,
+    enough: float = 0.0,
 ) -> Learned:
     """The policy of a sub-problem, learned alone until its greedy path from every start is good, or for `learner.episodes`.
 
     Good is a path of at most ROOM times the fewest moves. q0: (S, A), the start values; if they are good, nothing is learned.
-    approach: the moves to each start, which each episode that begins there costs, too; default: none.
+    approach: the moves to each start, which each episode that begins there costs, too; default: none. enough: the lesson ends,
+    too, when the path from one start has at most so many moves, its approach included.
     """
     mdp = sub.mdp
     starts = np.array(starts_of(mdp))
     most = np.floor(ROOM * fewest_moves(mdp)[starts])
+    ahead = np.array([(approach or {}).get(state, 0) for state in starts.tolist()])
 
     def good(q: FloatArray) -> bool:
-        return bool((greedy_moves(q, mdp)[starts] <= most).all())
+        walks = greedy_moves(q, mdp)[starts]
+        return bool((walks <= most).all() or (ahead + walks <= enough).any())
 
-    whole = frozenset(starts.tolist())
+    everywhere = frozenset(starts.tolist())
     if q0 is not None and good(q0):
-        return Learned(mdp, q0, whole)
+        return Learned(mdp, q0, everywhere)
     place = _Placed(mdp, experience, sub.walled, approach or {})
     session = Session(place, learner, GateSettings(gate="never"), None, draw, q0)
-    every = 1 if len(starts) == 1 else LOOKED
+    every = 1 if approach or len(starts) == 1 else LOOKED
     result = session.run(enough=lambda: session.episode % every == 0 and good(session.update.table()))
     if result.interrupted:
         raise KeyboardInterrupt
     moves = int(result.visits.sum()) + place.approached
-    return Learned(mdp, result.q, whole, len(result.steps), moves, result)
+    return Learned(mdp, result.q, everywhere, len(result.steps), moves, result)
 
 
 class _Placed(RecordedTable):

@@ -44,9 +44,10 @@ MEASURES = (
     "bottlenecks in just those moves, and learns the ways to them; 'hand-made' is given the doors, and learns the ways first. "
     "Where no known way leads to a goal, the task is learned flat, and bottlenecks are looked for again. A way's lesson begins "
     "each episode anywhere in its region, as in a prepared scene; that of a task's last way begins at the task's start. "
-    "'with memory': each lesson begins with the values of all moves made so far. 'optimistic': the flat learner with the start "
-    "values that ways have. 'random': as many states as spectral cuts find, drawn. later: in the second half of the tasks. "
-    "times_flat, times_hand-made: geometric means of the ratios, session by session."
+    "'off-policy': ways have no lessons, but are learned from all moves that were made, whatever for. 'with memory': each lesson "
+    "begins with the values of all moves made so far. 'optimistic': the flat learner with the start values that ways have. "
+    "'random': as many states as spectral cuts find, drawn. later: in the second half of the tasks. times_flat and so on: "
+    "geometric means of the ratios to those of another way of learning, session by session."
 )
 LOOKING = (
     f"doors_percent: the doors that a method finds (at most {BESIDE} move beside), false: its other proposals, after so many "
@@ -196,14 +197,20 @@ def true_neighbours(floor: Floor) -> dict[int, set[int]]:
 # ---- a session -------------------------------------------------------------------------------------------------------
 
 FLAT, OPTIMISTIC, HAND, FOUND, RANDOM = "flat", "flat, optimistic", "hand-made", "found", "random"
-REMEMBERS = " with memory"
-HOWS = (FLAT, OPTIMISTIC, HAND, FOUND, RANDOM, *(f"{how}{REMEMBERS}" for how in (FLAT, HAND, FOUND)))
+REMEMBERS, OFF = " with memory", ", off-policy"
+BOTH = f"{OFF}{REMEMBERS}"
+HOWS = (
+    *(FLAT, OPTIMISTIC, HAND, FOUND, RANDOM),
+    *(f"{how}{OFF}" for how in (HAND, FOUND, RANDOM)),
+    *(f"{FLAT}{REMEMBERS}", f"{HAND}{BOTH}", f"{FOUND}{BOTH}"),
+)
 METHOD = "spectral"  # that finds them in a series
 
 
 def session_of(floor: Floor, how: str, seed: int) -> Cost:
     """The cost of a session; all ways of learning have the same tasks for the same seed."""
     how, remembers = how.removesuffix(REMEMBERS), how.endswith(REMEMBERS)
+    how, off_policy = how.removesuffix(OFF), how.endswith(OFF)
     rng, draw = np.random.default_rng(seed), splitmix.stream(seed)
     tasks = tasks_of(floor, rng)
     experience, levels = Experience(floor.mdp.n_states, floor.mdp.n_actions), None
@@ -212,7 +219,9 @@ def session_of(floor: Floor, how: str, seed: int) -> Cost:
     for number, task in enumerate(tasks):
         until = episodes, moves
         if how == HAND and levels is None:
-            levels = TwoLevels(floor.mdp, true_neighbours(floor), floor.doors, experience, LEARNER, remembers)
+            levels = TwoLevels(
+                floor.mdp, true_neighbours(floor), floor.doors, experience, LEARNER, remembers, off_policy
+            )
             episodes, moves = levels.learn_ways(draw)
         path, last = ([], None) if levels is None else levels.solve(task.start, task.goal, draw)
         if last is not None:
@@ -227,7 +236,7 @@ def session_of(floor: Floor, how: str, seed: int) -> Cost:
             if how in (FOUND, RANDOM):
                 groups, before = _found(how, experience, rng), {} if levels is None else levels.by_signature()
                 near = experience.neighbours()
-                levels = TwoLevels(floor.mdp, near, groups, experience, LEARNER, remembers, before=before)
+                levels = TwoLevels(floor.mdp, near, groups, experience, LEARNER, remembers, off_policy, before=before)
                 more = levels.learn_ways(draw)
                 episodes, moves = episodes + more[0], moves + more[1]
         solved += length < np.inf
@@ -309,7 +318,7 @@ def all_looks(name: str, *, sessions: int, seed: int) -> list[list[Looked]]:
 
 
 def rows_of(setting: Setting, costs: Mapping[Setting, list[Cost]]) -> list[Row]:
-    """The measures of a setting; times_flat, times_hand: its moves and episodes over those of the others, session by session."""
+    """The measures of a setting; times_flat and so on: its moves and episodes over those of its rivals, session by session."""
     named: Row = {"problem": setting.floor, "how": setting.how}
     own = np.array(costs[setting])
     rows = [
@@ -323,15 +332,21 @@ def rows_of(setting: Setting, costs: Mapping[Setting, list[Cost]]) -> list[Row]:
         )
     ]
     rows.append(varying_row(named, "solved_percent", 100.0 * own[:, 2] / TASKS))
-    for other in (FLAT, HAND):
+    for other in rivals_of(setting.how):
         rival = np.array(costs[Setting(setting.floor, other)])
-        if setting.how != other:
-            for measure, column in (("episodes", 0), ("moves", 1)):
-                ratios = np.log(np.maximum(own[:, column], 1) / np.maximum(rival[:, column], 1))
-                means = varying_row(named, f"{measure}_times_{other}", ratios)
-                ends = means["ci95"] and [float(np.exp(end)) for end in means["ci95"]]
-                rows.append({**means, "value": float(np.exp(means["value"])), "ci95": ends})
+        for measure, column in (("episodes", 0), ("moves", 1)):
+            ratios = np.log(np.maximum(own[:, column], 1) / np.maximum(rival[:, column], 1))
+            means = varying_row(named, f"{measure}_times_{other}", ratios)
+            ends = means["ci95"] and [float(np.exp(end)) for end in means["ci95"]]
+            rows.append({**means, "value": float(np.exp(means["value"])), "ci95": ends})
     return rows
+
+
+def rivals_of(how: str) -> list[str]:
+    """The ways of learning that one is compared with: flat and hand-made, also those of its own kind."""
+    same = how.replace(FOUND, HAND).replace(RANDOM, HAND)
+    remembering = [f"{FLAT}{REMEMBERS}"] if how.endswith(REMEMBERS) else []
+    return [other for other in dict.fromkeys((FLAT, HAND, same, *remembering)) if other != how and other in HOWS]
 
 
 def looking_rows(name: str, looks: Sequence[Sequence[Looked]]) -> list[Row]:
@@ -350,7 +365,7 @@ def in_short(rows: Sequence[Row]) -> Row:
     summary: Row = {}
     for how in HOWS:
         told = []
-        for other in (FLAT, HAND):
+        for other in rivals_of(how):
             for measure in ("episodes", "moves"):
                 of = [row["value"] for row in those(rows, how=how, measure=f"{measure}_times_{other}")]
                 if of:
@@ -363,6 +378,6 @@ def picture(rows: Sequence[Row]) -> bytes:
     """The moves of a series, by floor, without memory."""
     lines = {
         how: [those(rows, problem=floor, how=how, measure="moves")[0] for floor in FLOORS]
-        for how in (FLAT, HAND, FOUND, RANDOM)
+        for how in (FLAT, HAND, FOUND, f"{HAND}{OFF}", f"{FOUND}{OFF}", f"{RANDOM}{OFF}")
     }
     return bars(list(FLOORS), lines, f"moves of {TASKS} tasks")

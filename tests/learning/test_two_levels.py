@@ -21,8 +21,8 @@ def row() -> TabularMDP:
     return TabularMDP(LEFT_RIGHT, np.full((7, 2), -0.1), none, none, 0, ("left", "right"))
 
 
-def levels(remembers: bool = False, experience: Experience | None = None) -> TwoLevels:
-    return TwoLevels(row(), NEAR, [(3,)], experience or Experience(7, 2), LEARNER, remembers)
+def levels(remembers: bool = False, experience: Experience | None = None, off_policy: bool = False) -> TwoLevels:
+    return TwoLevels(row(), NEAR, [(3,)], experience or Experience(7, 2), LEARNER, remembers, off_policy)
 
 
 def known() -> Experience:
@@ -86,6 +86,37 @@ def test_ways_learned_before_are_used_again() -> None:
     first.learn_ways(splitmix.stream(1))
     again = TwoLevels(row(), NEAR, [(3,)], Experience(7, 2), LEARNER, before=first.by_signature())
     assert again.learn_ways(splitmix.stream(2)) == (0, 0)
+
+
+def test_ways_are_learned_off_policy_from_whatever_was_moved() -> None:
+    experience = known()
+    experience.entered[0] = -1  # nothing was tried in the first cell
+    two = levels(experience=experience, off_policy=True)
+    assert two.learn_ways(splitmix.stream(1)) == (0, 0)
+    assert {way: sorted(learned.starts) for way, learned in two.ways.items()} == {(0, 0): [1, 2], (1, 0): [4, 5, 6]}
+    assert [two.ways[0, 0].walk(state) for state in (0, 1, 2)] == [np.inf, 2, 1]
+    path, last = two.solve(1, [6], splitmix.stream(2))
+    assert path == [1, 2, 3, 4, 5, 6]
+    assert last is not None
+    assert last.episodes > 0  # the last way is to a goal of its own
+    assert two.solve(0, [6], splitmix.stream(2))[0] == []
+
+
+def test_moves_made_later_make_more_ways() -> None:
+    two = levels(off_policy=True)
+    two.learn_ways(splitmix.stream(1))
+    assert [sorted(way.starts) for way in two.ways.values()] == [[], []]
+    two.experience.entered[:] = LEFT_RIGHT
+    assert two.solve(0, [6], splitmix.stream(2))[0] == [0, 1, 2, 3, 4, 5, 6]
+
+
+def test_a_last_way_is_learned_until_the_whole_path_is_good() -> None:
+    sub = sub_problem(row(), np.ones(7, bool), [6], [0, 5])
+    q0 = np.where([[0, 1]] * 7, [[0.0, 1.0]], 0.0)
+    q0[0] = [1.0, 0.0]  # from the first cell it goes against the wall
+    approach = {0: 9, 5: 2}
+    assert lesson(sub, LEARNER, Experience(7, 2), splitmix.stream(1), q0, approach, enough=3).episodes == 0
+    assert lesson(sub, LEARNER, Experience(7, 2), splitmix.stream(1), q0, approach, enough=2).episodes > 0
 
 
 def test_nothing_leads_to_a_goal_that_nobody_has_seen() -> None:
