@@ -9,6 +9,7 @@ TYPE_CHECKING = False  # typing.TYPE_CHECKING without its import, which would do
 if TYPE_CHECKING:
     from typing import Any
 
+    from lab.api.finding import FoundSubtasks, find
     from lab.api.lessons import LessonResult, teach
     from lab.api.orders import OrderResult, sequence
     from lab.api.pictures import Page, Picture
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
 
 
 _FACE = {
+    "lab.api.finding": ("FoundSubtasks", "find"),
     "lab.api.lessons": ("LessonResult", "teach"),
     "lab.api.orders": ("OrderResult", "sequence"),
     "lab.api.pictures": ("Page", "Picture"),
@@ -56,6 +58,7 @@ __all__ = [
     "AdvisorLeft",
     "BadInput",
     "Cell",
+    "FoundSubtasks",
     "Gate",
     "GridWorld",
     "LabError",
@@ -76,6 +79,7 @@ __all__ = [
     "Update",
     "WorkFailed",
     "compare",
+    "find",
     "grid",
     "run",
     "sequence",

@@ -44,4 +44,5 @@ def find(
                 console().print(text, markup=False)
     if finding.proposals and not yes and sys.stdin.isatty():
         accepted = deferred.accepted_by(finding.proposals, deferred.default_reader(console(), moves=False), console())
-    show(deferred.learned(finding, accepted, place), as_json, deferred.subtask_summary)
+    document, _ = deferred.learned(finding, accepted, place)
+    show(document, as_json, deferred.subtask_summary)

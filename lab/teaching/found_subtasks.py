@@ -82,8 +82,10 @@ def check_names(names: Sequence[str]) -> None:
             raise BadInput(f"name '{name}': another sub-task has it: wanted a new one")
 
 
-def learned(finding: Finding, accepted: Mapping[Bottleneck, str], toolbox: Toolbox) -> dict[str, Any]:
-    """The document of `lab find --json`, after the ways to the accepted bottlenecks were learned and kept in the toolbox.
+def learned(
+    finding: Finding, accepted: Mapping[Bottleneck, str], toolbox: Toolbox
+) -> tuple[dict[str, Any], list[Policy]]:
+    """(document, ways): the document of `lab find --json`, and the ways to the accepted bottlenecks, now learned and kept.
 
     accepted: their names by their states. The gain is measured on drawn tasks in the same problem, which are learned twice: with
     the ways, and flat; neither remembers the moves in which the bottlenecks were found.
@@ -96,16 +98,17 @@ def learned(finding: Finding, accepted: Mapping[Bottleneck, str], toolbox: Toolb
         problem.mdp, experience.neighbours(), list(accepted), experience, finding.learner, remembers=True
     )
     levels.learn_ways(draw)
-    kept = []
+    kept, policies = [], list[Policy]()
     for (region, number), way in levels.ways.items():
         name = f"{problem.name} {accepted[levels.groups[number]]} from room {region + 1}"
         policy = _policy(name, way, finding)
         toolbox.put(policy)
+        policies.append(policy)
         cost = {"episodes": way.episodes, "moves": way.moves, "longest": _longest(way)}
         kept.append(
             {"to": accepted[levels.groups[number]], "from": f"room {region + 1}"} | cost | {"saved_as": policy.name}
         )
-    return {
+    document = {
         "problem": problem.name,
         "method": finding.method,
         "seed": finding.seed,
@@ -124,6 +127,7 @@ def learned(finding: Finding, accepted: Mapping[Bottleneck, str], toolbox: Toolb
         "ways": kept,
         "gain": None if not kept else gain(finding, levels),
     }
+    return document, policies
 
 
 def gain(finding: Finding, levels: TwoLevels) -> dict[str, Any] | None:

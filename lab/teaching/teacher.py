@@ -62,8 +62,8 @@ class Teacher:
         if found is not None:
             lesson = self.teach(replace(plan, unfinished=found))
             return _explained(lesson, f"'{found.name}' was left unfinished", found, problem)
-        if self.composes and (lesson := self._composed(plan, known)) is not None:
-            return lesson
+        if self.composes and (put_together := self._composed(plan, known)) is not None:
+            return put_together
         if fitting is None:
             return replace(self.teach(plan), reason="nothing in the toolbox has its states and moves")
         policy, fitness = fitting

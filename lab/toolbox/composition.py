@@ -62,7 +62,8 @@ def composed(policies: Iterable[Policy], mdp: TabularMDP, discount: float = DISC
 def _made(policy: Policy, mdp: TabularMDP) -> BoolArray:
     """The moves (S, A) of a policy that count in this problem."""
     same = (policy.ends == OUT) == (measure_of(mdp).kinds == OUT)
-    return (policy.visits > 0) & same[:, None] & same[mdp.successor] & ~mdp.terminal[:, None]
+    made: BoolArray = (policy.visits > 0) & same[:, None] & same[mdp.successor] & ~mdp.terminal[:, None]
+    return made
 
 
 def _parts(

@@ -50,6 +50,8 @@ ASKED: dict[str, Callable[[], object]] = {
     "workers 0 (lab.compare): wanted a whole number": lambda: lab.compare(MAZE, workers=0),
     "sessions 0 (lab.study): wanted a whole number": lambda: lab.study("figure-9.4", sessions=0),
     "over 'alpha' (lab.tune): wanted a list of names": lambda: lab.tune(MAZE, over="alpha"),
+    "accept 3 (lab.find): wanted a function of a proposal": lambda: lab.find(MAZE, accept=3),  # type: ignore[arg-type]
+    "unknown method 'hexq' (--method)": lambda: lab.find(MAZE, method="hexq"),
     "toasts 'two' (lab.run): wanted a whole number": lambda: lab.run(toasts="two"),  # type: ignore[arg-type]
     "override 0 (lab.run): wanted a whole number, at least 10, at most 100": lambda: lab.run(override=0),
     "what 3 (lab.show): wanted a name or file": lambda: lab.show(3),  # type: ignore[arg-type]
