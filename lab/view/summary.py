@@ -206,7 +206,7 @@ def _found(skills: Sequence[Mapping[str, Any]], task: str) -> str:
     lines = []
     for kind in ("reused", "composed", "adapted"):
         rows = [row for row in skills if row["source"] == kind]
-        from_tasks = Counter(row["from_task"] for row in rows if row["from_task"] != task)
+        from_tasks = Counter(row["from_task"] for row in rows if row["from_task"] not in (task, None))
         notes = [f"{count} from {name}" for name, count in from_tasks.most_common()]
         elsewhere = sum(kind == "reused" and row["fitness"] is not None for row in rows)
         notes += [f"{elsewhere} of another problem"] if elsewhere else []
