@@ -66,5 +66,9 @@ def test_a_teacher_does_not_compose_unless_it_is_to(tmp_path: Path) -> None:
 
 def test_the_ways_of_a_run_are_one_of_two() -> None:
     assert [RunOptions(ways=ways).composes for ways in ("learned", "composed")] == [False, True]
+    kept = RunOptions(ways="composed").to_json()
+    assert RunOptions.from_json(kept, "journal").composes
+    del kept["ways"]  # of a run before there was a choice
+    assert not RunOptions.from_json(kept, "journal").composes
     with pytest.raises(BadInput, match=r"unknown ways 'compose' \(--ways\): did you mean 'composed'\?"):
         _ = RunOptions(ways="compose").composes
