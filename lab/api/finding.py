@@ -23,6 +23,15 @@ class FoundSubtasks:
     proposals: all that were proposed, each with `name` and `states`; policies: the learned ways to the accepted ones, by name.
     document: the dict that `lab find --json` prints, with the gain; map: the map of a grid, on which the proposals are marked
     1, 2 and so on, otherwise "".
+
+        >>> import lab
+        >>> found = lab.find(lab.world("S..#...\\n...#...\\n.......\\n...#...\\n...#..G"))
+        >>> print(found.map)
+        S.. ...
+        ... ...
+        ...1...
+        ... ...
+        ... ..G
     """
 
     proposals: tuple[Proposal, ...]

@@ -51,9 +51,9 @@ class Teacher:
 
         In this order: a solved policy of exactly this problem is reused; one of another problem that fits (see
         `lab.toolbox.fitness`) is reused, and not saved again; an unsolved one of this problem is continued; one of another
-        problem is adapted; otherwise the lesson begins anew. A teacher that composes does not adapt one policy: it puts
-        the moves of all together (see `lab.toolbox.composition`), uses that if it makes a shortest path, and otherwise begins the
-        lesson from it. Raises WorkFailed if no session reaches the goal, Interrupted on Ctrl-C.
+        problem is adapted; otherwise the lesson begins anew. A teacher that composes does not adapt one policy if the
+        problem has one start: it puts the moves of all together (see `lab.toolbox.composition`), uses that if it is a shortest
+        path, and otherwise begins the lesson from it. Raises WorkFailed if no session reaches the goal, Interrupted on Ctrl-C.
         """
         problem = plan.problem
         ready, found, fitting = self._looked_up(plan, known)
