@@ -1,0 +1,175 @@
+"""A sentence in a scene to what it means, or a refusal in words with the nearest sentence that would be understood."""
+
+import re
+from collections.abc import Mapping
+from functools import cache, lru_cache
+from importlib.resources import files
+from itertools import product
+from typing import Any
+
+from lab.lazy import lark
+from lab.words.meaning import Intent, Refusal
+from lab.words.reader import MOST_WORDS, Reading, kinds_of_words, names_of, read, words_of
+from lab.words.scene import GridScene, OrderScene, Scene
+from lab.words.sense import Misfit, Referents, Senses, Unclear
+
+MOST_READINGS = 200  # of one part of a sentence
+TOO_LONG = "that is too long: say it in shorter sentences"
+
+
+def listen(text: str, scene: Scene) -> list[Intent] | Refusal:
+    """The intents of a sentence in the order in which they are to be done, or a refusal of one line.
+
+    Two derivations with different meanings, a word that nobody knows, and a name that fits several objects are refused.
+    """
+    named, means = names_of(scene)
+    words = words_of(text)
+    if not words:
+        return Refusal(_hint("nothing was said", scene))
+    if len(words) > MOST_WORDS or len(text) > 1000:
+        return Refusal(TOO_LONG)
+    reading = read(text, scene, named)
+    if reading.unknown:
+        return _unknown(reading, scene, dict(means))
+    return _meant(reading.text, scene, dict(means))
+
+
+def _unknown(reading: Reading, scene: Scene, names: dict[str, object]) -> Refusal:
+    """The refusal of a sentence with unknown words; the rest of it is the hint if it means something."""
+    said = ", ".join(f"'{word[:20]}'" for word in reading.unknown[:3])
+    rest = _meant(re.sub(r"\?\S+ ?", "", reading.text).strip(), scene, names)
+    reason = f"{said}: not understood"
+    return Refusal(_hint(reason, scene) if isinstance(rest, Refusal) else f"{reason}; without it: {in_words(rest, scene)}?")
+
+
+def _meant(text: str, scene: Scene, names: dict[str, object]) -> list[Intent] | Refusal:
+    """The only meaning of words of the grammar, or a refusal."""
+    try:
+        found = _clauses(text, scene, names)
+    except Unclear as unclear:
+        return Refusal(str(unclear))
+    meanings: dict[tuple[Intent, ...], None] = {}
+    refused: dict[str, None] = {}
+    for clauses in found:
+        if isinstance(clauses, Refusal):
+            refused[clauses.reason] = None
+            continue
+        try:
+            meanings[Referents(scene).intents(clauses)] = None
+        except Misfit:
+            continue
+        except Unclear as unclear:
+            refused[str(unclear)] = None
+    if len(meanings) == 1 and not refused:
+        return list(next(iter(meanings)))
+    if len(meanings) > 1:
+        first, second = list(meanings)[:2]
+        return Refusal(f"that may mean two things: {in_words(first, scene)}, or {in_words(second, scene)}?")
+    return Refusal(next(iter(refused)) if refused else _hint("that is not understood", scene))
+
+
+# ---- the grammar -----------------------------------------------------------------------------------------------------------
+
+
+@cache
+def grammar(start: str) -> Any:
+    """The parser of a kind of scenes, "grid" or "order" (a `lark.Lark`), with a terminal for each kind of words."""
+    text = _flat(files("lab.words").joinpath("grammar.lark").read_text(encoding="utf-8"))
+    rows = {
+        **{kind: f"(?:{'|'.join(map(re.escape, phrases))})".replace("\\ ", " ") for kind, phrases in kinds_of_words().items()},
+        **{kind: f"{kind.lower()}[0-9]+x" for kind in ("NAME", "PART", "KIND", "STATION", "ACT")},
+        "NUM": r"[0-9]+(?:\.[0-9]+)?",
+        "LENGTH": r"[0-9.e+-]+cm[0-9.]+",
+    }
+    lines = [text, *(f"{kind}: /{pattern}(?![^ ])/" for kind, pattern in rows.items()), "%ignore FILLER", '%ignore " "']
+    return lark.Lark("\n".join(lines), parser="earley", lexer="dynamic", ambiguity="forest", start=start)
+
+
+def _flat(text: str) -> str:
+    """The grammar with a rule of its own for each part that may be left out or repeated, which keeps it small."""
+    made: dict[str, str] = {}
+
+    def named(match: re.Match[str]) -> str:
+        inner, suffix = match[1].strip(), match[2]
+        name = made.setdefault(f"{inner}{suffix}", f"_part{len(made)}")
+        return f"{name} "
+
+    text = re.sub("//.*", "", text)
+    while re.search(r"\(", text):
+        text = re.sub(r"\(([^()]*)\)([?*+]?)", named, text)
+    text = re.sub(r"\b(\w+)([?*+])", named, text)
+    forms = {"?": "{name}: {inner} |", "*": "{name}: {name} ({inner}) |", "+": "{name}: {inner} | {name} ({inner})", "": "{name}: {inner}"}
+    rules = list[str]()
+    for key, name in list(made.items()):
+        suffix = key[-1] if key[-1] in "?*+" else ""
+        inner = re.sub(r"\b(\w+)([?*+])", named, key.removesuffix(suffix) if suffix else key)
+        rules.append(forms[suffix].format(name=name, inner=inner))
+    for key, name in list(made.items())[len(rules) :]:
+        rules.append(forms[key[-1]].format(name=name, inner=key[:-1]))
+    return "\n".join([text, *rules])
+
+
+def _clauses(text: str, scene: Scene, names: Mapping[str, object]) -> list[Any]:
+    """All readings of a text: a tuple of clauses each, or a refusal. Raises Unclear if there are too many."""
+    start = "grid" if isinstance(scene, GridScene) else "order"
+    try:
+        root = grammar(start).parse(text)
+    except lark.exceptions.LarkError:
+        return []
+    return [value for (value,) in _Forest(Senses(scene, dict(names))).values(root)]
+
+
+class _Forest:
+    """The values of the nodes of a parse forest; each is found once, however many derivations share it."""
+
+    def __init__(self, senses: Senses) -> None:
+        self._senses = senses
+        self._known: dict[int, list[tuple[Any, ...]]] = {}
+
+    def values(self, node: Any) -> list[tuple[Any, ...]]:
+        """The different values of a node: a tuple of those of its parts in a rule that has no value of its own."""
+        if node is None:
+            return [()]
+        if isinstance(node, lark.parsers.earley_forest.TokenNode):
+            return [self._senses.token(node.token.type, str(node.token))]
+        if id(node) not in self._known:
+            self._known[id(node)] = []  # a circle adds nothing
+            found: dict[tuple[Any, ...], None] = {}
+            for packed in node.children:
+                for left, right in product(self.values(packed.left), self.values(packed.right)):
+                    for value in self._of(node, packed.rule, (*left, *right)):
+                        found[value] = None
+            if len(found) > MOST_READINGS:
+                raise Unclear(TOO_LONG)
+            self._known[id(node)] = list(found)
+        return self._known[id(node)]
+
+    def _of(self, node: Any, rule: Any, values: tuple[Any, ...]) -> list[tuple[Any, ...]]:
+        name = rule.alias or rule.origin.name
+        if node.is_intermediate or name.startswith("_"):
+            return [values]
+        if (refusal := next((value for value in values if isinstance(value, Refusal)), None)) is not None:
+            return [(refusal,)]
+        if rule.options is not None and rule.options.expand1 and not rule.alias and len(values) == 1:
+            return [values]
+        try:
+            return [(self._senses.of(str(name), values),)]
+        except Misfit:
+            return []
+        except Unclear as unclear:
+            return [(Refusal(str(unclear)),)]
+
+
+# ---- in words --------------------------------------------------------------------------------------------------------------
+
+
+def in_words(intents: Any, scene: Scene) -> str:
+    """Intents as the sentence that means them."""
+    return "; ".join(str(intent.as_json()) for intent in intents)
+
+
+def _hint(reason: str, scene: Scene) -> str:
+    return reason
+
+
+_ = (lru_cache, OrderScene)
