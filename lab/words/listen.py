@@ -11,7 +11,7 @@ from lab.lazy import lark
 from lab.words.meaning import Intent, Refusal
 from lab.words.reader import MOST_WORDS, Reading, kinds_of_words, names_of, read, words_of
 from lab.words.scene import GridScene, OrderScene, Scene
-from lab.words.sense import Misfit, Referents, Senses, Unclear
+from lab.words.sense import Misfit, Referents, Senses, Unclear, Unresolved
 
 MOST_READINGS = 200  # of one part of a sentence
 TOO_LONG = "that is too long: say it in shorter sentences"
@@ -48,23 +48,30 @@ def _meant(text: str, scene: Scene, names: dict[str, object]) -> list[Intent] | 
         found = _clauses(text, scene, names)
     except Unclear as unclear:
         return Refusal(str(unclear))
-    meanings: dict[tuple[Intent, ...], None] = {}
+    found_in: dict[int, dict[tuple[Intent, ...], None]] = {}
     refused: dict[str, None] = {}
+    unresolved: dict[str, None] = {}
     for clauses in found:
         if isinstance(clauses, Refusal):
-            refused[clauses.reason] = None
+            (unresolved if isinstance(clauses, Weak) else refused)[clauses.reason] = None
             continue
         try:
-            meanings[Referents(scene).intents(clauses)] = None
+            referents = Referents(scene)
+            meaning = referents.intents(clauses)
+            found_in.setdefault(referents.redundant, {})[meaning] = None
         except Misfit:
             continue
+        except Unresolved as unclear:
+            unresolved[str(unclear)] = None
         except Unclear as unclear:
             refused[str(unclear)] = None
+    meanings = found_in[min(found_in)] if found_in else {}
     if len(meanings) == 1 and not refused:
         return list(next(iter(meanings)))
     if len(meanings) > 1:
         first, second = list(meanings)[:2]
         return Refusal(f"that may mean two things: {in_words(first, scene)}, or {in_words(second, scene)}?")
+    refused |= unresolved
     return Refusal(next(iter(refused)) if refused else _hint("that is not understood", scene))
 
 
@@ -119,6 +126,10 @@ def _clauses(text: str, scene: Scene, names: Mapping[str, object]) -> list[Any]:
     return [value for (value,) in _Forest(Senses(scene, dict(names))).values(root)]
 
 
+class Weak(Refusal):
+    """The refusal of a reading that counts only if there is no other."""
+
+
 class _Forest:
     """The values of the nodes of a parse forest; each is found once, however many derivations share it."""
 
@@ -156,6 +167,8 @@ class _Forest:
             return [(self._senses.of(str(name), values),)]
         except Misfit:
             return []
+        except Unresolved as unclear:
+            return [(Weak(str(unclear)),)]
         except Unclear as unclear:
             return [(Refusal(str(unclear)),)]
 

@@ -18,9 +18,9 @@ CONTRACTIONS = (
         "isn'?t": "is not", "wasn'?t": "was not", "aren'?t": "are not", "mustn'?t": "must not", "shouldn'?t": "should not",
         "wouldn'?t": "would not", "couldn'?t": "could not", "needn'?t": "need not", "haven'?t": "have not",
         "hasn'?t": "has not", "ain'?t": "is not", "gonna": "going to", "wanna": "want to", "gotta": "have to",
-        "id like": "i would like", "ive": "i have", "itll": "it will", "ill": "i will", "dunno": "dunno", "y": "why",
+        "id like": "i would like", "ive": "i have", "itll": "it will", "ill": "i will", "u": "you", "strait": "straight", "thn": "then", "dn": "down", "rt": "right",
         "pls": "please", "plz": "please", "upto": "up to", "goto": "go to", "alot": "a lot", "lemme": "let me",
-        "gimme": "give me", "hows": "how is", "hes": "he is", "w/o": "without", "ur": "your", "thx": "thanks",
+        "gimme": "give me", "hows": "how is", "hes": "he is", "w/o": "without", "ur": "your", "thx": "thanks", "twise": "twice", "tw": "two",
     }.items()),
     (r"n't\b", " not"), (r"'re\b", " are"), (r"'ve\b", " have"), (r"'ll\b", " will"), (r"'d\b", " would"), (r"'m\b", " am"),
     (r"\b(it|that|what|there|here|he|she|who|how|where|why|nothing|everything|way)'s\b", r"\1 is"), (r"'s\b", " is"),
@@ -106,7 +106,8 @@ def _normal(words: Iterable[str]) -> list[str]:
 
 def phrases_of(listed: str) -> tuple[str, ...]:
     """The phrases of a row of the vocabulary, as the reader writes them, longest first."""
-    written = {" ".join(_normal(phrase.split())) for phrase in listed.split("|")} - {""}
+    said = [phrase for row in listed.split("|") for phrase in (row, re.sub(r"\b(work|find|make|pick|wind) way\b", r"\1 your way", row))]
+    written = {" ".join(_normal(phrase.split())) for phrase in said} - {""}
     return tuple(sorted(written, key=lambda phrase: (-len(phrase), phrase)))
 
 
@@ -190,7 +191,8 @@ def corrected(word: str, known: frozenset[str], frequent: frozenset[str]) -> str
 FREQUENT = frozenset(
     "left right up down forward forwards back backward backwards step steps until wall toaster cube block goal machine plate"
     " around avoid away near the then and go move stop please again before after slice first never wait put tray finish turn"
-    " higher lower other way direction last time good bad undo take why ask not past next nearest your you square squares".split()
+    " higher lower other way direction last time good bad undo take why ask not past next nearest your you square squares twice"
+    " straight once opposite same last than from with turn closest furthest bottom side sides metre meter wash milled".split()
 )
 
 
@@ -198,7 +200,7 @@ FREQUENT = frozenset(
 
 SYNONYMS: Mapping[str, tuple[str, ...]] = {
     "cube": ("cube", "block", "brick", "die"),
-    "goal": ("goal", "slot", "target", "destination", "finish", "hole"),
+    "goal": ("goal", "slot", "target", "destination", "hole"),
     "bin": ("bin", "box", "container", "basket"),
     "plate": ("plate", "dish"),
     "machine": ("machine", "device", "apparatus"),

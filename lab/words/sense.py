@@ -22,7 +22,11 @@ class Misfit(Exception):
 
 
 class Unclear(Exception):
-    """A sentence that is refused; its message is the reason, in one line."""
+    """A reading that is refused; its message is the reason, in one line."""
+
+
+class Unresolved(Unclear):
+    """A reading that refers to something that is not there: any other reading is better."""
 
 
 @dataclass(frozen=True)
@@ -31,6 +35,13 @@ class Thing:
 
     ids: tuple[str, ...] = ()
     adjectives: tuple[Any, ...] = ()
+
+
+@dataclass(frozen=True)
+class Post:
+    """A place that is named after an object, as in "the cube on the left"."""
+
+    place: Any
 
 
 @dataclass(frozen=True)
@@ -50,6 +61,7 @@ class Part:
     is_any: bool = False
 
 
+WITHOUT = "without"  # a station that is left out
 THERE = "there"  # the station that was named last
 
 
@@ -76,7 +88,7 @@ class Stretch:
 
 DIRECTIONS = {"d_left": "left", "d_right": "right", "d_forward": "forward", "d_back": "backward"}
 SIMPLE: dict[str, Intent] = {
-    "good": Praise(1), "bad": Praise(-1), "no_opposite": Opposite(), "again": Again(), "undo": Undo(), "own": Own(), "why": Why(),
+    "good": Praise(1), "bad": Praise(-1), "again": Again(), "undo": Undo(), "own": Own(), "why": Why(),
     "quiet_stuck": Quiet("stuck"), "quiet_episode": Quiet("episode"), "quiet_always": Quiet("always"),
     "allow_all": Allow(ALL), "rules_off": Allow(ALL),
 }  # fmt: skip
@@ -205,6 +217,12 @@ class Senses:
     def _leg_far_wall(self) -> tuple[Stretch, ...]:
         return self._leg_wall(self._direction("d_forward", ()))
 
+    def _leg_topmost(self, *values: str) -> tuple[Stretch, ...]:
+        return self._leg_wall_same(values[0] if values else self._direction("d_up", ()), self._direction("d_up", ()))
+
+    def _leg_bottommost(self, *values: str) -> tuple[Stretch, ...]:
+        return self._leg_wall_same(values[0] if values else self._direction("d_down", ()), self._direction("d_down", ()))
+
     def _leg_top(self) -> tuple[Stretch, ...]:
         return self._leg_wall(self._direction("d_higher", ()))
 
@@ -249,6 +267,12 @@ class Senses:
 
     # objects
 
+    def _same(self, value: Any) -> Any:
+        return value
+
+    def _no_opposite(self, *values: Any) -> Intent:
+        return Opposite()
+
     def _named(self, ids: tuple[str, ...]) -> Thing:
         return Thing(ids)
 
@@ -259,10 +283,10 @@ class Senses:
         return Thing(ids, adjectives)
 
     def _named_post(self, ids: tuple[str, ...], post: Any) -> Thing:
-        return Thing(ids, (post,))
+        return Thing(ids, (Post(post),))
 
     def _named_both(self, adjectives: tuple[Any, ...], ids: tuple[str, ...], post: Any) -> Thing:
-        return Thing(ids, (*adjectives, post))
+        return Thing(ids, (*adjectives, Post(post)))
 
     def _named_one(self, adjectives: tuple[Any, ...], number: float) -> Thing:
         if number != 1 or not isinstance(self.scene, GridScene):
@@ -273,7 +297,7 @@ class Senses:
         alike = {frozenset(o.id for o in self.scene.objects if name in o.names) for name in names}
         fitting = [ids for ids in kinds if ids in alike and len(ids) > 1]
         if len(fitting) != 1:
-            raise Unclear("'the one' may be any of several objects: name it")
+            raise Unresolved("'the one' may be any of several objects: name it")
         return Thing(tuple(sorted(fitting[0])), adjectives)
 
     def _a_beside(self, thing: Thing) -> Thing:
@@ -358,7 +382,11 @@ class Senses:
         return said
 
     def _move_to(self, part: Part, *stations: str) -> Said:
-        return Said("move", (part, stations[0] if len(stations) > 1 else None, stations[-1]))
+        named = [station for station in stations if station != WITHOUT]
+        return Said("move", (part, named[0] if len(named) > 1 else None, named[-1]))
+
+    def _without(self, station: str) -> str:
+        return WITHOUT
 
     def _move_from_to(self, part: Part, origin: str, target: str, *rest: str) -> Said:
         return Said("move", (part, origin, target))
@@ -446,6 +474,7 @@ class Referents:
         self._part: str | None = None
         self._station: str | None = None
         self._unit: float | None = None
+        self.redundant = 0  # the places that were named of objects that are the only ones of their kind
 
     def intents(self, clauses: Sequence[Any]) -> tuple[Intent, ...]:
         """The intents of the clauses, in order. Raises Unclear or Misfit."""
@@ -546,11 +575,12 @@ class Referents:
         assert isinstance(self.scene, GridScene)
         if not thing.ids:
             if self._thing is None:
-                raise Unclear("'it' is no object that was named: name it")
+                raise Unresolved("'it' is no object that was named: name it")
             return self._thing
         objects = [self.scene.object(id_) for id_ in thing.ids]
+        self.redundant += len(objects) == 1 and any(isinstance(word, Post) for word in thing.adjectives)
         for adjective in thing.adjectives:
-            objects = self._fitting(objects, adjective)
+            objects = self._fitting(objects, adjective.place if isinstance(adjective, Post) else adjective)
         if len(objects) != 1:
             names = _listed([f"the {word} {objects[0].names[0] if objects else 'object'}" for word in ("left", "nearest")])
             raise Unclear(f"{len(objects)} objects fit: say which, such as {names}")
@@ -611,7 +641,7 @@ class Referents:
     def _place(self, station: str) -> str:
         if station == THERE:
             if self._station is None:
-                raise Unclear("'there' is no station that was named: name it")
+                raise Unresolved("'there' is no station that was named: name it")
             return self._station
         self._station = station
         return station
@@ -619,7 +649,7 @@ class Referents:
     def _parts(self, part: Part) -> tuple[str, ...]:
         if not part.parts and not part.is_any:
             if self._part is None:
-                raise Unclear("'it' is no part that was named: name it")
+                raise Unresolved("'it' is no part that was named: name it")
             return (self._part,)
         if len(part.parts) == 1:
             self._part = part.parts[0]
@@ -647,7 +677,7 @@ class Referents:
             among = fitting or [move for move in self.scene.moves if move.part in parts] or self.scene.moves
             known = _listed([f"{move.number} ({move.part}, {move.origin} to {move.target})" for move in among[:4]])
             said = "several moves fit" if fitting else "that is none of the moves now"
-            raise Unclear(f"{said}: {known}")
+            raise (Unclear if fitting else Unresolved)(f"{said}: {known}")
         self._part = fitting[0].part
         return Move(fitting[0].number)
 

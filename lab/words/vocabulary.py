@@ -216,9 +216,10 @@ COMMON: Mapping[str, str] = {
     "END": "end|finish|close|terminate|quit|exit|stop|shut down|abort|conclude|leave|complete|wrap up|finish off|stop now|ending|break off",
     "ALLDONE": "we are done|i am done|we are finished|i am finished|that is all|that is it|that is it for today|that is all for today|that is enough"
     "|that is enough for today|enough for today|enough for now|that will do|that will do for today|enough now|enough|enough already|i have had enough|let us stop|let us stop here|let us end here|let us finish"
-    "|let us finish here|let us call it a day|call it a day|let us quit|stop here|stop there|stop now|end here|finish here|bye|bye bye|good bye|goodbye|see you|see you tomorrow|see you later|good night|i have to go|i must go|i am leaving"
+    "|let us finish here|let us call it a day|call it a day|let us quit|stop now|bye|bye bye|good bye|goodbye|see you|see you tomorrow|see you later|good night|i have to go|i must go|i am leaving"
     "|i quit|i stop here|i give up|game over|over and out|that was it|that was all|all done|we are through|we can stop|we can stop here|we can stop now|we can end here|you can stop|you can stop now|you may stop|you may stop now|time to stop|it is time to stop|stop for today|stop everything|stop it all|no more for today|done for today|finished for today|we are done for today|we are done here|we are finished here|we are done now|i am done for today|i am done here|i am done now|that does it|let us leave it at that|leave it at that|we leave it at that|let us end it here|end it here|end it|stop teaching|i want to stop|i would like to stop|i want to quit|i would like to quit|i want to stop here|let us stop for today|let us end it|let us wrap up|let us wrap it up|wrap it up|pack up|we stop here|stop this|quit now|exit now|finish up|finish now|no more today",
-    "STOPTHERE": "stop there|stop here|halt there|stop then|stay there|wait there|halt|remain there|stand still|stop moving|stand there|hold there|stay put",
+    "STOPTHERE": "stop there|stop here|halt there|stop then|halt|end there|end here|finish here|finish there|come to a stop|come to a halt",
+    "STAY": "stay there|wait there|remain there|stand still|stop moving|stand there|hold there|stay put|wait|stay",
     "UNIT": "steps|cell|cells|square|squares|tile|tiles|field|fields|moves|notch|notches|level|levels|space|spaces|position"
     "|positions|unit|units|pace|paces|grid cells|grid squares|spot|spots|floor tile|floor tiles|floor squares|grid steps|grid cell|little steps|small steps|single steps|click|clicks|hops|hop|ticks|tick|spaces over|layer|layers|storey|storeys",
     "STEP": "step|little step|small step|single step",
@@ -236,8 +237,10 @@ GRID: Mapping[str, str] = {
     "|up in picture|up on map|up in map|far side|forth|northerly|away from you|top of image|straight on ahead|go ahead|move on ahead",
     "BACK": "back|backward|backwards|south|southward|southwards|rear|reverse|retreat|back up|back off|fall back|pull back|rearward|rearwards|southern"
     "|bottom of picture|bottom of map|bottom of screen|bottom edge of picture|lower edge of picture|down in picture|down on map|near side|in reverse|southerly|draw back|move back|step back|back away|backing up|backing off|bottom of image|backtrack|withdraw|go in reverse",
-    "UP": "up|upward|upwards|up arrow|arrow up|top|upper|uppermost|topmost",
-    "DOWN": "down|downward|downwards|down arrow|arrow down|bottom|bottommost|lowermost|lowest|underside",
+    "UP": "up|upward|upwards|up arrow|arrow up|upper|uppermost|topmost",
+    "DOWN": "down|downward|downwards|down arrow|arrow down|bottommost|lowermost|lowest|underside",
+    "TOP": "top|upper edge|top edge|upper side|top row|upper end|upper wall|top wall|upper border|highest point|upper rim|top end|top side",
+    "BOTTOM": "bottom|lower edge|bottom edge|lower side|bottom row|lower end|lower wall|bottom wall|lower border|lowest point|lower rim|bottom end|bottom side",
     "HIGHER": "higher|rise|climb|ascend|lift|raise|elevate|lift up|rise up|climb up|raise up|go higher|rising|lift yourself|lift yourself up|climbing|highest|further up in air|gain height|into air",
     "LOWER": "lower|sink|descend|lower down|sink down|climb down|lower yourself|sinking|descending|drop|drop down|come lower|go lower|duck|lose height|nearer ground",
     "STRAIGHT": "straight|right straight",
@@ -265,7 +268,7 @@ GRID: Mapping[str, str] = {
     "INFRONT": "in front of|in front",
     "BEHIND": "behind|back of|rear of|behind back of",
     "NEXTTO": "next to|beside|besides|alongside|by side of|close to|close by|adjacent to|near to|close up to|right next to|right beside|right by|directly next to|directly beside|immediately next to|nearer to|closer to|in vicinity of|against|right at|close at|just next to|just beside|neighbour of|in neighbourhood of|right near",
-    "AT": "at|in|on|inside|along|via|by way of|within|upon|on top of|of",
+    "AT": "at|in|on|inside|along|via|by way of|within|upon|on top of",
     "BY": "by|another by",
     "FROM": "from|out of|off",
     "OF": "of it|of that",
