@@ -22,7 +22,7 @@ CONTRACTIONS = (
         "pls": "please", "plz": "please", "upto": "up to", "goto": "go to", "alot": "a lot", "lemme": "let me",
         "gimme": "give me", "hows": "how is", "hes": "he is", "w/o": "without", "ur": "your", "thx": "thanks", "twise": "twice", "tw": "two",
     }.items()),
-    (r"n't\b", " not"), (r"'re\b", " are"), (r"'ve\b", " have"), (r"'ll\b", " will"), (r"'d\b", " would"), (r"'m\b", " am"),
+    (r"\b(away|clear|far|back) form\b", r"\1 from"), (r"n't\b", " not"), (r"'re\b", " are"), (r"'ve\b", " have"), (r"'ll\b", " will"), (r"'d\b", " would"), (r"'m\b", " am"),
     (r"\b(it|that|what|there|here|he|she|who|how|where|why|nothing|everything|way)'s\b", r"\1 is"), (r"'s\b", " is"),
 )  # fmt: skip
 UNITS_AND_TEENS = (
@@ -31,7 +31,7 @@ UNITS_AND_TEENS = (
 ).split()
 TENS = dict(zip("twenty thirty forty fifty sixty seventy eighty ninety".split(), range(20, 100, 10), strict=True))
 NUMBERS = {**{word: n for n, word in enumerate(UNITS_AND_TEENS)}, **TENS, "fourty": 40, "dozen": 12, "hundred": 100}
-TIMES = {"once": 1, "twice": 2, "thrice": 3}
+TIMES = {"twice": 2, "thrice": 3}
 ORDINALS = {
     **dict(zip("first second third fourth fifth sixth seventh eighth ninth tenth".split(), range(1, 11), strict=True)),
     **{f"{n}{ending}": n for n, ending in ((1, "st"), (2, "nd"), (3, "rd"), *((n, "th") for n in range(4, 13)))},
@@ -169,7 +169,7 @@ def corrected(word: str, known: frozenset[str], frequent: frozenset[str]) -> str
         if len(other) < 2 or (len(other) == 2 and len(word) > 2):
             continue
         apart = distance(word, other, most)
-        if apart <= most and (len(word) > 3 or sorted(word) == sorted(other)):
+        if apart <= most and (len(word) > 3 or sorted(word) == sorted(other) or (len(other) == 4 and other in frequent)):
             if len(other) <= 3 and sorted(word) != sorted(other) and len(set(word) - set(other)) > 0:
                 continue
             near.setdefault(apart, []).append(other)
@@ -192,7 +192,7 @@ FREQUENT = frozenset(
     "left right up down forward forwards back backward backwards step steps until wall toaster cube block goal machine plate"
     " around avoid away near the then and go move stop please again before after slice first never wait put tray finish turn"
     " higher lower other way direction last time good bad undo take why ask not past next nearest your you square squares twice"
-    " straight once opposite same last than from with turn closest furthest bottom side sides metre meter wash milled".split()
+    " straight once opposite same last than from with turn closest furthest bottom side sides metre meter wash milled keep once".split()
 )
 
 

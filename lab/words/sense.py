@@ -207,7 +207,8 @@ class Senses:
     def _leg_wall(self, direction: str) -> tuple[Stretch, ...]:
         return (Stretch(direction, until=WALL),)
 
-    _leg_wall_d = _leg_wall
+    def _leg_wall_d(self, direction: str) -> tuple[Stretch, ...]:
+        return self._leg_wall(direction)
 
     def _leg_wall_same(self, direction: str, edge: str) -> tuple[Stretch, ...]:
         if direction != edge:
@@ -348,7 +349,7 @@ class Senses:
 
     # the order
 
-    def _part(self, part: str) -> Part:
+    def _part(self, part: str, *rest: Any) -> Part:
         return Part((part,))
 
     def _part_kind(self, *values: Any) -> Part:
@@ -356,12 +357,12 @@ class Senses:
             raise Misfit
         return Part(values[-1], is_any=True)
 
-    def _part_any(self) -> Part:
+    def _part_any(self, *values: Any) -> Part:
         return Part(self.scene.parts if isinstance(self.scene, OrderScene) else (), is_any=True)
 
     _any_part = _part_any
 
-    def _part_it(self) -> Part:
+    def _part_it(self, *values: Any) -> Part:
         return Part()
 
     def _station(self, station: str) -> str:
@@ -578,8 +579,8 @@ class Referents:
                 raise Unresolved("'it' is no object that was named: name it")
             return self._thing
         objects = [self.scene.object(id_) for id_ in thing.ids]
-        self.redundant += len(objects) == 1 and any(isinstance(word, Post) for word in thing.adjectives)
         for adjective in thing.adjectives:
+            self.redundant += isinstance(adjective, Post) and len(objects) == 1
             objects = self._fitting(objects, adjective.place if isinstance(adjective, Post) else adjective)
         if len(objects) != 1:
             names = _listed([f"the {word} {objects[0].names[0] if objects else 'object'}" for word in ("left", "nearest")])
@@ -635,6 +636,8 @@ class Referents:
                 first, second = (self._work(work) for work in values)
                 if first == second:
                     raise Misfit
+                if first.part and second.part and (first.station is None) != (second.station is None):
+                    raise Unclear(f"say the station of both {first.part} and {second.part}, or of neither")
                 return Before(first, second)
         raise AssertionError(clause)
 
@@ -677,7 +680,7 @@ class Referents:
             among = fitting or [move for move in self.scene.moves if move.part in parts] or self.scene.moves
             known = _listed([f"{move.number} ({move.part}, {move.origin} to {move.target})" for move in among[:4]])
             said = "several moves fit" if fitting else "that is none of the moves now"
-            raise (Unclear if fitting else Unresolved)(f"{said}: {known}")
+            raise Unresolved(f"{said}: {known}")
         self._part = fitting[0].part
         return Move(fitting[0].number)
 
