@@ -2,7 +2,8 @@
 
 import re
 from collections.abc import Mapping
-from functools import cache, lru_cache
+from difflib import get_close_matches
+from functools import cache
 from importlib.resources import files
 from itertools import product
 from typing import Any
@@ -10,7 +11,8 @@ from typing import Any
 from lab.lazy import lark
 from lab.words.meaning import Intent, Refusal
 from lab.words.reader import MOST_WORDS, Reading, kinds_of_words, names_of, read, words_of
-from lab.words.scene import GridScene, OrderScene, Scene
+from lab.words.said import examples, in_words
+from lab.words.scene import GridScene, Scene
 from lab.words.sense import Misfit, Referents, Senses, Unclear, Unresolved
 
 MOST_READINGS = 200  # of one part of a sentence
@@ -25,24 +27,24 @@ def listen(text: str, scene: Scene) -> list[Intent] | Refusal:
     named, means = names_of(scene)
     words = words_of(text)
     if not words:
-        return Refusal(_hint("nothing was said", scene))
+        return Refusal(_hint("nothing was said", scene, text))
     if len(words) > MOST_WORDS or len(text) > 1000:
         return Refusal(TOO_LONG)
     reading = read(text, scene, named)
     if reading.unknown:
-        return _unknown(reading, scene, dict(means))
-    return _meant(reading.text, scene, dict(means))
+        return _unknown(reading, scene, dict(means), text)
+    return _meant(reading.text, scene, dict(means), text)
 
 
-def _unknown(reading: Reading, scene: Scene, names: dict[str, object]) -> Refusal:
+def _unknown(reading: Reading, scene: Scene, names: dict[str, object], said_text: str) -> Refusal:
     """The refusal of a sentence with unknown words; the rest of it is the hint if it means something."""
     said = ", ".join(f"'{word[:20]}'" for word in reading.unknown[:3])
-    rest = _meant(re.sub(r"\?\S+ ?", "", reading.text).strip(), scene, names)
+    rest = _meant(re.sub(r"\?\S+ ?", "", reading.text).strip(), scene, names, said_text)
     reason = f"{said}: not understood"
-    return Refusal(_hint(reason, scene) if isinstance(rest, Refusal) else f"{reason}; without it: {in_words(rest, scene)}?")
+    return Refusal(_hint(reason, scene, said_text) if isinstance(rest, Refusal) else f"{reason}; without it: {in_words(rest, scene)}?")
 
 
-def _meant(text: str, scene: Scene, names: dict[str, object]) -> list[Intent] | Refusal:
+def _meant(text: str, scene: Scene, names: dict[str, object], said: str) -> list[Intent] | Refusal:
     """The only meaning of words of the grammar, or a refusal."""
     try:
         found = _clauses(text, scene, names)
@@ -72,7 +74,7 @@ def _meant(text: str, scene: Scene, names: dict[str, object]) -> list[Intent] | 
         first, second = list(meanings)[:2]
         return Refusal(f"that may mean two things: {in_words(first, scene)}, or {in_words(second, scene)}?")
     refused |= unresolved
-    return Refusal(next(iter(refused)) if refused else _hint("that is not understood", scene))
+    return Refusal(next(iter(refused)) if refused else _hint("that is not understood", scene, said))
 
 
 # ---- the grammar -----------------------------------------------------------------------------------------------------------
@@ -173,16 +175,11 @@ class _Forest:
             return [(Refusal(str(unclear)),)]
 
 
-# ---- in words --------------------------------------------------------------------------------------------------------------
+# ---- hints -----------------------------------------------------------------------------------------------------------------
 
 
-def in_words(intents: Any, scene: Scene) -> str:
-    """Intents as the sentence that means them."""
-    return "; ".join(str(intent.as_json()) for intent in intents)
-
-
-def _hint(reason: str, scene: Scene) -> str:
-    return reason
-
-
-_ = (lru_cache, OrderScene)
+def _hint(reason: str, scene: Scene, text: str = "") -> str:
+    """The reason with the nearest sentence that would be understood."""
+    known = examples(scene)
+    near = get_close_matches(text.lower(), known, n=1, cutoff=0.3) or known[:1]
+    return f"{reason}; what would be: {near[0]}" if near else reason
