@@ -1,6 +1,7 @@
 """Teaching at a terminal: questions as text and a person's answers, for moves in a table and for the order of transfers."""
 
-from collections.abc import Iterable
+from collections import deque
+from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 from itertools import groupby
 from typing import Any
@@ -17,11 +18,23 @@ from lab.seat import order_text, request_text
 from lab.seat.event_text import SessionText
 from lab.seat.grid_text import Marks, StateWords
 from lab.seat.request_text import PathAhead
+from lab.seat.spoken_answers import SpokenAnswers, decision_of
 from lab.seat.terminal.line_reader import Outside, ReadLine, default_reader
 from lab.seat.terminal.screen import folded, question, room, screen
-from lab.seat.terminal.typed_answer import COMMANDS, Understood, explained, explained_words, understand
+from lab.seat.terminal.typed_answer import (
+    ANSWERS,
+    COMMANDS,
+    IN_WORDS,
+    Understood,
+    explained,
+    explained_words,
+    is_sentence,
+    understand,
+)
 from lab.sequencing.search import SequenceRequest
 from lab.teaching.events import ORDER, Event, LessonEvent
+from lab.words.meaning import Intent, Own, Praise, Quiet, Refusal, Stop, Undo as TakeBack, Why
+from lab.words.ways import Motion, NoWay
 
 WORDS = ("why", "undo", "skip", "auto", "quit")
 TABLE = 56  # columns of a terminal, below which each move is a line of words instead of a table row
@@ -91,7 +104,7 @@ class OrderQuestion:
 
     def explained(self, request: SequenceRequest) -> list[tuple[str, str]]:
         """The possible inputs and their effects."""
-        return [("a number", "of the list: that move is made next"), *explained_words()]
+        return [("a number", "of the list: that move is made next"), *explained_words(), IN_WORDS]
 
     def named(self, request: SequenceRequest, decision: int) -> str:
         """A decision in words."""
@@ -182,6 +195,9 @@ class TableQuestion:
 
 
 STYLES = {"": "", "ask": "bold", "note": "yellow", "good": "green", "bad": "yellow", "lost": "bold red"}
+AGREED = "Is that what you mean? [enter = yes, no] "
+YES = ("", "y", "yes", "yeah", "ok", "okay")
+_ASK: Any = object()  # stands for: the person is asked again
 MOST_DRAWN = 5  # equal moves of a path that are drawn one by one
 
 
@@ -205,6 +221,8 @@ class TeachingPrompt:
         self._last: Request | None = None  # the last question
         self._text, self._order_text = SessionText(self._table.marks.named), SessionText(kind="order")
         self._guided = self._misleads = 0
+        self._spoken = SpokenAnswers()
+        self._ahead: deque[Intent] = deque()  # what was said for after the present path
 
     def __call__(self, request: Request) -> int | None:
         """The person's answer, after showing the learner's state."""
@@ -214,6 +232,12 @@ class TeachingPrompt:
         if self._path.goes_on(request):
             return self._give(request, self._path.step())
         self._drop_path(f"the learner is {self._way(request).where(request, request.state)} now")
+        if self._ahead:
+            said, self._ahead = list(self._ahead), deque()
+            if (done := self._carry_out(said, request)) is not _ASK:
+                return done
+        if (kept := self._spoken.kept(request)) is not None:
+            return self._keep(kept.action, kept.why)
         with self._outside.question():
             if self._read_line is None:
                 self._read_line = default_reader(self._console, plain=self._plain, outside=self._outside)
@@ -226,12 +250,14 @@ class TeachingPrompt:
 
     def about(self, known: StateWords | None) -> None:
         """Take over the object that describes the next lesson's states in words; None for none."""
-        self._table.known = known
+        self._table.known = self._spoken.about = known
 
     def show(self, request: Request) -> None:
         """Show the learner's state, its own choice, and its progress."""
         self._last = request
         self._print(self._way(request).shown(request))
+        if rules := self._spoken.standing(request):
+            self._say(f"Your rules: {'; '.join(rules)}.", "dim")
 
     def told(self, request: Request, action: int | None) -> None:
         """Show the answer to a request, such as "Answer: right"; None: the step was left to the learner."""
@@ -248,23 +274,122 @@ class TeachingPrompt:
         asked = way.asked(request)
         while True:
             try:
-                answer = way.understood(read_line(asked), request)
+                line = read_line(asked)
+                answer = way.understood(line, request)
+                if isinstance(answer, str) and answer not in ANSWERS and is_sentence(line):
+                    if (done := self._hear(line, answer, request, read_line)) is not _ASK:
+                        return done
+                    continue
             except EOFError:
                 self._say("No more answers: the learner goes on alone.")
                 raise AdvisorLeft from None
             match answer:
                 case int():
+                    self._spoken.gave(request, (answer,))
                     return self._give(request, answer)
                 case tuple() if isinstance(request, AdviceRequest):
-                    self._path = PathAhead(request, answer)
-                    self._say(f"A path of {counted(len(answer), 'move')}: {self._drawn(request, answer)}", "dim")
-                    return self._give(request, self._path.step())
+                    return self._begin_path(request, answer)
                 case "own":
+                    self._spoken.gave(request, (request.own,))
                     return request.own
                 case "skip":
                     return None
                 case _:
                     self._command(answer, request)
+
+    def _begin_path(self, request: AdviceRequest, moves: tuple[int, ...]) -> int:
+        """The first move of a path; its others answer the next questions along it."""
+        self._spoken.gave(request, moves)
+        self._path = PathAhead(request, moves)
+        self._say(f"A path of {counted(len(moves), 'move')}: {self._drawn(request, moves)}", "dim")
+        return self._give(request, self._path.step())
+
+    # ---- sentences ----------------------------------------------------------------------------------------------------
+
+    def _hear(self, line: str, hint: str, request: Request, read_line: ReadLine) -> Any:
+        """The answer that a sentence gives, _ASK if it gives none; a person at a terminal agrees to what was understood first.
+
+        hint: shown for a single word that is no sentence.
+        """
+        heard = self._spoken.heard(line, request)
+        if isinstance(heard, Refusal):
+            self._say(heard.reason if len(line.split()) > 1 else hint, "yellow")
+            return _ASK
+        self._say(f"Understood: {self._spoken.in_words(heard, request)}.", "bold")
+        if getattr(read_line, "confirms", False) and not all(isinstance(one, Why | Praise | Own) for one in heard):
+            if isinstance(request, AdviceRequest) and (moves := self._moves(heard, request)):
+                self._say(f"That is {self._drawn(request, moves)}", "dim")
+            if read_line(AGREED).strip().lower() not in YES:
+                self._say("Dropped.")
+                return _ASK
+        return self._carry_out(heard, request)
+
+    def _moves(self, heard: Sequence[Intent], request: AdviceRequest) -> tuple[int, ...]:
+        """The moves for what was said before anything is carried out, () if there is no way."""
+        try:
+            return self._spoken.moves(heard, request)
+        except NoWay:
+            return ()
+
+    def _carry_out(self, said: Sequence[Intent], request: Request) -> Any:
+        """Carry out what was said, up to a move, after which the rest waits; returns the answer, _ASK if there is none."""
+        rest = deque(said)
+        while rest:
+            intent = rest.popleft()
+            if isinstance(intent, Motion) and isinstance(request, AdviceRequest):
+                motions = [intent]
+                while rest and isinstance(rest[0], Motion):
+                    motions.append(rest.popleft())
+                try:
+                    moves = self._spoken.moves(motions, request)
+                except NoWay as reason:
+                    self._say(f"{reason}: not done.", "yellow")
+                    return _ASK
+                self._ahead = rest
+                return self._begin_path(request, moves)
+            if (decision := decision_of([intent])) is not None:
+                self._ahead = rest
+                self._spoken.gave(request, (decision,))
+                return self._give(request, decision)
+            if isinstance(intent, Own):
+                self._ahead = rest
+                self._spoken.gave(request, (request.own,))
+                return request.own
+            if isinstance(intent, Motion):
+                self._say("The other way, or the same again, is not understood for an order: say the move.", "yellow")
+                return _ASK
+            if refusal := self._note(intent, request):
+                self._say(f"{refusal}: not done.", "yellow")
+                return _ASK
+        if any(isinstance(intent, Quiet) for intent in said):
+            kept = self._spoken.kept(request)
+            return _ASK if kept is None else self._keep(kept.action, kept.why)
+        return _ASK
+
+    def _note(self, intent: Intent, request: Request) -> str:
+        """Carry out what gives no answer; returns why it cannot be, "" if it can."""
+        match intent:
+            case Why():
+                self._command("why", request)
+            case TakeBack():
+                self._ahead.clear()
+                self._command("undo", request)
+            case Stop():
+                self._command("quit", request)
+            case Praise():
+                self._say("Noted; praise is not learned from yet.", "dim")
+            case _:
+                return self._spoken.hold(intent, request)
+        return ""
+
+    def _keep(self, action: int | None, why: str) -> int | None:
+        """An answer by what was said before; raises AdvisorLeft when no more questions are wanted at all."""
+        if action is None and why:
+            self._command("done", self._last) if self._last is not None else None
+            raise AdvisorLeft
+        if why:
+            self._say(why, "dim")
+        return action
 
     def _command(self, word: str, request: Request) -> None:
         """Carry out a command word that gives no advice; any other word is a hint, which is shown."""
@@ -285,6 +410,8 @@ class TeachingPrompt:
             case "why":
                 for line in self._way(request).why(request, self._guided):
                     self._say(line)
+                if rules := self._spoken.standing(request):
+                    self._say(f"Your rules hold: {'; '.join(rules)}.")
             case "help":
                 self._help(request)
             case _:
