@@ -58,8 +58,8 @@ class SpokenAnswers:
     # ---- what a sentence means
 
     def heard(self, line: str, request: Request) -> list[Intent] | Refusal:
-        """The meaning of a sentence, or its refusal."""
-        return listen(line, self.scene(request))
+        """The meaning of a sentence, or its refusal; in a single word no typing error is corrected."""
+        return listen(line, self.scene(request), corrects=len(line.split()) > 1)
 
     def in_words(self, intents: Sequence[Intent], request: Request) -> str:
         """What was understood, as a sentence."""

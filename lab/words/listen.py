@@ -19,10 +19,10 @@ MOST_READINGS = 200  # of one part of a sentence
 TOO_LONG = "that is too long: say it in shorter sentences"
 
 
-def listen(text: str, scene: Scene) -> list[Intent] | Refusal:
+def listen(text: str, scene: Scene, corrects: bool = True) -> list[Intent] | Refusal:
     """The intents of a sentence in the order in which they are to be done, or a refusal of one line.
 
-    Two derivations with different meanings, a word that nobody knows, and a name that fits several objects are refused.
+    corrects: whether words with typing errors are corrected. Two derivations with different meanings, a word that nobody knows, and a name that fits several objects are refused.
     """
     named, means = names_of(scene)
     words = words_of(text)
@@ -30,7 +30,7 @@ def listen(text: str, scene: Scene) -> list[Intent] | Refusal:
         return Refusal(_hint("nothing was said", scene, text))
     if len(words) > MOST_WORDS or len(text) > 1000:
         return Refusal(TOO_LONG)
-    reading = read(text, scene, named)
+    reading = read(text, scene, named, corrects)
     if reading.unknown:
         return _unknown(reading, scene, dict(means), text)
     return _meant(reading.text, scene, dict(means), text)
@@ -86,7 +86,8 @@ def grammar(start: str) -> Any:
     text = _flat(files("lab.words").joinpath("grammar.lark").read_text(encoding="utf-8"))
     rows = {
         **{kind: f"(?:{'|'.join(map(re.escape, phrases))})".replace("\\ ", " ") for kind, phrases in kinds_of_words().items()},
-        **{kind: f"{kind.lower()}[0-9]+x" for kind in ("NAME", "PART", "KIND", "STATION", "ACT")},
+        **{kind: f"{kind.lower()}[0-9]+x" for kind in ("NAME", "PART", "KIND", "STATION", "ACTKIND")},
+        "ACT": "act(?:kind)?[0-9]+x",
         "NUM": r"[0-9]+(?:\.[0-9]+)?",
         "LENGTH": r"[0-9.e+-]+cm[0-9.]+",
     }
@@ -96,26 +97,28 @@ def grammar(start: str) -> Any:
 
 def _flat(text: str) -> str:
     """The grammar with a rule of its own for each part that may be left out or repeated, which keeps it small."""
-    made: dict[str, str] = {}
+    forms = {"?": "{0}: {1} |", "*": "{0}: {0} ({1}) |", "+": "{0}: {1} | {0} ({1})", "": "{0}: {1}"}
+    made: dict[tuple[str, str], str] = {}  # part and suffix -> the name of its rule
 
     def named(match: re.Match[str]) -> str:
-        inner, suffix = match[1].strip(), match[2]
-        name = made.setdefault(f"{inner}{suffix}", f"_part{len(made)}")
-        return f"{name} "
+        return made.setdefault((match[1].strip(), match[2]), f"_part{len(made)}") + " "
+
+    def without_suffixes(part: str) -> str:
+        return re.sub(r"\b(\w+)([?*+])", named, part)
 
     text = re.sub("//.*", "", text)
-    while re.search(r"\(", text):
+    while "(" in text:
         text = re.sub(r"\(([^()]*)\)([?*+]?)", named, text)
-    text = re.sub(r"\b(\w+)([?*+])", named, text)
-    forms = {"?": "{name}: {inner} |", "*": "{name}: {name} ({inner}) |", "+": "{name}: {inner} | {name} ({inner})", "": "{name}: {inner}"}
-    rules = list[str]()
-    for key, name in list(made.items()):
-        suffix = key[-1] if key[-1] in "?*+" else ""
-        inner = re.sub(r"\b(\w+)([?*+])", named, key.removesuffix(suffix) if suffix else key)
-        rules.append(forms[suffix].format(name=name, inner=inner))
-    for key, name in list(made.items())[len(rules) :]:
-        rules.append(forms[key[-1]].format(name=name, inner=key[:-1]))
-    return "\n".join([text, *rules])
+    rules = [without_suffixes(text)]
+    groups = list(made.items())
+    written = 0
+    while written < len(groups):
+        (part, suffix), name = groups[written]
+        inner = part if part.isidentifier() else without_suffixes(part)
+        rules.append(forms[suffix].format(name, inner))
+        written += 1
+        groups = list(made.items())
+    return "\n".join(rules)
 
 
 def _clauses(text: str, scene: Scene, names: Mapping[str, object]) -> list[Any]:

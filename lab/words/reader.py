@@ -205,12 +205,13 @@ SYNONYMS: Mapping[str, tuple[str, ...]] = {
     "plate": ("plate", "dish"),
     "machine": ("machine", "device", "apparatus"),
     "toaster": ("toaster",),
+    "toast": ("toast", "slice", "bread", "slice of toast", "slice of bread", "piece of toast", "piece of bread"),
     "cup": ("cup", "mug"),
     "shaft": ("shaft", "axle"),
     "gear": ("gear", "cog", "gearwheel", "gear wheel", "cogwheel"),
     "slice": ("slice", "bread", "toast", "slice of bread", "piece of bread", "bread slice", "slice of toast", "piece of toast"),
 }
-OBSTACLES = ("obstacle", "thing", "object", "block", "hurdle")
+OBSTACLES = ("obstacle", "object", "block", "hurdle")
 STATION_WORDS: Mapping[str, tuple[str, ...]] = {
     "washer": ("washer", "washing machine", "washing station", "wash"),
     "mill": ("mill", "milling machine", "milling station"),
@@ -302,24 +303,28 @@ def names_of(scene: Scene) -> tuple[Named, tuple[tuple[str, object], ...]]:
         elif station.endswith("er"):
             forms += [f"{station.removesuffix('er')}ing station"]
         add("station", station, forms)
+    nouns = {form: parts for kind, parts in kinds.items() for form in (kind, *SYNONYMS.get(kind, ()))}
     for station in scene.stations:
-        add("act", station, work_words(station))
+        words = work_words(station)
+        for noun in [word for word in words if word in nouns]:
+            add("actkind", (station, tuple(nouns[noun])), (noun,))
+        add("act", station, words)
     return named, tuple(means)
 
 
 # ---- the whole reading ---------------------------------------------------------------------------------------------------
 
 
-def read(text: str, scene: Scene, named: Named) -> Reading:
+def read(text: str, scene: Scene, named: Named, corrects: bool = True) -> Reading:
     """The text as words of the grammar."""
     kind = "grid" if isinstance(scene, GridScene) else "order"
     known = _known(kind) | {word for words in named for word in words if word.isalpha()}
     frequent = FREQUENT | {word for words in named for word in words if len(word) > 3}
     right, unknown, changes = list[str](), list[str](), list[tuple[str, str]]()
-    for word in _merged(_reason_cut(words_of(text)), known):
+    for word in _merged(_reason_cut(words_of(text)), known if corrects else None):
         if not word[0].isalpha() or word in known:
             right.append(word)
-        elif (meant := corrected(word, known, frequent)) is not None:
+        elif corrects and (meant := corrected(word, known, frequent)) is not None:
             right.append(meant)
             changes.append((word, meant))
         else:
@@ -338,9 +343,11 @@ def _reason_cut(words: Sequence[str]) -> list[str]:
     return list(words)
 
 
-def _merged(words: Sequence[str], known: frozenset[str]) -> list[str]:
-    """The words, two in one ("tothe") apart."""
-    result = []
+def _merged(words: Sequence[str], known: frozenset[str] | None) -> list[str]:
+    """The words, two in one ("tothe") apart; unchanged without known words."""
+    if known is None:
+        return list(words)
+    result = list[str]()
     for word in words:
         cuts = [
             (word[:n], word[n:]) for n in range(2, len(word) - 1)

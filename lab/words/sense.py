@@ -121,6 +121,8 @@ class Senses:
         if kind == "LENGTH":
             number, unit = text.split("cm")
             return (Amount(float(number), float(unit)),)
+        if kind in ("ACT", "ACTKIND") and isinstance(self.names[text], tuple):
+            return (self.names[text][kind == "ACTKIND"],)  # type: ignore[index]
         return (self.names[text],) if kind in ("NAME", "PART", "KIND", "STATION", "ACT") else ()
 
     # directions and amounts
@@ -200,6 +202,12 @@ class Senses:
 
     def _leg_until_before(self, until: Stretch, direction: str) -> tuple[Stretch, ...]:
         return (replace(until, direction=direction),)
+
+    def _leg_turn(self, amount: Amount, *values: str) -> tuple[Stretch, ...]:
+        return (Stretch(self._turned("turn right" if values else "turn left"), amount),)
+
+    def _leg_turn_right(self, amount: Amount) -> tuple[Stretch, ...]:
+        return (Stretch(self._turned("turn right"), amount),)
 
     def _leg_wall_until(self, direction: str, until: Stretch) -> tuple[Stretch, ...]:
         return (replace(until, direction=direction),)
@@ -579,9 +587,16 @@ class Referents:
                 raise Unresolved("'it' is no object that was named: name it")
             return self._thing
         objects = [self.scene.object(id_) for id_ in thing.ids]
+        every = objects
         for adjective in thing.adjectives:
-            self.redundant += isinstance(adjective, Post) and len(objects) == 1
-            objects = self._fitting(objects, adjective.place if isinstance(adjective, Post) else adjective)
+            if isinstance(adjective, Post):
+                self.redundant += len(objects) == 1
+                there = self._fitting(every, adjective.place)
+                objects = [thing for thing in objects if thing in there]
+                if not objects:
+                    raise Misfit
+            else:
+                objects = self._fitting(objects, adjective)
         if len(objects) != 1:
             names = _listed([f"the {word} {objects[0].names[0] if objects else 'object'}" for word in ("left", "nearest")])
             raise Unclear(f"{len(objects)} objects fit: say which, such as {names}")
@@ -634,7 +649,7 @@ class Referents:
                 return Never(self._part_or_any(part), self._place(station))
             case "before":
                 first, second = (self._work(work) for work in values)
-                if first == second:
+                if first == second or Work() in (first, second):
                     raise Misfit
                 if first.part and second.part and (first.station is None) != (second.station is None):
                     raise Unclear(f"say the station of both {first.part} and {second.part}, or of neither")

@@ -16,17 +16,17 @@ FILLERS = (
     "|if you do not mind|for me|with you|could you|can you|would you|will you|would you be so kind|be so kind|be so kind as to"
     "|would you be so kind as to|could we|can we|could we have|can we have|could i have|would you mind|do you mind"
     "|i want you|i want you to|i want you to be|i would like you|i would like you to|i would like you to be|i need you to"
-    "|i need you|i ask you to|i would say|i would|i think|i guess|i suppose|i suggest|i say|i said|i mean|i meant"
+    "|i need you|i ask you to|i would say|i would like that you|i want that you|i would like it if you|i wish you would|i wish you to|i wish that you|i wish you|oops|ups|whoops|let me|i would|i think|i guess|i suppose|i suggest|i say|i said|i mean|i meant"
     "|i would like to|i want to|i would like|i want"
     "|i would prefer|it would be nice if you|it would be good if you|it would be great if you|you should|you should to|you must"
     "|you have to|you need to|you ought to|you could|you had better|better|try to|try|let us|let us say|how about|what about"
     "|do me a favour and|do me a favor and|feel free to|go ahead and|go and|be a dear and|be nice and|quickly|slowly|carefully"
-    "|gently|quick|immediately|at once|straight away|right away|directly|sideways|a bit|hand|arm|gripper|tool|well|so|for now"
+    "|gently|quick|immediately|at once|straight away|right away|directly|sideways|hand|arm|gripper|tool|well|so|for now"
     "|from here|from there|from now on|from where you are|where you are|then please|i beg you|you know|in a curve"
     "|in a bow|in an arc|in a circle|in a wide arc|in a big circle|shortest path|shortest way|shortest route|quickest way"
     "|quickest path|quickest route|direct way|direct path|direct route|by shortest path|by shortest way|by shortest route"
     "|on shortest path|on shortest way|nice and slow|man|guys|folks|precisely|completely around|come on|listen|look|as i said"
-    "|again please|of course|sure|surely|certainly|indeed|definitely|strictly|finally then|wait|hang on|hold on|would rather|rather"
+    "|of course|sure|surely|certainly|indeed|definitely|strictly|finally then|wait|hang on|hold on|would rather|rather"
     "|instead|please do|do please|also|too please|as well|somewhat|total|in total|altogether|only then|though|exact|single|whole"
     "|full|further on|grid|thank u|ur|urself"
 )
@@ -74,14 +74,14 @@ COMMON: Mapping[str, str] = {
     "|marvellous|marvelous|cool|clever|smart|correct|beautiful|neat|impressive|well done|good job|great job|nice job|good work"
     "|great work|nice work|good move|great move|nice move|bravo|good one|nice one|good robot|good boy|good girl|not bad|not bad at all"
     "|not too bad|keep it up|keep up good work|way to go|thumbs up|much better|good choice|good decision|good step|spot on"
-    "|right thing|right move|right choice|right decision|best|right step|exactly right|quite right|quite good|good thing|a good one"
+    "|right thing|right move|right choice|right decision|best|right step|quite right|quite good|good thing|a good one"
     "|hooray|hurray|yay|wow|nicely done|nicely|nailed it|you nailed it|you did well|you did great|you are good|you did good"
     "|what i wanted|as i wanted|like i wanted|how i wanted it|i like it|i like that|i like this|i liked that|i liked it|i love it"
     "|i loved that|i am happy|i am happy with that|i am pleased|i am pleased with that|i am very pleased|i am satisfied"
     "|i am satisfied with that|i am impressed|could not be better|nothing to complain about|no complaints|outstanding|sweet"
     "|fabulous|exemplary|congratulations|congrats|kudos|chapeau|first class|first rate|top|like it|love it|liked it|loved it"
-    "|great stuff|good stuff|very fine|you are doing well|you are doing great|just right|a success|success|so much better",
-    "BAD": "bad|poor|awful|terrible|horrible|stupid|rubbish|mistake|nonsense|wrong|wrong move|wrong step|bad move|bad job|bad robot"
+    "|great stuff|good stuff|very fine|you are doing well|you are doing great|a success|success|so much better",
+    "BAD": "bad|poor|you did badly|you did that badly|you did wrong|you did that wrong|you did it wrong|badly|went wrong|awful|terrible|horrible|stupid|rubbish|mistake|nonsense|wrong|wrong move|wrong step|bad move|bad job|bad robot"
     "|not good|no good|not good at all|not right|not correct|incorrect|not great|not nice|not so good|not very good|not ok|not okay"
     "|not fine|disappointing|silly|worse|worst|dreadful|lousy|ugly|dumb|foolish|useless|badly done|poorly done|poor show|thumbs down"
     "|i do not like that|i do not like it|i did not like that|i did not like it|i do not like this|i hate that|i hated that"
@@ -146,6 +146,10 @@ COMMON: Mapping[str, str] = {
     "|reverse that|reverse last move|reverse what you did|reverse what you just did|undo last command|take back last command|cancel last command"
     "|cancel my last answer|cancel previous answer|cancel my answer|take my answer back|take back my answer|i withdraw that|i withdraw my answer"
     "|make that undone|make it undone|i did not mean that|i did not mean it|that was not what i meant to say|back to before that|withdraw it|undo my last answer",
+    "UNDOV": "undo|take back|revert|cancel|withdraw|remove|delete|forget|rewind|scratch|discard|reverse|retract|annul|drop|strike",
+    "UNDOBJ": "it|that|this|last one|last answer|my last answer|my answer|last move|your last move|last step|previous answer|previous move|that answer|that move|last command|my last command|what i said|what i just said|what you did|what you just did|last action|last instruction|my last instruction|last thing i said|last thing|my last move|my last step|this answer|your last step|my previous answer|that 1|this 1|that last 1|my words|my last words|that last answer|that last move|that step|that command|that instruction|last reply|my last reply|my reply",
+    "TAKEV": "take|put",
+    "BACKWORD": "back",
     "OWN": "do what you think is best|do what you think best|do what you think is right|do what you want|do what you like|do as you like"
     "|do as you want|do as you please|do as you wish|do whatever you want|do whatever you like|do whatever you think is best"
     "|whatever you want|whatever you like|whatever you think|whatever you think is best|what you think is best|as you like|as you wish"
@@ -196,7 +200,7 @@ COMMON: Mapping[str, str] = {
     "|asking for advice|ask for my help|asking for my help|ask me for help|asking me for help|ask me for advice|asking me for advice|ask anything|asking anything|ask me anything|asking me anything"
     "|questions|question|questioning me|ask me again|ask again|pester me|pestering me|annoy me|annoying me|talk|talk to me|talking|talking to me|come to me|call me|ask me about it|ask me any questions|ask any questions"
     "|ask a question|ask me a question|more questions|ask me something|ask something|trouble me|ask me more|ask more questions|ask me more questions|ask me any more questions|ask any more questions|query me|querying me|nag me|nagging me|nag|nagging|have questions",
-    "QUIET": "quiet|silent|silence|be quiet|be quite|stay quiet|keep quiet|remain quiet|be silent|stay silent|keep silent|remain silent|shut up"
+    "QUIET": "i do not want any questions|i do not want to be asked|i do not want questions|i want no questions|i want no more questions|i do not want any more questions|i do not want to be asked any more|i do not want to be disturbed|i do not want to be asked again|quiet|silent|silence|be quiet|be quite|stay quiet|keep quiet|remain quiet|be silent|stay silent|keep silent|remain silent|shut up"
     "|hush|leave me alone|leave me in peace|leave me be|give me a break|give me a rest|peace|peace and quiet|be still|hold your tongue|hold your questions"
     "|keep your questions to yourself|keep questions to yourself|let me be|let me alone|let me rest|i want peace|i need a break|quite please|let me sleep|no questions|no more questions|do not ask|no further questions|spare me|spare me questions|spare me your questions|no questions asked|work alone|work on your own|work by yourself|do it quietly|work quietly|go it alone|quiet please|silence please|zip it",
     "STOPV": "stop|quit|stop all|cease|enough of|enough|halt|refrain from|give up|avoid asking",
