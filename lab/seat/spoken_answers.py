@@ -235,13 +235,14 @@ def map_of(mdp: TabularMDP, about: StateWords | None = None) -> SceneMap:
         shown = [direction_of(mdp, action) for action in range(mdp.n_actions)]
         names = [name if way is None else DIRECTIONS[way] for name, way in zip(names, shown, strict=True)]
     aim = getattr(about, "way_in_words", lambda: ("", ""))()[1].removeprefix("the ")
-    goal = ("goal", "slot", aim) if aim.startswith("slot") else ("goal",)
+    goal = ("goal", "slot", aim, aim.removeprefix("slot of the ")) if aim.startswith("slot of ") else ("goal",)
+    obstacles = obstacles_of(mdp, getattr(about, "blocking", None)) if mdp.shape else ()
     return SceneMap(
         mdp,
         tuple(names),
         planes.place if has_grid else lambda cell: (0, 0),
-        obstacles_of(mdp, getattr(about, "blocking", None)) if mdp.shape else (),
-        goal,
+        obstacles,
+        tuple(name for name in goal if all(name not in thing.names for thing in obstacles)),
         _cell_cm(about),
     )
 

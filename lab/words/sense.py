@@ -531,7 +531,10 @@ class Referents:
             case "around":
                 return Around(self._object(values[0]).id, values[1])
             case "avoid":
-                return Avoid(self._object(values[0]).id)
+                thing = self._object(values[0])
+                if self.redundant:
+                    raise Unresolved("say only which object to keep away from")
+                return Avoid(thing.id)
             case "allow":
                 return Allow(self._object(values[0]).id)
         return self._of_order(clause)

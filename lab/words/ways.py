@@ -3,6 +3,7 @@
 A way enters no obstacle, no cell that is to be avoided, and the goal only as its end. It follows the table's own transitions.
 """
 
+import re
 from collections import deque
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -125,8 +126,9 @@ def obstacles_of(mdp: TabularMDP, causes: NDArray[np.str_] | None = None) -> tup
 
 
 def _names(name: str) -> tuple[str, ...]:
-    kind = name.rstrip("0123456789 ")
-    return (name, kind) if kind and kind != name else (name,)
+    """A name with its kind and its singular: "cubes C" is also "cube C", "cubes" and "cube"."""
+    kind = re.sub(r"[ -]?(\d+|\b[A-Za-z])$", "", name) or name
+    return tuple(dict.fromkeys((name, name.replace(kind, kind.removesuffix("s"), 1), kind, kind.removesuffix("s"))))
 
 
 def _clusters(cells: Collection[tuple[int, ...]]) -> list[frozenset[tuple[int, ...]]]:
