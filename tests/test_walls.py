@@ -19,7 +19,7 @@ ROOT = Path(__file__).resolve().parent.parent
 LAYERS: tuple[tuple[str, ...], ...] = (
     ("lab.errors", "lab.interrupts", "lab.lazy", "lab.operating_system", "lab.version"),
     ("lab.files", "lab.mdp", "lab.optional", "lab.plugins", "lab.statistics", "lab.workers"),
-    ("lab.learning", "lab.vision"),
+    ("lab.learning", "lab.vision", "lab.words"),
     ("lab.sequencing", "lab.toolbox"),
     ("lab.advice", "lab.tasks"),
     ("lab.sim",),
@@ -47,6 +47,7 @@ ALONE: dict[str, set[str]] = (
         "uvicorn": {"lab.view.server", "lab.view.server_page"},
         "websockets": set(),  # uvicorn's
         "jinja2": {"lab.studies.report"},
+        "lark": {"lab.words.listen"},
         "fsspec": {"lab.toolbox.remote_place"},
         "s3fs": set(),  # fsspec's
         "optuna": {"lab.studies.tuning"},
@@ -72,10 +73,11 @@ NEVER = {  # room -> rooms that it never imports, whatever the layers say
 }
 HEAVY = (
     *("numpy", "pydantic", "scipy", "trimesh", "matplotlib", "numba", "meshcat", "cv2", "pybullet", "safetensors"),
-    *("ortools", "starlette", "uvicorn", "gymnasium", "jinja2", "fsspec"),
+    *("ortools", "starlette", "uvicorn", "gymnasium", "jinja2", "lark", "fsspec"),
 )
 READS_ITS_OWN = (  # what ships with the lab, or what it has just written: nothing that a stranger may have made
     *("lab.view.meshcat", "lab.view.server_page", "lab.studies.report", "lab.cli.export", "lab.toolbox.remote_place"),
+    *("lab.words.listen", "lab.words.vocabulary"),
     *("lab.api.lessons", "lab.api.pictures", "lab.api.runs", "lab.api.scenes"),
 )
 BY_TABLE = ("lab", "lab.lazy", "lab.cli.app", "lab.tasks.instances", "lab_studies")  # what these load stands in a table

@@ -113,16 +113,22 @@ class SpokenAnswers:
         match intent:
             case Avoid() | Finish() | Never() | Before():
                 signature = ""
-                if isinstance(request, AdviceRequest) and intent.__class__ is Avoid and intent.object.startswith("cube"):
+                if (
+                    isinstance(request, AdviceRequest)
+                    and intent.__class__ is Avoid
+                    and intent.object.startswith("cube")
+                ):
                     signature = request.mdp.signature
                 if (refusal := self._against(intent, request)) != "":
                     return refusal
                 if (intent, signature) not in self._rules:
                     self._rules.append((intent, signature))
-            case Allow(object=ALL):
-                self._rules.clear()
             case Allow(id_):
-                self._rules = [rule for rule in self._rules if not (isinstance(rule[0], Avoid) and rule[0].object == id_)]
+                if id_ == ALL:
+                    self._rules.clear()
+                self._rules = [
+                    rule for rule in self._rules if not (isinstance(rule[0], Avoid) and rule[0].object == id_)
+                ]
             case Quiet(until):
                 self._silence = _Silence(intent, request.episode, until if isinstance(until, int) else 0)
         return ""
@@ -135,7 +141,9 @@ class SpokenAnswers:
             if rule.object == "goal":
                 return "keep away from the goal: then it would never arrive"
             if goals and goals <= known.near(rule.object):
-                return f"keep away from {called(known.scene(request.state), rule.object)}: the goal itself is next to it"
+                return (
+                    f"keep away from {called(known.scene(request.state), rule.object)}: the goal itself is next to it"
+                )
         if isinstance(request, SequenceRequest) and not kept_moves(request, [*self._held(request), rule]):
             return f"{in_words([rule], order_scene(request))}: none of the moves allowed now keeps that"
         return ""
@@ -145,7 +153,11 @@ class SpokenAnswers:
         if isinstance(request, SequenceRequest):
             return [rule for rule, _ in self._rules if not isinstance(rule, Avoid)]
         assert isinstance(request, AdviceRequest)
-        here = [rule for rule, signature in self._rules if signature in ("", request.mdp.signature) and isinstance(rule, Avoid)]
+        here = [
+            rule
+            for rule, signature in self._rules
+            if signature in ("", request.mdp.signature) and isinstance(rule, Avoid)
+        ]
         return [rule for rule in here if here and rule.object in self.map(request).spots_of]
 
     def standing(self, request: Request) -> list[str]:
@@ -181,14 +193,18 @@ class SpokenAnswers:
             return None
         best = max(good, key=lambda action: (request.q[state][action], -action))
         rules = ", ".join(self.standing(request))
-        return Kept(best, f"By your rule ({rules}): {mdp.action_labels[best]} instead of {mdp.action_labels[request.own]}.")
+        return Kept(
+            best, f"By your rule ({rules}): {mdp.action_labels[best]} instead of {mdp.action_labels[request.own]}."
+        )
 
     def _order_by_rule(self, request: SequenceRequest) -> Kept | None:
         rules = self._held(request)
         good = kept_moves(request, rules)
         if not good or len(good) == len(request.allowed):
             return None
-        best = request.own if request.own in good else min(good, key=lambda n: (order_text.move_of(request, n).wait_s, n))
+        best = (
+            request.own if request.own in good else min(good, key=lambda n: (order_text.move_of(request, n).wait_s, n))
+        )
         return Kept(best, f"By your rule ({', '.join(self.standing(request))}): move {best}.")
 
     def _by_silence(self, request: Request) -> Kept | None:
@@ -250,7 +266,11 @@ def map_of(mdp: TabularMDP, about: StateWords | None = None) -> SceneMap:
 def _cell_cm(about: StateWords | None) -> float | None:
     """The size of a cell along the first axes [cm], None if it is unknown or differs."""
     steps = getattr(about, "cell_steps", None)
-    sizes = {round(100.0 * step, 3) for step in steps()[:2]} if steps is not None and getattr(about, "moves_arm", False) else set()
+    sizes = (
+        {round(100.0 * step, 3) for step in steps()[:2]}
+        if steps is not None and getattr(about, "moves_arm", False)
+        else set()
+    )
     return sizes.pop() if len(sizes) == 1 else None
 
 
@@ -261,7 +281,10 @@ def order_scene(request: SequenceRequest) -> OrderScene:
     return OrderScene(
         tuple(_plain(cell.part_name(part)) for part in range(1, cell.parts + 1)),
         tuple(dict.fromkeys(map(_plain, cell.names))),
-        tuple(AllowedMove(m.decision, _plain(m.name.removesuffix("'s pallet")), _plain(m.origin), _plain(m.target)) for m in moves),
+        tuple(
+            AllowedMove(m.decision, _plain(m.name.removesuffix("'s pallet")), _plain(m.origin), _plain(m.target))
+            for m in moves
+        ),
     )
 
 
@@ -277,7 +300,11 @@ def kept_moves(request: SequenceRequest, rules: Sequence[Rule]) -> list[int]:
             case Finish(part):
                 moves = [move for move in moves if move.part == part] or moves
             case Never(part, station):
-                out = [move for move in moves if move.origin == station and part in (None, move.part) and _is_out(request, move)]
+                out = [
+                    move
+                    for move in moves
+                    if move.origin == station and part in (None, move.part) and _is_out(request, move)
+                ]
                 moves = out or moves
             case Before(first, second):
                 if _is_pending(request, first):

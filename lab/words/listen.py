@@ -22,7 +22,8 @@ TOO_LONG = "that is too long: say it in shorter sentences"
 def listen(text: str, scene: Scene, corrects: bool = True) -> list[Intent] | Refusal:
     """The intents of a sentence in the order in which they are to be done, or a refusal of one line.
 
-    corrects: whether words with typing errors are corrected. Two derivations with different meanings, a word that nobody knows, and a name that fits several objects are refused.
+    corrects: whether words with typing errors are corrected. Derivations with different meanings, a word that nobody knows, and
+    a name that fits several objects are refused.
     """
     named, means = names_of(scene)
     words = words_of(text)
@@ -41,7 +42,11 @@ def _unknown(reading: Reading, scene: Scene, names: dict[str, object], said_text
     said = ", ".join(f"'{word[:20]}'" for word in reading.unknown[:3])
     rest = _meant(re.sub(r"\?\S+ ?", "", reading.text).strip(), scene, names, said_text)
     reason = f"{said}: not understood"
-    return Refusal(_hint(reason, scene, said_text) if isinstance(rest, Refusal) else f"{reason}; without it: {in_words(rest, scene)}?")
+    return Refusal(
+        _hint(reason, scene, said_text)
+        if isinstance(rest, Refusal)
+        else f"{reason}; without it: {in_words(rest, scene)}?"
+    )
 
 
 def _meant(text: str, scene: Scene, names: dict[str, object], said: str) -> list[Intent] | Refusal:
@@ -85,7 +90,10 @@ def grammar(start: str) -> Any:
     """The parser of a kind of scenes, "grid" or "order" (a `lark.Lark`), with a terminal for each kind of words."""
     text = _flat(files("lab.words").joinpath("grammar.lark").read_text(encoding="utf-8"))
     rows = {
-        **{kind: f"(?:{'|'.join(map(re.escape, phrases))})".replace("\\ ", " ") for kind, phrases in kinds_of_words().items()},
+        **{
+            kind: f"(?:{'|'.join(map(re.escape, phrases))})".replace("\\ ", " ")
+            for kind, phrases in kinds_of_words().items()
+        },
         **{kind: f"{kind.lower()}[0-9]+x" for kind in ("NAME", "PART", "KIND", "STATION", "ACTKIND")},
         "ACT": "act(?:kind)?[0-9]+x",
         "NUM": r"[0-9]+(?:\.[0-9]+)?",

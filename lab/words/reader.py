@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cache
 
 from lab.words.scene import GridScene, OrderScene, Scene
-from lab.words.vocabulary import COMMON, GRID, LENGTHS, ORDER, PHRASES, SKIPPED
+from lab.words.vocabulary import LENGTHS, SKIPPED, sections
 
 MOST_WORDS = 60  # of a sentence
 CONTRACTIONS = (
@@ -15,68 +15,34 @@ CONTRACTIONS = (
         "can'?t": "can not", "cannot": "can not", "won'?t": "will not", "shan'?t": "shall not", "i'?m": "i am",
         "youre": "you are", "youve": "you have", "thats": "that is", "whats": "what is", "theres": "there is",
         "let'?s": "let us", "lets": "let us", "don'?t": "do not", "doesn'?t": "does not", "didn'?t": "did not",
-        "isn'?t": "is not", "wasn'?t": "was not", "aren'?t": "are not", "mustn'?t": "must not", "shouldn'?t": "should not",
-        "wouldn'?t": "would not", "couldn'?t": "could not", "needn'?t": "need not", "haven'?t": "have not",
-        "hasn'?t": "has not", "ain'?t": "is not", "gonna": "going to", "wanna": "want to", "gotta": "have to",
-        "id like": "i would like", "ive": "i have", "itll": "it will", "ill": "i will", "u": "you", "strait": "straight", "thn": "then", "dn": "down", "rt": "right",
-        "pls": "please", "plz": "please", "upto": "up to", "goto": "go to", "alot": "a lot", "lemme": "let me",
-        "gimme": "give me", "hows": "how is", "hes": "he is", "w/o": "without", "ur": "your", "thx": "thanks", "twise": "twice", "tw": "two",
+        "isn'?t": "is not", "wasn'?t": "was not", "aren'?t": "are not", "mustn'?t": "must not",
+        "shouldn'?t": "should not", "wouldn'?t": "would not", "couldn'?t": "could not", "needn'?t": "need not",
+        "haven'?t": "have not", "hasn'?t": "has not", "ain'?t": "is not", "gonna": "going to", "wanna": "want to",
+        "gotta": "have to", "id like": "i would like", "ive": "i have", "itll": "it will", "ill": "i will",
+        "u": "you", "strait": "straight", "thn": "then", "dn": "down", "rt": "right", "pls": "please",
+        "plz": "please", "upto": "up to", "goto": "go to", "alot": "a lot", "lemme": "let me", "gimme": "give me",
+        "hows": "how is", "hes": "he is", "w/o": "without", "ur": "your", "thx": "thanks", "twise": "twice",
+        "tw": "two",
     }.items()),
-    (r"\b(away|clear|far|back) form\b", r"\1 from"), (r"n't\b", " not"), (r"'re\b", " are"), (r"'ve\b", " have"), (r"'ll\b", " will"), (r"'d\b", " would"), (r"'m\b", " am"),
-    (r"\b(it|that|what|there|here|he|she|who|how|where|why|nothing|everything|way)'s\b", r"\1 is"), (r"'s\b", " is"),
+    (r"\b(away|clear|far|back) form\b", r"\1 from"),
+    *((rf"{short}\b", f" {full}") for short, full in {
+        "n't": "not", "'re": "are", "'ve": "have", "'ll": "will", "'d": "would", "'m": "am", "'s": "is",
+    }.items()),
 )  # fmt: skip
 UNITS_AND_TEENS = (
-    "zero one two three four five six seven eight nine ten eleven twelve thirteen fourteen fifteen sixteen seventeen "
-    "eighteen nineteen"
-).split()
-TENS = dict(zip("twenty thirty forty fifty sixty seventy eighty ninety".split(), range(20, 100, 10), strict=True))
+    *("zero", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve"),
+    *("thirteen", "fourteen", "fifteen", "sixteen", "seventeen", "eighteen", "nineteen"),
+)
+TENS = {
+    "twenty": 20, "thirty": 30, "forty": 40, "fifty": 50, "sixty": 60, "seventy": 70, "eighty": 80, "ninety": 90,
+}  # fmt: skip
 NUMBERS = {**{word: n for n, word in enumerate(UNITS_AND_TEENS)}, **TENS, "fourty": 40, "dozen": 12, "hundred": 100}
 TIMES = {"twice": 2, "thrice": 3}
+AMOUNTS = ("couple", "pair", "half", "quarter", "quarters", "of", "a", "toast")
 ORDINALS = {
-    **dict(zip("first second third fourth fifth sixth seventh eighth ninth tenth".split(), range(1, 11), strict=True)),
-    **{f"{n}{ending}": n for n, ending in ((1, "st"), (2, "nd"), (3, "rd"), *((n, "th") for n in range(4, 13)))},
-}
-# words of our language that are near one of the grammar's, and are not that word with a typing error
-OTHER_WORDS = frozenset(
-    "lift light night fight sight might tight felt lest list last past paste post lot lots cat cut hat hit bat ball call tall fall"
-    " fill bill kill will till mill well bell sell tell want went hunt wait wall walk talk work word world would wood wold food foot"
-    " good god gold cold old hold told sold bold mold gone done none bone one tone stone store stare start state stay stays star step steps"
-    " stop stops top tap tip trip drip drop crop shop ship slip sleep sheep cheap heap help held head heat heart hear here there where"
-    " were wear bear beer deer dear near fear year gear tear rear real deal meal meat meet feet feel fell tower town down dawn drawn drown"
-    " brown crown clown bread break brake bake cake lake make take tale sale male pale pile mile smile file life wife wise rise rice nice"
-    " dice price prize size side ride wide hide tide time lime line fine mine wine pine pin bin fin tin win ten men pen den hen when then than"
-    " that what hat this thin thing think thank tank bank rank sank sang song long wrong strong string spring bring king ring wing sing"
-    " camp lamp damp jump lump pump bump bum bug bag big beg bed red rod road load loaf leaf lead read ready lady baby body busy bury burn"
-    " turn born corn horn torn worn worm warm arm harm farm form from firm film fish dish wish wash cash dash lash mash rash crash trash flash"
-    " fresh flesh house mouse horse nurse purse curse course coarse coat boat goat float flat fat mat rat sat eat tea sea see bee fee free tree"
-    " three throw throat through though thought taught caught cough rough tough touch such much march match catch watch water later matter"
-    " letter better butter bitter litter little battle bottle cattle castle table cable able label level lever never ever every very"
-    " green queen screen seen keen been bean clean mean lean learn loan load lord cord card hard yard ward word"
-    " blue glue clue true rule ruler red yellow white black pink grey gray purple orange colour color morning evening tomorrow yesterday"
-    " weather football joke music song play game name same fame lame came come home some dome tomb comb poem"
-    " spoon moon noon soon room root boot shoot shout about above dove love live give five dive drive dried tried cried fried friend"
-    " brother mother father sister cook book look took hook rook hope rope pope pipe ripe wipe wine window door floor poor pool tool fool cool"
-    " roof proof loose lose close clothes cloud loud proud round sound found ground pound wound hound bound mountain fountain"
-    " paint point pint print sprint faint saint plant plane plan plain play clay day say pay lay may way"
-    " pray tray gray bray stray spray phone photo police please place palace plate slate skate late rate date gate hate fate mate"
-    " bath path math myth moth mouth south north worth earth birth death breath health wealth money honey monkey donkey turkey"
-    " key boy toy joy buy guy dry cry try fly sky spy why who whom whose how now know knew new few view"
-    " person people woman women man men child children dog cats dogs fire wire tire hire her his him them they their"
-    " fast rest best test west east nest pest vest guest quest twist wrist list mist fist first thirst burst worst worse"
-    " since science sense fence hence pence scene seat beat neat wheat sheet street sweet swear sweat sugar salt milk silk"
-    " kitchen chicken knife fork cup cap map gap lap nap tape shape escape grape drape ape knee knot not note nose rose hose"
-    " does did do dig pig fig wig jig leg beg egg ego echo each beach reach teach peach speech"
-    " sorry worry hurry story lorry marry carry merry cherry berry ferry"
-    " send sand hand land band bend lend mend tend end and sound stand stack stuck stick sick pick kick lick thick brick trick truck track"
-    " pack back sack lack hack rack snack crack black slack block lock sock rock clock shock knock luck duck"
-    " human machine engine magic logic python code file delete erase program computer system instruction instructions"
-    " twelve twenty open pen often oven over cover river liver silver"
-    " slide glide pride bride guide inside outside beside decide"
-    " color ghost most host cost lost coast toast roast boast breast"
-    " bird third girl swirl world early hourly daily nearly dearly really rally"
-    " chair hair fair pair stair air chain rain train brain drain grain gain main pain vain"
-    " story storey parrot carrot tomato potato".split()
-)
+    "first": 1, "second": 2, "third": 3, "fourth": 4, "fifth": 5, "sixth": 6, "seventh": 7, "eighth": 8, "ninth": 9,
+    "tenth": 10, "1st": 1, "2nd": 2, "3rd": 3, **{f"{n}th": n for n in range(4, 13)},
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -91,7 +57,12 @@ class Reading:
 def words_of(text: str) -> list[str]:
     """The words, numbers and separators of a text in lower case, contractions in full."""
     plain = unicodedata.normalize("NFKD", text.replace("’", "'").replace("‘", "'").replace("`", "'").replace("´", "'"))
-    plain = "".join(c for c in plain if not unicodedata.combining(c)).lower().replace("½", " half ").replace("¼", " quarter ")
+    plain = (
+        "".join(c for c in plain if not unicodedata.combining(c))
+        .lower()
+        .replace("½", " half ")
+        .replace("¼", " quarter ")
+    )
     for pattern, full in CONTRACTIONS:
         plain = re.sub(pattern, full, plain)
     plain = re.sub(r"(\d)[.,](\d)", r"\1_\2", plain)
@@ -104,30 +75,39 @@ def _normal(words: Iterable[str]) -> list[str]:
     return [str(NUMBERS[word]) if word in NUMBERS else word for word in words if word not in SKIPPED]
 
 
-def phrases_of(listed: str) -> tuple[str, ...]:
+def phrases_of(listed: Iterable[str]) -> tuple[str, ...]:
     """The phrases of a row of the vocabulary, as the reader writes them, longest first."""
-    said = [phrase for row in listed.split("|") for phrase in (row, re.sub(r"\b(work|find|make|pick|wind) way\b", r"\1 your way", row))]
+    said = [
+        text
+        for phrase in listed
+        for text in (phrase, re.sub(r"\b(work|find|make|pick|wind) way\b", r"\1 your way", phrase))
+    ]
     written = {" ".join(_normal(phrase.split())) for phrase in said} - {""}
     return tuple(sorted(written, key=lambda phrase: (-len(phrase), phrase)))
 
 
 @cache
 def kinds_of_words() -> Mapping[str, tuple[str, ...]]:
-    """Kind of word -> its phrases, longest first."""
-    rows = {**COMMON, **GRID, **{f"O_{kind}": listed for kind, listed in ORDER.items()}, **PHRASES}
+    """Kind of word -> its phrases, longest first; kinds of an order begin with O_."""
+    found = sections()
+    orders = {f"O_{kind}": listed for kind, listed in found["order"].items()}
+    rows = {**found["common"], **found["map"], **orders, **found["phrases"]}
     return {kind: phrases_of(listed) for kind, listed in rows.items()}
 
 
 @cache
-def _known(kind: str) -> frozenset[str]:
-    """The single words of a kind of scene ("grid" or "order")."""
-    local = GRID if kind == "grid" else ORDER
-    rows = [*COMMON.values(), *local.values(), *PHRASES.values()]
-    words = {word for row in rows for word in re.findall(r"[a-z]+", row)}
-    return frozenset(
-        words | set(NUMBERS) | set(TIMES) | set(ORDINALS) | set(LENGTHS) | set(SKIPPED)
-        | {"couple", "pair", "half", "quarter", "quarters", "of", "a", "toast"}
-    )  # fmt: skip
+def known_words(section: str) -> frozenset[str]:
+    """The single words of scenes whose own words are in a section, "map" or "order"."""
+    found = sections()
+    rows = [row for name in ("common", section, "phrases") for row in found[name].values()]
+    words = {word for row in rows for phrase in row for word in re.findall(r"[a-z]+", phrase)}
+    return frozenset({*words, *NUMBERS, *TIMES, *ORDINALS, *LENGTHS, *SKIPPED, *AMOUNTS})
+
+
+@cache
+def other_words() -> frozenset[str]:
+    """The words that are near a known one and are not that word with a typing error."""
+    return frozenset(sections()["other"]["WORDS"])
 
 
 # ---- typing errors -------------------------------------------------------------------------------------------------------
@@ -158,7 +138,7 @@ def corrected(word: str, known: frozenset[str], frequent: frozenset[str]) -> str
     Up to three letters only a swap is corrected, up to seven one error, from eight on two. Of several near words one of
     `frequent` is taken, else one with the same letters, else one with the same first letter.
     """
-    if word in OTHER_WORDS or not word.isalpha() or len(word) < 3:
+    if word in other_words() or not word.isalpha() or len(word) < 3:
         return None
     squeezed = re.sub(r"(.)\1{2,}", r"\1", word)
     if squeezed != word and squeezed in known:
@@ -169,7 +149,9 @@ def corrected(word: str, known: frozenset[str], frequent: frozenset[str]) -> str
         if len(other) < 2 or (len(other) == 2 and len(word) > 2):
             continue
         apart = distance(word, other, most)
-        if apart <= most and (len(word) > 3 or sorted(word) == sorted(other) or (len(other) == 4 and other in frequent)):
+        if apart <= most and (
+            len(word) > 3 or sorted(word) == sorted(other) or (len(other) == 4 and other in frequent)
+        ):
             if len(other) <= 3 and sorted(word) != sorted(other) and len(set(word) - set(other)) > 0:
                 continue
             near.setdefault(apart, []).append(other)
@@ -188,14 +170,6 @@ def corrected(word: str, known: frozenset[str], frequent: frozenset[str]) -> str
     return None
 
 
-FREQUENT = frozenset(
-    "left right up down forward forwards back backward backwards step steps until wall toaster cube block goal machine plate"
-    " around avoid away near the then and go move stop please again before after slice first never wait put tray finish turn"
-    " higher lower other way direction last time good bad undo take why ask not past next nearest your you square squares twice"
-    " straight once opposite same last than from with turn closest furthest bottom side sides metre meter wash milled keep once".split()
-)
-
-
 # ---- names of the scene --------------------------------------------------------------------------------------------------
 
 SYNONYMS: Mapping[str, tuple[str, ...]] = {
@@ -209,7 +183,16 @@ SYNONYMS: Mapping[str, tuple[str, ...]] = {
     "cup": ("cup", "mug"),
     "shaft": ("shaft", "axle"),
     "gear": ("gear", "cog", "gearwheel", "gear wheel", "cogwheel"),
-    "slice": ("slice", "bread", "toast", "slice of bread", "piece of bread", "bread slice", "slice of toast", "piece of toast"),
+    "slice": (
+        "slice",
+        "bread",
+        "toast",
+        "slice of bread",
+        "piece of bread",
+        "bread slice",
+        "slice of toast",
+        "piece of toast",
+    ),
 }
 OBSTACLES = ("obstacle", "object", "block", "hurdle")
 STATION_WORDS: Mapping[str, tuple[str, ...]] = {
@@ -229,6 +212,21 @@ STATION_WORK: Mapping[str, tuple[str, ...]] = {
 }
 
 
+STORES = (
+    "buffer",
+    "plate",
+    "tray",
+    "rack",
+    "store",
+    "storage",
+    "table",
+    "exit",
+    "entry",
+    "dock",
+    "pallet",
+)  # nothing is done there
+
+
 def _plurals(names: Iterable[str]) -> list[str]:
     return [form for name in names for form in (name, f"{name}s")]
 
@@ -238,9 +236,35 @@ def work_words(station: str) -> list[str]:
     if station in STATION_WORK:
         return list(STATION_WORK[station])
     words = station.split()
+    if words[-1] in STORES:
+        return []
     stem = words[0] if len(words) > 1 else station.removesuffix("er") if station.endswith("er") else station
     stem = stem.rstrip("e")
     return [f"{stem}{ending}" for ending in ("ing", "ed", "es", "s", "e", "")]
+
+
+def _station_forms(station: str) -> list[str]:
+    """What a station may be called, its own name first."""
+    words = station.split()
+    if len(words) > 1:
+        first, last = words[0], words[-1]
+        return [
+            station,
+            last,
+            f"{first}er",
+            f"{first} station",
+            f"{first} machine",
+            f"{first}ing station",
+            f"{first}ing machine",
+        ]
+    ing = [f"{station.removesuffix('er')}ing station"] if station.endswith("er") else []
+    return [station, *STATION_WORDS.get(station, ()), *ing]
+
+
+def _own(forms: Sequence[str], station: str, all_forms: Mapping[str, Sequence[str]]) -> list[str]:
+    """The forms that no other station has, and the station's own name."""
+    others = {form for other, listed in all_forms.items() if other != station for form in listed}
+    return [form for form in forms if form == station or (form not in others and form not in all_forms)]
 
 
 Named = Mapping[tuple[str, ...], str]  # words -> the word of the grammar
@@ -293,19 +317,18 @@ def names_of(scene: Scene) -> tuple[Named, tuple[tuple[str, object], ...]]:
             forms += [f"{ordinal} {kind}" for ordinal in ordinals] + [f"number {number} {kind}"]
         add("part", part, forms)
     for kind, parts in kinds.items():
-        add("kind", tuple(parts), _plurals(form for form in dict.fromkeys((kind, *SYNONYMS.get(kind, ()))) if form != "toast"))
-    for station in scene.stations:
-        forms = [*STATION_WORDS.get(station, (station,))]
-        words = station.split()
-        if len(words) > 1:
-            forms = [station, words[-1], f"{words[0]}er", f"{words[0]} station", f"{words[0]} machine", f"{words[0]}ing station"]
-            forms += [f"{words[0]}ing machine"]
-        elif station.endswith("er"):
-            forms += [f"{station.removesuffix('er')}ing station"]
-        add("station", station, forms)
+        add(
+            "kind",
+            tuple(parts),
+            _plurals(form for form in dict.fromkeys((kind, *SYNONYMS.get(kind, ()))) if form != "toast"),
+        )
+    forms_of = {station: _station_forms(station) for station in scene.stations}
+    for station, forms in forms_of.items():
+        add("station", station, _own(forms, station, forms_of))
     nouns = {form: parts for kind, parts in kinds.items() for form in (kind, *SYNONYMS.get(kind, ()))}
-    for station in scene.stations:
-        words = work_words(station)
+    works = {station: work_words(station) for station in scene.stations}
+    for station, words in works.items():
+        words = _own(words, station, works)
         for noun in [word for word in words if word in nouns]:
             add("actkind", (station, tuple(nouns[noun])), (noun,))
         add("act", station, words)
@@ -317,9 +340,10 @@ def names_of(scene: Scene) -> tuple[Named, tuple[tuple[str, object], ...]]:
 
 def read(text: str, scene: Scene, named: Named, corrects: bool = True) -> Reading:
     """The text as words of the grammar."""
-    kind = "grid" if isinstance(scene, GridScene) else "order"
-    known = _known(kind) | {word for words in named for word in words if word.isalpha()}
-    frequent = FREQUENT | {word for words in named for word in words if len(word) > 3}
+    known = known_words("map" if isinstance(scene, GridScene) else "order") | {
+        word for words in named for word in words if word.isalpha()
+    }
+    frequent = frozenset(sections()["other"]["FREQUENT"]) | {word for words in named for word in words if len(word) > 3}
     right, unknown, changes = list[str](), list[str](), list[tuple[str, str]]()
     for word in _merged(_reason_cut(words_of(text)), known if corrects else None):
         if not word[0].isalpha() or word in known:
@@ -338,7 +362,9 @@ def _reason_cut(words: Sequence[str]) -> list[str]:
     """The words without a first part such as "I burnt my toast yesterday, so"."""
     if words[:1] == ["i"] and "," in words:
         cut = words.index(",")
-        if list(words[cut + 1 : cut + 2]) == ["so"] and not {"want", "would", "need", "mean", "like"} & set(words[:cut]):
+        if list(words[cut + 1 : cut + 2]) == ["so"] and not {"want", "would", "need", "mean", "like"} & set(
+            words[:cut]
+        ):
             return list(words[cut + 2 :])
     return list(words)
 
@@ -353,12 +379,12 @@ def _merged(words: Sequence[str], known: frozenset[str] | None) -> list[str]:
             (word[:n], word[n:]) for n in range(2, len(word) - 1)
             if word[:n] in known and word[n:] in known and len(word[:n]) + len(word[n:]) > 4
             and (word[:n] in _GLUED or word[n:] in _GLUED)
-        ] if word.isalpha() and word not in known and word not in OTHER_WORDS else []  # fmt: skip
+        ] if word.isalpha() and word not in known and word not in other_words() else []  # fmt: skip
         result += cuts[0] if len(cuts) == 1 else (word,)
     return result
 
 
-_GLUED = frozenset("to the and then of in on until go left right two three".split())
+_GLUED = frozenset(["to", "the", "and", "then", "of", "in", "on", "until", "go", "left", "right", "two", "three"])
 
 
 def _numbered(words: Sequence[str]) -> list[str]:
@@ -374,9 +400,13 @@ def _numbered(words: Sequence[str]) -> list[str]:
     joined = " ".join(str(NUMBERS[word]) if word in NUMBERS else word for word in joined.split())
     joined = " ".join(f"{TIMES[word]} times" if word in TIMES else word for word in joined.split())
     units_of_length = "|".join(sorted(LENGTHS, key=len, reverse=True))
-    joined = re.sub(rf"\b(\d+) and (?:a )?half ({units_of_length})\b", lambda m: _length(float(m[1]) + 0.5, m[2]), joined)
+    joined = re.sub(
+        rf"\b(\d+) and (?:a )?half ({units_of_length})\b", lambda m: _length(float(m[1]) + 0.5, m[2]), joined
+    )
     joined = re.sub(rf"\ba ({units_of_length}) and (?:a )?half\b", lambda m: _length(1.5, m[1]), joined)
-    joined = re.sub(rf"\b(\d+) quarters? of (?:a )?({units_of_length})\b", lambda m: _length(float(m[1]) / 4, m[2]), joined)
+    joined = re.sub(
+        rf"\b(\d+) quarters? of (?:a )?({units_of_length})\b", lambda m: _length(float(m[1]) / 4, m[2]), joined
+    )
     joined = re.sub(rf"\b(?:a )?half (?:of )?(?:a )?({units_of_length})\b", lambda m: _length(0.5, m[1]), joined)
     joined = re.sub(rf"\b(?:a )?quarter (?:of )?(?:a )?({units_of_length})\b", lambda m: _length(0.25, m[1]), joined)
     joined = re.sub(rf"(\d+(?:\.\d+)?) ?({units_of_length})\b", lambda m: _length(float(m[1]), m[2]), joined)

@@ -3,14 +3,36 @@
 from collections.abc import Sequence
 
 from lab.words.meaning import (
-    ALL, CLEAR, WALL, Again, Allow, Around, Avoid, Before, Finish, Go, Intent, Leg, Move, Never, Opposite, Own, Praise, Quiet,
-    Stop, To, Undo, Why, Work,
+    ALL,
+    CLEAR,
+    WALL,
+    Again,
+    Allow,
+    Around,
+    Avoid,
+    Before,
+    Finish,
+    Go,
+    Intent,
+    Leg,
+    Move,
+    Never,
+    Opposite,
+    Own,
+    Praise,
+    Quiet,
+    Stop,
+    To,
+    Undo,
+    Why,
+    Work,
 )  # fmt: skip
 from lab.words.scene import GridScene, OrderScene, Scene, SceneObject
 
 EXAMPLES = (
-    "two steps forward", "left until the wall, then forward 2", "go to the goal", "like last time", "the other way", "that was good",
-    "take that back", "do what you think is best", "why do you ask?", "stop asking until you are stuck", "no questions for 5 steps",
+    "two steps forward", "left until the wall, then forward 2", "go to the goal", "like last time", "the other way",
+    "that was good", "take that back", "do what you think is best", "why do you ask?", "stop asking until you are stuck",
+    "no questions for 5 steps",
 )  # fmt: skip
 ORDER_EXAMPLES = ("forget the rules", "that was good", "take that back", "do what you think is best", "why do you ask?")
 
@@ -53,7 +75,11 @@ def _said(intent: Intent, scene: Scene) -> str:
         case Allow(id_):
             return "forget all rules" if id_ == ALL else f"you may go near {called(scene, id_)} again"
         case Quiet(until):
-            times = {"stuck": "stop asking until you are stuck", "episode": "no questions in this episode", "always": "never ask again"}
+            times = {
+                "stuck": "stop asking until you are stuck",
+                "episode": "no questions in this episode",
+                "always": "never ask again",
+            }
             return times[until] if isinstance(until, str) else f"no questions for {until} steps"
         case Praise(sign):
             return "that was good" if sign > 0 else "that was bad"
@@ -82,7 +108,11 @@ def _leg(leg: Leg, scene: Scene) -> str:
     if leg.until == WALL:
         return f"{leg.direction} until the wall"
     if leg.until == CLEAR:
-        return f"{leg.direction} until " + (f"you are past {called(scene, leg.past)}" if leg.past else f"the way {leg.towards} is free".replace("  ", " "))
+        return f"{leg.direction} until " + (
+            f"you are past {called(scene, leg.past)}"
+            if leg.past
+            else f"the way {leg.towards} is free".replace("  ", " ")
+        )
     return f"{leg.direction} until {called(scene, leg.until)}"
 
 
@@ -103,8 +133,16 @@ def examples(scene: Scene) -> list[str]:
         ids = [thing.id for thing in scene.objects if not thing.is_goal]
         known = [called(scene, id_) for id_ in ids[:3]]
         has_goal = len(ids) < len(scene.objects)
-        own = [text for name in known for text in (f"keep away from {name}", f"go around {name}", f"you may go near {name} again")]
+        own = [
+            text
+            for name in known
+            for text in (f"keep away from {name}", f"go around {name}", f"you may go near {name} again")
+        ]
         return [*(text for text in EXAMPLES if has_goal or "goal" not in text), *own]
     moves = [f"{move.part} to the {move.target}" for move in scene.moves[:3]]
-    rules = [f"finish {scene.parts[0]} first", f"never leave {scene.parts[0]} in the {scene.stations[0]}"] if scene.parts else []
+    rules = (
+        [f"finish {scene.parts[0]} first", f"never leave {scene.parts[0]} in the {scene.stations[0]}"]
+        if scene.parts
+        else []
+    )
     return [*moves, *rules, *ORDER_EXAMPLES]

@@ -9,8 +9,29 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from lab.words.meaning import (
-    ALL, CLEAR, WALL, Again, Allow, Around, Avoid, Before, Finish, Go, Intent, Leg, Move, Never, Opposite, Own, Praise, Quiet,
-    Stop, To, Undo, Why, Work,
+    ALL,
+    CLEAR,
+    WALL,
+    Again,
+    Allow,
+    Around,
+    Avoid,
+    Before,
+    Finish,
+    Go,
+    Intent,
+    Leg,
+    Move,
+    Never,
+    Opposite,
+    Own,
+    Praise,
+    Quiet,
+    Stop,
+    To,
+    Undo,
+    Why,
+    Work,
 )  # fmt: skip
 from lab.words.scene import Cell, GridScene, OrderScene, Scene, SceneObject
 
@@ -230,7 +251,9 @@ class Senses:
         return self._leg_wall_same(values[0] if values else self._direction("d_up", ()), self._direction("d_up", ()))
 
     def _leg_bottommost(self, *values: str) -> tuple[Stretch, ...]:
-        return self._leg_wall_same(values[0] if values else self._direction("d_down", ()), self._direction("d_down", ()))
+        return self._leg_wall_same(
+            values[0] if values else self._direction("d_down", ()), self._direction("d_down", ())
+        )
 
     def _leg_top(self) -> tuple[Stretch, ...]:
         return self._leg_wall(self._direction("d_higher", ()))
@@ -601,7 +624,9 @@ class Referents:
             else:
                 objects = self._fitting(objects, adjective)
         if len(objects) != 1:
-            names = _listed([f"the {word} {objects[0].names[0] if objects else 'object'}" for word in ("left", "nearest")])
+            names = _listed(
+                [f"the {word} {objects[0].names[0] if objects else 'object'}" for word in ("left", "nearest")]
+            )
             raise Unclear(f"{len(objects)} objects fit: say which, such as {names}")
         self._thing = objects[0]
         return objects[0]
@@ -619,7 +644,9 @@ class Referents:
         if adjective == "ahead":
             assert robot is not None
             ahead = [thing for thing in objects if any(c == robot[1] and r < robot[0] for r, c in thing.cells)]
-            return _least(ahead, lambda thing: min(robot[0] - r for r, c in thing.cells if c == robot[1] and r < robot[0]))
+            return _least(
+                ahead, lambda thing: min(robot[0] - r for r, c in thing.cells if c == robot[1] and r < robot[0])
+            )
         keys: dict[str, Callable[[SceneObject], float]] = {
             "left": lambda thing: _middle(thing, 1),
             "right": lambda thing: -_middle(thing, 1),

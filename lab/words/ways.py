@@ -78,9 +78,12 @@ class SceneMap:
 
     def scene(self, state: int) -> GridScene:
         """The scene with the robot in a state."""
-        ids = [(thing.id, thing.names) for thing in self.objects] + [("goal", self.goal_names)] * bool(self.mdp.goal.any())
+        ids = [(thing.id, thing.names) for thing in self.objects] + [("goal", self.goal_names)] * bool(
+            self.mdp.goal.any()
+        )
         objects = tuple(
-            SceneObject(id_, names, tuple(sorted({(row, column) for row, column, _ in self.spots_of[id_]}))) for id_, names in ids
+            SceneObject(id_, names, tuple(sorted({(row, column) for row, column, _ in self.spots_of[id_]})))
+            for id_, names in ids
         )
         return GridScene(self.actions, objects, self.spots[state][:2], self.cell_cm, max(self.mdp.shape, default=1000))
 
@@ -117,7 +120,9 @@ def obstacles_of(mdp: TabularMDP, causes: NDArray[np.str_] | None = None) -> tup
                     named.setdefault(name.replace("_", " "), set()).add(cell)
         left -= set().union(*named.values()) if named else set()
     found = [
-        Named(name, _names(name), frozenset(cells)) for name, cells in sorted(named.items()) if not name.startswith("out of ")
+        Named(name, _names(name), frozenset(cells))
+        for name, cells in sorted(named.items())
+        if not name.startswith("out of ")
     ]
     clusters = _clusters(left)
     for number, cells in enumerate(clusters, 1):
@@ -162,7 +167,9 @@ class Before:
     moves: tuple[int, ...] = ()
 
 
-def way(intents: Sequence[Intent], known: SceneMap, state: int, before: Before, avoided: frozenset[int]) -> tuple[int, ...]:
+def way(
+    intents: Sequence[Intent], known: SceneMap, state: int, before: Before, avoided: frozenset[int]
+) -> tuple[int, ...]:
     """The moves from a state for what was said, one motion after the other; () if none of it is a motion. Raises NoWay.
 
     avoided: states that the way does not enter, unless it is in them already.
@@ -225,7 +232,9 @@ class _Walk:
             for _ in range(leg.steps):
                 if not self._step(action) and not self._is_over():
                     made = len(self.moves) - begun
-                    raise NoWay(f"{leg.direction} {leg.steps}: {self._why_not(action)} after {made} of {leg.steps} steps")
+                    raise NoWay(
+                        f"{leg.direction} {leg.steps}: {self._why_not(action)} after {made} of {leg.steps} steps"
+                    )
             return
         if leg.until == WALL:
             while self._step(action):
@@ -237,7 +246,9 @@ class _Walk:
         else:
             while not self._is_beside(leg.until, action):
                 if not self._step(action):
-                    raise NoWay(f"{leg.direction} until {leg.until}: it does not come next to it, {self._why_not(action)}")
+                    raise NoWay(
+                        f"{leg.direction} until {leg.until}: it does not come next to it, {self._why_not(action)}"
+                    )
 
     def _why_not(self, action: int) -> str:
         entered = int(self.known.mdp.successor[self.state, action])
@@ -261,14 +272,20 @@ class _Walk:
         if not towards and not leg.past:
             raise NoWay(f"{leg.direction} until it is free: say which way is free then")
         onward = self._action(towards) if towards else None
-        while not (self._is_past(leg.past, onward, action) if leg.past else self._free(self.state, onward or 0) is not None):
+        while not (
+            self._is_past(leg.past, onward, action) if leg.past else self._free(self.state, onward or 0) is not None
+        ):
             if not self._step(action):
-                raise NoWay(f"{leg.direction} until it is free {towards}: {self._why_not(action)} before".replace("  ", " "))
+                raise NoWay(
+                    f"{leg.direction} until it is free {towards}: {self._why_not(action)} before".replace("  ", " ")
+                )
 
     def _is_past(self, id_: str, onward: int | None, action: int) -> bool:
         """Whether an object is not ahead: in the direction `onward`, or on either side of the direction of the leg."""
         there, spot = self.known.spots_of[id_], self.known.spots[self.state]
-        for turn in [onward] if onward is not None else [n for n in range(len(self.known.actions)) if n // 2 != action // 2]:
+        for turn in (
+            [onward] if onward is not None else [n for n in range(len(self.known.actions)) if n // 2 != action // 2]
+        ):
             name = self.known.actions[turn]
             by = _step_of(self.known.actions, name)
             ahead = spot
@@ -336,11 +353,19 @@ class _Walk:
             "forward": lambda s: left <= spots[s][1] <= right and spots[s][0] < top,
             "backward": lambda s: left <= spots[s][1] <= right and spots[s][0] > bottom,
             "up": lambda s: spots[s][2] > max(levels) and left <= spots[s][1] <= right and top <= spots[s][0] <= bottom,
-            "down": lambda s: spots[s][2] < min(levels) and left <= spots[s][1] <= right and top <= spots[s][0] <= bottom,
+            "down": lambda s: (
+                spots[s][2] < min(levels) and left <= spots[s][1] <= right and top <= spots[s][0] <= bottom
+            ),
         }
         if name not in beside:
             raise NoWay(f"around {id_}: '{side}' is no side")
-        ends = rows if name in ("left", "right") else columns if name in ("forward", "backward") else [*rows[:1], *columns[:1]]
+        ends = (
+            rows
+            if name in ("left", "right")
+            else columns
+            if name in ("forward", "backward")
+            else [*rows[:1], *columns[:1]]
+        )
         return [[beside[name], end] for end in ends[: 2 if name in ("up", "down") else 1]]
 
     def _goal_lies(self, axis: int, middle: float) -> bool:

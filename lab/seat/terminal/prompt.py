@@ -33,7 +33,8 @@ from lab.seat.terminal.typed_answer import (
 )
 from lab.sequencing.search import SequenceRequest
 from lab.teaching.events import ORDER, Event, LessonEvent
-from lab.words.meaning import Intent, Own, Praise, Quiet, Refusal, Stop, Undo as TakeBack, Why
+from lab.words.meaning import Intent, Own, Praise, Quiet, Refusal, Stop, Why
+from lab.words.meaning import Undo as TakeBack
 from lab.words.ways import Motion, NoWay
 
 WORDS = ("why", "undo", "skip", "auto", "quit")
