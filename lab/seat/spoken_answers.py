@@ -113,11 +113,7 @@ class SpokenAnswers:
         match intent:
             case Avoid() | Finish() | Never() | Before():
                 signature = ""
-                if (
-                    isinstance(request, AdviceRequest)
-                    and intent.__class__ is Avoid
-                    and intent.object.startswith("cube")
-                ):
+                if isinstance(request, AdviceRequest) and intent.__class__ is Avoid and intent.thing.startswith("cube"):
                     signature = request.mdp.signature
                 if (refusal := self._against(intent, request)) != "":
                     return refusal
@@ -127,7 +123,7 @@ class SpokenAnswers:
                 if id_ == ALL:
                     self._rules.clear()
                 self._rules = [
-                    rule for rule in self._rules if not (isinstance(rule[0], Avoid) and rule[0].object == id_)
+                    rule for rule in self._rules if not (isinstance(rule[0], Avoid) and rule[0].thing == id_)
                 ]
             case Quiet(until):
                 self._silence = _Silence(intent, request.episode, until if isinstance(until, int) else 0)
@@ -138,12 +134,10 @@ class SpokenAnswers:
         if isinstance(request, AdviceRequest) and isinstance(rule, Avoid):
             known = self.map(request)
             goals = {int(state) for state in np.flatnonzero(request.mdp.goal)}
-            if rule.object == "goal":
+            if rule.thing == "goal":
                 return "keep away from the goal: then it would never arrive"
-            if goals and goals <= known.near(rule.object):
-                return (
-                    f"keep away from {called(known.scene(request.state), rule.object)}: the goal itself is next to it"
-                )
+            if goals and goals <= known.near(rule.thing):
+                return f"keep away from {called(known.scene(request.state), rule.thing)}: the goal itself is next to it"
         if isinstance(request, SequenceRequest) and not kept_moves(request, [*self._held(request), rule]):
             return f"{in_words([rule], order_scene(request))}: none of the moves allowed now keeps that"
         return ""
@@ -158,7 +152,7 @@ class SpokenAnswers:
             for rule, signature in self._rules
             if signature in ("", request.mdp.signature) and isinstance(rule, Avoid)
         ]
-        return [rule for rule in here if here and rule.object in self.map(request).spots_of]
+        return [rule for rule in here if here and rule.thing in self.map(request).spots_of]
 
     def standing(self, request: Request) -> list[str]:
         """The rules that hold for a question, in words."""
@@ -167,7 +161,7 @@ class SpokenAnswers:
     def _avoided(self, request: AdviceRequest) -> frozenset[int]:
         known = self.map(request)
         rules = [rule for rule in self._held(request) if isinstance(rule, Avoid)]
-        return frozenset().union(*(known.near(rule.object) for rule in rules))
+        return frozenset().union(*(known.near(rule.thing) for rule in rules))
 
     def kept(self, request: Request) -> Kept | None:
         """The answer that what holds gives to a question, None if the person is to be asked."""

@@ -46,45 +46,45 @@ class Go:
 class To:
     """A shortest path to an object, or next to it: {"to": id}."""
 
-    object: str
+    thing: str
 
     def as_json(self) -> dict[str, object]:
         """The JSON form."""
-        return {"to": self.object}
+        return {"to": self.thing}
 
 
 @dataclass(frozen=True)
 class Around:
     """A path past an object, on the side with the name of an action, or on either: {"around": id, "side": action or null}."""
 
-    object: str
+    thing: str
     side: str | None = None
 
     def as_json(self) -> dict[str, object]:
         """The JSON form."""
-        return {"around": self.object, "side": self.side}
+        return {"around": self.thing, "side": self.side}
 
 
 @dataclass(frozen=True)
 class Avoid:
     """A rule, which holds until it is taken back: no move next to the object: {"avoid": id}."""
 
-    object: str
+    thing: str
 
     def as_json(self) -> dict[str, object]:
         """The JSON form."""
-        return {"avoid": self.object}
+        return {"avoid": self.thing}
 
 
 @dataclass(frozen=True)
 class Allow:
     """Rules are taken back, those about an object or ALL: {"allow": id}."""
 
-    object: str
+    thing: str
 
     def as_json(self) -> dict[str, object]:
         """The JSON form."""
-        return {"allow": self.object}
+        return {"allow": self.thing}
 
 
 @dataclass(frozen=True)

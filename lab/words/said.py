@@ -50,10 +50,9 @@ def called(scene: Scene, id_: str) -> str:
     alike = [other for other in scene.objects if thing.names[0] in other.names]
     if len(alike) == 1:
         return f"the {thing.names[0]}"
-    for word, key in (("left", lambda o: _middle(o, 1)), ("right", lambda o: -_middle(o, 1)),
-                      ("upper", lambda o: _middle(o, 0)), ("lower", lambda o: -_middle(o, 0))):  # fmt: skip
-        least = min(map(key, alike))
-        if [o.id for o in alike if key(o) == least] == [id_]:
+    for word, axis, sign in (("left", 1, 1), ("right", 1, -1), ("upper", 0, 1), ("lower", 0, -1)):
+        least = min(sign * _middle(other, axis) for other in alike)
+        if [other.id for other in alike if sign * _middle(other, axis) == least] == [id_]:
             return f"the {word} {thing.names[0]}"
     return f"the {id_.replace('-', ' ')}"
 

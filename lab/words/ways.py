@@ -109,8 +109,8 @@ def obstacles_of(mdp: TabularMDP, causes: NDArray[np.str_] | None = None) -> tup
     axes = min(len(mdp.shape), 3)
     if not axes:
         return ()
-    blocked = (mdp.terminal & ~mdp.goal).reshape(mdp.shape)
-    blocked = blocked.any(axis=tuple(range(axes, blocked.ndim))) if blocked.ndim > axes else blocked
+    closed = (mdp.terminal & ~mdp.goal).reshape(mdp.shape)
+    blocked = np.asarray(closed.any(axis=tuple(range(axes, closed.ndim)))) if closed.ndim > axes else closed
     named: dict[str, set[tuple[int, ...]]] = {}
     left = {tuple(map(int, cell)) for cell in np.argwhere(blocked)}
     if causes is not None and causes.shape[:axes] == blocked.shape:

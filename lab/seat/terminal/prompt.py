@@ -18,7 +18,7 @@ from lab.seat import order_text, request_text
 from lab.seat.event_text import SessionText
 from lab.seat.grid_text import Marks, StateWords
 from lab.seat.request_text import PathAhead
-from lab.seat.spoken_answers import SpokenAnswers, decision_of
+from lab.seat.spoken_answers import Rule, SpokenAnswers, decision_of
 from lab.seat.terminal.line_reader import Outside, ReadLine, default_reader
 from lab.seat.terminal.screen import folded, question, room, screen
 from lab.seat.terminal.typed_answer import (
@@ -362,7 +362,7 @@ class TeachingPrompt:
             if refusal := self._note(intent, request):
                 self._say(f"{refusal}: not done.", "yellow")
                 return _ASK
-        if any(isinstance(intent, Quiet) for intent in said):
+        if any(isinstance(intent, Quiet | Rule) for intent in said):
             kept = self._spoken.kept(request)
             return _ASK if kept is None else self._keep(kept.action, kept.why)
         return _ASK
