@@ -235,8 +235,9 @@ class TeachingPrompt:
         self._drop_path(f"the learner is {self._way(request).where(request, request.state)} now")
         if self._ahead:
             said, self._ahead = list(self._ahead), deque()
-            if (done := self._carry_out(said, request)) is not _ASK:
-                return done
+            answer: int | None = self._carry_out(said, request)
+            if answer is not _ASK:
+                return answer
         if (kept := self._spoken.kept(request)) is not None:
             return self._keep(kept.action, kept.why)
         with self._outside.question():
@@ -278,8 +279,9 @@ class TeachingPrompt:
                 line = read_line(asked)
                 answer = way.understood(line, request)
                 if isinstance(answer, str) and answer not in ANSWERS and is_sentence(line):
-                    if (done := self._hear(line, answer, request, read_line)) is not _ASK:
-                        return done
+                    given: int | None = self._hear(line, answer, request, read_line)
+                    if given is not _ASK:
+                        return given
                     continue
             except EOFError:
                 self._say("No more answers: the learner goes on alone.")
@@ -338,7 +340,7 @@ class TeachingPrompt:
         while rest:
             intent = rest.popleft()
             if isinstance(intent, Motion) and isinstance(request, AdviceRequest):
-                motions = [intent]
+                motions: list[Intent] = [intent]
                 while rest and isinstance(rest[0], Motion):
                     motions.append(rest.popleft())
                 try:
