@@ -86,10 +86,9 @@ class SpokenAnswers:
         known = self.map(request)
         if not request_text.is_known(request.mdp):
             return _blind(motions, known)
-        for intent in intents:
-            if isinstance(intent, Avoid):
-                self.hold(intent, request)
-        return way(motions, known, request.state, self._done_before(request), self._avoided(request))
+        new = (known.near(intent.thing) for intent in intents if isinstance(intent, Avoid))
+        avoided = self._avoided(request).union(*new)
+        return way(motions, known, request.state, self._done_before(request), avoided)
 
     def _done_before(self, request: AdviceRequest) -> DoneBefore:
         """What "the other way" is against, and what "the same" repeats."""

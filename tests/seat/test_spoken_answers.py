@@ -82,6 +82,18 @@ def test_a_person_at_a_terminal_agrees_before_it_counts() -> None:
     assert "Dropped." in written.getvalue()
 
 
+def test_a_rule_that_is_not_agreed_to_does_not_hold() -> None:
+    ask, _ = prompt("keep away from the cube, then go to the goal", "no", "right", confirms=True)
+    assert ask(request(5, own=RIGHT)) == RIGHT
+
+
+def test_what_is_said_after_taking_back_is_done_when_the_question_comes_again() -> None:
+    ask, _ = prompt("undo that and go two down instead")
+    with pytest.raises(Undo):
+        ask(replace(request(0), undoable=True))
+    assert [ask(request(0)), ask(request(5, step=2))] == [DOWN, DOWN]
+
+
 def test_a_rule_answers_where_the_learner_would_break_it_until_it_is_taken_back() -> None:
     ask, written = prompt("keep away from the cube", "down", "why", "right", "forget all rules", "right")
     assert ask(request(0)) == DOWN

@@ -361,6 +361,8 @@ class TeachingPrompt:
             if isinstance(intent, Motion):
                 self._say("The other way, or the same again, is not understood for an order: say the move.", "yellow")
                 return _ASK
+            if isinstance(intent, TakeBack) and request.undoable:
+                self._ahead = rest  # for the question that is asked again
             if refusal := self._note(intent, request):
                 self._say(f"{refusal}: not done.", "yellow")
                 return _ASK
@@ -375,7 +377,6 @@ class TeachingPrompt:
             case Why():
                 self._command("why", request)
             case TakeBack():
-                self._ahead.clear()
                 self._command("undo", request)
             case Stop():
                 self._command("quit", request)
@@ -388,7 +389,8 @@ class TeachingPrompt:
     def _keep(self, action: int | None, why: str) -> int | None:
         """An answer by what was said before; raises AdvisorLeft when no more questions are wanted at all."""
         if action is None and why:
-            self._command("done", self._last) if self._last is not None else None
+            self._say("No more advice in this run: from here on learners go on alone.")
+            self._done = True
             raise AdvisorLeft
         if why:
             self._say(why, "dim")
