@@ -1,0 +1,340 @@
+"""What groups of words mean on the order of transfers: moves, and rules about parts and stations."""
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from lab.words.clauses import NO_COMMAND, Clause, Group, Said, common
+from lab.words.meaning import Allow, Before, Finish, Intent, Move, Never, Stop, Work
+from lab.words.on_map import Misfit, Unclear
+from lab.words.scene import OrderScene
+from lab.words.slots import Part, Slot
+
+IT = Part()  # the part that was named last
+THERE = "there"  # the station that was named last
+SEPARATING = ("THEN", "COMMA", "AND", "DOT", "BUT")
+
+
+def meanings(group: Group) -> Iterator[tuple[float, Clause]]:
+    """What a group means on the order, each with a cost."""
+    yield from common(group)
+    never = _never(group)
+    if never is not None:
+        yield 0.0, never
+    elif (before := _before(group)) is not None:
+        yield 0.0, before
+    elif (in_turn := _in_turn(group)) is not None:
+        yield -7.0, in_turn  # its "then" is no border
+    if (finish := _finish(group)) is not None:
+        yield 0.0, finish
+    elif not group.has("BEFORE", "AFTER"):
+        if (number := _number(group)) is not None:
+            yield 0.0, number
+        elif (move := _move(group)) is not None:
+            yield 0.0, move
+    if _is_reason(group):
+        yield 1.0, Said("reason", tuple(group.all("part")[:1]))
+
+
+def _places(group: Group) -> list[str]:
+    """The stations that a group names, "there" among them."""
+    there = [THERE] * any(slot.kind == "IT" and "there" in str(slot.value) for slot in group.slots)
+    return group.all("station") or there
+
+
+def _parts(group: Group) -> list[Part]:
+    """The parts that a group names; without "the next one" if there is another."""
+    parts = group.all("part")
+    return [part for part in parts if not part.is_next] or parts[:1]
+
+
+def _number(group: Group) -> Said | None:
+    named = group.all("numbered")
+    listed = ("numbered", "PUT", "CHOOSE", "NUMBER", "ORDINALNOUN", "OWN", "GOON", "EVERY", "IN", "MORE", "part")
+    if len(named) != 1 or not group.only(*listed) or any(not part.is_next for part in group.all("part")):
+        return None
+    return Said("number", (named[0],))
+
+
+def _move(group: Group) -> Said | None:
+    listed = ("part", "station", "work", "PUT", "FROM", "IN", "NEXT", "LET", "CHOOSE", "NO", "LONG", "EVERY", "AND", "MORE", "LAST", "GOON", "WAIT", "ORDINALNOUN")
+    if not group.only(*listed) or (group.has("NO") and group.at("NO") > 0) or (group.has("WAIT") and not group.has("station")):
+        return None
+    parts, stations, works = _parts(group), _places(group), group.all("work")
+    if len(parts) > 1 or len(stations) > 2 or len(works) > 1 or (parts and (parts[0].is_none or parts[0].is_any)):
+        return None
+    if works and works[0][1].endswith("ed") and not group.has("PUT", "LET"):
+        return None  # "slice 1 is buttered"
+    if group.has("WAIT"):
+        return None
+    if not parts and not group.has("IT"):
+        if len(stations) != 2:
+            return None
+    part = parts[0] if parts else IT if group.has("IT") else Part(is_any=True)
+    if not (stations or works or group.has("PUT", "CHOOSE") or any(part.is_next for part in group.all("part"))):
+        return None
+    origin, target = _ends_of(group, stations)
+    if works:
+        if target not in (None, works[0][0]):
+            return None
+        target = works[0][0]
+    return Said("move", (part, origin, target))
+
+
+def _ends_of(group: Group, stations: Sequence[str]) -> tuple[str | None, str | None]:
+    """The stations that a move leaves and reaches, None for those that are not said."""
+    if not stations:
+        return None, None
+    leaves = [
+        station for station in stations
+        if any(a.kind == "FROM" and b.kind == "station" and b.value == station for a, b in zip(group.slots, group.slots[1:]))
+    ]  # fmt: skip
+    if len(stations) == 2:
+        second_left = leaves == [stations[1]]
+        return (stations[1], stations[0]) if second_left else (stations[0], stations[1])
+    return (stations[0], None) if leaves else (None, stations[0])
+
+
+def _never(group: Group) -> Said | None:
+    listed = ("WAIT", "LET", "part", "station", "NOT", "NO", "NEVER", "NOTHING", "NOLONGER", "IN", "EACHTIME", "LONG", "PUT", "DONE", "MORE", "ANYMORE", "EVERY", "STOP", "GO", "CAN", "OFFLIMITS")
+    none = any(part.is_none for part in group.all("part"))
+    if not group.only(*listed) or not (group.has("NOT", "NO", "NEVER", "NOTHING", "NOLONGER", "STOP") or none):
+        return None
+    stations = _places(group)
+    if not group.has("WAIT", "LET") or len(stations) != 1 or len(_parts(group)) > 1:
+        return None
+    parts = _parts(group)
+    part = parts[0] if parts else IT if group.has("IT") and not group.has("WAIT") or _it_is_a_part(group) else Part(is_any=True)
+    return Said("never", (part, stations[0]))
+
+
+def _it_is_a_part(group: Group) -> bool:
+    return any(slot.kind == "IT" and "there" not in str(slot.value) for slot in group.slots)
+
+
+# ---- one work before another -----------------------------------------------------------------------------------------------
+
+WORKS = (
+    "part", "station", "work", "PUT", "FROM", "IN", "NEXT", "LET", "FINISH", "DONE", "EACHTIME", "EVERY", "FIRST", "NOT", "NO", "NEVER",
+    "NOTHING", "ONLYTHEN", "HOLD", "MORE", "GO", "STOP", "BUT", "THEN", "AND", "CAN", "GOON", "WAIT", "LAST", "ANYMORE", "NOLONGER", "UNTILDONE",
+)  # fmt: skip
+
+
+def _before(group: Group) -> Said | None:
+    """One work before another, with the words "before" or "after"; or a part before all others."""
+    at = group.at("BEFORE", "AFTER")
+    if at < 0 or sum(slot.kind in ("BEFORE", "AFTER") for slot in group.slots) > 1:
+        return None
+    first, second = group.slots[:at], group.slots[at + 1 :]
+    is_fronted = not any(slot.kind in ("part", "station", "work", "IT") for slot in first)
+    if is_fronted:
+        cut = next((n for n, slot in enumerate(second) if slot.kind in SEPARATING), 0)
+        if not cut:
+            return None
+        first, second = (*first, *second[cut + 1 :]), second[:cut]
+    left, right = _work(Group(first)), _work(Group(second))
+    if left is None or right is None:
+        return None
+    marker = group.slots[at]
+    text = str(marker.value)
+    negated = Group(first).negated or any(part.is_none for part in Group(first).all("part"))
+    holds = Group(first).has("HOLD", "WAIT")
+    if marker.kind == "BEFORE":
+        swaps = negated or (is_fronted and False)
+        if holds and not negated:
+            return None
+    else:
+        strict = "until" in text or "till" in text or "til" in text or "unless" in text or "not" in text
+        if (negated or holds) and not strict:
+            return None
+        if strict and text in ("until", "till", "til") and not (negated or holds):
+            return None
+        swaps = True
+    if Group(second).negated:
+        return None
+    pair = (right, left) if swaps else (left, right)
+    return Said("before", pair)
+
+
+def _in_turn(group: Group) -> Said | None:
+    """One work first, and then another."""
+    if not group.has("FIRST") or not group.has("THEN") or group.negated:
+        return None
+    cuts = [n for n, slot in enumerate(group.slots) if slot.kind == "THEN"]
+    if len(cuts) != 1 or group.at("FIRST") > cuts[0]:
+        return None
+    left, right = _work(Group(group.slots[: cuts[0]])), _work(Group(group.slots[cuts[0] + 1 :]))
+    if left is None or right is None:
+        return None
+    return Said("in turn", (left, right))
+
+
+def _work(group: Group) -> Said | None:
+    """The work that a part of a clause names: a part, a station, or both; its last value is whether a verb names it."""
+    if not group.only(*WORKS) or len(_parts(group)) > 1 or len(group.all("station")) > 1 or len(group.all("work")) > 1:
+        return None
+    parts, stations, works = _parts(group), _places(group), group.all("work")
+    if group.has("FROM"):
+        return None
+    if works and stations and stations[0] not in (works[0][0], THERE):
+        return None
+    station = works[0][0] if works else stations[0] if stations else None
+    part = parts[0] if parts else IT if _it_is_a_part(group) and not station else Part(is_any=True)
+    if part.is_any and station is None:
+        return None
+    return Said("work", (part, station, bool(works)))
+
+
+# ---- one part first --------------------------------------------------------------------------------------------------------
+
+
+def _finish(group: Group) -> Said | None:
+    listed = (
+        "part", "FINISH", "WORKON", "PRIORITY", "FIRST", "DONE", "REST", "UNTILDONE", "PUT", "LET", "EACHTIME", "THEN", "AND", "GOON",
+        "ONLYTHEN", "COMMA", "IN", "MORE", "LONG", "CHOOSE", "BUT", "ANYPART", "BEFORE", "GOOD", "WAIT", "FROM", "numbered",
+    )  # fmt: skip
+    parts = [part for part in group.all("part") if not part.is_any]
+    others = [part for part in group.all("part") if part.is_any]
+    if not group.only(*listed) or len(parts) > 1 or (not parts and not group.has("IT")):
+        return None
+    if group.has("BEFORE") and not (group.at("BEFORE") > group.at("part") and (group.has("REST") or others)):
+        return None
+    if others and not group.has("BEFORE", "PRIORITY"):
+        return None
+    if group.has("numbered") and group.all("numbered") != [1.0] or group.has("WAIT") and not group.has("REST"):
+        return None
+    if not group.has("FINISH", "WORKON", "PRIORITY", "FIRST") and not (group.has("BEFORE") and group.has("REST")) and not group.has("numbered"):
+        return None
+    return Said("finish", (parts[0] if parts else IT,))
+
+
+def _is_reason(group: Group) -> bool:
+    if group.negated or group.has("PUT", "CHOOSE") or not group.has("DONE", "work", "WAIT", "LONG", "PRIORITY", "BECAUSE"):
+        return False
+    works = group.all("work")
+    if works and not all(text.endswith("ed") for _, text in works):
+        return False
+    return group.only("part", "station", "work", "DONE", "IN", "WAIT", "LONG", "BECAUSE")
+
+
+# ---- what is referred to -------------------------------------------------------------------------------------------------
+
+
+class OrderReferents:
+    """Turns the clauses of a sentence into intents on the order; it remembers the part and the station that were named last."""
+
+    def __init__(self, scene: OrderScene) -> None:
+        self.scene = scene
+        self._part: str | None = None
+        self._station: str | None = None
+
+    def intents(self, clauses: Sequence[Clause]) -> tuple[Intent, ...]:
+        """The intents of the clauses, in order. Raises Unclear or Misfit."""
+        found: list[Intent] = []
+        for clause in clauses:
+            for intent in self._intents(clause) if isinstance(clause, Said) else (clause,):
+                if not (found and found[-1] == intent):
+                    found.append(intent)
+        if not found:
+            raise Misfit
+        return tuple(found)
+
+    def _intents(self, clause: Said) -> tuple[Intent, ...]:
+        values = clause.values
+        match clause.rule:
+            case "unclear":
+                raise Unclear(str(values[0]))
+            case "reason":
+                if values:
+                    self._named(values[0])
+                return ()
+            case "stop":
+                return (Stop(),)
+            case "number":
+                numbers = {move.number for move in self.scene.moves}
+                if values[0] not in numbers:
+                    raise Unclear(f"{values[0]:g} is none of the moves: {_listed([str(n) for n in sorted(numbers)])}")
+                return (Move(int(values[0])),)
+            case "move":
+                return (self._move(*values),)
+            case "finish":
+                return (Finish(self._single(values[0])),)
+            case "never":
+                part, station = values
+                return (Never(self._part_or_any(part), self._place(station)),)
+            case "before":
+                return (self._before(*values),)
+            case "in turn":
+                return self._in_turn(*values)
+        raise AssertionError(clause)
+
+    def _before(self, first: Said, second: Said) -> Before:
+        works = [self._work(work) for work in (first, second)]
+        verbs = [bool(work.values[2]) for work in (first, second)]
+        for one, other in ((0, 1), (1, 0)):
+            if works[one].part and works[other].part and works[one].station and works[other].station is None:
+                if not verbs[one] or one == 1:
+                    raise Unclear(f"say the station of both {works[0].part} and {works[1].part}, or of neither")
+                works[other] = Work(works[other].part, works[one].station)
+        if works[0] == works[1]:
+            raise Misfit
+        return Before(works[0], works[1])
+
+    def _in_turn(self, first: Said, second: Said) -> tuple[Intent, ...]:
+        """Two moves if both are allowed now, else one work before the other."""
+        try:
+            pair = tuple(self._move(work.values[0], None, work.values[1]) for work in (first, second) if work.values[1])
+        except (Unclear, Misfit):
+            pair = ()
+        return pair if len(pair) == 2 else (self._before(first, second),)
+
+    def _place(self, station: str) -> str:
+        if station == THERE:
+            if self._station is None:
+                raise Unclear("'there' is no station that was named: name it")
+            return self._station
+        self._station = station
+        return station
+
+    def _named(self, part: Part) -> tuple[str, ...]:
+        if part == IT:
+            if self._part is None:
+                raise Unclear("'it' is no part that was named: name it")
+            return (self._part,)
+        if len(part.parts) == 1:
+            self._part = part.parts[0]
+        return part.parts
+
+    def _single(self, part: Part) -> str:
+        parts = self._named(part)
+        if len(parts) != 1:
+            raise Unclear(f"several parts fit: say which of {_listed(parts)}")
+        return parts[0]
+
+    def _part_or_any(self, part: Part) -> str | None:
+        """The part; None for any, also for a kind as "bread"."""
+        parts = () if part.is_any else self._named(part)
+        return parts[0] if len(parts) == 1 else None
+
+    def _move(self, part: Part, origin: str | None, target: str | None) -> Move:
+        parts = self.scene.parts if part.is_any else self._named(part)
+        origin = None if origin is None else self._place(origin)
+        target = None if target is None else self._place(target)
+        fitting = [
+            move for move in self.scene.moves
+            if move.part in parts and origin in (None, move.origin) and target in (None, move.target)
+        ]  # fmt: skip
+        if len(fitting) != 1:
+            among = fitting or [move for move in self.scene.moves if move.part in parts] or self.scene.moves
+            known = _listed([f"{move.number} ({move.part}, {move.origin} to {move.target})" for move in among[:4]])
+            said = "several moves fit" if fitting else "that is none of the moves now"
+            raise Unclear(f"{said}: {known}")
+        self._part, self._station = fitting[0].part, fitting[0].target
+        return Move(fitting[0].number)
+
+    def _work(self, work: Said) -> Work:
+        part, station, _ = work.values
+        return Work(self._part_or_any(part), None if station is None else self._place(station))
+
+
+def _listed(names: Sequence[str]) -> str:
+    return f"{', '.join(names[:-1])} or {names[-1]}" if len(names) > 1 else "".join(names)
