@@ -11,12 +11,12 @@ from typing import Any
 from lab.words.meaning import ALL, Again, Allow, Intent, Opposite, Own, Praise, Quiet, Stop, Undo, Why
 from lab.words.slots import Amount, Slot
 
-SEPARATORS = {"COMMA": 1.5, "AND": 1.5, "BUT": 1.5, "FIRST": 0.7, "DOT": 4.0, "THEN": 6.0}  # kind -> its cost inside of a group
+SEPARATORS = {"COMMA": 1.5, "AND": 1.5, "BUT": 1.5, "DOT": 4.0, "THEN": 6.0}  # kind -> its cost inside of a group
 ABUTTING = 2.0  # the cost of a group that begins without a separator
 ABUTTING_VERB = 0.7  # the same if it begins with a verb
 MOST_CUTS = 6  # of a rest of a sentence
 LONGEST = 14  # slots of a group
-FREE = frozenset(["YES", "OK", "IT", "ITS", "TO", "ON", "OF", "AGAIN", "PRETTY", "INSTEAD", "EVER", *SEPARATORS])
+FREE = frozenset(["YES", "OK", "IT", "ITS", "TO", "ON", "OF", "AGAIN", "PRETTY", "INSTEAD", "EVER", "FIRST", *SEPARATORS])
 
 
 @dataclass(frozen=True)
@@ -125,7 +125,7 @@ def common(group: Group) -> Iterator[tuple[float, Clause]]:
     has, only = group.has, group.only
     if has("GOOD") != has("BAD") and only(*JUDGING, "NO") and group.is_one() and not (has("GOOD") and has("NO")):
         yield 0.0, Praise(1 if has("GOOD") != has("NOT", "NEVER") else -1)
-    if has("OPPOSITE") and only("OPPOSITE", "NO", "NOTTHAT", "GO", "MOVE", "WAY", "TURN", "JUDGED", "PUT"):
+    if has("OPPOSITE") and only("OPPOSITE", "NO", "NOTTHAT", "GO", "MOVE", "WAY", "TURN", "JUDGED", "PUT", "CAN"):
         yield 0.0, Opposite()
     if group.all("dir") == ["reverse"] and has("NO", "NOTTHAT") and only("dir", "NO", "NOTTHAT", "GO", "MOVE"):
         yield 0.0, Opposite()
@@ -150,12 +150,12 @@ def common(group: Group) -> Iterator[tuple[float, Clause]]:
 
 
 def _takes_back(group: Group) -> bool:
-    objects = ("ANSWER", "LAST", "MOVE", "amount", "JUDGED", "MORE", "STEP", "NUMBER", "PUT", "part")
+    objects = ("ANSWER", "LASTLY", "ORDINALNOUN", "LAST", "MOVE", "amount", "JUDGED", "MORE", "STEP", "NUMBER", "PUT", "part")
     if not group.is_one() or group.all("part") and not group.all("part")[0].is_any:
         return False
     if group.has("UNDO", "SCRATCH"):
         return group.only("UNDO", "SCRATCH", "NO", "CORRECT", *objects)
-    return group.has("CANCEL") and group.has("ANSWER", "LAST", "MOVE") and group.only("CANCEL", "NO", *objects)
+    return group.has("CANCEL") and group.has("ANSWER", "LAST", "MOVE", "JUDGED") and group.only("CANCEL", "NO", *objects)
 
 
 def _leaves_it(group: Group) -> bool:
@@ -171,7 +171,7 @@ def _quiet(group: Group) -> Any:
     silent = group.has("QUIET", "NOT", "NO", "NEVER", "STOP", "NOTHING", "NOLONGER", "HOLD") or any(
         part.is_none for part in group.all("part")
     )
-    if not group.only(*HUSHING) or not group.has("ASK", "QUIET"):
+    if not group.only(*HUSHING) or not group.has("ASK", "QUIET", "ONLY"):
         return None
     words = group.conditions
     stuck = group.has("STUCK", "BLOCKED") or not words.isdisjoint(("STUCK", "BLOCKED"))

@@ -15,7 +15,7 @@ DIAGONALS = {
     "northwest": ("forward", "left"), "northeast": ("forward", "right"),
     "southwest": ("back", "left"), "southeast": ("back", "right"),
 }  # fmt: skip
-VERBS = ("GO", "MOVE", "KEEP", "GOON", "CAN", "NO", "MORE", "LAST", "UPTO", "WAY")
+VERBS = ("GO", "MOVE", "GOON", "CAN", "NO", "MORE", "LAST", "UPTO", "WAY")
 
 
 class Misfit(Exception):
@@ -45,14 +45,16 @@ def meanings(group: Group) -> Iterator[tuple[float, Clause]]:
         yield 0.0, Said("unclear", tuple(group.all("unclear")))
     if (rule := _rule(group)) is not None:
         yield 0.0, rule
+    redundant = float(sum(len(thing.ids) == 1 and bool(thing.posts) for thing in group.all("thing")))
     if (way := _around(group)) is not None:
-        yield 0.0, way
+        yield redundant, way
     if _goes_to(group):
-        yield 0.0, Said("to", (_thing(group),))
+        redundant += any(not thing.ids for thing in group.all("thing")) and not group.has("TO")
+        yield redundant, Said("to", (_thing(group),))
     yield from _legs(group)
     if (reason := _reason(group)) is not None:
         yield 1.0, reason
-    if group.has("TURNAROUND"):
+    if group.has("TURNAROUND") and not group.all("thing"):
         yield 0.0, Said("unclear", ("turning around is no move here",))
 
 
@@ -124,16 +126,19 @@ def _reason(group: Group) -> Said | None:
 # ---- ways to objects -------------------------------------------------------------------------------------------------------
 
 
+PASSING = ("AROUND", "PASS", "PAST", "TURN", "TURNAROUND")
+
+
 def _around(group: Group) -> Said | None:
     """A way past an object, with the word of its side."""
-    listed = ("AROUND", "PASS", "PAST", "thing", "dir", "side", "GO", "MOVE", "KEEP", "WAY", "INWAY", "SIDE", "FROM", "OVER", "UNDER", "BEHIND", "FREE", "FARTHEST", "NO", "ALLWAY", "BERTH")
+    listed = ("AROUND", "PASS", "PAST", "thing", "dir", "side", "GO", "MOVE", "KEEP", "WAY", "INWAY", "SIDE", "FROM", "OVER", "UNDER", "BEHIND", "FREE", "NO", "ALLWAY", "BERTH", "TURN", "TURNAROUND")
     if not group.only(*listed) or len(group.all("thing")) > 1 or not (group.all("thing") or group.has("IT", "ITS")):
         return None
     sides = [*group.all("dir"), *group.all("side")]
     vertical = ["higher"] * group.has("OVER") + ["lower"] * group.has("UNDER") + ["forward"] * group.has("BEHIND")
-    if not group.has("AROUND", "PASS", "PAST") and (not vertical or sides or not group.all("thing")):
+    if not group.has(*PASSING) and (not vertical or sides or not group.all("thing")):
         return None
-    if group.has("AROUND", "PASS", "PAST") and 0 <= group.at("dir") < group.at("AROUND", "PASS", "PAST") and not group.has("AROUND"):
+    if group.has(*PASSING) and 0 <= group.at("dir") < group.at(*PASSING) and not group.has("AROUND"):
         return None  # "left past the cube" is a leg
     sides = list(dict.fromkeys([*sides, *vertical]))
     if len(sides) > 1:
@@ -171,6 +176,8 @@ def _legs(group: Group) -> Iterator[tuple[float, Clause]]:
     ways = ways if group.has("EACH") else list(dict.fromkeys(ways))
     if not ways and group.has("TOP", "BOTTOM"):
         ways = ["up" if group.has("TOP") else "down"]
+    if not ways and group.has("UPTO") and group.has("WALL"):
+        ways = ["up"]
     if not ways and group.has("WALL") and group.has("FARTHEST"):
         ways = ["forward"]
     if group.has("NO") and group.at("NO") > 0:
@@ -214,7 +221,7 @@ def _leg(group: Group, way: str) -> Stretch | None:
         if len(things) > 1 or way == "back":
             return None
         if group.has("PAST", "PASS"):
-            return Stretch(way, turns, None, CLEAR, things[0]) if group.at("dir") < group.at("PAST", "PASS") else None
+            return Stretch(way, turns, None, CLEAR, things[0]) if 0 <= group.at("dir") < group.at("PAST", "PASS") else None
         if not group.has("TO", "UPTO", "HIT", "NEXTTO", "NEAR", "VISIT", "INFRONT"):
             return None
         in_order = group.at("dir") < group.at("TO", "UPTO", "HIT", "NEXTTO", "NEAR", "VISIT", "INFRONT") < group.at("thing")
@@ -404,7 +411,7 @@ class MapReferents:
         groups = {tuple(o.id for o in self.scene.objects if name in o.names) for name in names}
         several = [ids for ids in groups if len(ids) > 1]
         if len(several) != 1:
-            raise Unclear("'one' may be several things: name it")
+            raise Misfit
         return several[0]
 
     def _fitting(self, objects: Sequence[SceneObject], adjective: Any) -> list[SceneObject]:

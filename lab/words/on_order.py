@@ -31,6 +31,8 @@ def meanings(group: Group) -> Iterator[tuple[float, Clause]]:
             yield 0.0, number
         elif (move := _move(group)) is not None:
             yield 0.0, move
+    if _is_left_out(group):
+        yield 1.0, NO_COMMAND
     if _is_reason(group):
         yield 1.0, Said("reason", tuple(group.all("part")[:1]))
 
@@ -95,9 +97,9 @@ def _ends_of(group: Group, stations: Sequence[str]) -> tuple[str | None, str | N
 
 
 def _never(group: Group) -> Said | None:
-    listed = ("WAIT", "LET", "part", "station", "NOT", "NO", "NEVER", "NOTHING", "NOLONGER", "IN", "EACHTIME", "LONG", "PUT", "DONE", "MORE", "ANYMORE", "EVERY", "STOP", "GO", "CAN", "OFFLIMITS")
+    listed = ("WAIT", "LET", "part", "station", "NOT", "NO", "NEVER", "NOTHING", "NOLONGER", "IN", "EACHTIME", "LONG", "PUT", "DONE", "MORE", "ANYMORE", "EVERY", "STOP", "GO", "CAN", "OFFLIMITS", "CANCEL")
     none = any(part.is_none for part in group.all("part"))
-    if not group.only(*listed) or not (group.has("NOT", "NO", "NEVER", "NOTHING", "NOLONGER", "STOP") or none):
+    if not group.only(*listed) or not (group.has("NOT", "NO", "NEVER", "NOTHING", "NOLONGER", "STOP") or none) or group.has("DONE") and not group.has("WAIT", "LET"):
         return None
     stations = _places(group)
     if not group.has("WAIT", "LET") or len(stations) != 1 or len(_parts(group)) > 1:
@@ -216,6 +218,11 @@ def _is_reason(group: Group) -> bool:
     return group.only("part", "station", "work", "DONE", "IN", "WAIT", "LONG", "BECAUSE")
 
 
+def _is_left_out(group: Group) -> bool:
+    """Whether a group is like "no toasting", after a move that leaves that out."""
+    return group.has("NO") and group.has("work") and group.only("NO", "work")
+
+
 # ---- what is referred to -------------------------------------------------------------------------------------------------
 
 
@@ -275,7 +282,7 @@ class OrderReferents:
                 if not verbs[one] or one == 1:
                     raise Unclear(f"say the station of both {works[0].part} and {works[1].part}, or of neither")
                 works[other] = Work(works[other].part, works[one].station)
-        if works[0] == works[1]:
+        if works[0] == works[1] or Work() in works:
             raise Misfit
         return Before(works[0], works[1])
 

@@ -54,8 +54,15 @@ def read(text: str, scene: Scene, corrects: bool = True) -> list[Token]:
     if corrects:
         frequent = {word for word in own if len(word) > 3}
         words = [_spelled(word, known, frequent) for word in apart(words, known)]
-    words = [word for word in _numbered(words) if word not in skipped()]
-    return [token for token in _tokens(words, named, section) if token.kind != "FILLER"]
+    words = re.sub(r"\bthe (near|close)\b(?! to\b)", "the nearest", " ".join(_numbered(words))).split()
+    tokens = _tokens([word for word in words if word not in skipped()], named, section)
+    return [token for before, token in zip((None, *tokens), tokens) if not _adds_nothing(token, before)]
+
+
+def _adds_nothing(token: Token, before: Token | None) -> bool:
+    """Whether a token is a filler, or "that" and "which" after a name."""
+    relative = token.text in ("that", "which", "who", "that is", "which is", "where") and before is not None
+    return token.kind == "FILLER" or (relative and before.kind == "NAME")
 
 
 def _spelled(word: str, known: frozenset[str], frequent: set[str]) -> str:

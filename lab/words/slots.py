@@ -147,7 +147,9 @@ def _is_torn(first: Any, second: Any) -> bool:
         return False
     if first.kind == "UNTIL":
         return second.kind in CONDITIONS or second.kind in ("dir", "thing")
-    return (first.kind == "TO" and second.kind == "dir") or (first.kind == "until" and second.kind in CONDITIONS - {"GO", "MOVE"})
+    if second.kind == "thing" and first.kind in ("dir", "FARTHEST", "NEAREST", "BIG", "SMALL", "TOP", "BOTTOM"):
+        return True
+    return (first.kind in ("TO", "ON", "ITS") and second.kind == "dir") or (first.kind == "dir" and second.kind == "OF") or (first.kind == "until" and second.kind in CONDITIONS - {"GO", "MOVE"})
 
 
 # ---- the value of each rule ------------------------------------------------------------------------------------------------
