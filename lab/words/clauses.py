@@ -11,7 +11,7 @@ from typing import Any
 from lab.words.meaning import ALL, Again, Allow, Intent, Opposite, Own, Praise, Quiet, Stop, Undo, Why
 from lab.words.slots import Amount, Slot
 
-SEPARATORS = {"COMMA": 1.5, "AND": 1.5, "BUT": 1.5, "DOT": 4.0, "THEN": 6.0}  # kind -> its cost inside of a group
+SEPARATORS = {"COMMA": 1.5, "AND": 1.5, "BUT": 1.6, "DOT": 4.0, "THEN": 6.0}  # kind -> its cost inside of a group
 ABUTTING = 2.0  # the cost of a group that begins without a separator
 ABUTTING_VERB = 0.7  # the same if it begins with a verb
 MOST_CUTS = 6  # of a rest of a sentence
@@ -95,6 +95,8 @@ def cuts(slots: tuple[Slot, ...], meaning: Meaning) -> list[tuple[float, tuple[C
                     continue
                 inside = sum(SEPARATORS.get(slot.kind, 0.0) for slot in slots[at:end])
                 for price, clause in meaning(Group(slots[at:end])):
+                    if isinstance(clause, Why) and _joint(slots, end):
+                        continue  # "why did you go left?"
                     for cost, rest in best[end]:
                         total = cost + price + inside + _joint(slots, end)
                         found[clause, *rest] = min(total, found.get((clause, *rest), 99.0))
@@ -123,7 +125,8 @@ HUSHING = (
 def common(group: Group) -> Iterator[tuple[float, Clause]]:
     """What a group means in any scene, each with a cost."""
     has, only = group.has, group.only
-    if has("GOOD") != has("BAD") and only(*JUDGING, "NO") and group.is_one() and not (has("GOOD") and has("NO")):
+    asks = has("ASKS") and not all(text in ("what", "how") for text in group.all("ASKS"))
+    if has("GOOD") != has("BAD") and only(*JUDGING, "NO", "ASKS") and not asks and group.is_one() and not (has("GOOD") and has("NO")):
         yield 0.0, Praise(1 if has("GOOD") != has("NOT", "NEVER") else -1)
     if has("OPPOSITE") and only("OPPOSITE", "NO", "NOTTHAT", "GO", "MOVE", "WAY", "TURN", "JUDGED", "PUT", "CAN"):
         yield 0.0, Opposite()
@@ -136,14 +139,14 @@ def common(group: Group) -> Iterator[tuple[float, Clause]]:
     if _takes_back(group):
         yield 0.0, Undo()
     if _leaves_it(group):
-        yield (0.0 if group.content else 3.0), Own()
+        yield (-1.0 if has("GOAHEAD") and has("YES", "OK") else 0.0 if group.content else 3.0), Own()
     if has("WHY") and only("WHY", "ASK", "LAST", "NO", "ASKS", "STUCK", "GO", "part", "ANYPART", "MORE"):
         yield 0.0, Why()
     if (until := _quiet(group)) is not None:
         yield 0.0, Quiet(until)
     if has("STOP", "END", "BYE", "FINISH") and _ends(group):
         yield 0.0, Said("stop", (not has("END", "BYE", "SESSION"),))
-    if _lifts_all(group):
+    if _lifts_all(group) or (has("LIFTALL") and only("LIFTALL", "CAN")):
         yield 0.0, Allow(ALL)
     if has("NO", "NOTTHAT", "REST") and only("NO", "NOTTHAT", "REST", "LET", "WAIT", "PUT", "GOON", "GO", "ONLYTHEN", "LASTLY"):
         yield 1.0, NO_COMMAND
@@ -161,8 +164,8 @@ def _takes_back(group: Group) -> bool:
 def _leaves_it(group: Group) -> bool:
     if group.has("OWN", "DUNNO"):
         return group.only("OWN", "DUNNO", "NO", "GOON", "GO", "MOVE", "WAY", "CAN", "ANSWER", "PUT", "CHOOSE")
-    if group.has("GOON"):
-        return group.only("GOON", "WAY")
+    if group.has("GOON", "GOAHEAD"):
+        return group.only("GOON", "GOAHEAD", "WAY")
     return group.has("YES", "OK") and not group.content and not group.has("TO", "ON", "OF", "AGAIN")
 
 
@@ -205,7 +208,7 @@ def _ends(group: Group) -> bool:
 def _lifts_all(group: Group) -> bool:
     has = group.has
     lifting = ("CANCEL", "UNDO", "NOLONGER", "NO", "NOTHING", "STOP", "FROM", "OVER", "END", "NOT", "SCRATCH", "BYE", "LAST")
-    rest = ("RULE", "EVERYTHING", "MORE", "ANYMORE", "LAST", "AVOID", "OK", "BEFORE", "AFTER", "ANYPART", "GO", "part", "CAN", "PERMIT", "NEAR")
+    rest = ("RULE", "EVERYTHING", "MORE", "ANYMORE", "LAST", "AVOID", "OK", "BEFORE", "AFTER", "ANYPART", "GO", "part", "CAN", "PERMIT", "NEAR", "EVERY")
     if any(not part.is_any for part in group.all("part")) or not group.only(*lifting, *rest):
         return False
     anything = has("EVERYTHING") or bool(group.all("part"))

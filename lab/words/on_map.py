@@ -45,7 +45,9 @@ def meanings(group: Group) -> Iterator[tuple[float, Clause]]:
         yield 0.0, Said("unclear", tuple(group.all("unclear")))
     if (rule := _rule(group)) is not None:
         yield 0.0, rule
-    redundant = float(sum(len(thing.ids) == 1 and bool(thing.posts) for thing in group.all("thing")))
+    if [slot.value for slot in group.slots] == ["end"]:
+        yield 0.0, Said("stop", (False,))
+    redundant = float(sum(len(thing.ids) == 1 and bool(thing.posts) or bool(thing.posts and thing.adjectives) for thing in group.all("thing")))
     if (way := _around(group)) is not None:
         yield redundant, way
     if _goes_to(group):
@@ -102,9 +104,9 @@ def _rule(group: Group) -> Said | None:
         return None
     if not group.all("thing"):
         return None
-    after = group.at("OK") > group.at("thing")
-    lifts = (has("OK") and after) or (has("NOT", "NOLONGER") and has("DANGER")) or has("PERMIT")
-    if lifts and group.only("thing", "NOT", "NOLONGER", "DANGER", "ANYMORE", "PERMIT", "HARMLESS", "NEAR", "MORE", "EVERYTHING"):
+    after = group.at("OK", "CAN") > group.at("thing")
+    lifts = (has("OK", "CAN") and after) or (has("NOT", "NOLONGER") and has("DANGER")) or has("PERMIT")
+    if lifts and group.only("thing", "NOT", "NOLONGER", "DANGER", "ANYMORE", "PERMIT", "HARMLESS", "NEAR", "CAN", "MORE", "EVERYTHING"):
         return Said("allow", (thing,))
     return None
 
@@ -173,9 +175,10 @@ def _legs(group: Group) -> Iterator[tuple[float, Clause]]:
         return
     ways = [*group.all("dir"), *(group.all("side") if not group.has("dir") else ())]
     ways += ["higher"] * group.has("ASHIGH") + ["lower"] * group.has("ASLOW")
-    ways = ways if group.has("EACH") else list(dict.fromkeys(ways))
     if not ways and group.has("TOP", "BOTTOM"):
         ways = ["up" if group.has("TOP") else "down"]
+    if ways and group.has("TOP", "BOTTOM") and ways[0] in ("left", "right"):
+        return  # a corner
     if not ways and group.has("UPTO") and group.has("WALL"):
         ways = ["up"]
     if not ways and group.has("WALL") and group.has("FARTHEST"):
@@ -254,6 +257,8 @@ def _until(items: Sequence[Any]) -> tuple[str, Thing | None, str] | None:
         return CLEAR, thing, towards
     if "SOMETHING" in words or (blocking and thing is None and "IT" not in words):
         return (WALL, None, "") if not negated or "BLOCKED" in words or "FREE" in words else None
+    if negated and not things and not ways and words <= {"NOT", "NOLONGER", "ANYMORE", "CAN", "MORE"}:
+        return WALL, None, ""
     if "BLOCKED" in words or "STUCK" in words:
         return (WALL, None, "") if thing is None else ("object", thing, "")
     if negated and ("FREE" in words or words & {"GO", "MOVE", "CAN", "WAY"}):
@@ -285,7 +290,7 @@ class MapReferents:
         found: list[Intent] = []
         for clause in clauses:
             intent = self._intent(clause, found) if isinstance(clause, Said) else clause
-            if intent is None or (found and found[-1] == intent):
+            if intent is None or (found and found[-1] == intent and not isinstance(intent, Go)):
                 continue
             if isinstance(intent, Go) and found and isinstance(found[-1], Go):
                 intent = Go((*found.pop().legs, *intent.legs))  # type: ignore[union-attr]

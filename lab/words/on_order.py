@@ -30,7 +30,7 @@ def meanings(group: Group) -> Iterator[tuple[float, Clause]]:
         if (number := _number(group)) is not None:
             yield 0.0, number
         elif (move := _move(group)) is not None:
-            yield 0.0, move
+            yield (2.0 if move.values[1] and not move.values[2] else 0.0), move
     if _is_left_out(group):
         yield 1.0, NO_COMMAND
     if _is_reason(group):
@@ -39,7 +39,7 @@ def meanings(group: Group) -> Iterator[tuple[float, Clause]]:
 
 def _places(group: Group) -> list[str]:
     """The stations that a group names, "there" among them."""
-    there = [THERE] * any(slot.kind == "IT" and "there" in str(slot.value) for slot in group.slots)
+    there = [THERE] * any(slot.kind in ("IT", "WAIT") and "there" in str(slot.value) for slot in group.slots)
     return group.all("station") or there
 
 
@@ -277,11 +277,8 @@ class OrderReferents:
     def _before(self, first: Said, second: Said) -> Before:
         works = [self._work(work) for work in (first, second)]
         verbs = [bool(work.values[2]) for work in (first, second)]
-        for one, other in ((0, 1), (1, 0)):
-            if works[one].part and works[other].part and works[one].station and works[other].station is None:
-                if not verbs[one] or one == 1:
-                    raise Unclear(f"say the station of both {works[0].part} and {works[1].part}, or of neither")
-                works[other] = Work(works[other].part, works[one].station)
+        if verbs[0] and works[0].part and works[1].part and works[1].station is None:
+            works[1] = Work(works[1].part, works[0].station)  # "washed before the gear"
         if works[0] == works[1] or Work() in works:
             raise Misfit
         return Before(works[0], works[1])

@@ -32,6 +32,8 @@ CONTRACTIONS = (
 )  # fmt: skip
 PUNCTUATION = {",": "COMMA", ":": "COMMA", ".": "DOT", "!": "DOT", "?": "DOT", ";": "DOT"}
 NOT_MANNERS = frozenset(["only", "hardly", "barely", "nearly", "early", "fly", "apply", "reply", "supply", "family", "jelly", "belly", "rely", "hourly", "daily"])
+TELLING = frozenset(["i", "my", "we", "our", "he", "she", "because", "since", "yesterday"])
+TELLS = frozenset(["NOT", "NEVER", "AVOID", "NEAR", "STOP", "IF", "OR", "CANCEL", "RULE", "BEFORE", "AFTER", "FINISH", "OFFLIMITS", "LEFT", "RIGHT", "FORWARD", "BACK", "UP", "DOWN", "UNDO", "ASK"])  # they make it more than a story
 UNKNOWN = "UNKNOWN"  # the kind of what is of no kind
 
 
@@ -55,8 +57,31 @@ def read(text: str, scene: Scene, corrects: bool = True) -> list[Token]:
         frequent = {word for word in own if len(word) > 3}
         words = [_spelled(word, known, frequent) for word in apart(words, known)]
     words = re.sub(r"\bthe (near|close)\b(?! to\b)", "the nearest", " ".join(_numbered(words))).split()
-    tokens = _tokens([word for word in words if word not in skipped()], named, section)
+    tokens = _without_stories(_parts(words, named, section))
     return [token for before, token in zip((None, *tokens), tokens) if not _adds_nothing(token, before)]
+
+
+def _parts(words: Sequence[str], named: Named, section: str) -> list[tuple[str, list[Token]]]:
+    """The parts of a sentence between commas and the like: the first word of each, and its tokens with the mark that ends it."""
+    parts: list[list[str]] = [[]]
+    for word in words:
+        parts[-1].append(word)
+        if word in PUNCTUATION:
+            parts.append([])
+    return [
+        (part[0], _tokens([word for word in part if word not in skipped()], named, section)) for part in parts if part
+    ]
+
+
+def _without_stories(parts: Sequence[tuple[str, list[Token]]]) -> list[Token]:
+    """The tokens without the parts in which a person only tells something, as "I burnt my toast yesterday, so ..."."""
+    stories = [
+        first in TELLING and any(token.kind == UNKNOWN for token in tokens) and all(token.kind not in TELLS for token in tokens)
+        for first, tokens in parts
+    ]
+    if all(stories):
+        stories = [False] * len(parts)
+    return [token for (_, tokens), is_story in zip(parts, stories, strict=True) if not is_story for token in tokens]
 
 
 def _adds_nothing(token: Token, before: Token | None) -> bool:

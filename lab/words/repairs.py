@@ -18,8 +18,19 @@ class NotClear(Exception):
 
 def as_meant(slots: Slots, on_map: bool) -> Slots:
     """The slots without what was taken back in the same breath and what is only said not to be meant. Raises NotClear."""
-    slots = _without_asides(_corrected(slots))
+    slots = _without_asides(_corrected(_with_single_breaks(slots)))
     return _in_order(slots) if on_map else slots
+
+
+def _with_single_breaks(slots: Slots) -> Slots:
+    """The slots with the strongest of several separators that follow each other."""
+    kept: list[Slot] = []
+    for slot in slots:
+        if slot.kind in SEPARATORS and kept and kept[-1].kind in SEPARATORS:
+            kept[-1] = max(kept[-1], slot, key=lambda one: SEPARATORS[one.kind])
+        else:
+            kept.append(slot)
+    return tuple(kept)
 
 
 def _last_break(slots: Sequence[Slot]) -> int:
@@ -54,7 +65,7 @@ def _corrects(slots: Slots, at: int) -> bool:
     later = any(slot.kind in NAMING for slot in slots[at + 1 :])
     earlier = any(slot.kind in NAMING for slot in slots[_last_break(slots[: max(0, at - 1)]) : at])
     is_apart = at > 0 and slots[at - 1].kind in ("COMMA", "DOT") and slots[at + 1 : at + 2] != () and slots[at + 1].kind in (*SEPARATORS, *NAMING, *MOTIONS)
-    return slot.kind == "NO" and is_apart and earlier and later
+    return slot.kind == "NO" and slots[at + 1 : at + 2] != () and slots[at + 1].kind != "work" and is_apart and earlier and later
 
 
 def _merged(wrong: Sequence[Slot], right: Sequence[Slot]) -> list[Slot]:
@@ -106,8 +117,7 @@ def _without_asides(slots: Slots) -> Slots:
 
 
 def _has_but(slots: Slots, at: int) -> bool:
-    following = [slot.kind for slot in slots[at : at + 2]]
-    return "BUT" in following[:1] or following == ["COMMA", "BUT"]
+    return slots[at : at + 1] != () and slots[at].kind == "BUT"
 
 
 def _in_order(slots: Slots) -> Slots:

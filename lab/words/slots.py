@@ -149,7 +149,7 @@ def _is_torn(first: Any, second: Any) -> bool:
         return second.kind in CONDITIONS or second.kind in ("dir", "thing")
     if second.kind == "thing" and first.kind in ("dir", "FARTHEST", "NEAREST", "BIG", "SMALL", "TOP", "BOTTOM"):
         return True
-    return (first.kind in ("TO", "ON", "ITS") and second.kind == "dir") or (first.kind == "dir" and second.kind == "OF") or (first.kind == "until" and second.kind in CONDITIONS - {"GO", "MOVE"})
+    return (first.kind in ("TO", "ON", "ITS") and second.kind == "dir") or (first.kind == "dir" and second.kind == "OF") or (first.kind == "until" and second.kind in (CONDITIONS | {"side"}) - {"GO", "MOVE"})
 
 
 # ---- the value of each rule ------------------------------------------------------------------------------------------------
@@ -167,7 +167,7 @@ def _value(name: str, parts: tuple[Any, ...]) -> tuple[Any, ...]:
         case "same" | "post" | "word" if values:
             return (values[0],)
         case "word" | "mark":
-            return (tokens[0].kind if name == "word" else Slot(tokens[0].kind, tokens[0].text),)
+            return (tokens[-1].kind if name == "word" else Slot(tokens[0].kind, tokens[0].text),)
         case "number":
             return (tokens[0].value,)
         case "bare_steps":
