@@ -118,7 +118,7 @@ JUDGING = ("GOOD", "BAD", "JUDGED", "NOT", "NEVER", "GO", "MOVE", "LAST", "TOO",
 HUSHING = (
     "QUIET", "ASK", "NOT", "NO", "NEVER", "STOP", "NOTHING", "NOLONGER", "STUCK", "BLOCKED", "IF", "ONLY", "EPISODE", "amount", "MORE",
     "ANYMORE", "CAN", "SESSION", "EVERYTHING", "SOMETHING", "until", "UNTIL", "AFTER", "ANYPART", "GOON", "NEXT", "part", "ONLYTHEN",
-    "HOLD", "numbered", "STEP", "STEPS", "WAY", "ASKS", "CHOOSE",
+    "HOLD", "numbered", "STEP", "STEPS", "WAY", "ASKS", "CHOOSE", "ANSWER",
 )  # fmt: skip
 
 

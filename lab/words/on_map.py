@@ -53,6 +53,9 @@ def meanings(group: Group) -> Iterator[tuple[float, Clause]]:
     if _goes_to(group):
         redundant += any(not thing.ids for thing in group.all("thing")) and not group.has("TO")
         yield redundant, Said("to", (_thing(group),))
+    untils = [_until(items) for items in group.all("until")] if group.only("GO", "MOVE", "until", "GOON", "CAN") else []
+    if untils and untils[0] and untils[0][0] == "object":
+        yield 0.0, Said("to", (untils[0][1],))
     yield from _legs(group)
     if (reason := _reason(group)) is not None:
         yield 1.0, reason
@@ -156,6 +159,8 @@ def _goes_to(group: Group) -> bool:
         return False
     if group.has("KEEP", "STOP") and not group.has("GO", "MOVE", "NEXTTO"):
         return False
+    if group.all("until"):
+        return False
     if not group.all("thing"):
         return group.has("IT") and group.has("GO", "VISIT", "NEAR") and group.only("GO", "VISIT", "NEAR", "NEXTTO", "BACK", "UPTO") and not group.all("dir")
     going = group.has("GO", "VISIT", "NEAR", "HIT", "NEXTSTOP", "NEXTTO", "GOON")
@@ -181,7 +186,7 @@ def _legs(group: Group) -> Iterator[tuple[float, Clause]]:
         return  # a corner
     if not ways and group.has("UPTO") and group.has("WALL"):
         ways = ["up"]
-    if not ways and group.has("WALL") and group.has("FARTHEST"):
+    if not ways and group.has("WALL", "SIDE") and group.has("FARTHEST"):
         ways = ["forward"]
     if group.has("NO") and group.at("NO") > 0:
         return
@@ -204,7 +209,7 @@ def _leg(group: Group, way: str) -> Stretch | None:
     turns = group.has("TURN") or way in ("cw", "ccw")
     if turns and way not in ("left", "right", "cw", "ccw"):
         return None
-    limits = group.has("WALL", "TOP", "BOTTOM", "ALLWAY", "ASHIGH", "ASLOW", "BLOCKED")
+    limits = (group.has("SIDE") and group.has("FARTHEST")) or group.has("WALL", "TOP", "BOTTOM", "ALLWAY", "ASHIGH", "ASLOW", "BLOCKED")
     amounts, untils, things = group.all("amount"), group.all("until"), group.all("thing")
     if group.has("FREE", "STOP", "INFRONT", "SIDE", "FARTHEST") and not (limits or untils or things):
         return None

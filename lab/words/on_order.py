@@ -180,7 +180,7 @@ def _work(group: Group) -> Said | None:
     if works and stations and stations[0] not in (works[0][0], THERE):
         return None
     station = works[0][0] if works else stations[0] if stations else None
-    part = parts[0] if parts else IT if _it_is_a_part(group) and not station else Part(is_any=True)
+    part = parts[0] if parts else IT if _it_is_a_part(group) else Part(is_any=True)
     if part.is_any and station is None:
         return None
     return Said("work", (part, station, bool(works)))
@@ -204,7 +204,8 @@ def _finish(group: Group) -> Said | None:
         return None
     if group.has("numbered") and group.all("numbered") != [1.0] or group.has("WAIT") and not group.has("REST"):
         return None
-    if not group.has("FINISH", "WORKON", "PRIORITY", "FIRST") and not (group.has("BEFORE") and group.has("REST")) and not group.has("numbered"):
+    done = group.has("DONE") and group.has("PUT", "LET")
+    if not done and not group.has("FINISH", "WORKON", "PRIORITY", "FIRST") and not (group.has("BEFORE") and group.has("REST")) and not group.has("numbered"):
         return None
     return Said("finish", (parts[0] if parts else IT,))
 

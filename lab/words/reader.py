@@ -56,9 +56,16 @@ def read(text: str, scene: Scene, corrects: bool = True) -> list[Token]:
     if corrects:
         frequent = {word for word in own if len(word) > 3}
         words = [_spelled(word, known, frequent) for word in apart(words, known)]
-    words = re.sub(r"\bthe (near|close)\b(?! to\b)", "the nearest", " ".join(_numbered(words))).split()
+    words = _in_plain_order(" ".join(_numbered(words))).split()
     tokens = _without_stories(_parts(words, named, section))
     return [token for before, token in zip((None, *tokens), tokens) if not _adds_nothing(token, before)]
+
+
+def _in_plain_order(text: str) -> str:
+    """The text with "the near" as an adjective, and with "as far left as you can" in an order of words that phrases can have."""
+    text = re.sub(r"\bthe (near|close)\b(?! to\b)", "the nearest", text)
+    able = "(?:you (?:can|are able to)|possible|it goes|it will|it can)(?: go| move)?"
+    return re.sub(rf"\bas far (?!as\b)((?:to )?(?:the )?\w+) as {able}\b", r"all the way \1", text)
 
 
 def _parts(words: Sequence[str], named: Named, section: str) -> list[tuple[str, list[Token]]]:

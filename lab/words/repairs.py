@@ -12,13 +12,17 @@ COMPLETE = {"dir": ("amount", "until"), "amount": ("dir",)}
 MOTIONS = frozenset(["GO", "MOVE", "TURN", "TO", "ON", "ONLYTHEN", "PUT", "IN"])
 
 
+WEAK = ("actually", "sorry")  # words that correct only after a comma
+
+
 class NotClear(Exception):
     """A correction of which it is not clear what it corrects."""
 
 
 def as_meant(slots: Slots, on_map: bool) -> Slots:
     """The slots without what was taken back in the same breath and what is only said not to be meant. Raises NotClear."""
-    slots = _without_asides(_corrected(_with_single_breaks(slots)))
+    slots = _corrected(_with_single_breaks(slots))
+    slots = _without_asides(tuple(slot for slot in slots if slot.kind != "CORRECT"))
     return _in_order(slots) if on_map else slots
 
 
@@ -61,7 +65,7 @@ def _corrects(slots: Slots, at: int) -> bool:
     if slot.kind == "SCRATCH":
         return len(slots) > 1
     if slot.kind == "CORRECT":
-        return True
+        return slot.value not in WEAK or at == 0 or slots[at - 1].kind in SEPARATORS
     later = any(slot.kind in NAMING for slot in slots[at + 1 :])
     earlier = any(slot.kind in NAMING for slot in slots[_last_break(slots[: max(0, at - 1)]) : at])
     is_apart = at > 0 and slots[at - 1].kind in ("COMMA", "DOT") and slots[at + 1 : at + 2] != () and slots[at + 1].kind in (*SEPARATORS, *NAMING, *MOTIONS)

@@ -149,7 +149,11 @@ def _is_torn(first: Any, second: Any) -> bool:
         return second.kind in CONDITIONS or second.kind in ("dir", "thing")
     if second.kind == "thing" and first.kind in ("dir", "FARTHEST", "NEAREST", "BIG", "SMALL", "TOP", "BOTTOM"):
         return True
-    return (first.kind in ("TO", "ON", "ITS") and second.kind == "dir") or (first.kind == "dir" and second.kind == "OF") or (first.kind == "until" and second.kind in (CONDITIONS | {"side"}) - {"GO", "MOVE"})
+    if first.kind == "TO" and second.kind == "amount":
+        return True
+    if first.kind == "until" and second.kind == "side":
+        return isinstance(first.value[-1], tuple)
+    return (first.kind in ("TO", "ON", "ITS", "FROM") and second.kind == "dir") or (first.kind == "dir" and second.kind == "OF") or (first.kind == "until" and second.kind in CONDITIONS - {"GO", "MOVE"})
 
 
 # ---- the value of each rule ------------------------------------------------------------------------------------------------
