@@ -28,6 +28,7 @@ class Said:
 
 
 Clause = Intent | Said
+GOES_ON = Said("goes on")  # its own choice, or nothing before a command, as in "go on, two more to the right"
 NO_COMMAND = Said("reason")  # it adds nothing to other clauses, and means nothing alone
 
 
@@ -114,11 +115,12 @@ def _joint(slots: tuple[Slot, ...], end: int) -> float:
 
 # ---- what can be said anywhere ---------------------------------------------------------------------------------------------
 
-JUDGING = ("GOOD", "BAD", "JUDGED", "NOT", "NEVER", "GO", "MOVE", "LAST", "TOO", "ANSWER", "EVERYTHING", "WAY", "amount", "PUT", "ANYPART", "NUMBER", "MORE")
+JUDGING = ("GOOD", "BAD", "JUDGED", "NOT", "NEVER", "GO", "MOVE", "LAST", "TOO", "ANSWER", "EVERYTHING", "WAY", "amount", "PUT", "ANYPART", "NUMBER", "MORE", "ORDINALNOUN", "CHOOSE")
+CALLED = {"silly", "stupid", "dummy", "idiot", "fool", "moron", "you idiot", "you fool", "you dummy", "dumb", "dimwit"}
 HUSHING = (
     "QUIET", "ASK", "NOT", "NO", "NEVER", "STOP", "NOTHING", "NOLONGER", "STUCK", "BLOCKED", "IF", "ONLY", "EPISODE", "amount", "MORE",
     "ANYMORE", "CAN", "SESSION", "EVERYTHING", "SOMETHING", "until", "UNTIL", "AFTER", "ANYPART", "GOON", "NEXT", "part", "ONLYTHEN",
-    "HOLD", "numbered", "STEP", "STEPS", "WAY", "ASKS", "CHOOSE", "ANSWER",
+    "HOLD", "numbered", "STEP", "STEPS", "WAY", "ASKS", "CHOOSE", "ANSWER", "PUT", "DUNNO",
 )  # fmt: skip
 
 
@@ -128,6 +130,8 @@ def common(group: Group) -> Iterator[tuple[float, Clause]]:
     asks = has("ASKS") and not all(text in ("what", "how") for text in group.all("ASKS"))
     if has("GOOD") != has("BAD") and only(*JUDGING, "NO", "ASKS") and not asks and group.is_one() and not (has("GOOD") and has("NO")):
         yield 0.0, Praise(1 if has("GOOD") != has("NOT", "NEVER") else -1)
+    if has("BAD") and has("NO") and only("BAD", "NO") and not has("IT") and set(group.all("BAD")) <= CALLED:
+        yield -1.0, NO_COMMAND  # "no, silly"
     if has("OPPOSITE") and only("OPPOSITE", "NO", "NOTTHAT", "GO", "MOVE", "WAY", "TURN", "JUDGED", "PUT", "CAN"):
         yield 0.0, Opposite()
     if group.all("dir") == ["reverse"] and has("NO", "NOTTHAT") and only("dir", "NO", "NOTTHAT", "GO", "MOVE"):
@@ -138,7 +142,9 @@ def common(group: Group) -> Iterator[tuple[float, Clause]]:
         yield 0.5, Again()
     if _takes_back(group):
         yield 0.0, Undo()
-    if _leaves_it(group):
+    if has("GOON") and only("GOON", "WAY"):
+        yield 0.0, GOES_ON
+    elif _leaves_it(group):
         yield (-1.0 if has("GOAHEAD") and has("YES", "OK") else 0.0 if group.content else 3.0), Own()
     if has("WHY") and only("WHY", "ASK", "LAST", "NO", "ASKS", "STUCK", "GO", "part", "ANYPART", "MORE"):
         yield 0.0, Why()
@@ -156,6 +162,8 @@ def _takes_back(group: Group) -> bool:
     objects = ("ANSWER", "LASTLY", "ORDINALNOUN", "LAST", "MOVE", "amount", "JUDGED", "MORE", "STEP", "NUMBER", "PUT", "part")
     if not group.is_one() or group.all("part") and not group.all("part")[0].is_any:
         return False
+    if group.all("CANCEL") == ["cancel"] and group.only("CANCEL"):
+        return True
     if group.has("UNDO", "SCRATCH"):
         return group.only("UNDO", "SCRATCH", "NO", "CORRECT", *objects)
     return group.has("CANCEL") and group.has("ANSWER", "LAST", "MOVE", "JUDGED") and group.only("CANCEL", "NO", *objects)
@@ -164,7 +172,7 @@ def _takes_back(group: Group) -> bool:
 def _leaves_it(group: Group) -> bool:
     if group.has("OWN", "DUNNO"):
         return group.only("OWN", "DUNNO", "NO", "GOON", "GO", "MOVE", "WAY", "CAN", "ANSWER", "PUT", "CHOOSE")
-    if group.has("GOON", "GOAHEAD"):
+    if group.has("GOAHEAD"):
         return group.only("GOON", "GOAHEAD", "WAY")
     return group.has("YES", "OK") and not group.content and not group.has("TO", "ON", "OF", "AGAIN")
 
@@ -177,7 +185,7 @@ def _quiet(group: Group) -> Any:
     if not group.only(*HUSHING) or not group.has("ASK", "QUIET", "ONLY"):
         return None
     words = group.conditions
-    stuck = group.has("STUCK", "BLOCKED") or not words.isdisjoint(("STUCK", "BLOCKED"))
+    stuck = group.has("STUCK", "BLOCKED", "DUNNO") or not words.isdisjoint(("STUCK", "BLOCKED"))
     things = [item for items in group.all("until") for item in items if isinstance(item, tuple)]
     if stuck and (silent or group.has("IF", "ONLY", "until", "UNTIL", "AFTER", "ONLYTHEN", "BUT")):
         return "stuck"
@@ -208,7 +216,7 @@ def _ends(group: Group) -> bool:
 def _lifts_all(group: Group) -> bool:
     has = group.has
     lifting = ("CANCEL", "UNDO", "NOLONGER", "NO", "NOTHING", "STOP", "FROM", "OVER", "END", "NOT", "SCRATCH", "BYE", "LAST")
-    rest = ("RULE", "EVERYTHING", "MORE", "ANYMORE", "LAST", "AVOID", "OK", "BEFORE", "AFTER", "ANYPART", "GO", "part", "CAN", "PERMIT", "NEAR", "EVERY")
+    rest = ("RULE", "EVERYTHING", "MORE", "ANYMORE", "LAST", "AVOID", "OK", "BEFORE", "AFTER", "ANYPART", "GO", "part", "CAN", "PERMIT", "NEAR", "EVERY", "SOMETHING", "FROM", "KEEP")
     if any(not part.is_any for part in group.all("part")) or not group.only(*lifting, *rest):
         return False
     anything = has("EVERYTHING") or bool(group.all("part"))
@@ -221,3 +229,12 @@ def _lifts_all(group: Group) -> bool:
             has("OK") and group.at("OK") > max(group.at("EVERYTHING"), group.at("part")) >= 0
         )
     return has("CANCEL") and anything and group.only("CANCEL", "EVERYTHING", "part", "LAST", "ANYPART")
+
+
+def without_going_on(clauses: Sequence[Clause]) -> Iterator[Clause]:
+    """The clauses, with "go on" as the learner's own choice where no command comes after it."""
+    for clause, following in zip(clauses, (*clauses, None)[1:], strict=True):
+        if clause != GOES_ON:
+            yield clause
+        elif following is None or isinstance(following, Praise | Why | Stop | Undo) or following == NO_COMMAND:
+            yield Own()

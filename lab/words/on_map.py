@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from lab.words.clauses import NO_COMMAND, Clause, Group, Said, common
+from lab.words.clauses import NO_COMMAND, Clause, Group, Said, common, without_going_on
 from lab.words.meaning import ALL, CLEAR, WALL, Allow, Around, Avoid, Go, Intent, Leg, Stop, To
 from lab.words.scene import Cell, GridScene, SceneObject
 from lab.words.slots import Amount, Slot, Thing
@@ -53,6 +53,8 @@ def meanings(group: Group) -> Iterator[tuple[float, Clause]]:
     if _goes_to(group):
         redundant += any(not thing.ids for thing in group.all("thing")) and not group.has("TO")
         yield redundant, Said("to", (_thing(group),))
+    if group.all("thing") and group.only("thing", "NO") and len(group.all("thing")) == 1 and not group.has("NO"):
+        yield 1.0, Said("also", (_thing(group),))
     untils = [_until(items) for items in group.all("until")] if group.only("GO", "MOVE", "until", "GOON", "CAN") else []
     if untils and untils[0] and untils[0][0] == "object":
         yield 0.0, Said("to", (untils[0][1],))
@@ -74,7 +76,7 @@ def _thing(group: Group) -> Thing:
 RULES = (
     "thing", "AVOID", "NEAR", "HIT", "NEXTTO", "GO", "MOVE", "NOT", "NO", "NEVER", "NOLONGER", "NOTHING", "STOP", "OFFLIMITS", "BERTH",
     "GIVES", "ALONE", "CAN", "PERMIT", "CANCEL", "RULE", "UNDO", "FROM", "VISIT", "ANYMORE", "MORE", "TOO", "HARMLESS", "EVERYTHING",
-    "KEEP", "LAST", "FARTHEST", "NEAREST", "BETWEEN", "WAY", "FREE", "SOMETHING", "OVER", "CROSSED", "INFRONT", "DANGER", "AROUND", "END",
+    "KEEP", "LAST", "FARTHEST", "NEAREST", "BETWEEN", "WAY", "FREE", "SOMETHING", "OVER", "CROSSED", "INFRONT", "DANGER", "AROUND", "END", "EACH",
 )  # fmt: skip
 
 
@@ -85,6 +87,8 @@ def _rule(group: Group) -> Said | None:
         return None
     if has("CAN", "PERMIT") and has("EVERYTHING") and not group.all("thing") and not group.negated:
         return Said("allow", (ALL,)) if group.only("CAN", "PERMIT", "EVERYTHING", "GO", "MOVE", "NEAR", "VISIT") else None
+    if has("EVERYTHING", "SOMETHING") and not group.all("thing"):
+        return None
     thing = _thing(group)
     lifted = has("CANCEL", "UNDO", "HARMLESS", "PERMIT", "NOLONGER", "STOP", "END") or (has("NOT") and has("ANYMORE"))
     gives = has("BERTH") and (has("GIVES", "KEEP") or not group.negated)
@@ -293,7 +297,10 @@ class MapReferents:
     def intents(self, clauses: Sequence[Clause]) -> tuple[Intent, ...]:
         """The intents of the clauses, in order. Raises Unclear or Misfit."""
         found: list[Intent] = []
-        for clause in clauses:
+        for clause in without_going_on(clauses):
+            if isinstance(clause, Said) and clause.rule in ("avoid", "allow"):
+                found += [intent for intent in self._rules(clause) if intent not in found[-1:]]
+                continue
             intent = self._intent(clause, found) if isinstance(clause, Said) else clause
             if intent is None or (found and found[-1] == intent and not isinstance(intent, Go)):
                 continue
@@ -326,11 +333,22 @@ class MapReferents:
             case "around":
                 thing = self._object(values[0])
                 return Around(thing.id, None if values[1] is None else self._action(values[1]))
-            case "avoid":
-                return Avoid(self._object(values[0]).id)
-            case "allow":
-                return Allow(values[0] if values[0] == ALL else self._object(values[0]).id)
+            case "also":  # "keep away from the toaster and the left cube"
+                if not before or not isinstance(before[-1], To | Around | Avoid | Allow):
+                    raise Misfit
+                id_ = self._object(values[0]).id
+                return Around(id_, before[-1].side) if isinstance(before[-1], Around) else type(before[-1])(id_)
         raise AssertionError(clause)
+
+    def _rules(self, clause: Said) -> list[Intent]:
+        """The rules that a clause makes or ends: one, or one for each of "the cubes"."""
+        made = Avoid if clause.rule == "avoid" else Allow
+        thing = clause.values[0]
+        if thing == ALL:
+            return [Allow(ALL)]
+        if thing.is_plural and len(thing.ids) > 1 and not thing.adjectives and not thing.posts:
+            return [made(id_) for id_ in thing.ids]
+        return [made(self._object(thing).id)]
 
     def _action(self, way: str, turns: bool = False) -> str:
         """The action of a direction. Raises Unclear if there is none."""

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from lab.words.clauses import NO_COMMAND, Clause, Group, Said, common
+from lab.words.clauses import NO_COMMAND, Clause, Group, Said, common, without_going_on
 from lab.words.meaning import Allow, Before, Finish, Intent, Move, Never, Stop, Work
 from lab.words.on_map import Misfit, Unclear
 from lab.words.scene import OrderScene
@@ -23,14 +23,14 @@ def meanings(group: Group) -> Iterator[tuple[float, Clause]]:
     elif (before := _before(group)) is not None:
         yield 0.0, before
     elif (in_turn := _in_turn(group)) is not None:
-        yield -7.0, in_turn  # its "then" is no border
+        yield (0.0 if not group.has("THEN") else -7.0 if group.has("FIRST", "PRIORITY") else -3.0), in_turn  # its "then" is no border
     if (finish := _finish(group)) is not None:
         yield 0.0, finish
     elif not group.has("BEFORE", "AFTER"):
         if (number := _number(group)) is not None:
             yield 0.0, number
         elif (move := _move(group)) is not None:
-            yield (2.0 if move.values[1] and not move.values[2] else 0.0), move
+            yield (4.0 if move.values[1] and not move.values[2] else 0.0), move
     if _is_left_out(group):
         yield 1.0, NO_COMMAND
     if _is_reason(group):
@@ -51,7 +51,7 @@ def _parts(group: Group) -> list[Part]:
 
 def _number(group: Group) -> Said | None:
     named = group.all("numbered")
-    listed = ("numbered", "PUT", "CHOOSE", "NUMBER", "ORDINALNOUN", "OWN", "GOON", "EVERY", "IN", "MORE", "part")
+    listed = ("numbered", "PUT", "CHOOSE", "NUMBER", "ORDINALNOUN", "OWN", "GOON", "EVERY", "IN", "MORE", "part", "LET")
     if len(named) != 1 or not group.only(*listed) or any(not part.is_next for part in group.all("part")):
         return None
     return Said("number", (named[0],))
@@ -69,7 +69,7 @@ def _move(group: Group) -> Said | None:
     if group.has("WAIT"):
         return None
     if not parts and not group.has("IT"):
-        if len(stations) != 2:
+        if len(stations) != 2 or group.has("THEN", "COMMA", "AND", "DOT"):
             return None
     part = parts[0] if parts else IT if group.has("IT") else Part(is_any=True)
     if not (stations or works or group.has("PUT", "CHOOSE") or any(part.is_next for part in group.all("part"))):
@@ -98,6 +98,8 @@ def _ends_of(group: Group, stations: Sequence[str]) -> tuple[str | None, str | N
 
 def _never(group: Group) -> Said | None:
     listed = ("WAIT", "LET", "part", "station", "NOT", "NO", "NEVER", "NOTHING", "NOLONGER", "IN", "EACHTIME", "LONG", "PUT", "DONE", "MORE", "ANYMORE", "EVERY", "STOP", "GO", "CAN", "OFFLIMITS", "CANCEL")
+    if group.has("EMPTY") and group.has("LET") and group.only("EMPTY", "LET", "station", "EACHTIME") and len(group.all("station")) == 1:
+        return Said("never", (Part(is_any=True), group.all("station")[0]))
     none = any(part.is_none for part in group.all("part"))
     if not group.only(*listed) or not (group.has("NOT", "NO", "NEVER", "NOTHING", "NOLONGER", "STOP") or none) or group.has("DONE") and not group.has("WAIT", "LET"):
         return None
@@ -117,7 +119,7 @@ def _it_is_a_part(group: Group) -> bool:
 
 WORKS = (
     "part", "station", "work", "PUT", "FROM", "IN", "NEXT", "LET", "FINISH", "DONE", "EACHTIME", "EVERY", "FIRST", "NOT", "NO", "NEVER",
-    "NOTHING", "ONLYTHEN", "HOLD", "MORE", "GO", "STOP", "BUT", "THEN", "AND", "CAN", "GOON", "WAIT", "LAST", "ANYMORE", "NOLONGER", "UNTILDONE",
+    "NOTHING", "ONLYTHEN", "HOLD", "MORE", "GO", "STOP", "BUT", "THEN", "AND", "COMMA", "CAN", "GOON", "WAIT", "LAST", "ANYMORE", "NOLONGER", "UNTILDONE", "PRIORITY",
 )  # fmt: skip
 
 
@@ -130,9 +132,11 @@ def _before(group: Group) -> Said | None:
     is_fronted = not any(slot.kind in ("part", "station", "work", "IT") for slot in first)
     if is_fronted:
         cut = next((n for n, slot in enumerate(second) if slot.kind in SEPARATING), 0)
+        named = next((n for n, slot in enumerate(second) if slot.kind in ("part", "station", "work")), len(second))
+        cut = cut or next((n for n, slot in enumerate(second) if slot.kind == "PUT" and n > named), 0)
         if not cut:
             return None
-        first, second = (*first, *second[cut + 1 :]), second[:cut]
+        first, second = (*first, *second[cut:]), second[:cut]
     left, right = _work(Group(first)), _work(Group(second))
     if left is None or right is None:
         return None
@@ -159,10 +163,11 @@ def _before(group: Group) -> Said | None:
 
 def _in_turn(group: Group) -> Said | None:
     """One work first, and then another."""
-    if not group.has("FIRST") or not group.has("THEN") or group.negated:
+    if not group.has("THEN", "FIRST") or group.negated:
         return None
-    cuts = [n for n, slot in enumerate(group.slots) if slot.kind == "THEN"]
-    if len(cuts) != 1 or group.at("FIRST") > cuts[0]:
+    breaks = ("THEN",) if group.has("THEN") else ("COMMA", "AND")  # "mill first, wash later"
+    cuts = [n for n, slot in enumerate(group.slots) if slot.kind in breaks]
+    if len(cuts) != 1 or group.at("FIRST", "PRIORITY") > cuts[0]:
         return None
     left, right = _work(Group(group.slots[: cuts[0]])), _work(Group(group.slots[cuts[0] + 1 :]))
     if left is None or right is None:
@@ -194,6 +199,8 @@ def _finish(group: Group) -> Said | None:
         "part", "FINISH", "WORKON", "PRIORITY", "FIRST", "DONE", "REST", "UNTILDONE", "PUT", "LET", "EACHTIME", "THEN", "AND", "GOON",
         "ONLYTHEN", "COMMA", "IN", "MORE", "LONG", "CHOOSE", "BUT", "ANYPART", "BEFORE", "GOOD", "WAIT", "FROM", "numbered",
     )  # fmt: skip
+    if group.has("AFTER") and 0 <= group.at("REST") < group.at("AFTER") < group.at("part"):  # "all else can wait until"
+        return Said("finish", (group.all("part")[-1],)) if group.only("REST", "AFTER", "part", "DONE", "WAIT", "FINISH", "LET") else None
     parts = [part for part in group.all("part") if not part.is_any]
     others = [part for part in group.all("part") if part.is_any]
     if not group.only(*listed) or len(parts) > 1 or (not parts and not group.has("IT")):
@@ -221,7 +228,7 @@ def _is_reason(group: Group) -> bool:
 
 def _is_left_out(group: Group) -> bool:
     """Whether a group is like "no toasting", after a move that leaves that out."""
-    return group.has("NO") and group.has("work") and group.only("NO", "work")
+    return group.has("NO", "SKIP") and group.has("work", "station") and group.only("NO", "SKIP", "work", "station", "PUT", "IN")
 
 
 # ---- what is referred to -------------------------------------------------------------------------------------------------
@@ -238,7 +245,7 @@ class OrderReferents:
     def intents(self, clauses: Sequence[Clause]) -> tuple[Intent, ...]:
         """The intents of the clauses, in order. Raises Unclear or Misfit."""
         found: list[Intent] = []
-        for clause in clauses:
+        for clause in without_going_on(clauses):
             for intent in self._intents(clause) if isinstance(clause, Said) else (clause,):
                 if not (found and found[-1] == intent):
                     found.append(intent)
@@ -287,7 +294,11 @@ class OrderReferents:
     def _in_turn(self, first: Said, second: Said) -> tuple[Intent, ...]:
         """Two moves if both are allowed now, else one work before the other."""
         try:
-            pair = tuple(self._move(work.values[0], None, work.values[1]) for work in (first, second) if work.values[1])
+            pair = tuple(
+                self._move(part, None, station)
+                for part, station, _ in (first.values, second.values)
+                if station and not part.is_any
+            )
         except (Unclear, Misfit):
             pair = ()
         return pair if len(pair) == 2 else (self._before(first, second),)
@@ -338,6 +349,8 @@ class OrderReferents:
 
     def _work(self, work: Said) -> Work:
         part, station, _ = work.values
+        if part == IT and self._part is None:
+            part = Part(is_any=True)  # "everything has to be washed before it goes to the exit"
         return Work(self._part_or_any(part), None if station is None else self._place(station))
 
 

@@ -58,12 +58,16 @@ def read(text: str, scene: Scene, corrects: bool = True) -> list[Token]:
         words = [_spelled(word, known, frequent) for word in apart(words, known)]
     words = _in_plain_order(" ".join(_numbered(words))).split()
     tokens = _without_stories(_parts(words, named, section))
-    return [token for before, token in zip((None, *tokens), tokens) if not _adds_nothing(token, before)]
+    around = zip((None, *tokens), tokens, (*tokens[1:], None))
+    return [token for before, token, after in around if not _adds_nothing(token, before, after)]
 
 
 def _in_plain_order(text: str) -> str:
     """The text with "the near" as an adjective, and with "as far left as you can" in an order of words that phrases can have."""
     text = re.sub(r"\bthe (near|close)\b(?! to\b)", "the nearest", text)
+    text = re.sub(r"\bright (?=(next to|in front|beside|behind|against|up against|in between|on top|away|now|there|here)\b)", "", text)
+    text = re.sub(r"\b(?:the )?very (left|right|top|bottom|end|front|back)\b", r"all the way to the \1", text)
+    text = re.sub(r"\bthe reverse\b(?! side)", "the opposite", text)
     able = "(?:you (?:can|are able to)|possible|it goes|it will|it can)(?: go| move)?"
     return re.sub(rf"\bas far (?!as\b)((?:to )?(?:the )?\w+) as {able}\b", r"all the way \1", text)
 
@@ -91,10 +95,13 @@ def _without_stories(parts: Sequence[tuple[str, list[Token]]]) -> list[Token]:
     return [token for (_, tokens), is_story in zip(parts, stories, strict=True) if not is_story for token in tokens]
 
 
-def _adds_nothing(token: Token, before: Token | None) -> bool:
-    """Whether a token is a filler, or "that" and "which" after a name."""
-    relative = token.text in ("that", "which", "who", "that is", "which is", "where") and before is not None
-    return token.kind == "FILLER" or (relative and before.kind == "NAME")
+def _adds_nothing(token: Token, before: Token | None, after: Token | None) -> bool:
+    """Whether a token is a filler, "that" after a name ("the cube that is left"), or before one ("that cube")."""
+    if token.kind == "FILLER":
+        return True
+    relates = token.text in ("that", "which", "who", "that is", "which is", "where") and before is not None
+    points = token.text in ("that", "this", "those", "these") and after is not None
+    return (relates and before.kind == "NAME") or (points and after.kind in ("NAME", "PART", "KIND", "STATION", "ACTKIND"))
 
 
 def _spelled(word: str, known: frozenset[str], frequent: set[str]) -> str:
@@ -110,6 +117,8 @@ def _tokens(words: Sequence[str], named: Named, section: str) -> list[Token]:
     while at < len(words):
         sizes = range(min(longest, len(words) - at), 0, -1)
         size = next((size for size in sizes if tuple(words[at : at + size]) in named), 0)
+        if size and words[at] in ORDINALS and words[at + size : at + size + 1] != [] and words[at + size].isdigit():
+            size = 0  # "first slice 1"
         end, kind = phrases(section).longest(words, at)
         if size and size >= end - at:
             end = at + size
@@ -146,6 +155,7 @@ def words_of(text: str) -> list[str]:
         .replace("½", " half ")
         .replace("¼", " quarter ")
     )
+    plain = re.sub(r"[-=]+>|→", " to ", plain)
     for pattern, full in CONTRACTIONS:
         plain = re.sub(pattern, full, plain)
     plain = re.sub(r"(\d)[.,](\d)", r"\1_\2", plain)

@@ -32,6 +32,7 @@ class Thing:
     ids: tuple[str, ...]
     adjectives: tuple[Any, ...] = ()
     posts: tuple[Any, ...] = ()
+    is_plural: bool = False
 
 
 @dataclass(frozen=True)
@@ -188,7 +189,7 @@ def _value(name: str, parts: tuple[Any, ...]) -> tuple[Any, ...]:
         case "thing" | "one":
             at = next((n for n, part in enumerate(parts) if isinstance(part, Token) and part.kind in ("NAME", "ONE")))
             ids = parts[at].value if name == "thing" else ()
-            return (Slot("thing", Thing(ids, parts[:at], parts[at + 1 :])),)
+            return (Slot("thing", Thing(ids, parts[:at], parts[at + 1 :], name == "thing" and parts[at].text.endswith("s"))),)
         case "beside":
             return (("beside", values[0].value),)
         case "named":
