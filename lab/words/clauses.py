@@ -233,7 +233,9 @@ def _lifts_all(group: Group) -> bool:
 
 def without_going_on(clauses: Sequence[Clause]) -> Iterator[Clause]:
     """The clauses, with "go on" as the learner's own choice where no command comes after it."""
-    for clause, following in zip(clauses, (*clauses, None)[1:], strict=True):
+    for clause, following, before in zip(clauses, (*clauses, None)[1:], (None, *clauses)[:-1], strict=True):
+        if isinstance(clause, Quiet) and clause.until == "always" and isinstance(before, Quiet):
+            continue  # "only ask when you are stuck, no questions else"
         if clause != GOES_ON:
             yield clause
         elif following is None or isinstance(following, Praise | Why | Stop | Undo) or following == NO_COMMAND:

@@ -23,17 +23,24 @@ CONTRACTIONS = (
         "u": "you", "strait": "straight", "thn": "then", "dn": "down", "rt": "right", "pls": "please",
         "plz": "please", "upto": "up to", "goto": "go to", "alot": "a lot", "lemme": "let me", "gimme": "give me",
         "hows": "how is", "hes": "he is", "w/o": "without", "ur": "your", "thx": "thanks", "twise": "twice",
-        "tw": "two",
+        "tw": "two", "wy": "why",
     }.items()),
     (r"\b(away|clear|far|back) form\b", r"\1 from"),
     *((rf"{short}\b", f" {full}") for short, full in {
         "n't": "not", "'re": "are", "'ve": "have", "'ll": "will", "'d": "would", "'m": "am", "'s": "is",
     }.items()),
 )  # fmt: skip
+ARROWS = {"->": "arrowright", "=>": "arrowright", "→": "arrowright", "←": "arrowleft", "↑": "arrowup", "↓": "arrowdown", "⇒": "arrowright"}
+TAG = re.compile(
+    r"(?<=[,;]) (?:do|does|did|is|are|was|were|has|have|can|could|will|would|should|must|shall)(?: not)? (?:it|you|we|i|they)(?= [?.!,]|$)"
+)  # "that was good, wasn't it?"
 PUNCTUATION = {",": "COMMA", ":": "COMMA", ".": "DOT", "!": "DOT", "?": "DOT", ";": "DOT"}
 NOT_MANNERS = frozenset(["only", "hardly", "barely", "nearly", "early", "fly", "apply", "reply", "supply", "family", "jelly", "belly", "rely", "hourly", "daily"])
 TELLING = frozenset(["i", "my", "we", "our", "he", "she", "because", "since", "yesterday"])
 TELLS = frozenset(["NOT", "NEVER", "AVOID", "NEAR", "STOP", "IF", "OR", "CANCEL", "RULE", "BEFORE", "AFTER", "FINISH", "OFFLIMITS", "LEFT", "RIGHT", "FORWARD", "BACK", "UP", "DOWN", "UNDO", "ASK"])  # they make it more than a story
+RELATIVES = frozenset(["that", "which", "who", "that is", "which is", "where", "what is", "what", "who is"])
+POINTING = frozenset(["that", "this", "those", "these"])
+NAMES = frozenset(["NAME", "PART", "KIND", "STATION", "ACTKIND"])  # kinds of names of the scene
 UNKNOWN = "UNKNOWN"  # the kind of what is of no kind
 
 
@@ -58,12 +65,15 @@ def read(text: str, scene: Scene, corrects: bool = True) -> list[Token]:
         words = [_spelled(word, known, frequent) for word in apart(words, known)]
     words = _in_plain_order(" ".join(_numbered(words))).split()
     tokens = _without_stories(_parts(words, named, section))
-    around = zip((None, *tokens), tokens, (*tokens[1:], None))
-    return [token for before, token, after in around if not _adds_nothing(token, before, after)]
+    return _plain(tokens)
 
 
 def _in_plain_order(text: str) -> str:
     """The text with "the near" as an adjective, and with "as far left as you can" in an order of words that phrases can have."""
+    text = TAG.sub("", text)
+    text = re.sub(r"\btoo the\b", "to the", text)
+    text = re.sub(r"\bbefore you(?= [,.;!?]|$)", "in front of you", text)
+    text = re.sub(r"\b(is|are|was|has been|have been)( now| already| all)? clean\b", r"\1 cleaned", text)
     text = re.sub(r"\bthe (near|close)\b(?! to\b)", "the nearest", text)
     text = re.sub(r"\bright (?=(next to|in front|beside|behind|against|up against|in between|on top|away|now|there|here)\b)", "", text)
     text = re.sub(r"\b(?:the )?very (left|right|top|bottom|end|front|back)\b", r"all the way to the \1", text)
@@ -80,14 +90,16 @@ def _parts(words: Sequence[str], named: Named, section: str) -> list[tuple[str, 
         if word in PUNCTUATION:
             parts.append([])
     return [
-        (part[0], _tokens([word for word in part if word not in skipped()], named, section)) for part in parts if part
+        (part[0], _tokens([word for word in part if word not in skipped()], named, section))
+        for part in parts
+        if any(word not in skipped() for word in part)
     ]
 
 
 def _without_stories(parts: Sequence[tuple[str, list[Token]]]) -> list[Token]:
     """The tokens without the parts in which a person only tells something, as "I burnt my toast yesterday, so ..."."""
     stories = [
-        first in TELLING and any(token.kind == UNKNOWN for token in tokens) and all(token.kind not in TELLS for token in tokens)
+        (first in TELLING or tokens[-1].text == ":") and any(token.kind == UNKNOWN for token in tokens) and all(token.kind not in TELLS for token in tokens)
         for first, tokens in parts
     ]
     if all(stories):
@@ -95,13 +107,17 @@ def _without_stories(parts: Sequence[tuple[str, list[Token]]]) -> list[Token]:
     return [token for (_, tokens), is_story in zip(parts, stories, strict=True) if not is_story for token in tokens]
 
 
-def _adds_nothing(token: Token, before: Token | None, after: Token | None) -> bool:
-    """Whether a token is a filler, "that" after a name ("the cube that is left"), or before one ("that cube")."""
-    if token.kind == "FILLER":
-        return True
-    relates = token.text in ("that", "which", "who", "that is", "which is", "where") and before is not None
-    points = token.text in ("that", "this", "those", "these") and after is not None
-    return (relates and before.kind == "NAME") or (points and after.kind in ("NAME", "PART", "KIND", "STATION", "ACTKIND"))
+def _plain(tokens: Sequence[Token]) -> list[Token]:
+    """The tokens without fillers, and without "that" before a name; after one ("the cube that is left") it is like "on"."""
+    kept: list[Token] = []
+    for token, after in zip(tokens, (*tokens, None)[1:], strict=True):
+        relates = token.text in RELATIVES and bool(kept) and kept[-1].kind == "NAME"
+        points = token.text in POINTING and after is not None and after.kind in NAMES
+        if relates:
+            kept.append(Token("ON", None, token.text))
+        elif token.kind != "FILLER" and not points:
+            kept.append(token)
+    return kept
 
 
 def _spelled(word: str, known: frozenset[str], frequent: set[str]) -> str:
@@ -155,7 +171,8 @@ def words_of(text: str) -> list[str]:
         .replace("½", " half ")
         .replace("¼", " quarter ")
     )
-    plain = re.sub(r"[-=]+>|→", " to ", plain)
+    for arrow, word in ARROWS.items():
+        plain = plain.replace(arrow, f" {word} ")
     for pattern, full in CONTRACTIONS:
         plain = re.sub(pattern, full, plain)
     plain = re.sub(r"(\d)[.,](\d)", r"\1_\2", plain)

@@ -56,8 +56,8 @@ def corrected(word: str, known: Set[str], frequent: Set[str] = frozenset()) -> s
     for apart in sorted(near):
         found = sorted(near[apart])
         for better in (
-            [other for other in found if sorted(other) == sorted(word)],
             [other for other in found if other in frequent],
+            [other for other in found if sorted(other) == sorted(word)],
             [other for other in found if other[0] == word[0]],
             [other for other in found if other[-1] == word[-1]],
         ):
