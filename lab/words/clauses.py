@@ -16,7 +16,7 @@ ABUTTING = 2.0  # the cost of a group that begins without a separator
 ABUTTING_VERB = 0.7  # the same if it begins with a verb
 MOST_CUTS = 6  # of a rest of a sentence
 LONGEST = 14  # slots of a group
-FREE = frozenset(["YES", "OK", "IT", "ITS", "TO", "ON", "OF", "AGAIN", "PRETTY", "INSTEAD", "EVER", "FIRST", *SEPARATORS])
+FREE = frozenset(["YES", "OK", "IT", "ITS", "TO", "ON", "OF", "AGAIN", "PRETTY", "INSTEAD", "EVER", "FIRST", "IS", *SEPARATORS])
 
 
 @dataclass(frozen=True)
@@ -28,6 +28,7 @@ class Said:
 
 
 Clause = Intent | Said
+STOPS = Said("stop", (True,))
 GOES_ON = Said("goes on")  # its own choice, or nothing before a command, as in "go on, two more to the right"
 NO_COMMAND = Said("reason")  # it adds nothing to other clauses, and means nothing alone
 
@@ -92,12 +93,12 @@ def cuts(slots: tuple[Slot, ...], meaning: Meaning) -> list[tuple[float, tuple[C
                 found[rest] = min(cost, found.get(rest, 99.0))
         else:
             for end in range(at + 1, min(len(slots), at + LONGEST) + 1):
-                if not best[end] or slots[end - 1].kind in SEPARATORS:
-                    continue
+                if not best[end] or slots[end - 1].kind in SEPARATORS or slots[end : end + 1] != () and slots[end].kind in ("IS", "WAS"):
+                    continue  # "going left was wrong" is one statement
                 inside = sum(SEPARATORS.get(slot.kind, 0.0) for slot in slots[at:end])
                 for price, clause in meaning(Group(slots[at:end])):
-                    if isinstance(clause, Why) and _joint(slots, end):
-                        continue  # "why did you go left?"
+                    if _joint(slots, end) and (isinstance(clause, Why | Undo | Again) or clause == STOPS):
+                        continue  # "why did you go left?", "stop going left"
                     for cost, rest in best[end]:
                         total = cost + price + inside + _joint(slots, end)
                         found[clause, *rest] = min(total, found.get((clause, *rest), 99.0))
@@ -128,15 +129,15 @@ def common(group: Group) -> Iterator[tuple[float, Clause]]:
     """What a group means in any scene, each with a cost."""
     has, only = group.has, group.only
     asks = has("ASKS") and not all(text in ("what", "how") for text in group.all("ASKS"))
-    if has("GOOD") != has("BAD") and only(*JUDGING, "NO", "ASKS") and not asks and group.is_one() and not (has("GOOD") and has("NO")):
+    if has("GOOD") != has("BAD") and only(*JUDGING, "NO", "ASKS", "WAS") and not asks and group.is_one() and not (has("GOOD") and has("NO")):
         yield 0.0, Praise(1 if has("GOOD") != has("NOT", "NEVER") else -1)
     if has("BAD") and has("NO") and only("BAD", "NO") and not has("IT") and set(group.all("BAD")) <= CALLED:
         yield -1.0, NO_COMMAND  # "no, silly"
-    if has("OPPOSITE") and only("OPPOSITE", "NO", "NOTTHAT", "GO", "MOVE", "WAY", "TURN", "JUDGED", "PUT", "CAN"):
+    if has("OPPOSITE") and only("OPPOSITE", "NO", "NOTTHAT", "GO", "MOVE", "WAY", "TURN", "JUDGED", "PUT", "CAN", "WAS"):
         yield 0.0, Opposite()
     if group.all("dir") == ["reverse"] and has("NO", "NOTTHAT") and only("dir", "NO", "NOTTHAT", "GO", "MOVE"):
         yield 0.0, Opposite()
-    if has("SAME") and only("SAME", "LAST", "ANSWER", "GO", "MOVE", "WAY", "MORE", "ANYMORE", "JUDGED", "amount", "PUT", "GOON") and group.is_one():
+    if has("SAME") and only("SAME", "LAST", "ANSWER", "GO", "MOVE", "WAY", "MORE", "ANYMORE", "JUDGED", "amount", "PUT", "GOON", "WAS") and group.is_one():
         yield 0.0, Again()
     if has("AGAIN") and only("MORE", "PUT", "MOVE", "LAST"):
         yield 0.5, Again()
@@ -150,6 +151,8 @@ def common(group: Group) -> Iterator[tuple[float, Clause]]:
         yield 0.0, Why()
     if (until := _quiet(group)) is not None:
         yield 0.0, Quiet(until)
+    if has("STAY") and only("STAY"):
+        yield 0.0, Said("stay")
     if has("STOP", "END", "BYE", "FINISH") and _ends(group):
         yield 0.0, Said("stop", (not has("END", "BYE", "SESSION"),))
     if _lifts_all(group) or (has("LIFTALL") and only("LIFTALL", "CAN")):
@@ -159,7 +162,7 @@ def common(group: Group) -> Iterator[tuple[float, Clause]]:
 
 
 def _takes_back(group: Group) -> bool:
-    objects = ("ANSWER", "LASTLY", "ORDINALNOUN", "LAST", "MOVE", "amount", "JUDGED", "MORE", "STEP", "NUMBER", "PUT", "part")
+    objects = ("WAS", "ANSWER", "LASTLY", "ORDINALNOUN", "LAST", "MOVE", "amount", "JUDGED", "MORE", "STEP", "NUMBER", "PUT", "part")
     if not group.is_one() or group.all("part") and not group.all("part")[0].is_any:
         return False
     if group.all("CANCEL") == ["cancel"] and group.only("CANCEL"):

@@ -15,7 +15,7 @@ DIAGONALS = {
     "northwest": ("forward", "left"), "northeast": ("forward", "right"),
     "southwest": ("back", "left"), "southeast": ("back", "right"),
 }  # fmt: skip
-VERBS = ("GO", "MOVE", "GOON", "CAN", "NO", "MORE", "LAST", "UPTO", "WAY")
+VERBS = ("GO", "MOVE", "GOON", "CAN", "NO", "MORE", "UPTO", "WAY")
 
 
 class Misfit(Exception):
@@ -55,7 +55,7 @@ def meanings(group: Group) -> Iterator[tuple[float, Clause]]:
         yield redundant, Said("to", (_thing(group),))
     if group.all("thing") and group.only("thing", "NO") and len(group.all("thing")) == 1 and not group.has("NO"):
         yield 1.0, Said("also", (_thing(group),))
-    untils = [_until(items) for items in group.all("until")] if group.only("GO", "MOVE", "until", "GOON", "CAN") else []
+    untils = [_until(items) for items in group.all("until")] if group.has("GO", "MOVE", "GOON") and group.only("GO", "MOVE", "until", "GOON", "CAN") else []
     if untils and untils[0] and untils[0][0] == "object":
         yield 0.0, Said("to", (untils[0][1],))
     yield from _legs(group)
@@ -122,7 +122,7 @@ def _reason(group: Group) -> Said | None:
     """What is said about an object and commands nothing."""
     if not group.has("DANGER", "HARMLESS", "INWAY", "INFRONT", "AHEADOF", "TOO", "BECAUSE", "BEHIND", "OK"):
         return None
-    listed = ("thing", "DANGER", "HARMLESS", "INWAY", "INFRONT", "AHEADOF", "TOO", "LEVEL", "BEHIND", "SOMETHING", "MORE", "LAST", "BECAUSE")
+    listed = ("WAS", "thing", "DANGER", "HARMLESS", "INWAY", "INFRONT", "AHEADOF", "TOO", "LEVEL", "BEHIND", "SOMETHING", "MORE", "LAST", "BECAUSE")
     if group.has("OK") and not group.content:
         return NO_COMMAND
     if group.only(*listed) and group.content and len(group.all("thing")) <= 1:
@@ -141,7 +141,7 @@ PASSING = ("AROUND", "PASS", "PAST", "TURN", "TURNAROUND")
 def _around(group: Group) -> Said | None:
     """A way past an object, with the word of its side."""
     listed = ("AROUND", "PASS", "PAST", "thing", "dir", "side", "GO", "MOVE", "KEEP", "WAY", "INWAY", "SIDE", "FROM", "OVER", "UNDER", "BEHIND", "FREE", "NO", "ALLWAY", "BERTH", "TURN", "TURNAROUND")
-    if not group.only(*listed) or len(group.all("thing")) > 1 or not (group.all("thing") or group.has("IT", "ITS")):
+    if group.has("IS") or not group.only(*listed) or len(group.all("thing")) > 1 or not (group.all("thing") or group.has("IT", "ITS")):
         return None
     sides = [*group.all("dir"), *group.all("side")]
     vertical = ["higher"] * group.has("OVER") + ["lower"] * group.has("UNDER") + ["forward"] * group.has("BEHIND")
@@ -157,6 +157,8 @@ def _around(group: Group) -> Said | None:
 
 def _goes_to(group: Group) -> bool:
     """Whether a group sends the robot to an object."""
+    if group.has("IS") and not group.has("NEXTSTOP"):
+        return False
     if not group.only("thing", "GO", "MOVE", "NEXTTO", "VISIT", "NEAR", "HIT", "NEXTSTOP", "UPTO", "WAY", "ALLWAY", "INFRONT", "LAST", "GOON", "BACK", "dir", "KEEP", "UNTIL", "FROM", "STOP"):
         return False
     if set(group.all("dir")) - {"back"} or len(group.all("thing")) > 1:
@@ -180,7 +182,7 @@ def _legs(group: Group) -> Iterator[tuple[float, Clause]]:
         *VERBS, "dir", "side", "amount", "until", "TURN", "WALL", "TOP", "BOTTOM", "ALLWAY", "ASHIGH", "ASLOW", "thing", "PAST", "PASS",
         "HIT", "NEXTTO", "NEAR", "VISIT", "EACH", "DIAGONAL", "FARTHEST", "SIDE", "BLOCKED", "INFRONT", "FREE", "OVER", "STOP",
     )  # fmt: skip
-    if not group.only(*listed) or len(group.all("amount")) > 1 or len(group.all("until")) > 1:
+    if group.has("IS") or not group.only(*listed) or len(group.all("amount")) > 1 or len(group.all("until")) > 1:
         return
     ways = [*group.all("dir"), *(group.all("side") if not group.has("dir") else ())]
     ways += ["higher"] * group.has("ASHIGH") + ["lower"] * group.has("ASLOW")
@@ -192,7 +194,7 @@ def _legs(group: Group) -> Iterator[tuple[float, Clause]]:
         ways = ["up"]
     if not ways and group.has("WALL", "SIDE") and group.has("FARTHEST"):
         ways = ["forward"]
-    if group.has("NO") and group.at("NO") > 0:
+    if group.has("NO") and (group.at("NO") > 0 or group.at("amount") == 1):
         return
     cost = 1.0 if group.at("GO", "MOVE") > max(0, group.at("dir")) else 0.0
     if group.has("side") and not group.has("amount", "until", "WALL", "ALLWAY"):
@@ -322,6 +324,10 @@ class MapReferents:
             case "reason":
                 if values:
                     self._object(values[0])
+                return None
+            case "stay":
+                if not before or not isinstance(before[-1], Go | To | Around):
+                    raise Misfit
                 return None
             case "stop":
                 has_moved = bool(before) and isinstance(before[-1], Go | To | Around)

@@ -64,6 +64,10 @@ def _move(group: Group) -> Said | None:
     parts, stations, works = _parts(group), _places(group), group.all("work")
     if len(parts) > 1 or len(stations) > 2 or len(works) > 1 or (parts and (parts[0].is_none or parts[0].is_any)):
         return None
+    if group.has("IS") and not any(part.is_next for part in group.all("part")):
+        return None
+    if any(str(text).split()[0] not in ("let", "have", "make", "i", "want", "see") for text in group.all("LET")):
+        return None  # "leave slice 2 in the toaster"
     if works and works[0][1].endswith("ed") and not group.has("PUT", "LET"):
         return None  # "slice 1 is buttered"
     if group.has("WAIT"):
@@ -119,7 +123,7 @@ def _it_is_a_part(group: Group) -> bool:
 
 WORKS = (
     "part", "station", "work", "PUT", "FROM", "IN", "NEXT", "LET", "FINISH", "DONE", "EACHTIME", "EVERY", "FIRST", "NOT", "NO", "NEVER",
-    "NOTHING", "ONLYTHEN", "HOLD", "MORE", "GO", "STOP", "BUT", "THEN", "AND", "COMMA", "CAN", "GOON", "WAIT", "LAST", "ANYMORE", "NOLONGER", "UNTILDONE", "PRIORITY",
+    "NOTHING", "ONLYTHEN", "HOLD", "MORE", "GO", "STOP", "BUT", "THEN", "AND", "COMMA", "CAN", "GOON", "WAIT", "LAST", "ANYMORE", "NOLONGER", "UNTILDONE", "PRIORITY", "WAS",
 )  # fmt: skip
 
 
@@ -223,7 +227,7 @@ def _is_reason(group: Group) -> bool:
     works = group.all("work")
     if works and not all(text.endswith("ed") for _, text in works):
         return False
-    return group.only("part", "station", "work", "DONE", "IN", "WAIT", "LONG", "BECAUSE")
+    return group.only("part", "station", "work", "DONE", "IN", "WAIT", "LONG", "BECAUSE", "WAS")
 
 
 def _is_left_out(group: Group) -> bool:
@@ -262,6 +266,8 @@ class OrderReferents:
                 if values:
                     self._named(values[0])
                 return ()
+            case "stay":
+                raise Misfit
             case "stop":
                 return (Stop(),)
             case "number":

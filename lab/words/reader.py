@@ -71,6 +71,7 @@ def read(text: str, scene: Scene, corrects: bool = True) -> list[Token]:
 def _in_plain_order(text: str) -> str:
     """The text with "the near" as an adjective, and with "as far left as you can" in an order of words that phrases can have."""
     text = TAG.sub("", text)
+    text = re.sub(r"\bto where ((?:\w+ ){1,4}?)(?:is|are|stands|lies|sits)\b", r"to \1", text)
     text = re.sub(r"\btoo the\b", "to the", text)
     text = re.sub(r"\bbefore you(?= [,.;!?]|$)", "in front of you", text)
     text = re.sub(r"\b(is|are|was|has been|have been)( now| already| all)? clean\b", r"\1 cleaned", text)
@@ -98,6 +99,7 @@ def _parts(words: Sequence[str], named: Named, section: str) -> list[tuple[str, 
 
 def _without_stories(parts: Sequence[tuple[str, list[Token]]]) -> list[Token]:
     """The tokens without the parts in which a person only tells something, as "I burnt my toast yesterday, so ..."."""
+    parts = [(first, tokens) for first, tokens in parts if not _is_exclamation(tokens)] or list(parts)
     stories = [
         (first in TELLING or tokens[-1].text == ":") and any(token.kind == UNKNOWN for token in tokens) and all(token.kind not in TELLS for token in tokens)
         for first, tokens in parts
@@ -107,14 +109,21 @@ def _without_stories(parts: Sequence[tuple[str, list[Token]]]) -> list[Token]:
     return [token for (_, tokens), is_story in zip(parts, stories, strict=True) if not is_story for token in tokens]
 
 
+def _is_exclamation(tokens: Sequence[Token]) -> bool:
+    """Whether a part is one unknown word, as in "blimey, two left"."""
+    return [token.kind for token in tokens if token.kind != "FILLER"] in ([UNKNOWN, "COMMA"], [UNKNOWN, "DOT"])
+
+
 def _plain(tokens: Sequence[Token]) -> list[Token]:
-    """The tokens without fillers, and without "that" before a name; after one ("the cube that is left") it is like "on"."""
+    """The tokens without fillers, and without "that" before a name; after one ("the cube that is left") it is THATIS."""
     kept: list[Token] = []
     for token, after in zip(tokens, (*tokens, None)[1:], strict=True):
         relates = token.text in RELATIVES and bool(kept) and kept[-1].kind == "NAME"
         points = token.text in POINTING and after is not None and after.kind in NAMES
         if relates:
-            kept.append(Token("ON", None, token.text))
+            kept.append(Token("THATIS", None, token.text))
+        elif token.kind == "IS" and kept and kept[-1].kind == "THATIS":
+            continue
         elif token.kind != "FILLER" and not points:
             kept.append(token)
     return kept
@@ -173,6 +182,7 @@ def words_of(text: str) -> list[str]:
     )
     for arrow, word in ARROWS.items():
         plain = plain.replace(arrow, f" {word} ")
+    plain = re.sub(r"(?<![\w)])[-−](?=\d)", " minus ", plain)
     for pattern, full in CONTRACTIONS:
         plain = re.sub(pattern, full, plain)
     plain = re.sub(r"(\d)[.,](\d)", r"\1_\2", plain)

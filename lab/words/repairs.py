@@ -21,7 +21,10 @@ class NotClear(Exception):
 
 def as_meant(slots: Slots, on_map: bool) -> Slots:
     """The slots without what was taken back in the same breath and what is only said not to be meant. Raises NotClear."""
-    slots = _corrected(_with_single_breaks(slots))
+    slots = _with_single_breaks(slots)
+    if [slot.kind for slot in slots[1:2]] == ["COMMA"] and slots[0] == Slot("dir", "right") and slots[2].kind in ("GO", "MOVE", "TURN"):
+        raise NotClear("'right' may be a direction or no more than 'well'")
+    slots = _corrected(slots)
     slots = _without_asides(tuple(slot for slot in slots if slot.kind != "CORRECT"))
     return _in_order(slots) if on_map else slots
 

@@ -72,13 +72,13 @@ def slots_of(tokens: Sequence[Token], start: str) -> list[tuple[Slot, ...]]:
 def _kinds(start: str) -> tuple[str, ...]:
     from lab.words.vocabulary import rows
 
-    extra = ("COMMA", "DOT", "NUM", "ONE", "LENGTH", "NAME", "PART", "KIND", "STATION", "ACT", "ACTKIND", "ORDINAL")
+    extra = ("COMMA", "DOT", "NUM", "ONE", "LENGTH", "NAME", "PART", "KIND", "STATION", "ACT", "ACTKIND", "ORDINAL", "THATIS")
     return tuple(dict.fromkeys((*rows("common"), *rows("map"), *rows("order"), *extra)))
 
 
 IN_SLOTS = frozenset([
     "LEFT", "RIGHT", "FORWARD", "UP", "DOWN", "HIGHER", "LOWER", "CW", "CCW", "NORTHWEST", "NORTHEAST", "SOUTHWEST", "SOUTHEAST",
-    "NUM", "LENGTH", "NAME", "PART", "STATION", "ACT", "KIND", "ACTKIND", "ONE", "STEP", "STEPS", "SKIPPED", "FILLER",
+    "NUM", "LENGTH", "NAME", "THATIS", "PART", "STATION", "ACT", "KIND", "ACTKIND", "ONE", "STEP", "STEPS", "SKIPPED", "FILLER",
 ])  # never words by themselves  # fmt: skip
 
 
@@ -138,7 +138,7 @@ class _Forest:
 
 CONDITIONS = frozenset([
     "WALL", "TOP", "BOTTOM", "PAST", "FREE", "BLOCKED", "SOMETHING", "HIT", "NEXTTO", "NEAR", "NOT", "NO", "NOLONGER", "NOTHING", "CAN",
-    "GO", "MOVE", "WAY", "INWAY", "INFRONT", "AHEADOF", "MORE", "ANYMORE", "TO", "ON", "OF", "IT", "ITS", "BEHIND", "PASS", "STUCK",
+    "GO", "MOVE", "WAY", "INWAY", "INFRONT", "AHEADOF", "MORE", "ANYMORE", "TO", "ON", "OF", "IT", "ITS", "BEHIND", "PASS", "STUCK", "IS",
 ])  # fmt: skip
 
 
