@@ -15,8 +15,9 @@ from lab.words.listen import listen
 from lab.words.meaning import ALL, Allow, Avoid, Before, Finish, Go, Intent, Move, Never, Quiet, Refusal, Work
 from lab.words.said import called, in_words
 from lab.words.scene import AllowedMove, OrderScene, Scene
+from lab.words.scene_map import SceneMap, obstacles_of
 from lab.words.ways import Before as DoneBefore
-from lab.words.ways import Motion, NoWay, SceneMap, obstacles_of, way
+from lab.words.ways import Motion, NoWay, way
 
 Rule = Avoid | Finish | Never | Before
 STUCK_VISITS = 3  # questions in one state and episode, from which on the learner counts as stuck

@@ -1,6 +1,6 @@
 """Slots to clauses: a sentence is cut into the groups of slots that mean something, at the least cost.
 
-The order of the slots of a group hardly counts: a group means what its kinds of words allow, and nothing if one of them is left over.
+The order of the slots of a group hardly counts: it means what its kinds of words allow, and nothing if one of them is left over.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -10,13 +10,24 @@ from typing import Any
 
 from lab.words.meaning import ALL, Again, Allow, Intent, Opposite, Own, Praise, Quiet, Stop, Undo, Why
 from lab.words.slots import Amount, Slot
+from lab.words.vocabulary import clause_kinds
 
 SEPARATORS = {"COMMA": 1.5, "AND": 1.5, "BUT": 1.6, "DOT": 4.0, "THEN": 6.0}  # kind -> its cost inside of a group
 ABUTTING = 2.0  # the cost of a group that begins without a separator
 ABUTTING_VERB = 0.7  # the same if it begins with a verb
 MOST_CUTS = 6  # of a rest of a sentence
 LONGEST = 14  # slots of a group
-FREE = frozenset(["YES", "OK", "IT", "ITS", "TO", "ON", "OF", "AGAIN", "PRETTY", "INSTEAD", "EVER", "FIRST", "IS", *SEPARATORS])
+FREE = frozenset(
+    [*["YES", "OK", "IT", "ITS", "TO", "ON", "OF", "AGAIN", "PRETTY", "INSTEAD", "EVER", "FIRST", "IS"], *SEPARATORS]
+)
+
+
+class Misfit(Exception):
+    """A clause that means nothing in its scene: other ways to put the sentence together count."""
+
+
+class Unclear(Exception):
+    """A clause that is refused; the message is the reason, in one line."""
 
 
 @dataclass(frozen=True)
@@ -93,8 +104,9 @@ def cuts(slots: tuple[Slot, ...], meaning: Meaning) -> list[tuple[float, tuple[C
                 found[rest] = min(cost, found.get(rest, 99.0))
         else:
             for end in range(at + 1, min(len(slots), at + LONGEST) + 1):
-                if not best[end] or slots[end - 1].kind in SEPARATORS or slots[end : end + 1] != () and slots[end].kind in ("IS", "WAS"):
-                    continue  # "going left was wrong" is one statement
+                states = slots[end : end + 1] != () and slots[end].kind in ("IS", "WAS")  # "going left was wrong"
+                if not best[end] or slots[end - 1].kind in SEPARATORS or states:
+                    continue
                 inside = sum(SEPARATORS.get(slot.kind, 0.0) for slot in slots[at:end])
                 for price, clause in meaning(Group(slots[at:end])):
                     if _joint(slots, end) and (isinstance(clause, Why | Undo | Again) or clause == STOPS):
@@ -116,28 +128,27 @@ def _joint(slots: tuple[Slot, ...], end: int) -> float:
 
 # ---- what can be said anywhere ---------------------------------------------------------------------------------------------
 
-JUDGING = ("GOOD", "BAD", "JUDGED", "NOT", "NEVER", "GO", "MOVE", "LAST", "TOO", "ANSWER", "EVERYTHING", "WAY", "amount", "PUT", "ANYPART", "NUMBER", "MORE", "ORDINALNOUN", "CHOOSE")
+JUDGING = clause_kinds("praise")
 CALLED = {"silly", "stupid", "dummy", "idiot", "fool", "moron", "you idiot", "you fool", "you dummy", "dumb", "dimwit"}
-HUSHING = (
-    "QUIET", "ASK", "NOT", "NO", "NEVER", "STOP", "NOTHING", "NOLONGER", "STUCK", "BLOCKED", "IF", "ONLY", "EPISODE", "amount", "MORE",
-    "ANYMORE", "CAN", "SESSION", "EVERYTHING", "SOMETHING", "until", "UNTIL", "AFTER", "ANYPART", "GOON", "NEXT", "part", "ONLYTHEN",
-    "HOLD", "numbered", "STEP", "STEPS", "WAY", "ASKS", "CHOOSE", "ANSWER", "PUT", "DUNNO",
-)  # fmt: skip
+HUSHING = clause_kinds("quiet")
 
 
 def common(group: Group) -> Iterator[tuple[float, Clause]]:
     """What a group means in any scene, each with a cost."""
     has, only = group.has, group.only
     asks = has("ASKS") and not all(text in ("what", "how") for text in group.all("ASKS"))
-    if has("GOOD") != has("BAD") and only(*JUDGING, "NO", "ASKS", "WAS") and not asks and group.is_one() and not (has("GOOD") and has("NO")):
+    judges = has("GOOD") != has("BAD") and only(*JUDGING, "NO", "ASKS", "WAS") and group.is_one()
+    if judges and not asks and not (has("GOOD") and has("NO")):
         yield 0.0, Praise(1 if has("GOOD") != has("NOT", "NEVER") else -1)
     if has("BAD") and has("NO") and only("BAD", "NO") and not has("IT") and set(group.all("BAD")) <= CALLED:
         yield -1.0, NO_COMMAND  # "no, silly"
-    if has("OPPOSITE") and only("OPPOSITE", "NO", "NOTTHAT", "GO", "MOVE", "WAY", "TURN", "JUDGED", "PUT", "CAN", "WAS"):
+    if has("OPPOSITE") and only(
+        *["OPPOSITE", "NO", "NOTTHAT", "GO", "MOVE", "WAY", "TURN", "JUDGED", "PUT", "CAN", "WAS"]
+    ):
         yield 0.0, Opposite()
     if group.all("dir") == ["reverse"] and has("NO", "NOTTHAT") and only("dir", "NO", "NOTTHAT", "GO", "MOVE"):
         yield 0.0, Opposite()
-    if has("SAME") and only("SAME", "LAST", "ANSWER", "GO", "MOVE", "WAY", "MORE", "ANYMORE", "JUDGED", "amount", "PUT", "GOON", "WAS") and group.is_one():
+    if has("SAME") and only(*clause_kinds("again")) and group.is_one():
         yield 0.0, Again()
     if has("AGAIN") and only("MORE", "PUT", "MOVE", "LAST"):
         yield 0.5, Again()
@@ -147,7 +158,7 @@ def common(group: Group) -> Iterator[tuple[float, Clause]]:
         yield 0.0, GOES_ON
     elif _leaves_it(group):
         yield (-1.0 if has("GOAHEAD") and has("YES", "OK") else 0.0 if group.content else 3.0), Own()
-    if has("WHY") and only("WHY", "ASK", "LAST", "NO", "ASKS", "STUCK", "GO", "part", "ANYPART", "MORE"):
+    if has("WHY") and only(*["WHY", "ASK", "LAST", "NO", "ASKS", "STUCK", "GO", "part", "ANYPART", "MORE"]):
         yield 0.0, Why()
     if (until := _quiet(group)) is not None:
         yield 0.0, Quiet(until)
@@ -157,24 +168,28 @@ def common(group: Group) -> Iterator[tuple[float, Clause]]:
         yield 0.0, Said("stop", (not has("END", "BYE", "SESSION"),))
     if _lifts_all(group) or (has("LIFTALL") and only("LIFTALL", "CAN")):
         yield 0.0, Allow(ALL)
-    if has("NO", "NOTTHAT", "REST") and only("NO", "NOTTHAT", "REST", "LET", "WAIT", "PUT", "GOON", "GO", "ONLYTHEN", "LASTLY"):
+    if has("NO", "NOTTHAT", "REST") and only(
+        *["NO", "NOTTHAT", "REST", "LET", "WAIT", "PUT", "GOON", "GO", "ONLYTHEN", "LASTLY"]
+    ):
         yield 1.0, NO_COMMAND
 
 
 def _takes_back(group: Group) -> bool:
-    objects = ("WAS", "ANSWER", "LASTLY", "ORDINALNOUN", "LAST", "MOVE", "amount", "JUDGED", "MORE", "STEP", "NUMBER", "PUT", "part")
-    if not group.is_one() or group.all("part") and not group.all("part")[0].is_any:
+    objects = clause_kinds("undo")
+    if not group.is_one() or (group.all("part") and not group.all("part")[0].is_any):
         return False
     if group.all("CANCEL") == ["cancel"] and group.only("CANCEL"):
         return True
     if group.has("UNDO", "SCRATCH"):
         return group.only("UNDO", "SCRATCH", "NO", "CORRECT", *objects)
-    return group.has("CANCEL") and group.has("ANSWER", "LAST", "MOVE", "JUDGED") and group.only("CANCEL", "NO", *objects)
+    return (
+        group.has("CANCEL") and group.has("ANSWER", "LAST", "MOVE", "JUDGED") and group.only("CANCEL", "NO", *objects)
+    )
 
 
 def _leaves_it(group: Group) -> bool:
     if group.has("OWN", "DUNNO"):
-        return group.only("OWN", "DUNNO", "NO", "GOON", "GO", "MOVE", "WAY", "CAN", "ANSWER", "PUT", "CHOOSE")
+        return group.only(*["OWN", "DUNNO", "NO", "GOON", "GO", "MOVE", "WAY", "CAN", "ANSWER", "PUT", "CHOOSE"])
     if group.has("GOAHEAD"):
         return group.only("GOON", "GOAHEAD", "WAY")
     return group.has("YES", "OK") and not group.content and not group.has("TO", "ON", "OF", "AGAIN")
@@ -192,7 +207,8 @@ def _quiet(group: Group) -> Any:
     things = [item for items in group.all("until") for item in items if isinstance(item, tuple)]
     if stuck and (silent or group.has("IF", "ONLY", "until", "UNTIL", "AFTER", "ONLYTHEN", "BUT")):
         return "stuck"
-    if not silent or things or words - {"NOT", "NO", "EVER", "AGAIN", "IT", "MORE"} or (group.has("IF") and not group.has("ONLY")):
+    others = words - {"NOT", "NO", "EVER", "AGAIN", "IT", "MORE"}
+    if not silent or things or others or (group.has("IF") and not group.has("ONLY")):
         return None
     numbers = [*group.all("amount"), *(Amount(number) for number in group.all("numbered"))]
     if group.has("EPISODE"):
@@ -209,7 +225,7 @@ def _quiet(group: Group) -> Any:
 def _ends(group: Group) -> bool:
     if group.has("FINISH"):
         return group.has("SESSION") and group.only("FINISH", "SESSION", "EVERYTHING", "BYE")
-    if not group.only("STOP", "END", "BYE", "SESSION", "EVERYTHING", "MORE", "NO", "ANYPART", "part", "EPISODE"):
+    if not group.only(*["STOP", "END", "BYE", "SESSION", "EVERYTHING", "MORE", "NO", "ANYPART", "part", "EPISODE"]):
         return False
     if group.has("EPISODE"):
         return False
@@ -218,8 +234,8 @@ def _ends(group: Group) -> bool:
 
 def _lifts_all(group: Group) -> bool:
     has = group.has
-    lifting = ("CANCEL", "UNDO", "NOLONGER", "NO", "NOTHING", "STOP", "FROM", "OVER", "END", "NOT", "SCRATCH", "BYE", "LAST")
-    rest = ("RULE", "EVERYTHING", "MORE", "ANYMORE", "LAST", "AVOID", "OK", "BEFORE", "AFTER", "ANYPART", "GO", "part", "CAN", "PERMIT", "NEAR", "EVERY", "SOMETHING", "FROM", "KEEP")
+    lifting = clause_kinds("lifts")
+    rest = clause_kinds("lifted")
     if any(not part.is_any for part in group.all("part")) or not group.only(*lifting, *rest):
         return False
     anything = has("EVERYTHING") or bool(group.all("part"))
@@ -228,9 +244,9 @@ def _lifts_all(group: Group) -> bool:
     if has("AVOID"):
         return has("CANCEL", "UNDO", "NOLONGER", "STOP") and not has("NEAR")
     if anything and not group.negated and group.only(*rest):
-        return has("OK", "CAN", "PERMIT") and group.at("OK", "CAN", "PERMIT") >= 0 and not group.only("EVERYTHING")or (
-            has("OK") and group.at("OK") > max(group.at("EVERYTHING"), group.at("part")) >= 0
-        )
+        return (
+            has("OK", "CAN", "PERMIT") and group.at("OK", "CAN", "PERMIT") >= 0 and not group.only("EVERYTHING")
+        ) or (has("OK") and group.at("OK") > max(group.at("EVERYTHING"), group.at("part")) >= 0)
     return has("CANCEL") and anything and group.only("CANCEL", "EVERYTHING", "part", "LAST", "ANYPART")
 
 
@@ -243,3 +259,8 @@ def without_going_on(clauses: Sequence[Clause]) -> Iterator[Clause]:
             yield clause
         elif following is None or isinstance(following, Praise | Why | Stop | Undo) or following == NO_COMMAND:
             yield Own()
+
+
+def listed(names: Sequence[str]) -> str:
+    """Names with "or" before the last one."""
+    return f"{', '.join(names[:-1])} or {names[-1]}" if len(names) > 1 else "".join(names)

@@ -1,19 +1,19 @@
 """A sentence in a scene to what it means, or a refusal in words with the nearest sentence that would be understood.
 
 Its words become tokens (reader), tokens what belongs together (slots), these are put right where the sentence corrects itself
-(repairs), and cut into groups that mean something (clauses, on_map, on_order). A word that nobody knows, a group that means nothing,
-and two meanings at the same cost are refused.
+(repairs), and cut into groups that mean something (clauses, on_map, on_order). A word that nobody knows, a group that means
+nothing, and two meanings at the same cost are refused.
 """
 
 from collections.abc import Sequence
 from difflib import get_close_matches
 
-from lab.words.clauses import Clause, cuts
+from lab.words.clauses import Clause, Misfit, Unclear, cuts
+from lab.words.map_referents import MapReferents
 from lab.words.meaning import Intent, Refusal
-from lab.words.on_map import MapReferents, Misfit, Unclear
 from lab.words.on_map import meanings as map_meanings
-from lab.words.on_order import OrderReferents
 from lab.words.on_order import meanings as order_meanings
+from lab.words.order_referents import OrderReferents
 from lab.words.reader import UNKNOWN, Token, read
 from lab.words.repairs import NotClear, as_meant
 from lab.words.said import examples, in_words
@@ -29,8 +29,8 @@ TOO_LONG = "that is too long: say it in shorter sentences"
 def listen(text: str, scene: Scene, corrects: bool = True) -> list[Intent] | Refusal:
     """The intents of a sentence in the order in which they are to be done, or a refusal of one line.
 
-    corrects: whether words with typing errors are corrected. A word that nobody knows, a name that fits several objects and what may
-    mean two things are refused.
+    corrects: whether words with typing errors are corrected. A word that nobody knows, a name that fits several objects and what
+    may mean two things are refused.
     """
     if len(text.split()) > MOST_WORDS or len(text) > MOST_CHARACTERS:
         return Refusal(TOO_LONG)

@@ -109,8 +109,8 @@ Named = Mapping[tuple[str, ...], tuple[str, Any]]  # words -> their kind, and wh
 def names_of(scene: Scene) -> Named:
     """The words that name something in the scene, with what they stand for.
 
-    NAME: ids of objects. PART: a part. KIND: parts of one kind. STATION: a station. ACT: the station of a work. ACTKIND: a noun that
-    is also the verb of a work, as "toast": (station, parts).
+    NAME: ids of objects. PART: a part. KIND: parts of one kind. STATION: a station. ACT: the station of a work. ACTKIND: a noun
+    that is also the verb of a work, as "toast": (station, parts).
     """
     named: dict[tuple[str, ...], tuple[str, Any]] = {}
 
@@ -146,7 +146,8 @@ def names_of(scene: Scene) -> Named:
     works = {station: work_words(station) for station in scene.stations}
     for station, words in works.items():
         for word in _own(words, station, works):
-            add(*(("ACTKIND", (station, nouns[word])) if word in nouns else ("ACT", station)), (word,))
+            kind = "ACTKIND" if word in nouns else "ACT"
+            add(kind, (station, nouns[word]) if word in nouns else station, (word,))
     return named
 
 

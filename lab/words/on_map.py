@@ -1,29 +1,22 @@
 """What groups of words mean on a map: legs, objects to go to, around, and to keep away from; and which object is meant."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from lab.words.clauses import NO_COMMAND, Clause, Group, Said, common, without_going_on
-from lab.words.meaning import ALL, CLEAR, WALL, Allow, Around, Avoid, Go, Intent, Leg, Stop, To
-from lab.words.scene import Cell, GridScene, SceneObject
-from lab.words.slots import Amount, Slot, Thing
+from lab.words.clauses import NO_COMMAND, Clause, Group, Said, common
+from lab.words.meaning import ALL, CLEAR, WALL
+from lab.words.slots import Amount, Thing
+from lab.words.vocabulary import clause_kinds
 
-MOST_STEPS = 1000
 IT = Thing(("it",))  # the object that was named last
 DIAGONALS = {
-    "northwest": ("forward", "left"), "northeast": ("forward", "right"),
-    "southwest": ("back", "left"), "southeast": ("back", "right"),
-}  # fmt: skip
-VERBS = ("GO", "MOVE", "GOON", "CAN", "NO", "MORE", "UPTO", "WAY")
-
-
-class Misfit(Exception):
-    """A clause that means nothing here: other ways to put the sentence together count."""
-
-
-class Unclear(Exception):
-    """A clause that is refused; the message is the reason, in one line."""
+    "northwest": ("forward", "left"),
+    "northeast": ("forward", "right"),
+    "southwest": ("back", "left"),
+    "southeast": ("back", "right"),
+}
+VERBS = clause_kinds("moving")
 
 
 @dataclass(frozen=True)
@@ -47,7 +40,7 @@ def meanings(group: Group) -> Iterator[tuple[float, Clause]]:
         yield 0.0, rule
     if [slot.value for slot in group.slots] == ["end"]:
         yield 0.0, Said("stop", (False,))
-    redundant = float(sum(len(thing.ids) == 1 and bool(thing.posts) or bool(thing.posts and thing.adjectives) for thing in group.all("thing")))
+    redundant = float(sum(_says_too_much(thing) for thing in group.all("thing")))
     if (way := _around(group)) is not None:
         yield redundant, way
     if _goes_to(group):
@@ -55,7 +48,8 @@ def meanings(group: Group) -> Iterator[tuple[float, Clause]]:
         yield redundant, Said("to", (_thing(group),))
     if group.all("thing") and group.only("thing", "NO") and len(group.all("thing")) == 1 and not group.has("NO"):
         yield 1.0, Said("also", (_thing(group),))
-    untils = [_until(items) for items in group.all("until")] if group.has("GO", "MOVE", "GOON") and group.only("GO", "MOVE", "until", "GOON", "CAN") else []
+    goes = group.has("GO", "MOVE", "GOON") and group.only("GO", "MOVE", "until", "GOON", "CAN")
+    untils = [_until(items) for items in group.all("until")] if goes else []
     if untils and untils[0] and untils[0][0] == "object":
         yield 0.0, Said("to", (untils[0][1],))
     yield from _legs(group)
@@ -63,6 +57,11 @@ def meanings(group: Group) -> Iterator[tuple[float, Clause]]:
         yield 1.0, reason
     if group.has("TURNAROUND") and not group.all("thing"):
         yield 0.0, Said("unclear", ("turning around is no move here",))
+
+
+def _says_too_much(thing: Thing) -> bool:
+    """Whether a place is said of what is named already: it may be the side on which to pass it."""
+    return bool(thing.posts) and (len(thing.ids) == 1 or bool(thing.adjectives))
 
 
 def _thing(group: Group) -> Thing:
@@ -73,11 +72,7 @@ def _thing(group: Group) -> Thing:
 
 # ---- rules -----------------------------------------------------------------------------------------------------------------
 
-RULES = (
-    "thing", "AVOID", "NEAR", "HIT", "NEXTTO", "GO", "MOVE", "NOT", "NO", "NEVER", "NOLONGER", "NOTHING", "STOP", "OFFLIMITS", "BERTH",
-    "GIVES", "ALONE", "CAN", "PERMIT", "CANCEL", "RULE", "UNDO", "FROM", "VISIT", "ANYMORE", "MORE", "TOO", "HARMLESS", "EVERYTHING",
-    "KEEP", "LAST", "FARTHEST", "NEAREST", "BETWEEN", "WAY", "FREE", "SOMETHING", "OVER", "CROSSED", "INFRONT", "DANGER", "AROUND", "END", "EACH",
-)  # fmt: skip
+RULES = clause_kinds("rule")
 
 
 def _rule(group: Group) -> Said | None:
@@ -86,7 +81,9 @@ def _rule(group: Group) -> Said | None:
     if not group.only(*RULES) or len(group.all("thing")) > 1:
         return None
     if has("CAN", "PERMIT") and has("EVERYTHING") and not group.all("thing") and not group.negated:
-        return Said("allow", (ALL,)) if group.only("CAN", "PERMIT", "EVERYTHING", "GO", "MOVE", "NEAR", "VISIT") else None
+        return (
+            Said("allow", (ALL,)) if group.only("CAN", "PERMIT", "EVERYTHING", "GO", "MOVE", "NEAR", "VISIT") else None
+        )
     if has("EVERYTHING", "SOMETHING") and not group.all("thing"):
         return None
     thing = _thing(group)
@@ -96,7 +93,7 @@ def _rule(group: Group) -> Said | None:
     if has("RULE"):
         return Said("allow", (thing,)) if lifted and group.all("thing") else None
     if has("AVOID", "OFFLIMITS") or (has("ALONE") and has("GIVES", "KEEP")) or (gives and not near):
-        if lifted or has("NOT", "NO") and not has("NEAR", "HIT"):
+        if lifted or (has("NOT", "NO") and not has("NEAR", "HIT")):
             return Said("allow", (thing,)) if lifted or has("NOT") or has("OFFLIMITS") else None
         return None if has("NEVER", "CAN", "NOTHING") and not near else Said("avoid", (thing,))
     if has("CANCEL"):
@@ -113,16 +110,18 @@ def _rule(group: Group) -> Said | None:
         return None
     after = group.at("OK", "CAN") > group.at("thing")
     lifts = (has("OK", "CAN") and after) or (has("NOT", "NOLONGER") and has("DANGER")) or has("PERMIT")
-    if lifts and group.only("thing", "NOT", "NOLONGER", "DANGER", "ANYMORE", "PERMIT", "HARMLESS", "NEAR", "CAN", "MORE", "EVERYTHING"):
+    if lifts and group.only(
+        *["thing", "NOT", "NOLONGER", "DANGER", "ANYMORE", "PERMIT", "HARMLESS", "NEAR", "CAN", "MORE", "EVERYTHING"]
+    ):
         return Said("allow", (thing,))
     return None
 
 
 def _reason(group: Group) -> Said | None:
     """What is said about an object and commands nothing."""
-    if not group.has("DANGER", "HARMLESS", "INWAY", "INFRONT", "AHEADOF", "TOO", "BECAUSE", "BEHIND", "OK"):
+    if not group.has(*["DANGER", "HARMLESS", "INWAY", "INFRONT", "AHEADOF", "TOO", "BECAUSE", "BEHIND", "OK"]):
         return None
-    listed = ("WAS", "thing", "DANGER", "HARMLESS", "INWAY", "INFRONT", "AHEADOF", "TOO", "LEVEL", "BEHIND", "SOMETHING", "MORE", "LAST", "BECAUSE")
+    listed = clause_kinds("reason")
     if group.has("OK") and not group.content:
         return NO_COMMAND
     if group.only(*listed) and group.content and len(group.all("thing")) <= 1:
@@ -140,8 +139,10 @@ PASSING = ("AROUND", "PASS", "PAST", "TURN", "TURNAROUND")
 
 def _around(group: Group) -> Said | None:
     """A way past an object, with the word of its side."""
-    listed = ("AROUND", "PASS", "PAST", "thing", "dir", "side", "GO", "MOVE", "KEEP", "WAY", "INWAY", "SIDE", "FROM", "OVER", "UNDER", "BEHIND", "FREE", "NO", "ALLWAY", "BERTH", "TURN", "TURNAROUND")
-    if group.has("IS") or not group.only(*listed) or len(group.all("thing")) > 1 or not (group.all("thing") or group.has("IT", "ITS")):
+    listed = clause_kinds("around")
+    if group.has("IS") or not group.only(*listed) or len(group.all("thing")) > 1:
+        return None
+    if not group.all("thing") and not group.has("IT", "ITS"):
         return None
     sides = [*group.all("dir"), *group.all("side")]
     vertical = ["higher"] * group.has("OVER") + ["lower"] * group.has("UNDER") + ["forward"] * group.has("BEHIND")
@@ -159,7 +160,7 @@ def _goes_to(group: Group) -> bool:
     """Whether a group sends the robot to an object."""
     if group.has("IS") and not group.has("NEXTSTOP"):
         return False
-    if not group.only("thing", "GO", "MOVE", "NEXTTO", "VISIT", "NEAR", "HIT", "NEXTSTOP", "UPTO", "WAY", "ALLWAY", "INFRONT", "LAST", "GOON", "BACK", "dir", "KEEP", "UNTIL", "FROM", "STOP"):
+    if not group.only(*clause_kinds("to")):
         return False
     if set(group.all("dir")) - {"back"} or len(group.all("thing")) > 1:
         return False
@@ -167,8 +168,9 @@ def _goes_to(group: Group) -> bool:
         return False
     if group.all("until"):
         return False
-    if not group.all("thing"):
-        return group.has("IT") and group.has("GO", "VISIT", "NEAR") and group.only("GO", "VISIT", "NEAR", "NEXTTO", "BACK", "UPTO") and not group.all("dir")
+    if not group.all("thing"):  # "go there"
+        goes = group.has("GO", "VISIT", "NEAR") and group.only("GO", "VISIT", "NEAR", "NEXTTO", "BACK", "UPTO")
+        return group.has("IT") and goes and not group.all("dir")
     going = group.has("GO", "VISIT", "NEAR", "HIT", "NEXTSTOP", "NEXTTO", "GOON")
     return going or group.has("TO", "UPTO", "UNTIL")
 
@@ -179,9 +181,9 @@ def _goes_to(group: Group) -> bool:
 def _legs(group: Group) -> Iterator[tuple[float, Clause]]:
     """The legs that a group says: one, or one for each direction with the same amount."""
     listed = (
-        *VERBS, "dir", "side", "amount", "until", "TURN", "WALL", "TOP", "BOTTOM", "ALLWAY", "ASHIGH", "ASLOW", "thing", "PAST", "PASS",
-        "HIT", "NEXTTO", "NEAR", "VISIT", "EACH", "DIAGONAL", "FARTHEST", "SIDE", "BLOCKED", "INFRONT", "FREE", "OVER", "STOP",
-    )  # fmt: skip
+        *VERBS,
+        *clause_kinds("leg"),
+    )
     if group.has("IS") or not group.only(*listed) or len(group.all("amount")) > 1 or len(group.all("until")) > 1:
         return
     ways = [*group.all("dir"), *(group.all("side") if not group.has("dir") else ())]
@@ -194,6 +196,8 @@ def _legs(group: Group) -> Iterator[tuple[float, Clause]]:
         ways = ["up"]
     if not ways and group.has("WALL", "SIDE") and group.has("FARTHEST"):
         ways = ["forward"]
+    if any(text.startswith(("you", "last time")) for text in group.all("LAST")):
+        return  # "you went left"
     if group.has("NO") and (group.at("NO") > 0 or group.at("amount") == 1):
         return
     cost = 1.0 if group.at("GO", "MOVE") > max(0, group.at("dir")) else 0.0
@@ -201,7 +205,7 @@ def _legs(group: Group) -> Iterator[tuple[float, Clause]]:
         return
     if group.has("TURN") and 0 <= group.at("TURN") < group.at("GO", "MOVE"):
         return
-    if len(ways) == 1 and ways[0] in DIAGONALS or len(ways) > 1 and group.has("EACH", "DIAGONAL"):
+    if (len(ways) == 1 and ways[0] in DIAGONALS) or (len(ways) > 1 and group.has("EACH", "DIAGONAL")):
         if group.only(*VERBS, "dir", "side", "amount", "EACH", "DIAGONAL"):
             each = [way for named in ways for way in DIAGONALS.get(named, (named,))]
             amount = (group.all("amount") or [Amount(1.0)])[0]
@@ -215,7 +219,8 @@ def _leg(group: Group, way: str) -> Stretch | None:
     turns = group.has("TURN") or way in ("cw", "ccw")
     if turns and way not in ("left", "right", "cw", "ccw"):
         return None
-    limits = (group.has("SIDE") and group.has("FARTHEST")) or group.has("WALL", "TOP", "BOTTOM", "ALLWAY", "ASHIGH", "ASLOW", "BLOCKED")
+    limits = group.has("WALL", "TOP", "BOTTOM", "ALLWAY", "ASHIGH", "ASLOW", "BLOCKED")
+    limits = limits or (group.has("SIDE") and group.has("FARTHEST"))  # "the far side"
     amounts, untils, things = group.all("amount"), group.all("until"), group.all("thing")
     if group.has("FREE", "STOP", "INFRONT", "SIDE", "FARTHEST") and not (limits or untils or things):
         return None
@@ -235,10 +240,14 @@ def _leg(group: Group, way: str) -> Stretch | None:
         if len(things) > 1 or way == "back":
             return None
         if group.has("PAST", "PASS"):
-            return Stretch(way, turns, None, CLEAR, things[0]) if 0 <= group.at("dir") < group.at("PAST", "PASS") else None
+            return (
+                Stretch(way, turns, None, CLEAR, things[0]) if 0 <= group.at("dir") < group.at("PAST", "PASS") else None
+            )
         if not group.has("TO", "UPTO", "HIT", "NEXTTO", "NEAR", "VISIT", "INFRONT"):
             return None
-        in_order = group.at("dir") < group.at("TO", "UPTO", "HIT", "NEXTTO", "NEAR", "VISIT", "INFRONT") < group.at("thing")
+        in_order = (
+            group.at("dir") < group.at("TO", "UPTO", "HIT", "NEXTTO", "NEAR", "VISIT", "INFRONT") < group.at("thing")
+        )
         return Stretch(way, turns, None, "object", things[0]) if in_order else None
     if group.has("PAST", "PASS"):
         return Stretch(way, turns, None, CLEAR, IT) if group.has("IT") else None
@@ -278,224 +287,8 @@ def _until(items: Sequence[Any]) -> tuple[str, Thing | None, str] | None:
         return (WALL, None, "") if thing is None else None
     if "CAN" in words and not negated and thing is None:
         return CLEAR, None, towards
-    if (thing is not None or "IT" in words and words & {"HIT", "NEXTTO", "NEAR"}) and not negated and not ways:
+    if (thing is not None or ("IT" in words and words & {"HIT", "NEXTTO", "NEAR"})) and not negated and not ways:
         return "object", thing or IT, ""
     if "HIT" in words and not negated and not ways:
         return WALL, None, ""
     return None
-
-
-# ---- what is referred to -------------------------------------------------------------------------------------------------
-
-
-class MapReferents:
-    """Turns the clauses of a sentence into intents on a map; it remembers what was named last."""
-
-    def __init__(self, scene: GridScene) -> None:
-        self.scene = scene
-        self._thing: SceneObject | None = None
-        self._unit: float | None = None
-
-    def intents(self, clauses: Sequence[Clause]) -> tuple[Intent, ...]:
-        """The intents of the clauses, in order. Raises Unclear or Misfit."""
-        found: list[Intent] = []
-        for clause in without_going_on(clauses):
-            if isinstance(clause, Said) and clause.rule in ("avoid", "allow"):
-                found += [intent for intent in self._rules(clause) if intent not in found[-1:]]
-                continue
-            intent = self._intent(clause, found) if isinstance(clause, Said) else clause
-            if intent is None or (found and found[-1] == intent and not isinstance(intent, Go)):
-                continue
-            if isinstance(intent, Go) and found and isinstance(found[-1], Go):
-                intent = Go((*found.pop().legs, *intent.legs))  # type: ignore[union-attr]
-            found.append(intent)
-        if not found:
-            raise Misfit
-        for intent in found:
-            if isinstance(intent, Go):
-                _check_clear(intent.legs)
-        return tuple(found)
-
-    def _intent(self, clause: Said, before: Sequence[Intent]) -> Intent | None:
-        values = clause.values
-        match clause.rule:
-            case "unclear":
-                raise Unclear(str(values[0]))
-            case "reason":
-                if values:
-                    self._object(values[0])
-                return None
-            case "stay":
-                if not before or not isinstance(before[-1], Go | To | Around):
-                    raise Misfit
-                return None
-            case "stop":
-                has_moved = bool(before) and isinstance(before[-1], Go | To | Around)
-                return None if has_moved and values[0] else Stop()
-            case "go":
-                return Go(tuple(self._leg(stretch) for stretch in values))
-            case "to":
-                return To(self._object(values[0]).id)
-            case "around":
-                thing = self._object(values[0])
-                return Around(thing.id, None if values[1] is None else self._action(values[1]))
-            case "also":  # "keep away from the toaster and the left cube"
-                if not before or not isinstance(before[-1], To | Around | Avoid | Allow):
-                    raise Misfit
-                id_ = self._object(values[0]).id
-                return Around(id_, before[-1].side) if isinstance(before[-1], Around) else type(before[-1])(id_)
-        raise AssertionError(clause)
-
-    def _rules(self, clause: Said) -> list[Intent]:
-        """The rules that a clause makes or ends: one, or one for each of "the cubes"."""
-        made = Avoid if clause.rule == "avoid" else Allow
-        thing = clause.values[0]
-        if thing == ALL:
-            return [Allow(ALL)]
-        if thing.is_plural and len(thing.ids) > 1 and not thing.adjectives and not thing.posts:
-            return [made(id_) for id_ in thing.ids]
-        return [made(self._object(thing).id)]
-
-    def _action(self, way: str, turns: bool = False) -> str:
-        """The action of a direction. Raises Unclear if there is none."""
-        scene = self.scene
-        if turns:
-            action = f"turn {'left' if way in ('left', 'ccw') else 'right'}"
-            if action not in scene.actions:
-                raise Unclear(f"it cannot turn here: say {_listed(scene.actions)}")
-            return action
-        if way in ("higher", "lower") and not scene.has_height:
-            raise Unclear("there is no height here: say forward or backward")
-        flat = {"up": "forward", "down": "backward"}
-        action = {"back": "backward", "reverse": "backward", "higher": "up", "lower": "down"}.get(way, way)
-        if action in flat and not scene.has_height and flat[action] in scene.actions:
-            action = flat[action]
-        if action not in scene.actions:  # some maps call them up and down
-            action = {"forward": "up", "backward": "down"}.get(action, action)
-        if action not in scene.actions:
-            raise Unclear(f"there is no action '{action}' here: say {_listed(scene.actions)}")
-        return action
-
-    def _leg(self, stretch: Stretch) -> Leg:
-        direction = self._action(stretch.way, stretch.turns)
-        until, past = stretch.until, ""
-        towards = self._action(stretch.towards) if stretch.towards else ""
-        if stretch.thing is not None:
-            if until == CLEAR and stretch.thing == IT and self._thing is None:
-                return Leg(direction, None, CLEAR, towards)
-            thing = self._object(stretch.thing)
-            until, past = (CLEAR, thing.id) if until == CLEAR else (thing.id, "")
-        if until:
-            return Leg(direction, None, until, towards, past)
-        assert stretch.amount is not None
-        return Leg(direction, self._steps(stretch.amount))
-
-    def _steps(self, amount: Amount) -> int:
-        """The number of steps of an amount; a bare number after a length may be one of the same unit."""
-        number = amount.number
-        if amount.unit is not None:
-            self._unit = amount.unit
-            return self._whole(number, self.scene.cell_cm, f"{number:g} cm")
-        if amount.is_bare and self._unit is not None and self.scene.cell_cm:
-            cells = number * self._unit / self.scene.cell_cm
-            fits_length = cells == int(cells) and 1 <= cells <= self.scene.extent
-            fits_steps = number == int(number) and 1 <= number <= self.scene.extent
-            if fits_length and fits_steps and cells != number:
-                raise Unclear(f"{number:g} may be steps or a length: say which")
-            if fits_length:
-                return int(cells)
-        return self._whole(number, 1.0, f"{number:g} steps")
-
-    def _whole(self, number: float, cell_cm: float | None, said: str) -> int:
-        if not cell_cm:
-            raise Unclear(f"{said}: the size of a step is unknown here, say a number of steps")
-        cells = round(number / cell_cm, 6)
-        if cells != int(cells) or not 1 <= cells <= MOST_STEPS:
-            unit = "" if "steps" in said else f" of {cell_cm:g} cm"
-            raise Unclear(f"{said}: wanted a whole number of steps{unit}, from 1 to {MOST_STEPS}")
-        return int(cells)
-
-    # objects
-
-    def _object(self, thing: Thing) -> SceneObject:
-        """The object that is meant; it is the one that was named last from now on. Raises Unclear if several fit."""
-        if thing == IT:
-            if self._thing is None:
-                raise Unclear("'it' is no object that was named: name it")
-            return self._thing
-        ids = thing.ids or self._alike()
-        objects = [self.scene.object(id_) for id_ in ids]
-        every = objects
-        for adjective in thing.adjectives:
-            objects = self._fitting(objects, adjective)
-        for post in thing.posts:
-            there = self._fitting(every, post)
-            objects = [thing for thing in objects if thing in there]
-            if not objects:
-                raise Misfit
-        if len(objects) != 1:
-            names = _listed([f"the {word} {objects[0].names[0] if objects else 'object'}" for word in ("left", "nearest")])
-            raise Unclear(f"{len(objects)} objects fit: say which, such as {names}")
-        self._thing = objects[0]
-        return objects[0]
-
-    def _alike(self) -> tuple[str, ...]:
-        """The objects that "one" may mean: those of the only name that several have."""
-        names = {name for thing in self.scene.objects for name in thing.names}
-        groups = {tuple(o.id for o in self.scene.objects if name in o.names) for name in names}
-        several = [ids for ids in groups if len(ids) > 1]
-        if len(several) != 1:
-            raise Misfit
-        return several[0]
-
-    def _fitting(self, objects: Sequence[SceneObject], adjective: Any) -> list[SceneObject]:
-        if len(objects) < 2:
-            return list(objects)
-        robot = self.scene.robot
-        if isinstance(adjective, tuple):
-            there = MapReferents(self.scene)._object(adjective[1])
-            objects = [thing for thing in objects if thing.id != there.id]
-            return _least(objects, lambda thing: min(_steps_between(a, b) for a in thing.cells for b in there.cells))
-        if adjective in ("near", "far", "ahead") and robot is None:
-            raise Unclear("where the robot is cannot be seen here: say which object in another way")
-        if adjective == "ahead":
-            assert robot is not None
-            ahead = [thing for thing in objects if any(c == robot[1] and r < robot[0] for r, c in thing.cells)]
-            return _least(
-                ahead, lambda thing: min(robot[0] - r for r, c in thing.cells if c == robot[1] and r < robot[0])
-            )
-        keys: dict[str, Callable[[SceneObject], float]] = {
-            "left": lambda thing: _middle(thing, 1),
-            "right": lambda thing: -_middle(thing, 1),
-            "up": lambda thing: _middle(thing, 0),
-            "down": lambda thing: -_middle(thing, 0),
-            "near": lambda thing: min(_steps_between(robot or (0, 0), cell) for cell in thing.cells),
-            "far": lambda thing: -min(_steps_between(robot or (0, 0), cell) for cell in thing.cells),
-            "big": lambda thing: -len(thing.cells),
-            "small": lambda thing: len(thing.cells),
-        }
-        return _least(objects, keys[adjective])
-
-
-def _listed(names: Sequence[str]) -> str:
-    return f"{', '.join(names[:-1])} or {names[-1]}" if len(names) > 1 else "".join(names)
-
-
-def _check_clear(legs: Sequence[Leg]) -> None:
-    """Raises Unclear if a leg ends where another direction gets free than that of the next leg."""
-    for leg, following in zip(legs, (*legs[1:], None), strict=True):
-        if leg.until == CLEAR and leg.towards and following is not None and leg.towards != following.direction:
-            raise Unclear(f"the way {leg.towards} gets free, but then it goes {following.direction}: say one of them")
-
-
-def _least(objects: Sequence[SceneObject], key: Callable[[SceneObject], float]) -> list[SceneObject]:
-    least = min(map(key, objects), default=0.0)
-    return [thing for thing in objects if key(thing) == least]
-
-
-def _middle(thing: SceneObject, axis: int) -> float:
-    return sum(cell[axis] for cell in thing.cells) / len(thing.cells)
-
-
-def _steps_between(first: Cell, second: Cell) -> int:
-    return abs(first[0] - second[0]) + abs(first[1] - second[1])

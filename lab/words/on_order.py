@@ -1,13 +1,10 @@
 """What groups of words mean on the order of transfers: moves, and rules about parts and stations."""
 
 from collections.abc import Iterator, Sequence
-from typing import Any
 
-from lab.words.clauses import NO_COMMAND, Clause, Group, Said, common, without_going_on
-from lab.words.meaning import Allow, Before, Finish, Intent, Move, Never, Stop, Work
-from lab.words.on_map import Misfit, Unclear
-from lab.words.scene import OrderScene
-from lab.words.slots import Part, Slot
+from lab.words.clauses import NO_COMMAND, SEPARATORS, Clause, Group, Said, common
+from lab.words.slots import Part
+from lab.words.vocabulary import clause_kinds
 
 IT = Part()  # the part that was named last
 THERE = "there"  # the station that was named last
@@ -23,7 +20,8 @@ def meanings(group: Group) -> Iterator[tuple[float, Clause]]:
     elif (before := _before(group)) is not None:
         yield 0.0, before
     elif (in_turn := _in_turn(group)) is not None:
-        yield (0.0 if not group.has("THEN") else -7.0 if group.has("FIRST", "PRIORITY") else -3.0), in_turn  # its "then" is no border
+        border = SEPARATORS["THEN"] + 1.0 if group.has("FIRST", "PRIORITY") else SEPARATORS["THEN"] / 2
+        yield (-border if group.has("THEN") else 0.0), in_turn  # its "then" is no border
     if (finish := _finish(group)) is not None:
         yield 0.0, finish
     elif not group.has("BEFORE", "AFTER"):
@@ -51,15 +49,19 @@ def _parts(group: Group) -> list[Part]:
 
 def _number(group: Group) -> Said | None:
     named = group.all("numbered")
-    listed = ("numbered", "PUT", "CHOOSE", "NUMBER", "ORDINALNOUN", "OWN", "GOON", "EVERY", "IN", "MORE", "part", "LET")
+    listed = clause_kinds("number")
     if len(named) != 1 or not group.only(*listed) or any(not part.is_next for part in group.all("part")):
         return None
     return Said("number", (named[0],))
 
 
 def _move(group: Group) -> Said | None:
-    listed = ("part", "station", "work", "PUT", "FROM", "IN", "NEXT", "LET", "CHOOSE", "NO", "LONG", "EVERY", "AND", "MORE", "LAST", "GOON", "WAIT", "ORDINALNOUN")
-    if not group.only(*listed) or (group.has("NO") and group.at("NO") > 0) or (group.has("WAIT") and not group.has("station")):
+    listed = clause_kinds("move")
+    if (
+        not group.only(*listed)
+        or (group.has("NO") and group.at("NO") > 0)
+        or (group.has("WAIT") and not group.has("station"))
+    ):
         return None
     parts, stations, works = _parts(group), _places(group), group.all("work")
     if len(parts) > 1 or len(stations) > 2 or len(works) > 1 or (parts and (parts[0].is_none or parts[0].is_any)):
@@ -72,9 +74,8 @@ def _move(group: Group) -> Said | None:
         return None  # "slice 1 is buttered"
     if group.has("WAIT"):
         return None
-    if not parts and not group.has("IT"):
-        if len(stations) != 2 or group.has("THEN", "COMMA", "AND", "DOT"):
-            return None
+    if not parts and not group.has("IT") and (len(stations) != 2 or group.has(*SEPARATORS)):
+        return None
     part = parts[0] if parts else IT if group.has("IT") else Part(is_any=True)
     if not (stations or works or group.has("PUT", "CHOOSE") or any(part.is_next for part in group.all("part"))):
         return None
@@ -91,9 +92,13 @@ def _ends_of(group: Group, stations: Sequence[str]) -> tuple[str | None, str | N
     if not stations:
         return None, None
     leaves = [
-        station for station in stations
-        if any(a.kind == "FROM" and b.kind == "station" and b.value == station for a, b in zip(group.slots, group.slots[1:]))
-    ]  # fmt: skip
+        station
+        for station in stations
+        if any(
+            a.kind == "FROM" and b.kind == "station" and b.value == station
+            for a, b in zip(group.slots, group.slots[1:], strict=False)
+        )
+    ]
     if len(stations) == 2:
         second_left = leaves == [stations[1]]
         return (stations[1], stations[0]) if second_left else (stations[0], stations[1])
@@ -101,17 +106,24 @@ def _ends_of(group: Group, stations: Sequence[str]) -> tuple[str | None, str | N
 
 
 def _never(group: Group) -> Said | None:
-    listed = ("WAIT", "LET", "part", "station", "NOT", "NO", "NEVER", "NOTHING", "NOLONGER", "IN", "EACHTIME", "LONG", "PUT", "DONE", "MORE", "ANYMORE", "EVERY", "STOP", "GO", "CAN", "OFFLIMITS", "CANCEL")
-    if group.has("EMPTY") and group.has("LET") and group.only("EMPTY", "LET", "station", "EACHTIME") and len(group.all("station")) == 1:
+    listed = clause_kinds("never")
+    keeps_empty = group.has("EMPTY") and group.has("LET") and group.only("EMPTY", "LET", "station", "EACHTIME")
+    if keeps_empty and len(group.all("station")) == 1:
         return Said("never", (Part(is_any=True), group.all("station")[0]))
     none = any(part.is_none for part in group.all("part"))
-    if not group.only(*listed) or not (group.has("NOT", "NO", "NEVER", "NOTHING", "NOLONGER", "STOP") or none) or group.has("DONE") and not group.has("WAIT", "LET"):
+    if not group.only(*listed) or not (group.negated or group.has("STOP") or none):
         return None
     stations = _places(group)
     if not group.has("WAIT", "LET") or len(stations) != 1 or len(_parts(group)) > 1:
         return None
     parts = _parts(group)
-    part = parts[0] if parts else IT if group.has("IT") and not group.has("WAIT") or _it_is_a_part(group) else Part(is_any=True)
+    part = (
+        parts[0]
+        if parts
+        else IT
+        if (group.has("IT") and not group.has("WAIT")) or _it_is_a_part(group)
+        else Part(is_any=True)
+    )
     return Said("never", (part, stations[0]))
 
 
@@ -121,10 +133,7 @@ def _it_is_a_part(group: Group) -> bool:
 
 # ---- one work before another -----------------------------------------------------------------------------------------------
 
-WORKS = (
-    "part", "station", "work", "PUT", "FROM", "IN", "NEXT", "LET", "FINISH", "DONE", "EACHTIME", "EVERY", "FIRST", "NOT", "NO", "NEVER",
-    "NOTHING", "ONLYTHEN", "HOLD", "MORE", "GO", "STOP", "BUT", "THEN", "AND", "COMMA", "CAN", "GOON", "WAIT", "LAST", "ANYMORE", "NOLONGER", "UNTILDONE", "PRIORITY", "WAS",
-)  # fmt: skip
+WORKS = clause_kinds("work")
 
 
 def _before(group: Group) -> Said | None:
@@ -199,12 +208,10 @@ def _work(group: Group) -> Said | None:
 
 
 def _finish(group: Group) -> Said | None:
-    listed = (
-        "part", "FINISH", "WORKON", "PRIORITY", "FIRST", "DONE", "REST", "UNTILDONE", "PUT", "LET", "EACHTIME", "THEN", "AND", "GOON",
-        "ONLYTHEN", "COMMA", "IN", "MORE", "LONG", "CHOOSE", "BUT", "ANYPART", "BEFORE", "GOOD", "WAIT", "FROM", "numbered",
-    )  # fmt: skip
+    listed = clause_kinds("finish")
     if group.has("AFTER") and 0 <= group.at("REST") < group.at("AFTER") < group.at("part"):  # "all else can wait until"
-        return Said("finish", (group.all("part")[-1],)) if group.only("REST", "AFTER", "part", "DONE", "WAIT", "FINISH", "LET") else None
+        waits = group.only("REST", "AFTER", "part", "DONE", "WAIT", "FINISH", "LET")
+        return Said("finish", (group.all("part")[-1],)) if waits else None
     parts = [part for part in group.all("part") if not part.is_any]
     others = [part for part in group.all("part") if part.is_any]
     if not group.only(*listed) or len(parts) > 1 or (not parts and not group.has("IT")):
@@ -213,152 +220,32 @@ def _finish(group: Group) -> Said | None:
         return None
     if others and not group.has("BEFORE", "PRIORITY"):
         return None
-    if group.has("numbered") and group.all("numbered") != [1.0] or group.has("WAIT") and not group.has("REST"):
+    if (group.has("numbered") and group.all("numbered") != [1.0]) or (group.has("WAIT") and not group.has("REST")):
         return None
     done = group.has("DONE") and group.has("PUT", "LET")
-    if not done and not group.has("FINISH", "WORKON", "PRIORITY", "FIRST") and not (group.has("BEFORE") and group.has("REST")) and not group.has("numbered"):
+    before_all = group.has("BEFORE") and group.has("REST")
+    if not (done or before_all or group.has("FINISH", "WORKON", "PRIORITY", "FIRST", "numbered")):
         return None
     return Said("finish", (parts[0] if parts else IT,))
 
 
 def _is_reason(group: Group) -> bool:
-    if group.negated or group.has("PUT", "CHOOSE") or not group.has("DONE", "work", "WAIT", "LONG", "PRIORITY", "BECAUSE"):
+    if (
+        group.negated
+        or group.has("PUT", "CHOOSE")
+        or not group.has("DONE", "work", "WAIT", "LONG", "PRIORITY", "BECAUSE")
+    ):
         return False
     works = group.all("work")
     if works and not all(text.endswith("ed") for _, text in works):
         return False
-    return group.only("part", "station", "work", "DONE", "IN", "WAIT", "LONG", "BECAUSE", "WAS")
+    return group.only(*["part", "station", "work", "DONE", "IN", "WAIT", "LONG", "BECAUSE", "WAS"])
 
 
 def _is_left_out(group: Group) -> bool:
     """Whether a group is like "no toasting", after a move that leaves that out."""
-    return group.has("NO", "SKIP") and group.has("work", "station") and group.only("NO", "SKIP", "work", "station", "PUT", "IN")
-
-
-# ---- what is referred to -------------------------------------------------------------------------------------------------
-
-
-class OrderReferents:
-    """Turns the clauses of a sentence into intents on the order; it remembers the part and the station that were named last."""
-
-    def __init__(self, scene: OrderScene) -> None:
-        self.scene = scene
-        self._part: str | None = None
-        self._station: str | None = None
-
-    def intents(self, clauses: Sequence[Clause]) -> tuple[Intent, ...]:
-        """The intents of the clauses, in order. Raises Unclear or Misfit."""
-        found: list[Intent] = []
-        for clause in without_going_on(clauses):
-            for intent in self._intents(clause) if isinstance(clause, Said) else (clause,):
-                if not (found and found[-1] == intent):
-                    found.append(intent)
-        if not found:
-            raise Misfit
-        return tuple(found)
-
-    def _intents(self, clause: Said) -> tuple[Intent, ...]:
-        values = clause.values
-        match clause.rule:
-            case "unclear":
-                raise Unclear(str(values[0]))
-            case "reason":
-                if values:
-                    self._named(values[0])
-                return ()
-            case "stay":
-                raise Misfit
-            case "stop":
-                return (Stop(),)
-            case "number":
-                numbers = {move.number for move in self.scene.moves}
-                if values[0] not in numbers:
-                    raise Unclear(f"{values[0]:g} is none of the moves: {_listed([str(n) for n in sorted(numbers)])}")
-                return (Move(int(values[0])),)
-            case "move":
-                return (self._move(*values),)
-            case "finish":
-                return (Finish(self._single(values[0])),)
-            case "never":
-                part, station = values
-                return (Never(self._part_or_any(part), self._place(station)),)
-            case "before":
-                return (self._before(*values),)
-            case "in turn":
-                return self._in_turn(*values)
-        raise AssertionError(clause)
-
-    def _before(self, first: Said, second: Said) -> Before:
-        works = [self._work(work) for work in (first, second)]
-        verbs = [bool(work.values[2]) for work in (first, second)]
-        if verbs[0] and works[0].part and works[1].part and works[1].station is None:
-            works[1] = Work(works[1].part, works[0].station)  # "washed before the gear"
-        if works[0] == works[1] or Work() in works:
-            raise Misfit
-        return Before(works[0], works[1])
-
-    def _in_turn(self, first: Said, second: Said) -> tuple[Intent, ...]:
-        """Two moves if both are allowed now, else one work before the other."""
-        try:
-            pair = tuple(
-                self._move(part, None, station)
-                for part, station, _ in (first.values, second.values)
-                if station and not part.is_any
-            )
-        except (Unclear, Misfit):
-            pair = ()
-        return pair if len(pair) == 2 else (self._before(first, second),)
-
-    def _place(self, station: str) -> str:
-        if station == THERE:
-            if self._station is None:
-                raise Unclear("'there' is no station that was named: name it")
-            return self._station
-        self._station = station
-        return station
-
-    def _named(self, part: Part) -> tuple[str, ...]:
-        if part == IT:
-            if self._part is None:
-                raise Unclear("'it' is no part that was named: name it")
-            return (self._part,)
-        if len(part.parts) == 1:
-            self._part = part.parts[0]
-        return part.parts
-
-    def _single(self, part: Part) -> str:
-        parts = self._named(part)
-        if len(parts) != 1:
-            raise Unclear(f"several parts fit: say which of {_listed(parts)}")
-        return parts[0]
-
-    def _part_or_any(self, part: Part) -> str | None:
-        """The part; None for any, also for a kind as "bread"."""
-        parts = () if part.is_any else self._named(part)
-        return parts[0] if len(parts) == 1 else None
-
-    def _move(self, part: Part, origin: str | None, target: str | None) -> Move:
-        parts = self.scene.parts if part.is_any else self._named(part)
-        origin = None if origin is None else self._place(origin)
-        target = None if target is None else self._place(target)
-        fitting = [
-            move for move in self.scene.moves
-            if move.part in parts and origin in (None, move.origin) and target in (None, move.target)
-        ]  # fmt: skip
-        if len(fitting) != 1:
-            among = fitting or [move for move in self.scene.moves if move.part in parts] or self.scene.moves
-            known = _listed([f"{move.number} ({move.part}, {move.origin} to {move.target})" for move in among[:4]])
-            said = "several moves fit" if fitting else "that is none of the moves now"
-            raise Unclear(f"{said}: {known}")
-        self._part, self._station = fitting[0].part, fitting[0].target
-        return Move(fitting[0].number)
-
-    def _work(self, work: Said) -> Work:
-        part, station, _ = work.values
-        if part == IT and self._part is None:
-            part = Part(is_any=True)  # "everything has to be washed before it goes to the exit"
-        return Work(self._part_or_any(part), None if station is None else self._place(station))
-
-
-def _listed(names: Sequence[str]) -> str:
-    return f"{', '.join(names[:-1])} or {names[-1]}" if len(names) > 1 else "".join(names)
+    return (
+        group.has("NO", "SKIP")
+        and group.has("work", "station")
+        and group.only("NO", "SKIP", "work", "station", "PUT", "IN")
+    )

@@ -1,8 +1,8 @@
-"""Raw text to tokens: contractions, typing errors, numbers, lengths, the names of the scene, and the phrases of the vocabulary."""
+"""Raw text to tokens: contractions, typing errors, numbers, lengths, the names of the scene, and phrases of the vocabulary."""
 
 import re
 import unicodedata
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -30,14 +30,69 @@ CONTRACTIONS = (
         "n't": "not", "'re": "are", "'ve": "have", "'ll": "will", "'d": "would", "'m": "am", "'s": "is",
     }.items()),
 )  # fmt: skip
-ARROWS = {"->": "arrowright", "=>": "arrowright", "→": "arrowright", "←": "arrowleft", "↑": "arrowup", "↓": "arrowdown", "⇒": "arrowright"}
+ARROWS = {
+    "->": "arrowright",
+    "=>": "arrowright",
+    "→": "arrowright",
+    "←": "arrowleft",
+    "↑": "arrowup",
+    "↓": "arrowdown",
+    "⇒": "arrowright",
+}
 TAG = re.compile(
-    r"(?<=[,;]) (?:do|does|did|is|are|was|were|has|have|can|could|will|would|should|must|shall)(?: not)? (?:it|you|we|i|they)(?= [?.!,]|$)"
+    r"(?<=[,;]) (?:do|does|did|is|are|was|were|has|have|can|could|will|would|should|must|shall)(?: not)?"
+    r" (?:it|you|we|i|they)(?= [?.!,]|$)"
 )  # "that was good, wasn't it?"
 PUNCTUATION = {",": "COMMA", ":": "COMMA", ".": "DOT", "!": "DOT", "?": "DOT", ";": "DOT"}
-NOT_MANNERS = frozenset(["only", "hardly", "barely", "nearly", "early", "fly", "apply", "reply", "supply", "family", "jelly", "belly", "rely", "hourly", "daily"])
-TELLING = frozenset(["i", "my", "we", "our", "he", "she", "because", "since", "yesterday"])
-TELLS = frozenset(["NOT", "NEVER", "AVOID", "NEAR", "STOP", "IF", "OR", "CANCEL", "RULE", "BEFORE", "AFTER", "FINISH", "OFFLIMITS", "LEFT", "RIGHT", "FORWARD", "BACK", "UP", "DOWN", "UNDO", "ASK"])  # they make it more than a story
+NOT_MANNERS = frozenset(
+    [
+        *[
+            "only",
+            "hardly",
+            "barely",
+            "nearly",
+            "early",
+            "fly",
+            "apply",
+            "reply",
+            "supply",
+            "family",
+            "jelly",
+            "belly",
+            "rely",
+            "hourly",
+            "daily",
+        ]
+    ]
+)
+TELLING = frozenset([*["i", "my", "we", "our", "he", "she", "because", "since", "yesterday"]])
+TELLS = frozenset(
+    [
+        *[
+            "NOT",
+            "NEVER",
+            "AVOID",
+            "NEAR",
+            "STOP",
+            "IF",
+            "OR",
+            "CANCEL",
+            "RULE",
+            "BEFORE",
+            "AFTER",
+            "FINISH",
+            "OFFLIMITS",
+            "LEFT",
+            "RIGHT",
+            "FORWARD",
+            "BACK",
+            "UP",
+            "DOWN",
+            "UNDO",
+            "ASK",
+        ]
+    ]
+)  # they make it more than a story
 RELATIVES = frozenset(["that", "which", "who", "that is", "which is", "where", "what is", "what", "who is"])
 POINTING = frozenset(["that", "this", "those", "these"])
 NAMES = frozenset(["NAME", "PART", "KIND", "STATION", "ACTKIND"])  # kinds of names of the scene
@@ -76,7 +131,11 @@ def _in_plain_order(text: str) -> str:
     text = re.sub(r"\bbefore you(?= [,.;!?]|$)", "in front of you", text)
     text = re.sub(r"\b(is|are|was|has been|have been)( now| already| all)? clean\b", r"\1 cleaned", text)
     text = re.sub(r"\bthe (near|close)\b(?! to\b)", "the nearest", text)
-    text = re.sub(r"\bright (?=(next to|in front|beside|behind|against|up against|in between|on top|away|now|there|here)\b)", "", text)
+    text = re.sub(
+        r"\bright (?=(next to|in front|beside|behind|against|up against|in between|on top|away|now|there|here)\b)",
+        "",
+        text,
+    )
     text = re.sub(r"\b(?:the )?very (left|right|top|bottom|end|front|back)\b", r"all the way to the \1", text)
     text = re.sub(r"\bthe reverse\b(?! side)", "the opposite", text)
     able = "(?:you (?:can|are able to)|possible|it goes|it will|it can)(?: go| move)?"
@@ -101,7 +160,9 @@ def _without_stories(parts: Sequence[tuple[str, list[Token]]]) -> list[Token]:
     """The tokens without the parts in which a person only tells something, as "I burnt my toast yesterday, so ..."."""
     parts = [(first, tokens) for first, tokens in parts if not _is_exclamation(tokens)] or list(parts)
     stories = [
-        (first in TELLING or tokens[-1].text == ":") and any(token.kind == UNKNOWN for token in tokens) and all(token.kind not in TELLS for token in tokens)
+        (first in TELLING or tokens[-1].text == ":")
+        and any(token.kind == UNKNOWN for token in tokens)
+        and all(token.kind not in TELLS for token in tokens)
         for first, tokens in parts
     ]
     if all(stories):

@@ -7,7 +7,7 @@ from lab.words.clauses import SEPARATORS
 from lab.words.slots import Amount, Slot
 
 Slots = tuple[Slot, ...]
-NAMING = frozenset(["dir", "side", "amount", "until", "thing", "part", "station", "work", "numbered"])
+NAMING = frozenset([*["dir", "side", "amount", "until", "thing", "part", "station", "work", "numbered"]])
 COMPLETE = {"dir": ("amount", "until"), "amount": ("dir",)}
 MOTIONS = frozenset(["GO", "MOVE", "TURN", "TO", "ON", "ONLYTHEN", "PUT", "IN"])
 
@@ -22,7 +22,11 @@ class NotClear(Exception):
 def as_meant(slots: Slots, on_map: bool) -> Slots:
     """The slots without what was taken back in the same breath and what is only said not to be meant. Raises NotClear."""
     slots = _with_single_breaks(slots)
-    if [slot.kind for slot in slots[1:2]] == ["COMMA"] and slots[0] == Slot("dir", "right") and slots[2].kind in ("GO", "MOVE", "TURN"):
+    if (
+        [slot.kind for slot in slots[1:2]] == ["COMMA"]
+        and slots[0] == Slot("dir", "right")
+        and slots[2].kind in ("GO", "MOVE", "TURN")
+    ):
         raise NotClear("'right' may be a direction or no more than 'well'")
     slots = _corrected(slots)
     slots = _without_asides(tuple(slot for slot in slots if slot.kind != "CORRECT"))
@@ -71,8 +75,20 @@ def _corrects(slots: Slots, at: int) -> bool:
         return slot.value not in WEAK or at == 0 or slots[at - 1].kind in SEPARATORS
     later = any(slot.kind in NAMING for slot in slots[at + 1 :])
     earlier = any(slot.kind in NAMING for slot in slots[_last_break(slots[: max(0, at - 1)]) : at])
-    is_apart = at > 0 and slots[at - 1].kind in ("COMMA", "DOT") and slots[at + 1 : at + 2] != () and slots[at + 1].kind in (*SEPARATORS, *NAMING, *MOTIONS)
-    return slot.kind == "NO" and slots[at + 1 : at + 2] != () and slots[at + 1].kind != "work" and is_apart and earlier and later
+    is_apart = (
+        at > 0
+        and slots[at - 1].kind in ("COMMA", "DOT")
+        and slots[at + 1 : at + 2] != ()
+        and slots[at + 1].kind in (*SEPARATORS, *NAMING, *MOTIONS)
+    )
+    return (
+        slot.kind == "NO"
+        and slots[at + 1 : at + 2] != ()
+        and slots[at + 1].kind != "work"
+        and is_apart
+        and earlier
+        and later
+    )
 
 
 def _merged(wrong: Sequence[Slot], right: Sequence[Slot]) -> list[Slot]:
@@ -98,7 +114,9 @@ def _put_in(wrong: Sequence[Slot], new: Sequence[Slot]) -> list[Slot]:
         if at is None:
             raise NotClear("say again in one sentence what is meant")
         if isinstance(slot.value, Amount) and isinstance(result[at].value, Amount) and slot.value.is_bare:
-            slot = Slot(slot.kind, replace(slot.value, unit=result[at].value.unit, is_bare=result[at].value.unit is None))
+            slot = Slot(
+                slot.kind, replace(slot.value, unit=result[at].value.unit, is_bare=result[at].value.unit is None)
+            )
         result[at] = slot
     return result
 
@@ -114,7 +132,11 @@ def _without_asides(slots: Slots) -> Slots:
         denied = {item.kind for item in slots[at + 1 : end] if item.kind in NAMING}
         if not denied or (end < len(slots) and slots[end].kind not in SEPARATORS):
             continue
-        if denied & {"thing", "station"} and any(item.kind in ("GO", "MOVE", "PUT") for item in slots[at + 1 : end]) and not _has_but(slots, end):
+        if (
+            denied & {"thing", "station"}
+            and any(item.kind in ("GO", "MOVE", "PUT") for item in slots[at + 1 : end])
+            and not _has_but(slots, end)
+        ):
             continue  # "don't go to the toaster" may be a rule
         rest = slots[:at] + slots[end + _has_but(slots, end) :]
         kept = {item.kind for item in rest if item.kind in NAMING}

@@ -12,14 +12,17 @@ from typing import Any
 
 from lab.lazy import lark
 from lab.words.reader import Token
+from lab.words.vocabulary import clause_kinds, rows
 
 MOST_READINGS = 256
 
 
 @dataclass(frozen=True)
 class Slot:
-    """A part of a sentence: "dir", "side", "amount", "until", "thing", "part", "station", "work" or "numbered" with its value, or the
-    kind of a single word."""
+    """A part of a sentence: its kind, and its value, which is the text of a single word.
+
+    The kinds in small letters are the grammar's: dir, side, amount, until, thing, part, station, work, numbered, unclear.
+    """
 
     kind: str
     value: Any = None
@@ -70,16 +73,22 @@ def slots_of(tokens: Sequence[Token], start: str) -> list[tuple[Slot, ...]]:
 
 @cache
 def _kinds(start: str) -> tuple[str, ...]:
-    from lab.words.vocabulary import rows
-
-    extra = ("COMMA", "DOT", "NUM", "ONE", "LENGTH", "NAME", "PART", "KIND", "STATION", "ACT", "ACTKIND", "ORDINAL", "THATIS")
+    extra = [
+        "COMMA",
+        "DOT",
+        "NUM",
+        "ONE",
+        "LENGTH",
+        "NAME",
+        "PART",
+        "KIND",
+        "STATION",
+        "ACT",
+        "ACTKIND",
+        "ORDINAL",
+        "THATIS",
+    ]
     return tuple(dict.fromkeys((*rows("common"), *rows("map"), *rows("order"), *extra)))
-
-
-IN_SLOTS = frozenset([
-    "LEFT", "RIGHT", "FORWARD", "UP", "DOWN", "HIGHER", "LOWER", "CW", "CCW", "NORTHWEST", "NORTHEAST", "SOUTHWEST", "SOUTHEAST",
-    "NUM", "LENGTH", "NAME", "THATIS", "PART", "STATION", "ACT", "KIND", "ACTKIND", "ONE", "STEP", "STEPS", "SKIPPED", "FILLER",
-])  # never words by themselves  # fmt: skip
 
 
 @cache
@@ -87,15 +96,15 @@ def _parser(start: str) -> Any:
     """The parser of a kind of scenes (a `lark.Lark`)."""
     kinds = _kinds(start)
     text = files("lab.words").joinpath("grammar.lark").read_text(encoding="utf-8")
-    marks = " | ".join(kind for kind in kinds if kind not in IN_SLOTS)
+    marks = " | ".join(kind for kind in kinds if kind not in clause_kinds("never alone"))
 
-    class Words(lark.lexer.Lexer):  # type: ignore[misc]
+    class Words(lark.lexer.Lexer):
         """Hands on the tokens as they are."""
 
         def __init__(self, conf: object) -> None:
             pass
 
-        def lex(self, tokens: Sequence[Token]) -> Iterator[Any]:
+        def lex(self, tokens: Any, parser_state: Any = None) -> Iterator[Any]:
             for token in tokens:
                 yield lark.Token(token.kind, token)
 
@@ -136,25 +145,23 @@ class _Forest:
         return [(made,) for made in _value(name, parts)]
 
 
-CONDITIONS = frozenset([
-    "WALL", "TOP", "BOTTOM", "PAST", "FREE", "BLOCKED", "SOMETHING", "HIT", "NEXTTO", "NEAR", "NOT", "NO", "NOLONGER", "NOTHING", "CAN",
-    "GO", "MOVE", "WAY", "INWAY", "INFRONT", "AHEADOF", "MORE", "ANYMORE", "TO", "ON", "OF", "IT", "ITS", "BEHIND", "PASS", "STUCK", "IS",
-])  # fmt: skip
-
-
 def _is_torn(first: Any, second: Any) -> bool:
     """Whether two slots that follow each other belong together, which another reading has."""
     if not isinstance(first, Slot) or not isinstance(second, Slot):
         return False
     if first.kind == "UNTIL":
-        return second.kind in CONDITIONS or second.kind in ("dir", "thing")
+        return second.kind in clause_kinds("condition") or second.kind in ("dir", "thing")
     if second.kind == "thing" and first.kind in ("dir", "FARTHEST", "NEAREST", "BIG", "SMALL", "TOP", "BOTTOM"):
         return True
     if first.kind == "TO" and second.kind == "amount":
         return True
     if first.kind == "until" and second.kind == "side":
         return isinstance(first.value[-1], tuple)
-    return (first.kind in ("TO", "ON", "ITS", "FROM") and second.kind == "dir") or (first.kind == "dir" and second.kind == "OF") or (first.kind == "until" and second.kind in CONDITIONS - {"GO", "MOVE"})
+    if first.kind == "until":
+        return second.kind in clause_kinds("condition") and second.kind not in ("GO", "MOVE")
+    if second.kind == "dir":
+        return first.kind in ("TO", "ON", "ITS", "FROM")
+    return first.kind == "dir" and second.kind == "OF"
 
 
 # ---- the value of each rule ------------------------------------------------------------------------------------------------
@@ -189,7 +196,11 @@ def _value(name: str, parts: tuple[Any, ...]) -> tuple[Any, ...]:
         case "thing" | "one":
             at = next((n for n, part in enumerate(parts) if isinstance(part, Token) and part.kind in ("NAME", "ONE")))
             ids = parts[at].value if name == "thing" else ()
-            return (Slot("thing", Thing(ids, parts[:at], parts[at + 1 :], name == "thing" and parts[at].text.endswith("s"))),)
+            return (
+                Slot(
+                    "thing", Thing(ids, parts[:at], parts[at + 1 :], name == "thing" and parts[at].text.endswith("s"))
+                ),
+            )
         case "beside":
             return (("beside", values[0].value),)
         case "named":

@@ -148,6 +148,12 @@ def known_words(section: str) -> frozenset[str]:
 
 
 @cache
+def clause_kinds(name: str) -> tuple[str, ...]:
+    """The kinds of words that may stand in a clause, by its name in the file."""
+    return rows("clauses")[name]
+
+
+@cache
 def other_words() -> frozenset[str]:
     """The English words that are near a known one and are not that word with a typing error."""
     return frozenset(word for listed in rows("other").values() for row in listed for word in row.split())

@@ -33,14 +33,24 @@ def sentences(name: str) -> Iterator[dict[str, Any]]:
         yield from map(json.loads, path.read_text(encoding="utf-8").splitlines())
 
 
-@pytest.mark.parametrize("name", ["development.jsonl", "own.jsonl", "held_out.jsonl"])
+FILES = (
+    "development.jsonl",
+    "development_2.jsonl",
+    "development_3.jsonl",
+    "development_4.jsonl",
+    "own.jsonl",
+    "held_out.jsonl",
+)
+
+
+@pytest.mark.parametrize("name", FILES)
 def test_sentences_of_strangers_are_understood_or_refused(name: str) -> None:
     lines = list(sentences(name))
     if not lines:
         pytest.skip(f"there is no {name}")
-    wrong = [line["say"] for line in lines if meant(line["say"], SCENES[line["scene"]]) != line["means"]]
-    refused = [{"refuse": True}]
-    false = [line["say"] for line in lines if meant(line["say"], SCENES[line["scene"]]) not in (line["means"], refused)]
+    heard = [(line, meant(line["say"], SCENES[line["scene"]])) for line in lines]
+    wrong = [line["say"] for line, meaning in heard if meaning != line["means"]]
+    false = [line["say"] for line, meaning in heard if meaning not in (line["means"], [{"refuse": True}])]
     assert len(wrong) <= (1 - UNDERSTOOD) * len(lines), wrong
     assert len(false) <= MISUNDERSTOOD * len(lines), false
 

@@ -6,7 +6,8 @@ import pytest
 from lab.mdp import grid
 from lab.words.listen import listen
 from lab.words.meaning import Refusal
-from lab.words.ways import Before, NoWay, SceneMap, obstacles_of, way
+from lab.words.scene_map import SceneMap, obstacles_of
+from lab.words.ways import Before, NoWay, way
 
 LETTERS = "fblr"  # forward, backward, left, right
 
