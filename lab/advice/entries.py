@@ -53,7 +53,11 @@ class SessionEntry:
 
 @dataclass(frozen=True)
 class Answer:
-    """The answer of a person or a language model: an action, None for "skip"; left: it advises no more, and why."""
+    """The answer of a person or a language model: an action, None for "skip"; left: it advises no more, and why.
+
+    holds: what the person has said in words that holds from here on (rules and times without questions, see
+    `lab.seat.spoken_answers`), None if that is as before.
+    """
 
     by: str
     episode: int
@@ -62,6 +66,7 @@ class Answer:
     action: int | None
     left: bool = False
     why: str = ""
+    holds: tuple[dict[str, Any], ...] | None = field(default=None, metadata={"written": "if not None"})
 
 
 @dataclass(frozen=True)

@@ -1,10 +1,12 @@
 """Answers in words: sentences become moves, rules that hold until they are taken back, and times without questions."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
+from lab.errors import BadInput
 from lab.learning.requests import AdviceRequest, Request
 from lab.mdp import TabularMDP
 from lab.seat import order_text, request_text
@@ -12,7 +14,7 @@ from lab.seat.grid_text import DIRECTIONS, StateWords, direction_of, points_by_n
 from lab.sequencing.search import SequenceRequest
 from lab.view.value_levels import GridPlanes
 from lab.words.listen import listen
-from lab.words.meaning import ALL, Allow, Avoid, Before, Finish, Go, Intent, Move, Never, Quiet, Refusal, Work
+from lab.words.meaning import ALL, Allow, Avoid, Before, Finish, Go, Intent, Move, Never, Quiet, Refusal, Work, rule_of
 from lab.words.said import called, in_words
 from lab.words.scene import AllowedMove, OrderScene, Scene
 from lab.words.scene_map import SceneMap, obstacles_of
@@ -128,6 +130,32 @@ class SpokenAnswers:
             case Quiet(until):
                 self._silence = _Silence(intent, request.episode, until if isinstance(until, int) else 0)
         return ""
+
+    def held(self) -> tuple[dict[str, Any], ...]:
+        """What holds, as records for a journal: {"rule": its JSON form, "problem": a signature}, or {"quiet": ...}."""
+        rules = tuple({"rule": rule.as_json(), "problem": signature} for rule, signature in self._rules)
+        quiet = self._silence
+        if quiet is None:
+            return rules
+        until = quiet.left if isinstance(quiet.said.until, int) else quiet.said.until
+        return (*rules, {"quiet": until, "episode": quiet.episode})
+
+    def hold_again(self, records: Sequence[Mapping[str, Any]], where: str = "the journal") -> None:
+        """Hold what a journal has recorded, and nothing else. Raises BadInput for other records."""
+        self._rules, self._silence = [], None
+        try:
+            for record in records:
+                if "quiet" in record:
+                    said = rule_of({"quiet": record["quiet"]})
+                    assert isinstance(said, Quiet)
+                    self._silence = _Silence(said, record["episode"], said.until if isinstance(said.until, int) else 0)
+                    continue
+                rule = rule_of(record["rule"])
+                if isinstance(rule, Quiet):
+                    raise ValueError(f"{record!r}: no rule")
+                self._rules.append((rule, str(record["problem"])))
+        except (KeyError, ValueError) as error:
+            raise BadInput(f"{where}: what was said and holds: {error}: it was edited") from None
 
     def _against(self, rule: Rule, request: Request) -> str:
         """Why a rule cannot be kept, "" if it can."""

@@ -5,7 +5,7 @@ field that its docstring shows.
 """
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 WALL, CLEAR = "wall", "clear"
 ALL = "all"  # of Allow: every rule is taken back
@@ -239,3 +239,19 @@ class Refusal:
     def as_json(self) -> dict[str, object]:
         """{"refuse": true}."""
         return {"refuse": True}
+
+
+def rule_of(record: dict[str, Any]) -> Avoid | Finish | Never | Before | Quiet:
+    """The rule, or the time without questions, with a JSON form. Raises ValueError for any other record."""
+    match record:
+        case {"avoid": str(thing)}:
+            return Avoid(thing)
+        case {"finish": str(part)}:
+            return Finish(part)
+        case {"never": {"part": str() | None as part, "waits_in": str(station)}}:
+            return Never(part, station)
+        case {"before": [{"part": a, "station": b}, {"part": c, "station": d}]}:
+            return Before(Work(a, b), Work(c, d))
+        case {"quiet": "stuck" | "episode" | "always" | int() as until}:
+            return Quiet(until)
+    raise ValueError(f"{record!r}: no rule, and no time without questions")

@@ -1,7 +1,6 @@
 """Teaching at a terminal: questions as text and a person's answers, for moves in a table and for the order of transfers."""
 
-from collections import deque
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable
 from difflib import get_close_matches
 from itertools import groupby
 from typing import Any
@@ -18,7 +17,8 @@ from lab.seat import order_text, request_text
 from lab.seat.event_text import SessionText
 from lab.seat.grid_text import Marks, StateWords
 from lab.seat.request_text import PathAhead
-from lab.seat.spoken_answers import Rule, SpokenAnswers, decision_of
+from lab.seat.spoken_answers import SpokenAnswers
+from lab.seat.spoken_turns import ASKS, NO_MORE, SpokenTurns, Turn, counts_at_once
 from lab.seat.terminal.line_reader import Outside, ReadLine, default_reader
 from lab.seat.terminal.screen import folded, question, room, screen
 from lab.seat.terminal.typed_answer import (
@@ -33,9 +33,7 @@ from lab.seat.terminal.typed_answer import (
 )
 from lab.sequencing.search import SequenceRequest
 from lab.teaching.events import ORDER, Event, LessonEvent
-from lab.words.meaning import Intent, Own, Praise, Quiet, Refusal, Stop, Why
-from lab.words.meaning import Undo as TakeBack
-from lab.words.ways import Motion, NoWay
+from lab.words.meaning import Refusal
 
 WORDS = ("why", "undo", "skip", "auto", "quit")
 TABLE = 56  # columns of a terminal, below which each move is a line of words instead of a table row
@@ -198,7 +196,6 @@ class TableQuestion:
 STYLES = {"": "", "ask": "bold", "note": "yellow", "good": "green", "bad": "yellow", "lost": "bold red"}
 AGREED = "Is that what you mean? [enter = yes, no] "
 YES = ("", "y", "yes", "yeah", "ok", "okay")
-_ASK: Any = object()  # stands for: the person is asked again
 MOST_DRAWN = 5  # equal moves of a path that are drawn one by one
 
 
@@ -222,8 +219,11 @@ class TeachingPrompt:
         self._last: Request | None = None  # the last question
         self._text, self._order_text = SessionText(self._table.marks.named), SessionText(kind="order")
         self._guided = self._misleads = 0
-        self._spoken = SpokenAnswers()
-        self._ahead: deque[Intent] = deque()  # what was said for after the present path
+        self.spoken = SpokenAnswers()  # what the person has said in sentences
+        self._turns = SpokenTurns(self.spoken, self._say, self._command)
+        self.on_heard: Callable[[Request, str, tuple[int, ...]], None] | None = (
+            None  # what waits for agreement: text, path
+        )
 
     def __call__(self, request: Request) -> int | None:
         """The person's answer, after showing the learner's state."""
@@ -233,13 +233,13 @@ class TeachingPrompt:
         if self._path.goes_on(request):
             return self._give(request, self._path.step())
         self._drop_path(f"the learner is {self._way(request).where(request, request.state)} now")
-        if self._ahead:
-            said, self._ahead = list(self._ahead), deque()
-            answer: int | None = self._carry_out(said, request)
-            if answer is not _ASK:
-                return answer
-        if (kept := self._spoken.kept(request)) is not None:
-            return self._keep(kept.action, kept.why)
+        try:
+            turn = self._turns.before_asking(request)
+        except AdvisorLeft:
+            self._done = True
+            raise
+        if turn != ASKS:
+            return self._take(turn, request)
         with self._outside.question():
             if self._read_line is None:
                 self._read_line = default_reader(self._console, plain=self._plain, outside=self._outside)
@@ -252,13 +252,13 @@ class TeachingPrompt:
 
     def about(self, known: StateWords | None) -> None:
         """Take over the object that describes the next lesson's states in words; None for none."""
-        self._table.known = self._spoken.about = known
+        self._table.known = self.spoken.about = known
 
     def show(self, request: Request) -> None:
         """Show the learner's state, its own choice, and its progress."""
         self._last = request
         self._print(self._way(request).shown(request))
-        if rules := self._spoken.standing(request):
+        if rules := self.spoken.standing(request):
             self._say(f"Your rules: {'; '.join(rules)}.", "dim")
 
     def told(self, request: Request, action: int | None) -> None:
@@ -279,21 +279,23 @@ class TeachingPrompt:
                 line = read_line(asked)
                 answer = way.understood(line, request)
                 if isinstance(answer, str) and answer not in ANSWERS and is_sentence(line):
-                    given: int | None = self._hear(line, answer, request, read_line)
-                    if given is not _ASK:
-                        return given
+                    turn = self._hear(line, answer, request, read_line)
+                    if turn != ASKS:
+                        return self._take(turn, request)
+                    if self.on_heard is not None:
+                        self.on_heard(request, "", ())
                     continue
             except EOFError:
                 self._say("No more answers: the learner goes on alone.")
                 raise AdvisorLeft from None
             match answer:
                 case int():
-                    self._spoken.gave(request, (answer,))
+                    self.spoken.gave(request, (answer,))
                     return self._give(request, answer)
                 case tuple() if isinstance(request, AdviceRequest):
                     return self._begin_path(request, answer)
                 case "own":
-                    self._spoken.gave(request, (request.own,))
+                    self.spoken.gave(request, (request.own,))
                     return request.own
                 case "skip":
                     return None
@@ -302,99 +304,44 @@ class TeachingPrompt:
 
     def _begin_path(self, request: AdviceRequest, moves: tuple[int, ...]) -> int:
         """The first move of a path; its others answer the next questions along it."""
-        self._spoken.gave(request, moves)
+        self.spoken.gave(request, moves)
         self._path = PathAhead(request, moves)
         self._say(f"A path of {counted(len(moves), 'move')}: {self._drawn(request, moves)}", "dim")
         return self._give(request, self._path.step())
 
     # ---- sentences ----------------------------------------------------------------------------------------------------
 
-    def _hear(self, line: str, hint: str, request: Request, read_line: ReadLine) -> Any:
-        """The answer that a sentence gives, _ASK if it gives none; a person at a terminal agrees to what was understood first.
+    def _hear(self, line: str, hint: str, request: Request, read_line: ReadLine) -> Turn:
+        """What a sentence leads to; a person at a terminal agrees to what was understood first.
 
         hint: shown for a single word that is no sentence.
         """
-        heard = self._spoken.heard(line, request)
+        heard = self.spoken.heard(line, request)
         if isinstance(heard, Refusal):
             self._say(heard.reason if len(line.split()) > 1 else hint, "yellow")
-            return _ASK
-        self._say(f"Understood: {self._spoken.in_words(heard, request)}.", "bold")
-        if getattr(read_line, "confirms", False) and not all(isinstance(one, Why | Praise | Own) for one in heard):
-            if isinstance(request, AdviceRequest) and (moves := self._moves(heard, request)):
+            return ASKS
+        text = self.spoken.in_words(heard, request)
+        self._say(f"Understood: {text}.", "bold")
+        if getattr(read_line, "confirms", False) and not counts_at_once(heard):
+            if moves := self._turns.moves(heard, request):
                 self._say(f"That is {self._drawn(request, moves)}", "dim")
+            if self.on_heard is not None:
+                self.on_heard(request, text, moves)
             if read_line(AGREED).strip().lower() not in YES:
                 self._say("Dropped.")
-                return _ASK
-        return self._carry_out(heard, request)
-
-    def _moves(self, heard: Sequence[Intent], request: AdviceRequest) -> tuple[int, ...]:
-        """The moves for what was said before anything is carried out, () if there is no way."""
+                return ASKS
         try:
-            return self._spoken.moves(heard, request)
-        except NoWay:
-            return ()
-
-    def _carry_out(self, said: Sequence[Intent], request: Request) -> Any:
-        """Carry out what was said, up to a move, after which the rest waits; returns the answer, _ASK if there is none."""
-        rest = deque(said)
-        while rest:
-            intent = rest.popleft()
-            if isinstance(intent, Motion) and isinstance(request, AdviceRequest):
-                motions: list[Intent] = [intent]
-                while rest and isinstance(rest[0], Motion):
-                    motions.append(rest.popleft())
-                try:
-                    moves = self._spoken.moves(motions, request)
-                except NoWay as reason:
-                    self._say(f"{reason}: not done.", "yellow")
-                    return _ASK
-                self._ahead = rest
-                return self._begin_path(request, moves)
-            if (decision := decision_of([intent])) is not None:
-                self._ahead = rest
-                self._spoken.gave(request, (decision,))
-                return self._give(request, decision)
-            if isinstance(intent, Own):
-                self._ahead = rest
-                self._spoken.gave(request, (request.own,))
-                return request.own
-            if isinstance(intent, Motion):
-                self._say("The other way, or the same again, is not understood for an order: say the move.", "yellow")
-                return _ASK
-            if isinstance(intent, TakeBack) and request.undoable:
-                self._ahead = rest  # for the question that is asked again
-            if refusal := self._note(intent, request):
-                self._say(f"{refusal}: not done.", "yellow")
-                return _ASK
-        if any(isinstance(intent, Quiet | Rule) for intent in said):
-            kept = self._spoken.kept(request)
-            return _ASK if kept is None else self._keep(kept.action, kept.why)
-        return _ASK
-
-    def _note(self, intent: Intent, request: Request) -> str:
-        """Carry out what gives no answer; returns why it cannot be, "" if it can."""
-        match intent:
-            case Why():
-                self._command("why", request)
-            case TakeBack():
-                self._command("undo", request)
-            case Stop():
-                self._command("quit", request)
-            case Praise():
-                self._say("Noted; praise is not learned from yet.", "dim")
-            case _:
-                return self._spoken.hold(intent, request)
-        return ""
-
-    def _keep(self, action: int | None, why: str) -> int | None:
-        """An answer by what was said before; raises AdvisorLeft when no more questions are wanted at all."""
-        if action is None and why:
-            self._say("No more advice in this run: from here on learners go on alone.")
+            return self._turns.carry_out(heard, request)
+        except AdvisorLeft:
             self._done = True
-            raise AdvisorLeft
-        if why:
-            self._say(why, "dim")
-        return action
+            raise
+
+    def _take(self, turn: Turn, request: Request) -> int | None:
+        """The answer that a turn gives; a path begins with its first move."""
+        if isinstance(turn, tuple) and isinstance(request, AdviceRequest):
+            return self._begin_path(request, turn)
+        assert turn is None or isinstance(turn, int)
+        return turn if turn is None or turn == request.own else self._give(request, turn)
 
     def _command(self, word: str, request: Request) -> None:
         """Carry out a command word that gives no advice; any other word is a hint, which is shown."""
@@ -402,7 +349,7 @@ class TeachingPrompt:
             case "auto":
                 raise AdvisorLeft
             case "done":
-                self._say("No more advice in this run: from here on learners go on alone.")
+                self._say(NO_MORE)
                 self._done = True
                 raise AdvisorLeft
             case "quit":
@@ -415,7 +362,7 @@ class TeachingPrompt:
             case "why":
                 for line in self._way(request).why(request, self._guided):
                     self._say(line)
-                if rules := self._spoken.standing(request):
+                if rules := self.spoken.standing(request):
                     self._say(f"Your rules hold: {'; '.join(rules)}.")
             case "help":
                 self._help(request)
