@@ -76,3 +76,17 @@ def test_a_lesson_in_sentences_is_learned_from_and_replayed(lab: Lab, folder: Pa
     answers = [event["action"] for event in events if event["kind"] == "answer" and not event["left"]]
     assert answers[:4] == [1, 1, 3, 3]  # down, down, right, right
     assert lab("replay", "lesson", "--json").json["events"] == events
+
+
+def test_what_was_said_and_holds_is_resumed(lab: Lab, folder: Path) -> None:
+    """A rule and a time without questions are in the journal where they were said, and hold after --resume."""
+    (folder / "w.txt").write_text("S....\n.....\n..#..\n.....\n....G\n")
+    said = "keep away from the cube, then go right\nno questions for 3 steps\nquit\n"
+    words = ("w.txt", "--advisor", "terminal", "--gate", "always", "--episodes", "2", "--seed", "3", "--out", "lesson")
+    lab("teach", *words, stdin=said)
+    lines = [json.loads(line) for line in (folder / "lesson" / "events.jsonl").read_text().splitlines()]
+    holds = [line["holds"] for line in lines if line.get("holds") is not None]
+    assert holds[0] == [{"rule": {"avoid": "cube"}, "problem": holds[0][0]["problem"]}]
+    assert [each[1:] for each in holds[1:]] == [[{"quiet": left, "episode": 1}] for left in (2, 1, 0)]
+    again = lab("teach", "--resume", "lesson", stdin="right\nquit\n")
+    assert "Your rules: keep away from the cube." in again.err
