@@ -47,7 +47,7 @@ ALONE: dict[str, set[str]] = (
         "uvicorn": {"lab.view.server", "lab.view.server_page"},
         "websockets": set(),  # uvicorn's
         "jinja2": {"lab.studies.report"},
-        "lark": {"lab.words.listen"},
+        "lark": {"lab.words.slots"},
         "fsspec": {"lab.toolbox.remote_place"},
         "s3fs": set(),  # fsspec's
         "optuna": {"lab.studies.tuning"},
@@ -77,7 +77,7 @@ HEAVY = (
 )
 READS_ITS_OWN = (  # what ships with the lab, or what it has just written: nothing that a stranger may have made
     *("lab.view.meshcat", "lab.view.server_page", "lab.studies.report", "lab.cli.export", "lab.toolbox.remote_place"),
-    *("lab.words.listen", "lab.words.vocabulary"),
+    *("lab.words.slots", "lab.words.vocabulary"),
     *("lab.api.lessons", "lab.api.pictures", "lab.api.runs", "lab.api.scenes"),
 )
 BY_TABLE = ("lab", "lab.lazy", "lab.cli.app", "lab.tasks.instances", "lab_studies")  # what these load stands in a table

@@ -9,6 +9,7 @@ import numpy as np
 from lab.errors import BadInput
 from lab.learning.requests import AdviceRequest, Request
 from lab.mdp import TabularMDP
+from lab.production.operation.order_words import scene_of
 from lab.seat import order_text, request_text
 from lab.seat.grid_text import DIRECTIONS, StateWords, direction_of, points_by_name
 from lab.sequencing.search import SequenceRequest
@@ -298,16 +299,7 @@ def _cell_cm(about: StateWords | None) -> float | None:
 
 def order_scene(request: SequenceRequest) -> OrderScene:
     """The parts, stations and allowed moves of a question on the order, with spaces for underscores."""
-    cell = request.run.cell
-    moves = [order_text.move_of(request, decision) for decision in request.allowed]
-    return OrderScene(
-        tuple(_plain(cell.part_name(part)) for part in range(1, cell.parts + 1)),
-        tuple(dict.fromkeys(map(_plain, cell.names))),
-        tuple(
-            AllowedMove(m.decision, _plain(m.name.removesuffix("'s pallet")), _plain(m.origin), _plain(m.target))
-            for m in moves
-        ),
-    )
+    return scene_of(request.run, request.allowed)
 
 
 def _plain(name: str) -> str:
