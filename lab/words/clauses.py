@@ -111,6 +111,8 @@ def cuts(slots: tuple[Slot, ...], meaning: Meaning) -> list[tuple[float, tuple[C
                 for price, clause in meaning(Group(slots[at:end])):
                     if _joint(slots, end) and (isinstance(clause, Why | Undo | Again) or clause == STOPS):
                         continue  # "why did you go left?", "stop going left"
+                    if isinstance(clause, Praise) and slots[end : end + 1] != () and slots[end].kind == "TO":
+                        continue  # "it would be wrong to go left"
                     for cost, rest in best[end]:
                         total = cost + price + inside + _joint(slots, end)
                         found[clause, *rest] = min(total, found.get((clause, *rest), 99.0))
@@ -175,7 +177,7 @@ def common(group: Group) -> Iterator[tuple[float, Clause]]:
 
 
 def _takes_back(group: Group) -> bool:
-    objects = clause_kinds("undo")
+    objects = (*clause_kinds("undo"), "SAME")
     if not group.is_one() or (group.all("part") and not group.all("part")[0].is_any):
         return False
     if group.all("CANCEL") == ["cancel"] and group.only("CANCEL"):
@@ -205,7 +207,7 @@ def _quiet(group: Group) -> Any:
     words = group.conditions
     stuck = group.has("STUCK", "BLOCKED", "DUNNO") or not words.isdisjoint(("STUCK", "BLOCKED"))
     things = [item for items in group.all("until") for item in items if isinstance(item, tuple)]
-    if stuck and (silent or group.has("IF", "ONLY", "until", "UNTIL", "AFTER", "ONLYTHEN", "BUT")):
+    if stuck and (silent or group.has("IF", "ONLY", "until", "UNTIL", "AFTER", "BEFORE", "ONLYTHEN", "BUT")):
         return "stuck"
     others = words - {"NOT", "NO", "EVER", "AGAIN", "IT", "MORE"}
     if not silent or things or others or (group.has("IF") and not group.has("ONLY")):

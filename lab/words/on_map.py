@@ -80,7 +80,7 @@ def _rule(group: Group) -> Said | None:
     has = group.has
     if not group.only(*RULES) or len(group.all("thing")) > 1:
         return None
-    if has("CAN", "PERMIT") and has("EVERYTHING") and not group.all("thing") and not group.negated:
+    if has("CAN", "PERMIT", "AGAIN") and has("EVERYTHING") and not group.all("thing") and not group.negated:
         return (
             Said("allow", (ALL,)) if group.only("CAN", "PERMIT", "EVERYTHING", "GO", "MOVE", "NEAR", "VISIT") else None
         )
@@ -162,7 +162,11 @@ def _goes_to(group: Group) -> bool:
         return False
     if not group.only(*clause_kinds("to")):
         return False
-    if set(group.all("dir")) - {"back"} or len(group.all("thing")) > 1:
+    up_to = group.at("UPTO")  # "right up to the toaster" may be a way to it, or a leg to the right
+    dirs = [
+        s.value for n, s in enumerate(group.slots) if s.kind == "dir" and not (s.value == "right" and n == up_to - 1)
+    ]
+    if set(dirs) - {"back"} or len(group.all("thing")) > 1:
         return False
     if group.has("KEEP", "STOP") and not group.has("GO", "MOVE", "NEXTTO"):
         return False

@@ -70,7 +70,7 @@ def _move(group: Group) -> Said | None:
         return None
     if any(str(text).split()[0] not in ("let", "have", "make", "i", "want", "see") for text in group.all("LET")):
         return None  # "leave slice 2 in the toaster"
-    if works and works[0][1].endswith("ed") and not group.has("PUT", "LET"):
+    if works and works[0][1].endswith("ed") and group.has("IS", "WAS", "DONE"):
         return None  # "slice 1 is buttered"
     if group.has("WAIT"):
         return None
@@ -147,12 +147,16 @@ def _before(group: Group) -> Said | None:
         cut = next((n for n, slot in enumerate(second) if slot.kind in SEPARATING), 0)
         named = next((n for n, slot in enumerate(second) if slot.kind in ("part", "station", "work")), len(second))
         cut = cut or next((n for n, slot in enumerate(second) if slot.kind == "PUT" and n > named), 0)
+        parts = [n for n, slot in enumerate(second) if slot.kind == "part"]
+        cut = cut or (parts[1] if len(parts) > 1 else 0)
         if not cut:
             return None
         first, second = (*first, *second[cut:]), second[:cut]
     left, right = _work(Group(first)), _work(Group(second))
     if left is None or right is None:
         return None
+    if left.values[2] and right.values[1] is None and right.values[0].parts:
+        right = Said("work", (right.values[0], left.values[1], True))  # "washed before the gear"
     marker = group.slots[at]
     text = str(marker.value)
     negated = Group(first).negated or any(part.is_none for part in Group(first).all("part"))
@@ -237,6 +241,8 @@ def _is_reason(group: Group) -> bool:
     ):
         return False
     works = group.all("work")
+    if works and not group.has("IS", "WAS"):
+        return False
     if works and not all(text.endswith("ed") for _, text in works):
         return False
     return group.only(*["part", "station", "work", "DONE", "IN", "WAIT", "LONG", "BECAUSE", "WAS"])

@@ -61,9 +61,6 @@ class OrderReferents:
 
     def _before(self, first: Said, second: Said) -> Before:
         works = [self._work(work) for work in (first, second)]
-        verbs = [bool(work.values[2]) for work in (first, second)]
-        if verbs[0] and works[0].part and works[1].part and works[1].station is None:
-            works[1] = Work(works[1].part, works[0].station)  # "washed before the gear"
         if works[0] == works[1] or Work() in works:
             raise Misfit
         return Before(works[0], works[1])

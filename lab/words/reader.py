@@ -126,11 +126,12 @@ def read(text: str, scene: Scene, corrects: bool = True) -> list[Token]:
 def _in_plain_order(text: str) -> str:
     """The text with "the near" as an adjective, and with "as far left as you can" in an order of words that phrases can have."""
     text = TAG.sub("", text)
+    text = re.sub(r"\b(go|drive|walk|run|head|move|travel) where\b", r"\1 to where", text)
     text = re.sub(r"\bto where ((?:\w+ ){1,4}?)(?:is|are|stands|lies|sits)\b", r"to \1", text)
     text = re.sub(r"\btoo the\b", "to the", text)
     text = re.sub(r"\bbefore you(?= [,.;!?]|$)", "in front of you", text)
     text = re.sub(r"\b(is|are|was|has been|have been)( now| already| all)? clean\b", r"\1 cleaned", text)
-    text = re.sub(r"\bthe (near|close)\b(?! to\b)", "the nearest", text)
+    text = re.sub(r"\bthe (near|close|nearer|closer)\b(?! to\b)", "the nearest", text)
     text = re.sub(
         r"\bright (?=(next to|in front|beside|behind|against|up against|in between|on top|away|now|there|here)\b)",
         "",
@@ -181,7 +182,12 @@ def _plain(tokens: Sequence[Token]) -> list[Token]:
     for token, after in zip(tokens, (*tokens, None)[1:], strict=True):
         relates = token.text in RELATIVES and bool(kept) and kept[-1].kind == "NAME"
         points = token.text in POINTING and after is not None and after.kind in NAMES
-        if relates:
+        beside = (
+            token.text == "by" and bool(kept) and kept[-1].kind == "NAME" and after is not None and after.kind == "NAME"
+        )
+        if beside:
+            kept.append(Token("NEXTTO", None, token.text))
+        elif relates:
             kept.append(Token("THATIS", None, token.text))
         elif token.kind == "IS" and kept and kept[-1].kind == "THATIS":
             continue

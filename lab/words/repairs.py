@@ -132,12 +132,6 @@ def _without_asides(slots: Slots) -> Slots:
         denied = {item.kind for item in slots[at + 1 : end] if item.kind in NAMING}
         if not denied or (end < len(slots) and slots[end].kind not in SEPARATORS):
             continue
-        if (
-            denied & {"thing", "station"}
-            and any(item.kind in ("GO", "MOVE", "PUT") for item in slots[at + 1 : end])
-            and not _has_but(slots, end)
-        ):
-            continue  # "don't go to the toaster" may be a rule
         rest = slots[:at] + slots[end + _has_but(slots, end) :]
         kept = {item.kind for item in rest if item.kind in NAMING}
         if denied <= kept and not any(item.kind in ("BEFORE", "AFTER", "WAIT") for item in rest):
@@ -151,6 +145,8 @@ def _has_but(slots: Slots, at: int) -> bool:
 
 def _in_order(slots: Slots) -> Slots:
     """The steps of a map in the order in which they are to be done: "left 2, but first up 1", "up 1 before you go left"."""
+    if any(slot.kind in ("ASK", "QUIET") for slot in slots):
+        return slots  # "do not ask before you are stuck"
     for at, slot in enumerate(slots):
         first, second = slots[:at], slots[at + 1 :]
         if slot.kind == "BUTFIRST" and first and second:
@@ -164,10 +160,14 @@ def _in_order(slots: Slots) -> Slots:
             return (*_trimmed(first), Slot("THEN"), *_in_order(second))
         if steps:
             return (*_in_order(second), Slot("THEN"), *_trimmed(first))
+        named = next((n for n, item in enumerate(second) if item.kind in NAMING), len(second))
         cut = next((n for n, item in enumerate(second) if item.kind in SEPARATORS), None)
+        cut = cut or next(
+            (n for n, item in enumerate(second) if n > named and item.kind in ("GO", "MOVE", "TURN")), None
+        )
         if cut is None:
             raise NotClear("say what comes first, then what comes after it")
-        near, far = second[:cut], second[cut + 1 :]
+        near, far = second[:cut], second[cut:]
         return (*far, Slot("THEN"), *near) if slot.kind == "BEFORE" else (*near, Slot("THEN"), *far)
     return slots
 

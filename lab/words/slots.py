@@ -194,13 +194,12 @@ def _value(name: str, parts: tuple[Any, ...]) -> tuple[Any, ...]:
         case "angle" | "vague":
             return (Slot("unclear", "angles are not understood" if name == "angle" else "that is no number of steps"),)
         case "thing" | "one":
-            at = next((n for n, part in enumerate(parts) if isinstance(part, Token) and part.kind in ("NAME", "ONE")))
-            ids = parts[at].value if name == "thing" else ()
-            return (
-                Slot(
-                    "thing", Thing(ids, parts[:at], parts[at + 1 :], name == "thing" and parts[at].text.endswith("s"))
-                ),
-            )
+            wanted = "NAME" if name == "thing" else "ONE"
+            at = next(n for n, part in enumerate(parts) if isinstance(part, Token) and part.kind == wanted)
+            adjectives = tuple(part for part in parts[:at] if not isinstance(part, Token))
+            is_plural = wanted == "NAME" and parts[at].text.endswith("s")
+            ids = parts[at].value if wanted == "NAME" else ()
+            return (Slot("thing", Thing(ids, adjectives, parts[at + 1 :], is_plural)),)
         case "beside":
             return (("beside", values[0].value),)
         case "named":
