@@ -130,17 +130,15 @@ def _joint(slots: tuple[Slot, ...], end: int) -> float:
 
 # ---- what can be said anywhere ---------------------------------------------------------------------------------------------
 
-JUDGING = clause_kinds("praise")
 CALLED = {"silly", "stupid", "dummy", "idiot", "fool", "moron", "you idiot", "you fool", "you dummy", "dumb", "dimwit"}
-HUSHING = clause_kinds("quiet")
 
 
 def common(group: Group) -> Iterator[tuple[float, Clause]]:
     """What a group means in any scene, each with a cost."""
     has, only = group.has, group.only
     asks = has("ASKS") and not all(text in ("what", "how") for text in group.all("ASKS"))
-    judges = has("GOOD") != has("BAD") and only(*JUDGING, "NO", "ASKS", "WAS") and group.is_one()
-    if judges and not asks and not (has("GOOD") and has("NO")):
+    judges = has("GOOD") != has("BAD") and only(*clause_kinds("praise"), "NO", "ASKS", "WAS") and group.is_one()
+    if judges and not asks and not has("TO") and not (has("GOOD") and has("NO")):
         yield 0.0, Praise(1 if has("GOOD") != has("NOT", "NEVER") else -1)
     if has("BAD") and has("NO") and only("BAD", "NO") and not has("IT") and set(group.all("BAD")) <= CALLED:
         yield -1.0, NO_COMMAND  # "no, silly"
@@ -185,7 +183,9 @@ def _takes_back(group: Group) -> bool:
     if group.has("UNDO", "SCRATCH"):
         return group.only("UNDO", "SCRATCH", "NO", "CORRECT", *objects)
     return (
-        group.has("CANCEL") and group.has("ANSWER", "LAST", "MOVE", "JUDGED") and group.only("CANCEL", "NO", *objects)
+        group.has("CANCEL")
+        and group.has("ANSWER", "LAST", "MOVE", "JUDGED", "SAME")
+        and group.only("CANCEL", "NO", *objects)
     )
 
 
@@ -202,7 +202,7 @@ def _quiet(group: Group) -> Any:
     silent = group.has("QUIET", "NOT", "NO", "NEVER", "STOP", "NOTHING", "NOLONGER", "HOLD") or any(
         part.is_none for part in group.all("part")
     )
-    if not group.only(*HUSHING) or not group.has("ASK", "QUIET", "ONLY"):
+    if not group.only(*clause_kinds("quiet")) or not group.has("ASK", "QUIET", "ONLY"):
         return None
     words = group.conditions
     stuck = group.has("STUCK", "BLOCKED", "DUNNO") or not words.isdisjoint(("STUCK", "BLOCKED"))

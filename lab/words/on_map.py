@@ -16,7 +16,6 @@ DIAGONALS = {
     "southwest": ("back", "left"),
     "southeast": ("back", "right"),
 }
-VERBS = clause_kinds("moving")
 
 
 @dataclass(frozen=True)
@@ -72,13 +71,11 @@ def _thing(group: Group) -> Thing:
 
 # ---- rules -----------------------------------------------------------------------------------------------------------------
 
-RULES = clause_kinds("rule")
-
 
 def _rule(group: Group) -> Said | None:
     """A rule to keep away from an object, or its end; None if a group says neither."""
     has = group.has
-    if not group.only(*RULES) or len(group.all("thing")) > 1:
+    if not group.only(*clause_kinds("rule")) or len(group.all("thing")) > 1:
         return None
     if has("CAN", "PERMIT", "AGAIN") and has("EVERYTHING") and not group.all("thing") and not group.negated:
         return (
@@ -185,7 +182,7 @@ def _goes_to(group: Group) -> bool:
 def _legs(group: Group) -> Iterator[tuple[float, Clause]]:
     """The legs that a group says: one, or one for each direction with the same amount."""
     listed = (
-        *VERBS,
+        *clause_kinds("moving"),
         *clause_kinds("leg"),
     )
     if group.has("IS") or not group.only(*listed) or len(group.all("amount")) > 1 or len(group.all("until")) > 1:
@@ -210,7 +207,7 @@ def _legs(group: Group) -> Iterator[tuple[float, Clause]]:
     if group.has("TURN") and 0 <= group.at("TURN") < group.at("GO", "MOVE"):
         return
     if (len(ways) == 1 and ways[0] in DIAGONALS) or (len(ways) > 1 and group.has("EACH", "DIAGONAL")):
-        if group.only(*VERBS, "dir", "side", "amount", "EACH", "DIAGONAL"):
+        if group.only(*clause_kinds("moving"), "dir", "side", "amount", "EACH", "DIAGONAL"):
             each = [way for named in ways for way in DIAGONALS.get(named, (named,))]
             amount = (group.all("amount") or [Amount(1.0)])[0]
             yield cost, Said("go", tuple(Stretch(way, amount=amount) for way in each))

@@ -133,8 +133,6 @@ def _it_is_a_part(group: Group) -> bool:
 
 # ---- one work before another -----------------------------------------------------------------------------------------------
 
-WORKS = clause_kinds("work")
-
 
 def _before(group: Group) -> Said | None:
     """One work before another, with the words "before" or "after"; or a part before all others."""
@@ -194,7 +192,12 @@ def _in_turn(group: Group) -> Said | None:
 
 def _work(group: Group) -> Said | None:
     """The work that a part of a clause names: a part, a station, or both; its last value is whether a verb names it."""
-    if not group.only(*WORKS) or len(_parts(group)) > 1 or len(group.all("station")) > 1 or len(group.all("work")) > 1:
+    if (
+        not group.only(*clause_kinds("work"))
+        or len(_parts(group)) > 1
+        or len(group.all("station")) > 1
+        or len(group.all("work")) > 1
+    ):
         return None
     parts, stations, works = _parts(group), _places(group), group.all("work")
     if group.has("FROM"):
