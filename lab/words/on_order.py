@@ -114,7 +114,8 @@ def _never(group: Group) -> Said | None:
     if not group.only(*listed) or not (group.negated or group.has("STOP") or none):
         return None
     stations = _places(group)
-    if not group.has("WAIT", "LET") or len(stations) != 1 or len(_parts(group)) > 1:
+    forgets = any(str(text).startswith("forget") for text in group.all("CANCEL"))
+    if not (forgets or group.has("WAIT", "LET")) or len(stations) != 1 or len(_parts(group)) > 1:
         return None
     parts = _parts(group)
     part = (

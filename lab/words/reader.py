@@ -23,13 +23,17 @@ CONTRACTIONS = (
         "u": "you", "strait": "straight", "thn": "then", "dn": "down", "rt": "right", "pls": "please",
         "plz": "please", "upto": "up to", "goto": "go to", "alot": "a lot", "lemme": "let me", "gimme": "give me",
         "hows": "how is", "hes": "he is", "w/o": "without", "ur": "your", "thx": "thanks", "twise": "twice",
-        "tw": "two", "wy": "why",
+        "tw": "two", "wy": "why", "agn": "again", "gud": "good", "nvm": "never mind", "tbh": "to be honest", "kk": "ok",
+        "r": "are", "moar": "more", "stp": "stop", "upp": "up", "oposite?": "opposite", "wel": "well", "dun": "done",
+        "god job": "good job",
     }.items()),
     (r"\b(away|clear|far|back) form\b", r"\1 from"),
     *((rf"{short}\b", f" {full}") for short, full in {
         "n't": "not", "'re": "are", "'ve": "have", "'ll": "will", "'d": "would", "'m": "am", "'s": "is",
     }.items()),
 )  # fmt: skip
+BY_LETTER = {"l": "left", "r": "right", "f": "forward", "b": "backward", "u": "up", "d": "down"}
+LETTERS = r"(?:[lrfbud] ?\d+[ ,]*)+|(?:\d+ ?[lrfbud][ ,]*)+"  # "l2 u3"
 ARROWS = {
     "->": "arrowright",
     "=>": "arrowright",
@@ -38,6 +42,10 @@ ARROWS = {
     "↑": "arrowup",
     "↓": "arrowdown",
     "⇒": "arrowright",
+    "➡": "arrowright",
+    "⬅": "arrowleft",
+    "⬆": "arrowup",
+    "⬇": "arrowdown",
 }
 TAG = re.compile(
     r"(?<=[,;]) (?:do|does|did|is|are|was|were|has|have|can|could|will|would|should|must|shall)(?: not)?"
@@ -125,6 +133,7 @@ def read(text: str, scene: Scene, corrects: bool = True) -> list[Token]:
 
 def _in_plain_order(text: str) -> str:
     """The text with "the near" as an adjective, and with "as far left as you can" in an order of words that phrases can have."""
+    text = re.sub(r"\bif ((?:\w+ ){1,2})went\b", r"if \1go", text)
     text = TAG.sub("", text)
     text = re.sub(r"\b(go|drive|walk|run|head|move|travel) where\b", r"\1 to where", text)
     text = re.sub(r"\bto where ((?:\w+ ){1,4}?)(?:is|are|stands|lies|sits)\b", r"to \1", text)
@@ -247,6 +256,9 @@ def words_of(text: str) -> list[str]:
         .replace("½", " half ")
         .replace("¼", " quarter ")
     )
+    plain = re.sub(r"#(?=\d)", " number ", plain.replace("\ufe0f", ""))
+    if re.fullmatch(LETTERS, plain.strip()):
+        plain = re.sub(r"[lrfbud]", lambda match: f" {BY_LETTER[match[0]]} ", plain)
     for arrow, word in ARROWS.items():
         plain = plain.replace(arrow, f" {word} ")
     plain = re.sub(r"(?<![\w)])[-−](?=\d)", " minus ", plain)
