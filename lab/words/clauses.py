@@ -88,7 +88,8 @@ class Group:
 
     def is_one(self) -> bool:
         """Whether its amounts are nothing but "one" or "step"."""
-        return all(amount == Amount(1.0, is_bare=amount.is_bare) for amount in self.all("amount"))
+        ones = all(amount == Amount(1.0, is_bare=amount.is_bare) for amount in self.all("amount"))
+        return ones and all(number == 1.0 for number in self.all("numbered"))
 
 
 Meaning = Callable[[Group], Iterator[tuple[float, Clause]]]

@@ -245,7 +245,7 @@ def _is_reason(group: Group) -> bool:
     ):
         return False
     works = group.all("work")
-    if works and not group.has("IS", "WAS"):
+    if not group.has("part", "station", "DONE") or (works and not group.has("IS", "WAS")):
         return False
     if works and not all(text.endswith("ed") for _, text in works):
         return False
