@@ -18,7 +18,7 @@ ABUTTING_VERB = 0.7  # the same if it begins with a verb
 MOST_CUTS = 6  # of a rest of a sentence
 LONGEST = 14  # slots of a group
 FREE = frozenset(
-    [*["YES", "OK", "IT", "ITS", "TO", "ON", "OF", "AGAIN", "PRETTY", "INSTEAD", "EVER", "FIRST", "IS"], *SEPARATORS]
+    ["YES", "OK", "IT", "ITS", "TO", "ON", "OF", "AGAIN", "PRETTY", "INSTEAD", "EVER", "FIRST", "IS", *SEPARATORS]
 )
 
 
@@ -144,7 +144,7 @@ def common(group: Group) -> Iterator[tuple[float, Clause]]:
     if has("BAD") and has("NO") and only("BAD", "NO") and not has("IT") and set(group.all("BAD")) <= CALLED:
         yield -1.0, NO_COMMAND  # "no, silly"
     if has("OPPOSITE") and only(
-        *["OPPOSITE", "NO", "NOTTHAT", "GO", "MOVE", "WAY", "TURN", "JUDGED", "PUT", "CAN", "WAS"]
+        "OPPOSITE", "NO", "NOTTHAT", "GO", "MOVE", "WAY", "TURN", "JUDGED", "PUT", "CAN", "WAS"
     ):
         yield 0.0, Opposite()
     if group.all("dir") == ["reverse"] and has("NO", "NOTTHAT") and only("dir", "NO", "NOTTHAT", "GO", "MOVE"):
@@ -159,7 +159,7 @@ def common(group: Group) -> Iterator[tuple[float, Clause]]:
         yield 0.0, GOES_ON
     elif _leaves_it(group):
         yield (-1.0 if has("GOAHEAD") and has("YES", "OK") else 0.0 if group.content else 3.0), Own()
-    if has("WHY") and only(*["WHY", "ASK", "LAST", "NO", "ASKS", "STUCK", "GO", "part", "ANYPART", "MORE"]):
+    if has("WHY") and only("WHY", "ASK", "LAST", "NO", "ASKS", "STUCK", "GO", "part", "ANYPART", "MORE"):
         yield 0.0, Why()
     if (until := _quiet(group)) is not None:
         yield 0.0, Quiet(until)
@@ -170,7 +170,7 @@ def common(group: Group) -> Iterator[tuple[float, Clause]]:
     if _lifts_all(group) or (has("LIFTALL") and only("LIFTALL", "CAN")):
         yield 0.0, Allow(ALL)
     if has("NO", "NOTTHAT", "REST") and only(
-        *["NO", "NOTTHAT", "REST", "LET", "WAIT", "PUT", "GOON", "GO", "ONLYTHEN", "LASTLY"]
+        "NO", "NOTTHAT", "REST", "LET", "WAIT", "PUT", "GOON", "GO", "ONLYTHEN", "LASTLY"
     ):
         yield 1.0, NO_COMMAND
 
@@ -192,7 +192,7 @@ def _takes_back(group: Group) -> bool:
 
 def _leaves_it(group: Group) -> bool:
     if group.has("OWN", "DUNNO"):
-        return group.only(*["OWN", "DUNNO", "NO", "GOON", "GO", "MOVE", "WAY", "CAN", "ANSWER", "PUT", "CHOOSE"])
+        return group.only("OWN", "DUNNO", "NO", "GOON", "GO", "MOVE", "WAY", "CAN", "ANSWER", "PUT", "CHOOSE")
     if group.has("GOAHEAD"):
         return group.only("GOON", "GOAHEAD", "WAY")
     return group.has("YES", "OK") and not group.content and not group.has("TO", "ON", "OF", "AGAIN")
@@ -228,7 +228,7 @@ def _quiet(group: Group) -> Any:
 def _ends(group: Group) -> bool:
     if group.has("FINISH"):
         return group.has("SESSION") and group.only("FINISH", "SESSION", "EVERYTHING", "BYE")
-    if not group.only(*["STOP", "END", "BYE", "SESSION", "EVERYTHING", "MORE", "NO", "ANYPART", "part", "EPISODE"]):
+    if not group.only("STOP", "END", "BYE", "SESSION", "EVERYTHING", "MORE", "NO", "ANYPART", "part", "EPISODE"):
         return False
     if group.has("EPISODE"):
         return False

@@ -129,7 +129,7 @@ def _rule(group: Group) -> Said | None:
 
 def _reason(group: Group) -> Said | None:
     """What is said about an object and commands nothing."""
-    if not group.has(*["DANGER", "HARMLESS", "INWAY", "INFRONT", "AHEADOF", "TOO", "BECAUSE", "BEHIND", "OK"]):
+    if not group.has("DANGER", "HARMLESS", "INWAY", "INFRONT", "AHEADOF", "TOO", "BECAUSE", "BEHIND", "OK"):
         return None
     listed = clause_kinds("reason")
     if group.has("OK") and not group.content:

@@ -249,7 +249,7 @@ def _is_reason(group: Group) -> bool:
         return False
     if works and not all(text.endswith("ed") for _, text in works):
         return False
-    return group.only(*["part", "station", "work", "DONE", "IN", "WAIT", "LONG", "BECAUSE", "WAS"])
+    return group.only("part", "station", "work", "DONE", "IN", "WAIT", "LONG", "BECAUSE", "WAS")
 
 
 def _is_left_out(group: Group) -> bool:
