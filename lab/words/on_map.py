@@ -107,22 +107,7 @@ def _rule(group: Group) -> Said | None:
         return None
     after = group.at("OK", "CAN") > group.at("thing")
     lifts = (has("OK", "CAN") and after) or (has("NOT", "NOLONGER") and has("DANGER")) or has("PERMIT")
-    if lifts and group.only(
-        *[
-            "thing",
-            "NOT",
-            "NOLONGER",
-            "DANGER",
-            "ANYMORE",
-            "PERMIT",
-            "HARMLESS",
-            "NEAR",
-            "CAN",
-            "MORE",
-            "EVERYTHING",
-            "AS",
-        ]
-    ):
+    if lifts and group.only(*clause_kinds("lift")):
         return Said("allow", (thing,))
     return None
 

@@ -54,51 +54,47 @@ TAG = re.compile(
 PUNCTUATION = {",": "COMMA", ":": "COMMA", ".": "DOT", "!": "DOT", "?": "DOT", ";": "DOT"}
 NOT_MANNERS = frozenset(
     [
-        *[
-            "only",
-            "hardly",
-            "barely",
-            "nearly",
-            "early",
-            "fly",
-            "apply",
-            "reply",
-            "supply",
-            "family",
-            "jelly",
-            "belly",
-            "rely",
-            "hourly",
-            "daily",
-        ]
+        "only",
+        "hardly",
+        "barely",
+        "nearly",
+        "early",
+        "fly",
+        "apply",
+        "reply",
+        "supply",
+        "family",
+        "jelly",
+        "belly",
+        "rely",
+        "hourly",
+        "daily",
     ]
 )
-TELLING = frozenset([*["i", "my", "we", "our", "he", "she", "because", "since", "yesterday"]])
+TELLING = frozenset(["i", "my", "we", "our", "he", "she", "because", "since", "yesterday"])
 TELLS = frozenset(
     [
-        *[
-            "NOT",
-            "NEVER",
-            "AVOID",
-            "NEAR",
-            "STOP",
-            "IF",
-            "OR",
-            "CANCEL",
-            "RULE",
-            "BEFORE",
-            "AFTER",
-            "FINISH",
-            "OFFLIMITS",
-            "LEFT",
-            "RIGHT",
-            "FORWARD",
-            "BACK",
-            "UP",
-            "DOWN",
-            "UNDO",
-            "ASK",
-        ]
+        "NOT",
+        "NEVER",
+        "AVOID",
+        "NEAR",
+        "STOP",
+        "IF",
+        "OR",
+        "CANCEL",
+        "RULE",
+        "BEFORE",
+        "AFTER",
+        "FINISH",
+        "OFFLIMITS",
+        "LEFT",
+        "RIGHT",
+        "FORWARD",
+        "BACK",
+        "UP",
+        "DOWN",
+        "UNDO",
+        "ASK",
     ]
 )  # they make it more than a story
 RELATIVES = frozenset(["that", "which", "who", "that is", "which is", "where", "what is", "what", "who is"])

@@ -7,7 +7,7 @@ from lab.words.clauses import SEPARATORS
 from lab.words.slots import Amount, Slot
 
 Slots = tuple[Slot, ...]
-NAMING = frozenset([*["dir", "side", "amount", "until", "thing", "part", "station", "work", "numbered"]])
+NAMING = frozenset(["dir", "side", "amount", "until", "thing", "part", "station", "work", "numbered"])
 COMPLETE = {"dir": ("amount", "until"), "amount": ("dir",)}
 MOTIONS = frozenset(["GO", "MOVE", "TURN", "TO", "ON", "ONLYTHEN", "PUT", "IN"])
 
