@@ -110,7 +110,7 @@ def cuts(slots: tuple[Slot, ...], meaning: Meaning) -> list[tuple[float, tuple[C
                     continue
                 inside = sum(SEPARATORS.get(slot.kind, 0.0) for slot in slots[at:end])
                 for price, clause in meaning(Group(slots[at:end])):
-                    if _joint(slots, end) and (isinstance(clause, Why | Undo | Again) or clause == STOPS):
+                    if _joint(slots, end) and (isinstance(clause, Why | Undo | Again) or clause in (STOPS, NO_COMMAND)):
                         continue  # "why did you go left?", "stop going left"
                     if isinstance(clause, Praise) and slots[end : end + 1] != () and slots[end].kind == "TO":
                         continue  # "it would be wrong to go left"
@@ -140,7 +140,7 @@ def common(group: Group) -> Iterator[tuple[float, Clause]]:
     asks = has("ASKS") and not all(text in ("what", "how") for text in group.all("ASKS"))
     judges = has("GOOD") != has("BAD") and only(*clause_kinds("praise"), "NO", "ASKS", "WAS") and group.is_one()
     if judges and not asks and not has("TO") and not (has("GOOD") and has("NO")):
-        yield 0.0, Praise(1 if has("GOOD") != has("NOT", "NEVER") else -1)
+        yield 0.0, Praise(1 if has("GOOD") != has("NOT", "NEVER", "NOTTHAT") else -1)
     if has("BAD") and has("NO") and only("BAD", "NO") and not has("IT") and set(group.all("BAD")) <= CALLED:
         yield -1.0, NO_COMMAND  # "no, silly"
     if has("OPPOSITE") and only(

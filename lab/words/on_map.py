@@ -135,10 +135,12 @@ PASSING = ("AROUND", "PASS", "PAST", "TURN", "TURNAROUND")
 def _around(group: Group) -> Said | None:
     """A way past an object, with the word of its side."""
     listed = clause_kinds("around")
-    if group.has("IS") or not group.only(*listed) or len(group.all("thing")) > 1:
+    if group.has("IS", "EVER") or not group.only(*listed) or len(group.all("thing")) > 1:
         return None
     if not group.all("thing") and not group.has("IT", "ITS"):
         return None
+    if group.has("TURN") and not any("round" in str(text) for text in group.all("TURN")):
+        return None  # "turn off the toaster"
     sides = [*group.all("dir"), *group.all("side")]
     vertical = ["higher"] * group.has("OVER") + ["lower"] * group.has("UNDER") + ["forward"] * group.has("BEHIND")
     if not group.has(*PASSING) and (not vertical or sides or not group.all("thing")):

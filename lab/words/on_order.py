@@ -110,7 +110,12 @@ def _never(group: Group) -> Said | None:
     keeps_empty = group.has("EMPTY") and group.has("LET") and group.only("EMPTY", "LET", "station", "EACHTIME")
     if keeps_empty and len(group.all("station")) == 1:
         return Said("never", (Part(is_any=True), group.all("station")[0]))
-    none = any(part.is_none for part in group.all("part"))
+    keeps_from = (
+        group.has("FROM") and group.has("WAIT") and any(str(text).startswith("keep") for text in group.all("LET"))
+    )
+    if group.has("FROM") and not keeps_from:
+        return None
+    none = keeps_from or any(part.is_none for part in group.all("part"))
     if not group.only(*listed) or not (group.negated or group.has("STOP") or none):
         return None
     stations = _places(group)
@@ -220,6 +225,8 @@ def _finish(group: Group) -> Said | None:
     if group.has("AFTER") and 0 <= group.at("REST") < group.at("AFTER") < group.at("part"):  # "all else can wait until"
         waits = group.only("REST", "AFTER", "part", "DONE", "WAIT", "FINISH", "LET")
         return Said("finish", (group.all("part")[-1],)) if waits else None
+    if any(str(text).endswith("before") for text in group.all("REST")) and group.only("REST", "part", "DONE", "FINISH"):
+        return Said("finish", (group.all("part")[0],)) if len(group.all("part")) == 1 else None
     parts = [part for part in group.all("part") if not part.is_any]
     others = [part for part in group.all("part") if part.is_any]
     if not group.only(*listed) or len(parts) > 1 or (not parts and not group.has("IT")):

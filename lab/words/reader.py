@@ -133,6 +133,7 @@ def _in_plain_order(text: str) -> str:
     text = TAG.sub("", text)
     text = re.sub(r"\b(go|drive|walk|run|head|move|travel) where\b", r"\1 to where", text)
     text = re.sub(r"\bto where ((?:\w+ ){1,4}?)(?:is|are|stands|lies|sits)\b", r"to \1", text)
+    text = re.sub(r"\bits (left|right|top|bottom|upper|lower)( hand)? edge\b", r"its \1 side", text)
     text = re.sub(r"\btoo the\b", "to the", text)
     text = re.sub(r"\bbefore you(?= [,.;!?]|$)", "in front of you", text)
     text = re.sub(r"\b(is|are|was|has been|have been)( now| already| all)? clean\b", r"\1 cleaned", text)
