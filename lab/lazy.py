@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     import h5py  # type: ignore[import-untyped]
     import jinja2
     import joblib
+    import lark.exceptions
+    import lark.parsers.earley_forest
     import matplotlib.artist
     import matplotlib.axes
     import matplotlib.backends.backend_agg
@@ -61,6 +63,7 @@ LIBRARIES: Mapping[str, Sequence[str]] = {
     "h5py": ("h5py",),
     "jinja2": ("jinja2",),
     "joblib": ("joblib",),
+    "lark": ("lark.exceptions", "lark.parsers.earley_forest"),
     "matplotlib": (
         "matplotlib.artist",
         "matplotlib.axes",

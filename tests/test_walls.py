@@ -19,7 +19,7 @@ ROOT = Path(__file__).resolve().parent.parent
 LAYERS: tuple[tuple[str, ...], ...] = (
     ("lab.errors", "lab.interrupts", "lab.lazy", "lab.operating_system", "lab.version"),
     ("lab.files", "lab.mdp", "lab.optional", "lab.plugins", "lab.statistics", "lab.workers"),
-    ("lab.learning", "lab.vision"),
+    ("lab.learning", "lab.vision", "lab.words"),
     ("lab.sequencing", "lab.toolbox"),
     ("lab.advice", "lab.tasks"),
     ("lab.sim",),
@@ -49,6 +49,7 @@ ALONE: dict[str, set[str]] = (
         "segno": {"lab.classroom.code_picture"},
         "cryptography": {"lab.classroom.certificate"},
         "jinja2": {"lab.studies.report"},
+        "lark": {"lab.words.slots"},
         "fsspec": {"lab.toolbox.remote_place"},
         "s3fs": set(),  # fsspec's
         "optuna": {"lab.studies.tuning"},
@@ -74,7 +75,7 @@ NEVER = {  # room -> rooms that it never imports, whatever the layers say
 }
 HEAVY = (
     *("numpy", "pydantic", "scipy", "trimesh", "matplotlib", "numba", "meshcat", "cv2", "pybullet", "safetensors"),
-    *("ortools", "starlette", "uvicorn", "gymnasium", "jinja2", "fsspec"),
+    *("ortools", "starlette", "uvicorn", "gymnasium", "jinja2", "lark", "fsspec"),
 )
 READS_ITS_OWN = (  # what ships with the lab, or what it has just written: nothing that a stranger may have made
     *(
@@ -85,6 +86,7 @@ READS_ITS_OWN = (  # what ships with the lab, or what it has just written: nothi
         "lab.cli.export",
         "lab.toolbox.remote_place",
     ),
+    *("lab.words.slots", "lab.words.vocabulary"),
     *("lab.api.lessons", "lab.api.pictures", "lab.api.runs", "lab.api.scenes"),
 )
 BY_TABLE = ("lab", "lab.lazy", "lab.cli.app", "lab.tasks.instances", "lab_studies")  # what these load stands in a table

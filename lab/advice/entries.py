@@ -55,7 +55,11 @@ class SessionEntry:
 
 @dataclass(frozen=True)
 class Answer:
-    """The answer of a person or a language model: an action, None for "skip"; left: it advises no more, and why."""
+    """The answer of a person or a language model: an action, None for "skip"; left: it advises no more, and why.
+
+    holds: what the person has said in words that holds from here on (rules and times without questions, see
+    `lab.seat.spoken_answers`), None if that is as before.
+    """
 
     by: str
     episode: int
@@ -64,11 +68,12 @@ class Answer:
     action: int | None
     left: bool = False
     why: str = ""
+    holds: tuple[dict[str, Any], ...] | None = field(default=None, metadata={"written": "if not None"})
 
 
 @dataclass(frozen=True)
 class Praise:
-    """A person's judgement in answer to a question, see `lab.learning.praise.Judgement`."""
+    """A person's judgement in answer to a question, see `lab.learning.praise.Judgement`; holds: as in `Answer`."""
 
     by: str
     episode: int
@@ -76,6 +81,7 @@ class Praise:
     state: int
     value: Annotated[int, Ge(-MOST_VALUE), Le(MOST_VALUE)]
     moves: Annotated[int, Ge(0), Le(MOST_MOVES)]
+    holds: tuple[dict[str, Any], ...] | None = field(default=None, metadata={"written": "if not None"})
 
 
 @dataclass(frozen=True)

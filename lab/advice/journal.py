@@ -7,6 +7,7 @@ events are compared with the recorded ones.
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 from lab.advice.entries import (
     FILE,
@@ -54,6 +55,7 @@ class Journal:
     _at: int = 0
     _file: AppendedFile | None = None
     _unsafe: bool = False  # an answer may not be on the disk yet
+    _holds: dict[str, tuple[dict[str, Any], ...]] = field(default_factory=dict)  # by person: what was said and holds
 
     @classmethod
     def begin(cls, folder: Path, session: SessionEntry) -> "Journal":
@@ -107,6 +109,7 @@ class Journal:
     def rewind(self) -> None:
         """Goes back to the first entry, for running the session again."""
         self._at = 0
+        self._holds.clear()
 
     def tell(self, entry: Entry) -> bool:
         """Records an entry, or compares it with the recorded one if the session is run again; returns whether it is new.
@@ -145,18 +148,22 @@ class Journal:
     def answer(self, by: str, request: Request, ask: Ask) -> Reply:
         """A person's answer to a request: the recorded one, or one asked for now and written before it is used.
 
+        An `ask` with the methods `holding` and `recall` has what its person has said and what holds from then on recorded with
+        the answers, and is told it in a replay.
         Raises AdvisorLeft, and Again if the person took the last answer of the episode back.
         """
         if self.folding:
             before = self.entries[self._at]
             if isinstance(before, Praise) and request.judgement != "no":
                 self.tell(replace(before, by=by, episode=request.episode, step=request.step, state=request.state))
+                self._recall(by, request, ask, before.holds)
                 return _answered(before)
             known = before if isinstance(before, Answer) else Answer(by, 0, 0, 0, None)
             if known.action is not None and known.action not in request.allowed:
                 allowed = "allowed " + allowed_words(request.allowed)
                 raise BadInput(f"{self._which}: {line_of(known)}: action {known.action}: {allowed}: it was edited")
             self.tell(replace(known, by=by, episode=request.episode, step=request.step, state=request.state))
+            self._recall(by, request, ask, known.holds)
             return _answered(known)
         given = self._asked(by, request, ask)
         self._append(given)
@@ -167,19 +174,37 @@ class Journal:
         if self.read_only:
             raise KeyboardInterrupt  # the replay is over
         last = undoable(self.entries, by)
+        at = (by, request.episode, request.step, request.state)
         while True:
             try:
                 said = ask(replace(request, undoable=last is not None))
-                asked = by, request.episode, request.step, request.state
-                return Praise(*asked, said.value, said.moves) if isinstance(said, Judgement) else Answer(*asked, said)
+                if isinstance(said, Judgement):
+                    return Praise(*at, said.value, said.moves, self._new_holds(by, ask))
+                return Answer(*at, said, holds=self._new_holds(by, ask))
             except AdvisorLeft as left:
-                return Answer(by, request.episode, request.step, request.state, None, True, str(left))
+                return Answer(*at, None, True, str(left), self._new_holds(by, ask))
             except Undo:
                 if last is None:
                     continue
                 self._write(Undone(by, request.episode))
                 del self.entries[last:]
                 raise Again from None
+
+    def _recall(self, by: str, request: Request, ask: Ask, holds: tuple[dict[str, Any], ...] | None) -> None:
+        """Tell a person's `ask` what they had said by then, if an entry records it."""
+        if holds is not None:
+            self._holds[by] = holds
+            if (recall := getattr(ask, "recall", None)) is not None:
+                recall(request, holds)
+
+    def _new_holds(self, by: str, ask: Ask) -> tuple[dict[str, Any], ...] | None:
+        """What a person has said and what holds now, None if that is as recorded before."""
+        holding = getattr(ask, "holding", None)
+        now = () if holding is None else tuple(holding())
+        if now == self._holds.get(by, ()):
+            return None
+        self._holds[by] = now
+        return now
 
     def _append(self, entry: Entry) -> None:
         self._write(entry)

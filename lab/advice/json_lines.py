@@ -4,7 +4,7 @@ import json
 import os
 import stat
 from collections.abc import Hashable, Mapping
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from functools import cache
 from pathlib import Path
 from typing import Any, Self
@@ -28,8 +28,13 @@ class EntryKinds:
         self._name_of = {kind: name for name, kind in kinds.items()}
 
     def line_of(self, entry: Any) -> str:
-        """An entry as one line of JSON, without a line break."""
-        return json.dumps({"kind": self._name_of[type(entry)], **asdict(entry)}, allow_nan=False)
+        """An entry as one line of JSON, without a line break; a field that is written if it is not None is left out if it is."""
+        record = asdict(entry)
+        kind: Any = type(entry)
+        for name in _seldom(kind):
+            if record[name] is None:
+                del record[name]
+        return json.dumps({"kind": self._name_of[kind], **record}, allow_nan=False)
 
     def entry_of(self, line: bytes) -> Any:
         """The entry in a line. Raises ValueError if it holds none."""
@@ -57,6 +62,13 @@ def differing(before: str, now: str) -> str:
     begin = max(before.rfind(mark, 0, same) for mark in (", ", "{")) + 1
     then, comes = (line[begin : begin + _SHOWN].strip() for line in (before, now))
     return f"in {before[:begin][:_SHOWN]}... it says {then}, now comes {comes}"
+
+
+@cache
+def _seldom(model: Hashable) -> tuple[str, ...]:
+    """The fields of a kind of entries that are left out if they are None."""
+    kind: Any = model
+    return tuple(field.name for field in fields(kind) if field.metadata.get("written") == "if not None")
 
 
 @cache

@@ -7,6 +7,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from lab.advice.entries import Answer, Praise
+from lab.advice.journal import Undo
 from lab.advice.panel import Panel
 from lab.learning.problem import Problem
 from lab.learning.requests import AdviceRequest, Ask, Reply, Request
@@ -15,6 +16,7 @@ from lab.mdp import FloatArray
 from lab.seat.grid_text import skill_of
 from lab.seat.replay_pace import ReplayPace
 from lab.seat.run_progress import RunProgress
+from lab.seat.spoken_answers import SpokenAnswers
 from lab.seat.terminal.prompt import TeachingPrompt
 from lab.teaching.events import AdvisorGathered, Event, LessonBegan, LessonEvent, QuestionAnswered, ScenePrepared
 from lab.teaching.kept_session import known_values, receipt_of
@@ -27,6 +29,34 @@ if TYPE_CHECKING:
 WORTH_S = 2.0  # least time between two receipts of one lesson
 PAGE_S = 30.0  # time that a replay waits for a browser
 SEEN_S = 0.05  # least time between two pictures of a lesson whose questions go elsewhere
+
+
+class SpokenAsk:
+    """Asks a person, and keeps with the answers what the person has said in sentences that holds from then on."""
+
+    def __init__(self, ask: Ask, spoken: SpokenAnswers) -> None:
+        self._ask, self._spoken = ask, spoken
+        self._before: tuple[dict[str, Any], ...] = ()  # what held before the last answer
+
+    def __call__(self, request: Request) -> int | None:
+        """The person's answer; what was said with an answer that is taken back does not hold any more."""
+        before = self._spoken.held()
+        try:
+            answer = self._ask(request)
+        except Undo:
+            self._spoken.hold_again(self._before)
+            raise
+        self._before = before
+        return answer
+
+    def holding(self) -> tuple[dict[str, Any], ...]:
+        """What has been said and holds, for the journal."""
+        return self._spoken.held()
+
+    def recall(self, request: Request, holds: tuple[dict[str, Any], ...]) -> None:
+        """Take over what a journal has of what was said."""
+        self._before = self._spoken.held()
+        self._spoken.hold_again(holds)
 
 
 class LessonSeat:
@@ -148,9 +178,9 @@ class LessonSeat:
         """The functions that ask people and language models, by the name of the advisor."""
         people: dict[str, Ask] = {**self.models}
         if self._prompt is not None:
-            people["terminal"] = self._ask_terminal
+            people["terminal"] = SpokenAsk(self._ask_terminal, self._prompt.spoken)
         if self.page is not None:
-            people["web"] = self._ask_page
+            people["web"] = SpokenAsk(self._ask_page, self.page.spoken)
         return people
 
     def _ask_terminal(self, request: Request) -> Reply:
@@ -160,13 +190,20 @@ class LessonSeat:
         self._set_scene(request)
         self._show_state(request)
         if self.page is not None:
-            self.page.offer(request, self._prompt.answer_from_outside)
+            self._offer(request)
+            self._prompt.on_heard = self._offer
         try:
             with self.progress.paused():
                 return self._prompt(request)
         finally:
             if self.page is not None:
                 self.page.withdraw()
+
+    def _offer(self, request: Request, text: str = "", moves: tuple[int, ...] = ()) -> None:
+        """Show on the page what is asked at the terminal, and what was understood there and waits for agreement."""
+        assert self.page is not None
+        assert self._prompt is not None
+        self.page.offer(request, self._prompt.answer_from_outside, text, moves)
 
     def _ask_page(self, request: Request) -> Reply:
         assert self.page is not None

@@ -47,6 +47,7 @@ class AroundPart(Skill):
         """The problem over the poses around a part with neighbours beside it; episodes begin in any free cell above it."""
         self.surveys = surveys
         survey = surveys.around(self.station, self.kind, self.carries)
+        self.blocking = survey.causes
         rewards = surveys.task.subtask(self.subtask).rewards
         try:
             start = free_above(self.name, survey, self.goal, self.station)

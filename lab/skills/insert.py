@@ -71,6 +71,7 @@ class Insert(Skill):
         where = "the overhead camera's picture"
         self.seen = see(self.picture, self.grid.view(), goal_near_m=machine, where=where)
         blocked, names = self._blocked(surveys.task)
+        self.blocking = np.array([names.get(cell, "") for cell in np.ndindex(*blocked.shape)]).reshape(blocked.shape)
         rewards = surveys.task.subtask("insert").rewards
         try:
             if blocked[self.seen.goal]:

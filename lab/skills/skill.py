@@ -169,6 +169,7 @@ class Skill:
     near: ClassVar[bool] = False  # whether the skill stays around its station's first spot, as grasp and place do
 
     station = ""  # the station at which it takes place, if any
+    blocking: NDArray[np.str_] | None = None  # the causes of each blocked cell of the problem's grid, "" for a free one
     carries = False  # whether the gripper holds a part meanwhile
     surveys: "Surveys"  # set by `setup`
     problem: Problem

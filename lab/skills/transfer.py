@@ -53,6 +53,7 @@ class Transfer(Skill):
         for place in (self.origin, self.target):
             surveys.cells_near(place)  # before the workspace is surveyed, which may take long
         survey = surveys.workspace(self.kind)
+        self.blocking = survey.causes
         start, goal = surveys.dock(self.origin, self.kind), surveys.dock(self.target, self.kind)
         if start == goal:
             raise BadInput(

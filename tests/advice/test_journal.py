@@ -291,6 +291,7 @@ BY_FIELD: dict[str, Any] = {
         st.dictionaries(st.text(max_size=5), st.one_of(st.none(), st.text(max_size=5), whole_numbers)),
     ),
     "said": st.lists(st.tuples(st.text(max_size=5), whole_numbers), max_size=3).map(tuple),
+    "holds": st.none() | st.lists(st.dictionaries(st.text(max_size=5), whole_numbers), max_size=2).map(tuple),
     "action": st.one_of(st.none(), whole_numbers),
     "verdict": st.sampled_from(get_args(Verdict)),
     "reason": st.sampled_from(get_args(Ending)),

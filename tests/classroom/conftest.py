@@ -89,6 +89,18 @@ async def question(page: ClientConnection) -> Json:
     return dict((await until(page, lambda news: news.get("seat", {}).get("question")))["seat"]["question"])
 
 
+async def seated(page: ClientConnection) -> Json:
+    """The question on a page that has just been opened, once it may be answered there."""
+    known: Json = {}
+
+    def both(news: Json) -> bool:
+        known.update(news.get("seat", {}))
+        return bool(known.get("question") and known.get("you", {}).get("seat"))
+
+    await until(page, both)
+    return dict(known["question"])
+
+
 async def answer(page: ClientConnection, asks: Json, action: int) -> None:
     """Answer a question."""
     await page.send(json.dumps({"answer": {"question": asks["number"], "action": action}}))

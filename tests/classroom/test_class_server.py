@@ -21,7 +21,7 @@ from lab.teaching.subjects import subject_of
 from lab.teaching.teacher import Teacher
 from lab.toolbox.registry import Toolbox
 from lab.view.progress import EscapingConsole
-from tests.classroom.conftest import answer, asked, at_page, code_of_closing, frames, join, question, until
+from tests.classroom.conftest import answer, asked, at_page, code_of_closing, frames, join, question, seated, until
 
 Json = dict[str, Any]
 ORIGIN = "https://elsewhere.example"
@@ -63,7 +63,7 @@ def test_pupils_have_learners_of_their_own(server: ClassServer) -> None:
 
     async def both() -> list[str]:
         async with connect(frames(server, pages[0])) as one, connect(frames(server, pages[1])) as two:
-            first = await question(one)
+            first = await seated(one)
             await question(two)
             await answer(one, first, first["own"])
             return [(await question(one))["title"], first["title"]]
@@ -87,10 +87,11 @@ def test_a_closed_lid_and_a_killed_process_lead_back_to_the_open_question(server
     page = join(server)["page"]
 
     async def two(opened: ClientConnection) -> Json:
+        asks = await seated(opened)
         for _ in range(2):
-            asks = await question(opened)
             await answer(opened, asks, asks["own"])
-        return await question(opened)
+            asks = await question(opened)
+        return asks
 
     open_question = at_page(server, page, two)
     assert at_page(server, page, question)["title"] == open_question["title"]
@@ -109,7 +110,7 @@ def test_a_class_goes_on_after_its_server_has_ended(server: ClassServer) -> None
     page = join(server)["page"]
 
     async def one(opened: ClientConnection) -> Json:
-        asks = await question(opened)
+        asks = await seated(opened)
         await answer(opened, asks, asks["own"])
         return await question(opened)
 
@@ -126,7 +127,7 @@ def test_a_second_window_takes_over_from_the_first(server: ClassServer) -> None:
         async with connect(frames(server, page)) as one:
             await question(one)
             async with connect(frames(server, page)) as two:
-                asks = await question(two)
+                asks = await seated(two)
                 await answer(two, asks, asks["own"])
                 await question(two)
                 return await code_of_closing(one)
@@ -159,7 +160,7 @@ def test_the_teacher_sees_pauses_hints_helps_and_goes_on(server: ClassServer) ->
 
     async def seen() -> None:
         async with connect(frames(server, teacher(server))) as desk, connect(frames(server, said["page"])) as pupil:
-            asks = await question(pupil)
+            asks = await seated(pupil)
             tile = await told(desk, 1, lambda tile: tile["asks"])
             assert (tile["name"], tile["here"], tile["lesson"]) == (said["name"], True, 1)
             await does(desk, do="pause", on=True)

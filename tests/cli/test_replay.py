@@ -61,3 +61,32 @@ def test_ctrl_c_ends_a_replay_at_once(lab: Lab, folder: Path, monkeypatch: pytes
         assert ("over after" in ran.out) == ("0" in words)
     assert shown[:2] == [0.25, 0.25]
     assert shown[-1] == 3600
+
+
+def test_a_lesson_in_sentences_is_learned_from_and_replayed(lab: Lab, folder: Path) -> None:
+    """Each answer of a sentence is a move in the journal, so that the replay and the resumed session need no grammar."""
+    (folder / "w.txt").write_text("S..\n.#.\n..G\n")
+    said = "go around the cube on the left\nkeep away from the fridge\ngo to the goal\nlike last time\nnever ask me again\n"
+    words = ("w.txt", "--advisor", "terminal", "--gate", "always", "--memory", "--episodes", "30", "--out", "lesson")
+    taught = lab("teach", *words, stdin=said)
+    assert taught.code == 0, taught.err
+    assert "Understood: to the goal." in taught.err
+    assert "'fridge': not understood" in taught.err
+    events = lab("replay", "lesson", "--json").json["events"]
+    answers = [event["action"] for event in events if event["kind"] == "answer" and not event["left"]]
+    assert answers[:4] == [1, 1, 3, 3]  # down, down, right, right
+    assert lab("replay", "lesson", "--json").json["events"] == events
+
+
+def test_what_was_said_and_holds_is_resumed(lab: Lab, folder: Path) -> None:
+    """A rule and a time without questions are in the journal where they were said, and hold after --resume."""
+    (folder / "w.txt").write_text("S....\n.....\n..#..\n.....\n....G\n")
+    said = "keep away from the cube, then go right\nno questions for 3 steps\nquit\n"
+    words = ("w.txt", "--advisor", "terminal", "--gate", "always", "--episodes", "2", "--seed", "3", "--out", "lesson")
+    lab("teach", *words, stdin=said)
+    lines = [json.loads(line) for line in (folder / "lesson" / "events.jsonl").read_text().splitlines()]
+    holds = [line["holds"] for line in lines if line.get("holds") is not None]
+    assert holds[0] == [{"rule": {"avoid": "cube"}, "problem": holds[0][0]["problem"]}]
+    assert [each[1:] for each in holds[1:]] == [[{"quiet": left, "episode": 1}] for left in (2, 1, 0)]
+    again = lab("teach", "--resume", "lesson", stdin="right\nquit\n")
+    assert "Your rules: keep away from the cube." in again.err

@@ -131,10 +131,13 @@ def _place(rest: str) -> str | tuple[float, float, float]:
     return x, y, z
 
 
-def _order(rest: str) -> tuple[int, ...]:
+def _order(rest: str) -> tuple[int, ...] | str:
+    """The numbers of an order, or its moves in words."""
     words = rest.replace(",", " ").split()
     if not words:
         raise BadInput("no entries: wanted one number a move, such as 1 2 1 3")
+    if not words[0].isdecimal() and len(words) > 1:
+        return rest
     for number, word in enumerate(words, start=1):
         if not (word.isascii() and word.isdecimal() and len(word) <= 6 and int(word) > 0):
             raise BadInput(f"entry {number}, '{word[:40]}': wanted the number of a part, from 1")
@@ -166,7 +169,9 @@ COMMANDS: dict[str, OperatorCommand] = {
     "grasp": OperatorCommand(
         "", "take up the part that is nearest to the gripper, wherever that is", "by hand", _nothing
     ),
-    "order": OperatorCommand("1 2 1 3", "make this sequence the plan, checked move by move", "in turn", _order),
+    "order": OperatorCommand(
+        "1 2 1 3", "make this sequence the plan, checked move by move; also in words", "in turn", _order
+    ),
     "learn": OperatorCommand("NAME", "learn a skill, or a family of skills, and keep it", "in turn", _name),
     "execute": OperatorCommand("NAME [PART]", "carry one skill out now", "by hand", _name),
     "lead": OperatorCommand(

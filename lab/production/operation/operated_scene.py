@@ -16,6 +16,7 @@ from lab.production.floor import Floor, Hooks
 from lab.production.operation.by_hand import ByHand
 from lab.production.operation.commands import OPERATOR, Spoken
 from lab.production.operation.lead import DROP, END, EVERY, Demonstration, Lead, led_in_words
+from lab.production.operation.order_words import order_in_words
 from lab.production.order import GIVEN, OrderAdvice, checked, ordered
 from lab.production.order_learning import OrderLearning
 from lab.production.parts_in_machines import watch_machines
@@ -207,6 +208,8 @@ class OperatedScene:
                 return self._run()
             case "order", tuple():
                 return self._order(tuple(int(number) for number in argument))
+            case "order", str():
+                return self._order(order_in_words(argument, self._planned().state.plan))
             case "learn", str():
                 return self._learn(argument)
             case "parts", str():

@@ -8,6 +8,7 @@ from lab.seat.replay_pace import WORDS as REPLAY_WORDS
 
 MAX_CHARS = 4096
 MOST_MOVES = 1000  # of one path
+MOST_SAID = 1000  # characters of a sentence
 WORDS = ("skip", "auto", "undo", "quit", "+", "-")
 
 
@@ -17,12 +18,22 @@ class Refused(Exception):
 
 @dataclass(frozen=True)
 class PageAnswer:
-    """An answer to a question, by its number: an action, one of WORDS, or the actions of a whole path."""
+    """An answer to a question, by its number: an action, one of WORDS, the actions of a whole path, or a sentence.
+
+    agree: whether the sentence before was understood as it was meant; None for all other answers.
+    """
 
     question: int
     action: int | None = None
     word: str = ""
     path: tuple[int, ...] = ()
+    say: str = ""
+    agree: bool | None = None
+
+    @property
+    def is_spoken(self) -> bool:
+        """Whether it is a sentence, or agrees to one."""
+        return bool(self.say) or self.agree is not None
 
 
 @dataclass(frozen=True)
@@ -74,6 +85,12 @@ def understood(message: str | bytes) -> Message:
         case {"answer": {"question": int(number), "path": list(path), **rest}, **more} if not (rest or more):
             if not isinstance(number, bool) and 0 < len(path) <= MOST_MOVES and all(type(move) is int for move in path):
                 return PageAnswer(number, path[0], path=tuple(path))
+        case {"answer": {"question": int(number), "say": str(text), **rest}, **more} if not (rest or more):
+            if not isinstance(number, bool) and text.strip() and len(text) <= MOST_SAID and text.isprintable():
+                return PageAnswer(number, say=text.strip())
+        case {"answer": {"question": int(number), "agree": bool(agree), **rest}, **more} if not (rest or more):
+            if not isinstance(number, bool):
+                return PageAnswer(number, agree=agree)
         case {"seat": "take" | "give" as wish, **more} if not more:
             return Wish(wish)
         case {"replay": str(word), **more} if not more and word in REPLAY_WORDS:

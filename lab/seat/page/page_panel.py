@@ -229,11 +229,13 @@ class SeatPanel:
             raise Refused("Nothing of this episode can be taken back.")
         if answer.word in ("+", "-") and answer.word not in pending.words:
             raise Refused("Nothing was done yet that could be good or bad.")
-        if pending.request.judgement == "only" and not answer.word:
+        if pending.request.judgement == "only" and not (answer.word or answer.is_spoken):
             raise Refused("This question is about the move that it makes: press + or -, or skip.")
         if len(answer.path) > 1 and not isinstance(pending.request, AdviceRequest):
             raise Refused("Which part moves next is said move by move.")
-        if not answer.word and not {answer.action, *answer.path} <= {*pending.moves}:
+        if answer.agree is not None and (pending.heard is None or "text" not in pending.heard):
+            raise Refused("Nothing was said that waits for agreement.")
+        if not answer.is_spoken and not answer.word and not {answer.action, *answer.path} <= {*pending.moves}:
             raise Refused("There is no such move here.")
         return pending
 
@@ -312,7 +314,9 @@ def _finite(value: Any) -> Any:
 
 
 def word_of(request: Request, answer: PageAnswer) -> str:
-    """An answer as typed at a terminal: the label of an action, the number of a move, the word itself, or a path."""
+    """An answer as typed at a terminal: the label of an action, the number of a move, the word or sentence itself, or a path."""
+    if answer.is_spoken:
+        return answer.say or ("yes" if answer.agree else "no")
     if answer.word or answer.action is None:
         return answer.word
     if len(answer.path) > 1 and isinstance(request, AdviceRequest):

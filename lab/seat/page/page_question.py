@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from functools import lru_cache
-from itertools import pairwise
+from itertools import accumulate, pairwise
 from math import prod
 from typing import Any
 
@@ -15,6 +15,7 @@ from lab.learning.requests import AdviceRequest, Reply, Request
 from lab.learning.selection import chances
 from lab.learning.updates import Table
 from lab.mdp import TabularMDP
+from lab.seat import request_text
 from lab.seat.grid_text import Marks, StateWords, direction_of, safe_ansi
 from lab.seat.page.page_console import order_of
 from lab.seat.request_text import choice, leads, outcome
@@ -51,6 +52,17 @@ def spot(mdp: TabularMDP, state: int) -> list[int]:
     """The [row, column, layer] of a state as the page draws it; [] when the states are no grid."""
     cell = mdp.state_cell(state)
     return [*_planes(mdp).place(cell), _planes(mdp).layer(cell)] if cell else []
+
+
+def heard_of(request: Request, text: str, moves: Sequence[int]) -> Json:
+    """What was understood of a sentence: in words, and its path as cells of the page, the robot's first; [] for no path."""
+    path: list[list[int]] = []
+    if isinstance(request, AdviceRequest) and moves and request_text.is_known(request.mdp):
+        states = accumulate(
+            moves, lambda state, action: int(request.mdp.successor[state, action]), initial=request.state
+        )
+        path = [spot(request.mdp, state) for state in states]
+    return {"text": text, "path": path if all(path) else []}
 
 
 def directions(mdp: TabularMDP) -> list[int | None]:

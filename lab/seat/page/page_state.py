@@ -89,7 +89,8 @@ MOST_LINES = 80
 class Pending:
     """A pending question: its request, its deadline ([s] of the clock, None: never), and its number.
 
-    offered: somebody else waits for the answer, if anybody does.
+    offered: somebody else waits for the answer, if anybody does. heard: what was understood of a sentence and waits for
+    agreement: {"text": in words, "path": cells as the page draws them}; or {"refused": why nothing was understood}; else None.
     """
 
     request: Request
@@ -97,6 +98,7 @@ class Pending:
     until_s: float | None = None
     offered: bool = False
     number: int = 0
+    heard: Json | None = None
 
     @property
     def words(self) -> tuple[str, ...]:
@@ -253,6 +255,7 @@ def _question(known: PageContent, now_s: float) -> Json | None:
         "left_s": left_s,
         "words": list(pending.words),
         "offered": pending.offered,
+        "heard": pending.heard,
     }
 
 

@@ -6,12 +6,14 @@ const seatMap = (() => {
   const HINT = "colours: worth; arrows: what it prefers; drag from R to draw a path";
   const el = (id) => document.getElementById(id);
   let place = null, slice = null, asked = null, cell = 0, layer = null, told = { go() {}, look() {}, can: () => false };
+  let said = []; // the cells of the path that a sentence was understood to mean
   let way = [], view = null, pen = null; // the cells of the drawn path, the robot's first; the current view; the pointer that draws
 
   function show(state, shown) {
     ({ place, slice } = state);
     asked = shown;
     if (way.length && !(shown && same(shown.at, way[0]))) way = [];
+    said = shown && shown.heard && shown.heard.path ? shown.heard.path.filter((spot) => !slice || spot[2] === slice.layer) : [];
     el("map").hidden = !place || !slice;
     if (el("map").hidden) return;
     const at = shown && shown.at.length ? shown.at : state.robot;
@@ -23,7 +25,7 @@ const seatMap = (() => {
   }
 
   function paint() {
-    cell = seatDraw.grid(el("grid"), { place, slice, way, robot: view.at, question: asked, directions: place.directions }, view.room, view.tall);
+    cell = seatDraw.grid(el("grid"), { place, slice, way: said.length > 1 ? said : way, robot: view.at, question: asked, directions: place.directions }, view.room, view.tall);
     el("way").hidden = way.length < 2;
     if (way.length > 1) el("way-text").textContent = `A path of ${seatStatus.count(way.length - 1, "move")}`;
   }

@@ -5,7 +5,7 @@ a question is pending. Several pages may watch; one of them has the seat.
 """
 
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict
 from math import inf
@@ -16,21 +16,25 @@ from lab.errors import BadInput, counted
 from lab.learning.praise import Judgement
 from lab.learning.requests import AdviceRequest, AdvisorLeft, Reply, Request
 from lab.mdp import NoPath, shortest_steps
+from lab.seat import order_text, request_text
 from lab.seat.event_text import Told
-from lab.seat.grid_text import StateWords
+from lab.seat.grid_text import Marks, StateWords
 from lab.seat.page.page_console import PARTS as RUN_PARTS
 from lab.seat.page.page_console import Console, bars_of, made_until
 from lab.seat.page.page_messages import PageAnswer
 from lab.seat.page.page_panel import CLOSED, SeatPanel
-from lab.seat.page.page_question import said_of
+from lab.seat.page.page_question import Json, heard_of, said_of
 from lab.seat.page.page_run import hear_run
 from lab.seat.page.page_state import Pending, ShownLesson, hear, standing_of
 from lab.seat.replay_pace import ReplayPace
 from lab.seat.request_text import PathAhead
+from lab.seat.spoken_answers import SpokenAnswers
+from lab.seat.spoken_turns import ASKS, SpokenTurns, Turn, counts_at_once
 from lab.sequencing.search import SequenceRequest
 from lab.teaching.events import ORDER, Event, LessonBegan, LessonEvent
 from lab.teaching.lesson_plan import LessonPlan
 from lab.view.meshcat import LiveView
+from lab.words.meaning import Intent, Refusal
 
 TITLE = "Teaching lab"
 MOST_STATES = 50_000  # of problems whose shortest path is computed
@@ -50,6 +54,8 @@ class SeatPage(LiveView):
         self._wait_s = wait_s
         self._panel: SeatPanel = SeatPanel(TITLE)
         self._path = PathAhead()
+        self.spoken = SpokenAnswers()  # what the person has said in sentences
+        self._turns = SpokenTurns(self.spoken, self._tell, self._command)
 
     def close(self) -> None:
         """Stop serving; whoever waits for an answer is told that the page was closed. Safe to call again."""
@@ -68,15 +74,72 @@ class SeatPage(LiveView):
             self.look(request)
             return self._path.step()
         self._drop_path()
-        pending = self._pose(request)
-        try:
-            answer = self._panel.wait(pending)
-        finally:
-            self.withdraw()
+        turn = self._turns.before_asking(request)
+        if turn == ASKS:
+            try:
+                pending, answer, turn = self._answered(request)
+            finally:
+                self.withdraw()
+        if isinstance(turn, tuple) and isinstance(request, AdviceRequest):
+            self._path = PathAhead(request, turn)
+            return self._path.step()
+        if turn is None or isinstance(turn, int | Judgement):
+            self.look(request)
+            return turn
+        if answer is not None and not answer.word and answer.action is not None:
+            self.spoken.gave(request, answer.path or (answer.action,))
         if answer is not None and len(answer.path) > 1 and isinstance(request, AdviceRequest):
             self._path = PathAhead(request, answer.path)
             return self._path.step()
         return _said(pending, answer)
+
+    def _answered(self, request: Request) -> tuple[Pending, PageAnswer | None, Turn]:
+        """The answer that ends a question, or the turn to which its sentences have led, ASKS for none.
+
+        What a sentence was understood to mean is shown first, and counts once the person agrees.
+        """
+        heard: Json | None = None
+        said: list[Intent] = []
+        while True:
+            pending = self._pose(request, heard=heard)
+            answer = self._panel.wait(pending)
+            if answer is None or not answer.is_spoken:
+                return pending, answer, ASKS
+            heard = None
+            if answer.say:
+                meant = self.spoken.heard(answer.say, request)
+                if isinstance(meant, Refusal):
+                    said, heard = [], {"refused": meant.reason}
+                    continue
+                said = meant
+                if not counts_at_once(said):
+                    heard = heard_of(request, self.spoken.in_words(said, request), self._turns.moves(said, request))
+                    continue
+            if answer.agree is not False and (turn := self._turns.carry_out(said, request)) != ASKS:
+                return pending, answer, turn
+
+    def _tell(self, text: str, tone: str) -> None:
+        """A line for the person among the notices."""
+        with self._panel.lock:
+            self._panel.known.learning.notice(Told(text, "note" if tone == "yellow" else ""))
+            self._panel.known.changed("notices")
+
+    def _command(self, word: str, request: Request) -> None:
+        """Carry out a command that was said in a sentence."""
+        match word:
+            case "undo" if request.undoable:
+                raise Undo
+            case "undo":
+                self._tell("There is nothing to take back: you have answered nothing yet in this episode.", "yellow")
+            case "quit":
+                raise KeyboardInterrupt
+            case "why":
+                if isinstance(request, AdviceRequest):
+                    reasons = request_text.reasons(request, Marks(), 0)
+                else:
+                    reasons = order_text.reasons(request) if isinstance(request, SequenceRequest) else []
+                for line in (*reasons, *(f"Your rule holds: {rule}." for rule in self.spoken.standing(request))):
+                    self._tell(line, "")
 
     def _drop_path(self) -> None:
         """Drop the rest of a drawn path, because the learner has gone elsewhere, with a message."""
@@ -87,13 +150,16 @@ class SeatPage(LiveView):
                 self._panel.known.changed("notices")
         self._path = PathAhead()
 
-    def offer(self, request: Request, on_word: Callable[[str], None] | None = None) -> None:
+    def offer(
+        self, request: Request, on_word: Callable[[str], None] | None = None, text: str = "", moves: Sequence[int] = ()
+    ) -> None:
         """Show a question that is also asked elsewhere; returns at once.
 
-        on_word: called from the server's thread with the page's answer, as a word of the terminal.
+        on_word: called from the server's thread with the page's answer, as a word of the terminal. text, moves: of a sentence
+        that was understood there and waits for agreement.
         """
         self._panel.on_word = on_word
-        self._pose(request, offered=True)
+        self._pose(request, offered=True, heard=heard_of(request, text, moves) if text else None)
 
     def look(self, request: Request) -> None:
         """Show the learner's state and preferences without a question, because somebody else is asked."""
@@ -148,13 +214,13 @@ class SeatPage(LiveView):
         if self._panel.close():  # otherwise an answer on the page has closed it, and its result follows
             self._wake()
 
-    def _pose(self, request: Request, offered: bool = False) -> Pending:
+    def _pose(self, request: Request, offered: bool = False, heard: Json | None = None) -> Pending:
         self._running()
         wait_s = None if offered else self._wait_s
         until_s = None if wait_s is None else time.monotonic() + wait_s
         with self._panel.lock:
             self._see(request)
-            pending = self._panel.pose(Pending(request, wait_s, until_s, offered))
+            pending = self._panel.pose(Pending(request, wait_s, until_s, offered, heard=heard))
         self._wake()
         return pending
 
@@ -209,7 +275,7 @@ class SeatPage(LiveView):
     def about(self, known: StateWords | None) -> None:
         """Take over the object that describes the new lesson's states in words; None for none."""
         with self._panel.lock:
-            self._panel.known.learning.known = known
+            self._panel.known.learning.known = self.spoken.about = known
 
     # ---- receipt, advisors, end
 

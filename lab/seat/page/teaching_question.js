@@ -68,6 +68,7 @@ const seat = (() => {
     el("where").textContent = shown ? shown.where || "" : "";
     el("detail").textContent = shown ? detail() : "";
     el("words").hidden = !shown || Boolean(state.replay);
+    showHeard();
     el("because").hidden = !(shown && whyOpen);
     if (!shown && (state.ended || state.standing.verdict)) el("moves").hidden = true; // no more questions come
     el(state.ended ? "ask" : "learning").append(el("receipt")); // at the end the receipt matters most
@@ -86,6 +87,27 @@ const seat = (() => {
 
   const judges = (word) => word === "+" || word === "-";
   const asked = () => (shown.judges === "only" ? " How is that: good (+) or bad (-)?" : "");
+  // A sentence: what was understood of it, which counts once the person agrees
+  function showHeard() {
+    el("say").hidden = !shown || Boolean(state.replay);
+    const heard = (shown && shown.heard) || null, waits = Boolean(heard && heard.text);
+    el("heard").hidden = !heard;
+    el("heard").classList.toggle("refused", Boolean(heard && heard.refused));
+    if (heard) el("heard-text").textContent = waits ? `Understood: ${heard.text}.` : heard.refused;
+    el("heard-yes").hidden = el("heard-no").hidden = !waits;
+  }
+
+  const heardWaits = () => Boolean(shown && shown.heard && shown.heard.text);
+
+  function speak(event) {
+    event.preventDefault();
+    const text = el("say-text").value.trim();
+    if (!text && heardWaits()) return answer({ agree: true });
+    if (!text || !canAnswer()) return answer({ say: text });
+    el("say-text").value = "";
+    answer({ say: text });
+  }
+
   const detail = () => `${shown.would}${asked()}${shown.why ? ` It asks because ${shown.why}.` : ""}${shown.offered && !state.replay ? " The terminal asks, too." : ""}`;
 
   function countDown() {
@@ -174,6 +196,7 @@ const seat = (() => {
   function enable() {
     const can = canAnswer();
     for (const button of moveButtons.values()) button.disabled = !can || Boolean(shown && shown.judges === "only");
+    for (const part of el("say").querySelectorAll("input, button")) part.disabled = !can;
     for (const button of el("words").querySelectorAll("button")) {
       const word = button.dataset.word;
       button.disabled = word === "why" ? !shown : !can || (word === "undo" && !shown.words.includes("undo"));
@@ -264,6 +287,7 @@ const seat = (() => {
 
   function pressed(event) {
     if (seatConsole.pressed(event, { busy: Boolean(shown), drawn: Boolean(shown) && seatMap.drawn().length > 0 })) return;
+    if (event.key === "Escape" && heardWaits() && canAnswer()) return answer({ agree: false });
     if (event.key === "Escape" && !seatMap.drop()) event.target.blur();
     const pace = state.replay && !state.ended && !event.ctrlKey && !event.target.matches("input, button") ? PACES[event.key] : undefined;
     if (pace) {
@@ -272,6 +296,7 @@ const seat = (() => {
     }
     if (event.ctrlKey || event.altKey || event.metaKey || !shown || state.replay || event.target.matches("input, select, textarea")) return;
     if (event.key === "Enter" && event.target.matches("button")) return; // the button handles this key
+    if (event.key === "Enter" && heardWaits()) return answer({ agree: true });
     if (draws(event)) return event.preventDefault();
     const direction = ARROW_KEYS.indexOf(event.key), digit = Number.parseInt(event.key, 10) - 1;
     const word = LETTERS[event.key] || LETTERS[event.key.toLowerCase()];
@@ -310,6 +335,9 @@ const seat = (() => {
     if (button) paced(button.dataset.replay);
     if (button && event.detail) button.blur();
   });
+  el("say").addEventListener("submit", speak);
+  el("heard-yes").onclick = () => answer({ agree: true });
+  el("heard-no").onclick = () => answer({ agree: false });
   el("way-send").onclick = sendWay;
   el("way-drop").onclick = () => seatMap.drop();
   window.addEventListener("resize", redraw);

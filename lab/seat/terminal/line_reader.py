@@ -106,7 +106,7 @@ class PlainReader:
         self.outside = outside or Outside()
         self._console = console
         self._stream = stream
-        self._typed = stream.isatty()
+        self._typed = self.confirms = stream.isatty()
         self._bytes: _Stream | None
         try:
             self._bytes = _STREAMS.setdefault(stream, _Stream(stream.fileno()))
@@ -185,7 +185,12 @@ _STREAMS: "WeakKeyDictionary[TextIO, _Stream]" = WeakKeyDictionary()
 
 
 class TerminalReader:
-    """Line editing with history; with `moves`, an arrow key on an empty line answers at once, after "path" it draws an arrow."""
+    """Line editing with history; with `moves`, an arrow key on an empty line answers at once, after "path" it draws an arrow.
+
+    confirms: a person types here, who agrees to what was understood of a sentence before it counts.
+    """
+
+    confirms = True
 
     def __init__(
         self,

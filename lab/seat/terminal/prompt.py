@@ -1,6 +1,6 @@
 """Teaching at a terminal: questions as text and a person's answers, for moves in a table and for the order of transfers."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from difflib import get_close_matches
 from itertools import groupby
 from typing import Any
@@ -18,21 +18,26 @@ from lab.seat import order_text, request_text
 from lab.seat.event_text import SessionText
 from lab.seat.grid_text import Marks, StateWords
 from lab.seat.request_text import PathAhead
+from lab.seat.spoken_answers import SpokenAnswers
+from lab.seat.spoken_turns import ASKS, NO_MORE, SpokenTurns, Turn, counts_at_once
 from lab.seat.terminal.line_reader import Outside, ReadLine, default_reader
 from lab.seat.terminal.screen import folded, question, room, screen
 from lab.seat.terminal.typed_answer import (
     ANSWERS,
     COMMANDS,
+    IN_WORDS,
     JUDGE_HINT,
     PRAISES,
     Understood,
     explained,
     explained_words,
+    is_sentence,
     judged,
     understand,
 )
 from lab.sequencing.search import SequenceRequest
 from lab.teaching.events import ORDER, Event, LessonEvent
+from lab.words.meaning import Refusal
 
 WORDS = ("why", "undo", "skip", "auto", "quit")
 TABLE = 56  # columns of a terminal, below which each move is a line of words instead of a table row
@@ -102,7 +107,7 @@ class OrderQuestion:
 
     def explained(self, request: SequenceRequest) -> list[tuple[str, str]]:
         """The possible inputs and their effects."""
-        return [("a number", "of the list: that move is made next"), *explained_words()]
+        return [("a number", "of the list: that move is made next"), *explained_words(), IN_WORDS]
 
     def named(self, request: SequenceRequest, decision: int) -> str:
         """A decision in words."""
@@ -205,6 +210,8 @@ class TableQuestion:
 
 
 STYLES = {"": "", "ask": "bold", "note": "yellow", "good": "green", "bad": "yellow", "lost": "bold red"}
+AGREED = "Is that what you mean? [enter = yes, no] "
+YES = ("", "y", "yes", "yeah", "ok", "okay")
 MOST_DRAWN = 5  # equal moves of a path that are drawn one by one
 
 
@@ -228,6 +235,11 @@ class TeachingPrompt:
         self._last: Request | None = None  # the last question
         self._text, self._order_text = SessionText(self._table.marks.named), SessionText(kind="order")
         self._guided = self._misleads = 0
+        self.spoken = SpokenAnswers()  # what the person has said in sentences
+        self._turns = SpokenTurns(self.spoken, self._say, self._command)
+        self.on_heard: Callable[[Request, str, tuple[int, ...]], None] | None = (
+            None  # what waits for agreement: text, path
+        )
 
     def __call__(self, request: Request) -> Reply:
         """The person's answer, after showing the learner's state."""
@@ -237,6 +249,13 @@ class TeachingPrompt:
         if self._path.goes_on(request):
             return self._give(request, self._path.step())
         self._drop_path(f"the learner is {self._way(request).where(request, request.state)} now")
+        try:
+            turn = self._turns.before_asking(request)
+        except AdvisorLeft:
+            self._done = True
+            raise
+        if turn != ASKS:
+            return self._take(turn, request)
         with self._outside.question():
             if self._read_line is None:
                 self._read_line = default_reader(self._console, plain=self._plain, outside=self._outside)
@@ -249,12 +268,14 @@ class TeachingPrompt:
 
     def about(self, known: StateWords | None) -> None:
         """Take over the object that describes the next lesson's states in words; None for none."""
-        self._table.known = known
+        self._table.known = self.spoken.about = known
 
     def show(self, request: Request) -> None:
         """Show the learner's state, its own choice, and its progress."""
         self._last = request
         self._print(self._way(request).shown(request))
+        if rules := self.spoken.standing(request):
+            self._say(f"Your rules: {'; '.join(rules)}.", "dim")
 
     def told(self, request: Request, action: Reply) -> None:
         """Show the answer to a request, such as "Answer: right"; None: the step was left to the learner."""
@@ -274,7 +295,16 @@ class TeachingPrompt:
         asked = way.asked(request)
         while True:
             try:
-                answer = way.understood(read_line(asked), request)
+                line = read_line(asked)
+                answer = way.understood(line, request)
+                alone = answer == JUDGE_HINT and len(line.split()) == 1
+                if isinstance(answer, str) and answer not in ANSWERS and is_sentence(line) and not alone:
+                    turn = self._hear(line, answer, request, read_line)
+                    if turn != ASKS:
+                        return self._take(turn, request)
+                    if self.on_heard is not None:
+                        self.on_heard(request, "", ())
+                    continue
             except EOFError:
                 self._say("No more answers: the learner goes on alone.")
                 raise AdvisorLeft from None
@@ -283,17 +313,61 @@ class TeachingPrompt:
                     self._say(f"Noted: {answer}.", "dim")
                     return answer
                 case int():
+                    self.spoken.gave(request, (answer,))
                     return self._give(request, answer)
                 case tuple() if isinstance(request, AdviceRequest):
-                    self._path = PathAhead(request, answer)
-                    self._say(f"A path of {counted(len(answer), 'move')}: {self._drawn(request, answer)}", "dim")
-                    return self._give(request, self._path.step())
+                    return self._begin_path(request, answer)
                 case "own":
+                    self.spoken.gave(request, (request.own,))
                     return request.own
                 case "skip":
                     return None
                 case _:
                     self._command(answer, request)
+
+    def _begin_path(self, request: AdviceRequest, moves: tuple[int, ...]) -> int:
+        """The first move of a path; its others answer the next questions along it."""
+        self.spoken.gave(request, moves)
+        self._path = PathAhead(request, moves)
+        self._say(f"A path of {counted(len(moves), 'move')}: {self._drawn(request, moves)}", "dim")
+        return self._give(request, self._path.step())
+
+    # ---- sentences ----------------------------------------------------------------------------------------------------
+
+    def _hear(self, line: str, hint: str, request: Request, read_line: ReadLine) -> Turn:
+        """What a sentence leads to; a person at a terminal agrees to what was understood first.
+
+        hint: shown for a single word that is no sentence.
+        """
+        heard = self.spoken.heard(line, request)
+        if isinstance(heard, Refusal):
+            self._say(heard.reason if len(line.split()) > 1 else hint, "yellow")
+            return ASKS
+        text = self.spoken.in_words(heard, request)
+        self._say(f"Understood: {text}.", "bold")
+        if getattr(read_line, "confirms", False) and not counts_at_once(heard):
+            if moves := self._turns.moves(heard, request):
+                self._say(f"That is {self._drawn(request, moves)}", "dim")
+            if self.on_heard is not None:
+                self.on_heard(request, text, moves)
+            if read_line(AGREED).strip().lower() not in YES:
+                self._say("Dropped.")
+                return ASKS
+        try:
+            return self._turns.carry_out(heard, request)
+        except AdvisorLeft:
+            self._done = True
+            raise
+
+    def _take(self, turn: Turn, request: Request) -> Reply:
+        """The answer that a turn gives; a path begins with its first move."""
+        if isinstance(turn, Judgement):
+            self._say(f"Noted: {turn}.", "dim")
+            return turn
+        if isinstance(turn, tuple) and isinstance(request, AdviceRequest):
+            return self._begin_path(request, turn)
+        assert turn is None or isinstance(turn, int)
+        return turn if turn is None or turn == request.own else self._give(request, turn)
 
     def _command(self, word: str, request: Request) -> None:
         """Carry out a command word that gives no advice; any other word is a hint, which is shown."""
@@ -301,7 +375,7 @@ class TeachingPrompt:
             case "auto":
                 raise AdvisorLeft
             case "done":
-                self._say("No more advice in this run: from here on learners go on alone.")
+                self._say(NO_MORE)
                 self._done = True
                 raise AdvisorLeft
             case "quit":
@@ -314,6 +388,8 @@ class TeachingPrompt:
             case "why":
                 for line in self._way(request).why(request, self._guided):
                     self._say(line)
+                if rules := self.spoken.standing(request):
+                    self._say(f"Your rules hold: {'; '.join(rules)}.")
             case "help":
                 self._help(request)
             case _:

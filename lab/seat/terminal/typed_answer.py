@@ -153,13 +153,25 @@ def _unknown(word: str, mdp: TabularMDP) -> str:
     return f"'{word[:20]}' is no direction: {hint}type {known} or ?"
 
 
+IN_WORDS = (
+    "a sentence",
+    "such as two steps left, then up until the wall; keep away from the cube; like last time; take that back",
+)
+
+
+def is_sentence(line: str) -> bool:
+    """Whether a line that is no move, path or command may be a sentence: not a key's name, and not "path" with a bad path."""
+    return not line.lstrip().lower().startswith(("path ", "the key ")) and any(c.isalpha() for c in line)
+
+
 def explained(mdp: TabularMDP) -> list[tuple[str, str]]:
     """The possible inputs and their effects, one row each."""
     known = letters(mdp)
     move = "a word from the list of moves, or its beginning; arrow keys follow the picture"
     if known:
         move += f"; {_known_letters(known, mdp)}"
-    return [("a move", move), *explained_words(example=example(mdp), letter=next(iter(known), ARROWS[0]))]
+    words = explained_words(example=example(mdp), letter=next(iter(known), ARROWS[0]))
+    return [("a move", move), *words, IN_WORDS]
 
 
 def explained_words(**examples: str) -> list[tuple[str, str]]:

@@ -345,3 +345,15 @@ def test_through_a_forwarded_port_and_after_the_line_was_cut(
         until(browser_page, says(3))
     finally:
         tunnel.close()
+
+
+def test_a_sentence_is_shown_as_a_path_before_it_counts(page: SeatPage, tab: "Page", until: Until) -> None:
+    """Typed in the page's field, agreed to with Enter, and done move by move."""
+    teaching = Teaching(page, episodes=1)
+    learned = teaching.start()
+    until(tab, says(1))
+    tab.fill("#say-text", "two steps right, then one down")
+    tab.press("#say-text", "Enter")
+    until(tab, "document.getElementById('heard-text').textContent.startsWith('Understood: right 2, then down 1')")
+    tab.press("#say-text", "Enter")
+    assert learned.result(20).steps[0] == 3

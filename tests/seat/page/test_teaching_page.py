@@ -529,3 +529,30 @@ def test_a_whole_run_is_told_in_the_panel(page: SeatPage, opens: "Opens") -> Non
             4.0,
             64.0,
         )
+
+
+def test_a_sentence_counts_once_what_was_understood_is_agreed_to(
+    page: SeatPage, request_1: AdviceRequest, opens: "Opens"
+) -> None:
+    """What is understood is shown in words and as cells; dropped it leads to nothing, agreed to it is a path."""
+    with opens(page) as browser:
+        asked = meanwhile(page.ask, request_1)
+        number = browser.hear_until(question)["question"]["number"]
+
+        def after(**what: Any) -> dict[str, Any]:
+            nonlocal number
+            answer(browser, number, **what)
+            shown: dict[str, Any] = browser.hear_until(asked_again(number))["question"]
+            number = shown["number"]
+            return shown
+
+        assert after(say="go to the fridge")["heard"]["refused"].startswith("'fridge': not understood")
+        assert after(say="two steps right, please")["heard"] == {
+            "text": "right 2",
+            "path": [[0, 0, 0], [0, 1, 0], [0, 2, 0]],
+        }
+        assert after(agree=False)["heard"] is None
+        assert after(say="go to the goal")["heard"]["text"] == "to the goal"
+        answer(browser, number, agree=True)
+        assert asked.result(20) == RIGHT
+        assert page.ask(replace(request_1, state=1, step=2)) == RIGHT  # the rest of the path

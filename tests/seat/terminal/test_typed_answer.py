@@ -135,6 +135,7 @@ def test_every_word_is_explained_once() -> None:
         "a move",
         "enter",
         *(word for word in COMMANDS if word not in ("", "help", "q")),
+        "a sentence",
     ]
     assert "letters: u up, d down, l left, r right" in rows[0][1]
     assert "path rru, or 3u for uuu" in dict(rows)["path"]
