@@ -38,7 +38,7 @@ class SpokenAsk:
         self._ask, self._spoken = ask, spoken
         self._before: tuple[dict[str, Any], ...] = ()  # what held before the last answer
 
-    def __call__(self, request: Request) -> int | None:
+    def __call__(self, request: Request) -> Reply:
         """The person's answer; what was said with an answer that is taken back does not hold any more."""
         before = self._spoken.held()
         try:

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from lab.learning.praise import Judgement
-from lab.learning.requests import AdviceRequest, Judgeable
+from lab.learning.praise import Judgeable, Judgement
+from lab.learning.requests import AdviceRequest
 from lab.mdp import grid
 from lab.seat.spoken_answers import SpokenAnswers
 from lab.seat.spoken_turns import ASKS, SpokenTurns
