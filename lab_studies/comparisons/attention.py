@@ -1,4 +1,4 @@
-"""What costs a person least for the same result: moves, whole ways, praise and blame, or a demonstration, all of them typed.
+"""What costs a person least for the same result: moves, ways, sentences, praise and blame, or a demonstration, all of them typed.
 
 The person knows the best moves. The seconds of attention are those of the keystroke-level model for what is typed at the prompts
 of the lab; each line is read by the parser of its prompt before it counts.
@@ -24,16 +24,18 @@ from lab.learning.session import Session
 from lab.learning.settings import GateSettings
 from lab.mdp import FloatArray, TabularMDP, greedy_path, shortest_steps
 from lab.seat.request_text import PathAhead
+from lab.seat.spoken_answers import SpokenAnswers
 from lab.seat.terminal.typed_answer import judged, letters, understand
 from lab.statistics import interval
 from lab.studies.charts import bars
 from lab.studies.findings import Findings, Row, mean_row, row, share_row, those
 from lab.studies.runner import Job, seeds_of
+from lab.words.meaning import Refusal
 from lab_studies.comparisons.advice_bench.problems import problem
 
 SKILLS = {"insert": "insert at toaster", "transfer": "transfer plate to insert with slice"}  # by problem
 PROBLEMS = tuple(SKILLS)
-NOBODY, ACTIONS, WAYS, DEMONSTRATION = "nobody", "actions", "ways", "demonstration"
+NOBODY, ACTIONS, WAYS, SENTENCES, DEMONSTRATION = "nobody", "actions", "ways", "sentences", "demonstration"
 PRAISE, LATE_PRAISE, CONTRARY_PRAISE = "praise", "late praise", "contrary praise"
 LATE = 2  # moves, of late praise
 JUDGING = {  # by kind: how a person judges; all rules by which the learner may act on it, the default without its name
@@ -44,8 +46,8 @@ JUDGING = {  # by kind: how a person judges; all rules by which the learner may 
         for kind in (PRAISE, CONTRARY_PRAISE)
     },
 }
-KINDS = (NOBODY, ACTIONS, WAYS, DEMONSTRATION, *JUDGING)
-HELPED = (ACTIONS, WAYS, PRAISE, LATE_PRAISE, DEMONSTRATION)
+KINDS = (NOBODY, ACTIONS, WAYS, SENTENCES, DEMONSTRATION, *JUDGING)
+HELPED = (ACTIONS, WAYS, SENTENCES, PRAISE, LATE_PRAISE, DEMONSTRATION)
 GATE = GateSettings("ccrl", first_episode=10, by_evidence=True, spare_best=True)
 WITHIN = 0.1  # of the fewest moves: the result
 KEY_S, MENTAL_S = 0.28, 1.35  # operators K, of an average typist who is no secretary, and M
@@ -59,9 +61,9 @@ MEASURES = (
     "judged. seconds: the keystroke-level model over all that was typed until then, an M for each line and for each further "
     f"straight part of a way, and a K for each key, Enter and Shift included (M {MENTAL_S} s, K {KEY_S} s; the hands stay on the "
     "keys, and the learner answers at once). It leaves out how long a person looks at a question. actions: a letter in answer to "
-    f"each question; ways: the rest of the way in one line; praise: + or - of each move; late praise: 0 to {LATE} moves late; "
-    "demonstration: `lead`, jogs and `lead end` at the console of lab operate, once, before the session. Sentences are not in "
-    "the table, because this version of the lab does not read them."
+    "each question; ways: the rest of the way in one line; sentences: the same in words, such as 3 right, then 2 forward, and an "
+    f"M and a K to agree to what was understood; praise: + or - of each move; late praise: 0 to {LATE} moves late; "
+    "demonstration: `lead`, jogs and `lead end` at the console of lab operate, once, before the session."
 )
 CONTRARY = (
     "contrary praise: + of the worst moves, - of the others. final_moves and late_steps are those of the whole session: the "
@@ -83,6 +85,12 @@ def way_line(mdp: TabularMDP, moves: Sequence[int]) -> tuple[str, int]:
     return "".join(f"{count}{key}" if count > 1 else key for key, count in runs), len(runs)
 
 
+def way_sentence(mdp: TabularMDP, moves: Sequence[int]) -> tuple[str, int]:
+    """(sentence, parts): a way in words, such as "8 right, then 3 forward", and the number of its straight parts."""
+    runs = [f"{len([*run])} {mdp.action_labels[action]}" for action, run in groupby(moves)]
+    return ", then ".join(runs), len(runs)
+
+
 def demonstrated(mdp: TabularMDP, skill: str, moves: Sequence[int]) -> list[str]:
     """The lines of a demonstration of a skill at the console: a jog for each straight part of the way."""
     runs = [(mdp.action_labels[action], len([*run])) for action, run in groupby(moves)]
@@ -99,6 +107,7 @@ class Typist:
     def __init__(self, kind: str, mdp: TabularMDP, values: FloatArray, draw: Draw):
         self._kind, self._mdp, self._values, self._draw = kind, mdp, values, draw
         self._path, self._episode, self._verdicts = PathAhead(), 0, list[str]()
+        self._spoken = SpokenAnswers()
         self.seconds = 0.0
         self.judging = JUDGING.get(kind)
 
@@ -106,10 +115,13 @@ class Typist:
         """The answer that the prompt reads from what is typed."""
         if self._kind == ACTIONS:
             return self._moves([int(self._values[request.state].argmax())], 1)
-        if self._kind == WAYS:
+        if self._kind in (WAYS, SENTENCES):
             if not self._path.goes_on(request):
                 moves = greedy_path(self._values, self._mdp, self._mdp.n_states, request.state)[1]
-                self._moves(moves, way_line(self._mdp, moves)[1])
+                if self._kind == WAYS:
+                    self._moves(moves, way_line(self._mdp, moves)[1])
+                else:
+                    self._sentence(moves, request)
                 self._path = PathAhead(request, moves)
             return self._path.step()
         return self._judgement(request)
@@ -120,6 +132,13 @@ class Typist:
         assert meant == (moves[0] if len(moves) == 1 else tuple(moves))
         self.seconds += seconds_of(line, parts)
         return moves[0]
+
+    def _sentence(self, moves: Sequence[int], request: AdviceRequest) -> None:
+        sentence, parts = way_sentence(self._mdp, moves)
+        meant = self._spoken.heard(sentence, request)
+        assert not isinstance(meant, Refusal)
+        assert self._spoken.moves(meant, request) == tuple(moves)
+        self.seconds += seconds_of(sentence, parts) + seconds_of("")
 
     def _judgement(self, request: AdviceRequest) -> Judgement | None:
         assert self.judging is not None

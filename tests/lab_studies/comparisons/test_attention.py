@@ -18,6 +18,7 @@ from lab_studies.comparisons.attention import (
     MENTAL_S,
     NOBODY,
     PRAISE,
+    SENTENCES,
     SKILLS,
     WAYS,
     WITHIN,
@@ -28,6 +29,7 @@ from lab_studies.comparisons.attention import (
     seconds_of,
     sessions_of,
     way_line,
+    way_sentence,
 )
 
 CELLS = grid((3, 4), np.zeros((3, 4), bool), (0, 0), (2, 3), action_labels=("left", "right", "backward", "forward"))
@@ -44,6 +46,7 @@ def test_seconds_of_a_line() -> None:
 def test_a_way_and_its_demonstration() -> None:
     moves = [1, 1, 3, 1]
     assert way_line(CELLS, moves) == ("2rfr", 3)
+    assert way_sentence(CELLS, moves) == ("2 right, then 1 forward, then 1 right", 3)
     assert demonstrated(CELLS, "insert at toaster", moves) == [
         "lead insert at toaster",
         "jog +x 100",
@@ -56,8 +59,11 @@ def test_a_way_and_its_demonstration() -> None:
 @pytest.mark.parametrize("name", SKILLS)
 def test_sessions_that_are_helped_come_to_the_result(name: str) -> None:
     mdp = problem(name).mdp
-    told = {kind: sessions_of(Setting(name, kind), 2, 0) for kind in (NOBODY, ACTIONS, WAYS, PRAISE, DEMONSTRATION)}
-    for kind in (ACTIONS, WAYS, PRAISE, DEMONSTRATION):
+    told = {
+        kind: sessions_of(Setting(name, kind), 2, 0)
+        for kind in (NOBODY, ACTIONS, WAYS, SENTENCES, PRAISE, DEMONSTRATION)
+    }
+    for kind in (ACTIONS, WAYS, SENTENCES, PRAISE, DEMONSTRATION):
         assert all(one.reached and one.final <= (1 + WITHIN) * shortest_steps(mdp) for one in told[kind])
     assert [one.helped for one in told[ACTIONS]] == [
         one.helped for one in told[WAYS]
