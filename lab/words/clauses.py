@@ -115,6 +115,8 @@ def cuts(slots: tuple[Slot, ...], meaning: Meaning) -> list[tuple[float, tuple[C
                     if isinstance(clause, Praise) and slots[end : end + 1] != () and slots[end].kind == "TO":
                         continue  # "it would be wrong to go left"
                     for cost, rest in best[end]:
+                        if isinstance(clause, Own) and _joint(slots, end) and not isinstance(rest[0], Quiet):
+                            continue  # "you pick one"
                         total = cost + price + inside + _joint(slots, end)
                         found[clause, *rest] = min(total, found.get((clause, *rest), 99.0))
         ordered = sorted(((cost, clauses) for clauses, cost in found.items()), key=lambda pair: pair[0])
@@ -144,14 +146,14 @@ def common(group: Group) -> Iterator[tuple[float, Clause]]:
     if has("BAD") and has("NO") and only("BAD", "NO") and not has("IT") and set(group.all("BAD")) <= CALLED:
         yield -1.0, NO_COMMAND  # "no, silly"
     if has("OPPOSITE") and only(
-        "OPPOSITE", "NO", "NOTTHAT", "GO", "MOVE", "WAY", "TURN", "JUDGED", "PUT", "CAN", "WAS"
+        "OPPOSITE", "NO", "NOTTHAT", "GO", "MOVE", "WAY", "TURN", "JUDGED", "PUT", "CAN", "WAS", "DOIT"
     ):
         yield 0.0, Opposite()
     if group.all("dir") == ["reverse"] and has("NO", "NOTTHAT") and only("dir", "NO", "NOTTHAT", "GO", "MOVE"):
         yield 0.0, Opposite()
     if has("SAME") and only(*clause_kinds("again")) and group.is_one():
         yield 0.0, Again()
-    if has("AGAIN") and only("MORE", "PUT", "MOVE", "LAST"):
+    if has("AGAIN") and only("MORE", "PUT", "MOVE", "LAST", "DOIT"):
         yield 0.5, Again()
     if _takes_back(group):
         yield 0.0, Undo()
@@ -191,8 +193,8 @@ def _takes_back(group: Group) -> bool:
 
 
 def _leaves_it(group: Group) -> bool:
-    if group.has("OWN", "DUNNO"):
-        return group.only("OWN", "DUNNO", "NO", "GOON", "GO", "MOVE", "WAY", "CAN", "ANSWER", "PUT", "CHOOSE")
+    if group.has("OWN", "DUNNO", "DOIT") and not (group.has("AGAIN") and group.only("DOIT", "MORE")):
+        return group.only(*clause_kinds("own"))
     if group.has("GOAHEAD"):
         return group.only("GOON", "GOAHEAD", "WAY")
     return group.has("YES", "OK") and not group.content and not group.has("TO", "ON", "OF", "AGAIN")

@@ -167,7 +167,7 @@ def _goes_to(group: Group) -> bool:
         return False
     if group.has("KEEP", "STOP") and not group.has("GO", "MOVE", "NEXTTO"):
         return False
-    if group.all("until"):
+    if group.all("until") and not _repeats(group):
         return False
     if not group.all("thing"):  # "go there"
         goes = group.has("GO", "VISIT", "NEAR") and group.only("GO", "VISIT", "NEAR", "NEXTTO", "BACK", "UPTO")
@@ -223,6 +223,7 @@ def _leg(group: Group, way: str) -> Stretch | None:
     limits = group.has("WALL", "TOP", "BOTTOM", "ALLWAY", "ASHIGH", "ASLOW", "BLOCKED")
     limits = limits or (group.has("SIDE") and group.has("FARTHEST"))  # "the far side"
     amounts, untils, things = group.all("amount"), group.all("until"), group.all("thing")
+    untils = [] if _repeats(group) else untils
     if group.has("FREE", "STOP", "INFRONT", "SIDE", "FARTHEST") and not (limits or untils or things):
         return None
     if way == "reverse" and not (amounts or untils or limits):
@@ -257,6 +258,12 @@ def _leg(group: Group, way: str) -> Stretch | None:
     if group.has("HIT", "NEXTTO", "NEAR", "VISIT", "UPTO"):
         return None
     return Stretch(way, turns, Amount(1.0))
+
+
+def _repeats(group: Group) -> bool:
+    """Whether a condition only says again where an object ends the way: "up to the cube until you are next to it"."""
+    untils = [_until(items) for items in group.all("until")]
+    return untils == [("object", IT, "")] and len(group.all("thing")) == 1 and group.at("thing") < group.at("until")
 
 
 def _until(items: Sequence[Any]) -> tuple[str, Thing | None, str] | None:

@@ -52,6 +52,11 @@ def _number(group: Group) -> Said | None:
     listed = clause_kinds("number")
     if len(named) != 1 or not group.only(*listed) or any(not part.is_next for part in group.all("part")):
         return None
+    at = group.at("numbered")
+    before = group.slots[at - 1] if at else None
+    points = before is not None and (before.kind == "part" or str(before.value).endswith((" that", " this")))
+    if points and named[0] == 1.0:
+        return None  # "pick that one", "another one"
     return Said("number", (named[0],))
 
 

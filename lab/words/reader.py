@@ -19,7 +19,8 @@ CONTRACTIONS = (
         "isn'?t": "is not", "wasn'?t": "was not", "aren'?t": "are not", "mustn'?t": "must not",
         "shouldn'?t": "should not", "wouldn'?t": "would not", "couldn'?t": "could not", "needn'?t": "need not",
         "haven'?t": "have not", "hasn'?t": "has not", "ain'?t": "is not", "gonna": "going to", "wanna": "want to",
-        "gotta": "have to", "id like": "i would like", "ive": "i have", "itll": "it will", "ill": "i will",
+        "gotta": "have to", "id(?= [a-z])": "i would", "youd": "you would", "itd": "it would", "ive": "i have",
+        "itll": "it will", "youll": "you will", "ill": "i will",
         "u": "you", "strait": "straight", "thn": "then", "dn": "down", "rt": "right", "pls": "please",
         "plz": "please", "upto": "up to", "goto": "go to", "alot": "a lot", "lemme": "let me", "gimme": "give me",
         "hows": "how is", "hes": "he is", "w/o": "without", "ur": "your", "thx": "thanks", "twise": "twice",
@@ -28,9 +29,14 @@ CONTRACTIONS = (
         "god job": "good job",
     }.items()),
     (r"\b(away|clear|far|back) form\b", r"\1 from"),
+    (r"\b(?:the|any|which|whichever|whatever) one (?=you (?:like|want|pick|choose|select|prefer|think|find)\b)", "whichever "),
+    (r"\bits (?=((all|completely|fully|totally|entirely) )?(done|finished|completed?|ready|blocked|over|through)\b)", "it is "),
     *((rf"{short}\b", f" {full}") for short, full in {
         "n't": "not", "'re": "are", "'ve": "have", "'ll": "will", "'d": "would", "'m": "am", "'s": "is",
     }.items()),
+    (r"\b(?<!i )(?<!i will )(?<!i would )(pick|choose|select)( any)? one\b"
+     r"(?= *($|[,.;!?]|(of|for|yourself|then|please|now|number|option|move|possibility|choice)\b))",
+     r"\1 any"),  # a pronoun, and no number
 )  # fmt: skip
 BY_LETTER = {"l": "left", "r": "right", "f": "forward", "b": "backward", "u": "up", "d": "down"}
 LETTERS = r"(?:[lrfbud] ?\d+[ ,]*)+|(?:\d+ ?[lrfbud][ ,]*)+"  # "l2 u3"
@@ -98,6 +104,7 @@ TELLS = frozenset(
     ]
 )  # they make it more than a story
 RELATIVES = frozenset(["that", "which", "who", "that is", "which is", "where", "what is", "what", "who is"])
+TAKEN_BACK = "rules?|bans?|restrictions?|limits?|limitations?|warnings?|prohibitions?"  # "take my rules back"
 POINTING = frozenset(["that", "this", "those", "these"])
 NAMES = frozenset(["NAME", "PART", "KIND", "STATION", "ACTKIND"])  # kinds of names of the scene
 UNKNOWN = "UNKNOWN"  # the kind of what is of no kind
@@ -135,6 +142,11 @@ def _in_plain_order(text: str) -> str:
     text = re.sub(r"\bto where ((?:\w+ ){1,4}?)(?:is|are|stands|lies|sits)\b", r"to \1", text)
     text = re.sub(r"\bits (left|right|top|bottom|upper|lower)( hand)? edge\b", r"its \1 side", text)
     text = re.sub(r"\btoo the\b", "to the", text)
+    text = re.sub(
+        rf"\b(take|throw) ((?:\w+ ){{0,3}}?(?:{TAKEN_BACK})(?: (?!and |then |go )\w+){{0,4}}?) (back|away|out)\b",
+        r"\1 \3 \2",
+        text,
+    )
     text = re.sub(r"\bbefore you(?= [,.;!?]|$)", "in front of you", text)
     text = re.sub(r"\b(is|are|was|has been|have been)( now| already| all)? clean\b", r"\1 cleaned", text)
     text = re.sub(r"\bthe (near|close|nearer|closer)\b(?! to\b)", "the nearest", text)
@@ -191,7 +203,9 @@ def _plain(tokens: Sequence[Token]) -> list[Token]:
         beside = (
             token.text == "by" and bool(kept) and kept[-1].kind == "NAME" and after is not None and after.kind == "NAME"
         )
-        if beside:
+        if token.kind == "SCRATCH" and after is not None and after.kind == "RULE":
+            kept.append(Token("CANCEL", None, token.text))  # "cancel that rule"
+        elif beside:
             kept.append(Token("NEXTTO", None, token.text))
         elif relates:
             kept.append(Token("THATIS", None, token.text))

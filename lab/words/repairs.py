@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 from lab.words.clauses import SEPARATORS
 from lab.words.slots import Amount, Slot
@@ -55,7 +56,7 @@ def _corrected(slots: Slots) -> Slots:
         before, after = list(slots[:at]), list(slots[at + 1 :])
         while before and before[-1].kind in SEPARATORS:
             before.pop()
-        while after and (after[0].kind in SEPARATORS or after[0].kind in ("CORRECT", "NO", "SCRATCH")):
+        while after and (after[0].kind in (*SEPARATORS, "CORRECT", "NO") or (before and after[0].kind == "SCRATCH")):
             after.pop(0)
         if slots[at].kind == "SCRATCH":
             slots = tuple(after) if after else (slots[at],)
@@ -70,7 +71,7 @@ def _corrects(slots: Slots, at: int) -> bool:
     """Whether a slot is a word of correction with something before it; "sorry" and "no" at a beginning correct nothing."""
     slot = slots[at]
     if slot.kind == "SCRATCH":
-        return len(slots) > 1
+        return _commands(slots[:at]) or ("thought" in slot.value and len(slots) > 1)
     if slot.kind == "CORRECT":
         return slot.value not in WEAK or at == 0 or slots[at - 1].kind in SEPARATORS
     later = any(slot.kind in NAMING for slot in slots[at + 1 :])
@@ -89,6 +90,13 @@ def _corrects(slots: Slots, at: int) -> bool:
         and earlier
         and later
     )
+
+
+def _commands(slots: Slots) -> bool:
+    """Whether there is a command that can be scratched: "no, that was bad, scratch that" takes back an earlier answer."""
+    breaks = [-1, *(n for n, slot in enumerate(slots) if slot.kind in SEPARATORS), len(slots)]
+    parts = ({slot.kind for slot in slots[a + 1 : b]} for a, b in pairwise(breaks))
+    return any("BAD" not in kinds and kinds - {"NO", "NOTTHAT", "CORRECT", "SCRATCH", "YES", "OK"} for kinds in parts)
 
 
 def _merged(wrong: Sequence[Slot], right: Sequence[Slot]) -> list[Slot]:
