@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from lab.production.sequencing_job import SequencingOptions, sequence_named
     from lab.seat.language_model import language_models
     from lab.seat.lesson_seat import LessonSeat
+    from lab.seat.page.finding_page import FindingPage
     from lab.seat.page.teaching_page import SeatPage
     from lab.seat.run_progress import RunProgress
     from lab.seat.terminal.console_app import OperatorConsole
@@ -110,7 +111,7 @@ if TYPE_CHECKING:
     from lab.view.movie import write_movie
     from lab.view.progress import EscapingConsole, counting
     from lab.view.schedule_scene import scene_of
-    from lab.view.subtask_summary import map_of, proposals_text, subtask_summary
+    from lab.view.subtask_summary import gain_text, map_of, proposals_text, subtask_summary
     from lab.view.summary import (
         audit_summary,
         delivered_in_words,
@@ -177,6 +178,7 @@ TABLE = {
     "lab.production.sequencing_job": ("sequence_named", "SequencingOptions"),
     "lab.seat.language_model": ("language_models",),
     "lab.seat.lesson_seat": ("LessonSeat",),
+    "lab.seat.page.finding_page": ("FindingPage",),
     "lab.seat.page.teaching_page": ("SeatPage",),
     "lab.seat.run_progress": ("RunProgress",),
     "lab.seat.terminal.console_app": ("OperatorConsole",),
@@ -235,7 +237,7 @@ TABLE = {
     "lab.view.meshcat": ("LiveView", "replay_html"),
     "lab.view.movie": ("write_movie",),
     "lab.view.schedule_scene": ("scene_of",),
-    "lab.view.subtask_summary": ("map_of", "proposals_text", "subtask_summary"),
+    "lab.view.subtask_summary": ("gain_text", "map_of", "proposals_text", "subtask_summary"),
     "lab.view.summary": (
         "audit_summary",
         "delivered_in_words",

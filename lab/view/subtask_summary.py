@@ -49,14 +49,19 @@ def subtask_summary(document: Mapping[str, Any]) -> RenderableType:
         return Text("\n".join(lines))
     parts: list[RenderableType] = [Text("\n".join(lines))]
     parts.append(table_of(document["ways"], ("to", "from", "episodes", "moves", "longest", "saved_as")))
-    gain = document["gain"]
-    if gain is not None:
-        parts.append(
-            Text(
-                f"gain: {gain['tasks']} drawn tasks in the same rooms took {counted(gain['moves'], 'move')} in "
-                f"{counted(gain['episodes'], 'episode')} with these ways, {counted(gain['flat_moves'], 'move')} in "
-                f"{counted(gain['flat_episodes'], 'episode')} without; finding them took {counted(document['moves'], 'move')}, "
-                f"learning the ways {sum(way['moves'] for way in document['ways'])} more"
-            )
-        )
+    if document["gain"] is not None:
+        parts.append(Text(gain_text(document)))
     return Group(*parts)
+
+
+def gain_text(document: Mapping[str, Any]) -> str:
+    """What the accepted sub-tasks gain, in a sentence; how many ways were learned, where that was not measured."""
+    gain, ways = document["gain"], document["ways"]
+    if gain is None:
+        return f"{counted(len(ways), 'way')} learned and kept."
+    return (
+        f"gain: {gain['tasks']} drawn tasks in the same rooms took {counted(gain['moves'], 'move')} in "
+        f"{counted(gain['episodes'], 'episode')} with these ways, {counted(gain['flat_moves'], 'move')} in "
+        f"{counted(gain['flat_episodes'], 'episode')} without; finding them took {counted(document['moves'], 'move')}, "
+        f"learning the ways {sum(way['moves'] for way in ways)} more"
+    )

@@ -49,6 +49,7 @@ def test_a_single_room_has_nothing_to_propose(lab: Lab, folder: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "error"),
     [
+        (("--yes", "--page"), "lab: --yes beside --page: with --yes nothing is asked: leave one of them away\n"),
         (("--method", "hexq"), "lab: unknown method 'hexq' (--method): known: betweenness, paths, spectral\n"),
         (("--episodes", "0"), None),
     ],
