@@ -101,6 +101,7 @@ class ClassServer:
         base = f"{place.hosts[0]}:{self.port}"
         self.join_url = f"{place.scheme}://{base}/?code={roster.code}"
         self.teacher_url = f"{place.scheme}://{base}/teacher/?token={self._token}"
+        self._picture = code_svg(self.join_url)
         self._files = self._pages()
 
     def __enter__(self) -> "ClassServer":
@@ -371,19 +372,16 @@ class ClassServer:
 
     async def _tell(self, browser: WebSocket, stirred: asyncio.Event) -> None:
         """Send the tiles and rows that have changed, a few times a second."""
-        send, seen, told = sender(browser), dict[int, str](), ""
+        send = sender(browser)
+        seen, told = dict[int, Any](), dict[str, Any]()
         while True:
             stirred.clear()
-            tiles = {number: json.dumps(tile) for number, tile in self.room.tiles().items()}
-            changed = {number: json.loads(text) for number, text in tiles.items() if seen.get(number) != text}
-            seen = tiles
-            known = {"class": self._known(), "rows": self.room.rows()}
-            if (text := json.dumps(known)) == told:
-                known = {}
-            else:
-                told = text
-            if changed or known:
-                await send(json.dumps(known | {"tiles": [*changed.values()]}))
+            tiles, now = self.room.tiles(), {"class": self._known(), "rows": self.room.rows()}
+            news = {part: value for part, value in now.items() if told.get(part) != value}
+            changed = [tile for number, tile in tiles.items() if seen.get(number) != tile]
+            seen, told = tiles, now
+            if changed or news:
+                await send(json.dumps(news | {"tiles": changed}))
             await asyncio.sleep(TILES_EVERY_S)
             with suppress(TimeoutError):  # the time that questions have waited changes by itself
                 await asyncio.wait_for(stirred.wait(), 1.0)
@@ -395,7 +393,7 @@ class ClassServer:
         return {
             "code": self.roster.code,
             "join": self.join_url,
-            "picture": code_svg(self.join_url),
+            "picture": self._picture,
             "lessons": lessons,
             "paused": self.room.paused,
             "most": self.roster.most,
@@ -413,9 +411,9 @@ class ClassServer:
                 case {"do": "help", "pupil": int(number), "on": bool(begins)}:
                     room.help(number, begins)
                 case {"do": "next", "pupil": int() | None as number}:
-                    await room.go_on(number)
+                    room.go_on(number)
                 case {"do": "lesson", "pupil": int() | None as number, "lesson": int(lesson)}:
-                    await room.go_on(number, lesson - 1)
+                    room.go_on(number, lesson - 1)
                 case {"do": "open", "pupil": int(number)}:
                     room.open_again(number)
                 case {"do": "end"}:

@@ -40,8 +40,9 @@ class Desk:
     parts: the newest parts of the page's document. result: the lesson's document, once it is over. text: why it failed.
     """
 
-    def __init__(self, order: DeskOrder, on_news: Callable[[], None]) -> None:
-        self.order, self._on_news = order, on_news
+    def __init__(self, order: DeskOrder) -> None:
+        self.order = order
+        self.on_news: Callable[[], None] = lambda: None
         self.state: State = "opening"
         self.parts: Json = {}
         self.result: Mapping[str, Any] | None = None
@@ -115,7 +116,7 @@ class Desk:
                 self.state, self.result = "over", document
             case ("failed" | "stopped" as how, str(text)):
                 self.state, self.text = how, text
-        self._on_news()
+        self.on_news()
 
     def _ended(self) -> None:
         """The process has ended; if nobody asked it to, it was killed."""
@@ -123,7 +124,7 @@ class Desk:
             self.state, self.text = "lost", "its process has ended"
         self._address = ""
         self.ready.set()
-        self._on_news()
+        self.on_news()
 
     async def _watch(self) -> None:
         """Take over the parts of the document as they change."""
@@ -133,4 +134,4 @@ class Desk:
                     parts = json.loads(message).get("seat", {})
                     if new := {part: parts[part] for part in KEPT if part in parts}:
                         self.parts |= new
-                        self._on_news()
+                        self.on_news()

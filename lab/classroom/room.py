@@ -53,6 +53,9 @@ class Room:
         self.shoulders: set[PupilPage] = set()  # the teacher's pages at pupils' desks
         self._hints: dict[int, str] = {}
         self._helped: set[int] = set()
+        self._finished: dict[
+            tuple[int, int], Json | None
+        ] = {}  # (pupil, earlier lesson) -> its document, if it was finished
         self._lost: Counter[tuple[int, int]] = Counter()  # (pupil, lesson) -> how often its process was killed
         self._asked: dict[int, tuple[int, float]] = {}  # pupil -> the pending question's number, and when it came
         self._context = processes()
@@ -80,16 +83,23 @@ class Room:
         """Open the desk of a pupil at the pupil's lesson: the lesson begins, goes on, or is shown if it is over."""
         options = replace(self.roster.lessons[pupil.lesson], seed=self.roster.seed)
         order = DeskOrder(options, self.folder(pupil, pupil.lesson), self.roster.folder / pupil.folder / "toolbox")
-        desk = self.desks[pupil.number] = Desk(order, lambda: self._stirred(pupil.number))
+        before = self.desks.get(pupil.number)
+        desk = self.desks[pupil.number] = Desk(order)
+        desk.on_news = lambda: self._stirred(pupil.number, desk)
         kept = self._kept(order.folder)
         if kept is not None:
             desk.state, desk.result, desk.parts = "over", kept["document"], kept["page"]
             desk.ready.set()
         else:
-            self._start(self._opened(desk))
+            self._start(self._opened(desk, before))
+        if before is not None:
+            self._start(before.close())
         self.on_news()
 
-    async def _opened(self, desk: Desk) -> None:
+    async def _opened(self, desk: Desk, before: Desk | None) -> None:
+        """Open a desk after the one before it, whose journal it may go on with, has been closed."""
+        if before is not None:
+            await before.close()
         async with self._starting:
             await desk.open(self._context)
             await desk.ready.wait()
@@ -99,9 +109,10 @@ class Room:
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
 
-    def _stirred(self, number: int) -> None:
+    def _stirred(self, number: int, desk: Desk) -> None:
         """Something of a desk has changed: keep a finished lesson, note when a question came."""
-        desk = self.desks[number]
+        if self.desks[number] is not desk:
+            return  # it was closed, and another one is in its place
         question = desk.parts.get("question")
         if not question:
             self._asked.pop(number, None)
@@ -195,21 +206,23 @@ class Room:
         """Whether a pupil's page takes the seat when it is free: always, unless the teacher answers."""
         return number not in self._helped
 
-    async def go_on(self, number: int | None, lesson: int | None = None) -> None:
+    def go_on(self, number: int | None, lesson: int | None = None) -> None:
         """The next lesson, or the lesson with a number from 0, of a pupil, or of all if `number` is None.
 
-        Raises BadInput for a pupil or lesson that there is not.
+        Who is at that lesson already stays there. Raises BadInput for a pupil or lesson that there is not.
         """
         pupils = [*self.roster.pupils] if number is None else [self._pupil(number)]
         for pupil in pupils:
             wanted = pupil.lesson + 1 if lesson is None else lesson
             if number is None and wanted >= len(self.roster.lessons):
                 continue
+            if wanted == pupil.lesson:
+                continue
+            self._finished.pop((pupil.number, pupil.lesson), None)
             moved = self.roster.move(pupil.number, wanted)
             self._hints.pop(pupil.number, None)
             self._helped.discard(pupil.number)
-            before = self.desks[pupil.number]
-            self._start(before.close())
+            self._asked.pop(pupil.number, None)
             self.seat(moved)
             if page := self.pages.get(pupil.number):
                 self._start(page.close(RELOAD))
@@ -258,8 +271,10 @@ class Room:
         return rows
 
     def _document(self, pupil: Pupil, lesson: int) -> Json | None:
-        desk = self.desks.get(pupil.number)
-        if desk is not None and lesson == pupil.lesson:
-            return None if desk.result is None else dict(desk.result)
-        kept = self._kept(self.folder(pupil, lesson))
-        return None if kept is None else dict(kept["document"])
+        if lesson == pupil.lesson:
+            result = self.desks[pupil.number].result
+            return None if result is None else dict(result)
+        if (pupil.number, lesson) not in self._finished:
+            kept = self._kept(self.folder(pupil, lesson))
+            self._finished[pupil.number, lesson] = None if kept is None else dict(kept["document"])
+        return self._finished[pupil.number, lesson]
